@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# One word a purpose. Every word sets up what it needs in .venv (dependencies from PyPI).
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+VENV := .venv
+PY := $(VENV)/bin/python
+SOURCES := $(shell find native cmake -type f) CMakeLists.txt pyproject.toml
+PYTEST := $(PY) -m pytest
+
+.PHONY: help setup build demo test test-slow bench sanitize format lint extension gallery docs clean
+
+help:  ## this list
+	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/:.*##/ -/'
+
+$(VENV)/.ready: requirements.txt
+	@test -x $(PY) || $(PYTHON) -m venv $(VENV) || { echo "Python 3.11 with the venv module is needed (Debian: python3.11-venv)"; exit 1; }
+	$(PY) -m pip install -q --disable-pip-version-check -r requirements.txt
+	@touch $@
+
+setup: $(VENV)/.ready  ## .venv with all that building and testing needs
+
+# The wheel's build folder is kept, so a rebuild compiles only what changed.
+$(VENV)/.installed: $(VENV)/.ready $(SOURCES)
+	$(PY) -m pip install -q --disable-pip-version-check --no-build-isolation --no-deps --force-reinstall \
+	  -C build-dir=build/wheel -C cmake.define.ARAPFIELDS_NATIVE_TESTS=ON -C build.targets="arapfields;_native;native_tests" .
+	@touch $@
+
+build: $(VENV)/.installed  ## the Python package, installed in .venv
+
+demo: build  ## the main job on Suzanne: out/demo.blend and out/demo.png
+	$(PY) blender_scripts/demo.py --output out
+
+test: build  ## all tests but the slow ones
+	$(PYTEST) -m "not slow" tests
+
+test-slow: build  ## every test
+	$(PYTEST) tests
+
+bench: build  ## paired benchmarks against the real competitors
+	$(PY) -m pip install -q --disable-pip-version-check -r tests/benchmarks/requirements.txt
+	$(PY) -m tests.benchmarks
+
+sanitize: setup  ## the native tests under the address and undefined-behaviour sanitizers
+	$(VENV)/bin/cmake -S . -B build/sanitize -G Ninja -DPython_EXECUTABLE=$(abspath $(PY)) -DCMAKE_MAKE_PROGRAM=$(abspath $(VENV)/bin/ninja) \
+	  -DCMAKE_BUILD_TYPE=RelWithDebInfo -DARAPFIELDS_SANITIZE=address,undefined -DARAPFIELDS_NATIVE_TESTS=ON
+	$(VENV)/bin/cmake --build build/sanitize --target native_tests
+	ASAN_OPTIONS=detect_leaks=0:detect_odr_violation=0 UBSAN_OPTIONS=print_stacktrace=1 build/sanitize/tests/native_tests
+
+format: setup  ## clang-format and ruff over our files
+	git ls-files '*.h' '*.cpp' | xargs $(VENV)/bin/clang-format -i
+	$(VENV)/bin/ruff format -q . && $(VENV)/bin/ruff check -q --fix .
+
+lint: setup  ## the same, checking alone
+	git ls-files '*.h' '*.cpp' | xargs $(VENV)/bin/clang-format --dry-run --Werror
+	$(VENV)/bin/ruff format --check -q . && $(VENV)/bin/ruff check .
+
+extension: build  ## dist/arapfields-<version>-linux-x64.zip for Blender
+	$(PY) blender_scripts/build_extension.py --output dist
+
+gallery: build  ## the documentation's pictures, rendered by the code
+	$(PY) blender_scripts/gallery.py --output docs/gallery
+
+docs: build  ## the documentation site in site/
+	$(PY) -m pip install -q --disable-pip-version-check -r docs/requirements.txt
+	$(PY) -m mkdocs build --strict
+
+clean:  ## removes build products (.venv stays)
+	rm -rf build dist out site $(VENV)/.installed

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# The C++ libtorch of an installed torch wheel, found without importing torch.
+# Defines the imported target libtorch::libtorch and LIBTORCH_DIR (the wheel's torch folder).
+if(NOT LIBTORCH_DIR)
+  execute_process(
+    COMMAND ${Python_EXECUTABLE} -c
+            "import importlib.util as u, pathlib as p; print(p.Path(u.find_spec('torch').origin).parent)"
+    OUTPUT_VARIABLE LIBTORCH_DIR OUTPUT_STRIP_TRAILING_WHITESPACE RESULT_VARIABLE libtorch_status)
+  if(libtorch_status)
+    message(FATAL_ERROR "torch is not installed in ${Python_EXECUTABLE}; pip install torch==2.13.0")
+  endif()
+endif()
+set(LIBTORCH_DIR "${LIBTORCH_DIR}" CACHE PATH "torch folder of a torch wheel")
+
+add_library(libtorch::libtorch INTERFACE IMPORTED)
+target_include_directories(libtorch::libtorch SYSTEM INTERFACE
+  "${LIBTORCH_DIR}/include" "${LIBTORCH_DIR}/include/torch/csrc/api/include")
+# torch >= 2.6 wheels for Linux use the C++11 ABI of libstdc++.
+target_compile_definitions(libtorch::libtorch INTERFACE _GLIBCXX_USE_CXX11_ABI=1)
+foreach(name c10 torch_cpu torch)
+  find_library(LIBTORCH_${name} NAMES ${name} PATHS "${LIBTORCH_DIR}/lib" NO_DEFAULT_PATH REQUIRED)
+  target_link_libraries(libtorch::libtorch INTERFACE "${LIBTORCH_${name}}")
+endforeach()

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Options shared by all our targets, and arapfields_sources(), by which each folder lists its files.
+add_library(arapfields_options INTERFACE)
+target_include_directories(arapfields_options INTERFACE "${PROJECT_SOURCE_DIR}/native")
+target_link_libraries(arapfields_options INTERFACE arapfields_eigen)
+target_compile_options(arapfields_options INTERFACE -Wall -Wextra -Wshadow -Wno-unknown-pragmas)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  # STB_GNU_UNIQUE symbols are shared by the whole process: two libtorch copies would then clash.
+  target_compile_options(arapfields_options INTERFACE -fno-gnu-unique)
+endif()
+if(ARAPFIELDS_WERROR)
+  target_compile_options(arapfields_options INTERFACE -Werror)
+endif()
+if(ARAPFIELDS_SANITIZE)
+  target_compile_options(arapfields_options INTERFACE
+    -fsanitize=${ARAPFIELDS_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer -g)
+  target_link_options(arapfields_options INTERFACE -fsanitize=${ARAPFIELDS_SANITIZE})
+endif()
+
+# Three object libraries make up the one shared library: sources that need only Eigen, sources that
+# need libtorch (with a precompiled header), and kernels compiled once per instruction set.
+add_library(arapfields_plain OBJECT)
+target_link_libraries(arapfields_plain PRIVATE arapfields_options)
+add_library(arapfields_torch OBJECT)
+target_link_libraries(arapfields_torch PRIVATE arapfields_options libtorch::libtorch)
+target_precompile_headers(arapfields_torch PRIVATE <ATen/ATen.h> <ATen/Parallel.h> <Eigen/Dense>)
+target_compile_options(arapfields_torch PRIVATE -fpch-preprocess)  # lets ccache see through the header
+
+set(ARAPFIELDS_SIMD_baseline "")
+set(ARAPFIELDS_SIMD_avx2 -mavx2 -mfma)
+set(ARAPFIELDS_SIMD_avx512 -mavx2 -mfma -mavx512f -mavx512dq -mavx512bw -mavx512vl -mprefer-vector-width=512)
+set(ARAPFIELDS_SIMD_LEVELS baseline)
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  list(APPEND ARAPFIELDS_SIMD_LEVELS avx2 avx512)
+endif()
+foreach(level ${ARAPFIELDS_SIMD_LEVELS})
+  add_library(arapfields_simd_${level} OBJECT)
+  target_link_libraries(arapfields_simd_${level} PRIVATE arapfields_options)
+  # Kernels live in the namespace arapfields::SIMD_LEVEL; Eigen, where one uses it, is renamed likewise,
+  # so that no inline function compiled for a newer processor can be picked by the linker for all.
+  target_compile_definitions(arapfields_simd_${level} PRIVATE SIMD_LEVEL=${level} Eigen=Eigen_${level})
+  target_compile_options(arapfields_simd_${level} PRIVATE ${ARAPFIELDS_SIMD_${level}}
+    -O3 -fno-math-errno -fno-trapping-math -ffp-contract=fast)
+endforeach()
+
+# arapfields_sources([PLAIN a.cpp ...] [TORCH b.cpp ...] [SIMD c.cpp ...])
+function(arapfields_sources)
+  cmake_parse_arguments(arg "" "" "PLAIN;TORCH;SIMD" ${ARGN})
+  list(TRANSFORM arg_PLAIN PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/")
+  list(TRANSFORM arg_TORCH PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/")
+  list(TRANSFORM arg_SIMD PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/")
+  target_sources(arapfields_plain PRIVATE ${arg_PLAIN})
+  target_sources(arapfields_torch PRIVATE ${arg_TORCH})
+  foreach(level ${ARAPFIELDS_SIMD_LEVELS})
+    target_sources(arapfields_simd_${level} PRIVATE ${arg_SIMD})
+  endforeach()
+endfunction()

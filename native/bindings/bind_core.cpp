@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bindings/bind.h"
+#include "core/frame.h"
+#include "core/parallel.h"
+#include "core/simd.h"
+
+namespace arapfields::python {
+namespace {
+
+std::string shape_text(const py::array& array) {
+  return "shape " + py::cast<std::string>(py::str(array.attr("shape"))) + ", dtype " +
+         py::cast<std::string>(py::str(array.dtype()));
+}
+
+py::array as_array(const py::handle& value, const std::string& argument, const std::string& kinds,
+                   const std::string& allowed) {
+  py::array array = py::array::ensure(py::reinterpret_borrow<py::object>(value));
+  if (!array) {
+    PyErr_Clear();
+    throw InvalidInput(argument, "got " + py::cast<std::string>(py::str(py::type::of(value))), allowed);
+  }
+  require(kinds.find(array.dtype().kind()) != std::string::npos, argument, shape_text(array), allowed);
+  return array;
+}
+
+template <class Scalar>
+using Forced = py::array_t<Scalar, py::array::c_style | py::array::forcecast>;
+
+template <class Result, class Scalar>
+Result as_rows_of_three(const py::handle& value, const std::string& argument, const std::string& kinds,
+                        const std::string& allowed) {
+  const py::array array = as_array(value, argument, kinds, allowed);
+  require(array.ndim() == 2 && array.shape(1) == 3, argument, shape_text(array), allowed);
+  const Forced<Scalar> forced = Forced<Scalar>::ensure(array);
+  return Eigen::Map<const Result>(forced.data(), forced.shape(0), 3);
+}
+
+}  // namespace
+
+Points as_points(const py::handle& value, const std::string& argument) {
+  return as_rows_of_three<Points, double>(value, argument, "fiu", "expected real numbers of shape (n, 3)");
+}
+
+Triangles as_triangles(const py::handle& value, const std::string& argument) {
+  const std::string allowed = "expected integers of shape (m, 3) that fit 32 bits";
+  using Wide = Eigen::Matrix<std::int64_t, Eigen::Dynamic, 3, Eigen::RowMajor>;
+  const Wide wide = as_rows_of_three<Wide, std::int64_t>(value, argument, "iu", allowed);
+  if (wide.size() > 0)
+    require(wide.minCoeff() >= INT32_MIN && wide.maxCoeff() <= INT32_MAX, argument, "an index is too large",
+            allowed);
+  return wide.cast<std::int32_t>();
+}
+
+Eigen::MatrixXd as_matrix(const py::handle& value, const std::string& argument) {
+  const std::string allowed = "expected real numbers in a two-dimensional array";
+  const py::array array = as_array(value, argument, "fiu", allowed);
+  require(array.ndim() == 2, argument, shape_text(array), allowed);
+  const Forced<double> forced = Forced<double>::ensure(array);
+  return Eigen::Map<const RowMatrix<double>>(forced.data(), forced.shape(0), forced.shape(1));
+}
+
+Vector as_vector(const py::handle& value, const std::string& argument) {
+  const std::string allowed = "expected real numbers of shape (n,)";
+  const py::array array = as_array(value, argument, "fiu", allowed);
+  require(array.ndim() == 1, argument, shape_text(array), allowed);
+  const Forced<double> forced = Forced<double>::ensure(array);
+  return Eigen::Map<const Vector>(forced.data(), forced.shape(0));
+}
+
+Mat4 as_matrix4(const py::handle& value, const std::string& argument) {
+  const Eigen::MatrixXd matrix = as_matrix(value, argument);
+  require(matrix.rows() == 4 && matrix.cols() == 4, argument,
+          "shape (" + std::to_string(matrix.rows()) + ", " + std::to_string(matrix.cols()) + ")",
+          "expected a 4×4 matrix");
+  require(matrix.allFinite(), argument, "some entries are NaN or infinite", "all entries must be finite");
+  return matrix;
+}
+
+Vec3 as_vec3(const py::handle& value, const std::string& argument) {
+  const Vector vector = as_vector(value, argument);
+  require(vector.size() == 3, argument, std::to_string(vector.size()) + " numbers", "expected three");
+  require(vector.allFinite(), argument, "NaN or infinite", "expected finite numbers");
+  return vector;
+}
+
+void bind_core(py::module_& module) {
+  // Python's own exceptions: InvalidInput is a ValueError, so that callers may catch either.
+  static py::exception<InvalidInput> invalid(module, "InvalidInput", PyExc_ValueError);
+  static py::exception<Cancelled> cancelled(module, "Cancelled", PyExc_RuntimeError);
+  static py::exception<Diverged> diverged(module, "Diverged", PyExc_RuntimeError);
+  invalid.attr("__doc__") = "An argument that cannot be used; names it, what was found and what is allowed.";
+  cancelled.attr("__doc__") = "Raised in the caller whose Task was cancelled.";
+  diverged.attr("__doc__") = "An optimization left the finite numbers; names the stage and what to change.";
+
+  py::class_<Task>(module, "Task", "Cancels a long call and reads its progress, from any thread.")
+      .def(py::init<>())
+      .def("cancel", &Task::cancel, "Asks the running call to stop; its caller gets Cancelled within 0.2 s.")
+      .def_property_readonly("cancelled", &Task::cancelled)
+      .def_property_readonly("progress", &Task::progress, "Share of the work done, in [0, 1]; never falls.")
+      .def_property_readonly("message", &Task::message, "What is being done, in a few words.")
+      .def("report", &Task::report, "fraction"_a, "message"_a = "",
+           "Sets progress (kept if larger already) and message.");
+
+  py::class_<Frame>(module, "Frame", "Mesh coordinates and the unit cube: x_cube = (x_mesh - center) / scale.")
+      .def(py::init([](const py::object& center, double scale) {
+             const Frame frame{as_vec3(center, "center"), scale};
+             require(std::isfinite(scale) && scale > 0, "scale", std::to_string(scale), "must be positive");
+             return frame;
+           }),
+           "center"_a, "scale"_a)
+      .def_readonly("center", &Frame::center)
+      .def_readonly("scale", &Frame::scale)
+      .def("to_cube", [](const Frame& f, const py::object& p) { return f.to_cube(as_points(p, "points")); },
+           "points"_a)
+      .def("to_mesh", [](const Frame& f, const py::object& p) { return f.to_mesh(as_points(p, "points")); },
+           "points"_a)
+      .def("__eq__", [](const Frame& a, const Frame& b) { return a == b; });
+
+  module.def("thread_count", &thread_count, "Threads that native calls use unless their options say otherwise.");
+  module.def("simd_level", &simd_level_name, "Instruction set of the kernels: baseline, avx2 or avx512.");
+}
+
+}  // namespace arapfields::python

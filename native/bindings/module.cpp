@@ -1,0 +1,9 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bindings/bind.h"
+
+PYBIND11_MODULE(_native, module) {
+  using namespace arapfields::python;
+  module.doc() = "Native part of arapfields.";
+  module.attr("__version__") = ARAPFIELDS_VERSION;
+  bind_core(module);
+}

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/types.h"
+
+namespace arapfields {
+
+/// Dense products and Cholesky factors of row-major matrices through libtorch's BLAS and LAPACK, which pick
+/// the processor's instruction set at run time (Eigen, compiled for the baseline, cannot).
+enum class Transpose { no, yes };
+
+/// C = alpha op(A) op(B) + beta C.
+template <class Scalar>
+void gemm(Transpose transpose_a, Transpose transpose_b, Scalar alpha,
+          const Eigen::Ref<const RowMatrix<Scalar>>& a, const Eigen::Ref<const RowMatrix<Scalar>>& b,
+          Scalar beta, Eigen::Ref<RowMatrix<Scalar>> c);
+
+/// Lower Cholesky factor of a symmetric positive definite matrix; throws InvalidInput where it is not.
+template <class Scalar>
+RowMatrix<Scalar> cholesky(const Eigen::Ref<const RowMatrix<Scalar>>& a);
+
+/// Solves L Lᵀ X = B for X (n,k).
+template <class Scalar>
+RowMatrix<Scalar> cholesky_solve(const Eigen::Ref<const RowMatrix<Scalar>>& factor,
+                                 const Eigen::Ref<const RowMatrix<Scalar>>& b);
+
+}  // namespace arapfields

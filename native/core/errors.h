@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace arapfields {
+
+/// An argument that cannot be used. The text names the argument, what was found and what is allowed.
+/// Python sees arapfields.InvalidInput, a ValueError.
+class InvalidInput : public std::invalid_argument {
+ public:
+  explicit InvalidInput(const std::string& what) : std::invalid_argument(what) {}
+  InvalidInput(const std::string& argument, const std::string& found, const std::string& allowed)
+      : std::invalid_argument(argument + ": " + found + "; " + allowed) {}
+};
+
+/// The caller's Task was cancelled. Python sees arapfields.Cancelled.
+class Cancelled : public std::runtime_error {
+ public:
+  Cancelled() : std::runtime_error("cancelled") {}
+};
+
+/// An optimization left the finite numbers and could not go on. Python sees arapfields.Diverged.
+class Diverged : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Throws InvalidInput(argument, found, allowed) unless `holds`.
+inline void require(bool holds, const std::string& argument, const std::string& found,
+                    const std::string& allowed) {
+  if (!holds) throw InvalidInput(argument, found, allowed);
+}
+
+}  // namespace arapfields

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/types.h"
+
+namespace arapfields {
+
+/// Mesh coordinates ↔ the unit cube [-1,1]³ in which networks live: x_cube = (x_mesh − center) / scale.
+struct Frame {
+  Vec3 center = Vec3::Zero();
+  double scale = 1.0;
+
+  /// Centres the points' bounding box and scales its largest half-extent to `half_extent`.
+  /// Throws InvalidInput for no points, non-finite ones, or all of them equal.
+  static Frame around(PointsIn points, double half_extent = 0.75);
+
+  Points to_cube(PointsIn points) const;
+  Points to_mesh(PointsIn points) const;
+  /// A rigid motion or box matrix (4×4, affine) of mesh coordinates, in cube coordinates on both sides.
+  Mat4 motion_to_cube(const Mat4& motion) const;
+  /// A matrix whose columns span a box in mesh coordinates (domain untouched), in cube coordinates.
+  Mat4 placement_to_cube(const Mat4& placement) const;
+  bool operator==(const Frame&) const = default;
+};
+
+}  // namespace arapfields

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/types.h"
+
+namespace arapfields {
+
+/// A function Φ on the unit cube [-1,1]³ whose zero set is a surface: negative inside. Sampling and
+/// extraction know no more than this; a neural SDF is one, analytic shapes in tests are others.
+/// Both calls are batched and parallel, and may be made from one thread at a time for each object.
+class ImplicitFunction {
+ public:
+  virtual ~ImplicitFunction() = default;
+  /// values (n) at points (n,3) in cube coordinates.
+  virtual void evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> values) const = 0;
+  /// The same with ∂Φ/∂x (n,3).
+  virtual void evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> values,
+                        Eigen::Ref<PointsF> gradients) const = 0;
+};
+
+}  // namespace arapfields

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/parallel.h"
+
+#include <ATen/Parallel.h>
+
+#include "core/errors.h"
+
+namespace arapfields {
+
+void parallel_for(Index begin, Index end, Index grain, const std::function<void(Index, Index)>& body) {
+  at::parallel_for(begin, end, grain, body);
+}
+
+ThreadScope::ThreadScope(int threads) : before_(at::get_num_threads()) {
+  require(threads >= 0 && threads <= 1024, "threads", std::to_string(threads), "0 (all) to 1024 are allowed");
+  if (threads > 0) at::set_num_threads(threads);
+}
+
+ThreadScope::~ThreadScope() {
+  if (at::get_num_threads() != before_) at::set_num_threads(before_);
+}
+
+int thread_count() { return at::get_num_threads(); }
+
+}  // namespace arapfields

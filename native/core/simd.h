@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+namespace arapfields {
+
+/// Instruction sets for which kernels are compiled (SIMD sources of CMake). A kernel file defines its
+/// functions in the namespace arapfields::SIMD_LEVEL; a plain source picks one by simd_level().
+enum class SimdLevel { baseline, avx2, avx512 };
+
+/// The best level of this processor; ARAPFIELDS_SIMD=baseline|avx2|avx512 in the environment lowers it.
+SimdLevel simd_level();
+const char* simd_level_name();
+
+}  // namespace arapfields
+
+/// Calls function(...) in the namespace of the level at hand.
+#if defined(__x86_64__) || defined(_M_X64)
+#define ARAPFIELDS_DISPATCH(call)                              \
+  (::arapfields::simd_level() == SimdLevel::avx512  ? avx512::call \
+   : ::arapfields::simd_level() == SimdLevel::avx2 ? avx2::call   \
+                                                   : baseline::call)
+/// Declares `declaration;` in every level's namespace (use inside namespace arapfields).
+#define ARAPFIELDS_DECLARE(declaration) \
+  namespace baseline {                  \
+  declaration;                          \
+  }                                     \
+  namespace avx2 {                      \
+  declaration;                          \
+  }                                     \
+  namespace avx512 {                    \
+  declaration;                          \
+  }
+#else
+#define ARAPFIELDS_DISPATCH(call) baseline::call
+#define ARAPFIELDS_DECLARE(declaration) \
+  namespace baseline {                  \
+  declaration;                          \
+  }
+#endif

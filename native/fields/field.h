@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/frame.h"
+#include "core/jets.h"
+#include "core/types.h"
+
+namespace at {
+class Tensor;
+}
+
+namespace arapfields {
+
+/// A deformation f: R³ → R³ of the unit cube's space that knows its jets: all that energies, extraction and
+/// results ask of it. The frame says where the cube lies in mesh coordinates.
+class DeformationField {
+ public:
+  virtual ~DeformationField() = default;
+  /// Jets at points (n,3), all in cube coordinates; `out` has count n and any order. Batched and parallel.
+  virtual void evaluate(PointsIn points, JetView<double> out) const = 0;
+
+  const Frame& frame() const { return frame_; }
+  void set_frame(const Frame& frame) { frame_ = frame; }
+
+ private:
+  Frame frame_;
+};
+
+/// A field whose parameters a first-order method can train: it pulls the cotangents of its jets back to them.
+/// Tensors live on the field's device and have its dtype.
+class TrainableField : public DeformationField {
+ public:
+  /// Jets (columns, n, 3) at points (n,3); keeps what pull_back needs until the next call.
+  virtual at::Tensor forward(const at::Tensor& points, JetOrder order) = 0;
+  /// Adds Jᵀ·cotangents (columns, n, 3) of the last forward call to gradient().
+  virtual void pull_back(const at::Tensor& cotangents) = 0;
+  /// All parameters, and their gradient, as one contiguous vector (p).
+  virtual at::Tensor& parameters() = 0;
+  virtual at::Tensor& gradient() = 0;
+};
+
+}  // namespace arapfields
