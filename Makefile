@@ -23,7 +23,7 @@ setup: $(VENV)/.ready  ## .venv with all that building and testing needs
 # The wheel's build folder is kept, so a rebuild compiles only what changed.
 $(VENV)/.installed: $(VENV)/.ready $(SOURCES)
 	$(PY) -m pip install -q --disable-pip-version-check --no-build-isolation --no-deps --force-reinstall \
-	  -C build-dir=build/wheel -C cmake.define.ARAPFIELDS_NATIVE_TESTS=ON -C build.targets="arapfields;_native;native_tests" .
+	  -C build-dir=build/wheel -C cmake.define.ARAPFIELDS_NATIVE_TESTS=ON -C build.targets="arapfields;_native;stubs;native_tests" .
 	@touch $@
 
 build: $(VENV)/.installed  ## the Python package, installed in .venv

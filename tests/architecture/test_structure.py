@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The structure of docs/architecture.md, kept by tests: file lengths, layering, what may import what."""
+
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+FOLDERS = ["core", "mesh", "distance", "neural", "sampling", "fields", "energies", "solve", "extraction"]
+LINE_LIMITS = {".cpp": 350, ".h": 120, ".py": 250}
+SOURCE_FOLDERS = ["native", "addon", "blender_scripts", "tests"]
+
+
+def sources(*suffixes):
+    found = []
+    for folder in SOURCE_FOLDERS:
+        found += [p for p in sorted((ROOT / folder).rglob("*")) if p.suffix in suffixes and p.is_file()]
+    assert found, f"no {suffixes} files under {ROOT}"
+    return found
+
+
+def name(path):
+    return str(path.relative_to(ROOT))
+
+
+def includes(path):
+    return re.findall(r'^\s*#include\s+[<"]([^">]+)[">]', path.read_text(), flags=re.M)
+
+
+def imported_modules(path):
+    modules = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            modules |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            modules.add(node.module.split(".")[0])
+    return modules
+
+
+@pytest.mark.parametrize("suffix", LINE_LIMITS)
+def test_files_are_short(suffix):
+    lengths = {name(path): len(path.read_text().splitlines()) for path in sources(suffix)}
+    too_long = {path: lines for path, lines in lengths.items() if lines > LINE_LIMITS[suffix]}
+    assert not too_long, f"over {LINE_LIMITS[suffix]} lines: {too_long}"
+
+
+def test_every_source_names_its_licence():
+    texts = {name(path): path.read_text() for path in sources(".cpp", ".h", ".py")}
+    line = "SPDX-License-Identifier: GPL-3.0-or-later"
+    assert not [path for path, text in texts.items() if text.strip() and line not in text[:200]]
+
+
+def test_includes_follow_the_data_flow():
+    wrong = []
+    for position, folder in enumerate(FOLDERS):
+        # Energies and fields know only jets; neither knows the other.
+        allowed = {*FOLDERS[: position + 1]} - ({"fields"} if folder == "energies" else set())
+        for path in (ROOT / "native" / folder).glob("*.*"):
+            for include in includes(path):
+                top = include.split("/")[0]
+                if "/" in include and top in {*FOLDERS, "bindings"} and top not in allowed:
+                    wrong.append(f"{name(path)} includes {include}")
+    assert not wrong, wrong
+
+
+def test_headers_and_bindings_are_free_of_torch():
+    files = [*sorted((ROOT / "native").rglob("*.h")), *sorted((ROOT / "native/bindings").glob("*.cpp"))]
+    wrong = [name(p) for p in files if any(i.startswith(("ATen", "torch", "c10")) for i in includes(p))]
+    assert not wrong, wrong
+
+
+def test_every_native_source_is_built():
+    for folder in [*FOLDERS, "bindings"]:
+        listed = (ROOT / "native" / folder / "CMakeLists.txt").read_text()
+        missing = [p.name for p in (ROOT / "native" / folder).glob("*.cpp") if p.name not in listed]
+        assert not missing, f"native/{folder}/CMakeLists.txt does not list {missing}"
+
+
+def test_no_automatic_differentiation_in_native_code():
+    pattern = re.compile(r"requires_grad|autograd|\.backward\(|torch::nn")
+    native = [p for p in sources(".cpp", ".h") if name(p).startswith("native/")]
+    assert not [name(p) for p in native if pattern.search(p.read_text())]
+
+
+def test_bpy_stays_where_it_belongs():
+    blender = {"bpy", "mathutils", "bl_ui"}
+    places = [ROOT / "addon" / "core", ROOT / "native" / "python"]
+    wrong = [name(p) for place in places for p in place.rglob("*.py") if imported_modules(p) & blender]
+    assert not wrong, wrong
+
+
+def test_nothing_looks_back_from_the_library_to_the_addon():
+    library = (ROOT / "native" / "python").rglob("*.py")
+    wrong = [name(p) for p in library if imported_modules(p) & {"addon", "torch"}]
+    assert not wrong, wrong
+
+
+def test_import_needs_neither_torch_nor_bpy():
+    code = "import sys, arapfields; print(sorted({'torch', 'bpy', 'scipy'} & set(sys.modules)))"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "[]"
+
+
+def test_the_library_never_links_torchs_python_part():
+    import arapfields
+
+    for library in Path(arapfields.__file__).parent.glob("*.so"):
+        needed = subprocess.run(["ldd", str(library)], capture_output=True, text=True, check=True).stdout
+        assert "libtorch_python" not in needed, library
+        assert "not found" not in needed, needed
+
+
+def test_top_level_folders_are_documented():
+    text = (ROOT / "docs" / "architecture.md").read_text()
+    command = ["git", "ls-files"]
+    tracked = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    folders = {line.split("/")[0] for line in tracked.splitlines() if "/" in line and line[0] != "."}
+    undocumented = {folder for folder in folders if f"{folder}/" not in text}
+    assert not undocumented, undocumented

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The public names: documented, in the type stub that the build makes, and usable by a type checker."""
+
+import ast
+import inspect
+import subprocess
+import sys
+from pathlib import Path
+
+import arapfields
+
+STUB = Path(arapfields.__file__).parent / "_native.pyi"
+
+
+def stub_names():
+    tree = ast.parse(STUB.read_text())
+    names = {node.name for node in tree.body if isinstance(node, ast.ClassDef | ast.FunctionDef)}
+    return names | {node.target.id for node in tree.body if isinstance(node, ast.AnnAssign)}
+
+
+def test_the_stub_covers_every_native_name():
+    from arapfields import _native
+
+    public = {n for n, v in vars(_native).items() if not n.startswith("_") and not inspect.ismodule(v)}
+    assert public <= stub_names()
+
+
+def test_every_public_name_is_documented():
+    values = {name: getattr(arapfields, name) for name in arapfields.__all__}
+    undocumented = [name for name, v in values.items() if callable(v) and not (v.__doc__ or "").strip()]
+    assert not undocumented
+
+
+def test_all_lists_what_is_there():
+    assert len(set(arapfields.__all__)) == len(arapfields.__all__)
+    assert all(hasattr(arapfields, name) for name in arapfields.__all__)
+
+
+def test_a_type_checker_accepts_a_typical_script(tmp_path):
+    script = tmp_path / "script.py"
+    command = [sys.executable, "-m", "mypy", "--no-error-summary", "--cache-dir", str(tmp_path), str(script)]
+    script.write_text(
+        "import arapfields as af\n"
+        "task: af.Task = af.Task()\nprogress: float = task.progress\nversion: str = af.__version__\n"
+    )
+    result = subprocess.run(command, capture_output=True, text=True)
+    assert result.returncode == 0, result.stdout + result.stderr
+    script.write_text("import arapfields as af\naf.Task().no_such_method()\n")
+    assert subprocess.run(command, capture_output=True, text=True).returncode == 1

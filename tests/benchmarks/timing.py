@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Paired timings: on a shared machine only ratios taken side by side mean anything."""
+
+import statistics
+import time
+
+
+def once(call):
+    begin = time.perf_counter()
+    call()
+    return time.perf_counter() - begin
+
+
+def paired(ours, theirs, rounds=5, warm_up=True):
+    """Runs both calls alternately; the row fields: median seconds of each and the median of the ratios."""
+    if warm_up:
+        ours(), theirs()
+    pairs = [(once(ours), once(theirs)) for _ in range(rounds)]
+    return {
+        "ours_s": round(statistics.median(a for a, _ in pairs), 5),
+        "theirs_s": round(statistics.median(b for _, b in pairs), 5),
+        "times_faster": round(statistics.median(b / a for a, b in pairs), 2),
+    }
