@@ -16,6 +16,7 @@ $(VENV)/.ready: requirements.txt
 	$(PY) -m pip install -q --disable-pip-version-check -r requirements.txt
 	@# Headers of Boost.Test alone are used; the wheel's numpy>=2 (for Boost.Python) would clash with bpy 4.5's.
 	$(PY) -m pip install -q --disable-pip-version-check --no-deps cmeel-boost==1.90.0
+	$(PY) blender_scripts/system_libraries.py
 	@touch $@
 
 setup: $(VENV)/.ready  ## .venv with all that building and testing needs

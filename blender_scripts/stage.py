@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A photographer's table for results: backdrop, lights, camera, materials and coloured handle boxes."""
+
+import math
+from pathlib import Path
+
+import bpy
+from mathutils import Matrix, Vector
+
+CLAY = (0.62, 0.60, 0.56)
+RESULT = (0.93, 0.55, 0.20)
+SURFACE = (0.30, 0.52, 0.75)
+BOX_COLOURS = [
+    (0.05, 0.25, 0.85),
+    (0.85, 0.06, 0.05),
+    (0.05, 0.60, 0.12),
+    (0.75, 0.10, 0.70),
+    (0.90, 0.65, 0.02),
+]
+
+
+def clear():
+    """Removes every object of the open file: the factory scene is not ours."""
+    for item in list(bpy.data.objects):
+        bpy.data.objects.remove(item, do_unlink=True)
+
+
+def material(name, colour, roughness=0.45, alpha=1.0):
+    made = bpy.data.materials.new(name)
+    made.use_nodes = True
+    shader = made.node_tree.nodes["Principled BSDF"]
+    shader.inputs["Base Color"].default_value = (*colour, 1.0)
+    shader.inputs["Roughness"].default_value = roughness
+    shader.inputs["Alpha"].default_value = alpha
+    made.diffuse_color = (*colour, alpha)
+    return made
+
+
+def paint(target, colour):
+    target.data.materials.clear()
+    target.data.materials.append(material(f"{target.name} paint", colour))
+
+
+def box(name, matrix, colour, edge=0.012):
+    """A box drawn by its edges; `matrix` maps the cube [-1,1]³ onto it."""
+    corners = [Vector((x, y, z)) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    ends = [
+        (a, b)
+        for a in range(8)
+        for b in range(a)
+        if sum(i != j for i, j in zip(corners[a], corners[b], strict=True)) == 1
+    ]
+    curve = bpy.data.curves.new(name, "CURVE")
+    curve.dimensions, curve.bevel_depth, curve.bevel_resolution = "3D", edge, 3
+    for a, b in ends:
+        line = curve.splines.new("POLY")
+        line.points.add(1)
+        line.points[0].co = (*(matrix @ corners[a]), 1)
+        line.points[1].co = (*(matrix @ corners[b]), 1)
+    curve.materials.append(material(f"{name} edge", colour, roughness=0.6))
+    made = bpy.data.objects.new(name, curve)
+    bpy.context.collection.objects.link(made)
+    return made
+
+
+def caption(text, location, size=0.22):
+    curve = bpy.data.curves.new(f"caption {text}", "FONT")
+    curve.body, curve.align_x, curve.size = text, "CENTER", size
+    curve.materials.append(material(f"caption {text}", (0.05, 0.05, 0.06), roughness=1.0))
+    made = bpy.data.objects.new(f"caption {text}", curve)
+    made.location = location
+    made.rotation_euler = (math.radians(90), 0, 0)
+    bpy.context.collection.objects.link(made)
+    return made
+
+
+def bounds(objects):
+    """Low and high corner of the world-space boxes of what is drawn."""
+    corners = [item.matrix_world @ Vector(c) for item in objects for c in item.bound_box]
+    low = Vector(min(c[axis] for c in corners) for axis in range(3))
+    return low, Vector(max(c[axis] for c in corners) for axis in range(3))
+
+
+def backdrop(floor_z, depth, width):
+    """A floor that bends up into a wall: no horizon line in the picture."""
+    radius, steps = 3.0, 24
+    profile = (
+        [(-40.0, 0.0)]
+        + [
+            (depth + radius * math.sin(a), radius - radius * math.cos(a))
+            for a in (math.pi / 2 * i / steps for i in range(steps + 1))
+        ]
+        + [(depth + radius, 40.0)]
+    )
+    vertices = [(x, y, floor_z + z) for y, z in profile for x in (-width, width)]
+    faces = [(2 * i, 2 * i + 1, 2 * i + 3, 2 * i + 2) for i in range(len(profile) - 1)]
+    mesh = bpy.data.meshes.new("backdrop")
+    mesh.from_pydata(vertices, [], faces)
+    mesh.polygons.foreach_set("use_smooth", [True] * len(faces))
+    mesh.materials.append(material("backdrop", (0.86, 0.87, 0.88), roughness=0.9))
+    made = bpy.data.objects.new("backdrop", mesh)
+    bpy.context.collection.objects.link(made)
+
+
+def light(name, location, target, energy, size, colour=(1, 1, 1)):
+    data = bpy.data.lights.new(name, "AREA")
+    data.energy, data.size, data.color = energy, size, colour
+    made = bpy.data.objects.new(name, data)
+    made.matrix_world = look_at(Vector(location), Vector(target))
+    bpy.context.collection.objects.link(made)
+
+
+def look_at(eye, target):
+    return Matrix.Translation(eye) @ (target - eye).to_track_quat("-Z", "Y").to_matrix().to_4x4()
+
+
+def photograph(objects, path, size=(1440, 600), samples=24, elevation=12.0, azimuth=0.0, threads=0):
+    """Frames the objects from the front (looking along +y), lights them and renders a PNG with Cycles."""
+    bpy.context.view_layer.update()
+    low, high = bounds(objects)
+    middle, extent = (low + high) / 2, high - low
+    backdrop(low.z - 0.002 * extent.z, high.y + 0.6 * extent.x, 20 * extent.x)
+    span = max(extent.x, extent.z * size[0] / size[1])
+    light(
+        "key", middle + Vector((-0.55, -0.9, 0.9)) * span, middle, 7.5 * span**2, 0.35 * span, (1, 0.96, 0.9)
+    )
+    light(
+        "fill", middle + Vector((0.9, -0.7, 0.35)) * span, middle, 2.2 * span**2, 0.6 * span, (0.88, 0.94, 1)
+    )
+    light("rim", middle + Vector((0.3, 0.5, 0.9)) * span, middle, 4 * span**2, 0.4 * span)
+
+    data = bpy.data.cameras.new("camera")
+    data.lens = 70
+    camera = bpy.data.objects.new("camera", data)
+    bpy.context.collection.objects.link(camera)
+    a, e = math.radians(azimuth), math.radians(elevation)
+    towards = Vector((math.sin(a) * math.cos(e), -math.cos(a) * math.cos(e), math.sin(e)))
+    distance = 1.02 * span / 2 / math.tan(data.angle / 2) + extent.y / 2
+    camera.matrix_world = look_at(middle + towards * distance, middle)
+
+    scene = bpy.context.scene
+    scene.camera = camera
+    scene.world = scene.world or bpy.data.worlds.new("world")
+    scene.world.use_nodes = True
+    scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.9, 0.93, 1.0, 1)
+    scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.35
+    render = scene.render
+    render.engine = "CYCLES"
+    render.resolution_x, render.resolution_y, render.resolution_percentage = *size, 100
+    render.filepath, render.image_settings.file_format = str(Path(path).resolve()), "PNG"
+    if threads:
+        render.threads_mode, render.threads = "FIXED", threads
+    scene.cycles.device, scene.cycles.samples = "CPU", samples
+    scene.cycles.use_denoising = True
+    scene.view_settings.view_transform = "Standard"
+    bpy.ops.render.render(write_still=True)
