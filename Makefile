@@ -13,6 +13,7 @@ help:  ## this list
 
 $(VENV)/.ready: requirements.txt
 	@test -x $(PY) || $(PYTHON) -m venv $(VENV) || { echo "Python 3.11 with the venv module is needed (Debian: python3.11-venv)"; exit 1; }
+	$(PY) -m pip install -q --disable-pip-version-check --upgrade "pip>=24"
 	$(PY) -m pip install -q --disable-pip-version-check -r requirements.txt
 	@# Headers of Boost.Test alone are used; the wheel's numpy>=2 (for Boost.Python) would clash with bpy 4.5's.
 	$(PY) -m pip install -q --disable-pip-version-check --no-deps cmeel-boost==1.90.0
