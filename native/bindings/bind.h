@@ -104,5 +104,6 @@ class OptionsBinding {
 };
 
 void bind_core(py::module_& module);
+void bind_neural(py::module_& module);
 
 }  // namespace arapfields::python

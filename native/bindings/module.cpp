@@ -6,4 +6,5 @@ PYBIND11_MODULE(_native, module) {
   module.doc() = "Native part of arapfields.";
   module.attr("__version__") = ARAPFIELDS_VERSION;
   bind_core(module);
+  bind_neural(module);
 }

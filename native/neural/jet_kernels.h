@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+
+#include "core/simd.h"
+
+namespace arapfields {
+
+/// One layer's softplus on the jets of a block of points. `planes` = (columns, points, width), contiguous.
+/// Before: plane 0 holds z without its bias; after activate(): φ(z + bias). The planes of ∂ and ∂∂ keep z
+/// until activate_back() turns them into those of h. `slope` (points, width) receives φ'.
+template <class Scalar>
+struct ActivationBlock {
+  Scalar* planes = nullptr;
+  Scalar* slope = nullptr;  ///< may be null in activate(): nothing is kept then
+  Scalar* jets = nullptr;   ///< (columns, points, width): h; not used with one column, where planes holds h
+  const Scalar* bias = nullptr;
+  Scalar sharpness = 1;
+  std::int64_t points = 0;
+  std::int64_t width = 0;
+  int columns = 1;
+  bool mixed = true;  ///< false at the first layer: the mixed second derivatives of z are zero and not stored
+};
+
+/// The encoding of a block of points and its derivatives by the coordinate that each entry depends on.
+template <class Scalar>
+struct EncodingBlock {
+  const Scalar* points = nullptr;  ///< (points, 3)
+  Scalar* value = nullptr;  ///< (points, 6·octaves); derivatives follow in the same shape, if asked for
+  Scalar* first = nullptr;
+  Scalar* second = nullptr;
+  double frequency = 1.0;
+  std::int64_t count = 0;
+  int octaves = 4;
+};
+
+#define ARAPFIELDS_JET_KERNELS(Scalar)                                                                     \
+  ARAPFIELDS_DECLARE(void activate(const ActivationBlock<Scalar>& block))                                  \
+  /* cotangents (columns, points, width) of h become those of z; bias_gradient (width) is added to */      \
+  ARAPFIELDS_DECLARE(                                                                                      \
+      void activate_back(const ActivationBlock<Scalar>& block, Scalar* cotangents, Scalar* bias_gradient)) \
+  ARAPFIELDS_DECLARE(void encode(const EncodingBlock<Scalar>& block))
+ARAPFIELDS_JET_KERNELS(float)
+ARAPFIELDS_JET_KERNELS(double)
+#undef ARAPFIELDS_JET_KERNELS
+
+}  // namespace arapfields

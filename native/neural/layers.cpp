@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "neural/layers.h"
+
+#include <ATen/ATen.h>
+
+#include "core/errors.h"
+
+namespace arapfields {
+namespace {
+
+std::string size_text(Index rows, Index cols) {
+  std::string text = "(";
+  return text.append(std::to_string(rows)).append(", ").append(std::to_string(cols)).append(")");
+}
+
+at::Tensor as_tensor(const double* data, at::IntArrayRef sizes, const at::Tensor& like) {
+  return at::from_blob(const_cast<double*>(data), sizes, at::kDouble).to(like.options(), false, true);
+}
+
+}  // namespace
+
+MlpShape shape_of(const Layers& layers, int octaves, double frequency, double sharpness) {
+  const std::size_t count = layers.weights.size();
+  require(count >= 2 && layers.biases.size() == count, "weights",
+          std::to_string(count) + " matrices and " + std::to_string(layers.biases.size()) + " biases",
+          "expected as many of each, at least two");
+  MlpShape shape;
+  shape.layers = static_cast<int>(count) - 1;
+  shape.width = static_cast<int>(layers.weights[0].rows());
+  shape.outputs = static_cast<int>(layers.weights.back().rows());
+  shape.octaves = octaves;
+  shape.frequency = frequency;
+  shape.sharpness = sharpness;
+  for (std::size_t l = 0; l < count; ++l) {
+    const RowMatrix<double>& weight = layers.weights[l];
+    const int out = shape.fan_out(static_cast<int>(l)), in = shape.fan_in(static_cast<int>(l));
+    const std::string name = "weights[" + std::to_string(l) + "]";
+    require(weight.rows() == out && weight.cols() == in, name,
+            "shape " + size_text(weight.rows(), weight.cols()),
+            "expected " + size_text(out, in) + ": hidden layers of one width, 6·octaves inputs");
+    require(weight.allFinite(), name, "NaN or infinite entries", "all must be finite");
+    const Vector& bias = layers.biases[l];
+    const std::string bias_name = "biases[" + std::to_string(l) + "]";
+    require(bias.size() == out, bias_name, std::to_string(bias.size()) + " entries",
+            "expected " + std::to_string(out));
+    require(bias.allFinite(), bias_name, "NaN or infinite entries", "all must be finite");
+  }
+  return shape;
+}
+
+Mlp make_mlp(const Layers& layers, const MlpShape& shape, bool double_precision, const std::string& device) {
+  Mlp mlp(shape, 0, true, double_precision, device);
+  for (int l = 0; l <= shape.layers; ++l) {
+    const RowMatrix<double>& weight = layers.weights[static_cast<std::size_t>(l)];
+    const Vector& bias = layers.biases[static_cast<std::size_t>(l)];
+    mlp.weight(l).copy_(as_tensor(weight.data(), {weight.rows(), weight.cols()}, mlp.parameters()));
+    mlp.bias(l).copy_(as_tensor(bias.data(), {bias.size()}, mlp.parameters()));
+  }
+  return mlp;
+}
+
+Layers layers_of(const Mlp& mlp) {
+  Layers layers;
+  for (int l = 0; l <= mlp.shape().layers; ++l) {
+    const at::Tensor weight = mlp.weight(l).to(at::kCPU, at::kDouble).contiguous();
+    const at::Tensor bias = mlp.bias(l).to(at::kCPU, at::kDouble).contiguous();
+    layers.weights.push_back(
+        Eigen::Map<const RowMatrix<double>>(weight.data_ptr<double>(), weight.size(0), weight.size(1)));
+    layers.biases.push_back(Eigen::Map<const Vector>(bias.data_ptr<double>(), bias.size(0)));
+  }
+  return layers;
+}
+
+JetSweeps sweep_jets(Mlp& mlp, PointsIn points, JetOrder order, const Vector& cotangents) {
+  const auto plain = [](const at::Tensor& tensor) -> Vector {
+    const at::Tensor flat = tensor.to(at::kCPU, at::kDouble).contiguous();
+    return Eigen::Map<const Vector>(flat.data_ptr<double>(), flat.numel());
+  };
+  const at::Tensor where = as_tensor(points.data(), {points.rows(), 3}, mlp.parameters());
+  const at::Tensor jets = mlp.forward(where, order);
+  JetSweeps result;
+  result.jets = plain(jets);
+  if (cotangents.size() == 0) return result;
+  require(cotangents.size() == jets.numel(), "cotangents", std::to_string(cotangents.size()) + " numbers",
+          "expected " + std::to_string(jets.numel()));
+  mlp.gradient().zero_();
+  mlp.pull_back(as_tensor(cotangents.data(), jets.sizes(), jets));
+  result.gradient = plain(mlp.gradient());
+  return result;
+}
+
+}  // namespace arapfields

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "neural/mlp.h"
+
+#include <ATen/ATen.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/errors.h"
+#include "core/parallel.h"
+#include "core/random.h"
+#include "neural/mlp_sweep.h"
+
+namespace arapfields {
+namespace {
+
+void check(const MlpShape& shape) {
+  const auto within = [](const char* what, double value, double low, double high) {
+    require(value >= low && value <= high, what, "got " + std::to_string(value),
+            "allowed are " + std::to_string(low) + " to " + std::to_string(high));
+  };
+  within("outputs", shape.outputs, 1, 1024);
+  within("width", shape.width, 1, 8192);
+  within("layers", shape.layers, 1, 64);
+  within("octaves", shape.octaves, 1, 32);
+  within("frequency", shape.frequency, 1e-6, 1e6);
+  within("sharpness", shape.sharpness, 1e-6, 1e6);
+}
+
+Index parameter_count(const MlpShape& shape) {
+  Index count = 0;
+  for (int l = 0; l <= shape.layers; ++l)
+    count += static_cast<Index>(shape.fan_out(l)) * (shape.fan_in(l) + 1);
+  return count;
+}
+
+}  // namespace
+
+struct Mlp::State {
+  MlpShape shape;
+  at::Tensor parameters, gradient;
+  LayerViews layers;  // into parameters
+  // Of the last forward call:
+  Blocks kept;
+  at::Tensor result;
+  bool fresh = false;
+
+  void prepare(const at::Tensor& points, int columns);
+};
+
+namespace {
+
+void check_points(const at::Tensor& points, const at::Tensor& like) {
+  require(points.dim() == 2 && points.size(1) == 3 && points.is_contiguous() &&
+              points.scalar_type() == like.scalar_type() && points.device() == like.device(),
+          "points", "another shape, dtype or device",
+          "expected a contiguous (n,3) tensor like the parameters");
+}
+
+}  // namespace
+
+void Mlp::State::prepare(const at::Tensor& points, int columns) {
+  const int threads = sweep_threads(parameters);
+  const Index n = points.size(0);
+  const bool same = result.defined() && result.size(0) == columns && result.size(1) == n &&
+                    static_cast<int>(kept.workspaces.size()) == threads;
+  if (same) return;
+  kept = {};  // frees before it allocates
+  kept.blocks = split_points(n, columns, threads, parameters.is_cpu());
+  Index largest = 0;
+  for (Block& block : kept.blocks) {
+    allocate(shape, parameters, true, block);
+    largest = std::max(largest, block.count);
+  }
+  for (int t = 0; t < threads; ++t) {
+    kept.workspaces.push_back(make_workspace(shape, parameters, largest, columns));
+    Workspace& space = kept.workspaces.back();
+    space.gradient = t == 0 ? gradient : at::empty_like(gradient);
+    space.gradients = LayerViews(shape, space.gradient);
+  }
+  result = at::empty({columns, n, shape.outputs}, parameters.options());
+}
+
+Mlp::Mlp(const MlpShape& shape, std::uint64_t seed, bool zero_last_layer, bool double_precision,
+         const std::string& device) {
+  check(shape);
+  const Index count = parameter_count(shape);
+  at::Tensor values = at::zeros({count}, at::kDouble);
+  double* next = values.data_ptr<double>();
+  for (int l = 0; l < shape.layers + (zero_last_layer ? 0 : 1); ++l) {
+    Random random(seed, 0x6d6c7000u + static_cast<std::uint64_t>(l));
+    const double bound = 1.0 / std::sqrt(shape.fan_in(l));
+    for (Index i = static_cast<Index>(shape.fan_out(l)) * (shape.fan_in(l) + 1); i > 0; --i)
+      *next++ = random.uniform(-bound, bound);
+  }
+  state_ = std::make_unique<State>();
+  state_->shape = shape;
+  state_->parameters =
+      values.to(at::TensorOptions(double_precision ? at::kDouble : at::kFloat).device(at::Device(device)));
+  state_->gradient = at::zeros_like(state_->parameters);
+  state_->layers = LayerViews(shape, state_->parameters);
+}
+
+Mlp::~Mlp() = default;
+Mlp::Mlp(Mlp&&) noexcept = default;
+Mlp& Mlp::operator=(Mlp&&) noexcept = default;
+
+const MlpShape& Mlp::shape() const { return state_->shape; }
+at::Tensor& Mlp::parameters() { return state_->parameters; }
+const at::Tensor& Mlp::parameters() const { return state_->parameters; }
+at::Tensor& Mlp::gradient() { return state_->gradient; }
+at::Tensor Mlp::weight(int layer) const { return state_->layers.weights.at(static_cast<std::size_t>(layer)); }
+at::Tensor Mlp::bias(int layer) const { return state_->layers.biases.at(static_cast<std::size_t>(layer)); }
+
+void Mlp::release_buffers() {
+  state_->kept = {};
+  state_->result = at::Tensor();
+  state_->fresh = false;
+}
+
+at::Tensor Mlp::forward(const at::Tensor& points, JetOrder order) {
+  State& s = *state_;
+  check_points(points, s.parameters);
+  s.prepare(points, columns(order));
+  s.kept.for_each([&](Block& block, Workspace& space) {
+    sweep_forward(s.shape, s.layers, points, block, space, s.result);
+  });
+  s.fresh = true;
+  return s.result;
+}
+
+void Mlp::pull_back(const at::Tensor& cotangents) {
+  State& s = *state_;
+  if (!s.fresh) throw std::logic_error("Mlp::pull_back needs a forward call of its own");
+  require(cotangents.sizes() == s.result.sizes() && cotangents.scalar_type() == s.result.scalar_type(),
+          "cotangents", "another shape or dtype than the jets", "they must match");
+  s.fresh = false;
+  const std::size_t threads = s.kept.workspaces.size();
+  for (std::size_t t = 1; t < threads; ++t) s.kept.workspaces[t].gradient.zero_();
+  s.kept.for_each(
+      [&](Block& block, Workspace& space) { sweep_back(s.shape, s.layers, cotangents, block, space); });
+  for (std::size_t t = 1; t < threads; ++t) s.gradient.add_(s.kept.workspaces[t].gradient);
+}
+
+namespace {
+
+/// Runs body(block, workspace) over all points with one block's memory a thread.
+void in_passing(const MlpShape& shape, const at::Tensor& like, Index n, int columns, bool keep,
+                const std::function<void(Block&, Workspace&)>& body) {
+  Blocks passing;
+  const int threads = sweep_threads(like);
+  passing.blocks = split_points(n, columns, threads, like.is_cpu());
+  Index largest = 0;
+  for (const Block& block : passing.blocks) largest = std::max(largest, block.count);
+  std::vector<Block> memory(static_cast<std::size_t>(threads));
+  for (Block& block : memory) {
+    block.count = largest;
+    block.columns = columns;
+    allocate(shape, like, keep, block);
+    passing.workspaces.push_back(make_workspace(shape, like, largest, columns));
+  }
+  passing.for_each([&](Block& block, Workspace& space) {
+    const Block& own = memory[static_cast<std::size_t>(&space - passing.workspaces.data())];
+    borrow(own, block);
+    body(block, space);
+    block.planes.clear(), block.slope.clear(), block.encoding = at::Tensor();
+  });
+}
+
+}  // namespace
+
+at::Tensor Mlp::evaluate(const at::Tensor& points, JetOrder order) const {
+  const State& s = *state_;
+  check_points(points, s.parameters);
+  at::Tensor result = at::empty({columns(order), points.size(0), s.shape.outputs}, s.parameters.options());
+  in_passing(s.shape, s.parameters, points.size(0), columns(order), false,
+             [&](Block& block, Workspace& space) {
+               sweep_forward(s.shape, s.layers, points, block, space, result);
+             });
+  return result;
+}
+
+void Mlp::evaluate_with_gradient(const at::Tensor& points, at::Tensor& values, at::Tensor& gradients) const {
+  const State& s = *state_;
+  check_points(points, s.parameters);
+  require(s.shape.outputs == 1, "network", std::to_string(s.shape.outputs) + " outputs", "expected one");
+  values = at::empty({1, points.size(0), 1}, s.parameters.options());
+  gradients = at::empty({points.size(0), 3}, s.parameters.options());
+  in_passing(s.shape, s.parameters, points.size(0), 1, true, [&](Block& block, Workspace& space) {
+    sweep_forward(s.shape, s.layers, points, block, space, values);
+    sweep_to_points(s.shape, s.layers, block, space, gradients);
+  });
+  values = values.view({-1});
+}
+
+}  // namespace arapfields

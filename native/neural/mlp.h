@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "core/jets.h"
+
+namespace at {
+class Tensor;
+}
+
+namespace arapfields {
+
+/// A network R³ → R^outputs: positional encoding, `layers` hidden layers of `width` softplus units, linear
+/// output. Encoding: for each coordinate c in turn, for k < octaves, the pair cos(2^k·frequency·c),
+/// sin(2^k·frequency·c).
+struct MlpShape {
+  int outputs = 3;
+  int width = 256;
+  int layers = 4;
+  int octaves = 4;
+  double frequency = 1.0;
+  /// β of softplus(z) = log(1 + exp(βz))/β.
+  double sharpness = 30.0;
+
+  int encoded() const { return 6 * octaves; }
+  int fan_in(int layer) const { return layer == 0 ? encoded() : width; }
+  int fan_out(int layer) const { return layer == layers ? outputs : width; }
+  bool operator==(const MlpShape&) const = default;
+};
+
+/// The network with explicit jets: values and input derivatives up to second order travel through the layers
+/// as columns (core/jets.h), one matrix product a layer for all of them, and so do their cotangents
+/// backwards. Tensors are (columns, n, outputs), points (n,3); all have the network's dtype and device. Work
+/// is split over threads by points; same seed, same thread count: same result, bit for bit.
+class Mlp {
+ public:
+  /// Weights and biases uniform in ±1/√fan-in; the output layer zero where `zero_last_layer` asks for it.
+  /// `device` is "cpu" or "cuda" (or "cuda:1", …). Throws InvalidInput for a shape out of range.
+  Mlp(const MlpShape& shape, std::uint64_t seed, bool zero_last_layer, bool double_precision = false,
+      const std::string& device = "cpu");
+  ~Mlp();
+  Mlp(Mlp&&) noexcept;
+  Mlp& operator=(Mlp&&) noexcept;
+
+  const MlpShape& shape() const;
+
+  /// Jets at the points; keeps what pull_back needs until the next call. The result is a buffer of the
+  /// network's: the next forward call overwrites it.
+  at::Tensor forward(const at::Tensor& points, JetOrder order);
+  /// Adds Σ ⟨cotangents, ∂jets/∂parameters⟩ of the last forward call to gradient(). Once for each forward
+  /// call: it consumes the kept activations.
+  void pull_back(const at::Tensor& cotangents);
+
+  /// Frees what forward() keeps; the next call allocates anew.
+  void release_buffers();
+
+  /// Jets at the points, nothing kept, in chunks: memory beyond the result does not grow with n.
+  at::Tensor evaluate(const at::Tensor& points, JetOrder order) const;
+  /// For networks with one output: values (n) and input gradients (n,3) by one backward sweep a chunk.
+  void evaluate_with_gradient(const at::Tensor& points, at::Tensor& values, at::Tensor& gradients) const;
+
+  /// All weights and biases, and their gradient, as one contiguous vector (p): weight 0, bias 0, weight 1, …
+  at::Tensor& parameters();
+  const at::Tensor& parameters() const;
+  at::Tensor& gradient();
+  /// Views (fan_out, fan_in) and (fan_out) into parameters(); `layer` runs from 0 to shape().layers, the
+  /// output's.
+  at::Tensor weight(int layer) const;
+  at::Tensor bias(int layer) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace arapfields

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The two sweeps through the layers, for one block of points. Only for libtorch sources, which include
+// ATen before this.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "neural/mlp.h"
+
+namespace arapfields {
+
+/// Each layer's weight (fan_out, fan_in) and bias (fan_out) as views into one flat vector.
+struct LayerViews {
+  LayerViews() = default;
+  LayerViews(const MlpShape& shape, const at::Tensor& flat);
+  std::vector<at::Tensor> weights, biases;
+};
+
+/// A range of points and what the forward sweep computes for it. planes[l] is (columns·count, width): the
+/// pre-activations of layer l, then as in ActivationBlock; slope[l] (count, width) is φ', or undefined where
+/// nothing is kept; encoding (1 to 3, count, 6·octaves).
+struct Block {
+  Index begin = 0;
+  Index count = 0;
+  int columns = 1;
+  at::Tensor encoding;
+  std::vector<at::Tensor> planes, slope;
+};
+
+/// What one thread needs besides: flat buffers for its largest block, and its own gradient.
+struct Workspace {
+  at::Tensor jets, other, output;
+  at::Tensor gradient;
+  LayerViews gradients;
+};
+
+/// The blocks and workspaces of one size of call, as equal shares for the threads in force.
+struct Blocks {
+  std::vector<Block> blocks;
+  std::vector<Workspace> workspaces;  // one a thread; thread t owns an equal run of the blocks
+
+  void for_each(const std::function<void(Block&, Workspace&)>& body);
+};
+
+/// Ranges of about the best number of points for `columns`, as many for each thread.
+std::vector<Block> split_points(Index n, int columns, int threads, bool on_cpu);
+/// Threads that the sweeps of tensors like `like` are split over.
+int sweep_threads(const at::Tensor& like);
+
+/// Gives a block its memory; for every layer where `keep` asks for the activations. With one column the
+/// encoding always has its first derivatives, for sweep_to_points().
+void allocate(const MlpShape& shape, const at::Tensor& like, bool keep, Block& block);
+/// Lends the memory of a block of at least as many points and the same columns.
+void borrow(const Block& memory, Block& block);
+Workspace make_workspace(const MlpShape& shape, const at::Tensor& like, Index points, int columns);
+
+/// Jets of the block's points into result[:, begin:begin+count].
+void sweep_forward(const MlpShape& shape, const LayerViews& layers, const at::Tensor& points, Block& block,
+                   Workspace& space, at::Tensor& result);
+/// Adds to space.gradients; consumes the block.
+void sweep_back(const MlpShape& shape, const LayerViews& layers, const at::Tensor& cotangents, Block& block,
+                Workspace& space);
+/// ∂(the one output)/∂point after a kept forward sweep with one column; consumes the block.
+void sweep_to_points(const MlpShape& shape, const LayerViews& layers, Block& block, Workspace& space,
+                     at::Tensor& gradients);
+
+}  // namespace arapfields
