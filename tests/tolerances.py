@@ -7,3 +7,12 @@ AUTOGRAD = 1e-8
 DIFFERENCES = 1e-8
 # Single precision against double, relative to a column's largest entry: rounding times sharpness².
 FLOAT_JETS = 2e-4
+# Energies in float64 against another float64 formula of the same derivative: rounding, amplified by the
+# conditioning of K, which the tests keep above 0.2.
+FLOAT64_GRADIENT = 1e-8
+# Closest rotations against singular values: 1e-16 over the smallest sum of two singular values (0.2).
+FLOAT64_ROTATION = 1e-13
+# The same energies in float32 (rounding 6e-8) after some hundred operations.
+FLOAT32_ENERGY = 2e-5
+# g(n_k) = 1: what the refined solution of the linear system leaves.
+GAUSS_WEIGHTS = 1e-10

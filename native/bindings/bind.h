@@ -105,5 +105,6 @@ class OptionsBinding {
 
 void bind_core(py::module_& module);
 void bind_neural(py::module_& module);
+void bind_energies(py::module_& module);
 
 }  // namespace arapfields::python

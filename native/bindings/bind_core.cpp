@@ -85,9 +85,9 @@ Vec3 as_vec3(const py::handle& value, const std::string& argument) {
 
 void bind_core(py::module_& module) {
   // Python's own exceptions: InvalidInput is a ValueError, so that callers may catch either.
-  static py::exception<InvalidInput> invalid(module, "InvalidInput", PyExc_ValueError);
-  static py::exception<Cancelled> cancelled(module, "Cancelled", PyExc_RuntimeError);
-  static py::exception<Diverged> diverged(module, "Diverged", PyExc_RuntimeError);
+  auto& invalid = py::register_exception<InvalidInput>(module, "InvalidInput", PyExc_ValueError);
+  auto& cancelled = py::register_exception<Cancelled>(module, "Cancelled", PyExc_RuntimeError);
+  auto& diverged = py::register_exception<Diverged>(module, "Diverged", PyExc_RuntimeError);
   invalid.attr("__doc__") = "An argument that cannot be used; names it, what was found and what is allowed.";
   cancelled.attr("__doc__") = "Raised in the caller whose Task was cancelled.";
   diverged.attr("__doc__") = "An optimization left the finite numbers; names the stage and what to change.";

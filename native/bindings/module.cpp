@@ -7,4 +7,5 @@ PYBIND11_MODULE(_native, module) {
   module.attr("__version__") = ARAPFIELDS_VERSION;
   bind_core(module);
   bind_neural(module);
+  bind_energies(module);
 }

@@ -4,15 +4,40 @@
 Arrays are NumPy, all coordinates are the mesh's own; distances are negative inside.
 """
 
-from ._native import Cancelled, Diverged, Frame, InvalidInput, Task, __version__, simd_level, thread_count
+from ._native import (
+    Cancelled,
+    Cuboid,
+    Distortion,
+    Diverged,
+    Frame,
+    Handle,
+    InvalidInput,
+    Point,
+    Region,
+    Task,
+    __version__,
+    gauss_preference,
+    preferred_normals,
+    simd_level,
+    style_names,
+    thread_count,
+)
 
 __all__ = [
     "Cancelled",
+    "Cuboid",
+    "Distortion",
     "Diverged",
     "Frame",
+    "Handle",
     "InvalidInput",
+    "Point",
+    "Region",
     "Task",
     "__version__",
+    "gauss_preference",
+    "preferred_normals",
     "simd_level",
+    "style_names",
     "thread_count",
 ]

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bindings/bind.h"
+#include "bindings/jet_arrays.h"
+#include "energies/arap.h"
+#include "energies/distortion.h"
+#include "energies/gauss.h"
+#include "energies/handles.h"
+#include "energies/rotation.h"
+#include "energies/styles.h"
+
+namespace arapfields::python {
+namespace {
+
+/// Python's three kinds of Handle, so that each has a constructor of its own.
+struct CuboidHandle : Handle {};
+struct PointHandle : Handle {};
+struct RegionHandle : Handle {};
+
+void bind_handles(py::module_& module) {
+  py::class_<Handle>(module, "Handle",
+                     "A part of the surface asked to follow a rigid motion; mesh coordinates.")
+      .def_readonly("weight", &Handle::weight, "Factor of this handle's part of the loss.")
+      .def_property_readonly(
+          "motion", [](const Handle& self) { return self.motion(); },
+          "(4, 4) rigid motion rest → target; InvalidInput where it scales, shears or mirrors.");
+  py::class_<CuboidHandle, Handle>(
+      module, "Cuboid",
+      "The surface inside a box. `rest` and `target` (4, 4) map the cube [-1, 1]³ onto the box before and\n"
+      "after; target·rest⁻¹ must be rigid. A box that does not move holds its part in place.")
+      .def(py::init([](const py::object& rest, const py::object& target, double weight) {
+             CuboidHandle handle;
+             handle.rest = as_matrix4(rest, "rest");
+             handle.target = as_matrix4(target, "target");
+             handle.weight = weight;
+             handle.motion();
+             return handle;
+           }),
+           "rest"_a, "target"_a, "weight"_a = 1.0)
+      .def_property_readonly("rest", [](const CuboidHandle& self) { return self.rest; })
+      .def_property_readonly("target", [](const CuboidHandle& self) { return self.target; });
+  py::class_<PointHandle, Handle>(module, "Point",
+                                  "One material point: `rest` (3,) is to arrive at `target` (3,).")
+      .def(py::init([](const py::object& rest, const py::object& target, double weight) {
+             PointHandle handle;
+             handle.kind = Handle::Kind::point;
+             handle.rest_point = as_vec3(rest, "rest");
+             handle.target_point = as_vec3(target, "target");
+             handle.weight = weight;
+             return handle;
+           }),
+           "rest"_a, "target"_a, "weight"_a = 1.0)
+      .def_property_readonly("rest", [](const PointHandle& self) { return self.rest_point; })
+      .def_property_readonly("target", [](const PointHandle& self) { return self.target_point; });
+  py::class_<RegionHandle, Handle>(
+      module, "Region",
+      "The listed samples (indices into the surface samples), moved by target·rest⁻¹ (4, 4 each, rigid).")
+      .def(py::init([](std::vector<Index> samples, const py::object& rest, const py::object& target,
+                       double weight) {
+             RegionHandle handle;
+             handle.kind = Handle::Kind::region;
+             handle.samples = std::move(samples);
+             handle.rest = as_matrix4(rest, "rest");
+             handle.target = as_matrix4(target, "target");
+             handle.weight = weight;
+             handle.motion();
+             return handle;
+           }),
+           "samples"_a, "rest"_a, "target"_a, "weight"_a = 1.0)
+      .def_property_readonly("samples", [](const RegionHandle& self) { return self.samples; })
+      .def_property_readonly("rest", [](const RegionHandle& self) { return self.rest; })
+      .def_property_readonly("target", [](const RegionHandle& self) { return self.target; });
+}
+
+void bind_styles(py::module_& module) {
+  module.def("style_names", &style_names, "Names of the preset styles, in menu order.");
+  module.def("preferred_normals", &preferred_normals, "name"_a,
+             "Unit face normals (k, 3) of a preset style's solid; its axis, where it has one, is z.");
+  module.def(
+      "gauss_preference",
+      [](const py::object& normals, const py::object& preferred, double sharpness) {
+        const Points directions = as_points(normals, "normals");
+        return gauss_preference(as_points(preferred, "preferred"), sharpness).values(directions);
+      },
+      "normals"_a, "preferred"_a, "sharpness"_a = 5.0,
+      "How much each unit normal (n, 3) agrees with the preferred normals (k, 3): (n,) values\n"
+      "g = sum_k w_k exp(sharpness n·n_k) with g(n_k) = 1, small far from all of them. Coinciding preferred\n"
+      "normals raise InvalidInput that names the pair. After Kohlbrenner et al., Gauss Stylization (2021).");
+}
+
+template <class Scalar>
+void bind_testing(py::module_& module) {
+  module.def(
+      "arap_energy",
+      [](JetArray<Scalar> jets, double bending, double weight) {
+        JetArray<Scalar> cotangents = zeros_like(jets);
+        const ArapValue value =
+            arap_energy<Scalar>(jet_view<const Scalar>(jets), bending, weight, jet_view<Scalar>(cotangents));
+        return py::make_tuple(value.stretch, value.bend, cotangents);
+      },
+      "jets"_a.noconvert(), "bending"_a, "weight"_a = 1.0);
+  module.def(
+      "closest_rotations",
+      [](JetArray<Scalar> jacobians) {
+        JetArray<Scalar> rotations = zeros_like(jacobians);
+        closest_rotations<Scalar>(jacobians.data(), jacobians.shape(1), rotations.mutable_data());
+        return rotations;
+      },
+      "jacobians"_a.noconvert());
+  module.def(
+      "gauss_energy",
+      [](JetArray<Scalar> jets, const PointsOf<Scalar>& normals, const Points& preferred, double sharpness,
+         double weight, const Eigen::VectorX<Scalar>& sample_weights) {
+        JetArray<Scalar> cotangents = zeros_like(jets);
+        const double value = gauss_energy<Scalar>(jet_view<const Scalar>(jets), normals, sample_weights,
+                                                  gauss_preference(preferred, sharpness), weight,
+                                                  jet_view<Scalar>(cotangents));
+        return py::make_tuple(value, cotangents);
+      },
+      "jets"_a.noconvert(), "normals"_a, "preferred"_a, "sharpness"_a, "weight"_a, "sample_weights"_a);
+  module.def(
+      "handle_energy",
+      [](JetArray<Scalar> jets, const BoundHandles& handles, double weight) {
+        JetArray<Scalar> cotangents = zeros_like(jets);
+        const double value = handle_energy<Scalar>(jet_view<const Scalar>(jets), handles.all<Scalar>(),
+                                                   weight, jet_view<Scalar>(cotangents));
+        return py::make_tuple(value, cotangents);
+      },
+      "jets"_a.noconvert(), "handles"_a, "weight"_a = 1.0);
+  module.def(
+      "fold_barrier",
+      [](JetArray<Scalar> jets, double threshold, double weight) {
+        JetArray<Scalar> cotangents = zeros_like(jets);
+        const double value = fold_barrier<Scalar>(jet_view<const Scalar>(jets), threshold, weight,
+                                                  jet_view<Scalar>(cotangents));
+        return py::make_tuple(value, cotangents);
+      },
+      "jets"_a.noconvert(), "threshold"_a, "weight"_a = 1.0);
+}
+
+}  // namespace
+
+void bind_energies(py::module_& module) {
+  bind_handles(module);
+  bind_styles(module);
+  py::class_<Distortion>(module, "Distortion", "How far a deformation is from a fold, over its samples.")
+      .def_readonly("min_determinant", &Distortion::min_determinant, "Smallest det J.")
+      .def_readonly("flipped_share", &Distortion::flipped_share, "Share of samples with det J ≤ 0.")
+      .def_readonly("max_stretch", &Distortion::max_stretch, "Largest singular value of J.")
+      .def_readonly("min_stretch", &Distortion::min_stretch, "Smallest singular value of J.");
+
+  py::module_ testing = testing_module(module);
+  py::class_<BoundHandles>(testing, "BoundHandles")
+      .def(py::init([](const std::vector<Handle>& handles, const Points& samples) {
+        return BoundHandles(handles, samples);
+      }))
+      .def_property_readonly("sources", &BoundHandles::sources)
+      .def_property_readonly("targets", &BoundHandles::targets)
+      .def_property_readonly("members", &BoundHandles::members)
+      .def("retarget", &BoundHandles::retarget)
+      .def("error", [](const BoundHandles& self, const Points& values) {
+        const HandleError error = handle_error(self, values);
+        return py::make_tuple(error.mean, error.max);
+      });
+  testing.def("gauss_weights", [](const Points& normals, double sharpness) {
+    const GaussPreference preference = gauss_preference(normals, sharpness);
+    return py::make_tuple(preference.normals, preference.weights);
+  });
+  testing.def("distortion",
+              [](JetArray<double> jets) { return distortion<double>(jet_view<const double>(jets)); });
+  bind_testing<double>(testing);
+  bind_testing<float>(testing);
+}
+
+}  // namespace arapfields::python

@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/pack.h"
+#include "energies/kernels.h"
+#include "energies/rotation_pack.h"
+
+namespace arapfields::SIMD_LEVEL {
+namespace {
+
+/// Below this eigenvalue of K (a sum of two signed singular values) the rotation is taken to be ambiguous.
+template <class Scalar>
+constexpr Scalar smallest_sum = Scalar(0.01);
+constexpr int second_column[3][3] = {{4, 7, 8}, {7, 5, 9}, {8, 9, 6}};
+
+template <class Scalar>
+inline void product_transposed(const Pack33<Scalar>& a, const Pack33<Scalar>& b, Pack33<Scalar>& out) {
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < 3; ++k) out[i][k] = a[0][i] * b[0][k] + a[1][i] * b[1][k] + a[2][i] * b[2][k];
+}
+
+/// axl(M): ⟨M, [w]×⟩ = w·axl(M).
+template <class Scalar>
+inline void axial(const Pack33<Scalar>& m, Pack3<Scalar>& out) {
+  out[0] = m[2][1] - m[1][2];
+  out[1] = m[0][2] - m[2][0];
+  out[2] = m[1][0] - m[0][1];
+}
+
+/// K⁻¹ a in K's eigenvectors.
+template <class Scalar>
+inline void solve_k(const RotationPack<Scalar>& polar, const Pack3<Scalar>& inverse, const Pack3<Scalar>& a,
+                    Pack3<Scalar>& out) {
+  Pack<Scalar> t[3];
+  for (int c = 0; c < 3; ++c)
+    t[c] = inverse[c] * (polar.axes[c][0] * a[0] + polar.axes[c][1] * a[1] + polar.axes[c][2] * a[2]);
+  for (int i = 0; i < 3; ++i)
+    out[i] = t[0] * polar.axes[0][i] + t[1] * polar.axes[1][i] + t[2] * polar.axes[2][i];
+}
+
+/// Column i of R[w]×: r_i × w in terms of R's rows, that is (R[w]×)_ij = (r_i × w)_j.
+template <class Scalar>
+inline void rotation_times_cross(const Pack33<Scalar>& r, const Pack3<Scalar>& w, Pack33<Scalar>& out) {
+  for (int i = 0; i < 3; ++i) {
+    out[i][0] = r[i][1] * w[2] - r[i][2] * w[1];
+    out[i][1] = r[i][2] * w[0] - r[i][0] * w[2];
+    out[i][2] = r[i][0] * w[1] - r[i][1] * w[0];
+  }
+}
+
+/// Everything the bend of one pack of points needs from one pass to the next.
+template <class Scalar>
+struct Bend {
+  Pack33<Scalar> a_matrix[3];  // A_k = Rᵀ D_k
+  Pack3<Scalar> w[3];
+  Pack3<Scalar> inverse_sums;
+  Pack<Scalar> value;
+};
+
+template <class Scalar>
+inline void evaluate_bend(const ArapBlock<Scalar>& block, std::int64_t point, std::int64_t valid,
+                          const RotationPack<Scalar>& polar, Bend<Scalar>& bend) {
+  Pack<Scalar> d[10][3];
+  for (int c = 4; c < 10; ++c) load_points(block.jets + (c * block.count + point) * 3, valid, d[c]);
+  for (int c = 0; c < 3; ++c) {
+    const Pack<Scalar> least = broadcast(smallest_sum<Scalar>);
+    bend.inverse_sums[c] = Scalar(1) / (polar.sums[c] > least ? polar.sums[c] : least);
+  }
+  bend.value = Pack<Scalar>{};
+  for (int k = 0; k < 3; ++k) {
+    Pack33<Scalar> derivative;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) derivative[i][j] = d[second_column[j][k]][i];
+    product_transposed<Scalar>(polar.rotation, derivative, bend.a_matrix[k]);
+    Pack3<Scalar> a;
+    axial<Scalar>(bend.a_matrix[k], a);
+    solve_k<Scalar>(polar, bend.inverse_sums, a, bend.w[k]);
+    bend.value += a[0] * bend.w[k][0] + a[1] * bend.w[k][1] + a[2] * bend.w[k][2];
+  }
+}
+
+/// ∂b/∂D_k = 2 R[w_k]×, collected by columns.
+template <class Scalar>
+inline void add_second_cotangents(const ArapBlock<Scalar>& block, std::int64_t point, std::int64_t valid,
+                                  const RotationPack<Scalar>& polar, const Bend<Scalar>& bend) {
+  Pack33<Scalar> by_slice[3];
+  for (int k = 0; k < 3; ++k) rotation_times_cross<Scalar>(polar.rotation, bend.w[k], by_slice[k]);
+  const Scalar weight = Scalar(2) * block.bend_weight;
+  for (int j = 0; j < 3; ++j)
+    for (int k = j; k < 3; ++k) {
+      Pack3<Scalar> column;
+      for (int i = 0; i < 3; ++i)
+        column[i] = weight * (j == k ? by_slice[k][i][j] : by_slice[k][i][j] + by_slice[j][i][k]);
+      add_points(block.cotangents + (second_column[j][k] * block.count + point) * 3, valid, column);
+    }
+}
+
+/// ∂b/∂J = R([z]× − B) with B = Σ(|w_k|² I − w_k w_kᵀ), M = BY − 2 Σ [w_k]× A_kᵀ, z = K⁻¹ axl(M).
+template <class Scalar>
+inline void add_bend_by_jacobian(const Pack33<Scalar>& jacobian, const RotationPack<Scalar>& polar,
+                                 const Bend<Scalar>& bend, Scalar weight, Pack33<Scalar>& gradient) {
+  using P = Pack<Scalar>;
+  Pack33<Scalar> b, y, m, turned;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      P entry = {};
+      for (int k = 0; k < 3; ++k) entry -= bend.w[k][i] * bend.w[k][j];
+      b[i][j] = entry;
+    }
+  const P trace = -(b[0][0] + b[1][1] + b[2][2]);
+  for (int i = 0; i < 3; ++i) b[i][i] += trace;
+  product_transposed<Scalar>(polar.rotation, jacobian, y);
+  product_transposed<Scalar>(b, y, m);  // B is symmetric
+  for (int k = 0; k < 3; ++k)
+    for (int j = 0; j < 3; ++j) {  // column j of [w]× A_kᵀ is w × (row j of A_k)
+      const auto& w = bend.w[k];
+      const auto& row = bend.a_matrix[k][j];
+      m[0][j] -= Scalar(2) * (w[1] * row[2] - w[2] * row[1]);
+      m[1][j] -= Scalar(2) * (w[2] * row[0] - w[0] * row[2]);
+      m[2][j] -= Scalar(2) * (w[0] * row[1] - w[1] * row[0]);
+    }
+  Pack3<Scalar> axis, z;
+  axial<Scalar>(m, axis);
+  solve_k<Scalar>(polar, bend.inverse_sums, axis, z);
+  rotation_times_cross<Scalar>(polar.rotation, z, turned);
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      const auto& r = polar.rotation[i];
+      gradient[i][j] += weight * (turned[i][j] - (r[0] * b[0][j] + r[1] * b[1][j] + r[2] * b[2][j]));
+    }
+}
+
+template <class Scalar>
+inline double sum_of_valid(Pack<Scalar> values, std::int64_t valid) {
+  double sum = 0;
+  for (int i = 0; i < lanes<Scalar> && i < valid; ++i) sum += static_cast<double>(values[i]);
+  return sum;
+}
+
+template <class Scalar>
+void run(const ArapBlock<Scalar>& block, std::int64_t begin, std::int64_t end, double* sums) {
+  for (std::int64_t point = begin; point < end; point += lanes<Scalar>) {
+    const std::int64_t valid = end - point;
+    Pack33<Scalar> jacobian, gradient;
+    for (int k = 0; k < 3; ++k) {
+      Pack3<Scalar> column;
+      load_points(block.jets + ((1 + k) * block.count + point) * 3, valid, column);
+      for (int i = 0; i < 3; ++i) jacobian[i][k] = column[i];
+    }
+    RotationPack<Scalar> polar;
+    closest_rotation<Scalar>(jacobian, polar);
+    Pack<Scalar> stretch = {};
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < 3; ++k) {
+        const Pack<Scalar> difference = jacobian[i][k] - polar.rotation[i][k];
+        stretch += difference * difference;
+        gradient[i][k] = Scalar(2) * block.stretch_weight * difference;
+      }
+    sums[0] += sum_of_valid<Scalar>(stretch, valid);
+    if (block.has_second) {
+      Bend<Scalar> bend;
+      evaluate_bend(block, point, valid, polar, bend);
+      sums[1] += sum_of_valid<Scalar>(bend.value, valid);
+      if (block.cotangents != nullptr && block.second_cotangents) {
+        add_second_cotangents(block, point, valid, polar, bend);
+        add_bend_by_jacobian<Scalar>(jacobian, polar, bend, block.bend_weight, gradient);
+      }
+    }
+    if (block.cotangents == nullptr) continue;
+    for (int k = 0; k < 3; ++k) {
+      const Pack3<Scalar> column = {gradient[0][k], gradient[1][k], gradient[2][k]};
+      add_points(block.cotangents + ((1 + k) * block.count + point) * 3, valid, column);
+    }
+  }
+}
+
+template <class Scalar>
+void rotate(const Scalar* jacobians, std::int64_t count, std::int64_t begin, std::int64_t end,
+            Scalar* rotations) {
+  for (std::int64_t point = begin; point < end; point += lanes<Scalar>) {
+    const std::int64_t valid = end - point;
+    Pack33<Scalar> jacobian;
+    for (int k = 0; k < 3; ++k) {
+      Pack3<Scalar> column;
+      load_points(jacobians + (k * count + point) * 3, valid, column);
+      for (int i = 0; i < 3; ++i) jacobian[i][k] = column[i];
+    }
+    RotationPack<Scalar> polar;
+    closest_rotation<Scalar>(jacobian, polar);
+    for (int lane = 0; lane < lanes<Scalar> && lane < valid; ++lane)
+      for (int k = 0; k < 3; ++k)
+        for (int i = 0; i < 3; ++i)
+          rotations[(k * count + point + lane) * 3 + i] = polar.rotation[i][k][lane];
+  }
+}
+
+}  // namespace
+
+void arap_range(const ArapBlock<float>& block, std::int64_t begin, std::int64_t end, double* sums) {
+  run(block, begin, end, sums);
+}
+void arap_range(const ArapBlock<double>& block, std::int64_t begin, std::int64_t end, double* sums) {
+  run(block, begin, end, sums);
+}
+void rotation_range(const float* jacobians, std::int64_t count, std::int64_t begin, std::int64_t end,
+                    float* rotations) {
+  rotate(jacobians, count, begin, end, rotations);
+}
+void rotation_range(const double* jacobians, std::int64_t count, std::int64_t begin, std::int64_t end,
+                    double* rotations) {
+  rotate(jacobians, count, begin, end, rotations);
+}
+
+}  // namespace arapfields::SIMD_LEVEL

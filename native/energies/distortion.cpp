@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "energies/distortion.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "core/errors.h"
+#include "energies/ranges.h"
+
+namespace arapfields {
+namespace {
+
+template <class Scalar>
+Mat3 jacobian_at(JetView<const Scalar> jets, Index point) {
+  Mat3 j;
+  for (int k = 0; k < 3; ++k)
+    for (int i = 0; i < 3; ++i) j(i, k) = static_cast<double>(jets.at(first_column(k), point)[i]);
+  return j;
+}
+
+Mat3 cofactors(const Mat3& j) {
+  Mat3 c;
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 a = j.col((k + 1) % 3), b = j.col((k + 2) % 3);
+    c.col(k) << a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0];
+  }
+  return c;
+}
+
+}  // namespace
+
+template <class Scalar>
+Distortion distortion(JetView<const Scalar> jets) {
+  require(jets.order != JetOrder::value, "jets", "values alone", "first derivatives are needed");
+  Distortion result;
+  if (jets.count == 0) return result;
+  std::vector<Distortion> parts(static_cast<std::size_t>((jets.count + range_size - 1) / range_size));
+  for_ranges(jets.count, [&](Index begin, Index end) {
+    Distortion part{INFINITY, 0.0, 0.0, INFINITY};
+    for (Index p = begin; p < end; ++p) {
+      const Mat3 j = jacobian_at(jets, p);
+      const double determinant = j.determinant();
+      Eigen::SelfAdjointEigenSolver<Mat3> eigen;
+      eigen.computeDirect(j.transpose() * j, Eigen::EigenvaluesOnly);
+      part.min_determinant = std::min(part.min_determinant, determinant);
+      part.flipped_share += determinant > 0.0 ? 0.0 : 1.0;
+      part.max_stretch = std::max(part.max_stretch, std::sqrt(std::max(0.0, eigen.eigenvalues()[2])));
+      part.min_stretch = std::min(part.min_stretch, std::sqrt(std::max(0.0, eigen.eigenvalues()[0])));
+    }
+    parts[static_cast<std::size_t>(begin / range_size)] = part;
+  });
+  result = {INFINITY, 0.0, 0.0, INFINITY};
+  for (const Distortion& part : parts) {
+    result.min_determinant = std::min(result.min_determinant, part.min_determinant);
+    result.flipped_share += part.flipped_share / static_cast<double>(jets.count);
+    result.max_stretch = std::max(result.max_stretch, part.max_stretch);
+    result.min_stretch = std::min(result.min_stretch, part.min_stretch);
+  }
+  return result;
+}
+
+template <class Scalar>
+double fold_barrier(JetView<const Scalar> jets, double threshold, double weight, JetView<Scalar> cotangents) {
+  require(jets.order != JetOrder::value, "jets", "values alone", "first derivatives are needed");
+  require(threshold > 0.0 && std::isfinite(threshold), "threshold", std::to_string(threshold),
+          "must be positive");
+  require(
+      cotangents.data == nullptr || (cotangents.count == jets.count && cotangents.order != JetOrder::value),
+      "cotangents", "another shape than the jets'", "as many points and first derivatives are needed");
+  if (jets.count == 0) return 0.0;
+  const double n = static_cast<double>(jets.count);
+  const auto sums = sum_over_ranges<1>(jets.count, [&](Index begin, Index end, double* out) {
+    for (Index p = begin; p < end; ++p) {
+      const Mat3 j = jacobian_at(jets, p);
+      const double gap = 1.0 - j.determinant() / threshold;
+      if (gap <= 0.0) continue;
+      out[0] += gap * gap;
+      if (cotangents.data == nullptr) continue;
+      const Mat3 gradient = (-2.0 * gap / threshold * weight / n) * cofactors(j);
+      for (int k = 0; k < 3; ++k)
+        for (int i = 0; i < 3; ++i)
+          cotangents.at(first_column(k), p)[i] += static_cast<Scalar>(gradient(i, k));
+    }
+  });
+  return sums[0] / n;
+}
+
+template Distortion distortion<float>(JetView<const float>);
+template Distortion distortion<double>(JetView<const double>);
+template double fold_barrier<float>(JetView<const float>, double, double, JetView<float>);
+template double fold_barrier<double>(JetView<const double>, double, double, JetView<double>);
+
+}  // namespace arapfields

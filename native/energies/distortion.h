@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/jets.h"
+
+namespace arapfields {
+
+/// How far a deformation is from a fold, over the points at which its jets were taken.
+struct Distortion {
+  double min_determinant = 1.0;  ///< smallest det J
+  double flipped_share = 0.0;    ///< share of points with det J ≤ 0
+  double max_stretch = 1.0;      ///< largest singular value of J
+  double min_stretch = 1.0;      ///< smallest singular value of J
+};
+
+/// Jets of at least first order; no points: the identity's measures.
+template <class Scalar>
+Distortion distortion(JetView<const Scalar> jets);
+
+/// A barrier against folds: mean of max(0, 1 − det J/threshold)², 0 where det J ≥ threshold > 0. Adds weight
+/// times its cotangents (data may be null).
+template <class Scalar>
+double fold_barrier(JetView<const Scalar> jets, double threshold, double weight, JetView<Scalar> cotangents);
+
+}  // namespace arapfields

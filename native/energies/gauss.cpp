@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "energies/gauss.h"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <string>
+
+#include "core/errors.h"
+#include "energies/kernels.h"
+#include "energies/ranges.h"
+
+namespace arapfields {
+namespace {
+
+Points unit_normals(PointsIn normals) {
+  require(normals.rows() > 0, "normals", "none were given", "at least one is needed");
+  Points unit = normals;
+  for (Index i = 0; i < unit.rows(); ++i) {
+    const double length = unit.row(i).stableNorm();
+    require(std::isfinite(length) && length > 0.0, "normals",
+            "row " + std::to_string(i) + (length == 0.0 ? " is zero" : " is NaN or infinite"),
+            "finite directions of any positive length are allowed");
+    unit.row(i) /= length;
+  }
+  for (Index i = 0; i < unit.rows(); ++i)
+    for (Index j = 0; j < i; ++j)
+      require((unit.row(i) - unit.row(j)).norm() > 1e-6, "normals",
+              "rows " + std::to_string(j) + " and " + std::to_string(i) + " have the same direction",
+              "all directions must differ by more than 1e-6");
+  return unit;
+}
+
+/// The solution of kernel·w = 1 from the eigenvectors above `cutoff`, refined twice.
+Vector truncated_solution(const Eigen::MatrixXd& kernel,
+                          const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>& eigen, double cutoff) {
+  const Vector& values = eigen.eigenvalues();
+  Vector inverse(values.size());
+  for (Index i = 0; i < values.size(); ++i) inverse[i] = values[i] > cutoff ? 1.0 / values[i] : 0.0;
+  Vector weights = Vector::Zero(values.size());
+  for (int pass = 0; pass < 3; ++pass) {
+    const Vector residual = Vector::Ones(values.size()) - kernel * weights;
+    weights += eigen.eigenvectors() * (inverse.asDiagonal() * (eigen.eigenvectors().transpose() * residual));
+  }
+  return weights;
+}
+
+}  // namespace
+
+double GaussPreference::value(const Vec3& normal) const {
+  return (sharpness * (normals * normal)).array().exp().matrix().dot(weights);
+}
+
+Vector GaussPreference::values(PointsIn directions) const {
+  Vector result(directions.rows());
+  for_ranges(directions.rows(), [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) result[i] = value(directions.row(i).transpose());
+  });
+  return result;
+}
+
+GaussPreference gauss_preference(PointsIn normals, double sharpness) {
+  require(sharpness > 0.0 && sharpness <= 100.0, "sharpness", std::to_string(sharpness),
+          "must be positive and at most 100");
+  GaussPreference result{unit_normals(normals), {}, sharpness};
+  // exp(σ(n·m − 1)): the same system with every weight scaled by e^σ, whose diagonal is 1.
+  const Eigen::MatrixXd kernel =
+      (sharpness * ((result.normals * result.normals.transpose()).array() - 1.0)).exp().matrix();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(kernel);
+  const double largest = eigen.eigenvalues().maxCoeff();
+  double best = INFINITY;
+  for (double cutoff = 1e-4 * largest; cutoff > 1e-17 * largest && best > 1e-12; cutoff *= 0.1) {
+    const Vector weights = truncated_solution(kernel, eigen, cutoff);
+    const double residual = (kernel * weights - Vector::Ones(weights.size())).cwiseAbs().maxCoeff();
+    if (residual < best) {
+      best = residual;
+      result.weights = weights * std::exp(-sharpness);
+    }
+  }
+  return result;
+}
+
+template <class Scalar>
+double gauss_energy(JetView<const Scalar> jets, ConstPointsRef<Scalar> normals,
+                    const Eigen::Ref<const Eigen::VectorX<Scalar>>& sample_weights,
+                    const GaussPreference& preference, double weight, JetView<Scalar> cotangents) {
+  require(jets.order != JetOrder::value, "jets", "values alone", "first derivatives are needed");
+  require(normals.rows() == jets.count, "normals", std::to_string(normals.rows()) + " rows",
+          "one for each of the " + std::to_string(jets.count) + " samples is needed");
+  require(sample_weights.size() == 0 || sample_weights.size() == jets.count, "sample_weights",
+          std::to_string(sample_weights.size()) + " numbers", "one for each sample, or none, is needed");
+  require(
+      cotangents.data == nullptr || (cotangents.count == jets.count && cotangents.order != JetOrder::value),
+      "cotangents", "another shape than the jets'", "as many points and first derivatives are needed");
+  if (jets.count == 0) return 0.0;
+  RowMatrix<Scalar> preferred(preference.normals.rows(), 4);
+  preferred << preference.normals.cast<Scalar>(), preference.weights.cast<Scalar>();
+  const GaussBlock<Scalar> block{jets.data,
+                                 cotangents.data,
+                                 jets.count,
+                                 normals.data(),
+                                 sample_weights.size() == 0 ? nullptr : sample_weights.data(),
+                                 preferred.data(),
+                                 preferred.rows(),
+                                 static_cast<Scalar>(preference.sharpness),
+                                 static_cast<Scalar>(weight / static_cast<double>(jets.count))};
+  const auto sums = sum_over_ranges<1>(jets.count, [&](Index begin, Index end, double* out) {
+    out[0] += ARAPFIELDS_DISPATCH(gauss_range(block, begin, end));
+  });
+  return sums[0] / static_cast<double>(jets.count);
+}
+
+#define ARAPFIELDS_GAUSS(Scalar)                                                        \
+  template double gauss_energy<Scalar>(JetView<const Scalar>, ConstPointsRef<Scalar>,   \
+                                       const Eigen::Ref<const Eigen::VectorX<Scalar>>&, \
+                                       const GaussPreference&, double, JetView<Scalar>);
+ARAPFIELDS_GAUSS(float)
+ARAPFIELDS_GAUSS(double)
+
+}  // namespace arapfields

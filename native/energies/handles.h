@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "core/frame.h"
+#include "core/jets.h"
+#include "core/random.h"
+
+namespace arapfields {
+
+/// A part of the surface that is asked to follow a rigid motion.
+struct Handle {
+  enum class Kind {
+    cuboid,  ///< the samples inside the box that `rest` makes of [-1,1]³
+    point,   ///< one material point, no sample needed
+    region   ///< the samples listed
+  };
+  Kind kind = Kind::cuboid;
+  Mat4 rest = Mat4::Identity();    ///< cuboid, region: the motion is target·rest⁻¹
+  Mat4 target = Mat4::Identity();  ///< rigidly moved rest
+  Vec3 rest_point = Vec3::Zero();  ///< point
+  Vec3 target_point = Vec3::Zero();
+  std::vector<Index> samples;  ///< region: sample indices
+  double weight = 1.0;         ///< factor of this handle's part of the loss
+
+  /// The handle of mesh coordinates in the frame's cube.
+  Handle in_cube(const Frame& frame) const;
+  /// target·rest⁻¹ made exactly rigid (of a point: the translation). Throws InvalidInput that names handle
+  /// `index` for non-finite matrices, a rest pose without volume, and motions that scale, shear or mirror by
+  /// more than 1e-3.
+  Mat4 motion(Index index = 0) const;
+};
+
+/// Pairs x → C x of one evaluation with their weights: loss = Σ_p weights_p ‖f(sources_p) − targets_p‖².
+template <class Scalar>
+struct HandleBatch {
+  PointsOf<Scalar> sources, targets;
+  Eigen::VectorX<Scalar> weights;
+};
+
+/// Handles with their sample members, sources and targets computed once. All in cube coordinates.
+/// The loss is the mean over the handles of weight × mean over the handle's pairs of ‖f(x) − C x‖².
+class BoundHandles {
+ public:
+  BoundHandles() = default;
+  /// Throws InvalidInput that names the handle which is invalid or holds no sample.
+  BoundHandles(std::vector<Handle> handles, PointsIn samples);
+
+  Index count() const { return static_cast<Index>(handles_.size()); }
+  const Handle& handle(Index i) const { return handles_[static_cast<std::size_t>(i)]; }
+  /// Pairs of handle i are rows begin(i) … begin(i+1)−1.
+  Index begin(Index i) const { return begin_[static_cast<std::size_t>(i)]; }
+  const Points& sources() const { return sources_; }
+  const Points& targets() const { return targets_; }
+  /// Index of each pair's sample, −1 for point handles.
+  const std::vector<Index>& members() const { return members_; }
+  const Mat4& motion(Index i) const { return motions_[static_cast<std::size_t>(i)]; }
+
+  /// New targets for the same regions: each handle's target (or target_point) is taken from `moved`.
+  void retarget(const std::vector<Handle>& moved);
+  /// All pairs, or at most `per_handle` random ones of each handle (0: all).
+  template <class Scalar>
+  HandleBatch<Scalar> batch(Index per_handle, Random& random) const;
+  template <class Scalar>
+  HandleBatch<Scalar> all() const;
+
+ private:
+  void move(Index i);
+
+  std::vector<Handle> handles_;
+  std::vector<Mat4> motions_;
+  std::vector<Index> begin_{0};
+  std::vector<Index> members_;
+  Points sources_, targets_;
+};
+
+/// Value of the batch's loss for jets at batch.sources; adds weight times its cotangents on the value column
+/// (data may be null).
+template <class Scalar>
+double handle_energy(JetView<const Scalar> jets, const HandleBatch<Scalar>& batch, double weight,
+                     JetView<Scalar> cotangents);
+
+struct HandleError {
+  double mean = 0.0;  ///< mean over handles of the mean distance ‖f(x) − C x‖
+  double max = 0.0;   ///< largest distance over all pairs
+};
+
+/// For the field's values (rows) at handles.sources().
+HandleError handle_error(const BoundHandles& handles, PointsIn values);
+
+}  // namespace arapfields

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Kernels of this folder, compiled for each instruction set. All take the whole block and a range of points.
+#pragma once
+
+#include <cstdint>
+
+#include "core/simd.h"
+
+namespace arapfields {
+
+/// Columns of `jets` and `cotangents` (null: values alone) are count·3 apart. Sums, not means, are added to
+/// sums[0] (stretch) and sums[1] (bend).
+template <class Scalar>
+struct ArapBlock {
+  const Scalar* jets;
+  Scalar* cotangents;
+  std::int64_t count;
+  bool has_second, second_cotangents;
+  Scalar stretch_weight, bend_weight;
+};
+
+/// Same blocks, with rest normals (count,3), per-sample weights (count; null: ones), and the preference as k
+/// rows (normal, weight); adds Σ u (1 − g) to the result.
+template <class Scalar>
+struct GaussBlock {
+  const Scalar* jets;
+  Scalar* cotangents;
+  std::int64_t count;
+  const Scalar* normals;
+  const Scalar* sample_weights;
+  const Scalar* preferred;
+  std::int64_t preferred_count;
+  Scalar sharpness, weight;
+};
+
+ARAPFIELDS_DECLARE(void arap_range(const ArapBlock<float>&, std::int64_t begin, std::int64_t end,
+                                   double* sums))
+ARAPFIELDS_DECLARE(void arap_range(const ArapBlock<double>&, std::int64_t begin, std::int64_t end,
+                                   double* sums))
+ARAPFIELDS_DECLARE(double gauss_range(const GaussBlock<float>&, std::int64_t begin, std::int64_t end))
+ARAPFIELDS_DECLARE(double gauss_range(const GaussBlock<double>&, std::int64_t begin, std::int64_t end))
+ARAPFIELDS_DECLARE(void rotation_range(const float*, std::int64_t count, std::int64_t begin, std::int64_t end,
+                                       float*))
+ARAPFIELDS_DECLARE(void rotation_range(const double*, std::int64_t count, std::int64_t begin,
+                                       std::int64_t end, double*))
+
+}  // namespace arapfields

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Closest rotations of many 3×3 matrices at once, for SIMD sources.
+#pragma once
+
+#include "energies/jacobi_pack.h"
+
+namespace arapfields::SIMD_LEVEL {
+
+template <class Scalar>
+using Pack3 = Pack<Scalar>[3];
+template <class Scalar>
+using Pack33 = Pack<Scalar>[3][3];
+
+/// R closest to J, and K = tr(Y) I − Y with Y = RᵀJ as eigenvalues (two signed singular values' sums, ≥ 0)
+/// and unit eigenvectors axes[0..2].
+template <class Scalar>
+struct RotationPack {
+  Pack33<Scalar> rotation;
+  Pack33<Scalar> axes;
+  Pack3<Scalar> sums;
+};
+
+/// Unit quaternions q: tr(R(q)ᵀJ) = qᵀNq for a symmetric 4×4 N linear in J, so the closest rotation is N's
+/// top eigenvector, whatever J's rank and determinant. The others are q·(0, v_i), v_i K's eigenvectors, and
+/// the gaps to the top are twice K's eigenvalues (Horn 1987, "Closed-form solution of absolute orientation
+/// using unit quaternions", for N; the rest follows by writing J = R Y).
+template <class Scalar>
+inline void closest_rotation(const Pack33<Scalar>& jacobian, RotationPack<Scalar>& out) {
+  using P = Pack<Scalar>;
+  const P zero = {}, one = broadcast(Scalar(1));
+  P scale = zero;
+  for (const auto& row : jacobian)
+    for (const P& x : row) {
+      const P magnitude = x < zero ? -x : x;
+      scale = magnitude > scale ? magnitude : scale;
+    }
+  const P inverse_scale = scale > zero ? Scalar(1) / scale : one;
+  P j[3][3];
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < 3; ++k) j[i][k] = jacobian[i][k] * inverse_scale;
+  P a[4][4], v[4][4];
+  a[0][0] = j[0][0] + j[1][1] + j[2][2];
+  a[1][1] = j[0][0] - j[1][1] - j[2][2];
+  a[2][2] = j[1][1] - j[0][0] - j[2][2];
+  a[3][3] = j[2][2] - j[0][0] - j[1][1];
+  a[0][1] = a[1][0] = j[2][1] - j[1][2];
+  a[0][2] = a[2][0] = j[0][2] - j[2][0];
+  a[0][3] = a[3][0] = j[1][0] - j[0][1];
+  a[1][2] = a[2][1] = j[0][1] + j[1][0];
+  a[1][3] = a[3][1] = j[0][2] + j[2][0];
+  a[2][3] = a[3][2] = j[1][2] + j[2][1];
+  for (int i = 0; i < 4; ++i)
+    for (int k = 0; k < 4; ++k) v[i][k] = i == k ? one : zero;
+  jacobi_diagonalise<Scalar>(a, v);
+  for (int c = 1; c < 4; ++c) {
+    const auto swap = a[c][c] > a[0][0];
+    const P top = a[0][0];
+    a[0][0] = swap ? a[c][c] : top;
+    a[c][c] = swap ? top : a[c][c];
+    for (int k = 0; k < 4; ++k) {
+      const P x = v[k][0];
+      v[k][0] = swap ? v[k][c] : x;
+      v[k][c] = swap ? x : v[k][c];
+    }
+  }
+  const P norm =
+      Scalar(1) / square_root(v[0][0] * v[0][0] + v[1][0] * v[1][0] + v[2][0] * v[2][0] + v[3][0] * v[3][0]);
+  const P w = v[0][0] * norm, x = v[1][0] * norm, y = v[2][0] * norm, z = v[3][0] * norm;
+  auto& r = out.rotation;
+  r[0][0] = one - Scalar(2) * (y * y + z * z);
+  r[1][1] = one - Scalar(2) * (x * x + z * z);
+  r[2][2] = one - Scalar(2) * (x * x + y * y);
+  r[0][1] = Scalar(2) * (x * y - w * z);
+  r[1][0] = Scalar(2) * (x * y + w * z);
+  r[0][2] = Scalar(2) * (x * z + w * y);
+  r[2][0] = Scalar(2) * (x * z - w * y);
+  r[1][2] = Scalar(2) * (y * z - w * x);
+  r[2][1] = Scalar(2) * (y * z + w * x);
+  for (int c = 1; c < 4; ++c) {  // the vector part of conj(q)·q_c
+    const P b = v[0][c], bx = v[1][c], by = v[2][c], bz = v[3][c];
+    out.axes[c - 1][0] = w * bx - b * x - (y * bz - z * by);
+    out.axes[c - 1][1] = w * by - b * y - (z * bx - x * bz);
+    out.axes[c - 1][2] = w * bz - b * z - (x * by - y * bx);
+    out.sums[c - 1] = Scalar(0.5) * (a[0][0] - a[c][c]) * scale;
+  }
+}
+
+}  // namespace arapfields::SIMD_LEVEL

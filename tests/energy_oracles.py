@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The energies written the slow, obvious way in PyTorch (float64), derivatives by autograd."""
+
+import numpy as np
+import torch
+
+# columns of a jet: value, d1 d2 d3, d11 d22 d33 d12 d13 d23
+SECOND = [[4, 7, 8], [7, 5, 9], [8, 9, 6]]
+
+
+def random_rotations(count, rng):
+    q = rng.normal(size=(count, 4))
+    w, x, y, z = (q / np.linalg.norm(q, axis=1, keepdims=True)).T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)
+
+
+def jets_with_jacobians(jacobians, rng, order=10, second=1.0):
+    """(order, n, 3) jets with the Jacobians (n, 3, 3) and random values and second derivatives."""
+    jets = rng.normal(size=(order, len(jacobians), 3)) * second
+    jets[1:4] = np.moveaxis(jacobians, 2, 0)
+    return jets
+
+
+def jacobians_of(jets):
+    """(n, 3, 3) from a NumPy or torch jet: J[p, i, k] = jets[1 + k, p, i]."""
+    return torch.as_tensor(jets)[1:4].permute(1, 2, 0)
+
+
+def polar(jacobians):
+    """Closest rotations (det +1) by singular values."""
+    u, _, vh = torch.linalg.svd(jacobians)
+    sign = torch.det(u @ vh).detach()
+    u = torch.cat([u[..., :2], u[..., 2:] * sign[..., None, None]], -1)
+    return u @ vh
+
+
+def arap_terms(jets):
+    """(stretch, bend) means; the rotation's derivative along x_k is the polar factor's in the direction D_k."""
+    jacobians = jacobians_of(jets)
+    rotations = polar(jacobians)
+    stretch = ((jacobians - rotations) ** 2).sum((1, 2)).mean()
+    symmetric = rotations.mT @ jacobians
+    bend = 0.0
+    for k in range(3):
+        slice_k = torch.stack([jets[SECOND[j][k]] for j in range(3)], -1)
+        turn = torch.func.jvp(polar, (jacobians,), (slice_k,))[1]
+        bend = bend + (turn * (turn @ symmetric)).sum((1, 2)).mean()
+    return stretch, bend
+
+
+def gauss_loss(jets, normals, preferred, weights, sharpness, sample_weights=None):
+    moved = torch.linalg.solve(jacobians_of(jets).mT, normals)
+    moved = moved / moved.norm(dim=1, keepdim=True)
+    g = (torch.exp(sharpness * moved @ preferred.mT) * weights).sum(1)
+    return ((1 - g) * (1.0 if sample_weights is None else sample_weights)).mean()
+
+
+def gradient_of(function, jets):
+    """Value(s) and the gradient of the first by the jets."""
+    leaf = torch.tensor(jets, requires_grad=True)
+    value = function(leaf)
+    value.backward()
+    return value.item(), leaf.grad.numpy()
