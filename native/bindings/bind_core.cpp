@@ -101,7 +101,8 @@ void bind_core(py::module_& module) {
       .def("report", &Task::report, "fraction"_a, "message"_a = "",
            "Sets progress (kept if larger already) and message.");
 
-  py::class_<Frame>(module, "Frame", "Mesh coordinates and the unit cube: x_cube = (x_mesh - center) / scale.")
+  py::class_<Frame>(module, "Frame",
+                    "Mesh coordinates and the unit cube: x_cube = (x_mesh - center) / scale.")
       .def(py::init([](const py::object& center, double scale) {
              const Frame frame{as_vec3(center, "center"), scale};
              require(std::isfinite(scale) && scale > 0, "scale", std::to_string(scale), "must be positive");
@@ -110,13 +111,16 @@ void bind_core(py::module_& module) {
            "center"_a, "scale"_a)
       .def_readonly("center", &Frame::center)
       .def_readonly("scale", &Frame::scale)
-      .def("to_cube", [](const Frame& f, const py::object& p) { return f.to_cube(as_points(p, "points")); },
-           "points"_a)
-      .def("to_mesh", [](const Frame& f, const py::object& p) { return f.to_mesh(as_points(p, "points")); },
-           "points"_a)
+      .def(
+          "to_cube", [](const Frame& f, const py::object& p) { return f.to_cube(as_points(p, "points")); },
+          "points"_a)
+      .def(
+          "to_mesh", [](const Frame& f, const py::object& p) { return f.to_mesh(as_points(p, "points")); },
+          "points"_a)
       .def("__eq__", [](const Frame& a, const Frame& b) { return a == b; });
 
-  module.def("thread_count", &thread_count, "Threads that native calls use unless their options say otherwise.");
+  module.def("thread_count", &thread_count,
+             "Threads that native calls use unless their options say otherwise.");
   module.def("simd_level", &simd_level_name, "Instruction set of the kernels: baseline, avx2 or avx512.");
 }
 

@@ -31,7 +31,9 @@ def test_rotation_of_degenerate_matrices_is_a_best_one():
     """Rank 2, 1, 0, reflections with equal singular values, huge and tiny: tr(RᵀJ) is as large as it gets."""
     rng = np.random.default_rng(1)
     turns = random_rotations(7, rng)
-    sigmas = np.array([[1, 1, 0], [1, 0, 0], [0, 0, 0], [1, 1, -1], [2, 1, -1], [1e150, 1e150, 1e149], [1e-150] * 3])
+    sigmas = np.array(
+        [[1, 1, 0], [1, 0, 0], [0, 0, 0], [1, 1, -1], [2, 1, -1], [1e150, 1e150, 1e149], [1e-150] * 3]
+    )
     jacobians = turns @ (sigmas[:, :, None] * random_rotations(7, rng))
     block = np.ascontiguousarray(np.moveaxis(jacobians, 2, 0))
     found = jacobians_of(np.concatenate([block[:1], testing.closest_rotations(block)])).numpy()
@@ -93,13 +95,18 @@ def test_rigid_motions_cost_nothing_and_composition_changes_nothing():
     assert stretch < 1e-28 and bend == 0 and np.abs(cotangents).max() < 1e-15
     jets = jets_with_jacobians(np.eye(3) + 0.3 * rng.normal(size=(200, 3, 3)), rng)
     turn = random_rotations(1, rng)[0]
-    before, after = testing.arap_energy(jets, 0.01), testing.arap_energy(np.ascontiguousarray(jets @ turn.T), 0.01)
+    before, after = (
+        testing.arap_energy(jets, 0.01),
+        testing.arap_energy(np.ascontiguousarray(jets @ turn.T), 0.01),
+    )
     assert after[:2] == pytest.approx(before[:2], rel=1e-12)
     assert np.abs(after[2] - before[2] @ turn.T).max() < 1e-12
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
-@pytest.mark.parametrize("sigma", [[1, 1, -1], [1, 0, 0], [0, 0, 0], [1, 1, 0], [0.5, 0.5, -0.5], [3, 1e-9, -1e-9]])
+@pytest.mark.parametrize(
+    "sigma", [[1, 1, -1], [1, 0, 0], [0, 0, 0], [1, 1, 0], [0.5, 0.5, -0.5], [3, 1e-9, -1e-9]]
+)
 def test_ambiguous_rotations_stay_finite(sigma, dtype):
     rng = np.random.default_rng(6)
     turns, others = random_rotations(50, rng), random_rotations(50, rng)

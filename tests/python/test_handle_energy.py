@@ -32,7 +32,11 @@ def test_membership_and_targets(points):
     rest = box([0.3, 0.2, -0.1], [0.5, 0.3, 0.6], turn[0])
     motion = rigid(turn[1], [0.1, 0.2, 0.3])
     bound = testing.BoundHandles(
-        [af.Cuboid(rest, motion @ rest), af.Point([1, 2, 3], [4, 4, 4]), af.Region([5, 7], rest, motion @ rest)],
+        [
+            af.Cuboid(rest, motion @ rest),
+            af.Point([1, 2, 3], [4, 4, 4]),
+            af.Region([5, 7], rest, motion @ rest),
+        ],
         points,
     )
     local = (points - rest[:3, 3]) @ np.linalg.inv(rest[:3, :3]).T
