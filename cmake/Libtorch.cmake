@@ -21,3 +21,8 @@ foreach(name c10 torch_cpu torch)
   find_library(LIBTORCH_${name} NAMES ${name} PATHS "${LIBTORCH_DIR}/lib" NO_DEFAULT_PATH REQUIRED)
   target_link_libraries(libtorch::libtorch INTERFACE "${LIBTORCH_${name}}")
 endforeach()
+# A CUDA build registers its kernels when libtorch_cuda is loaded, though no symbol of it is named by us.
+find_library(LIBTORCH_torch_cuda NAMES torch_cuda PATHS "${LIBTORCH_DIR}/lib" NO_DEFAULT_PATH)
+if(LIBTORCH_torch_cuda)
+  target_link_libraries(libtorch::libtorch INTERFACE -Wl,--no-as-needed "${LIBTORCH_torch_cuda}" -Wl,--as-needed)
+endif()
