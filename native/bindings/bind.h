@@ -104,6 +104,8 @@ class OptionsBinding {
 };
 
 void bind_core(py::module_& module);
+void bind_mesh(py::module_& module);
+void bind_distance(py::module_& module);
 void bind_neural(py::module_& module);
 void bind_energies(py::module_& module);
 

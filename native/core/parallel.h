@@ -12,6 +12,10 @@ namespace arapfields {
 /// count alone. An exception in `body` reaches the caller.
 void parallel_for(Index begin, Index end, Index grain, const std::function<void(Index, Index)>& body);
 
+/// Runs body(job) for jobs 0 to count−1 on the same threads, each taking the next job that is left: for jobs
+/// of unequal length whose results do not depend on who runs them.
+void parallel_jobs(Index count, const std::function<void(Index)>& body);
+
 /// Sets the calling thread's number of worker threads for its lifetime; 0 keeps what is in force.
 class ThreadScope {
  public:

@@ -14,13 +14,17 @@ from ._native import (
     InvalidInput,
     Point,
     Region,
+    SurfaceSamples,
     Task,
     __version__,
     gauss_preference,
     preferred_normals,
+    sample_mesh,
+    signed_distance,
     simd_level,
     style_names,
     thread_count,
+    winding_number,
 )
 
 __all__ = [
@@ -33,11 +37,15 @@ __all__ = [
     "InvalidInput",
     "Point",
     "Region",
+    "SurfaceSamples",
     "Task",
     "__version__",
     "gauss_preference",
     "preferred_normals",
+    "sample_mesh",
+    "signed_distance",
     "simd_level",
     "style_names",
     "thread_count",
+    "winding_number",
 ]

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "core/types.h"
+#include "distance/hierarchy_layout.h"
+
+namespace arapfields {
+
+/// A bounding-volume hierarchy over a triangle soup that serves both closest points and winding numbers.
+/// Our own, since Eigen's KdBVH is binary, tests one box at a time and knows no moments: here a node has
+/// eight children and a leaf eight triangles, each tested with a few vector instructions.
+/// The tree depends on the mesh alone, not on the thread count.
+class Hierarchy {
+ public:
+  /// The mesh must be valid (mesh/triangle_mesh.h).
+  Hierarchy(PointsIn vertices, TrianglesIn triangles);
+
+  HierarchyView view() const;
+  /// Mesh coordinates → the centred and scaled ones of the hierarchy; the factor is a power of two.
+  const Vec3& center() const { return center_; }
+  double factor() const { return factor_; }
+  Vec3 normalized(const Vec3& point) const { return (point - center_) * factor_; }
+  Vec3 restored(const Vec3& point) const { return point / factor_ + center_; }
+
+ private:
+  Vec3 center_;
+  double factor_ = 1.0;
+  std::vector<WideNode> nodes_;
+  std::vector<NodeMoments> moments_;
+  std::vector<TrianglePacket> packets_;
+};
+
+}  // namespace arapfields

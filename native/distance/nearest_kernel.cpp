@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <cmath>
+#include <cstring>
+
+#include "distance/kernels.h"
+
+namespace arapfields::SIMD_LEVEL {
+namespace {
+
+constexpr int W = tree_width;
+
+/// Makes `best` the nearest among itself and a packet's triangles. Never inlined: every caller must see the
+/// same rounding.
+__attribute__((noinline)) void visit(const TrianglePacket& t, std::int32_t index, const double* p,
+                                     Nearest& best) {
+  alignas(64) double squared[W];
+  for (int i = 0; i < W; ++i) {
+    const double dx = p[0] - t.origin[0][i], dy = p[1] - t.origin[1][i], dz = p[2] - t.origin[2][i];
+    const double x = dx * t.axis_x[0][i] + dy * t.axis_x[1][i] + dz * t.axis_x[2][i];
+    const double y = dx * t.axis_y[0][i] + dy * t.axis_y[1][i] + dz * t.axis_y[2][i];
+    const double z = dx * t.axis_z[0][i] + dy * t.axis_z[1][i] + dz * t.axis_z[2][i];
+    const double bx = t.bx[i], cx = t.cx[i], cy = t.cy[i], ex = cx - bx, xb = x - bx;
+    // Nearest point of each side, by its parameter along the side.
+    double ab = x < bx ? x : bx;
+    ab = ab > 0.0 ? ab : 0.0;
+    double ac = (x * cx + y * cy) * t.inverse_ac[i];
+    ac = ac < 1.0 ? ac : 1.0;
+    ac = ac > 0.0 ? ac : 0.0;
+    double bc = (xb * ex + y * cy) * t.inverse_bc[i];
+    bc = bc < 1.0 ? bc : 1.0;
+    bc = bc > 0.0 ? bc : 0.0;
+    const double ab_x = x - ab, ac_x = x - ac * cx, ac_y = y - ac * cy;
+    const double bc_x = xb - bc * ex, bc_y = y - bc * cy;
+    const double to_ab = ab_x * ab_x + y * y, to_ac = ac_x * ac_x + ac_y * ac_y;
+    const double to_bc = bc_x * bc_x + bc_y * bc_y;
+    double in_plane = to_ab < to_ac ? to_ab : to_ac;
+    in_plane = in_plane < to_bc ? in_plane : to_bc;
+    const bool inside = (y > 0.0) & (x * cy - y * cx > 0.0) & (y * ex - xb * cy > 0.0);
+    squared[i] = z * z + (inside ? 0.0 : in_plane);
+  }
+  int closer = 0;
+  for (int i = 0; i < W; ++i) closer |= squared[i] <= best.squared_distance ? 1 : 0;
+  if (closer == 0) return;
+  for (int i = 0; i < W; ++i) {
+    const bool first = squared[i] == best.squared_distance && t.triangle[i] < best.triangle;
+    if (squared[i] < best.squared_distance || first) best = {squared[i], t.triangle[i], index};
+  }
+}
+
+/// A point in single precision, as an interval that holds the exact one.
+struct Interval {
+  float low[3], high[3];
+};
+
+Interval around(const double* p) {
+  Interval result;
+  for (int k = 0; k < 3; ++k) {
+    const float x = static_cast<float>(p[k]), slack = std::fabs(x) * 1.3e-7f + 1e-38f;
+    result.low[k] = x - slack;
+    result.high[k] = x + slack;
+  }
+  return result;
+}
+
+/// No box whose squared distance, as box_distances rounds it, exceeds this can hold anything as near.
+float bound(const Nearest& best) { return static_cast<float>(best.squared_distance) * 1.000002f + 1e-37f; }
+
+void box_distances(const WideNode& node, const Interval& p, float* squared) {
+  for (int i = 0; i < W; ++i) {
+    float sum = 0.0f;
+    for (int k = 0; k < 3; ++k) {
+      const float below = node.low[k][i] - p.high[k], above = p.low[k] - node.high[k][i];
+      float d = below > above ? below : above;
+      d = d > 0.0f ? d : 0.0f;
+      sum += d * d;
+    }
+    squared[i] = sum;
+  }
+}
+
+struct Entry {
+  float squared;
+  std::int32_t child;
+};
+
+void search(const HierarchyView& tree, const double* p, Nearest& best) {
+  const Interval interval = around(p);
+  const std::int32_t seen = best.packet;
+  Entry stack[stack_size];
+  Entry* top = stack;
+  *top++ = {0.0f, 0};
+  float limit = bound(best);
+  while (top != stack) {
+    const Entry entry = *--top;
+    if (entry.squared > limit) continue;
+    if (entry.child < 0) {
+      if (~entry.child == seen) continue;
+      visit(tree.packets[~entry.child], ~entry.child, p, best);
+      limit = bound(best);
+      continue;
+    }
+    const WideNode& node = tree.nodes[entry.child];
+    alignas(64) float squared[W];
+    box_distances(node, interval, squared);
+    // Farther children go below nearer ones on the stack.
+    Entry* const floor = top;
+    for (int i = 0; i < node.count; ++i) {
+      if (squared[i] > limit) continue;
+      Entry* place = top++;
+      for (; place != floor && place[-1].squared < squared[i]; --place) *place = place[-1];
+      *place = {squared[i], node.child[i]};
+    }
+  }
+}
+
+constexpr Nearest nothing = {INFINITY, INT32_MAX, -1};
+
+}  // namespace
+
+void nearest(const HierarchyView& tree, const double* points, std::int64_t count, Nearest* results) {
+  std::int32_t likely = 0;  // the previous point's packet: its distance is a good first bound
+  for (std::int64_t i = 0; i < count; ++i) {
+    Nearest best = nothing;
+    visit(tree.packets[likely], likely, points + 3 * i, best);
+    search(tree, points + 3 * i, best);
+    results[i] = best;
+    likely = best.packet;
+  }
+}
+
+void nearest_of_all(const HierarchyView& tree, const double* points, std::int64_t count, Nearest* results) {
+  for (std::int64_t i = 0; i < count; ++i) {
+    results[i] = nothing;
+    for (std::int32_t k = 0; k < tree.packet_count; ++k)
+      visit(tree.packets[k], k, points + 3 * i, results[i]);
+  }
+}
+
+void overlapping(const double* points, const Nearest* nearest, int count, std::uint64_t* links) {
+  alignas(64) double x[3][linked_points], radius[linked_points];
+  alignas(64) std::uint64_t bit[linked_points];
+  for (int i = 0; i < linked_points; ++i) {
+    for (int k = 0; k < 3; ++k) x[k][i] = i < count ? points[3 * i + k] : 0.0;
+    // Shrunk, so that rounding cannot make balls touch that do not.
+    radius[i] = i < count ? std::sqrt(nearest[i].squared_distance) * (1.0 - 1e-9) : 0.0;
+    bit[i] = i < count ? std::uint64_t{1} << i : 0;
+  }
+  for (int i = 0; i < count; ++i) {
+    std::uint64_t mask = 0;
+    for (int j = 0; j < linked_points; ++j) {
+      const double dx = x[0][i] - x[0][j], dy = x[1][i] - x[1][j], dz = x[2][i] - x[2][j];
+      const double reach = radius[i] + radius[j];
+      mask |= dx * dx + dy * dy + dz * dz < reach * reach ? bit[j] : 0;
+    }
+    links[i] = mask;
+  }
+}
+
+}  // namespace arapfields::SIMD_LEVEL

@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "distance/signed_distance.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <cmath>
+#include <string>
+
+#include "core/errors.h"
+#include "core/parallel.h"
+#include "distance/closed.h"
+#include "distance/hierarchy.h"
+#include "distance/kernels.h"
+#include "distance/morton.h"
+#include "distance/packet.h"
+#include "mesh/triangle_mesh.h"
+
+namespace arapfields {
+namespace {
+
+/// Points that are sorted together; bounds the memory of a query.
+constexpr Index sorted_points = Index{1} << 21;
+constexpr Index block_size = linked_points;
+constexpr double farthest = 1e90;
+
+/// Opening angles, as multiples of a cluster's radius. For signs of closed meshes the winding number need
+/// only be told from the next integer.
+constexpr double opening_of_integers = 1.5;
+constexpr double opening_of_signs = 2.0;
+constexpr double opening_of_numbers = 3.0;
+
+/// A few points that are near each other.
+struct Block {
+  int count = 0;
+  std::array<Index, block_size> rows;         ///< which points of the query they are
+  std::array<double, 3 * block_size> points;  ///< in the hierarchy's coordinates
+};
+
+void require_usable(PointsIn points, const Hierarchy& hierarchy) {
+  for (Index i = 0; i < points.rows(); ++i) {
+    const Vec3 p = points.row(i).transpose();
+    require(p.allFinite(), "points", "point " + std::to_string(i) + " is NaN or infinite",
+            "all coordinates must be finite");
+    require(hierarchy.normalized(p).cwiseAbs().maxCoeff() < farthest, "points",
+            "point " + std::to_string(i) + " is too far away",
+            "the distance must be below 1e90 times the mesh's size");
+  }
+}
+
+/// Runs body(block) over all points, in blocks of neighbours, on all threads.
+template <class Body>
+void for_blocks(PointsIn points, const Hierarchy& hierarchy, const Progress& progress, const Body& body) {
+  std::atomic<Index> done{0};
+  for (Index first = 0; first < points.rows(); first += sorted_points) {
+    const Index count = std::min(sorted_points, points.rows() - first);
+    const std::vector<std::uint32_t> order = morton_order(points.middleRows(first, count));
+    parallel_jobs((count + block_size - 1) / block_size, [&](Index job) {
+      progress.check();
+      Block block;
+      const Index begin = job * block_size;
+      block.count = static_cast<int>(std::min(block_size, count - begin));
+      for (int i = 0; i < block.count; ++i) {
+        const Index row = first + order[static_cast<std::size_t>(begin + i)];
+        const Vec3 p = hierarchy.normalized(points.row(row).transpose());
+        block.rows[static_cast<std::size_t>(i)] = row;
+        std::copy_n(p.data(), 3, block.points.data() + 3 * i);
+      }
+      body(block);
+      const Index so_far = done += block.count;
+      if (job % 64 == 0)
+        progress.report(static_cast<double>(so_far) / static_cast<double>(points.rows()), "distances");
+    });
+  }
+  progress.report(1.0);
+}
+
+void run_nearest(const HierarchyView& view, const Block& block, Nearest* results) {
+  ARAPFIELDS_DISPATCH(nearest(view, block.points.data(), block.count, results));
+}
+
+void run_winding(const HierarchyView& view, const double* points, int count, double opening,
+                 double* numbers) {
+  ARAPFIELDS_DISPATCH(winding(view, points, count, opening, numbers));
+}
+
+/// inside[i] for points about which the soup winds an integer number of times: balls that hold no triangle
+/// and overlap lie on one side, so one point, the one farthest from the surface, answers for each cluster.
+void integer_sides(const HierarchyView& view, const Block& block, const Nearest* nearest, bool* inside) {
+  std::array<std::uint64_t, block_size> links;
+  ARAPFIELDS_DISPATCH(overlapping(block.points.data(), nearest, block.count, links.data()));
+  std::array<double, 3 * block_size> asked;
+  std::array<std::uint64_t, block_size> cluster;
+  int clusters = 0;
+  std::uint64_t left = block.count == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << block.count) - 1;
+  while (left != 0) {
+    std::uint64_t members = 0, fresh = left & (~left + 1);
+    int center = std::countr_zero(left);
+    while (fresh != 0) {
+      const int i = std::countr_zero(fresh);
+      if (nearest[i].squared_distance > nearest[center].squared_distance) center = i;
+      members |= std::uint64_t{1} << i;
+      left &= ~(std::uint64_t{1} << i);
+      fresh = (fresh | links[static_cast<std::size_t>(i)]) & left;
+    }
+    std::copy_n(block.points.data() + 3 * center, 3, asked.data() + 3 * clusters);
+    cluster[static_cast<std::size_t>(clusters++)] = members;
+  }
+  std::array<double, block_size> numbers;
+  run_winding(view, asked.data(), clusters, opening_of_integers, numbers.data());
+  for (int c = 0; c < clusters; ++c)
+    for (std::uint64_t rest = cluster[static_cast<std::size_t>(c)]; rest != 0; rest &= rest - 1)
+      inside[std::countr_zero(rest)] = numbers[static_cast<std::size_t>(c)] > 0.5;
+}
+
+}  // namespace
+
+struct SignedDistance::Parts {
+  Hierarchy hierarchy;
+  bool closed;
+};
+
+SignedDistance::SignedDistance(PointsIn vertices, TrianglesIn triangles) {
+  validate(vertices, triangles);
+  const Points used = used_vertices(vertices, triangles);
+  require((used.colwise().maxCoeff() - used.colwise().minCoeff()).allFinite(), "vertices",
+          "their bounding box is too large for floating point", "its sides must be finite");
+  parts_.reset(new Parts{Hierarchy(vertices, triangles), arapfields::is_closed(vertices, triangles)});
+}
+
+SignedDistance::~SignedDistance() = default;
+SignedDistance::SignedDistance(SignedDistance&&) noexcept = default;
+
+bool SignedDistance::is_closed() const { return parts_->closed; }
+
+void SignedDistance::evaluate(PointsIn points, Eigen::Ref<Vector> distances, const Progress& progress) const {
+  const Hierarchy& hierarchy = parts_->hierarchy;
+  require_usable(points, hierarchy);
+  for_blocks(points, hierarchy, progress, [&](const Block& block) {
+    const HierarchyView view = hierarchy.view();
+    std::array<Nearest, block_size> nearest;
+    run_nearest(view, block, nearest.data());
+    std::array<bool, block_size> inside;
+    if (parts_->closed) {
+      integer_sides(view, block, nearest.data(), inside.data());
+    } else {
+      std::array<double, block_size> numbers;
+      run_winding(view, block.points.data(), block.count, opening_of_signs, numbers.data());
+      for (std::size_t i = 0; i < inside.size(); ++i) inside[i] = numbers[i] > 0.5;
+    }
+    for (std::size_t i = 0; i < static_cast<std::size_t>(block.count); ++i) {
+      const double distance = std::sqrt(nearest[i].squared_distance) / hierarchy.factor();
+      distances[block.rows[i]] = inside[i] ? -distance : distance;
+    }
+  });
+}
+
+void SignedDistance::unsigned_distance(PointsIn points, Eigen::Ref<Vector> distances,
+                                       const Progress& progress) const {
+  const Hierarchy& hierarchy = parts_->hierarchy;
+  require_usable(points, hierarchy);
+  for_blocks(points, hierarchy, progress, [&](const Block& block) {
+    std::array<Nearest, block_size> nearest;
+    run_nearest(hierarchy.view(), block, nearest.data());
+    for (std::size_t i = 0; i < static_cast<std::size_t>(block.count); ++i)
+      distances[block.rows[i]] = std::sqrt(nearest[i].squared_distance) / hierarchy.factor();
+  });
+}
+
+ClosestPoints SignedDistance::closest(PointsIn points, const Progress& progress) const {
+  const Hierarchy& hierarchy = parts_->hierarchy;
+  require_usable(points, hierarchy);
+  ClosestPoints result{Points(points.rows(), 3), {}, Vector(points.rows())};
+  result.triangles.resize(static_cast<std::size_t>(points.rows()));
+  for_blocks(points, hierarchy, progress, [&](const Block& block) {
+    const HierarchyView view = hierarchy.view();
+    std::array<Nearest, block_size> nearest;
+    run_nearest(view, block, nearest.data());
+    for (std::size_t i = 0; i < static_cast<std::size_t>(block.count); ++i) {
+      const TrianglePacket& packet = view.packets[nearest[i].packet];
+      const auto lane = std::find(packet.triangle, packet.triangle + tree_width, nearest[i].triangle);
+      const Vec3 query = Eigen::Map<const Vec3>(block.points.data() + 3 * i);
+      const Vec3 point = closest_point(packet, static_cast<int>(lane - packet.triangle), query);
+      result.points.row(block.rows[i]) = hierarchy.restored(point).transpose();
+      result.triangles[static_cast<std::size_t>(block.rows[i])] = nearest[i].triangle;
+      result.distances[block.rows[i]] = std::sqrt(nearest[i].squared_distance) / hierarchy.factor();
+    }
+  });
+  return result;
+}
+
+void SignedDistance::winding_number(PointsIn points, Eigen::Ref<Vector> numbers,
+                                    const Progress& progress) const {
+  const Hierarchy& hierarchy = parts_->hierarchy;
+  require_usable(points, hierarchy);
+  for_blocks(points, hierarchy, progress, [&](const Block& block) {
+    std::array<double, block_size> values;
+    run_winding(hierarchy.view(), block.points.data(), block.count, opening_of_numbers, values.data());
+    for (std::size_t i = 0; i < static_cast<std::size_t>(block.count); ++i)
+      numbers[block.rows[i]] = values[i];
+  });
+}
+
+Vector signed_distance(PointsIn vertices, TrianglesIn triangles, PointsIn points, int threads,
+                       const Progress& progress) {
+  const ThreadScope scope(threads);
+  Vector distances(points.rows());
+  SignedDistance(vertices, triangles).evaluate(points, distances, progress);
+  return distances;
+}
+
+}  // namespace arapfields

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "core/types.h"
+
+namespace arapfields {
+
+struct Box {
+  Eigen::Array3f low = Eigen::Array3f::Constant(3e38f);
+  Eigen::Array3f high = Eigen::Array3f::Constant(-3e38f);
+  void grow(const Box& other) {
+    low = low.min(other.low);
+    high = high.max(other.high);
+  }
+  float half_area() const {
+    const Eigen::Array3f d = high - low;
+    return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
+  }
+};
+
+/// A triangle while the hierarchy is being built: its box, rounded outwards.
+struct Primitive {
+  Box box;
+  std::int32_t triangle;
+};
+
+/// A run of primitives that becomes one child; `level` counts the splits that led to it.
+struct PrimitiveRange {
+  Index begin = 0, end = 0;
+  int level = 0;
+  Box box;
+  Index size() const { return end - begin; }
+};
+
+/// Rearranges the range's primitives and returns its two parts, neither empty: the best of binned planes by
+/// the surface area heuristic (Wald 2007, "On fast Construction of SAH-based Bounding Volume Hierarchies"),
+/// where a part costs its area times the packets it will fill.
+std::pair<PrimitiveRange, PrimitiveRange> split(std::vector<Primitive>& primitives,
+                                                const PrimitiveRange& range);
+
+}  // namespace arapfields

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "mesh/triangle_mesh.h"
+
+#include <string>
+#include <vector>
+
+#include "core/errors.h"
+
+namespace arapfields {
+
+void validate(PointsIn vertices, TrianglesIn triangles) {
+  require(vertices.rows() > 0, "vertices", "there are none", "a mesh needs at least three");
+  require(vertices.rows() <= INT32_MAX, "vertices", std::to_string(vertices.rows()) + " of them",
+          "32-bit indices reach " + std::to_string(INT32_MAX));
+  require(triangles.rows() > 0, "triangles", "there are none", "a mesh needs at least one");
+  require(triangles.rows() <= INT32_MAX, "triangles", std::to_string(triangles.rows()) + " of them",
+          "at most " + std::to_string(INT32_MAX) + " are supported");
+  for (Index i = 0; i < vertices.rows(); ++i)
+    require(vertices.row(i).allFinite(), "vertices", "vertex " + std::to_string(i) + " is NaN or infinite",
+            "all coordinates must be finite");
+  const auto count = static_cast<std::int32_t>(vertices.rows());
+  for (Index t = 0; t < triangles.rows(); ++t)
+    for (int corner = 0; corner < 3; ++corner) {
+      const std::int32_t index = triangles(t, corner);
+      require(index >= 0 && index < count, "triangles",
+              "triangle " + std::to_string(t) + " refers to vertex " + std::to_string(index),
+              "indices 0 to " + std::to_string(count - 1) + " exist");
+    }
+}
+
+Points used_vertices(PointsIn vertices, TrianglesIn triangles) {
+  std::vector<char> used(static_cast<std::size_t>(vertices.rows()), 0);
+  for (Index i = 0; i < triangles.size(); ++i) used[static_cast<std::size_t>(triangles.data()[i])] = 1;
+  Points result(vertices.rows(), 3);
+  Index count = 0;
+  for (Index i = 0; i < vertices.rows(); ++i)
+    if (used[static_cast<std::size_t>(i)]) result.row(count++) = vertices.row(i);
+  result.conservativeResize(count, 3);
+  return result;
+}
+
+}  // namespace arapfields
