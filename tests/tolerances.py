@@ -16,3 +16,11 @@ FLOAT64_ROTATION = 1e-13
 FLOAT32_ENERGY = 2e-5
 # g(n_k) = 1: what the refined solution of the linear system leaves.
 GAUSS_WEIGHTS = 1e-10
+# Distances against libigl's, as a share of the bounding box's diagonal: both are exact to rounding.
+DISTANCE = 1e-12
+# Share of points on the same side as libigl's. On closed meshes only points within rounding of the surface
+# may differ; on open ones the boundary is where the winding number passes 1/2, which both approximate.
+SIGN_AGREEMENT_CLOSED = 0.9999
+SIGN_AGREEMENT_OPEN = 0.999
+# Winding numbers against sums of solid angles: what the multipoles leave out.
+WINDING = 1e-3

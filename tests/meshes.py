@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes that tests share: vertices (n,3) float64, triangles (m,3) int64, counter-clockwise from outside."""
+
+import functools
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+
+def grid_triangles(rows, columns, wrap_rows=False, wrap_columns=False):
+    """Two triangles a cell of a rows × columns grid of vertices; wrapping joins its borders."""
+    i, j = np.meshgrid(
+        np.arange(rows if wrap_rows else rows - 1), np.arange(columns if wrap_columns else columns - 1)
+    )
+    i, j = i.ravel(), j.ravel()
+    k, l = (i + 1) % rows, (j + 1) % columns
+    a, b, c, d = i * columns + j, k * columns + j, k * columns + l, i * columns + l
+    return np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+
+
+def torus(major=1.0, minor=0.4, around=48, tube=24):
+    u = np.linspace(0, 2 * np.pi, around, endpoint=False)[:, None]
+    v = np.linspace(0, 2 * np.pi, tube, endpoint=False)[None, :]
+    ring = major + minor * np.cos(v)
+    points = np.stack([ring * np.cos(u), ring * np.sin(u), minor * np.sin(v) + 0 * u], -1)
+    return points.reshape(-1, 3), grid_triangles(around, tube, True, True)
+
+
+def sphere(radius=1.0, subdivisions=3):
+    """An octahedron, its triangles quartered and its vertices moved out to the sphere."""
+    vertices = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
+    upper = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4]]
+    triangles = np.array(upper + [[b, a, 5] for a, b, _ in upper])
+    for _ in range(subdivisions):
+        vertices, triangles = subdivide(vertices, triangles)
+    return radius * vertices / np.linalg.norm(vertices, axis=1, keepdims=True), triangles
+
+
+def subdivide(vertices, triangles):
+    """Every triangle into four, through the middles of its edges; the surface stays as it is."""
+    edges = np.sort(
+        np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1
+    )
+    edges, which = np.unique(edges, axis=0, return_inverse=True)
+    ab, bc, ca = which.reshape(3, -1) + len(vertices)
+    a, b, c = triangles.T
+    parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+    middles = vertices[edges].mean(axis=1)
+    return np.concatenate([vertices, middles]), np.concatenate([np.stack(p, 1) for p in parts])
+
+
+def box(half=(1.0, 1.0, 1.0)):
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * np.asarray(
+        half, float
+    )
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    return corners, np.array([t for a, b, c, d in quads for t in ([a, b, c], [a, c, d])])
+
+
+def read(path):
+    """Vertices and triangles of an OBJ or OFF file; larger faces become fans."""
+    path = Path(path)
+    lines = [line.split() for line in path.read_text().splitlines() if line.strip() and line[0] != "#"]
+    if path.suffix == ".off":
+        count, faces = int(lines[1][0]), int(lines[1][1])
+        vertices = [row[:3] for row in lines[2 : 2 + count]]
+        polygons = [
+            [int(i) for i in row[1 : 1 + int(row[0])]] for row in lines[2 + count : 2 + count + faces]
+        ]
+    else:
+        vertices = [row[1:4] for row in lines if row[0] == "v"]
+        polygons = [[int(i.split("/")[0]) - 1 for i in row[1:]] for row in lines if row[0] == "f"]
+    triangles = [(p[0], p[k], p[k + 1]) for p in polygons for k in range(1, len(p) - 1)]
+    return np.array(vertices, float), np.array(triangles)
+
+
+@functools.cache
+def suzanne():
+    """Blender's monkey: open at the eyes, and its parts run through each other. Needs the bpy package."""
+    code = (
+        "import sys, bpy, numpy as np\n"
+        "bpy.ops.mesh.primitive_monkey_add()\n"
+        "mesh = bpy.context.object.data\n"
+        "mesh.calc_loop_triangles()\n"
+        "np.savez(sys.argv[1], v=[tuple(v.co) for v in mesh.vertices],\n"
+        "         f=[tuple(t.vertices) for t in mesh.loop_triangles])\n"
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "suzanne.npz"
+        subprocess.run([sys.executable, "-c", code, str(file)], check=True, capture_output=True)
+        arrays = np.load(file)
+        return arrays["v"].astype(float), arrays["f"].astype(np.int64)
