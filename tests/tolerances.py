@@ -24,3 +24,6 @@ SIGN_AGREEMENT_CLOSED = 0.9999
 SIGN_AGREEMENT_OPEN = 0.999
 # Winding numbers against sums of solid angles: what the multipoles leave out.
 WINDING = 1e-3
+# Published networks in single precision against PyTorch in double.
+PUBLISHED_VALUE = 1e-5
+PUBLISHED_GRADIENT = 1e-4

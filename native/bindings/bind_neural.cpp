@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bindings/bind.h"
-#include "neural/layers.h"
+#include "neural/neural_sdf.h"
 
 namespace arapfields::python {
 namespace {
@@ -18,6 +18,114 @@ py::array_t<double> as_array(const Vector& flat, const std::vector<Index>& shape
   py::array_t<double> array(shape);
   Eigen::Map<Vector>(array.mutable_data(), flat.size()) = flat;
   return array;
+}
+
+Points finite_points(const py::object& points) {
+  Points p = as_points(points, "points");
+  require(p.allFinite(), "points", "some coordinates are NaN or infinite", "all must be finite");
+  return p;
+}
+
+/// Runs `call`, and names the file in what it finds wrong with the file's content.
+template <class Call>
+auto naming_file(const py::object& path, Call&& call) {
+  const std::string name = py::cast<std::string>(py::str(path));
+  try {
+    return call();
+  } catch (const InvalidInput& error) {
+    throw InvalidInput(name, "cannot be loaded", error.what());
+  } catch (const py::error_already_set& error) {
+    if (!error.matches(PyExc_KeyError) && !error.matches(PyExc_TypeError)) throw;
+    throw InvalidInput(name, "cannot be loaded", "an entry is missing or of the wrong type");
+  } catch (const py::cast_error&) {
+    throw InvalidInput(name, "cannot be loaded", "an entry is of the wrong type");
+  }
+}
+
+void save(const py::object& self, const py::object& path) {
+  const NeuralSdf& sdf = py::cast<const NeuralSdf&>(self);
+  const MlpShape& shape = sdf.mlp().shape();
+  const Layers layers = layers_of(sdf.mlp());
+  py::list weights, biases;  // single precision holds all there is
+  for (const RowMatrix<double>& weight : layers.weights)
+    weights.append(RowMatrix<float>(weight.cast<float>()));
+  for (const Vector& bias : layers.biases) biases.append(VectorF(bias.cast<float>()));
+  const py::dict network("octaves"_a = shape.octaves, "frequency"_a = shape.frequency,
+                         "sharpness"_a = shape.sharpness, "weights"_a = weights, "biases"_a = biases);
+  const py::dict frame("center"_a = sdf.frame().center, "scale"_a = sdf.frame().scale);
+  py::module_::import("arapfields._files")
+      .attr("save_state")(
+          path, "sdf", py::dict("network"_a = network, "frame"_a = frame, "report"_a = self.attr("report")));
+}
+
+py::object load(const py::object& path) {
+  const py::dict state = py::module_::import("arapfields._files").attr("load_state")(path, "sdf");
+  return naming_file(path, [&] {
+    const py::dict network = state["network"], place = state["frame"];
+    const Frame frame{as_vec3(place["center"], "center"), py::cast<double>(place["scale"])};
+    require(std::isfinite(frame.scale) && frame.scale > 0, "scale", "got " + std::to_string(frame.scale),
+            "must be positive");
+    py::object sdf = py::cast(NeuralSdf::from_layers(
+        as_layers(network["weights"], network["biases"]), py::cast<int>(network["octaves"]),
+        py::cast<double>(network["frequency"]), py::cast<double>(network["sharpness"]), frame));
+    sdf.attr("_report") = py::dict(state["report"]);
+    return sdf;
+  });
+}
+
+void bind_sdf(py::module_& module) {
+  py::class_<ImplicitFunction, std::shared_ptr<ImplicitFunction>>(
+      module, "ImplicitFunction",
+      "A function on the unit cube whose zero set is a surface; negative inside.");
+  py::class_<NeuralSdf, ImplicitFunction, std::shared_ptr<NeuralSdf>>(
+      module, "NeuralSdf", py::dynamic_attr(),
+      "A signed distance function by a network: negative inside, in the mesh's coordinates and unit.\n\n"
+      "Positional encoding, then layers of softplus units.\n"
+      "Made by fit_sdf, from_layers or load. Outside the frame's cube, where the network has learnt "
+      "nothing:\n"
+      "its value at the cube's nearest point plus the distance to that point.")
+      .def_static(
+          "from_layers",
+          [](const py::sequence& weights, const py::sequence& biases, int octaves, double frequency,
+             double sharpness) {
+            return NeuralSdf::from_layers(as_layers(weights, biases), octaves, frequency, sharpness);
+          },
+          "weights"_a, "biases"_a, "octaves"_a = 4, "frequency"_a = 1.0, "sharpness"_a = 30.0,
+          "A published network, in cube coordinates (its frame is the identity).\n\n"
+          "weights[l] (out, in) and biases[l] (out,) of each layer, the last with one output; the first "
+          "takes\n"
+          "6*octaves numbers: for x, y, z in turn and k < octaves, cos(2^k*frequency*c), "
+          "sin(2^k*frequency*c).\n"
+          "sharpness is softplus's beta. InvalidInput where shapes do not fit or numbers are not finite.")
+      .def(
+          "__call__",
+          [](const NeuralSdf& sdf, const py::object& points) {
+            const Points p = finite_points(points);
+            return run_long(nullptr, [&](const Progress&) { return sdf.distances(p); });
+          },
+          "points"_a, "Distances (p,) at points (p,3), negative inside; mesh coordinates and unit.")
+      .def(
+          "gradient",
+          [](const NeuralSdf& sdf, const py::object& points) {
+            const Points p = finite_points(points);
+            return run_long(nullptr, [&](const Progress&) { return sdf.gradients(p); });
+          },
+          "points"_a, "Derivatives (p,3) of the distance by the point: about unit length, pointing outwards.")
+      .def_property_readonly("frame", &NeuralSdf::frame, "Mesh coordinates and the unit cube.")
+      .def_property_readonly(
+          "report", [](const py::object& self) { return py::getattr(self, "_report", py::dict()); },
+          "What the fit measured, as a dict (see fit_sdf); empty for none.")
+      .def("save", &save, "path"_a,
+           "Writes network, frame and report as one file, whole or not at all; OSError where that fails.")
+      .def_static(
+          "load", &load, "path"_a,
+          "What save() wrote. OSError for a file that cannot be read, InvalidInput naming the file for\n"
+          "one that is damaged, foreign, of another kind or version, or holds unusable numbers.")
+      .def("__repr__", [](const NeuralSdf& sdf) {
+        const MlpShape& s = sdf.mlp().shape();
+        return py::str("NeuralSdf({} x {}, octaves={}, frequency={:g})")
+            .format(s.layers, s.width, s.octaves, s.frequency);
+      });
 }
 
 void bind_testing(py::module_& module) {
@@ -45,6 +153,9 @@ void bind_testing(py::module_& module) {
 
 }  // namespace
 
-void bind_neural(py::module_& module) { bind_testing(module); }
+void bind_neural(py::module_& module) {
+  bind_sdf(module);
+  bind_testing(module);
+}
 
 }  // namespace arapfields::python
