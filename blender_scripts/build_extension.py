@@ -23,8 +23,12 @@ def arguments():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--output", type=Path, default=ROOT / "dist")
     parser.add_argument("--build", type=Path, default=ROOT / "build/wheel", help="CMake build folder to take")
-    parser.add_argument("--python", nargs="+", metavar="X.Y", help="Pythons that must be served (default: at hand)")
-    parser.add_argument("--python-include", nargs="+", default=[], metavar="DIR", help="further folders with Python.h")
+    parser.add_argument(
+        "--python", nargs="+", metavar="X.Y", help="Pythons that must be served (default: at hand)"
+    )
+    parser.add_argument(
+        "--python-include", nargs="+", default=[], metavar="DIR", help="further folders with Python.h"
+    )
     return parser.parse_args()
 
 
@@ -60,7 +64,9 @@ def build_wheel(options, version, headers, work):
     if foreign:
         raise RuntimeError(f"the libraries need what would not be shipped: {', '.join(foreign)}")
     print("needs glibc {}.{} or newer".format(*libraries.glibc_floor([shipped[0], *modules])))
-    scripts = [path for path in package.iterdir() if path.suffix in (".py", ".pyi") or path.name == "py.typed"]
+    scripts = [
+        path for path in package.iterdir() if path.suffix in (".py", ".pyi") or path.name == "py.typed"
+    ]
     files = {f"arapfields/{path.name}": path for path in [*shipped, *modules, *scripts]}
     licence = (ROOT / "LICENSE").read_text()
     return wheel.write_wheel(options.output / "wheels", "arapfields", version, WHEEL_TAG, files, licence)

@@ -49,7 +49,9 @@ def prepare_libraries(library, torch_libraries, output):
     output.mkdir(parents=True, exist_ok=True)
     names = bundled_closure(library, torch_libraries)
     if not any("torch" in name for name in names):
-        raise RuntimeError(f"{library} needs no library of {torch_libraries}; is it built against that torch?")
+        raise RuntimeError(
+            f"{library} needs no library of {torch_libraries}; is it built against that torch?"
+        )
     renamed = {name: private_name(name) for name in names}
     copies = [(library, output / library.name, None)]
     copies += [(torch_libraries / name, output / renamed[name], renamed[name]) for name in names]

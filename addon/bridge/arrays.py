@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes as arrays: what Blender shows of an object (modifiers, shape keys), and meshes from arrays."""
+
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..core.errors import UserError
+
+
+@dataclass(frozen=True)
+class MeshArrays:
+    """An evaluated mesh in local coordinates."""
+
+    vertices: np.ndarray  # (n, 3) float64
+    triangles: np.ndarray  # (m, 3) int32
+
+
+@contextmanager
+def evaluated_mesh(context, source):
+    """The mesh as shown, for as long as the block runs."""
+    depsgraph = context.evaluated_depsgraph_get()
+    evaluated = source.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    if mesh is None:
+        raise UserError(f"{source.name}: Blender gives no mesh for it")
+    try:
+        yield mesh
+    finally:
+        evaluated.to_mesh_clear()
+
+
+def positions(mesh):
+    """(n, 3) vertex positions of a mesh, as float64."""
+    flat = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+    attribute = mesh.attributes.get("position")
+    if attribute is not None:
+        attribute.data.foreach_get("vector", flat)
+    else:
+        mesh.vertices.foreach_get("co", flat)
+    return flat.reshape(-1, 3).astype(np.float64)
+
+
+def set_positions(mesh, points):
+    """Moves the vertices of a mesh and nothing else."""
+    flat = np.ascontiguousarray(points, dtype=np.float32).ravel()
+    attribute = mesh.attributes.get("position")
+    if attribute is not None:
+        attribute.data.foreach_set("vector", flat)
+    else:
+        mesh.vertices.foreach_set("co", flat)
+    mesh.update()
+
+
+def triangles(mesh):
+    """(m, 3) corners of the mesh's triangles, its larger faces split as Blender draws them."""
+    mesh.calc_loop_triangles()
+    flat = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
+    mesh.loop_triangles.foreach_get("vertices", flat)
+    return flat.reshape(-1, 3)
+
+
+def read(context, source):
+    """What there is to fit of an object; UserError that names it when there is nothing."""
+    with evaluated_mesh(context, source) as mesh:
+        arrays = MeshArrays(positions(mesh), triangles(mesh))
+    if not len(arrays.vertices):
+        raise UserError(f"{source.name}: the mesh is empty")
+    broken = np.flatnonzero(~np.isfinite(arrays.vertices).all(axis=1))
+    if len(broken):
+        raise UserError(
+            f"{source.name}: {len(broken)} vertices have no finite position, the first is {broken[0]}"
+        )
+    if not len(arrays.triangles):
+        raise UserError(f"{source.name}: the mesh has no faces")
+    return arrays
+
+
+def new_mesh(name, vertices, corners):
+    """A smooth-shaded triangle mesh from (n, 3) positions and (m, 3) corners."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(len(vertices))
+    mesh.loops.add(3 * len(corners))
+    mesh.polygons.add(len(corners))
+    mesh.vertices.foreach_set("co", np.ascontiguousarray(vertices, dtype=np.float32).ravel())
+    mesh.loops.foreach_set("vertex_index", np.ascontiguousarray(corners, dtype=np.int32).ravel())
+    mesh.polygons.foreach_set("loop_start", np.arange(0, 3 * len(corners), 3, dtype=np.int32))
+    mesh.update(calc_edges=True)
+    return mesh

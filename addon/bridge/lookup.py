@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Objects across ticks of a job: found again by their session's number, never kept as references."""
+
+import bpy
+
+from ..core.errors import UserError
+from ..names import PROPERTY
+
+
+class ObjectId:
+    """Stands for an object while a job runs; the object may be renamed, undone or deleted meanwhile."""
+
+    def __init__(self, item):
+        self.name, self.uid = item.name, item.session_uid
+
+    def get(self):
+        for item in bpy.data.objects:
+            if item.session_uid == self.uid:
+                return item
+        raise UserError(f"{self.name} was deleted while it was worked on")
+
+
+def settings_of(item):
+    return getattr(item, PROPERTY)
+
+
+def source_of(context):
+    """The mesh object that the panel and the operators work on, or None.
+
+    The active object when it is a mesh; the owner of the active handle or result.
+    """
+    active = context.view_layer.objects.active if context.view_layer else None
+    if active is None:
+        return None
+    ours = settings_of(active)
+    if active.type == "EMPTY":
+        if ours.handle_of is not None:
+            return ours.handle_of
+        meshes = [item for item in context.selected_objects if item.type == "MESH"]
+        return meshes[0] if len(meshes) == 1 else None
+    if active.type != "MESH":
+        return None
+    return ours.result_of if ours.result_of is not None else active
+
+
+def refusal(item):
+    """Why an object cannot be worked on, or an empty text."""
+    if item is None:
+        return "Select a mesh object"
+    if item.type != "MESH":
+        return f"{item.name} is no mesh object"
+    if item.mode == "EDIT":
+        return f"{item.name} is in Edit Mode; leave it first"
+    return ""

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What deforming and stylizing share: a field is solved on the worker, then moves a mesh."""
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..core.errors import UserError
+from ..core.jobs import Item
+from . import results
+from .settings import chosen
+from .work import read_surface, settings_of
+
+
+@dataclass
+class Moved:
+    """What the worker hands back, in local coordinates."""
+
+    vertices: np.ndarray
+    corners: np.ndarray | None  # of the implicit surface; None for the source's own mesh
+    report: dict
+
+
+def plan_move(context, operator, source, kind, samples, seed, solve):
+    """The job's item. `solve(stages, surface, samples)` returns the field, on the worker."""
+    surface = read_surface(context, source)
+    ours = settings_of(source)
+    output = chosen("output", ours, operator)
+    cells = chosen("resolution", ours, operator)
+    choice = chosen("surface", ours, operator)
+    use_fit = choice == "FIT" or output == "SURFACE" or (choice == "AUTO" and surface.is_cached)
+
+    def work(stages):
+        field = solve(stages, surface, surface.samples(stages, samples, seed, use_fit))
+        before, corners = surface.vertices, None
+        if output == "SURFACE":
+            before, corners = surface.extract(stages, cells, 0.1)
+            if not len(corners):
+                raise UserError("the fitted surface is empty; fit with more quality")
+        after = field(before)
+        if not np.isfinite(after).all():
+            raise UserError("the result has vertices that are not finite; try other settings")
+        return Moved(surface.space.to_local(after), corners, {"output": output, **dict(field.report)})
+
+    def apply(moved):
+        owner = surface.who.get()
+        if moved.corners is not None:
+            mesh = results.surface_mesh(owner, moved.vertices, moved.corners)
+        else:
+            mesh = results.warp_mesh(bpy.context, owner, surface.local, moved.vertices)
+        item = results.show(bpy.context, owner, kind, output, mesh, moved.report)
+        if mesh.shape_keys is not None:
+            results.add_warp_key(item, surface.local, moved.vertices)
+        return describe(item, moved.report)
+
+    return Item(source.name, work, apply)
+
+
+def describe(item, report):
+    figures = [f"{item.name}"]
+    if "energy" in report:
+        figures.append(f"energy {report['energy']:.4g}")
+    if report.get("handle_error_mean"):
+        figures.append(f"handles off by {report['handle_error_mean']:.2g} on average")
+    if report.get("flipped_share"):
+        figures.append(f"{report['flipped_share']:.1%} folded")
+    return ", ".join(figures)

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Result objects: made once for a source and kind, updated in place by later runs."""
+
+import json
+
+import bpy
+
+from ..core.errors import UserError
+from ..names import REPORT, RESULT_SUFFIX, RESULTS, WARP_KEY
+from . import arrays
+from .lookup import settings_of
+
+
+def collection(context):
+    """The scene's collection for results; each scene has its own."""
+    for child in context.scene.collection.children:
+        if child.name.split(".")[0] == RESULTS and child.library is None:
+            return child
+    made = bpy.data.collections.new(RESULTS)
+    context.scene.collection.children.link(made)
+    return made
+
+
+def existing(context, source, kind, output):
+    """The result that an earlier run made, where it can be written to."""
+    for entry in settings_of(source).results:
+        item = entry.item
+        if entry.kind == kind and entry.output == output and item is not None:
+            if item.mode == "EDIT" or item.library or context.scene.objects.get(item.name) != item:
+                continue
+            return item
+    return None
+
+
+def register(source, kind, output, item):
+    entries = settings_of(source).results
+    for index in reversed(range(len(entries))):
+        if entries[index].item is None or (entries[index].kind == kind and entries[index].output == output):
+            entries.remove(index)
+    entry = entries.add()
+    entry.kind, entry.output, entry.item = kind, output, item
+    settings_of(item).result_of = source
+
+
+def show(context, source, kind, output, mesh, report):
+    """Puts the mesh on the source's result object of that kind, exactly where the source is."""
+    item = existing(context, source, kind, output)
+    mesh.name = f"{source.name}{RESULT_SUFFIX[kind]}"
+    if item is None:
+        item = bpy.data.objects.new(f"{source.name}{RESULT_SUFFIX[kind]}", mesh)
+        collection(context).objects.link(item)
+    else:
+        old, item.data = item.data, mesh
+        if old.users == 0:
+            bpy.data.meshes.remove(old)
+    register(source, kind, output, item)
+    item.matrix_world = source.matrix_world.copy()
+    item[REPORT] = json.dumps(report)
+    if context.view_layer.objects.active == source:
+        select_only(context, item)
+    return item
+
+
+def select_only(context, item):
+    if context.mode != "OBJECT":
+        return
+    for other in context.selected_objects:
+        other.select_set(False)
+    item.select_set(True)
+    context.view_layer.objects.active = item
+
+
+def surface_mesh(source, vertices, corners):
+    """A mesh of the implicit surface, in local coordinates, with the source's materials."""
+    mesh = arrays.new_mesh(source.name, vertices, corners)
+    for material in source.data.materials:
+        mesh.materials.append(material)
+    return mesh
+
+
+def warp_mesh(context, source, before, after):
+    """A copy of the source's mesh whose vertices, (n, 3) `before` as shown, lie at `after`.
+
+    All else on the mesh is kept. Where modifiers changed the vertices, the copy is of the mesh as shown.
+    """
+    copied = source.data.copy()
+    if keeps_vertices(source, copied, before):
+        if copied.shape_keys is None:
+            arrays.set_positions(copied, after)
+        return copied
+    bpy.data.meshes.remove(copied)
+    depsgraph = context.evaluated_depsgraph_get()
+    evaluated = source.evaluated_get(depsgraph)
+    applied = bpy.data.meshes.new_from_object(evaluated, preserve_all_data_layers=True, depsgraph=depsgraph)
+    if len(applied.vertices) != len(after):
+        bpy.data.meshes.remove(applied)
+        raise UserError(f"{source.name} changed while it was worked on; run again")
+    arrays.set_positions(applied, after)
+    return applied
+
+
+def keeps_vertices(source, mesh, before):
+    """Whether the object is shown with just the vertices of its own mesh: no modifier is at work."""
+    shown = [modifier for modifier in source.modifiers if modifier.show_viewport]
+    keys = mesh.shape_keys
+    usable = keys is None or (keys.use_relative and not source.show_only_shape_key)
+    return not shown and usable and len(mesh.vertices) == len(before)
+
+
+def add_warp_key(item, before, after):
+    """On a mesh with shape keys the motion is a key of its own: every other key and slider stays as it is."""
+    import numpy as np
+
+    keys = item.data.shape_keys
+    old = keys.key_blocks.get(WARP_KEY)
+    if old is not None:
+        item.shape_key_remove(old)
+    key = item.shape_key_add(name=WARP_KEY, from_mix=False)
+    basis = np.empty(3 * len(before), dtype=np.float32)
+    key.relative_key.data.foreach_get("co", basis)
+    moved = basis.reshape(-1, 3) + (after - before)
+    key.data.foreach_set("co", np.ascontiguousarray(moved, dtype=np.float32).ravel())
+    key.value = 1.0
+    item.data.update()

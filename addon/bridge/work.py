@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The work of one object, read on the main thread and run on the worker: surface, samples, extraction."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..core import native
+from ..core.fit_cache import FitCache, fit_key
+from ..core.parameters import FIT, native_options
+from ..core.spaces import Space, space_of
+from . import arrays, settings
+from .lookup import ObjectId, settings_of
+
+VERSION = 1  # raised whenever fits of older versions must not be used
+
+
+@dataclass
+class Surface:
+    """A source in solve space, with what its fit needs."""
+
+    who: ObjectId
+    space: Space
+    local: np.ndarray  # (n, 3) vertices as shown
+    vertices: np.ndarray  # (n, 3) the same in solve space
+    triangles: np.ndarray
+    fit_options: dict
+    key: str
+    cache: FitCache
+    machine: dict = field(default_factory=dict)
+
+    @property
+    def is_cached(self):
+        return self.cache.path(self.key).exists()
+
+    def fit(self, stages, share, again=False):
+        """The fitted surface, from the cache unless it shall be made `again`; runs on the worker."""
+        af = native.library()
+        ready = None if again else self.cache.load(self.key, af.NeuralSdf.load)
+        if ready is not None:
+            return ready
+        options = af.FitOptions(**self.fit_options, **known(af.FitOptions, self.machine))
+        sdf = af.fit_sdf(self.vertices, self.triangles, options, stages.start("Fitting", share))
+        self.cache.save(self.key, sdf.save)
+        return sdf
+
+    def samples(self, stages, count, seed, use_fit):
+        """Points spread evenly over the surface: the fit's when there is one, else the triangles'."""
+        af = native.library()
+        if use_fit:
+            sdf = self.fit(stages, 0.3)
+            return af.sample_surface(sdf, count=count, seed=seed, task=stages.start("Sampling", 0.1))
+        return af.sample_mesh(self.vertices, self.triangles, count=count, seed=seed)
+
+    def extract(self, stages, resolution, share):
+        """(k, 3) vertices and (m, 3) corners of the implicit surface, in solve space."""
+        af = native.library()
+        sdf = self.fit(stages, share)
+        return af.extract_surface(sdf, resolution=resolution, task=stages.start("Extracting", 0.2))
+
+
+def known(options, values):
+    """The values that this class of native options has a field for."""
+    return {name: value for name, value in values.items() if name in options.fields}
+
+
+def read_surface(context, source, operator=None):
+    """Everything of a source that the worker needs; UserError when it cannot be worked on."""
+    context.view_layer.update()
+    mesh = arrays.read(context, source)
+    space = space_of(source.matrix_world, source.name)
+    vertices = space.to_solve(mesh.vertices)
+    group = settings_of(source).fit
+    if operator is None:
+        chosen = {p.name: settings.plain(getattr(group, p.name)) for p in FIT}
+    else:
+        chosen = settings.in_force(FIT, group, operator)
+    options = native_options(chosen)
+    key = fit_key(vertices, mesh.triangles, options, VERSION)
+    return Surface(
+        ObjectId(source),
+        space,
+        mesh.vertices,
+        vertices,
+        mesh.triangles,
+        options,
+        key,
+        settings.fit_cache(),
+        settings.machine_options(),
+    )

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The native library, or the reason why it cannot be used. Nothing here raises on import."""
+
+import importlib
+import platform
+import sys
+from pathlib import Path
+
+from .errors import UserError
+
+ADVICE = "Install arapfields-<version>-<platform>.zip of a release, not the source code"
+
+
+def library():
+    """The package `arapfields`; UserError when it cannot be used."""
+    text = problem()
+    if text:
+        raise UserError(text)
+    return sys.modules["arapfields"]
+
+
+_problem = None
+
+
+def problem():
+    """Why the native library cannot be used, in one sentence; empty when it can."""
+    global _problem
+    if _problem is None:
+        _problem = _try_import()
+    return _problem
+
+
+def forget():
+    """Lets the next call of `problem` try again."""
+    global _problem
+    _problem = None
+
+
+def _try_import():
+    try:
+        module = importlib.import_module("arapfields")
+        return "" if hasattr(module, "deform") else f"Another package named arapfields is installed. {ADVICE}"
+    except ModuleNotFoundError as error:
+        return _missing(error)
+    except Exception as error:  # a broken library must not keep the add-on from loading
+        return f"The native library cannot be loaded: {error}"
+
+
+def _missing(error):
+    if error.name == "arapfields":
+        return f"The native library is not part of this installation. {ADVICE}"
+    if error.name == "arapfields._native":
+        package = (
+            Path(sys.modules["arapfields"].__file__).parent if "arapfields" in sys.modules else _folder()
+        )
+        served = sorted(path.name.split("-")[1] for path in package.glob("_native.cpython-*"))
+        here = f"{sys.version_info.major}.{sys.version_info.minor}"
+        which = ", ".join(f"{tag[0]}.{tag[1:]}" for tag in served) or "none"
+        return f"This build has no module for Python {here} (it has: {which}). Take a build for this Blender"
+    return f"The native library lacks {error.name}. {ADVICE}"
+
+
+def _folder():
+    spec = importlib.util.find_spec("arapfields")
+    return Path(spec.origin).parent if spec and spec.origin else Path()
+
+
+def report():
+    """Lines about the library and the machine, for the preferences and for bug reports."""
+    lines = [f"Python {platform.python_version()}, {platform.system()} {platform.machine()}"]
+    if problem():
+        return [*lines, problem()]
+    native = library()
+    lines.append(f"arapfields {native.__version__} in {Path(native.__file__).parent}")
+    lines.append(f"{native.thread_count()} threads, kernels for {native.simd_level()}")
+    return lines

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+
+from ..bridge.settings import fit_cache
+from ..core import jobs, native
+from ..names import Op
+
+
+class ARAPFIELDS_OT_cancel(bpy.types.Operator):
+    """Stop the running job; nothing of it is kept"""
+
+    bl_idname = Op.CANCEL
+    bl_label = "Cancel"
+
+    @classmethod
+    def poll(cls, context):
+        if jobs.running() is None:
+            cls.poll_message_set("No job is running")
+        return jobs.running() is not None
+
+    def execute(self, context):
+        jobs.running().cancel()
+        return {"FINISHED"}
+
+
+class ARAPFIELDS_OT_clear_cache(bpy.types.Operator):
+    """Delete every fitted surface from disk; they are fitted again when needed"""
+
+    bl_idname = Op.CLEAR_CACHE
+    bl_label = "Clear Fits"
+
+    @classmethod
+    def poll(cls, context):
+        if jobs.running() is not None:
+            cls.poll_message_set("Wait for the running job, or cancel it")
+        return jobs.running() is None
+
+    def execute(self, context):
+        self.report({"INFO"}, f"{fit_cache().clear()} fitted surfaces deleted")
+        return {"FINISHED"}
+
+
+class ARAPFIELDS_OT_copy_report(bpy.types.Operator):
+    """Copy what is known about the native library and this machine, for a bug report"""
+
+    bl_idname = Op.COPY_REPORT
+    bl_label = "Copy Report"
+
+    def execute(self, context):
+        lines = [f"Blender {bpy.app.version_string}", *native.report()]
+        context.window_manager.clipboard = "\n".join(lines)
+        return {"FINISHED"}
+
+
+CLASSES = [ARAPFIELDS_OT_cancel, ARAPFIELDS_OT_clear_cache, ARAPFIELDS_OT_copy_report]

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What every section of the side panel shares."""
+
+from ..bridge import lookup
+from ..core import native
+from ..names import CATEGORY
+
+
+class Section:
+    """Mixin of the sections: where they are, and that a broken library or a missing source hides them."""
+
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = CATEGORY
+    needs_source = True
+
+    @classmethod
+    def poll(cls, context):
+        if native.problem():
+            return False
+        return not cls.needs_source or lookup.source_of(context) is not None
+
+    def draw(self, context):
+        source = lookup.source_of(context)
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
+        self.fill(context, source, lookup.settings_of(source) if source else None)
+
+
+def settings_column(layout, group, parameters, skip=()):
+    """The everyday parameters, and under them the advanced ones in a closed drawer."""
+    column = layout.column()
+    for parameter in parameters:
+        if not parameter.advanced and parameter.name not in skip:
+            column.prop(group, parameter.name)
+    further = [p for p in parameters if p.advanced and p.name not in skip]
+    if further:
+        header, body = layout.panel(f"arapfields_{type(group).__name__}", default_closed=True)
+        header.label(text="Advanced")
+        if body:
+            for parameter in further:
+                body.prop(group, parameter.name)
+
+
+def wrapped(layout, text, icon="NONE", width=46):
+    """A long text as several labels."""
+    import textwrap
+
+    column = layout.column(align=True)
+    for number, line in enumerate(textwrap.wrap(text, width)):
+        column.label(text=line, icon=icon if number == 0 else "BLANK1")

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+
+from ..core import jobs
+from ..names import Op
+from .section import Section, wrapped
+
+ICONS = {"INFO": "CHECKMARK", "WARNING": "ERROR", "ERROR": "CANCEL"}
+
+
+class ARAPFIELDS_PT_status(Section, bpy.types.Panel):
+    bl_label = "Status"
+    bl_idname = "ARAPFIELDS_PT_status"
+    bl_order = 6
+    needs_source = False
+
+    def fill(self, context, source, ours):
+        layout = self.layout
+        job = jobs.running()
+        if job is not None:
+            layout.progress(factor=job.fraction, text=f"{job.fraction:.0%}")
+            wrapped(layout, job.message)
+            left = job.remaining
+            layout.label(
+                text=f"{job.elapsed:.0f} s" + (f", about {left:.0f} s left" if left is not None else "")
+            )
+            layout.operator(Op.CANCEL, icon="X")
+        for level, text in jobs.notes():
+            wrapped(layout, text, icon=ICONS[level])
+        if job is None and not jobs.notes():
+            layout.label(text="Ready")
+
+
+CLASSES = [ARAPFIELDS_PT_status]

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import json
+
+import bpy
+
+from ..bridge.settings import fit_cache
+from ..core.parameters import FIT
+from ..names import Op
+from .section import Section, settings_column
+
+
+class ARAPFIELDS_PT_surface(Section, bpy.types.Panel):
+    bl_label = "Implicit Surface"
+    bl_idname = "ARAPFIELDS_PT_surface"
+    bl_order = 1
+
+    def fill(self, context, source, ours):
+        layout = self.layout
+        settings_column(layout, ours.fit, FIT)
+        layout.operator(Op.FIT, icon="MOD_REMESH")
+        if not ours.fit_key:
+            layout.label(text="Not fitted yet: optional for Original Mesh", icon="INFO")
+            return
+        kept = fit_cache().path(ours.fit_key).exists()
+        layout.label(
+            text="Fit in the cache" if kept else "Fit was cleared", icon="CHECKMARK" if kept else "ERROR"
+        )
+        for name, value in json.loads(ours.fit_report or "{}").items():
+            if isinstance(value, float) and "error" in name:
+                layout.label(text=f"{name.replace('_', ' ')}: {value:.3g}")
+
+
+CLASSES = [ARAPFIELDS_PT_surface]

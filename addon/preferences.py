@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+
+from .bridge import settings
+from .core import native
+from .names import PACKAGE, Op
+
+DEVICES = (
+    ("auto", "Automatic", "The fastest device that is found"),
+    ("cpu", "Processor", "The processor's cores"),
+    ("cuda", "CUDA", "A graphics card, where the native library was built for it"),
+)
+
+
+class ARAPFIELDS_AP_preferences(bpy.types.AddonPreferences):
+    bl_idname = PACKAGE
+
+    threads: bpy.props.IntProperty(
+        name="Threads", description="Threads that a job may use; 0 for all", default=0, min=0, max=256
+    )
+    device: bpy.props.EnumProperty(items=DEVICES, name="Device", description="Where jobs are computed")
+    cache_folder: bpy.props.StringProperty(
+        name="Fit Folder",
+        description="Where fitted surfaces are kept; empty for Blender's own folder for this extension",
+        subtype="DIR_PATH",
+    )
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop(self, "threads")
+        layout.prop(self, "device")
+        layout.prop(self, "cache_folder")
+        cache = settings.fit_cache()
+        row = layout.row()
+        row.label(text=f"{cache.size() / 1e6:.1f} MB of fitted surfaces in {cache.folder}")
+        row.operator(Op.CLEAR_CACHE)
+        box = layout.box()
+        for line in native.report():
+            box.label(text=line, icon="ERROR" if line == native.problem() else "NONE")
+        box.operator(Op.COPY_REPORT, icon="COPYDOWN")
+
+
+CLASSES = [ARAPFIELDS_AP_preferences]

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One handle of a source: its Empty and where that was at rest."""
+
+import bpy
+
+KINDS = (
+    ("CUBE", "Region", "What lies in the box at rest follows the Empty"),
+    ("POINT", "Point", "The point of the surface nearest to the Empty at rest follows it"),
+)
+
+
+class ARAPFIELDS_PG_handle(bpy.types.PropertyGroup):
+    empty: bpy.props.PointerProperty(type=bpy.types.Object, name="Empty", description="Moves the handle")
+    kind: bpy.props.EnumProperty(items=KINDS, name="Kind", description="What of the surface the handle holds")
+    rest: bpy.props.FloatVectorProperty(
+        size=16,
+        name="Rest Box",
+        description="The cube [-1, 1]³ → the object's coordinates, at rest (row by row)",
+    )
+    inside: bpy.props.IntProperty(
+        name="Points Inside",
+        description="Vertices in the rest box when it was stored; -1 when not counted",
+        default=-1,
+    )
+
+
+CLASSES = [ARAPFIELDS_PG_handle]

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""object.arapfields: the settings, handles and results of one object."""
+
+import bpy
+
+from ..names import PROPERTY
+from .handle import ARAPFIELDS_PG_handle
+from .settings import ARAPFIELDS_PG_deform, ARAPFIELDS_PG_fit, ARAPFIELDS_PG_stylize
+
+OUTPUTS = (
+    ("WARP", "Original Mesh", "The object's own vertices moved: UVs, materials, groups and topology stay"),
+    (
+        "SURFACE",
+        "Implicit Surface",
+        "A new mesh of the fitted surface, moved along: even triangles, no seams",
+    ),
+)
+SURFACES = (
+    ("AUTO", "Best at Hand", "The fitted surface where it is up to date, else the mesh's own triangles"),
+    ("FIT", "Fitted", "The fitted surface; it is fitted first where it is out of date"),
+    ("MESH", "Mesh", "The mesh's own triangles; no fit is needed"),
+)
+
+
+def output(**extra):
+    return bpy.props.EnumProperty(
+        items=OUTPUTS, name="Output", description="What the result is made of", **extra
+    )
+
+
+def surface(**extra):
+    return bpy.props.EnumProperty(
+        items=SURFACES, name="Surface", description="What the solve takes for the surface at rest", **extra
+    )
+
+
+def resolution(**extra):
+    return bpy.props.IntProperty(
+        name="Resolution",
+        description="Cells along the longest side of the implicit surface's grid",
+        default=256,
+        min=16,
+        max=512,
+        **extra,
+    )
+
+
+class ARAPFIELDS_PG_result(bpy.types.PropertyGroup):
+    item: bpy.props.PointerProperty(type=bpy.types.Object, name="Object", description="The result object")
+    kind: bpy.props.StringProperty(name="Kind", description="DEFORM, STYLIZE or EXTRACT")
+    output: bpy.props.StringProperty(name="Output", description="WARP or SURFACE")
+
+
+class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
+    fit: bpy.props.PointerProperty(type=ARAPFIELDS_PG_fit, name="Fit", description="Settings of the fit")
+    deform: bpy.props.PointerProperty(
+        type=ARAPFIELDS_PG_deform, name="Deform", description="Settings of the deformation"
+    )
+    stylize: bpy.props.PointerProperty(
+        type=ARAPFIELDS_PG_stylize, name="Stylize", description="Settings of the stylization"
+    )
+    handles: bpy.props.CollectionProperty(
+        type=ARAPFIELDS_PG_handle,
+        name="Handles",
+        description="Empties that hold and move parts of the object",
+    )
+    active_handle: bpy.props.IntProperty(
+        name="Active Handle", description="Row chosen in the list of handles"
+    )
+    handle_of: bpy.props.PointerProperty(
+        type=bpy.types.Object, name="Handle Of", description="The object that this Empty is a handle of"
+    )
+    result_of: bpy.props.PointerProperty(
+        type=bpy.types.Object, name="Result Of", description="The object that this result was made from"
+    )
+    results: bpy.props.CollectionProperty(
+        type=ARAPFIELDS_PG_result, name="Results", description="Objects made from this one"
+    )
+    output: output()
+    surface: surface()
+    resolution: resolution()
+    fit_key: bpy.props.StringProperty(name="Fit", description="Name of the object's last fit in the cache")
+    fit_report: bpy.props.StringProperty(
+        name="Fit Report", description="Figures of the object's last fit, as JSON"
+    )
+
+
+CLASSES = [ARAPFIELDS_PG_result, ARAPFIELDS_PG_object]
+
+
+def register():
+    setattr(
+        bpy.types.Object, PROPERTY, bpy.props.PointerProperty(type=ARAPFIELDS_PG_object, name="ARAP Fields")
+    )
+
+
+def unregister():
+    delattr(bpy.types.Object, PROPERTY)

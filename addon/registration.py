@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the extension registers, in order: a table of contents."""
+
+import bpy
+
+from . import panels, preferences
+from .bridge import jobs
+from .operators import deform, extract, fit, handles, status
+from .properties import handle, item, settings
+
+MODULES = [
+    *(handle, settings, item, preferences, jobs),
+    *(fit, handles, deform, extract, status),
+    *panels.SECTIONS,
+]
+
+
+def register():
+    done = []
+    try:
+        for module in MODULES:
+            done.append(module)
+            _register(module)
+    except Exception:
+        for module in reversed(done):
+            _unregister(module)
+        raise
+
+
+def unregister():
+    for module in reversed(MODULES):
+        _unregister(module)
+
+
+def _register(module):
+    for cls in getattr(module, "CLASSES", []):
+        bpy.utils.register_class(cls)
+    if hasattr(module, "register"):
+        module.register()
+
+
+def _unregister(module):
+    if hasattr(module, "unregister"):
+        module.unregister()
+    for cls in reversed(getattr(module, "CLASSES", [])):
+        if cls.is_registered:
+            bpy.utils.unregister_class(cls)
