@@ -21,9 +21,13 @@ class DeformationField {
 
   const Frame& frame() const { return frame_; }
   void set_frame(const Frame& frame) { frame_ = frame; }
+  /// Points (n,3) of the rest surface in cube coordinates, near which inverses are looked for; may be empty.
+  const Points& rest_points() const { return rest_points_; }
+  void set_rest_points(Points points) { rest_points_ = std::move(points); }
 
  private:
   Frame frame_;
+  Points rest_points_;
 };
 
 /// A field whose parameters a first-order method can train: it pulls the cotangents of its jets back to them.

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bindings/bind.h"
+#include "bindings/field_state.h"
+#include "fields/inverse.h"
+
+namespace arapfields::python {
+namespace {
+
+using FieldArray = py::array_t<double>;
+
+/// Jets at points of mesh coordinates, as one block.
+JetBlock<double> evaluate(const DeformationField& field, const py::object& points, JetOrder order,
+                          Index& count) {
+  const Points mesh = as_points(points, "points");
+  require(mesh.allFinite(), "points", "some coordinates are NaN or infinite", "all must be finite");
+  count = mesh.rows();
+  JetBlock<double> block(count, order);
+  run_long(nullptr, [&](const Progress&) { field.evaluate(field.frame().to_cube(mesh), block.view()); });
+  return block;
+}
+
+Points values(const DeformationField& field, const py::object& points) {
+  Index count = 0;
+  JetBlock<double> block = evaluate(field, points, JetOrder::value, count);
+  return field.frame().to_mesh(Eigen::Map<const Points>(block.view().data, count, 3));
+}
+
+FieldArray jacobian(const DeformationField& field, const py::object& points) {
+  Index count = 0;
+  JetBlock<double> block = evaluate(field, points, JetOrder::first, count);
+  FieldArray result({count, Index{3}, Index{3}});
+  auto entry = result.mutable_unchecked<3>();
+  for (Index p = 0; p < count; ++p)
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) entry(p, i, j) = block.view().at(first_column(j), p)[i];
+  return result;
+}
+
+FieldArray hessian(const DeformationField& field, const py::object& points) {
+  Index count = 0;
+  JetBlock<double> block = evaluate(field, points, JetOrder::second, count);
+  FieldArray result({count, Index{3}, Index{3}, Index{3}});
+  auto entry = result.mutable_unchecked<4>();
+  for (Index p = 0; p < count; ++p)
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j)
+        for (int k = 0; k < 3; ++k)
+          entry(p, i, j, k) = block.view().at(second_column(j, k), p)[i] / field.frame().scale;
+  return result;
+}
+
+Points inverse(const DeformationField& field, const py::object& points, double tolerance, Task* task) {
+  const Points mesh = as_points(points, "points");
+  InverseOptions options;
+  options.tolerance = tolerance / field.frame().scale;
+  return run_long(task, [&](const Progress& progress) {
+    return field.frame().to_mesh(invert(field, field.frame().to_cube(mesh), options, progress).points);
+  });
+}
+
+py::object report(const py::object& self) { return py::getattr(self, "_report", py::dict()); }
+
+void save(const py::object& self, const py::object& path) {
+  py::dict state = field_state(py::cast<const DeformationField&>(self));
+  state["report"] = report(self);
+  py::module_::import("arapfields._files").attr("save_state")(path, "field", state);
+}
+
+py::object load(const py::object& path) {
+  const py::dict state = py::module_::import("arapfields._files").attr("load_state")(path, "field");
+  py::object field = py::cast(field_from_state(state));
+  if (state.contains("report")) field.attr("_report") = state["report"];
+  return field;
+}
+
+}  // namespace
+
+void bind_fields(py::module_& module) {
+  py::class_<DeformationField, std::shared_ptr<DeformationField>>(
+      module, "DeformationField", py::dynamic_attr(),
+      "A smooth deformation of space, x ↦ f(x), with its derivatives; all in mesh coordinates.")
+      .def("__call__", &values, "points"_a, "Where the points (p, 3) go: (p, 3).")
+      .def("jacobian", &jacobian, "points"_a, "(p, 3, 3): [:, i, j] is the derivative of f_i by x_j.")
+      .def("hessian", &hessian, "points"_a, "(p, 3, 3, 3): [:, i, j, k] is ∂²f_i/∂x_j∂x_k (1/length).")
+      .def(
+          "inverse", &inverse, "points"_a, "tolerance"_a = 2e-6, "task"_a = nullptr,
+          "Points (p, 3) that the field takes to `points` within `tolerance` (a length), by Newton's method\n"
+          "with the analytic Jacobian; rows of NaN where none was found. Where space is folded there are\n"
+          "several, and the one nearest to the surface's rest samples is preferred.")
+      .def_property_readonly(
+          "frame", [](const DeformationField& self) { return self.frame(); },
+          "Mesh coordinates and the unit cube in which the field works.")
+      .def_property_readonly("report", &report, "What the solve measured: a dict; empty for none.")
+      .def("save", &save, "path"_a, "Writes field and report as one file; OSError where that fails.")
+      .def_static("load", &load, "path"_a,
+                  "The field of a file that save wrote; InvalidInput for any other or a damaged one.");
+}
+
+}  // namespace arapfields::python

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bindings/bind.h"
+#include "energies/styles.h"
+#include "solve/deform.h"
+#include "solve/setup.h"
+#include "solve/stylize.h"
+
+namespace arapfields::python {
+namespace {
+
+py::dict report_dict(const SolveReport& report, double scale) {
+  const auto mean_of = [](const std::vector<double>& values) {
+    double sum = 0.0;
+    for (const double value : values) sum += value;
+    return values.empty() ? 0.0 : sum / static_cast<double>(values.size());
+  };
+  const auto max_of = [](const std::vector<double>& values) {
+    return values.empty() ? 0.0 : *std::max_element(values.begin(), values.end());
+  };
+  py::dict result(
+      "stretch"_a = report.arap.stretch, "bend"_a = report.arap.bend, "energy"_a = report.energy,
+      "handle_error_mean"_a = mean_of(report.handle_mean), "handle_error_max"_a = max_of(report.handle_max),
+      "handles"_a = py::list(), "min_determinant"_a = report.distortion.min_determinant,
+      "flipped_share"_a = report.distortion.flipped_share, "max_stretch"_a = report.distortion.max_stretch,
+      "min_stretch"_a = report.distortion.min_stretch, "iterations"_a = report.loop.iterations,
+      "seconds"_a = report.loop.seconds, "out_of_time"_a = report.loop.out_of_time, "scale"_a = scale,
+      "loss"_a = report.loop.history, "notes"_a = report.notes);
+  for (std::size_t i = 0; i < report.handle_mean.size(); ++i)
+    py::list(result["handles"])
+        .append(py::dict("error_mean"_a = report.handle_mean[i], "error_max"_a = report.handle_max[i]));
+  if (report.preference) result["preference"] = *report.preference;
+  return result;
+}
+
+py::object wrap(const Solution& solution) {
+  py::object field = py::cast(solution.field);
+  field.attr("_report") = report_dict(solution.report, solution.field->frame().scale);
+  return field;
+}
+
+/// Runs a solver without the GIL; a divergence reaches Python with the last good field as its `field`.
+template <class Solve>
+py::object solve(Task* task, Solve&& call) {
+  try {
+    return wrap(run_long(task, call));
+  } catch (const SolveDiverged& error) {
+    const py::object type = py::module_::import("arapfields._native").attr("Diverged");
+    py::object raised = type(error.what());
+    raised.attr("field") = wrap(error.last_good);
+    PyErr_SetObject(type.ptr(), raised.ptr());
+    throw py::error_already_set();
+  }
+}
+
+Points preferred_from(const py::object& style, const py::object& orientation) {
+  const Points normals = py::isinstance<py::str>(style) ? preferred_normals(py::cast<std::string>(style))
+                                                        : as_points(style, "normals");
+  if (orientation.is_none()) return normals;
+  const Eigen::MatrixXd turn = as_matrix(orientation, "orientation");
+  require(turn.rows() == 3 && turn.cols() == 3 && turn.allFinite() &&
+              (turn.transpose() * turn - Mat3::Identity()).norm() < 1e-4,
+          "orientation", "not an orthogonal 3×3 matrix", "a rotation is needed");
+  return normals * turn.transpose();
+}
+
+void bind_options(py::module_& module) {
+  OptionsBinding<DeformOptions>(module, "DeformOptions",
+                                "Options of deform. Lengths and weights refer to the samples' unit cube.")
+      .field("field", &DeformOptions::field,
+             "'neural': a network trained by Adam. 'radial': bumps, solved directly at interactive rates.")
+      .field("start", &DeformOptions::start, "What the network refines: 'identity' or the 'radial' result.")
+      .field("iterations", &DeformOptions::iterations, "Steps of the optimization.")
+      .field("batch", &DeformOptions::batch, "Surface samples a step.")
+      .field("bending", &DeformOptions::bending, "λ_bend, the weight of the bend against the stretch.")
+      .field("handle_weight", &DeformOptions::handle_weight, "Weight of the handles' mean squared distance.")
+      .field("handle_batch", &DeformOptions::handle_batch, "Most samples of each handle a step.")
+      .field("exact_handles", &DeformOptions::exact_handles,
+             "Interpolate the handles' motions by construction instead of by weight.")
+      .field("margin", &DeformOptions::margin, "Width of the fall-off around an exact handle.")
+      .field("barrier", &DeformOptions::barrier, "Weight of the barrier that keeps det J up; 0: none.")
+      .field("barrier_threshold", &DeformOptions::barrier_threshold, "det J below which the barrier acts.")
+      .field("invertibility", &DeformOptions::invertibility,
+             "Weight of the cycle loss with an inverse trained along, which penalises folds; 0: none.")
+      .field("learning_rate", &DeformOptions::learning_rate, "Adam's, before its schedule.")
+      .field("width", &DeformOptions::width, "Units of a hidden layer.")
+      .field("layers", &DeformOptions::layers, "Hidden layers.")
+      .field("octaves", &DeformOptions::octaves, "Octaves of the positional encoding.")
+      .field("frequency", &DeformOptions::frequency, "Angular frequency of its first octave.")
+      .field("sharpness", &DeformOptions::sharpness, "β of softplus.")
+      .field("time_budget", &DeformOptions::time_budget, "Seconds after which to stop; 0: none.")
+      .field("threads", &DeformOptions::threads, "Worker threads; 0: all.")
+      .field("device", &DeformOptions::device, "'auto', 'cpu' or 'cuda'.")
+      .field("seed", &DeformOptions::seed, "Of weights and subsets; same seed, same result.");
+  OptionsBinding<StylizeOptions>(module, "StylizeOptions",
+                                 "Options of stylize. Lengths and weights refer to the samples' unit cube.")
+      .field("strength", &StylizeOptions::strength, "From 0, the shape itself, to 1.")
+      .field("sharpness", &StylizeOptions::sharpness,
+             "How narrow the preference is about each normal (σ): low rounds edges, high keeps them crisp.")
+      .field("gauss_weight", &StylizeOptions::gauss_weight, "λ_Gauss at full strength.")
+      .field("rigidity", &StylizeOptions::rigidity, "λ_ARAP.")
+      .field("bending", &StylizeOptions::bending, "λ_bend.")
+      .field("iterations", &StylizeOptions::iterations, "Steps of the optimization.")
+      .field("batch", &StylizeOptions::batch, "Surface samples a step.")
+      .field("handle_weight", &StylizeOptions::handle_weight, "Weight of the handles, where there are any.")
+      .field("handle_batch", &StylizeOptions::handle_batch, "Most samples of each handle a step.")
+      .field("barrier", &StylizeOptions::barrier, "Weight of the barrier that keeps det J up; 0: none.")
+      .field("barrier_threshold", &StylizeOptions::barrier_threshold, "det J below which the barrier acts.")
+      .field("learning_rate", &StylizeOptions::learning_rate, "Adam's, before its schedule.")
+      .field("width", &StylizeOptions::width, "Units of a hidden layer.")
+      .field("layers", &StylizeOptions::layers, "Hidden layers.")
+      .field("octaves", &StylizeOptions::octaves, "Octaves of the positional encoding.")
+      .field("frequency", &StylizeOptions::frequency, "Angular frequency of its first octave.")
+      .field("softplus_sharpness", &StylizeOptions::softplus_sharpness, "β of softplus.")
+      .field("time_budget", &StylizeOptions::time_budget, "Seconds after which to stop; 0: none.")
+      .field("threads", &StylizeOptions::threads, "Worker threads; 0: all.")
+      .field("device", &StylizeOptions::device, "'auto', 'cpu' or 'cuda'.")
+      .field("seed", &StylizeOptions::seed, "Of weights and subsets; same seed, same result.");
+}
+
+py::tuple energy_of(const DeformationField& field, const py::object& points) {
+  SurfaceSamples samples;
+  samples.frame = field.frame();
+  samples.points = field.frame().to_cube(as_points(points, "points"));
+  require_samples(samples);
+  const ArapValue value = run_long(nullptr, [&](const Progress&) {
+    return measure(field, samples, ObjectiveTerms(), samples.size()).arap;
+  });
+  return py::make_tuple(value.stretch, value.bend);
+}
+
+}  // namespace
+
+void bind_solve(py::module_& module) {
+  bind_options(module);
+  module.def(
+      "deform",
+      [](const SurfaceSamples& samples, const std::vector<Handle>& handles, const DeformOptions& options,
+         Task* task) {
+        return solve(task, [&](const Progress& p) { return deform(samples, handles, options, p); });
+      },
+      "samples"_a, "handles"_a, py::arg_v("options", DeformOptions(), "DeformOptions()"), "task"_a = nullptr,
+      "The DeformationField that moves the surface's handles (Cuboid, Point, Region) to their targets and is "
+      "as\n"
+      "rigid as possible on the samples elsewhere: it minimises mean stretch + bending · mean bend +\n"
+      "handle_weight · mean squared handle distance (section 4 of As-Rigid-As-Possible Regularization for\n"
+      "Implicit Surfaces, with the stretch as printed there; the authors' package divides it by 3).\n"
+      "field.report holds energies, handle errors, the smallest det J, times and the loss history.\n"
+      "Raises InvalidInput, Cancelled, and Diverged, whose attribute `field` is the last good state.");
+  module.def(
+      "stylize",
+      [](const SurfaceSamples& samples, const py::object& normals, const StylizeOptions& options, Task* task,
+         const py::object& weights, const std::vector<Handle>& handles, const py::object& orientation) {
+        const Points preferred = preferred_from(normals, orientation);
+        const Vector blend = weights.is_none() ? Vector() : as_vector(weights, "weights");
+        return solve(
+            task, [&](const Progress& p) { return stylize(samples, preferred, options, p, blend, handles); });
+      },
+      "samples"_a, "normals"_a, py::arg_v("options", StylizeOptions(), "StylizeOptions()"),
+      "task"_a = nullptr, "weights"_a = py::none(), "handles"_a = std::vector<Handle>(),
+      "orientation"_a = py::none(),
+      "The DeformationField that turns the surface's normals to preferred ones: `normals` (k, 3) or a "
+      "style's\n"
+      "name, turned by `orientation` (3, 3). `weights` (n,) blend the effect sample by sample. Without "
+      "handles\n"
+      "the lowest sample stays in place; strength 0 is the identity. field.report['preference'] is the mean\n"
+      "preference reached. Raises as deform does.");
+  module.def("arap_energy", &energy_of, "field"_a, "points"_a,
+             "(stretch, bend), means over the points (p, 3) of the rest surface, in the field's unit cube:\n"
+             "stretch ‖J − R‖² with R the rotation closest to J, bend the squared speed at which R turns.");
+}
+
+}  // namespace arapfields::python

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fields/inverse.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <unsupported/Eigen/BVH>
+
+#include "core/errors.h"
+#include "core/parallel.h"
+
+namespace arapfields {
+namespace {
+
+/// Points x with their images f(x), searched by image.
+class Starts {
+ public:
+  Starts(const DeformationField& field, Points rest) : rest_(std::move(rest)), images_(rest_.rows(), 3) {
+    field.evaluate(rest_, {images_.data(), rest_.rows(), JetOrder::value});
+    std::vector<int> ids;
+    std::vector<Eigen::AlignedBox3d> boxes;
+    for (Index i = 0; i < images_.rows(); ++i) {
+      if (!images_.row(i).allFinite()) continue;
+      ids.push_back(static_cast<int>(i));
+      boxes.emplace_back(Vec3(images_.row(i)), Vec3(images_.row(i)));
+    }
+    tree_.init(ids.begin(), ids.end(), boxes.begin(), boxes.end());
+    empty_ = ids.empty();
+  }
+
+  bool empty() const { return empty_; }
+
+  Vec3 nearest(const Vec3& image) const {
+    Search search{images_, image};
+    Eigen::BVMinimize(tree_, search);
+    return rest_.row(search.best);
+  }
+
+ private:
+  struct Search {
+    using Scalar = double;
+    const Points& images;
+    Vec3 target;
+    int best = 0;
+    double least = std::numeric_limits<double>::infinity();
+    double minimumOnVolume(const Eigen::AlignedBox3d& box) const {
+      return box.squaredExteriorDistance(target);
+    }
+    double minimumOnObject(int i) {
+      const double distance = (images.row(i).transpose() - target).squaredNorm();
+      if (distance < least) {
+        least = distance;
+        best = i;
+      }
+      return distance;
+    }
+  };
+
+  Points rest_, images_;
+  Eigen::KdBVH<double, 3, int> tree_;
+  bool empty_ = true;
+};
+
+Points grid(int side) {
+  Points points(side * side * side, 3);
+  for (Index i = 0; i < points.rows(); ++i)
+    points.row(i) = (2.0 / (side - 1)) * Vec3(i % side, i / side % side, i / side / side).transpose() -
+                    Vec3::Ones().transpose();
+  return points;
+}
+
+/// One point's state: the best x so far, its residual r = f(x) − y, and the Newton step d from it.
+struct Walker {
+  Index row;
+  Vec3 target, best, step;
+  double residual = std::numeric_limits<double>::infinity();
+  double damping = 1.0;
+  bool done = false;
+};
+
+Vec3 newton_step(const Mat3& jacobian, const Vec3& residual, double longest) {
+  Vec3 step = -jacobian.inverse() * residual;
+  if (!step.allFinite() || step.norm() > 1e3) {
+    const Mat3 normal = jacobian.transpose() * jacobian + 1e-4 * Mat3::Identity();
+    step = -normal.inverse() * (jacobian.transpose() * residual);
+  }
+  const double length = step.norm();
+  return length > longest ? Vec3(step * (longest / length)) : step;
+}
+
+/// Moves all walkers until they arrive or can go no further; every evaluation is one batch.
+void walk(const DeformationField& field, std::vector<Walker>& walkers, const InverseOptions& options,
+          const Progress& progress) {
+  constexpr double smallest_damping = 1.0 / 64.0;
+  std::vector<std::size_t> active(walkers.size());
+  std::iota(active.begin(), active.end(), 0);
+  for (int iteration = 0; iteration < options.iterations && !active.empty(); ++iteration) {
+    progress.check();
+    const Index count = static_cast<Index>(active.size());
+    Points trial(count, 3);
+    for (Index k = 0; k < count; ++k) {
+      const Walker& w = walkers[active[static_cast<std::size_t>(k)]];
+      trial.row(k) = iteration == 0 ? w.best : Vec3(w.best + w.damping * w.step);
+    }
+    JetBlock<double> block(count, JetOrder::first);
+    field.evaluate(trial, block.view());
+    const JetView<const double> jets = block.view();
+    for (Index k = 0; k < count; ++k) {
+      Walker& w = walkers[active[static_cast<std::size_t>(k)]];
+      const Vec3 residual = Vec3(jets.at(0, k)) - w.target;
+      const double norm = residual.norm();
+      if (norm < w.residual) {
+        Mat3 jacobian;
+        for (int j = 0; j < 3; ++j) jacobian.col(j) = Vec3(jets.at(first_column(j), k));
+        w.best = trial.row(k);
+        w.step = newton_step(jacobian, residual, options.longest_step);
+        w.done = norm < 0.02 * options.tolerance;
+        w.residual = norm;
+        w.damping = std::min(1.0, 2.0 * w.damping);
+      } else {
+        w.damping *= 0.5;
+        w.done = w.damping < smallest_damping || !(w.residual < std::numeric_limits<double>::infinity());
+      }
+    }
+    std::erase_if(active, [&](std::size_t i) { return walkers[i].done; });
+  }
+}
+
+}  // namespace
+
+InverseResult invert(const DeformationField& field, PointsIn targets, const InverseOptions& options,
+                     const Progress& progress) {
+  require(options.iterations > 0, "iterations", std::to_string(options.iterations), "must be positive");
+  require(options.tolerance > 0.0, "tolerance", std::to_string(options.tolerance), "must be positive");
+  constexpr Index chunk = 4096;
+  const Starts surface(field, field.rest_points()), space(field, grid(17));
+  InverseResult result{Points::Constant(targets.rows(), 3, std::numeric_limits<double>::quiet_NaN()), 0, 0.0};
+  for (Index begin = 0; begin < targets.rows(); begin += chunk) {
+    progress.report(static_cast<double>(begin) / static_cast<double>(targets.rows()), "inverting");
+    const Index rows = std::min(chunk, targets.rows() - begin);
+    std::vector<Index> left;
+    for (Index i = begin; i < begin + rows; ++i)
+      if (targets.row(i).allFinite()) left.push_back(i);
+    for (int attempt = 0; attempt < 3 && !left.empty(); ++attempt) {
+      const Starts* starts = attempt == 0 ? &surface : attempt == 1 ? &space : nullptr;
+      if (starts != nullptr && starts->empty()) continue;
+      std::vector<Walker> walkers(left.size());
+      parallel_for(0, static_cast<Index>(left.size()), 64, [&](Index from, Index to) {
+        for (Index k = from; k < to; ++k) {
+          Walker& w = walkers[static_cast<std::size_t>(k)];
+          w.row = left[static_cast<std::size_t>(k)];
+          w.target = targets.row(w.row);
+          w.best = starts != nullptr ? starts->nearest(w.target) : w.target;
+        }
+      });
+      walk(field, walkers, options, progress);
+      left.clear();
+      for (const Walker& w : walkers) {
+        if (w.residual <= options.tolerance) {
+          result.points.row(w.row) = w.best;
+          result.worst_residual = std::max(result.worst_residual, w.residual);
+        } else {
+          left.push_back(w.row);
+        }
+      }
+    }
+  }
+  for (Index i = 0; i < targets.rows(); ++i)
+    if (!result.points.row(i).allFinite()) ++result.failures;
+  progress.report(1.0);
+  return result;
+}
+
+}  // namespace arapfields

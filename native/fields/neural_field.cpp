@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fields/neural_field.h"
+
+#include <ATen/ATen.h>
+
+#include "core/errors.h"
+
+namespace arapfields {
+namespace {
+
+/// Points of any real tensor on any device, as ours.
+Points to_points(const at::Tensor& points) {
+  const at::Tensor host = points.to(at::kCPU, at::kDouble).contiguous();
+  return Eigen::Map<const Points>(host.const_data_ptr<double>(), host.size(0), 3);
+}
+
+at::Tensor tensor_of(const double* data, at::IntArrayRef sizes, const at::TensorOptions& options) {
+  return at::from_blob(const_cast<double*>(data), sizes, at::kDouble).to(options, false, true);
+}
+
+void add_identity(JetView<double> jets, PointsIn points) {
+  Eigen::Map<Points>(jets.column(0), jets.count, 3) += points;
+  if (jets.order == JetOrder::value) return;
+  for (int k = 0; k < 3; ++k)
+    Eigen::Map<Points>(jets.column(first_column(k)), jets.count, 3).col(k).array() += 1.0;
+}
+
+/// Jets of the product a·p, a (columns, n, 1) and p (columns, n, 3).
+at::Tensor product(const at::Tensor& a, const at::Tensor& p) {
+  at::Tensor result = a[0] * p;
+  const auto columns = p.size(0);
+  for (int64_t c = 1; c < columns; ++c) result[c].addcmul_(a[c], p[0]);
+  if (columns < 10) return result;
+  for (int j = 0; j < 3; ++j)
+    for (int k = j; k < 3; ++k) {
+      at::Tensor mixed = result[second_column(j, k)];
+      mixed.addcmul_(a[first_column(j)], p[first_column(k)]);
+      mixed.addcmul_(a[first_column(k)], p[first_column(j)]);
+    }
+  return result;
+}
+
+/// The transpose of product(a, ·).
+at::Tensor product_pull_back(const at::Tensor& a, const at::Tensor& cotangents) {
+  at::Tensor result = a[0] * cotangents;
+  const auto columns = cotangents.size(0);
+  for (int64_t c = 1; c < columns; ++c) result[0].addcmul_(a[c], cotangents[c]);
+  if (columns < 10) return result;
+  for (int j = 0; j < 3; ++j)
+    for (int k = j; k < 3; ++k) {
+      const at::Tensor mixed = cotangents[second_column(j, k)];
+      result[first_column(k)].addcmul_(a[first_column(j)], mixed);
+      result[first_column(j)].addcmul_(a[first_column(k)], mixed);
+    }
+  return result;
+}
+
+}  // namespace
+
+NeuralField::NeuralField(const MlpShape& shape, std::uint64_t seed, bool double_precision,
+                         const std::string& device)
+    : network_(shape, seed, true, double_precision, device) {
+  require(shape.outputs == 3, "outputs", std::to_string(shape.outputs), "a deformation has 3");
+}
+
+void NeuralField::fixed_part(PointsIn points, JetView<double> b, Vector& a) const {
+  const Index n = points.rows();
+  const int count = columns(b.order);
+  if (base_) {
+    base_->evaluate(points, b);
+  } else {
+    std::fill(b.data, b.data + b.size(), 0.0);
+    add_identity(b, points);
+  }
+  a.resize(0);
+  if (!handles_) return;
+  a.resize(count * n);
+  handles_->free_weight(points, b.order, a.data());
+  JetBlock<double> blend(n, b.order);
+  handles_->evaluate(points, blend.view());
+  const at::TensorOptions options(at::kDouble);
+  at::Tensor result = at::from_blob(b.data, {count, n, 3}, options);
+  const at::Tensor exact = at::from_blob(blend.view().data, {count, n, 3}, options);
+  if (!base_) {
+    result.copy_(exact);
+    return;
+  }
+  JetBlock<double> identity(n, b.order);
+  add_identity(identity.view(), points);
+  result.sub_(at::from_blob(identity.view().data, {count, n, 3}, options));
+  result.copy_(product(at::from_blob(a.data(), {count, n, 1}, options), result) + exact);
+}
+
+void NeuralField::evaluate(PointsIn points, JetView<double> out) const {
+  require(out.count == points.rows(), "out", std::to_string(out.count) + " jets", "one a point is needed");
+  if (out.count == 0) return;
+  Vector a;
+  fixed_part(points, out, a);
+  const at::TensorOptions options = network_.parameters().options();
+  const at::Tensor x = tensor_of(points.data(), {points.rows(), 3}, options);
+  at::Tensor jets = network_.evaluate(x, out.order).to(at::kCPU, at::kDouble);
+  if (a.size() > 0)
+    jets = product(at::from_blob(a.data(), {columns(out.order), out.count, 1}, at::kDouble), jets);
+  at::from_blob(out.data, {columns(out.order), out.count, 3}, at::kDouble).add_(jets);
+}
+
+at::Tensor NeuralField::forward(const at::Tensor& points, JetOrder order) {
+  at::Tensor jets = network_.forward(points, order);
+  factor_.reset();
+  if (!base_ && !handles_) {
+    jets[0].add_(points);
+    if (order != JetOrder::value)
+      for (int k = 0; k < 3; ++k) jets[first_column(k)].select(1, k).add_(1.0);
+    return jets;
+  }
+  const Points x = to_points(points);
+  JetBlock<double> b(x.rows(), order);
+  Vector a;
+  fixed_part(x, b.view(), a);
+  const at::Tensor fixed = tensor_of(b.view().data, jets.sizes(), jets.options());
+  if (a.size() == 0) return jets.add_(fixed);
+  factor_ =
+      std::make_shared<at::Tensor>(tensor_of(a.data(), {jets.size(0), jets.size(1), 1}, jets.options()));
+  return product(*factor_, jets).add_(fixed);
+}
+
+void NeuralField::pull_back(const at::Tensor& cotangents) {
+  network_.pull_back(factor_ ? product_pull_back(*factor_, cotangents) : cotangents);
+}
+
+VectorF NeuralField::weights() const {
+  const at::Tensor host = network_.parameters().to(at::kCPU, at::kFloat).contiguous();
+  return Eigen::Map<const VectorF>(host.const_data_ptr<float>(), host.numel());
+}
+
+void NeuralField::set_weights(const VectorF& weights) {
+  at::Tensor& parameters = network_.parameters();
+  require(weights.size() == parameters.numel(), "weights", std::to_string(weights.size()) + " numbers",
+          "this network has " + std::to_string(parameters.numel()));
+  parameters.copy_(at::from_blob(const_cast<float*>(weights.data()), {weights.size()}, at::kFloat));
+}
+
+}  // namespace arapfields

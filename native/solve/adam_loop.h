@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/errors.h"
+#include "core/random.h"
+#include "core/task.h"
+#include "fields/field.h"
+
+namespace arapfields {
+
+/// A loss of a trainable field, estimated anew at each iteration on a random subset.
+class Objective {
+ public:
+  virtual ~Objective() = default;
+  /// Adds the gradient of the estimate to field.gradient(); returns the estimate.
+  virtual double accumulate(TrainableField& field, Random& random) = 0;
+};
+
+/// Adam (Kingma and Ba 2015) with a learning rate that is held for `hold` of the run and then falls along a
+/// half cosine to final_share of itself, so that the last steps average out the noise of the subsets.
+struct LoopOptions {
+  std::string stage = "solving";  ///< what messages call the loop
+  int iterations = 300;
+  double learning_rate = 1e-3;
+  double final_share = 0.05;
+  double hold = 0.5;
+  int warm_up = 0;  ///< iterations over which the rate rises from 0
+  double first_decay = 0.9, second_decay = 0.99;
+  double time_budget = 0.0;  ///< seconds; 0: none. The schedule then follows the clock if that is ahead.
+  std::uint64_t seed = 0;
+};
+
+struct LoopResult {
+  int iterations = 0;
+  double seconds = 0.0;
+  bool out_of_time = false;
+  std::vector<std::pair<int, double>> history;  ///< (iteration, loss), at most a few hundred entries
+};
+
+/// Called with the number of finished iterations after each of them.
+using LoopObserver = std::function<void(int)>;
+
+/// Minimises. Where the loss or the gradient leaves the finite numbers, the parameters of the last good state
+/// are put back and Diverged is thrown, which names the iteration of both.
+LoopResult minimise(TrainableField& field, Objective& objective, const LoopOptions& options,
+                    const Progress& progress, const LoopObserver& observer = {});
+
+}  // namespace arapfields

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "solve/deform.h"
+
+#include "core/parallel.h"
+#include "fields/neural_field.h"
+#include "solve/setup.h"
+
+namespace arapfields {
+namespace {
+
+std::shared_ptr<const HandleBlend> exact_blend(const BoundHandles& handles, double margin,
+                                               std::vector<std::string>& notes) {
+  std::vector<RigidRegion> regions;
+  std::vector<Points> members;
+  for (Index i = 0; i < handles.count(); ++i) {
+    const Handle& handle = handles.handle(i);
+    const std::string name = "handles[" + std::to_string(i) + "]";
+    require(handle.kind != Handle::Kind::region, name, "a region of listed samples",
+            "exact handles are cuboids or points");
+    RigidRegion region{handle.rest, handles.motion(i), margin, name};
+    if (handle.kind == Handle::Kind::point) {
+      region.placement = Mat4::Zero();
+      region.placement.topRightCorner<3, 1>() = handle.rest_point;
+    }
+    regions.push_back(region);
+    members.push_back(
+        handles.sources().middleRows(handles.begin(i), handles.begin(i + 1) - handles.begin(i)));
+  }
+  notes = limit_margins(regions, members);
+  return std::make_shared<HandleBlend>(std::move(regions));
+}
+
+}  // namespace
+
+Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handles,
+                const DeformOptions& options, const Progress& progress) {
+  options.validate();
+  require_samples(samples);
+  require(!handles.empty(), "handles", "none were given", "at least one is needed");
+  require(options.field == "neural" && options.start == "identity", "field", "'radial'",
+          "not available in this build");
+  const ThreadScope threads(options.threads);
+  ObjectiveTerms terms;
+  terms.batch = options.batch;
+  terms.bending = options.bending;
+  terms.barrier = options.barrier;
+  terms.barrier_threshold = options.barrier_threshold;
+  terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
+  terms.handle_weight = options.exact_handles ? 0.0 : options.handle_weight;
+  terms.handle_batch = options.handle_batch;
+
+  const MlpShape shape{
+      3, options.width, options.layers, options.octaves, options.frequency, options.sharpness};
+  const auto seed = static_cast<std::uint64_t>(options.seed);
+  auto field = std::make_shared<NeuralField>(shape, seed, false, resolve_device(options.device));
+  std::vector<std::string> notes;
+  if (options.exact_handles) field->set_handles(exact_blend(terms.handles, options.margin, notes));
+
+  LoopOptions loop;
+  loop.stage = "deform";
+  loop.iterations = options.iterations;
+  loop.learning_rate = options.learning_rate;
+  loop.time_budget = options.time_budget;
+  loop.seed = seed;
+  Solution solution = solve_field(field, samples, std::move(terms), loop, progress);
+  solution.report.notes = notes;
+  return solution;
+}
+
+}  // namespace arapfields

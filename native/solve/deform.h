@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "solve/options.h"
+#include "solve/report.h"
+
+namespace arapfields {
+
+/// Deforms a surface as rigidly as possible so that its handles (mesh coordinates) follow their motions.
+/// Throws InvalidInput for bad options, no samples, no handles, or a handle that cannot be used (named),
+/// SolveDiverged, Cancelled.
+Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handles,
+                const DeformOptions& options, const Progress& progress = {});
+
+}  // namespace arapfields

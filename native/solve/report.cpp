@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "solve/report.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace arapfields {
+namespace {
+
+constexpr Index chunk = 1024;
+constexpr Index kept_rest_points = 4000;
+
+void merge(Distortion& total, const Distortion& part) {
+  total.min_determinant = std::min(total.min_determinant, part.min_determinant);
+  total.max_stretch = std::max(total.max_stretch, part.max_stretch);
+  total.min_stretch = std::min(total.min_stretch, part.min_stretch);
+}
+
+void measure_handles(const DeformationField& field, const BoundHandles& handles, double scale,
+                     SolveReport& report) {
+  for (Index i = 0; i < handles.count(); ++i) {
+    const Index begin = handles.begin(i), rows = handles.begin(i + 1) - begin;
+    Points values(rows, 3);
+    field.evaluate(handles.sources().middleRows(begin, rows), {values.data(), rows, JetOrder::value});
+    const Vector distance = (values - handles.targets().middleRows(begin, rows)).rowwise().norm();
+    report.handle_mean.push_back(distance.mean() * scale);
+    report.handle_max.push_back(distance.maxCoeff() * scale);
+  }
+}
+
+}  // namespace
+
+SolveReport measure(const DeformationField& field, const SurfaceSamples& samples, const ObjectiveTerms& terms,
+                    Index max_samples) {
+  const Index count = std::min(samples.size(), max_samples);
+  Points points(count, 3), normals(terms.preference ? count : 0, 3);
+  for (Index i = 0; i < count; ++i) {
+    const Index pick = i * samples.size() / count;
+    points.row(i) = samples.points.row(pick);
+    if (terms.preference) normals.row(i) = samples.normals.row(pick);
+  }
+  SolveReport report;
+  double preference = 0.0;
+  bool first = true;
+  for (Index begin = 0; begin < count; begin += chunk) {
+    const Index rows = std::min(chunk, count - begin);
+    const double share = static_cast<double>(rows) / static_cast<double>(count);
+    JetBlock<double> block(rows, JetOrder::second);
+    field.evaluate(points.middleRows(begin, rows), block.view());
+    const JetView<const double> jets = block.view();
+    const ArapValue arap = arap_energy<double>(jets, terms.bending, 0.0, {});
+    report.arap.stretch += share * arap.stretch;
+    report.arap.bend += share * arap.bend;
+    Distortion part = distortion<double>(jets);
+    part.flipped_share = report.distortion.flipped_share + share * part.flipped_share;
+    if (!first) merge(part, report.distortion);
+    report.distortion = part;
+    first = false;
+    if (terms.preference) {
+      const Points rest = normals.middleRows(begin, rows);
+      preference += share * (1.0 - gauss_energy<double>(jets, rest, Vector(), *terms.preference, 0.0, {}));
+    }
+  }
+  report.energy = report.arap.stretch + terms.bending * report.arap.bend;
+  if (terms.preference) report.preference = preference;
+  measure_handles(field, terms.handles, samples.frame.scale, report);
+  return report;
+}
+
+Solution solve_field(std::shared_ptr<TrainableField> field, const SurfaceSamples& samples,
+                     ObjectiveTerms terms, const LoopOptions& options, const Progress& progress) {
+  field->set_frame(samples.frame);
+  field->set_rest_points(samples.points.topRows(std::min(samples.size(), kept_rest_points)));
+  FieldObjective objective(samples, std::move(terms));
+  Solution solution{field, {}};
+  try {
+    const LoopResult loop = minimise(*field, objective, options, progress.part(0.0, 0.95));
+    progress.report(0.95, "measuring the result");
+    solution.report = measure(*field, samples, objective.terms());
+    solution.report.loop = loop;
+  } catch (const Diverged& cause) {
+    solution.report = measure(*field, samples, objective.terms());
+    throw SolveDiverged(cause, solution);
+  }
+  progress.report(1.0, options.stage + ": done");
+  return solution;
+}
+
+}  // namespace arapfields

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "solve/stylize.h"
+
+#include "core/parallel.h"
+#include "fields/neural_field.h"
+#include "solve/setup.h"
+
+namespace arapfields {
+namespace {
+
+void check_samples(const SurfaceSamples& samples, const Vector& weights) {
+  require_samples(samples);
+  require(samples.normals.rows() == samples.size(), "samples", "they have no normals",
+          "stylize needs one a sample");
+  if (weights.size() == 0) return;
+  require(weights.size() == samples.size(), "weights", std::to_string(weights.size()) + " numbers",
+          std::to_string(samples.size()) + ", one a sample, are needed");
+  require(weights.allFinite() && weights.minCoeff() >= 0.0, "weights", "some are negative or not finite",
+          "all must be 0 or larger");
+}
+
+/// The surface's lowest sample stays where it is.
+Handle hold_lowest(const SurfaceSamples& samples) {
+  Index lowest = 0;
+  samples.points.col(2).minCoeff(&lowest);
+  Handle handle;
+  handle.kind = Handle::Kind::point;
+  handle.rest_point = handle.target_point = samples.points.row(lowest);
+  return handle;
+}
+
+}  // namespace
+
+Solution stylize(const SurfaceSamples& samples, PointsIn preferred, const StylizeOptions& options,
+                 const Progress& progress, const Vector& weights, const std::vector<Handle>& handles) {
+  options.validate();
+  check_samples(samples, weights);
+  const ThreadScope threads(options.threads);
+  ObjectiveTerms terms;
+  terms.batch = options.batch;
+  terms.rigidity = options.rigidity;
+  terms.bending = options.bending;
+  terms.preference = gauss_preference(preferred, options.sharpness);
+  terms.gauss = options.strength * options.gauss_weight;
+  terms.preference_weights = weights;
+  terms.barrier = options.barrier;
+  terms.barrier_threshold = options.barrier_threshold;
+  terms.handles = handles.empty() ? BoundHandles({hold_lowest(samples)}, samples.points)
+                                  : BoundHandles(in_cube(handles, samples.frame), samples.points);
+  terms.handle_weight = handles.empty() ? 1.0 : options.handle_weight;
+  terms.handle_batch = options.handle_batch;
+
+  const MlpShape shape{
+      3, options.width, options.layers, options.octaves, options.frequency, options.softplus_sharpness};
+  const auto seed = static_cast<std::uint64_t>(options.seed);
+  auto field = std::make_shared<NeuralField>(shape, seed, false, resolve_device(options.device));
+  LoopOptions loop;
+  loop.stage = "stylize";
+  loop.iterations = terms.gauss == 0.0 && handles.empty() ? 0 : options.iterations;
+  loop.learning_rate = options.learning_rate;
+  loop.time_budget = options.time_budget;
+  loop.seed = seed;
+  return solve_field(field, samples, std::move(terms), loop, progress);
+}
+
+}  // namespace arapfields

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "solve/options.h"
+#include "solve/report.h"
+
+namespace arapfields {
+
+/// Deforms a surface so that its normals turn to the preferred ones (k,3), as rigidly as possible:
+///   strength·gauss_weight·mean u(1 − g(ñ)) + rigidity·(stretch + bending·bend) + handles,
+/// ñ the unit normals of the deformed surface. (The paper's text has the sign of the first term reversed and
+/// leaves the normals without unit length, which a collapsing surface would win.) Without handles the lowest
+/// sample is held in place. `weights` (one u ≥ 0 a sample, or empty) blend the effect. Strength 0 is the
+/// identity. Throws InvalidInput for bad options, samples without normals, weights or handles that do not
+/// fit; SolveDiverged; Cancelled.
+Solution stylize(const SurfaceSamples& samples, PointsIn preferred, const StylizeOptions& options,
+                 const Progress& progress = {}, const Vector& weights = {},
+                 const std::vector<Handle>& handles = {});
+
+}  // namespace arapfields
