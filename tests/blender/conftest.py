@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tests that run inside a headless Blender (PyPI's bpy) with its own empty user folder."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+
+
+def isolated(folder):
+    """Environment of a Blender that knows nothing of the user's own."""
+    paths = [str(ROOT), str(ROOT / "tests"), str(HERE), os.environ.get("PYTHONPATH", "")]
+    return {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(filter(None, paths)),
+        "BLENDER_USER_RESOURCES": str(folder),
+        "TMPDIR": str(folder),
+    }
+
+
+class Blender:
+    """The worker process; started when first needed, and again after a crash."""
+
+    def __init__(self, folder):
+        self.folder, self.process = folder, None
+
+    def call(self, file, function, arguments):
+        if self.process is None or self.process.poll() is not None:
+            self.process = subprocess.Popen(
+                [sys.executable, str(HERE / "worker.py")],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+                env=isolated(self.folder),
+            )
+        order = {"file": file, "function": function, "arguments": arguments}
+        self.process.stdin.write(json.dumps(order) + "\n")
+        self.process.stdin.flush()
+        answer = self.process.stdout.readline()
+        if not answer:
+            pytest.fail(f"Blender ended with status {self.process.wait()}")
+        if json.loads(answer):
+            pytest.fail(json.loads(answer), pytrace=False)
+
+    def close(self):
+        if self.process is not None:
+            self.process.stdin.close()
+            self.process.wait()
+
+
+@pytest.fixture(scope="session")
+def blender(tmp_path_factory):
+    pytest.importorskip("bpy", reason="PyPI's bpy is not installed")
+    worker = Blender(tmp_path_factory.mktemp("blender"))
+    yield worker
+    worker.close()
+
+
+@pytest.fixture
+def user_folder(tmp_path):
+    return isolated(tmp_path)

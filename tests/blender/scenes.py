@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scenes for tests inside Blender: small, textured, with everything on the mesh that must survive."""
+
+import bpy
+import numpy as np
+
+QUICK = {"iterations": 40, "samples": 2000, "batch": 100, "width": 32, "layers": 2}
+
+
+def activate(*items):
+    """Selects the objects and makes the last one active."""
+    for other in bpy.context.selected_objects:
+        other.select_set(False)
+    for item in items:
+        item.select_set(True)
+    bpy.context.view_layer.objects.active = items[-1]
+
+
+def bar(name="Bar", length=1.0):
+    """A bar along x from -length to length, 0.5 wide, of 8 × 4 × 4 quads a side."""
+    import bmesh
+
+    mesh = bpy.data.meshes.new(name)
+    made = bmesh.new()
+    bmesh.ops.create_grid(made, x_segments=2, y_segments=2, size=0.25)
+    bmesh.ops.delete(made, geom=made.faces, context="FACES_ONLY")
+    bmesh.ops.delete(made, geom=made.verts, context="VERTS")
+    bmesh.ops.create_cube(made, size=1.0)
+    bmesh.ops.subdivide_edges(made, edges=made.edges, cuts=7, use_grid_fill=True)
+    bmesh.ops.scale(made, vec=(2 * length, 0.5, 0.5), verts=made.verts)
+    made.to_mesh(mesh)
+    made.free()
+    item = bpy.data.objects.new(name, mesh)
+    bpy.context.collection.objects.link(item)
+    bpy.context.view_layer.update()
+    activate(item)
+    return item
+
+
+def cube_empty(location, half, name="Handle"):
+    empty = bpy.data.objects.new(name, None)
+    empty.empty_display_type, empty.empty_display_size = "CUBE", 1.0
+    empty.location, empty.scale = location, half
+    bpy.context.collection.objects.link(empty)
+    return empty
+
+
+def bar_with_handles(name="Bar"):
+    """A bar held at its left end, whose right end follows a handle. (bar, fixed, moving)"""
+    item = bar(name)
+    fixed = cube_empty((-1.0, 0, 0), (0.25, 0.5, 0.5), "Fixed")
+    moving = cube_empty((1.0, 0, 0), (0.25, 0.5, 0.5), "Moving")
+    bpy.context.view_layer.update()
+    activate(fixed, moving, item)
+    bpy.ops.arapfields.add_handle()
+    activate(item)
+    return item, fixed, moving
+
+
+def world_points(item):
+    """(n, 3) vertices of an object as shown, in world space."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    evaluated = item.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    flat = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+    mesh.vertices.foreach_get("co", flat)
+    evaluated.to_mesh_clear()
+    matrix = np.array(item.matrix_world, dtype=np.float64)
+    return flat.reshape(-1, 3).astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def decorate(item):
+    """UVs, colours, materials, groups, flags and custom attributes, all different from one another."""
+    mesh, rng = item.data, np.random.default_rng(0)
+    uv = mesh.uv_layers.new(name="UV")
+    uv.data.foreach_set("uv", rng.random(2 * len(mesh.loops)).astype(np.float32))
+    colours = mesh.color_attributes.new("Colour", "BYTE_COLOR", "CORNER")
+    colours.data.foreach_set("color", rng.random(4 * len(mesh.loops)).astype(np.float32))
+    for name, kind, domain in (("weight", "FLOAT", "POINT"), ("number", "INT", "FACE"), ("mark", "BOOLEAN", "EDGE")):
+        attribute = mesh.attributes.new(name, kind, domain)
+        attribute.data.foreach_set("value", rng.integers(0, 2, len(attribute.data)))
+    for name in ("one", "two"):
+        mesh.materials.append(bpy.data.materials.new(name))
+    mesh.polygons.foreach_set("material_index", rng.integers(0, 2, len(mesh.polygons)).astype(np.int32))
+    group = item.vertex_groups.new(name="Group")
+    for index in range(0, len(mesh.vertices), 3):
+        group.add([index], float(rng.random()), "REPLACE")
+    mesh.edges.foreach_set("use_seam", rng.integers(0, 2, len(mesh.edges)).astype(bool))
+    mesh.edges.foreach_set("use_edge_sharp", rng.integers(0, 2, len(mesh.edges)).astype(bool))
+    mesh.polygons.foreach_set("use_smooth", rng.integers(0, 2, len(mesh.polygons)).astype(bool))
+    mesh.update()
+    return item
+
+
+FIELDS = {"FLOAT": "value", "INT": "value", "BOOLEAN": "value", "FLOAT_VECTOR": "vector", "FLOAT2": "vector"}
+FIELDS |= {"BYTE_COLOR": "color", "FLOAT_COLOR": "color", "INT32_2D": "value", "INT16_2D": "value", "INT8": "value"}
+SIZES = {"vector": {"FLOAT_VECTOR": 3, "FLOAT2": 2}, "color": {"BYTE_COLOR": 4, "FLOAT_COLOR": 4}}
+
+
+def everything(item):
+    """All that is on an object's mesh except positions, comparable: {name: bytes or list}."""
+    mesh, found = item.data, {}
+    for attribute in mesh.attributes:
+        if attribute.name == "position":
+            continue
+        field = FIELDS[attribute.data_type]
+        width = SIZES.get(field, {}).get(attribute.data_type, 2 if "2D" in attribute.data_type else 1)
+        whole = attribute.data_type in ("INT", "INT8", "INT32_2D", "INT16_2D")
+        flat = np.empty(width * len(attribute.data), dtype=np.int32 if whole else np.float32)
+        if attribute.data_type == "BOOLEAN":
+            flat = flat.astype(bool)
+        attribute.data.foreach_get(field, flat)
+        found[attribute.name, attribute.domain, attribute.data_type] = flat.tobytes()
+    for what, field, width in (("loops", "vertex_index", 1), ("edges", "vertices", 2), ("polygons", "loop_start", 1)):
+        flat = np.empty(width * len(getattr(mesh, what)), dtype=np.int32)
+        getattr(mesh, what).foreach_get(field, flat)
+        found[what] = flat.tobytes()
+    found["materials"] = [m.name if m else None for m in mesh.materials]
+    found["group names"] = [g.name for g in item.vertex_groups]
+    found["groups"] = [[(g.group, g.weight) for g in v.groups] for v in mesh.vertices]
+    return found
