@@ -4,6 +4,7 @@
 import json
 
 import bpy
+import numpy as np
 
 from ..core.errors import UserError
 from ..names import REPORT, RESULT_SUFFIX, RESULTS, WARP_KEY
@@ -54,11 +55,41 @@ def show(context, source, kind, output, mesh, report):
         if old.users == 0:
             bpy.data.meshes.remove(old)
     register(source, kind, output, item)
-    item.matrix_world = source.matrix_world.copy()
+    place(context, source, item)
     item[REPORT] = json.dumps(report)
     if context.view_layer.objects.active == source:
         select_only(context, item)
     return item
+
+
+CHANNELS = (
+    "rotation_mode",
+    "location",
+    "rotation_euler",
+    "rotation_quaternion",
+    "rotation_axis_angle",
+    "scale",
+)
+DELTAS = ("delta_location", "delta_rotation_euler", "delta_rotation_quaternion", "delta_scale")
+
+
+def place(context, source, item):
+    """Puts a result exactly where its source is: under the same parent, with the same channels.
+
+    A matrix alone would lose the shear of unevenly scaled parents. Only where constraints or the like
+    move the source beyond its channels, the matrix is taken.
+    """
+    item.parent, item.parent_type, item.parent_bone = source.parent, source.parent_type, source.parent_bone
+    if source.parent_type in ("VERTEX", "VERTEX_3"):
+        item.parent_vertices = source.parent_vertices
+    item.matrix_parent_inverse = source.matrix_parent_inverse
+    for channel in (*CHANNELS, *DELTAS):
+        setattr(item, channel, getattr(source, channel))
+    context.view_layer.update()
+    if not np.allclose(item.matrix_world, source.matrix_world, rtol=1e-6, atol=1e-6):
+        item.parent = None
+        item.matrix_world = source.matrix_world.copy()
+        context.view_layer.update()
 
 
 def select_only(context, item):
@@ -109,8 +140,6 @@ def keeps_vertices(source, mesh, before):
 
 def add_warp_key(item, before, after):
     """On a mesh with shape keys the motion is a key of its own: every other key and slider stays as it is."""
-    import numpy as np
-
     keys = item.data.shape_keys
     old = keys.key_blocks.get(WARP_KEY)
     if old is not None:

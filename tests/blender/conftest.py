@@ -22,6 +22,7 @@ def isolated(folder):
         "PYTHONPATH": os.pathsep.join(filter(None, paths)),
         "BLENDER_USER_RESOURCES": str(folder),
         "TMPDIR": str(folder),
+        "OMP_NUM_THREADS": "1",  # the solves here are too small for more
     }
 
 

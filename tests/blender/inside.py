@@ -15,7 +15,10 @@ def in_blender(function):
     functools.update_wrapper(test, function)
     del test.__wrapped__
     test.__signature__ = inspect.Signature(
-        [inspect.Parameter("blender", inspect.Parameter.KEYWORD_ONLY), *(p.replace(kind=p.KEYWORD_ONLY) for p in parameters)]
+        [
+            inspect.Parameter("blender", inspect.Parameter.KEYWORD_ONLY),
+            *(p.replace(kind=p.KEYWORD_ONLY) for p in parameters),
+        ]
     )
     test.inside = function
     return test

@@ -76,7 +76,11 @@ def decorate(item):
     uv.data.foreach_set("uv", rng.random(2 * len(mesh.loops)).astype(np.float32))
     colours = mesh.color_attributes.new("Colour", "BYTE_COLOR", "CORNER")
     colours.data.foreach_set("color", rng.random(4 * len(mesh.loops)).astype(np.float32))
-    for name, kind, domain in (("weight", "FLOAT", "POINT"), ("number", "INT", "FACE"), ("mark", "BOOLEAN", "EDGE")):
+    for name, kind, domain in (
+        ("weight", "FLOAT", "POINT"),
+        ("number", "INT", "FACE"),
+        ("mark", "BOOLEAN", "EDGE"),
+    ):
         attribute = mesh.attributes.new(name, kind, domain)
         attribute.data.foreach_set("value", rng.integers(0, 2, len(attribute.data)))
     for name in ("one", "two"):
@@ -93,7 +97,13 @@ def decorate(item):
 
 
 FIELDS = {"FLOAT": "value", "INT": "value", "BOOLEAN": "value", "FLOAT_VECTOR": "vector", "FLOAT2": "vector"}
-FIELDS |= {"BYTE_COLOR": "color", "FLOAT_COLOR": "color", "INT32_2D": "value", "INT16_2D": "value", "INT8": "value"}
+FIELDS |= {
+    "BYTE_COLOR": "color",
+    "FLOAT_COLOR": "color",
+    "INT32_2D": "value",
+    "INT16_2D": "value",
+    "INT8": "value",
+}
 SIZES = {"vector": {"FLOAT_VECTOR": 3, "FLOAT2": 2}, "color": {"BYTE_COLOR": 4, "FLOAT_COLOR": 4}}
 
 
@@ -111,7 +121,11 @@ def everything(item):
             flat = flat.astype(bool)
         attribute.data.foreach_get(field, flat)
         found[attribute.name, attribute.domain, attribute.data_type] = flat.tobytes()
-    for what, field, width in (("loops", "vertex_index", 1), ("edges", "vertices", 2), ("polygons", "loop_start", 1)):
+    for what, field, width in (
+        ("loops", "vertex_index", 1),
+        ("edges", "vertices", 2),
+        ("polygons", "loop_start", 1),
+    ):
         flat = np.empty(width * len(getattr(mesh, what)), dtype=np.int32)
         getattr(mesh, what).foreach_get(field, flat)
         found[what] = flat.tobytes()

@@ -4,6 +4,7 @@
 Reads lines of JSON, {"file", "function", "arguments"}, and answers each with one line: "" or a traceback.
 """
 
+import functools
 import importlib.util
 import json
 import sys
@@ -13,12 +14,12 @@ from pathlib import Path
 import bpy
 
 
-def load(path, loaded={}):  # noqa: B006: one module a file
-    if path not in loaded:
-        spec = importlib.util.spec_from_file_location(Path(path).stem, path)
-        loaded[path] = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(loaded[path])
-    return loaded[path]
+@functools.cache
+def load(path):
+    spec = importlib.util.spec_from_file_location(Path(path).stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def run(order):

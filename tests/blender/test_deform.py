@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Deforming inside Blender: what moves, what stays, in whichever space the object lives."""
+
+import math
+
+import pytest
+from inside import in_blender
+
+ON_SOURCE = 2e-6  # single precision of positions of size one
+
+
+@in_blender
+def test_the_moved_end_follows_and_the_held_end_stays():
+    import bpy
+    import numpy as np
+    import scenes
+
+    bar, _, moving = scenes.bar_with_handles()
+    before = scenes.world_points(bar)
+    moving.location.z += 0.4
+    assert bpy.ops.arapfields.deform(
+        output="WARP", **scenes.QUICK | {"iterations": 120, "learning_rate": 5e-3}
+    ) == {"FINISHED"}
+    after = scenes.world_points(bpy.data.objects["Bar_deformed"])
+    shift = after - before
+    assert np.abs(shift[before[:, 0] < -0.8]).max() < 0.08
+    assert np.abs(shift[before[:, 0] > 0.8] - [0, 0, 0.4]).max() < 0.12
+    assert np.array_equal(scenes.world_points(bar), before)
+
+
+@in_blender
+def test_unmoved_handles_give_the_shape_itself():
+    import bpy
+    import numpy as np
+    import scenes
+
+    bar, *_ = scenes.bar_with_handles()
+    before = scenes.world_points(bar)
+    bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK)
+    assert np.abs(scenes.world_points(bpy.data.objects["Bar_deformed"]) - before).max() < 5e-3
+
+
+@in_blender
+def test_everything_but_positions_is_byte_equal():
+    import bpy
+    import scenes
+
+    bar, _, moving = scenes.bar_with_handles()
+    scenes.decorate(bar)
+    before = scenes.everything(bar)
+    moving.location.z += 0.4
+    bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK)
+    result = bpy.data.objects["Bar_deformed"]
+    assert scenes.everything(result) == before and len(before) > 12
+    assert result.data != bar.data and scenes.everything(bar) == before
+
+
+@in_blender
+def test_shape_keys_stay_and_the_motion_is_one_more():
+    import bpy
+    import numpy as np
+    import scenes
+
+    bar, _, moving = scenes.bar_with_handles()
+    bar.shape_key_add(name="Basis")
+    key = bar.shape_key_add(name="Fat")
+    for point in key.data:
+        point.co.y *= 1.5
+    key.value = 0.5
+    bpy.context.view_layer.update()
+    flat = np.empty(3 * len(key.data), np.float32)
+    key.data.foreach_get("co", flat)
+    shown = scenes.world_points(bar)
+    moving.location.z += 0.4
+    bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK)
+    result = bpy.data.objects["Bar_deformed"]
+    keys = result.data.shape_keys.key_blocks
+    assert [k.name for k in keys] == ["Basis", "Fat", "ARAP Fields"]
+    kept = np.empty_like(flat)
+    keys["Fat"].data.foreach_get("co", kept)
+    assert np.array_equal(kept, flat) and keys["Fat"].value == 0.5
+    moved = scenes.world_points(result)
+    assert np.abs(moved - shown).max() > 0.1
+    keys["ARAP Fields"].value = 0.0
+    bpy.context.view_layer.update()
+    assert np.abs(scenes.world_points(result) - shown).max() < 1e-6
+
+
+@in_blender
+def test_modifiers_are_read_and_the_result_is_what_was_shown():
+    import bpy
+    import numpy as np
+    import scenes
+
+    bar, _, moving = scenes.bar_with_handles()
+    bar.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    before = scenes.world_points(bar)
+    moving.location.z += 0.4
+    bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK | {"iterations": 120, "learning_rate": 5e-3})
+    result = bpy.data.objects["Bar_deformed"]
+    after = scenes.world_points(result)
+    assert len(after) == len(before) > len(bar.data.vertices) and not result.modifiers
+    assert np.abs((after - before)[before[:, 0] < -0.8]).max() < 0.08
+
+
+PLACES = {
+    "under an unevenly scaled parent": {"rotation_euler": (0.3, 0.5, 0.7), "parent": (2, 0.5, 1)},
+    "moved and turned": {"location": (3, -2, 5), "rotation_euler": (0.3, 1.0, -2.0)},
+    "mirrored": {"scale": (1, -1, 1)},
+    "uneven": {"scale": (0.5, 2.0, 1.3), "rotation_euler": (0.3, 0.5, 0.7)},
+    "tiny": {"scale": (1e-3, 1e-3, 1e-3)},
+    "huge": {"scale": (1e3, 1e3, 1e3), "location": (1e3, 0, 0)},
+}
+
+
+@pytest.mark.parametrize("place", PLACES)
+@in_blender
+def test_a_result_lands_on_its_source_wherever_that_is(place):
+    """One handle moves as a screw of the whole bar: the result is the rigidly moved bar."""
+    import bpy
+    import numpy as np
+    import scenes
+    from mathutils import Matrix
+
+    bar = scenes.bar()
+    for name, value in PLACES[place].items():
+        if name == "parent":
+            bar.parent = scenes.cube_empty((1, 2, 3), value, "Parent")
+            continue
+        setattr(bar, name, value)
+    bpy.context.view_layer.update()
+    size = float(np.ptp(scenes.world_points(bar), axis=0).max())
+    empty = scenes.cube_empty(bar.matrix_world.translation, (size, size, size))
+    bpy.context.view_layer.update()
+    scenes.activate(empty, bar)
+    bpy.ops.arapfields.add_handle()
+    scenes.activate(bar)
+    before = scenes.world_points(bar)
+    middle = Matrix.Translation(bar.matrix_world.translation)
+    turn = middle @ Matrix.Rotation(math.radians(25), 4, "Z") @ middle.inverted()
+    empty.matrix_world = turn @ empty.matrix_world
+    bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK | {"iterations": 120, "learning_rate": 5e-3})
+    result = bpy.data.objects["Bar_deformed"]
+    assert np.array_equal(np.array(result.matrix_world), np.array(bar.matrix_world))
+    turn = np.array(turn)
+    expected = before @ turn[:3, :3].T + turn[:3, 3]
+    assert np.abs(scenes.world_points(result) - expected).max() < 0.03 * size
+
+
+@in_blender
+def test_a_second_run_updates_the_same_object():
+    import bpy
+    import scenes
+
+    scenes.bar_with_handles()
+    for _ in range(2):
+        scenes.activate(bpy.data.objects["Bar"])
+        bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK)
+    assert [o.name for o in bpy.data.objects if "deformed" in o.name] == ["Bar_deformed"]
+    assert len([m for m in bpy.data.meshes if "deformed" in m.name]) == 1
+
+
+@in_blender
+def test_same_seed_same_result():
+    import bpy
+    import numpy as np
+    import scenes
+
+    bar, _, moving = scenes.bar_with_handles()
+    moving.location.z += 0.4
+    found = []
+    for _ in range(2):
+        scenes.activate(bar)
+        bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK)
+        found.append(scenes.world_points(bpy.data.objects["Bar_deformed"]))
+    assert np.array_equal(*found)
