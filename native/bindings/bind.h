@@ -110,5 +110,6 @@ void bind_neural(py::module_& module);
 void bind_fields(py::module_& module);
 void bind_energies(py::module_& module);
 void bind_solve(py::module_& module);
+void bind_curves(py::module_& module);
 
 }  // namespace arapfields::python

@@ -12,4 +12,5 @@ PYBIND11_MODULE(_native, module) {
   bind_fields(module);
   bind_energies(module);
   bind_solve(module);
+  bind_curves(module);
 }

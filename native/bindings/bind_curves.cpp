@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Curves of the plane: the energy's other dimension, from samples to field.
+#include "bindings/bind.h"
+#include "energies/arap2d.h"
+#include "sampling/curve_samples.h"
+#include "solve/deform_curve.h"
+
+namespace arapfields::python {
+namespace {
+
+Points2 as_points2(const py::handle& value, const std::string& argument) {
+  const Eigen::MatrixXd matrix = as_matrix(value, argument);
+  require(matrix.cols() == 2, argument,
+          "shape (" + std::to_string(matrix.rows()) + ", " + std::to_string(matrix.cols()) + ")",
+          "expected points of the plane, shape (n, 2)");
+  return matrix;
+}
+
+/// Python's field: the solution with its report.
+py::array_t<double> jacobian(const CurveSolution& self, const py::object& points) {
+  const Points2 at = as_points2(points, "points");
+  const RowMatrix<double> jets = self.field.jets(at);
+  const Index n = at.rows();
+  py::array_t<double> result({n, Index(2), Index(2)});
+  auto out = result.mutable_unchecked<3>();
+  for (Index p = 0; p < n; ++p)
+    for (int i = 0; i < 2; ++i)
+      for (int k = 0; k < 2; ++k) out(p, i, k) = jets((1 + k) * n + p, i);
+  return result;
+}
+
+template <class Scalar>
+void bind_testing(py::module_& testing) {
+  using Array = py::array_t<Scalar, py::array::c_style>;
+  testing.def(
+      "arap_energy2",
+      [](const Array& jets, double bending, double weight) {
+        require(jets.ndim() == 3 && jets.shape(0) == columns2 && jets.shape(2) == 2, "jets",
+                std::to_string(jets.ndim()) + " dimensions", "expected shape (6, n, 2)");
+        Array cotangents({jets.shape(0), jets.shape(1), jets.shape(2)});
+        std::fill_n(cotangents.mutable_data(), cotangents.size(), Scalar(0));
+        const ArapValue value = arap_energy2<Scalar>({jets.data(), jets.shape(1)}, bending, weight,
+                                                     {cotangents.mutable_data(), jets.shape(1)});
+        return py::make_tuple(value.stretch, value.bend, cotangents);
+      },
+      "jets"_a.noconvert(), "bending"_a, "weight"_a = 1.0);
+}
+
+}  // namespace
+
+void bind_curves(py::module_& module) {
+  py::class_<CurveSamples>(module, "CurveSamples", "Samples of a plane curve, in order along it.")
+      .def_readonly("points", &CurveSamples::points, "(n, 2)")
+      .def_readonly("normals", &CurveSamples::normals,
+                    "(n, 2) unit normals: outward of a closed curve, right-hand of an open one.");
+  module.def(
+      "sample_curve",
+      [](const py::object& vertices, Index count, bool closed) {
+        return sample_curve(as_points2(vertices, "vertices"), count, closed);
+      },
+      "vertices"_a, "count"_a = 400, "closed"_a = true,
+      "CurveSamples at equal distances along the polygon with these vertices (m, 2); closed: the last is "
+      "joined\n"
+      "to the first. InvalidInput for too few or non-finite vertices, a curve without length, count < 1.");
+
+  py::class_<CurveHandle>(
+      module, "CurveHandle",
+      "Samples of a plane curve (indices) that a rigid motion is to move. `motion` (3, 3) maps\n"
+      "homogeneous (x, y, 1); the identity, its default, holds them in place.")
+      .def(py::init([](std::vector<Index> samples, const py::object& motion, double weight) {
+             CurveHandle handle;
+             handle.samples = std::move(samples);
+             if (!motion.is_none()) {
+               const Eigen::MatrixXd matrix = as_matrix(motion, "motion");
+               require(matrix.rows() == 3 && matrix.cols() == 3, "motion",
+                       "shape (" + std::to_string(matrix.rows()) + ", " + std::to_string(matrix.cols()) + ")",
+                       "expected (3, 3)");
+               handle.motion = matrix;
+             }
+             handle.weight = weight;
+             return handle;
+           }),
+           "samples"_a, "motion"_a = py::none(), "weight"_a = 1.0)
+      .def_readonly("samples", &CurveHandle::samples)
+      .def_readonly("motion", &CurveHandle::motion)
+      .def_readonly("weight", &CurveHandle::weight);
+
+  OptionsBinding<CurveOptions>(module, "CurveOptions", "Options of deform_curve.")
+      .field("bending", &CurveOptions::bending, "Weight λ_bend of the bend, in the curve's square.")
+      .field("handle_weight", &CurveOptions::handle_weight, "Factor of the handles' mean squared distance.")
+      .field("iterations", &CurveOptions::iterations, "Quasi-Newton steps at most.")
+      .field("spacing", &CurveOptions::spacing, "Distance of neighbouring bumps, in the curve's square.")
+      .field("threads", &CurveOptions::threads, "Threads; 0 uses all.");
+
+  py::class_<CurveReport>(module, "CurveReport", "What deform_curve reached.")
+      .def_readonly("stretch", &CurveReport::stretch, "Mean ‖J − R‖² over the samples.")
+      .def_readonly("bend", &CurveReport::bend, "Mean bend over the samples, in the curve's square.")
+      .def_readonly("handle_error_mean", &CurveReport::handle_error_mean, "In the curve's units.")
+      .def_readonly("handle_error_max", &CurveReport::handle_error_max, "In the curve's units.")
+      .def_readonly("min_determinant", &CurveReport::min_determinant, "Smallest det J at the samples.")
+      .def_readonly("energies", &CurveReport::energies, "The whole loss after each quasi-Newton step.");
+
+  py::class_<CurveSolution>(module, "CurveField",
+                            "A deformation of the plane, made for a curve by deform_curve.")
+      .def(
+          "__call__",
+          [](const CurveSolution& self, const py::object& points) {
+            return self.field(as_points2(points, "points"));
+          },
+          "points"_a, "(p, 2) → (p, 2), in the curve's coordinates.")
+      .def("jacobian", &jacobian, "points"_a, "(p, 2, 2), [p, i, k] = ∂f_i/∂x_k.")
+      .def_readonly("report", &CurveSolution::report);
+
+  module.def(
+      "deform_curve",
+      [](const py::object& points, const std::vector<CurveHandle>& handles, const CurveOptions& options,
+         Task* task) {
+        const Points2 samples = as_points2(points, "points");
+        return run_long(task, [&](const Progress& progress) {
+          return deform_curve(samples, handles, options, progress);
+        });
+      },
+      "points"_a, "handles"_a, "options"_a = CurveOptions(), "task"_a = py::none(),
+      "Deforms a plane curve, given by its samples (n, 2), as rigidly as possible so that the handles' "
+      "samples\n"
+      "follow their motions. The energy is that of surfaces with d = 2; the field is a sum of Gaussian "
+      "bumps.\n"
+      "Lengths and weights refer to the square in which the curve's bounding box has half-extent 0.75.\n"
+      "InvalidInput for no handles, indices out of range, motions that are not rigid.");
+
+  py::module_ testing = module.attr("testing");
+  bind_testing<double>(testing);
+  bind_testing<float>(testing);
+}
+
+}  // namespace arapfields::python

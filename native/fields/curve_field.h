@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/jets2d.h"
+
+namespace arapfields {
+
+/// Gaussian bumps exp(−|x − p_m|²/r_m²) in the plane, and the affine maps: bumps first, then 1, x, y.
+struct CurveBasis {
+  Points2 centers;  ///< (m,2)
+  Vector radii;     ///< (m)
+
+  Index size() const { return centers.rows() + 3; }
+  /// (6n, size): the basis functions' own jets at points (n,2), column by column of the jet.
+  RowMatrix<double> rows(Points2In points) const;
+};
+
+/// Bumps at the nodes of a grid that have a point within a cell and a half, and at all nodes of one three
+/// times as coarse over the points' surroundings; each twice its grid's spacing wide. A curve's own points
+/// would be poor centres: straight on a line, no bump centred on it has a slope across.
+CurveBasis curve_basis(Points2In points, double spacing);
+
+/// A deformation of the plane, made for a curve. Points are in the curve's coordinates; the basis lives in
+/// the square in which the curve's bounding box has half-extent 0.75.
+struct CurveField {
+  Vec2 center = Vec2::Zero();
+  double scale = 1.0;
+  CurveBasis basis;
+  RowMatrix<double> coefficients;  ///< (size,2)
+
+  /// The field that moves nothing, for this curve. Throws InvalidInput for no points, non-finite ones, one
+  /// place.
+  static CurveField around(Points2In points, double spacing);
+  Points2 to_square(Points2In points) const { return (points.rowwise() - center.transpose()) / scale; }
+  Points2 operator()(Points2In points) const;
+  /// Jets in the square at points in the curve's coordinates; the first derivatives are the same in both.
+  RowMatrix<double> jets(Points2In points) const;
+};
+
+}  // namespace arapfields

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sampling/curve_samples.h"
+
+#include <vector>
+
+#include "core/errors.h"
+
+namespace arapfields {
+
+CurveSamples sample_curve(Points2In vertices, Index count, bool closed) {
+  const Index least = closed ? 3 : 2;
+  require(vertices.rows() >= least, "vertices", std::to_string(vertices.rows()) + " vertices",
+          closed ? "a closed curve has three or more" : "an open curve has two or more");
+  require(vertices.allFinite(), "vertices", "some are NaN or infinite", "all must be finite");
+  require(count >= 1, "count", std::to_string(count), "must be positive");
+
+  const Index edges = closed ? vertices.rows() : vertices.rows() - 1;
+  std::vector<double> ends(static_cast<std::size_t>(edges));
+  double length = 0.0, twice_area = 0.0;
+  for (Index e = 0; e < edges; ++e) {
+    const Vec2 a = vertices.row(e), b = vertices.row((e + 1) % vertices.rows());
+    length += (b - a).norm();
+    twice_area += a.x() * b.y() - a.y() * b.x();
+    ends[static_cast<std::size_t>(e)] = length;
+  }
+  require(length > 0, "vertices", "all are the same point", "a curve has a length");
+  const double side =
+      closed && twice_area < 0 ? -1.0 : 1.0;  // clockwise curves have their inside to the right
+
+  CurveSamples samples{Points2(count, 2), Points2(count, 2)};
+  Index e = 0;
+  for (Index s = 0; s < count; ++s) {
+    const double at = length * (static_cast<double>(s) + 0.5) / static_cast<double>(count);
+    while (e + 1 < edges && ends[static_cast<std::size_t>(e)] < at) ++e;
+    const Vec2 a = vertices.row(e), b = vertices.row((e + 1) % vertices.rows());
+    const double edge = (b - a).norm();
+    const Vec2 direction = (b - a) / edge;
+    samples.points.row(s) = b - (ends[static_cast<std::size_t>(e)] - at) * direction;
+    samples.normals.row(s) = side * Vec2(direction.y(), -direction.x());
+  }
+  return samples;
+}
+
+}  // namespace arapfields

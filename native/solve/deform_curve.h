@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "core/task.h"
+#include "fields/curve_field.h"
+
+namespace arapfields {
+
+/// Samples of the curve (indices) that a rigid motion of the plane, (3,3) homogeneous, is to move.
+struct CurveHandle {
+  std::vector<Index> samples;
+  Mat3 motion = Mat3::Identity();
+  double weight = 1.0;
+};
+
+struct CurveOptions {
+  double bending = 0.01;       ///< λ_bend, in the square
+  double handle_weight = 100;  ///< factor of the handles' mean squared distance
+  int iterations = 200;        ///< quasi-Newton steps at most
+  double spacing = 0.1;        ///< of the fine bumps, in the square
+  int threads = 0;             ///< 0: all
+};
+
+struct CurveReport {
+  double stretch = 0.0, bend = 0.0;                        ///< means over the samples, in the square
+  double handle_error_mean = 0.0, handle_error_max = 0.0;  ///< in the curve's units
+  double min_determinant = 0.0;                            ///< smallest det J at the samples
+  std::vector<double> energies;                            ///< after each quasi-Newton step
+};
+
+struct CurveSolution {
+  CurveField field;
+  CurveReport report;
+};
+
+/// Deforms a curve (samples (n,2)) as rigidly as possible so that the handles' samples follow their motions:
+/// alternating rotations and a linear solve, then quasi-Newton on stretch + λ_bend·bend +
+/// handle_weight·handles. Throws InvalidInput for no handles, indices out of range, and motions that are not
+/// rigid.
+CurveSolution deform_curve(Points2In points, const std::vector<CurveHandle>& handles,
+                           const CurveOptions& options = {}, const Progress& progress = {});
+
+}  // namespace arapfields
