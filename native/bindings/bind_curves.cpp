@@ -87,6 +87,9 @@ void bind_curves(py::module_& module) {
 
   OptionsBinding<CurveOptions>(module, "CurveOptions", "Options of deform_curve.")
       .field("bending", &CurveOptions::bending, "Weight λ_bend of the bend, in the curve's square.")
+      .field("smoothness", &CurveOptions::smoothness,
+             "Weight of the second derivatives' mean square at the bumps: keeps the plane tame away from the "
+             "curve.")
       .field("handle_weight", &CurveOptions::handle_weight, "Factor of the handles' mean squared distance.")
       .field("iterations", &CurveOptions::iterations, "Quasi-Newton steps at most.")
       .field("spacing", &CurveOptions::spacing, "Distance of neighbouring bumps, in the curve's square.")

@@ -16,14 +16,17 @@ namespace {
 using Rows = RowMatrix<double>;
 
 constexpr int local_global_steps = 8;
-constexpr double gain_tolerance = 1e-7;
+constexpr double gain_tolerance = 1e-6;
 
 void check(const CurveOptions& options) {
   const auto positive = [](const char* name, double value) {
     require(std::isfinite(value) && value > 0, name, std::to_string(value), "must be positive");
   };
-  require(std::isfinite(options.bending) && options.bending >= 0, "bending", std::to_string(options.bending),
-          "must be 0 or more");
+  const auto not_negative = [](const char* name, double value) {
+    require(std::isfinite(value) && value >= 0, name, std::to_string(value), "must be 0 or more");
+  };
+  not_negative("bending", options.bending);
+  not_negative("smoothness", options.smoothness);
   positive("handle_weight", options.handle_weight);
   require(options.iterations >= 0, "iterations", std::to_string(options.iterations), "must be 0 or more");
   positive("spacing", options.spacing);
@@ -62,10 +65,11 @@ class CurveProblem {
         held_.push_back({s, share, field_.to_square(moved.transpose())});
       }
     }
-    Rows quadratic = Rows::Zero(size(), size());
-    add_square(quadratic, 1, 1);
-    add_square(quadratic, 2, 1);
-    for (int c = 3; c < columns2; ++c) add_square(quadratic, c, options.bending * (c == 5 ? 2 : 1));
+    smooth_ = Rows::Zero(size(), size());
+    add_second(smooth_, field_.basis.rows(field_.basis.centers), options.smoothness);
+    Rows quadratic = smooth_;
+    for (int c = 1; c <= 2; ++c) add_square(quadratic, rows_, c, 1);
+    add_second(quadratic, rows_, options.bending);
     for (const Held& h : held_) quadratic += h.weight * rows_.row(h.sample).transpose() * rows_.row(h.sample);
     quadratic.diagonal().array() += 1e-9 * quadratic.diagonal().mean();
     factor_ = cholesky<double>(quadratic);
@@ -97,7 +101,9 @@ class CurveProblem {
       value += h.weight * gap.squaredNorm();
       cotangents.row(h.sample) += 2 * h.weight * gap;
     }
-    gradient = pull_back(cotangents);
+    const Rows pull = smooth_ * coefficients;
+    value += pull.cwiseProduct(coefficients).sum();
+    gradient = pull_back(cotangents) + 2 * pull;
     return value;
   }
 
@@ -130,10 +136,16 @@ class CurveProblem {
 
   Index size() const { return field_.basis.size(); }
 
-  void add_square(Rows& quadratic, int column, double weight) const {
-    const auto block = rows_.middleRows(column * count_, count_);
-    gemm<double>(Transpose::yes, Transpose::no, weight / static_cast<double>(count_), block, block, 1.0,
+  /// Adds the quadratic form of weight times the mean square of one jet column.
+  static void add_square(Rows& quadratic, const Rows& rows, int column, double weight) {
+    const Index n = rows.rows() / columns2;
+    const auto block = rows.middleRows(column * n, n);
+    gemm<double>(Transpose::yes, Transpose::no, weight / static_cast<double>(n), block, block, 1.0,
                  quadratic);
+  }
+  /// The same for all second derivatives, ‖D‖².
+  static void add_second(Rows& quadratic, const Rows& rows, double weight) {
+    for (int c = 3; c < columns2; ++c) add_square(quadratic, rows, c, c == 5 ? 2 * weight : weight);
   }
   Rows evaluate(const Rows& coefficients) const {
     Rows jets(rows_.rows(), 2);
@@ -150,6 +162,7 @@ class CurveProblem {
   Index count_;
   CurveField field_;
   Rows rows_;
+  Rows smooth_;  // quadratic form of the smoothness
   Rows factor_;
   std::vector<Held> held_;
 };
