@@ -32,8 +32,16 @@ HANDLES = [
 SPACING = 3.3
 
 
+def job_progress():
+    """Share done and message of the operator's job, if one runs."""
+    from addon.core import jobs
+
+    job = jobs.running()
+    return (job.fraction, job.message) if job else (0.0, "")
+
+
 @contextmanager
-def timed(title, progress):
+def timed(title, progress=job_progress):
     """Prints a stage's title, a progress bar while it runs, and its time."""
     done = threading.Event()
     begin = time.perf_counter()
@@ -83,7 +91,9 @@ def add_handles(monkey):
     rest = [empty.matrix_world.copy() for empty in empties]
     for empty, (_, _, _, angle, pivot) in zip(empties, HANDLES, strict=True):
         there = Matrix.Translation(Vector(pivot))
-        empty.matrix_world = there @ Matrix.Rotation(math.radians(angle), 4, "Y") @ there.inverted() @ empty.matrix_world
+        empty.matrix_world = (
+            there @ Matrix.Rotation(math.radians(angle), 4, "Y") @ there.inverted() @ empty.matrix_world
+        )
     bpy.context.view_layer.update()
     return rest, [empty.matrix_world.copy() for empty in empties]
 
@@ -119,24 +129,27 @@ def main():
     options.output.mkdir(parents=True, exist_ok=True)
     begin = time.perf_counter()
     addon.register()
-    from addon.core import jobs
-
     stage.clear()
     monkey = suzanne()
     activate(monkey)
-    with timed("neural surface (fit)", jobs.progress):
+    with timed("neural surface (fit)"):
         bpy.ops.arapfields.fit()
     rest, targets = add_handles(monkey)
     results = []
-    for output, text, colour in (("WARP", "original mesh warped", stage.RESULT), ("SURFACE", "implicit surface", stage.SURFACE)):
+    for output, text, colour in (
+        ("WARP", "original mesh warped", stage.RESULT),
+        ("SURFACE", "implicit surface", stage.SURFACE),
+    ):
         activate(monkey)
-        with timed(f"deform, {text}", jobs.progress):
+        with timed(f"deform, {text}"):
             bpy.ops.arapfields.deform(output=output)
         results.append((text, bpy.context.view_layer.objects.active, colour))
     with timed("picture", lambda: (0.5, "Cycles")):
         arrange(monkey, results, rest, targets, options.output / "demo.png")
     bpy.ops.wm.save_as_mainfile(filepath=str((options.output / "demo.blend").resolve()))
-    print(f"total {time.perf_counter() - begin:.1f} s: {options.output / 'demo.blend'}, {options.output / 'demo.png'}")
+    print(
+        f"total {time.perf_counter() - begin:.1f} s: {options.output / 'demo.blend'}, {options.output / 'demo.png'}"
+    )
 
 
 if __name__ == "__main__":
