@@ -5,12 +5,12 @@ import bpy
 
 from . import panels, preferences
 from .bridge import jobs
-from .operators import deform, extract, fit, handles, status
+from .operators import deform, extract, fit, handles, status, stylize
 from .properties import handle, item, settings
 
 MODULES = [
     *(handle, settings, item, preferences, jobs),
-    *(fit, handles, deform, extract, status),
+    *(fit, handles, deform, stylize, extract, status),
     *panels.SECTIONS,
 ]
 

@@ -3,12 +3,13 @@
 
 import bpy
 import numpy as np
-from mathutils import Matrix
+from mathutils import Matrix, Vector
 
 from ..core.errors import UserError
 from ..core.handles import box_matrix, solve_handle
+from ..core.spaces import transform
 from ..names import HANDLE_SUFFIX
-from . import arrays
+from . import arrays, groups
 from .lookup import settings_of
 
 
@@ -43,15 +44,20 @@ def find(source, empty):
     return next((index for index, entry in enumerate(handles) if entry.empty == empty), -1)
 
 
-def solve_handles(source, space):
+def solve_handles(context, source, space):
     """All handles of a source as the solver wants them; UserError when there is none."""
-    handles = [
-        solve_handle(entry.empty.name, entry.kind, rest_box(source, entry), box_now(entry.empty), space)
-        for entry in used(source)
-    ]
-    if not handles:
+    found = []
+    for entry in used(source):
+        weights = groups.vertex_weights(context, source, entry.group) if entry.kind == "GROUP" else None
+        where = rest_box(source, entry), box_now(entry.empty)
+        further = {"weights": weights, "weight": entry.weight}
+        found.append(solve_handle(entry.empty.name, entry.kind, *where, space, **further))
+    if not found:
         raise UserError(f"{source.name} has no handle; add one in the panel's Handles section")
-    return handles
+    return found
+
+
+SHAPES = {"CUBE": "CUBE", "POINT": "SPHERE", "GROUP": "ARROWS"}
 
 
 def add(source, empty, kind="CUBE"):
@@ -71,7 +77,7 @@ def add(source, empty, kind="CUBE"):
     entry = ours.handles[index]
     entry.empty, entry.kind = empty, kind
     settings_of(empty).handle_of = source
-    empty.empty_display_type = "CUBE" if kind == "CUBE" else "SPHERE"
+    empty.empty_display_type = SHAPES[kind]
     store_rest(source, entry)
     ours.active_handle = index
     return entry
@@ -92,11 +98,17 @@ def editable(context):
     return [context.scene.collection, *context.scene.collection.children_recursive]
 
 
-def at_cursor(context, source):
-    """A new Empty at the 3D cursor, a sixth of the source's size."""
-    size = max(source.dimensions) / 6
-    cursor = context.scene.cursor
-    return make_empty(context, source, Matrix.Translation(cursor.location), size or 1.0)
+def new_empty(context, source, kind, group):
+    """A new Empty a sixth of the source's size: at the 3D cursor, or amid the vertex group."""
+    corners = transform(matrix_of(source), np.array(source.bound_box))
+    size = float(np.ptp(corners, axis=0).max()) / 6 or 1.0
+    place = context.scene.cursor.location
+    if kind == "GROUP":
+        weights = groups.vertex_weights(context, source, group)
+        with arrays.evaluated_mesh(context, source) as mesh:
+            middle = np.average(arrays.positions(mesh), axis=0, weights=weights)
+        place = source.matrix_world @ Vector(middle)
+    return make_empty(context, source, Matrix.Translation(place), size)
 
 
 def reset(source, entry):
@@ -117,10 +129,13 @@ def remove(source, index):
 
 
 def count_inside(context, source):
-    """Stores how many of the shown vertices lie in each handle's rest box."""
+    """Stores how many of the shown vertices each handle holds at rest."""
     with arrays.evaluated_mesh(context, source) as mesh:
         vertices = arrays.positions(mesh)
     for entry in used(source):
-        box = np.array(entry.rest, dtype=np.float64).reshape(4, 4)
-        local = (vertices - box[:3, 3]) @ np.linalg.inv(box[:3, :3]).T
-        entry.inside = int((np.abs(local) <= 1).all(axis=1).sum())
+        if entry.kind == "GROUP":
+            held = groups.vertex_weights(context, source, entry.group) >= groups.HELD
+        else:
+            box = np.array(entry.rest, dtype=np.float64).reshape(4, 4)
+            held = (np.abs((vertices - box[:3, 3]) @ np.linalg.inv(box[:3, :3]).T) <= 1).all(axis=1)
+        entry.inside = int(held.sum()) if entry.kind != "POINT" else -1

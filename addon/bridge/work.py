@@ -7,7 +7,8 @@ import numpy as np
 
 from ..core import native
 from ..core.fit_cache import FitCache, fit_key
-from ..core.parameters import FIT, native_options
+from ..core.fitting import FIT, QUALITIES
+from ..core.parameters import native_options
 from ..core.spaces import Space, space_of
 from . import arrays, settings
 from .lookup import ObjectId, settings_of
@@ -64,27 +65,32 @@ def known(options, values):
     return {name: value for name, value in values.items() if name in options.fields}
 
 
+def fit_values(group, operator):
+    """The fit's settings in force; an operator's `quality` counts before single settings of the object."""
+    if operator is None:
+        return {p.name: settings.plain(getattr(group, p.name)) for p in FIT}
+    values = settings.in_force(FIT, group, operator)
+    if operator.properties.is_property_set("quality"):
+        preset = QUALITIES[operator.quality][2]
+        values |= {n: v for n, v in preset.items() if not operator.properties.is_property_set(n)}
+    return values
+
+
 def read_surface(context, source, operator=None):
     """Everything of a source that the worker needs; UserError when it cannot be worked on."""
     context.view_layer.update()
     mesh = arrays.read(context, source)
     space = space_of(source.matrix_world, source.name)
     vertices = space.to_solve(mesh.vertices)
-    group = settings_of(source).fit
-    if operator is None:
-        chosen = {p.name: settings.plain(getattr(group, p.name)) for p in FIT}
-    else:
-        chosen = settings.in_force(FIT, group, operator)
-    options = native_options(chosen)
-    key = fit_key(vertices, mesh.triangles, options, VERSION)
+    options = native_options(fit_values(settings_of(source).fit, operator))
     return Surface(
-        ObjectId(source),
-        space,
-        mesh.vertices,
-        vertices,
-        mesh.triangles,
-        options,
-        key,
-        settings.fit_cache(),
-        settings.machine_options(),
+        who=ObjectId(source),
+        space=space,
+        local=mesh.vertices,
+        vertices=vertices,
+        triangles=mesh.triangles,
+        fit_options=options,
+        key=fit_key(vertices, mesh.triangles, options, VERSION),
+        cache=settings.fit_cache(),
+        machine=settings.machine_options(),
     )

@@ -17,9 +17,11 @@ class Handle:
     """One handle in solve space. `rest` and `target` map the cube [-1, 1]³ onto the box."""
 
     name: str
-    kind: str  # CUBE or POINT
+    kind: str  # CUBE, POINT or GROUP
     rest: np.ndarray
     target: np.ndarray
+    weights: np.ndarray | None = None  # GROUP: (n,) of the source's vertices
+    weight: float = 1.0  # how strictly it is followed, relative to others
 
     @property
     def is_anchor(self):
@@ -36,7 +38,7 @@ def box_matrix(matrix_world, size):
     return np.asarray(matrix_world, dtype=np.float64) @ np.diag([size, size, size, 1.0])
 
 
-def solve_handle(name, kind, rest_world, now_world, space):
+def solve_handle(name, kind, rest_world, now_world, space, **further):
     """A handle from its box at rest and its box now, both in world space."""
     to_solve = space.world_to_solve
     rest = to_solve @ rest_world
@@ -50,13 +52,11 @@ def solve_handle(name, kind, rest_world, now_world, space):
     moved = np.abs(motion[:3, :3] - np.eye(3)).max() > STILL
     shift = motion[:3, :3] @ rest[:3, 3] + motion[:3, 3] - rest[:3, 3]
     moved = moved or np.abs(shift).max() > STILL * extent
-    return Handle(name, kind, rest, motion @ rest if moved else rest.copy())
+    return Handle(name, kind, rest, motion @ rest if moved else rest.copy(), **further)
 
 
-def require_points(handles, points):
-    """How many of the points each box handle holds; UserError that names those that hold none."""
-    counts = {h.name: int(h.inside(points).sum()) for h in handles if h.kind == "CUBE"}
+def require_held(counts):
+    """`counts`: samples by handle name. UserError that names the handles that hold none."""
     empty = [name for name, count in counts.items() if count == 0]
     if empty:
-        raise UserError(f"no part of the surface lies in the rest box of {', '.join(empty)}")
-    return counts
+        raise UserError(f"no part of the surface lies in the rest region of {', '.join(empty)}")

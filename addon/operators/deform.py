@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..bridge import handles
+from ..bridge import groups, handles
 from ..bridge.jobs import JobOperator
 from ..bridge.lookup import refusal, settings_of, source_of
 from ..bridge.moving import plan_move
 from ..bridge.settings import annotations, in_force, machine_options
 from ..bridge.work import known
 from ..core import native
-from ..core.handles import require_points
 from ..core.parameters import DEFORM, native_options
 from ..core.spaces import space_of
 from ..names import Op
@@ -45,20 +44,13 @@ class ARAPFIELDS_OT_deform(JobOperator, bpy.types.Operator):
         values = in_force(DEFORM, settings_of(source).deform, self)
         af = native.library()
         options = af.DeformOptions(**native_options(values), **known(af.DeformOptions, machine_options()))
-        wanted = handles.solve_handles(source, space_of(source.matrix_world, source.name))
+        wanted = handles.solve_handles(context, source, space_of(source.matrix_world, source.name))
 
         def solve(stages, rest, samples):
-            require_points(wanted, samples.points)
-            ready = [native_handle(af, handle) for handle in wanted]
+            ready = groups.native_handles(af, wanted, rest, samples)
             return af.deform(samples, ready, options, stages.start("Deforming", 0.5))
 
         return plan_move(context, self, source, "DEFORM", values["samples"], values["seed"], solve)
-
-
-def native_handle(af, handle):
-    if handle.kind == "POINT":
-        return af.Point(handle.rest[:3, 3], handle.target[:3, 3])
-    return af.Cuboid(handle.rest, handle.target)
 
 
 CLASSES = [ARAPFIELDS_OT_deform]

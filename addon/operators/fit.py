@@ -7,9 +7,10 @@ from ..bridge.jobs import JobOperator
 from ..bridge.lookup import settings_of
 from ..bridge.settings import annotations
 from ..bridge.work import read_surface
+from ..core.fitting import FIT
 from ..core.jobs import Item
-from ..core.parameters import FIT
 from ..names import Op
+from ..properties.settings import quality
 
 
 class ARAPFIELDS_OT_fit(JobOperator, bpy.types.Operator):
@@ -22,6 +23,7 @@ class ARAPFIELDS_OT_fit(JobOperator, bpy.types.Operator):
 
     __annotations__ = {
         **annotations(FIT, options={"SKIP_SAVE"}),
+        "quality": quality(options={"SKIP_SAVE"}),
         "again": bpy.props.BoolProperty(
             name="Again", description="Fit anew even where a fit is in the cache", options={"SKIP_SAVE"}
         ),

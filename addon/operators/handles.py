@@ -51,12 +51,19 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
     needs_handle = False
 
     kind: bpy.props.EnumProperty(items=KINDS, name="Kind", description="What of the surface the handle holds")
+    group: bpy.props.StringProperty(
+        name="Vertex Group", description="The group to hold, for that kind; empty for the object's active one"
+    )
 
     def change(self, context, source):
+        group = self.group or (source.vertex_groups.active.name if source.vertex_groups else "")
+        if self.kind == "GROUP" and not group:
+            raise UserError(f"{source.name} has no vertex group")
         empties = [item for item in context.selected_objects if item.type == "EMPTY"]
-        empties = empties or [handles.at_cursor(context, source)]
+        empties = empties or [handles.new_empty(context, source, self.kind, group)]
         for empty in empties:
-            handles.add(source, empty, self.kind)
+            entry = handles.add(source, empty, self.kind)
+            entry.group = group if self.kind == "GROUP" else ""
         handles.count_inside(context, source)
         return f"{len(empties)} handle{'s' if len(empties) > 1 else ''} of {source.name}"
 

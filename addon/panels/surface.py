@@ -4,7 +4,7 @@ import json
 import bpy
 
 from ..bridge.settings import fit_cache
-from ..core.parameters import FIT
+from ..core.fitting import FIT
 from ..names import Op
 from .section import Section, settings_column
 
@@ -16,6 +16,7 @@ class ARAPFIELDS_PT_surface(Section, bpy.types.Panel):
 
     def fill(self, context, source, ours):
         layout = self.layout
+        layout.prop(ours.fit, "quality")
         settings_column(layout, ours.fit, FIT)
         layout.operator(Op.FIT, icon="MOD_REMESH")
         if not ours.fit_key:

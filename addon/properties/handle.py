@@ -6,12 +6,23 @@ import bpy
 KINDS = (
     ("CUBE", "Region", "What lies in the box at rest follows the Empty"),
     ("POINT", "Point", "The point of the surface nearest to the Empty at rest follows it"),
+    ("GROUP", "Vertex Group", "What a vertex group of the object holds follows the Empty"),
 )
 
 
 class ARAPFIELDS_PG_handle(bpy.types.PropertyGroup):
     empty: bpy.props.PointerProperty(type=bpy.types.Object, name="Empty", description="Moves the handle")
     kind: bpy.props.EnumProperty(items=KINDS, name="Kind", description="What of the surface the handle holds")
+    group: bpy.props.StringProperty(
+        name="Vertex Group", description="The group that the handle holds, for handles of that kind"
+    )
+    weight: bpy.props.FloatProperty(
+        name="Weight",
+        description="How strictly this handle is followed, relative to the others",
+        default=1.0,
+        min=0.0,
+        soft_max=10.0,
+    )
     rest: bpy.props.FloatVectorProperty(
         size=16,
         name="Rest Box",

@@ -4,15 +4,74 @@
 import bpy
 
 from ..bridge.settings import annotations
-from ..core.parameters import DEFORM, FIT, STYLIZE
+from ..core.fitting import FIT, QUALITIES
+from ..core.parameters import DEFORM
+from ..core.styles import STYLES, STYLIZE, style_identifier
+
+QUALITY_ITEMS = tuple((key, label, tip) for key, (label, tip, _) in QUALITIES.items())
+STYLE_ITEMS = tuple(
+    (style_identifier(name), label, f"Turns the surface towards the faces of: {label.lower()}")
+    for name, label in STYLES
+)
+FRAMES = (
+    ("OBJECT", "Object", "The style stands along the object's own axes"),
+    ("WORLD", "World", "The style stands along the world's axes"),
+    ("EMPTY", "Empty", "The style stands along the axes of a chosen object"),
+)
 
 
-def group(name, parameters):
-    return type(name, (bpy.types.PropertyGroup,), {"__annotations__": annotations(parameters)})
+def quality(**extra):
+    return bpy.props.EnumProperty(
+        items=QUALITY_ITEMS,
+        name="Quality",
+        description="Sets the steps and the network's size",
+        default="GOOD",
+        **extra,
+    )
 
 
-ARAPFIELDS_PG_fit = group("ARAPFIELDS_PG_fit", FIT)
+def style(**extra):
+    return bpy.props.EnumProperty(
+        items=STYLE_ITEMS,
+        name="Style",
+        description="The solid whose faces the surface turns towards",
+        **extra,
+    )
+
+
+def frame(**extra):
+    return bpy.props.EnumProperty(
+        items=FRAMES, name="Orientation", description="Along which axes the style stands", **extra
+    )
+
+
+def apply_quality(group, context):
+    for name, value in QUALITIES[group.quality][2].items():
+        setattr(group, name, value)
+
+
+def group(name, parameters, **further):
+    annotated = {**further, **annotations(parameters)}
+    return type(name, (bpy.types.PropertyGroup,), {"__annotations__": annotated})
+
+
+ARAPFIELDS_PG_fit = group("ARAPFIELDS_PG_fit", FIT, quality=quality(update=apply_quality))
 ARAPFIELDS_PG_deform = group("ARAPFIELDS_PG_deform", DEFORM)
-ARAPFIELDS_PG_stylize = group("ARAPFIELDS_PG_stylize", STYLIZE)
+ARAPFIELDS_PG_stylize = group(
+    "ARAPFIELDS_PG_stylize",
+    STYLIZE,
+    style=style(),
+    frame=frame(),
+    frame_object=bpy.props.PointerProperty(
+        type=bpy.types.Object, name="Axes Of", description="Object along whose axes the style stands"
+    ),
+    region=bpy.props.StringProperty(
+        name="Region",
+        description="Vertex group whose weights say how strongly the style acts; empty for everywhere",
+    ),
+    use_handles=bpy.props.BoolProperty(
+        name="Follow Handles", description="Handles hold and move their parts while the rest is stylized"
+    ),
+)
 
 CLASSES = [ARAPFIELDS_PG_fit, ARAPFIELDS_PG_deform, ARAPFIELDS_PG_stylize]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from addon.core.errors import UserError
-from addon.core.handles import box_matrix, require_points, solve_handle
+from addon.core.handles import box_matrix, require_held, solve_handle
 from addon.core.spaces import pose, rigid_motion, space_of, transform
 
 EXACT = 1e-9  # float64 arithmetic on numbers near one
@@ -113,14 +113,16 @@ def test_a_box_is_the_emptys_cube():
     assert np.allclose(corner, [[0.5, 1.0, 1.5]])
 
 
+def test_a_box_holds_what_is_inside_it():
+    rest = np.diag([1.0, 2.0, 3.0, 1.0])
+    handle = solve_handle("Empty", "CUBE", rest, rest, space_of(np.eye(4)))
+    points = np.array([[0.9, 1.9, -2.9], [1.1, 0, 0], [0, 2.1, 0], [0, 0, -3.1]])
+    assert handle.inside(points).tolist() == [True, False, False, False]
+
+
 def test_handles_that_hold_nothing_are_named():
-    space = space_of(np.eye(4))
-    boxes = {"full": np.eye(4), "bare": np.eye(4)}
-    boxes["bare"][:3, 3] = 10.0
-    handles = [solve_handle(name, "CUBE", box, box, space) for name, box in boxes.items()]
-    with pytest.raises(UserError, match=r"rest box of bare$"):
-        require_points(handles, np.zeros((5, 3)))
-    assert require_points(handles[:1], np.zeros((5, 3))) == {"full": 5}
+    with pytest.raises(UserError, match=r"rest region of bare, empty$"):
+        require_held({"bare": 0, "full": 3, "empty": 0})
 
 
 def test_a_flat_box_is_refused():

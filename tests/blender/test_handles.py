@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Handles: Empties of every kind, their rest poses, and who owns them."""
+
+from inside import in_blender
+
+
+@in_blender
+def test_selected_empties_become_handles_and_anchors_at_first():
+    import bpy
+    import scenes
+
+    from addon.bridge import handles
+    from addon.core.spaces import space_of
+
+    bar, fixed, moving = scenes.bar_with_handles()
+    found = handles.solve_handles(bpy.context, bar, space_of(bar.matrix_world))
+    assert [h.name for h in found] == ["Fixed", "Moving"] and all(h.is_anchor for h in found)
+    moving.location.z += 1
+    bpy.context.view_layer.update()
+    found = handles.solve_handles(bpy.context, bar, space_of(bar.matrix_world))
+    assert [h.is_anchor for h in found] == [True, False]
+    assert all(entry.inside > 0 for entry in bar.arapfields.handles)
+    assert fixed.arapfields.handle_of == bar and fixed.empty_display_type == "CUBE"
+
+
+@in_blender
+def test_without_empties_one_is_made_at_the_cursor():
+    import bpy
+    import scenes
+
+    bar = scenes.bar()
+    bpy.context.scene.cursor.location = (0.5, 0, 0)
+    bpy.ops.arapfields.add_handle()
+    (entry,) = bar.arapfields.handles
+    assert entry.empty.name == "Bar_handle" and tuple(entry.empty.location) == (0.5, 0, 0)
+    assert entry.empty.users_collection == bar.users_collection and entry.inside > 0
+
+
+@in_blender
+def test_rest_follows_the_source_and_reset_returns_to_it():
+    import bpy
+    import numpy as np
+    import scenes
+
+    bar, _, moving = scenes.bar_with_handles()
+    before = np.array(moving.matrix_world)
+    bar.location.x += 5
+    bpy.context.view_layer.update()
+    scenes.activate(bar)
+    bpy.ops.arapfields.reset_handle(all=True)
+    bpy.context.view_layer.update()
+    before[0, 3] += 5
+    assert np.allclose(np.array(moving.matrix_world), before, atol=1e-5)
+
+
+@in_blender
+def test_set_rest_makes_the_present_pose_the_rest():
+    import bpy
+    import scenes
+
+    from addon.bridge import handles
+    from addon.core.spaces import space_of
+
+    bar, _, moving = scenes.bar_with_handles()
+    moving.location.y += 0.1
+    bpy.ops.arapfields.set_rest(all=True)
+    found = handles.solve_handles(bpy.context, bar, space_of(bar.matrix_world))
+    assert all(h.is_anchor for h in found)
+
+
+@in_blender
+def test_remove_takes_the_selected_and_may_delete_them():
+    import bpy
+    import scenes
+
+    bar, fixed, _ = scenes.bar_with_handles()
+    scenes.activate(fixed, bar)
+    bpy.ops.arapfields.remove_handle()
+    assert [e.empty.name for e in bar.arapfields.handles] == ["Moving"]
+    assert fixed.arapfields.handle_of is None
+    scenes.activate(bar)
+    bpy.ops.arapfields.remove_handle(delete=True)
+    assert not bar.arapfields.handles and "Moving" not in bpy.data.objects
+
+
+@in_blender
+def test_a_deleted_empty_is_no_handle_any_more():
+    import bpy
+    import scenes
+
+    from addon.bridge import handles
+
+    bar, _, moving = scenes.bar_with_handles()
+    bpy.data.objects.remove(moving)
+    assert [e.empty.name for e in handles.used(bar)] == ["Fixed"]
+
+
+@in_blender
+def test_with_a_handle_or_a_result_active_the_source_is_still_found():
+    import bpy
+    import scenes
+
+    from addon.bridge.lookup import source_of
+
+    bar, fixed, _ = scenes.bar_with_handles()
+    scenes.activate(fixed)
+    assert source_of(bpy.context) == bar
+    bpy.ops.arapfields.deform(**scenes.QUICK)
+    assert bpy.context.view_layer.objects.active == fixed
+    scenes.activate(bpy.data.objects["Bar_deformed"])
+    assert source_of(bpy.context) == bar
+
+
+@in_blender
+def test_a_vertex_group_is_a_handle():
+    import bpy
+    import numpy as np
+    import scenes
+
+    bar = scenes.bar()
+    before = scenes.world_points(bar)
+    for name, chosen in (("left", before[:, 0] < -0.8), ("right", before[:, 0] > 0.8)):
+        bar.vertex_groups.new(name=name).add(np.flatnonzero(chosen).tolist(), 1.0, "REPLACE")
+        bpy.ops.arapfields.add_handle(kind="GROUP", group=name)
+        scenes.activate(bar)
+    right = bar.arapfields.handles[1].empty
+    assert abs(right.location.x - 0.93) < 0.1
+    right.location.z += 0.4
+    bpy.ops.arapfields.deform(**scenes.QUICK | {"iterations": 120, "learning_rate": 5e-3})
+    shift = scenes.world_points(bpy.data.objects["Bar_deformed"]) - before
+    assert np.abs(shift[before[:, 0] < -0.8]).max() < 0.1
+    assert np.abs(shift[before[:, 0] > 0.8] - [0, 0, 0.4]).max() < 0.15

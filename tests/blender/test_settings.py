@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel's settings are the native library's options: same names, same defaults."""
+
+from inside import in_blender
+
+# Defaults that are the add-on's own, with the reason.
+OWN_DEFAULTS = set()
+
+
+@in_blender
+def test_names_and_defaults_are_the_librarys():
+    import arapfields as af
+    from addon.core.fitting import FIT
+    from addon.core.parameters import DEFORM, OURS
+    from addon.core.styles import STYLIZE
+
+    tables = {"DeformOptions": DEFORM, "StylizeOptions": STYLIZE, "FitOptions": FIT}
+    for name, table in tables.items():
+        options = getattr(af, name)()
+        for parameter in table:
+            if parameter.name in OURS:
+                continue
+            assert parameter.name in type(options).fields, (name, parameter.name)
+            if (name, parameter.name) not in OWN_DEFAULTS:
+                assert getattr(options, parameter.name) == parameter.default, (name, parameter.name)
+
+
+@in_blender
+def test_values_survive_single_precision():
+    import bpy
+    import scenes
+
+    from addon.bridge.settings import in_force
+    from addon.core.parameters import DEFORM
+
+    item = scenes.bar()
+
+    class Operator:
+        properties = type("P", (), {"is_property_set": staticmethod(lambda name: False)})
+
+    values = in_force(DEFORM, item.arapfields.deform, Operator)
+    assert values == {p.name: p.default for p in DEFORM}
+    assert bpy.context.object == item
+
+
+@in_blender
+def test_every_property_and_operator_is_described():
+    import bpy
+
+    import addon.registration as registration
+
+    bare = []
+    for module in registration.MODULES:
+        for cls in getattr(module, "CLASSES", []):
+            if issubclass(cls, bpy.types.Operator):
+                group, name = cls.bl_idname.split(".")
+                if not getattr(getattr(bpy.ops, group), name).get_rna_type().description:
+                    bare.append(cls.__name__)
+            for prop in cls.bl_rna.properties:
+                ours = prop.identifier in getattr(cls, "__annotations__", {})
+                if ours and not prop.description:
+                    bare.append(f"{cls.__name__}.{prop.identifier}")
+    assert not bare, bare

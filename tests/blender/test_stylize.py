@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Stylizing inside Blender."""
+
+import pytest
+from inside import in_blender
+
+
+def ball(name="Ball"):
+    import bpy
+
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
+    bpy.context.object.name = name
+    return bpy.context.object
+
+
+SETTINGS = {"iterations": 60, "samples": 2000, "batch": 200, "width": 32, "layers": 2, "learning_rate": 5e-3}
+
+
+@in_blender
+def test_a_ball_turns_towards_a_cube_and_keeps_its_mesh():
+    import json
+
+    import bpy
+
+    item = ball()
+    bpy.ops.arapfields.stylize(style="CUBE", **SETTINGS)
+    result = bpy.data.objects["Ball_stylized"]
+    assert len(result.data.polygons) == len(item.data.polygons)
+    assert json.loads(result["arapfields_report"])["preference"] > 0.75
+
+
+@pytest.mark.parametrize("frame", ["OBJECT", "WORLD", "EMPTY"])
+@in_blender
+def test_the_style_stands_along_the_chosen_axes(frame):
+    """A ball, turned: the cube's axes are those along which its result is most flat."""
+    import math
+
+    import bpy
+    import numpy as np
+    import scenes
+
+    item = ball()
+    item.rotation_euler.z = math.radians(20)
+    empty = scenes.cube_empty((0, 0, 0), (1, 1, 1), "Axes")
+    empty.rotation_euler.z = math.radians(-25)
+    bpy.context.view_layer.update()
+    scenes.activate(item)
+    item.arapfields.stylize.frame_object = empty
+    bpy.ops.arapfields.stylize(style="CUBE", frame=frame, **SETTINGS)
+    points = scenes.world_points(bpy.data.objects["Ball_stylized"])
+    points -= points.mean(axis=0)
+
+    def reach(degrees):
+        turn = math.radians(degrees)
+        return np.abs(points @ [math.cos(turn), math.sin(turn), 0]).max()
+
+    # A cube reaches least along its axes.
+    flattest = min((20, 0, -25), key=reach)
+    assert flattest == {"OBJECT": 20, "WORLD": 0, "EMPTY": -25}[frame]
+
+
+@in_blender
+def test_a_vertex_group_bounds_the_region():
+    import bpy
+    import numpy as np
+    import scenes
+
+    item = ball()
+    before = scenes.world_points(item)
+    top = item.vertex_groups.new(name="top")
+    top.add(np.flatnonzero(before[:, 2] > 0.2).tolist(), 1.0, "REPLACE")
+    item.arapfields.stylize.region = "top"
+    bpy.ops.arapfields.stylize(style="CUBE", **SETTINGS)
+    result = bpy.data.objects["Ball_stylized"]
+    normals = np.array([face.normal for face in result.data.polygons])
+    heights = np.array([face.center.z for face in item.data.polygons])
+    agreement = np.abs(normals).max(axis=1)  # with the cube's axes
+    assert agreement[heights > 0.5].mean() > agreement[heights < -0.5].mean() + 0.03
+
+
+@in_blender
+def test_the_menu_lists_the_librarys_styles():
+    import arapfields
+    from addon.core.styles import STYLES, style_identifier, style_name
+
+    assert [name for name, _ in STYLES] == list(arapfields.style_names())
+    assert all(style_name(style_identifier(name)) == name for name, _ in STYLES)
