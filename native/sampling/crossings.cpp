@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sampling/crossings.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace arapfields {
+namespace {
+
+constexpr int max_rounds = 40;
+constexpr int max_finals = 3;  // gradients a zero, where rounding keeps Φ above the tolerance
+constexpr double accepted = 1e-4;
+// A secant step from here is expected to end below the tolerance: the next evaluation takes the gradient.
+constexpr double nearly = 3e-4;
+constexpr double narrowest = 1e-8;
+
+/// One bracket on its way to its zero.
+struct Search {
+  Index bracket = 0;
+  int low_sign = 0;              // of Φ at low
+  double low = 0.0, high = 0.0;  // around the zero
+  double t = 0.0;                // where Φ is asked next …
+  double slope = 0.0;            // … and its slope as far as known
+  double old_t = 0.0, old_value = 0.0;
+  double old_width = 0.0;
+  int rounds = 0, finals = 0;
+  bool final = false;  // the next evaluation takes the gradient
+  bool done = false;
+
+  /// Takes in Φ(t) and its slope there and chooses the next parameter.
+  void advance(double value, double new_slope) {
+    slope = new_slope;
+    ((value < 0.0 ? -1 : 1) == low_sign ? low : high) = t;
+    old_t = t;
+    old_value = value;
+    bool stalled = false;
+    if (++rounds % 4 == 0) {
+      stalled = high - low > 0.25 * old_width;
+      old_width = high - low;
+    }
+    final = std::abs(value) < nearly;
+    t -= value / slope;
+    if (!(t > low && t < high) || stalled) t = 0.5 * (low + high);
+  }
+  void value_seen(double value, double tolerance) {
+    const double at = t;
+    const bool secant = rounds > 0 && std::abs(t - old_t) > 1e-6;
+    advance(value, secant ? (value - old_value) / (t - old_t) : slope);
+    if (rounds == 1) final = false;  // its slope is the model's
+    if (std::abs(value) > tolerance && high - low > narrowest) return;
+    t = at;
+    final = true;
+  }
+  void gradient_seen(double value, double new_slope, double tolerance) {
+    done = std::abs(value) <= tolerance || high - low < narrowest ||
+           (++finals == max_finals && std::abs(value) <= accepted);
+    if (!done) advance(value, new_slope != 0.0 ? new_slope : slope);
+  }
+};
+
+}  // namespace
+
+Crossings find_crossings(CountedFunction& function, const std::vector<Line>& lines,
+                         const std::vector<Bracket>& brackets, double tolerance) {
+  const auto total = static_cast<Index>(brackets.size());
+  PointsF points(total, 3), gradients(total, 3);
+  std::vector<double> best(brackets.size(), 1e30);
+  std::vector<Search> active(brackets.size());
+  for (std::size_t i = 0; i < brackets.size(); ++i) {
+    const Bracket& b = brackets[i];
+    active[i] = {.bracket = static_cast<Index>(i),
+                 .low_sign = b.slope > 0.0 ? -1 : 1,
+                 .low = b.low,
+                 .high = b.high,
+                 .t = b.guess,
+                 .slope = b.slope,
+                 .old_width = b.high - b.low};
+  }
+  const auto line_of = [&](const Search& s) -> const Line& {
+    return lines[static_cast<std::size_t>(brackets[static_cast<std::size_t>(s.bracket)].line)];
+  };
+  for (int round = 0; round < max_rounds && !active.empty(); ++round) {
+    const auto plain_end =
+        std::stable_partition(active.begin(), active.end(), [](const Search& s) { return !s.final; });
+    const auto plain = static_cast<Index>(plain_end - active.begin());
+    PointsF batch(static_cast<Index>(active.size()), 3), slopes;
+    for (Index row = 0; row < batch.rows(); ++row) {
+      const Search& s = active[static_cast<std::size_t>(row)];
+      batch.row(row) = line_of(s).at(s.t).cast<float>();
+    }
+    const VectorF values = function.values(batch.topRows(plain));
+    const VectorF ends = function.values(batch.bottomRows(batch.rows() - plain), slopes);
+    for (Index row = 0; row < batch.rows(); ++row) {
+      Search& s = active[static_cast<std::size_t>(row)];
+      if (row < plain) {
+        s.value_seen(values[row], tolerance);
+        continue;
+      }
+      const double value = ends[row - plain];
+      double& least = best[static_cast<std::size_t>(s.bracket)];
+      if (std::abs(value) < least) {
+        least = std::abs(value);
+        points.row(s.bracket) = batch.row(row);
+        gradients.row(s.bracket) = slopes.row(row - plain);
+      }
+      s.gradient_seen(value, slopes.row(row - plain).cast<double>().dot(line_of(s).direction), tolerance);
+    }
+    std::erase_if(active, [](const Search& s) { return s.done; });
+  }
+  Crossings result;
+  for (Index i = 0; i < total; ++i) {
+    const double value = best[static_cast<std::size_t>(i)];
+    (value <= accepted ? result.bracket : result.failed).push_back(i);
+    if (value <= accepted) result.largest = std::max(result.largest, value);
+  }
+  result.points.resize(static_cast<Index>(result.bracket.size()), 3);
+  result.gradients.resize(result.points.rows(), 3);
+  for (Index row = 0; row < result.points.rows(); ++row) {
+    result.points.row(row) = points.row(result.bracket[static_cast<std::size_t>(row)]);
+    result.gradients.row(row) = gradients.row(result.bracket[static_cast<std::size_t>(row)]);
+  }
+  return result;
+}
+
+}  // namespace arapfields

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sampling/sample_surface.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "core/errors.h"
+#include "core/random.h"
+#include "sampling/crossings.h"
+
+namespace arapfields {
+namespace {
+
+constexpr Index largest_count = 100'000'000;
+constexpr Index fewest_lines = 1024;
+constexpr Index most_lines_a_round = 1 << 18;
+constexpr Index hopeless_lines = 1 << 18;  // without a crossing: there is no surface
+constexpr std::uint64_t shuffle_stream = ~std::uint64_t{0};
+
+/// The model pays off while it has fewer cells than a quarter of the points wanted.
+SparseModelOptions model_options(Index count) {
+  return {.wanted_cells = std::clamp<Index>(count / 4, 200, 50'000), .max_resolution = 128};
+}
+
+/// Casts lines and keeps those that cross, with a bracket for every crossing.
+class Caster {
+ public:
+  Caster(CountedFunction& function, const SparseModel& model, std::uint64_t seed)
+      : function_(function), model_(model), box_(model.bounds()), seed_(seed) {}
+
+  /// Brackets of `count` further lines, appended to `brackets`.
+  void cast(Index count) {
+    std::vector<Line> fresh(static_cast<std::size_t>(count));
+    for (Line& line : fresh) {
+      Random random(seed_, static_cast<std::uint64_t>(cast_++));
+      line = random_line(box_, random);
+    }
+    ScanResult found = scan_lines(model_, fresh);
+    const std::vector<Bracket> more = settle_doubts(function_, model_, fresh, found.doubts);
+    found.brackets.insert(found.brackets.end(), more.begin(), more.end());
+    std::sort(found.brackets.begin(), found.brackets.end(), [](const Bracket& a, const Bracket& b) {
+      return a.line != b.line ? a.line < b.line : a.low < b.low;
+    });
+    Index before = -1;
+    for (Bracket each : found.brackets) {
+      if (each.line != before) lines.push_back(fresh[static_cast<std::size_t>(each.line)]);
+      before = each.line;
+      each.line = static_cast<Index>(lines.size()) - 1;
+      brackets.push_back(each);
+    }
+  }
+  Index lines_cast() const { return cast_; }
+  /// Lines that should yield `crossings` more.
+  Index lines_for(Index crossings) const {
+    const double spacing = model_.spacing();
+    // Before the first cast: the surface's area from the volume of the cells around it.
+    double rate = static_cast<double>(model_.active().size()) * spacing * spacing / 2.0 / box_.area();
+    if (!brackets.empty()) rate = static_cast<double>(brackets.size()) / static_cast<double>(cast_);
+    return std::clamp(static_cast<Index>(1.02 * static_cast<double>(crossings) / std::max(rate, 1e-6)),
+                      fewest_lines, most_lines_a_round);
+  }
+
+  std::vector<Line> lines;
+  std::vector<Bracket> brackets;
+
+ private:
+  CountedFunction& function_;
+  const SparseModel& model_;
+  Box box_;
+  std::uint64_t seed_;
+  Index cast_ = 0;
+};
+
+[[noreturn]] void throw_empty(const std::string& found) {
+  throw InvalidInput("sdf", found, "a function with a zero surface inside the cube [-1, 1]^3 is needed");
+}
+
+void shuffle(std::vector<Bracket>& items, std::size_t begin, Random& random) {
+  for (std::size_t i = begin; i + 1 < items.size(); ++i)
+    std::swap(items[i],
+              items[i + static_cast<std::size_t>(random.below(static_cast<Index>(items.size() - i)))]);
+}
+
+}  // namespace
+
+SurfaceSamples sample_surface(const ImplicitFunction& implicit, const Frame& frame,
+                              const SampleOptions& options, const Progress& progress, SampleReport* report) {
+  require(options.count >= 1 && options.count <= largest_count, "count", std::to_string(options.count),
+          "1 to 100 million points are allowed");
+  require(options.tolerance > 0.0 && options.tolerance <= 1e-4, "tolerance",
+          std::to_string(options.tolerance), "must be positive and at most 1e-4");
+  const auto start = std::chrono::steady_clock::now();
+  progress.report(0.0, "measuring the implicit function");
+  CountedFunction function(implicit, progress);
+  const SparseModel model(function, model_options(options.count));
+  const Index model_evaluations = function.value_count() + function.gradient_count();
+  if (model.active().empty()) throw_empty("its values keep one sign in the whole cube");
+
+  SurfaceSamples samples;
+  samples.frame = frame;
+  samples.points.resize(options.count, 3);
+  samples.normals.resize(options.count, 3);
+  Caster caster(function, model, options.seed);
+  Random order(options.seed, shuffle_stream);
+  Index done = 0;
+  double largest = 0.0;
+  std::size_t used = 0;  // brackets searched so far
+  while (done < options.count) {
+    const auto pool = [&] { return static_cast<Index>(caster.brackets.size() - used); };
+    const Index missing = options.count - done;
+    while (pool() < missing) {
+      progress.report(0.3 + 0.4 * static_cast<double>(done + pool()) / static_cast<double>(options.count),
+                      "casting lines");
+      caster.cast(caster.lines_for(missing - pool()));
+      if (caster.brackets.empty() && caster.lines_cast() > hopeless_lines)
+        throw_empty("no line of " + std::to_string(caster.lines_cast()) + " crosses its zero surface");
+    }
+    // Which crossings are kept must not depend on where they are.
+    shuffle(caster.brackets, used, order);
+    const auto begin = caster.brackets.begin() + static_cast<std::ptrdiff_t>(used);
+    const std::vector<Bracket> chosen(begin, begin + missing);
+    used += chosen.size();
+    progress.report(0.7, "finding the crossings");
+    const Crossings found = find_crossings(function, caster.lines, chosen, options.tolerance);
+    const Index fresh = found.points.rows();
+    samples.points.middleRows(done, fresh) = found.points.cast<double>();
+    samples.normals.middleRows(done, fresh) = found.gradients.cast<double>().rowwise().normalized();
+    done += fresh;
+    largest = std::max(largest, found.largest);
+  }
+  if (report != nullptr)
+    *report = {.lines = caster.lines_cast(),
+               .value_evaluations = function.value_count(),
+               .gradient_evaluations = function.gradient_count(),
+               .model_evaluations = model_evaluations,
+               .lipschitz = model.lipschitz(),
+               .largest_value = largest,
+               .seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()};
+  progress.report(1.0, "sampled the surface");
+  return samples;
+}
+
+}  // namespace arapfields
