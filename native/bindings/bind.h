@@ -107,6 +107,7 @@ void bind_core(py::module_& module);
 void bind_mesh(py::module_& module);
 void bind_distance(py::module_& module);
 void bind_neural(py::module_& module);
+void bind_sampling(py::module_& module);
 void bind_fields(py::module_& module);
 void bind_energies(py::module_& module);
 void bind_solve(py::module_& module);
