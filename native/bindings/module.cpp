@@ -10,6 +10,7 @@ PYBIND11_MODULE(_native, module) {
   bind_distance(module);
   bind_neural(module);
   bind_sampling(module);
+  bind_fit(module);
   bind_fields(module);
   bind_energies(module);
   bind_solve(module);

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+
+#include "core/simd.h"
+
+namespace arapfields {
+
+/// Entries [0, count) of parameters, gradient and the two running means. `rate` is the learning rate over the
+/// first mean's correction, `scale` one over the root of the second's.
+template <class Scalar>
+struct AdamBlock {
+  Scalar* parameters = nullptr;
+  const Scalar* gradient = nullptr;
+  Scalar* mean = nullptr;
+  Scalar* square = nullptr;
+  std::int64_t count = 0;
+  Scalar first_decay = 0, second_decay = 0, rate = 0, scale = 0, epsilon = 0;
+};
+
+ARAPFIELDS_DECLARE(void adam(const AdamBlock<float>& block))
+ARAPFIELDS_DECLARE(void adam(const AdamBlock<double>& block))
+
+}  // namespace arapfields

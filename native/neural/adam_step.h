@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "core/types.h"
+
+namespace at {
+class Tensor;
+}
+
+namespace arapfields {
+
+struct AdamOptions {
+  double first_decay = 0.9;    ///< β1, of the gradient's running mean
+  double second_decay = 0.99;  ///< β2, of the running mean of its squares
+  double epsilon = 1e-8;
+};
+
+/// Adam (Kingma and Ba 2015, algorithm 1, with both bias corrections) on a flat contiguous vector of
+/// parameters, in one pass over memory; float or double, on any device.
+class AdamStep {
+ public:
+  /// Keeps nothing of `parameters` but its size, dtype and device.
+  explicit AdamStep(const at::Tensor& parameters, const AdamOptions& options = {});
+  ~AdamStep();
+  AdamStep(AdamStep&&) noexcept;
+  AdamStep& operator=(AdamStep&&) noexcept;
+
+  /// parameters −= learning_rate · (mean / √square), both corrected.
+  void step(at::Tensor& parameters, const at::Tensor& gradient, double learning_rate);
+  /// The same for entries [begin, end) alone; the caller counts steps by next_step().
+  void step_range(at::Tensor& parameters, const at::Tensor& gradient, double learning_rate, Index begin,
+                  Index end);
+  void next_step();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace arapfields

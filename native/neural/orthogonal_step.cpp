@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "neural/orthogonal_step.h"
+
+#include <ATen/ATen.h>
+#include <ATen/core/LegacyTypeDispatch.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/parallel.h"
+
+namespace arapfields {
+namespace {
+
+// p(s) = a s + b s³ + c s⁵ drives singular values in (0,1] to about 1 (0.7 to 1.2): the coefficients of
+// Jordan et al., chosen for the slope at 0 rather than for the limit.
+constexpr double slope = 3.4445, cubic = -4.7750, quintic = 2.0315;
+
+/// One weight matrix. `x` is the momentum with its shorter side as rows.
+struct Matrix {
+  Index begin = 0;  // in the flat vector
+  Index rows = 0, columns = 0;
+  at::Tensor momentum, x, next, gram, polynomial;
+};
+
+struct Task {
+  Matrix* matrix = nullptr;
+  Index first = 0, count = 0;  // rows of x
+};
+
+}  // namespace
+
+struct OrthogonalStep::State {
+  OrthogonalOptions options;
+  AdamStep adam;
+  std::vector<Matrix> matrices;
+  std::vector<Task> tasks;
+
+  void for_each_task(const std::function<void(const Task&)>& body) const;
+};
+
+void OrthogonalStep::State::for_each_task(const std::function<void(const Task&)>& body) const {
+  parallel_for(0, static_cast<Index>(tasks.size()), 1, [&](Index begin, Index end) {
+    const at::AutoDispatchBelowADInplaceOrView quick;
+    for (Index t = begin; t < end; ++t) body(tasks[static_cast<std::size_t>(t)]);
+  });
+}
+
+OrthogonalStep::OrthogonalStep(const Mlp& mlp, const OrthogonalOptions& options)
+    : state_(std::make_unique<State>(State{options, AdamStep(mlp.parameters(), options.adam), {}, {}})) {
+  const at::TensorOptions like = mlp.parameters().options();
+  for (int l = 0; l < mlp.shape().layers; ++l) {
+    const at::Tensor weight = mlp.weight(l);
+    Matrix m;
+    m.begin = weight.storage_offset();
+    m.rows = weight.size(0), m.columns = weight.size(1);
+    const Index small = std::min(m.rows, m.columns), large = std::max(m.rows, m.columns);
+    m.momentum = at::zeros({m.rows, m.columns}, like);
+    m.x = at::empty({small, large}, like);
+    m.next = at::empty({small, large}, like);
+    m.gram = at::empty({small, small}, like);
+    m.polynomial = at::empty({small, small}, like);
+    state_->matrices.push_back(m);
+  }
+  const Index parts = mlp.parameters().is_cpu() ? 2 * thread_count() : 1;
+  for (Matrix& m : state_->matrices) {
+    const Index rows = m.x.size(0), each = std::max<Index>(32, (rows + parts - 1) / parts);
+    for (Index first = 0; first < rows; first += each)
+      state_->tasks.push_back({&m, first, std::min(each, rows - first)});
+  }
+}
+
+OrthogonalStep::~OrthogonalStep() = default;
+OrthogonalStep::OrthogonalStep(OrthogonalStep&&) noexcept = default;
+OrthogonalStep& OrthogonalStep::operator=(OrthogonalStep&&) noexcept = default;
+
+void OrthogonalStep::step(Mlp& mlp, double learning_rate) {
+  State& s = *state_;
+  at::Tensor &parameters = mlp.parameters(), &gradient = mlp.gradient();
+  s.adam.next_step();
+  Index done = 0;
+  const auto adam_up_to = [&](Index end) {
+    s.adam.step_range(parameters, gradient, s.options.adam_share * learning_rate, done, end);
+  };
+  for (Matrix& m : s.matrices) {
+    adam_up_to(m.begin);
+    done = m.begin + m.rows * m.columns;
+    const at::Tensor g = gradient.slice(0, m.begin, done).view({m.rows, m.columns});
+    m.momentum.mul_(s.options.momentum).add_(g);
+    const at::Tensor ahead = at::add(g, m.momentum, s.options.momentum);
+    m.x.copy_(m.rows > m.columns ? ahead.t() : ahead);
+    m.x.div_(at::norm(ahead).add_(1e-30));
+  }
+  adam_up_to(parameters.numel());
+  for (int i = 0; i < s.options.iterations; ++i) {
+    s.for_each_task([](const Task& t) {
+      at::Tensor out = t.matrix->gram.narrow(0, t.first, t.count);
+      at::mm_out(out, t.matrix->x.narrow(0, t.first, t.count), t.matrix->x.t());
+    });
+    s.for_each_task([](const Task& t) {
+      at::Tensor out = t.matrix->polynomial.narrow(0, t.first, t.count);
+      const at::Tensor rows = t.matrix->gram.narrow(0, t.first, t.count);
+      at::addmm_out(out, rows, rows, t.matrix->gram, cubic, quintic);
+    });
+    s.for_each_task([](const Task& t) {
+      at::Tensor out = t.matrix->next.narrow(0, t.first, t.count);
+      at::addmm_out(out, t.matrix->x.narrow(0, t.first, t.count),
+                    t.matrix->polynomial.narrow(0, t.first, t.count), t.matrix->x, slope, 1.0);
+    });
+    for (Matrix& m : s.matrices) std::swap(m.x, m.next);
+  }
+  for (Matrix& m : s.matrices) {
+    const double stretch =
+        std::sqrt(std::max(1.0, static_cast<double>(m.rows) / static_cast<double>(m.columns)));
+    at::Tensor weight = parameters.slice(0, m.begin, m.begin + m.rows * m.columns).view({m.rows, m.columns});
+    weight.sub_(m.rows > m.columns ? m.x.t() : m.x, learning_rate * stretch);
+  }
+}
+
+}  // namespace arapfields
