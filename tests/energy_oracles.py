@@ -40,7 +40,7 @@ def polar(jacobians):
 
 
 def arap_terms(jets):
-    """(stretch, bend) means; the rotation's derivative along x_k is the polar factor's in the direction D_k."""
+    """(stretch, bend) means; ∂_k R is the derivative of the polar factor in the direction D_k."""
     jacobians = jacobians_of(jets)
     rotations = polar(jacobians)
     stretch = ((jacobians - rotations) ** 2).sum((1, 2)).mean()

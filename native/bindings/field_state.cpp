@@ -2,6 +2,7 @@
 #include "bindings/field_state.h"
 
 #include "fields/neural_field.h"
+#include "fields/radial_field.h"
 
 namespace arapfields::python {
 namespace {
@@ -80,13 +81,25 @@ std::shared_ptr<DeformationField> neural_from(const py::dict& state) {
   return field;
 }
 
+py::dict radial_state(const RadialField& field) {
+  return py::dict("kind"_a = "radial", "centers"_a = field.basis().centers, "radii"_a = field.basis().radii,
+                  "coefficients"_a = field.coefficients());
+}
+
+std::shared_ptr<DeformationField> radial_from(const py::dict& state) {
+  RadialBasis basis{as_points(get(state, "centers"), "centers"), as_vector(get(state, "radii"), "radii")};
+  return std::make_shared<RadialField>(std::move(basis),
+                                       as_points(get(state, "coefficients"), "coefficients"));
+}
+
 }  // namespace
 
 py::dict field_state(const DeformationField& field) {
   const auto* neural = dynamic_cast<const NeuralField*>(&field);
-  require(neural != nullptr, "field", "a kind without a file format",
-          "fields of deform and stylize can be saved");
-  py::dict state = neural_state(*neural);
+  const auto* radial = dynamic_cast<const RadialField*>(&field);
+  require(neural != nullptr || radial != nullptr, "field", "a kind without a file format",
+          "neural and radial fields can be saved");
+  py::dict state = neural != nullptr ? neural_state(*neural) : radial_state(*radial);
   state["center"] = field.frame().center;
   state["scale"] = field.frame().scale;
   state["rest_points"] = field.rest_points();
@@ -95,8 +108,9 @@ py::dict field_state(const DeformationField& field) {
 
 std::shared_ptr<DeformationField> field_from_state(const py::dict& state) {
   const std::string kind = get_as<std::string>(state, "kind");
-  require(kind == "neural", "file", "a field of kind '" + kind + "'", "this version reads 'neural'");
-  const std::shared_ptr<DeformationField> field = neural_from(state);
+  require(kind == "neural" || kind == "radial", "file", "a field of kind '" + kind + "'",
+          "this version reads 'neural' and 'radial'");
+  const std::shared_ptr<DeformationField> field = kind == "neural" ? neural_from(state) : radial_from(state);
   field->set_frame({as_vec3(get(state, "center"), "center"), get_as<double>(state, "scale")});
   field->set_rest_points(as_points(get(state, "rest_points"), "rest_points"));
   return field;

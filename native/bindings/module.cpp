@@ -14,5 +14,6 @@ PYBIND11_MODULE(_native, module) {
   bind_fields(module);
   bind_energies(module);
   bind_solve(module);
+  bind_live(module);
   bind_curves(module);
 }

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fields/radial_basis.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numeric>
+#include <string>
+
+#include "core/errors.h"
+
+namespace arapfields {
+namespace {
+
+/// Interleaves the lowest ten bits of three numbers: the order of a space-filling curve.
+std::uint32_t morton(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+  std::uint32_t code = 0;
+  for (int bit = 0; bit < 10; ++bit)
+    code |= ((x >> bit & 1u) << (3 * bit + 2)) | ((y >> bit & 1u) << (3 * bit + 1)) |
+            ((z >> bit & 1u) << (3 * bit));
+  return code;
+}
+
+}  // namespace
+
+RowMatrix<double> RadialBasis::identity() const {
+  RowMatrix<double> result = RowMatrix<double>::Zero(size(), 3);
+  result.bottomRows<3>().setIdentity();
+  return result;
+}
+
+std::vector<Index> spatial_order(PointsIn points) {
+  std::vector<Index> order(static_cast<std::size_t>(points.rows()));
+  std::iota(order.begin(), order.end(), 0);
+  if (points.rows() == 0) return order;
+  const Eigen::RowVector3d low = points.colwise().minCoeff(), high = points.colwise().maxCoeff();
+  const double scale = 1023.0 / std::max((high - low).maxCoeff(), 1e-300);
+  std::vector<std::uint32_t> codes(order.size());
+  for (std::size_t i = 0; i < codes.size(); ++i) {
+    const Eigen::RowVector3d cell = (points.row(static_cast<Index>(i)) - low) * scale;
+    codes[i] = morton(static_cast<std::uint32_t>(cell[0]), static_cast<std::uint32_t>(cell[1]),
+                      static_cast<std::uint32_t>(cell[2]));
+  }
+  std::sort(order.begin(), order.end(), [&](Index a, Index b) {
+    const auto x = codes[static_cast<std::size_t>(a)], y = codes[static_cast<std::size_t>(b)];
+    return x != y ? x < y : a < b;
+  });
+  return order;
+}
+
+FarthestPoints farthest_points(PointsIn points, Index count) {
+  require(points.rows() > 0 && points.allFinite(), "points", "none, or NaN or infinite ones",
+          "finite points are needed");
+  const Index n = points.rows(), stride = (n + 15) / 16 * 16;
+  std::vector<double> columns(static_cast<std::size_t>(3 * stride)),
+      distance(static_cast<std::size_t>(stride), 1e300);
+  for (Index i = 0; i < stride; ++i)
+    for (int k = 0; k < 3; ++k)
+      columns[static_cast<std::size_t>(k * stride + i)] = points(std::min(i, n - 1), k);
+  const Eigen::RowVector3d middle = points.colwise().mean();
+  Index next = 0;
+  (points.rowwise() - middle).rowwise().squaredNorm().maxCoeff(&next);
+  FarthestPoints result;
+  while (static_cast<Index>(result.indices.size()) < count) {
+    result.indices.push_back(next);
+    const Vec3 from = points.row(next);
+    const double worst =
+        ARAPFIELDS_DISPATCH(farthest_update(columns.data(), stride, stride, from.data(), distance.data()));
+    result.fill_distance = std::sqrt(worst);
+    if (!(worst > 0.0)) break;
+    next = std::min<Index>(std::find(distance.begin(), distance.end(), worst) - distance.begin(), n - 1);
+  }
+  return result;
+}
+
+RadialBasis radial_basis(PointsIn points, const std::vector<RadialScale>& scales) {
+  require(!scales.empty(), "scales", "none were given", "at least one is needed");
+  std::vector<Index> centers;
+  std::vector<double> radii;
+  for (const RadialScale& scale : scales) {
+    require(scale.count > 0, "scales.count", std::to_string(scale.count), "must be positive");
+    require(scale.reach > 0.0 && std::isfinite(scale.reach), "scales.reach", std::to_string(scale.reach),
+            "must be positive");
+    const FarthestPoints chosen = farthest_points(points, scale.count);
+    const double extent = (points.colwise().maxCoeff() - points.colwise().minCoeff()).maxCoeff();
+    // All points covered exactly (few points, or one): the radius falls back on the extent.
+    const double fill = chosen.fill_distance > 0.0 ? chosen.fill_distance : std::max(extent, 1e-3);
+    centers.insert(centers.end(), chosen.indices.begin(), chosen.indices.end());
+    radii.insert(radii.end(), chosen.indices.size(), scale.reach * fill);
+  }
+  RadialBasis basis{Points(static_cast<Index>(centers.size()), 3),
+                    Eigen::Map<const Vector>(radii.data(), static_cast<Index>(radii.size()))};
+  for (std::size_t m = 0; m < centers.size(); ++m)
+    basis.centers.row(static_cast<Index>(m)) = points.row(centers[m]);
+  return basis;
+}
+
+}  // namespace arapfields

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <memory>
+
+#include "energies/distortion.h"
+#include "fields/radial_field.h"
+#include "mesh/surface_samples.h"
+#include "solve/live_objective.h"
+
+namespace arapfields {
+
+/// Options of a live solve. Lengths and weights refer to the unit cube of the samples' frame.
+struct LiveOptions {
+  int samples = 2000;          ///< surface samples that the energy sees
+  int coarse_bumps = 60;       ///< bumps of the coarse scale (0: none)
+  int fine_bumps = 300;        ///< bumps of the fine scale
+  double coarse_reach = 3.0;   ///< radius of the coarse bumps as a multiple of their spacing
+  double fine_reach = 4.0;     ///< the same of the fine bumps
+  double bending = 0.01;       ///< λ_bend
+  double handle_weight = 100;  ///< factor of the handles' mean squared distance
+  int handle_samples = 300;    ///< samples that a handle pulls at, at most
+  int steps = 20;              ///< quasi-Newton steps of one solve, at most
+  double tolerance = 1e-3;     ///< a solve ends where a step is expected to gain less than this share
+  double gauss_weight = 6.0;   ///< λ_Gauss of a style at strength 1
+  int threads = 0;             ///< 0: all
+  std::int64_t seed = 0;
+
+  /// Throws InvalidInput that names the option.
+  void validate() const;
+};
+
+/// What a solve reached, measured at its own samples; energies in the unit cube, lengths in mesh units.
+struct LiveReport {
+  ArapValue arap;
+  double energy = 0.0;  ///< stretch + bending · bend
+  double handle_mean = 0.0, handle_max = 0.0;
+  std::optional<double> preference;  ///< mean g of the deformed normals, where there is a style
+  Distortion distortion;
+  Index steps = 0, evaluations = 0;
+  bool converged = false;
+  double setup_seconds = 0.0, seconds = 0.0;
+};
+
+/// Deforms a surface at interactive rates: the energy of deform (and stylize) over a radial field, solved
+/// from where the last solve ended. Serves one caller at a time.
+class LiveSolver {
+ public:
+  /// Handles in mesh coordinates; none are needed where a style follows. Throws InvalidInput as deform does.
+  LiveSolver(const SurfaceSamples& samples, const std::vector<Handle>& handles, const LiveOptions& options,
+             const Progress& progress = {});
+
+  /// Other handles for the same surface; the shape at hand stays the start of the next solve.
+  void set_handles(const std::vector<Handle>& handles);
+  /// Preferred normals (k,3), strength ≥ 0 (0 takes the style away), sharpness σ, and weights (one for each
+  /// surface sample given to the constructor, or empty).
+  void set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights = {});
+  void clear_style();
+  /// Moves the handles' targets.
+  void set_targets(const std::vector<Handle>& moved);
+  /// Improves the field for the targets and the style at hand, by at most `steps` steps (0: the options').
+  std::shared_ptr<RadialField> solve(Index steps = 0, const Progress& progress = {});
+  /// Back to the identity, and the handles' targets to rest.
+  void reset();
+
+  std::shared_ptr<RadialField> field() const;
+  const LiveReport& report() const { return report_; }
+  const std::vector<Handle>& handles() const { return handles_; }
+
+ private:
+  void measure(double seconds);
+
+  LiveOptions options_;
+  Frame frame_;
+  Points surface_;  // all samples, cube coordinates
+  Points surface_normals_;
+  std::vector<Index> chosen_;  // those that the energy sees
+  std::vector<Handle> handles_;
+  BoundHandles bound_;
+  std::vector<Index> pair_rows_;  // rows of bound_ that pull
+  RadialBasis basis_;
+  std::unique_ptr<LiveObjective> objective_;
+  QuasiNewton optimizer_;
+  RowMatrix<double> coefficients_;
+  bool styled_ = false;
+  LiveReport report_;
+};
+
+}  // namespace arapfields

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "solve/quasi_newton.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/errors.h"
+
+namespace arapfields {
+namespace {
+
+constexpr std::size_t history = 12;
+constexpr double armijo = 1e-4, wolfe = 0.9;
+
+double dot(const RowMatrix<double>& a, const RowMatrix<double>& b) { return a.cwiseProduct(b).sum(); }
+
+/// A point of the line u + t du: value, slope, and the cotangents there.
+struct Trial {
+  double t = 0.0, value = 0.0, slope = 0.0;
+  Vector u, cotangents;
+};
+
+/// Minimiser of the cubic through two points' values and slopes, kept inside the middle of their interval.
+double cubic_minimum(const Trial& a, const Trial& b) {
+  const double d1 = a.slope + b.slope - 3.0 * (a.value - b.value) / (a.t - b.t);
+  const double square = d1 * d1 - a.slope * b.slope;
+  const double low = std::min(a.t, b.t), high = std::max(a.t, b.t), margin = 0.1 * (high - low);
+  double t = 0.5 * (low + high);
+  if (square >= 0.0) {
+    const double d2 = std::copysign(std::sqrt(square), b.t - a.t);
+    const double candidate = b.t - (b.t - a.t) * (b.slope + d2 - d1) / (b.slope - a.slope + 2.0 * d2);
+    if (std::isfinite(candidate)) t = candidate;
+  }
+  return std::clamp(t, low + margin, high - margin);
+}
+
+/// A step that lowers the value enough and leaves no steep slope; t = 0 where there is none.
+Trial search_line(const MeasuredObjective& objective, const Trial& start, const Vector& du,
+                  Index& evaluations) {
+  const auto at = [&](double t) {
+    Trial trial;
+    trial.t = t;
+    trial.u = start.u + t * du;
+    trial.value = objective.value(trial.u, &trial.cotangents);
+    trial.slope = trial.cotangents.dot(du);
+    ++evaluations;
+    return trial;
+  };
+  const auto falls = [&](const Trial& trial) {
+    return std::isfinite(trial.value) && std::isfinite(trial.slope) &&
+           trial.value <= start.value + armijo * trial.t * start.slope;
+  };
+  Trial low = start, next = at(1.0);
+  for (int tries = 0; tries < 12; ++tries) {
+    if (!falls(next) || (next.value >= low.value && low.t > 0.0)) {  // the minimum lies between low and next
+      const bool usable = std::isfinite(next.value) && std::isfinite(next.slope);
+      next = at(usable ? cubic_minimum(low, next) : low.t + 0.2 * (next.t - low.t));
+      continue;
+    }
+    if (std::abs(next.slope) <= -wolfe * start.slope || tries >= 4) return next;
+    const double t = next.slope < 0.0 ? 3.0 * next.t : cubic_minimum(low, next);
+    low = next;
+    next = at(t);
+  }
+  return falls(low) ? low : start;
+}
+
+}  // namespace
+
+RowMatrix<double> QuasiNewton::direction(const MeasuredObjective& objective,
+                                         const RowMatrix<double>& gradient) const {
+  RowMatrix<double> q = gradient;
+  std::vector<double> weights(pairs_.size());
+  for (std::size_t i = pairs_.size(); i-- > 0;) {
+    weights[i] = dot(pairs_[i].step, q) / pairs_[i].product;
+    q -= weights[i] * pairs_[i].change;
+  }
+  q = objective.precondition(q);
+  for (std::size_t i = 0; i < pairs_.size(); ++i)
+    q += (weights[i] - dot(pairs_[i].change, q) / pairs_[i].product) * pairs_[i].step;
+  return -q;
+}
+
+QuasiNewtonReport QuasiNewton::minimise(const MeasuredObjective& objective, const QuasiNewtonOptions& options,
+                                        RowMatrix<double>& c, const Progress& progress) {
+  QuasiNewtonReport report;
+  Trial now;
+  objective.measure(c, now.u);
+  now.value = objective.value(now.u, &now.cotangents);
+  report.evaluations = 1;
+  if (!std::isfinite(now.value)) throw Diverged("live solve: the energy is not finite at the start");
+  RowMatrix<double> gradient = objective.pull_back(now.cotangents);
+  Vector du;
+  while (report.steps < options.steps) {
+    progress.report(static_cast<double>(report.steps) / static_cast<double>(options.steps));
+    RowMatrix<double> step = direction(objective, gradient);
+    double slope = dot(gradient, step);
+    if (!(slope < 0.0)) {  // stale pairs
+      if (pairs_.empty()) break;
+      forget();
+      continue;
+    }
+    if (-0.5 * slope < options.tolerance * now.value) {
+      report.converged = true;
+      break;
+    }
+    objective.measure(step, du);
+    now.slope = slope;
+    now.t = 0.0;
+    Trial next = search_line(objective, now, du, report.evaluations);
+    if (next.t == 0.0) {
+      if (pairs_.empty()) break;
+      forget();
+      continue;
+    }
+    step *= next.t;
+    c += step;
+    RowMatrix<double> next_gradient = objective.pull_back(next.cotangents);
+    Pair pair{step, next_gradient - gradient, 0.0};
+    pair.product = dot(pair.step, pair.change);
+    if (pair.product > 1e-10 * std::sqrt(dot(pair.step, pair.step) * dot(pair.change, pair.change))) {
+      pairs_.push_back(std::move(pair));
+      if (pairs_.size() > history) pairs_.pop_front();
+    }
+    gradient = std::move(next_gradient);
+    now = std::move(next);
+    ++report.steps;
+  }
+  report.value = now.value;
+  return report;
+}
+
+}  // namespace arapfields
