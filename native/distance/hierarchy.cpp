@@ -7,184 +7,96 @@
 #include <limits>
 
 #include "core/parallel.h"
+#include "distance/disk.h"
 #include "distance/multipole.h"
 #include "distance/packet.h"
-#include "distance/split.h"
+#include "distance/topology.h"
 #include "mesh/triangle_mesh.h"
 
 namespace arapfields {
 namespace {
 
-constexpr Index grain = 4096;
-
-/// Nodes in the order in which a depth-first walk enters them, and their leaves likewise.
-struct Tree {
-  std::vector<WideNode> nodes;
-  std::vector<NodeMoments> moments;
-  std::vector<TrianglePacket> packets;
-};
-
-/// What a finished child tells its parent.
-struct Child {
-  std::int32_t reference = 0;
-  Box box;
+/// What a parent needs to know of a child.
+struct Summary {
+  Disk disk;
   Multipole multipole;
 };
 
-class Builder {
+/// Fills in packets, disks and moments from the leaves up.
+class Summarizer {
  public:
-  Builder(const Points& vertices, TrianglesIn triangles) : vertices_(vertices), triangles_(triangles) {
-    primitives_.resize(static_cast<std::size_t>(triangles.rows()));
-    parallel_for(0, triangles.rows(), grain, [&](Index begin, Index end) {
-      for (Index t = begin; t < end; ++t)
-        primitives_[static_cast<std::size_t>(t)] = {box(t), static_cast<std::int32_t>(t)};
-    });
-  }
+  Summarizer(const Points& vertices, TrianglesIn triangles, const Topology& topology, WideNode* nodes,
+             NodeMoments* moments, TrianglePacket* packets)
+      : vertices_(vertices),
+        triangles_(triangles),
+        topology_(topology),
+        nodes_(nodes),
+        moments_(moments),
+        packets_(packets),
+        finished_(topology.subtrees.size()) {}
 
-  Tree build() {
-    PrimitiveRange all{0, static_cast<Index>(primitives_.size()), 0, {}};
-    for (const Primitive& p : primitives_) all.box.grow(p.box);
-    // Two levels are split first, so that the (up to 64) subtrees below can be built side by side.
-    const std::vector<PrimitiveRange> top = wide_split(all);
-    std::vector<std::vector<PrimitiveRange>> second(top.size());
-    parallel_jobs(static_cast<Index>(top.size()), [&](Index i) {
-      const PrimitiveRange& range = top[static_cast<std::size_t>(i)];
-      if (range.size() > tree_width) second[static_cast<std::size_t>(i)] = wide_split(range);
+  void run() {
+    parallel_jobs(static_cast<Index>(finished_.size()), [&](Index job) {
+      const auto i = static_cast<std::size_t>(job);
+      finished_[i] = node(topology_.subtrees[i]);
     });
-    std::vector<std::pair<Index, Index>> jobs;
-    for (std::size_t i = 0; i < top.size(); ++i)
-      for (std::size_t j = 0; j < second[i].size(); ++j)
-        jobs.emplace_back(static_cast<Index>(i), static_cast<Index>(j));
-    std::vector<std::pair<Tree, Child>> subtrees(jobs.size());
-    parallel_jobs(static_cast<Index>(jobs.size()), [&](Index job) {
-      auto& [tree, child] = subtrees[static_cast<std::size_t>(job)];
-      const auto [i, j] = jobs[static_cast<std::size_t>(job)];
-      child = build_child(second[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)], tree);
-    });
-
-    Tree tree;
-    std::size_t nodes = 1 + top.size(), packets = top.size();
-    for (const auto& [part, child] : subtrees) {
-      nodes += part.nodes.size();
-      packets += part.packets.size();
-    }
-    tree.nodes.reserve(nodes);
-    tree.moments.reserve(nodes);
-    tree.packets.reserve(packets);
-    auto next = subtrees.begin();
-    const auto appended = [&](std::size_t) {
-      const Child child = append(next->first, next->second, tree);
-      ++next;
-      return child;
-    };
-    add_node(tree, top.size(), all.box, [&](std::size_t i) {
-      if (second[i].empty()) return build_child(top[i], tree);
-      return add_node(tree, second[i].size(), top[i].box, appended);
-    });
-    return tree;
+    top(0);
   }
 
  private:
-  Vec3 corner(Index t, int k) const { return vertices_.row(triangles_(t, k)).transpose(); }
-
-  Box box(Index t) const {
-    const Vec3 a = corner(t, 0), b = corner(t, 1), c = corner(t, 2);
-    const Vec3 low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
-    Box result;
-    constexpr float infinity = std::numeric_limits<float>::infinity();
-    for (int k = 0; k < 3; ++k) {
-      result.low[k] = std::nextafter(static_cast<float>(low[k]), -infinity);
-      result.high[k] = std::nextafter(static_cast<float>(high[k]), infinity);
-    }
-    return result;
-  }
-
-  /// Splits a range into up to eight, always the part whose area promises most.
-  std::vector<PrimitiveRange> wide_split(const PrimitiveRange& range) {
-    std::vector<PrimitiveRange> parts = {range};
-    while (parts.size() < tree_width) {
-      PrimitiveRange* widest = nullptr;
-      for (PrimitiveRange& part : parts)
-        if (part.size() > tree_width && (widest == nullptr || part.box.half_area() > widest->box.half_area()))
-          widest = &part;
-      if (widest == nullptr) break;
-      const auto [left, right] = split(primitives_, *widest);
-      *widest = left;
-      parts.push_back(right);
-    }
-    return parts;
-  }
-
-  Child build_child(const PrimitiveRange& range, Tree& tree) {
-    if (range.size() <= tree_width) return build_leaf(range, tree);
-    const std::vector<PrimitiveRange> parts = wide_split(range);
-    return add_node(tree, parts.size(), range.box,
-                    [&](std::size_t i) { return build_child(parts[i], tree); });
-  }
-
-  Child build_leaf(const PrimitiveRange& range, Tree& tree) {
+  Summary leaf(std::int32_t number) {
+    const Topology::Leaf& leaf = topology_.leaves[static_cast<std::size_t>(number)];
+    const std::int32_t* triangles = topology_.triangles.data() + leaf.begin;
     std::array<Vec3, 3 * tree_width> corners;
-    std::array<std::int32_t, tree_width> numbers{};
-    const int count = static_cast<int>(range.size());
-    // In the order of their numbers, so that the first of several equally near triangles is the lowest.
-    std::sort(primitives_.begin() + range.begin, primitives_.begin() + range.end,
-              [](const Primitive& a, const Primitive& b) { return a.triangle < b.triangle; });
-    for (int i = 0; i < count; ++i)
-      numbers[static_cast<std::size_t>(i)] = primitives_[static_cast<std::size_t>(range.begin + i)].triangle;
-    for (int i = 0; i < count; ++i)
-      for (int k = 0; k < 3; ++k)
-        corners[static_cast<std::size_t>(3 * i + k)] = corner(numbers[static_cast<std::size_t>(i)], k);
-    tree.packets.emplace_back();
-    fill(tree.packets.back(), corners.data(), numbers.data(), count);
-    return {~static_cast<std::int32_t>(tree.packets.size() - 1), range.box,
-            multipole_of(corners.data(), count)};
+    std::array<Disk, 3 * tree_width> points;
+    for (int i = 0; i < 3 * leaf.count; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      corners[at] = vertices_.row(triangles_(triangles[i / 3], i % 3)).transpose();
+      points[at].center = corners[at];
+    }
+    fill(packets_[number], corners.data(), triangles, leaf.count);
+    const Multipole multipole = multipole_of(corners.data(), leaf.count);
+    return {disk_around(points.data(), 3 * leaf.count, multipole.dipole), multipole};
   }
 
-  /// Enters a node and makes its children.
-  template <class MakeChild>
-  static Child add_node(Tree& tree, std::size_t count, const Box& box, const MakeChild& make_child) {
-    const std::size_t node = tree.nodes.size();
-    tree.nodes.emplace_back();
-    tree.moments.emplace_back();
+  template <class SummaryOf>
+  Summary summarize(std::int32_t number, const SummaryOf& summary_of) {
+    WideNode& wide = nodes_[number];
     std::array<Multipole, tree_width> multipoles;
-    for (std::size_t i = 0; i < tree_width; ++i) {
-      const Child child = i < count ? make_child(i) : Child{};
-      WideNode& wide = tree.nodes[node];
-      for (int k = 0; k < 3; ++k) {
-        wide.low[k][i] = i < count ? child.box.low[k] : 3e38f;
-        wide.high[k][i] = i < count ? child.box.high[k] : 3e38f;
-      }
-      wide.child[i] = child.reference;
-      multipoles[i] = child.multipole;
-      if (i < count)
-        store(child.multipole, tree.moments[node], static_cast<int>(i));
-      else
-        store_nothing(tree.moments[node], static_cast<int>(i));
+    std::array<Disk, tree_width> disks;
+    for (int i = 0; i < wide.count; ++i) {
+      const Summary child = summary_of(wide.child[i]);
+      multipoles[static_cast<std::size_t>(i)] = child.multipole;
+      disks[static_cast<std::size_t>(i)] = child.disk;
+      store(child.disk, wide, i);
+      store(child.multipole, moments_[number], i);
     }
-    tree.nodes[node].count = static_cast<std::int32_t>(count);
-    return {static_cast<std::int32_t>(node), box, multipole_of(multipoles.data(), static_cast<int>(count))};
+    for (int i = wide.count; i < tree_width; ++i) store_nothing(moments_[number], i);
+    const Multipole sum = multipole_of(multipoles.data(), wide.count);
+    return {disk_around(disks.data(), wide.count, sum.dipole), sum};
   }
 
-  /// Moves a subtree behind what is there.
-  static Child append(const Tree& part, Child child, Tree& tree) {
-    const auto node = static_cast<std::int32_t>(tree.nodes.size());
-    const auto packet = static_cast<std::int32_t>(tree.packets.size());
-    const auto moved = [&](std::int32_t reference) {
-      return reference >= 0 ? reference + node : reference - packet;
-    };
-    tree.packets.insert(tree.packets.end(), part.packets.begin(), part.packets.end());
-    tree.moments.insert(tree.moments.end(), part.moments.begin(), part.moments.end());
-    for (WideNode wide : part.nodes) {
-      for (int i = 0; i < wide.count; ++i) wide.child[i] = moved(wide.child[i]);
-      tree.nodes.push_back(wide);
-    }
-    child.reference = moved(child.reference);
-    return child;
+  Summary node(std::int32_t number) {
+    return summarize(number, [&](std::int32_t child) { return child < 0 ? leaf(~child) : node(child); });
+  }
+
+  /// A node at or above the subtrees, whose summaries are there already.
+  Summary top(std::int32_t number) {
+    return summarize(number, [&](std::int32_t child) {
+      if (child < 0) return leaf(~child);
+      const auto found = std::lower_bound(topology_.subtrees.begin(), topology_.subtrees.end(), child);
+      if (found == topology_.subtrees.end() || *found != child) return top(child);
+      return finished_[static_cast<std::size_t>(found - topology_.subtrees.begin())];
+    });
   }
 
   const Points& vertices_;
   TrianglesIn triangles_;
-  std::vector<Primitive> primitives_;
+  const Topology& topology_;
+  WideNode* nodes_;
+  NodeMoments* moments_;
+  TrianglePacket* packets_;
+  std::vector<Summary> finished_;
 };
 
 }  // namespace
@@ -196,14 +108,17 @@ Hierarchy::Hierarchy(PointsIn vertices, TrianglesIn triangles) {
   const double half = std::max((high - center_).maxCoeff(), std::numeric_limits<double>::min());
   factor_ = std::ldexp(1.0, std::clamp(-std::ilogb(half) - 1, -1000, 1000));
   const Points normalized_vertices = (vertices.rowwise() - center_.transpose()) * factor_;
-  Tree tree = Builder(normalized_vertices, triangles).build();
-  nodes_ = std::move(tree.nodes);
-  moments_ = std::move(tree.moments);
-  packets_ = std::move(tree.packets);
+
+  Topology topology = build_topology(normalized_vertices, triangles);
+  nodes_ = std::move(topology.nodes);
+  moments_.resize(nodes_.size());
+  packet_count_ = static_cast<std::int32_t>(topology.leaves.size());
+  packets_.reset(new TrianglePacket[topology.leaves.size()]);
+  Summarizer(normalized_vertices, triangles, topology, nodes_.data(), moments_.data(), packets_.get()).run();
 }
 
 HierarchyView Hierarchy::view() const {
-  return {nodes_.data(), moments_.data(), packets_.data(), static_cast<std::int32_t>(packets_.size())};
+  return {nodes_.data(), moments_.data(), packets_.get(), packet_count_};
 }
 
 }  // namespace arapfields

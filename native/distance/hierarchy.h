@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "core/types.h"
@@ -29,7 +30,8 @@ class Hierarchy {
   double factor_ = 1.0;
   std::vector<WideNode> nodes_;
   std::vector<NodeMoments> moments_;
-  std::vector<TrianglePacket> packets_;
+  std::unique_ptr<TrianglePacket[]> packets_;  // not a vector, which would zero them first
+  std::int32_t packet_count_ = 0;
 };
 
 }  // namespace arapfields

@@ -9,11 +9,15 @@ namespace arapfields {
 /// Children of a node and triangles of a leaf: one vector of doubles, or half of one of floats, in AVX-512.
 constexpr int tree_width = 8;
 
-/// Bounding boxes of up to eight children, rounded outwards to single precision, coordinate by coordinate.
-/// child ≥ 0 is a node, child < 0 the packet ~child. Unused lanes come last.
+/// Bounding boxes and disks (distance/disk.h) of up to eight children, rounded outwards to single precision,
+/// coordinate by coordinate. child ≥ 0 is a node, child < 0 the packet ~child. Unused lanes come last.
 struct alignas(64) WideNode {
   float low[3][tree_width];
   float high[3][tree_width];
+  float disk_center[3][tree_width];
+  float disk_normal[3][tree_width];
+  float disk_height[tree_width];
+  float disk_radius[tree_width];
   std::int32_t child[tree_width];
   std::int32_t count;
 };

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#if defined(__AVX__)
+#include <immintrin.h>
+#endif
+
+#include <bit>
 #include <cmath>
-#include <cstring>
 
 #include "distance/kernels.h"
 
@@ -47,35 +51,64 @@ __attribute__((noinline)) void visit(const TrianglePacket& t, std::int32_t index
   }
 }
 
-/// A point in single precision, as an interval that holds the exact one.
-struct Interval {
-  float low[3], high[3];
+/// A point in single precision: an interval that holds the exact one, and its error beside lengths up to
+/// that of the way to any disk.
+struct Query {
+  float low[3], high[3], middle[3];
+  float slack;
 };
 
-Interval around(const double* p) {
-  Interval result;
+Query rounded(const double* p) {
+  Query result;
+  result.slack = 3e-6f;
   for (int k = 0; k < 3; ++k) {
-    const float x = static_cast<float>(p[k]), slack = std::fabs(x) * 1.3e-7f + 1e-38f;
-    result.low[k] = x - slack;
-    result.high[k] = x + slack;
+    const float x = static_cast<float>(p[k]), half = std::fabs(x) * 1.3e-7f + 1e-38f;
+    result.low[k] = x - half;
+    result.high[k] = x + half;
+    result.middle[k] = x;
+    result.slack += std::fabs(x) * 1e-6f;
   }
   return result;
 }
 
-/// No box whose squared distance, as box_distances rounds it, exceeds this can hold anything as near.
-float bound(const Nearest& best) { return static_cast<float>(best.squared_distance) * 1.000002f + 1e-37f; }
+/// No child whose squared distance, as bounds_from_below rounds it, exceeds this can hold anything as near.
+float limit_of(const Nearest& best) { return static_cast<float>(best.squared_distance) * 1.000002f + 1e-37f; }
 
-void box_distances(const WideNode& node, const Interval& p, float* squared) {
+/// For each child the squared distance to its box or to its disk, whichever is larger.
+inline void bounds_from_below(const WideNode& node, const Query& p, float* squared) {
   for (int i = 0; i < W; ++i) {
-    float sum = 0.0f;
+    float to_box = 0.0f;
     for (int k = 0; k < 3; ++k) {
       const float below = node.low[k][i] - p.high[k], above = p.low[k] - node.high[k][i];
       float d = below > above ? below : above;
       d = d > 0.0f ? d : 0.0f;
-      sum += d * d;
+      to_box += d * d;
     }
-    squared[i] = sum;
+    const float dx = p.middle[0] - node.disk_center[0][i], dy = p.middle[1] - node.disk_center[1][i];
+    const float dz = p.middle[2] - node.disk_center[2][i];
+    const float along =
+        dx * node.disk_normal[0][i] + dy * node.disk_normal[1][i] + dz * node.disk_normal[2][i];
+    const float length = dx * dx + dy * dy + dz * dz;
+    const float across = length * 0.999998f - along * along;
+    float above = std::fabs(along) - (node.disk_height[i] + p.slack);
+    float beside = std::sqrt(across > 0.0f ? across : 0.0f) - (node.disk_radius[i] + p.slack);
+    above = above > 0.0f ? above : 0.0f;
+    beside = beside > 0.0f ? beside : 0.0f;
+    const float to_disk = above * above + beside * beside;
+    squared[i] = to_box > to_disk ? to_box : to_disk;
   }
+}
+
+/// Bit i: values[i] ≤ limit.
+inline unsigned at_most(const float* values, float limit) {
+#if defined(__AVX__)
+  const __m256 v = _mm256_loadu_ps(values);
+  return static_cast<unsigned>(_mm256_movemask_ps(_mm256_cmp_ps(v, _mm256_set1_ps(limit), _CMP_LE_OQ)));
+#else
+  unsigned mask = 0;
+  for (int i = 0; i < W; ++i) mask |= values[i] <= limit ? 1u << i : 0u;
+  return mask;
+#endif
 }
 
 struct Entry {
@@ -84,28 +117,28 @@ struct Entry {
 };
 
 void search(const HierarchyView& tree, const double* p, Nearest& best) {
-  const Interval interval = around(p);
+  const Query query = rounded(p);
   const std::int32_t seen = best.packet;
   Entry stack[stack_size];
   Entry* top = stack;
   *top++ = {0.0f, 0};
-  float limit = bound(best);
+  float limit = limit_of(best);
   while (top != stack) {
     const Entry entry = *--top;
     if (entry.squared > limit) continue;
     if (entry.child < 0) {
       if (~entry.child == seen) continue;
       visit(tree.packets[~entry.child], ~entry.child, p, best);
-      limit = bound(best);
+      limit = limit_of(best);
       continue;
     }
     const WideNode& node = tree.nodes[entry.child];
     alignas(64) float squared[W];
-    box_distances(node, interval, squared);
+    bounds_from_below(node, query, squared);
     // Farther children go below nearer ones on the stack.
     Entry* const floor = top;
-    for (int i = 0; i < node.count; ++i) {
-      if (squared[i] > limit) continue;
+    for (unsigned hits = at_most(squared, limit) & ((1u << node.count) - 1u); hits != 0; hits &= hits - 1) {
+      const int i = std::countr_zero(hits);
       Entry* place = top++;
       for (; place != floor && place[-1].squared < squared[i]; --place) *place = place[-1];
       *place = {squared[i], node.child[i]};

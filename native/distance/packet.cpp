@@ -34,11 +34,11 @@ Planar in_its_plane(const Vec3* v) {
     }
   }
   const Vec3 a = v[start], ab = v[(start + 1) % 3] - a, ac = v[(start + 2) % 3] - a;
-  const double length = ab.stableNorm();
+  const double length = ab.norm();
   const Vec3 x = length > 0.0 ? Vec3(ab / length) : Vec3(Vec3::UnitX());
   const double along = x.dot(ac);
   const Vec3 across = ac - along * x;
-  double height = across.stableNorm();
+  double height = across.norm();
   Vec3 y;
   if (height > 4.0 * std::numeric_limits<double>::epsilon() * length) {
     y = across / height;

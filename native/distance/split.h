@@ -9,15 +9,16 @@
 
 namespace arapfields {
 
+/// An axis-aligned box in the first three of four lanes; the last is idle.
 struct Box {
-  Eigen::Array3f low = Eigen::Array3f::Constant(3e38f);
-  Eigen::Array3f high = Eigen::Array3f::Constant(-3e38f);
+  Eigen::Array4f low = Eigen::Array4f::Constant(3e38f);
+  Eigen::Array4f high = Eigen::Array4f::Constant(-3e38f);
   void grow(const Box& other) {
     low = low.min(other.low);
     high = high.max(other.high);
   }
   float half_area() const {
-    const Eigen::Array3f d = high - low;
+    const Eigen::Array4f d = high - low;
     return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
   }
 };

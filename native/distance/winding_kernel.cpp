@@ -10,12 +10,15 @@ namespace {
 constexpr int W = tree_width;
 constexpr double pi = std::numbers::pi;
 
-/// atan2(y, x) to 1e-15, without branches. On [0, tan(π/8)] a minimax polynomial of atan(t)/t in t².
+/// atan2(y, x) to 1e-15. On [0, tan(π/8)] a minimax polynomial of atan(t)/t in t². Choices are made by
+/// factors 0 and 1: compilers turn conditions into branches, and then use no vectors.
 inline double arc_tangent(double y, double x) {
   const double ax = std::fabs(x), ay = std::fabs(y);
+  const double swap = ax < ay ? 1.0 : 0.0, back = x < 0.0 ? 1.0 : 0.0;
   const double small = ax < ay ? ax : ay, large = ax < ay ? ay : ax;
-  const bool steep = small > 0.41421356237309503 * large;  // then atan(t) = π/4 + atan((t − 1)/(t + 1))
-  const double t = (steep ? small - large : small) / (steep ? small + large : large + 1e-300);
+  // Above tan(π/8): atan(t) = π/4 + atan((t − 1)/(t + 1)).
+  const double steep = small > 0.41421356237309503 * large ? 1.0 : 0.0;
+  const double t = (small - steep * large) / (large + steep * small + 1e-300);
   const double u = t * t;
   double p = -0.0253164795737764757;
   p = p * u + 0.0502476211894012803;
@@ -27,10 +30,10 @@ inline double arc_tangent(double y, double x) {
   p = p * u + 0.199999999783926621;
   p = p * u - 0.33333333333221434;
   p = p * u + 0.999999999999999041;
-  double angle = t * p + (steep ? 0.25 * pi : 0.0);
-  angle = ax < ay ? 0.5 * pi - angle : angle;
-  angle = x < 0.0 ? pi - angle : angle;
-  return y < 0.0 ? -angle : angle;
+  double angle = t * p + steep * (0.25 * pi);
+  angle = swap * (0.5 * pi) + (1.0 - 2.0 * swap) * angle;
+  angle = back * pi + (1.0 - 2.0 * back) * angle;
+  return std::copysign(angle, y);
 }
 
 /// Adds each triangle's half solid angle seen from p (Van Oosterom and Strackee 1983), in its own plane's
@@ -46,8 +49,7 @@ inline void add_half_angles(const TrianglePacket& t, const double* p, double* su
     const double c = std::sqrt(xc * xc + yc * yc + zz);
     const double ab = y * y + zz - x * xb, bc = xb * xc - y * yc + zz, ca = zz - x * xc - y * yc;
     const double triple = -z * t.bx[i] * t.cy[i], sum = a * b * c + ab * c + bc * a + ca * b;
-    const double angle = arc_tangent(triple, sum);
-    sums[i] += triple != 0.0 ? angle : 0.0;
+    sums[i] += (triple != 0.0 ? 1.0 : 0.0) * arc_tangent(triple, sum);
   }
 }
 
