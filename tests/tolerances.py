@@ -29,3 +29,7 @@ PUBLISHED_VALUE = 1e-5
 PUBLISHED_GRADIENT = 1e-4
 # A fit's reported mean errors against means over other random points: sampling noise of some thousand points.
 FIT_REPORT = 0.15
+# A live solver at rest against the identity, in the unit cube: rounding times a hundred bumps.
+LIVE_IDENTITY = 1e-8
+# A pose solved again after others, as a share of the shape's length: what the last steps still gain.
+LIVE_DRIFT = 1e-4

@@ -23,14 +23,14 @@ std::vector<Handle> moved_handles(const LiveSolver& live, const py::sequence& ta
 }
 
 py::dict report_dict(const LiveReport& report) {
-  py::dict result("stretch"_a = report.arap.stretch, "bend"_a = report.arap.bend, "energy"_a = report.energy,
-                  "handle_error_mean"_a = report.handle_mean, "handle_error_max"_a = report.handle_max,
-                  "min_determinant"_a = report.distortion.min_determinant,
-                  "flipped_share"_a = report.distortion.flipped_share,
-                  "max_stretch"_a = report.distortion.max_stretch,
-                  "min_stretch"_a = report.distortion.min_stretch, "steps"_a = report.steps,
-                  "evaluations"_a = report.evaluations, "converged"_a = report.converged,
-                  "seconds"_a = report.seconds, "setup_seconds"_a = report.setup_seconds);
+  py::dict result(
+      "stretch"_a = report.arap.stretch, "bend"_a = report.arap.bend, "energy"_a = report.energy,
+      "value"_a = report.value, "handle_error_mean"_a = report.handle_mean,
+      "handle_error_max"_a = report.handle_max, "min_determinant"_a = report.distortion.min_determinant,
+      "flipped_share"_a = report.distortion.flipped_share, "max_stretch"_a = report.distortion.max_stretch,
+      "min_stretch"_a = report.distortion.min_stretch, "steps"_a = report.steps,
+      "evaluations"_a = report.evaluations, "converged"_a = report.converged, "seconds"_a = report.seconds,
+      "setup_seconds"_a = report.setup_seconds);
   if (report.preference) result["preference"] = *report.preference;
   return result;
 }
@@ -41,10 +41,12 @@ py::object with_report(const LiveSolver& live) {
   return field;
 }
 
-py::object solve(LiveSolver& live, const py::object& targets, Index steps, Task* task) {
+py::object solve(LiveSolver& live, const py::object& targets, Index steps, double tolerance, Task* task) {
   require(steps >= 0, "steps", std::to_string(steps), "0 (the options') or more is allowed");
+  require(tolerance >= 0.0 && tolerance < 1.0, "tolerance", std::to_string(tolerance),
+          "0 (the options') or a share below 1 is allowed");
   if (!targets.is_none()) live.set_targets(moved_handles(live, py::cast<py::sequence>(targets)));
-  run_long(task, [&](const Progress& progress) { return live.solve(steps, progress); });
+  run_long(task, [&](const Progress& progress) { return live.solve(steps, tolerance, progress); });
   return with_report(live);
 }
 
@@ -102,9 +104,11 @@ void bind_live(py::module_& module) {
           "samples: SurfaceSamples; handles: Cuboid, Point or Region in mesh coordinates (none: for a style\n"
           "alone; the lowest sample is then held). InvalidInput names the handle or option that does not "
           "fit.")
-      .def("solve", &solve, "targets"_a = py::none(), "steps"_a = 0, "task"_a = nullptr,
+      .def("solve", &solve, "targets"_a = py::none(), "steps"_a = 0, "tolerance"_a = 0.0, "task"_a = nullptr,
            "Follows the handles to `targets` (a 4×4 matrix a handle, three numbers for a point; None: where\n"
-           "they are) by at most `steps` steps (0: the options') and returns a DeformationField of its own.")
+           "they are) and returns a DeformationField of its own. `steps` and `tolerance` replace the "
+           "options' for\n"
+           "this call, for instance to finish a drag: steps=100, tolerance=1e-6.")
       .def("set_handles", &LiveSolver::set_handles, "handles"_a,
            "Other handles for the same surface; the shape at hand is kept as the start of the next solve.")
       .def("set_style", &set_style, "normals"_a, "strength"_a = 1.0, "sharpness"_a = 5.0,

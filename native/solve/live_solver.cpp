@@ -18,6 +18,10 @@ constexpr Index center_candidates = 6000;
 /// Weight, against the surface's energy, with which a style without handles holds the lowest sample in place.
 constexpr double anchor_weight = 1.0;
 
+/// Samples × bumps below which a step takes about a millisecond: waking other threads, which may be busy with
+/// drawing, would cost more than they do.
+constexpr Index worth_threads = 1000000;
+
 class Stopwatch {
  public:
   double seconds() const {
@@ -175,14 +179,21 @@ void LiveSolver::clear_style() {
   optimizer_.forget();
 }
 
-std::shared_ptr<RadialField> LiveSolver::solve(Index steps, const Progress& progress) {
-  const ThreadScope threads(options_.threads);
+int LiveSolver::solve_threads() const {
+  const Index work = static_cast<Index>(chosen_.size()) * basis_.bumps();
+  return options_.threads == 0 && work < worth_threads ? 1 : options_.threads;
+}
+
+std::shared_ptr<RadialField> LiveSolver::solve(Index steps, double tolerance, const Progress& progress) {
+  const ThreadScope threads(solve_threads());
   const Stopwatch watch;
   const QuasiNewtonReport found = optimizer_.minimise(
-      *objective_, {steps > 0 ? steps : options_.steps, options_.tolerance}, coefficients_, progress);
+      *objective_, {steps > 0 ? steps : options_.steps, tolerance > 0.0 ? tolerance : options_.tolerance},
+      coefficients_, progress);
   report_.steps = found.steps;
   report_.evaluations = found.evaluations;
   report_.converged = found.converged;
+  report_.value = found.value;
   measure(watch.seconds());
   return field();
 }

@@ -20,10 +20,10 @@ struct LiveOptions {
   double bending = 0.01;       ///< λ_bend
   double handle_weight = 100;  ///< factor of the handles' mean squared distance
   int handle_samples = 300;    ///< samples that a handle pulls at, at most
-  int steps = 20;              ///< quasi-Newton steps of one solve, at most
-  double tolerance = 1e-3;     ///< a solve ends where a step is expected to gain less than this share
+  int steps = 12;              ///< quasi-Newton steps of one solve, at most
+  double tolerance = 1e-4;     ///< a solve ends where a step is expected to gain less than this share
   double gauss_weight = 6.0;   ///< λ_Gauss of a style at strength 1
-  int threads = 0;             ///< 0: all
+  int threads = 0;             ///< 0: all for the set-up, and for a solve where that is large
   std::int64_t seed = 0;
 
   /// Throws InvalidInput that names the option.
@@ -34,6 +34,7 @@ struct LiveOptions {
 struct LiveReport {
   ArapValue arap;
   double energy = 0.0;  ///< stretch + bending · bend
+  double value = 0.0;   ///< all that the solve minimises
   double handle_mean = 0.0, handle_max = 0.0;
   std::optional<double> preference;  ///< mean g of the deformed normals, where there is a style
   Distortion distortion;
@@ -58,8 +59,8 @@ class LiveSolver {
   void clear_style();
   /// Moves the handles' targets.
   void set_targets(const std::vector<Handle>& moved);
-  /// Improves the field for the targets and the style at hand, by at most `steps` steps (0: the options').
-  std::shared_ptr<RadialField> solve(Index steps = 0, const Progress& progress = {});
+  /// Improves the field for the targets and the style at hand; 0 steps or tolerance: the options'.
+  std::shared_ptr<RadialField> solve(Index steps = 0, double tolerance = 0.0, const Progress& progress = {});
   /// Back to the identity, and the handles' targets to rest.
   void reset();
 
@@ -69,6 +70,7 @@ class LiveSolver {
 
  private:
   void measure(double seconds);
+  int solve_threads() const;
 
   LiveOptions options_;
   Frame frame_;

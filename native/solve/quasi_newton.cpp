@@ -101,7 +101,7 @@ QuasiNewtonReport QuasiNewton::minimise(const MeasuredObjective& objective, cons
       forget();
       continue;
     }
-    if (-0.5 * slope < options.tolerance * now.value) {
+    if (-0.5 * slope < options.tolerance * std::abs(now.value)) {
       report.converged = true;
       break;
     }

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <boost/test/unit_test.hpp>
+#include <cmath>
+
+#include "core/errors.h"
+#include "core/random.h"
+#include "fields/radial_field.h"
+#include "solve/quasi_newton.h"
+
+using namespace arapfields;
+
+namespace {
+
+Points random_points(Index count, std::uint64_t seed) {
+  Random random(seed);
+  Points points(count, 3);
+  for (Index i = 0; i < count; ++i) points.row(i) = random.direction().transpose() * random.uniform(0.5, 0.7);
+  return points;
+}
+
+RowMatrix<double> random_matrix(Index rows, Index cols, std::uint64_t seed) {
+  Random random(seed);
+  RowMatrix<double> result(rows, cols);
+  for (Index i = 0; i < result.size(); ++i) result.data()[i] = random.normal();
+  return result;
+}
+
+/// Σ (u_i⁴/4 + u_i²/2 − b_i u_i), u = A c: convex, far from quadratic.
+class Quartic : public MeasuredObjective {
+ public:
+  explicit Quartic(Index n) : a_(random_matrix(2 * n, n, 3)), b_(random_matrix(6 * n, 1, 4) * 20.0) {}
+  void measure(const RowMatrix<double>& c, Vector& u) const override {
+    const RowMatrix<double> product = a_ * c;
+    u = Eigen::Map<const Vector>(product.data(), product.size());
+  }
+  double value(const Vector& u, Vector* cotangents) const override {
+    if (cotangents != nullptr) *cotangents = u.array().cube().matrix() + u - b_;
+    return u.array().pow(4).sum() / 4 + u.squaredNorm() / 2 - b_.dot(u);
+  }
+  RowMatrix<double> pull_back(const Vector& x) const override {
+    return a_.transpose() * Eigen::Map<const RowMatrix<double>>(x.data(), a_.rows(), 3);
+  }
+  RowMatrix<double> precondition(const RowMatrix<double>& g) const override { return g * 0.01; }
+
+ private:
+  RowMatrix<double> a_;
+  Vector b_;
+};
+
+}  // namespace
+
+BOOST_AUTO_TEST_SUITE(live)
+
+BOOST_AUTO_TEST_CASE(farthest_points_spread_and_stop_at_duplicates) {
+  const Points points = random_points(500, 1);
+  const FarthestPoints few = farthest_points(points, 10), more = farthest_points(points, 100);
+  BOOST_TEST(more.fill_distance < few.fill_distance);
+  for (Index i = 0; i < points.rows(); ++i) {
+    double nearest = 1e9;
+    for (const Index j : more.indices) nearest = std::min(nearest, (points.row(i) - points.row(j)).norm());
+    BOOST_TEST(nearest <= more.fill_distance + 1e-12);
+  }
+  BOOST_TEST(farthest_points(Points::Ones(40, 3), 7).indices.size() == 1u);
+  BOOST_CHECK_THROW(farthest_points(Points(0, 3), 7), InvalidInput);
+}
+
+BOOST_AUTO_TEST_CASE(spatial_order_is_a_permutation) {
+  const auto order = spatial_order(random_points(300, 2));
+  std::vector<bool> seen(300, false);
+  for (const Index i : order) seen[static_cast<std::size_t>(i)] = true;
+  BOOST_TEST(order.size() == 300u);
+  BOOST_TEST(std::all_of(seen.begin(), seen.end(), [](bool b) { return b; }));
+}
+
+BOOST_AUTO_TEST_CASE(sites_agree_with_their_rows_and_pull_back_is_the_transpose) {
+  const Points points = random_points(77, 5);
+  const RadialBasis basis = radial_basis(random_points(400, 6), {{10, 1.5}, {60, 2.0}});
+  const RadialSites sites(basis, points);
+  const RowMatrix<double> c = random_matrix(basis.size(), 3, 7);
+  for (const JetOrder order : {JetOrder::value, JetOrder::first, JetOrder::second}) {
+    JetBlock<double> jets(points.rows(), order);
+    sites.evaluate(c, jets.view());
+    const Index size = columns(order) * points.rows();
+    const Eigen::Map<const RowMatrix<double>> found(jets.view().data, size, 3);
+    const RowMatrix<double> rows = sites.rows(order);
+    BOOST_TEST((rows * c - found).norm() < 1e-11 * found.norm());
+    const RowMatrix<double> cotangents = random_matrix(size, 3, 8);
+    RowMatrix<double> gradient = RowMatrix<double>::Zero(basis.size(), 3);
+    sites.pull_back({cotangents.data(), points.rows(), order}, gradient);
+    BOOST_TEST((rows.transpose() * cotangents - gradient).norm() < 1e-11 * gradient.norm());
+  }
+}
+
+BOOST_AUTO_TEST_CASE(quasi_newton_descends_to_the_minimum_and_stays) {
+  const Quartic objective(20);
+  RowMatrix<double> c = RowMatrix<double>::Zero(20, 3);
+  QuasiNewton optimizer;
+  double last = 0.0;
+  for (int i = 0; i < 60; ++i) {
+    const QuasiNewtonReport report = optimizer.minimise(objective, {1, 1e-15}, c);
+    BOOST_TEST(report.value <= last);
+    last = report.value;
+  }
+  Vector u, cotangents;
+  objective.measure(c, u);
+  objective.value(u, &cotangents);
+  BOOST_TEST(objective.pull_back(cotangents).norm() < 1e-3);
+  const RowMatrix<double> before = c;
+  BOOST_TEST(optimizer.minimise(objective, {5, 1e-6}, c).steps == 0);
+  BOOST_TEST((before - c).norm() == 0.0);
+  c(0, 0) = std::nan("");
+  BOOST_CHECK_THROW(optimizer.minimise(objective, {}, c), Diverged);
+}
+
+BOOST_AUTO_TEST_SUITE_END()
