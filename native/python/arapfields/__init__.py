@@ -46,6 +46,7 @@ from ._native import (
     thread_count,
     winding_number,
 )
+from .grids import save_grid, sdf_grid
 
 __all__ = [
     "Cancelled",
@@ -82,6 +83,8 @@ __all__ = [
     "sample_curve",
     "sample_mesh",
     "sample_surface",
+    "save_grid",
+    "sdf_grid",
     "signed_distance",
     "simd_level",
     "style_names",

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`python -m arapfields`. Exit codes: 0 done, 1 failed, 2 bad input or usage, 130 interrupted."""
+
+import sys
+
+from ._native import Cancelled, Diverged, InvalidInput
+from .cli.parser import parse
+
+
+def main(arguments=None):
+    """Runs one verb and returns the exit code; errors are one line on stderr."""
+    verb = "arapfields"
+    try:
+        options = parse(sys.argv[1:] if arguments is None else arguments)
+        verb = f"arapfields {options.verb}"
+        options.run(options)
+        return 0
+    except SystemExit as stop:
+        return stop.code or 0
+    except (KeyboardInterrupt, Cancelled):
+        return _fail(verb, "interrupted", 130)
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename is not None else ""
+        return _fail(verb, f"{where}{error.strerror or error}", 2)
+    except (InvalidInput, ImportError) as error:
+        return _fail(verb, error, 2)
+    except (Diverged, MemoryError) as error:
+        return _fail(verb, str(error) or "out of memory", 1)
+
+
+def _fail(verb, reason, code):
+    print(f"{verb}: {' '.join(str(reason).split())}", file=sys.stderr)
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reading and writing meshes, point clouds, normals, SDFs and fields. Every error names the file."""
+
+import logging
+import re
+from pathlib import Path
+
+import numpy as np
+
+from .. import _native
+from .._native import InvalidInput
+
+MESH_SUFFIXES = (".ply", ".obj", ".stl", ".off")
+CLOUD_SUFFIXES = (".ply", ".npz", ".xyz")
+STATE_SUFFIXES = (".npz",)
+OBJ_VERTEX = re.compile(r"^([ \t]*v[ \t]+)(\S+)[ \t]+(\S+)[ \t]+(\S+)", flags=re.M)
+MOST_PREFERRED = 256  # face normals a chosen mesh may have as preferred normals
+
+
+def _trimesh():
+    try:
+        import trimesh
+    except ImportError:
+        raise ImportError("meshes need the package trimesh: pip install 'arapfields[cli]'") from None
+    logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # what matters is in our own error
+    return trimesh
+
+
+def existing(path, suffixes):
+    """The path of an input file; InvalidInput for none, a directory, or another extension."""
+    path = Path(path)
+    if path.is_dir():
+        raise InvalidInput(f"{path}: is a directory, not a file")
+    if not path.exists():
+        raise InvalidInput(f"{path}: no such file")
+    if path.suffix.lower() not in suffixes:
+        raise InvalidInput(f"{path}: unknown extension; readable are {', '.join(suffixes)}")
+    return path
+
+
+def is_mesh(path):
+    return Path(path).suffix.lower() in MESH_SUFFIXES
+
+
+def read_mesh(path):
+    """Vertices (n, 3) and triangles (m, 3) of a file; larger polygons are cut into triangles.
+
+    Vertices keep the file's order, except that an STL's equal corners become one vertex.
+    """
+    path = existing(path, MESH_SUFFIXES)
+    trimesh = _trimesh()
+    try:
+        mesh = trimesh.load(path, force="mesh", process=False, maintain_order=True, skip_materials=True)
+        vertices, triangles = np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
+    except OSError:
+        raise
+    except Exception as error:  # a reader meets a damaged file with whatever it stumbles over
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InvalidInput(
+            f"{path}: not readable as {path.suffix[1:].upper()}, perhaps damaged ({reason})"
+        ) from error
+    if triangles.size == 0:
+        raise InvalidInput(f"{path}: has no faces (or is cut off); a triangle mesh is needed")
+    if not np.isfinite(vertices).all():
+        first = int(np.flatnonzero(~np.isfinite(vertices).all(1))[0])
+        raise InvalidInput(f"{path}: vertex {first} is NaN or infinite; coordinates must be finite")
+    if triangles.min() < 0 or triangles.max() >= len(vertices):
+        raise InvalidInput(f"{path}: a face names a vertex beyond the {len(vertices)} there are")
+    if path.suffix.lower() == ".stl":
+        vertices, triangles = _merged(vertices, triangles)
+    return vertices, triangles.astype(np.int32)
+
+
+def _merged(vertices, triangles):
+    unique, inverse = np.unique(vertices, axis=0, return_inverse=True)
+    return unique, inverse.reshape(-1)[triangles]
+
+
+def write_mesh(path, vertices, triangles):
+    """Writes PLY, OBJ, STL or OFF, by the path's extension."""
+    mesh = _trimesh().Trimesh(vertices, triangles, process=False)
+    mesh.export(path)
+
+
+def write_moved_mesh(path, source, mesh, move):
+    """The mesh of the file `source`, its vertices moved by `move`, points (n, 3) → (n, 3).
+
+    OBJ to OBJ keeps everything else of the file: polygons, texture coordinates, materials, groups; normals
+    go, which would be those of the old shape. Otherwise positions and triangles alone are written.
+    """
+    if path.suffix.lower() == Path(source).suffix.lower() == ".obj":
+        text = Path(source).read_text(errors="surrogateescape")
+        before = np.array([[float(c) for c in m.groups()[1:]] for m in OBJ_VERTEX.finditer(text)])
+        if np.isfinite(before).all():
+            rows = iter(move(before))
+            moved = OBJ_VERTEX.sub(lambda m: m[1] + " ".join(f"{c:.9g}" for c in next(rows)), text)
+            moved = re.sub(r"^[ \t]*vn[ \t].*\n?", "", moved, flags=re.M)
+            moved = re.sub(r"^[ \t]*f[ \t].*$", _without_normals, moved, flags=re.M)
+            path.write_text(moved, errors="surrogateescape")
+            return
+    vertices, triangles = mesh
+    write_mesh(path, move(vertices), triangles)
+
+
+def _without_normals(line):
+    return re.sub(r"(\d+)/(-?\d*)/-?\d+", lambda m: f"{m[1]}/{m[2]}".rstrip("/"), line[0])
+
+
+def write_cloud(path, points, normals):
+    """Points (n, 3) with normals (n, 3) as binary PLY, NPZ (`points`, `normals`), or rows of text."""
+    suffix = path.suffix.lower()
+    if suffix == ".npz":
+        np.savez(path, points=points, normals=normals)
+        return
+    rows = np.ascontiguousarray(np.hstack([points, normals]))
+    if suffix == ".xyz":
+        np.savetxt(path, rows, fmt="%.9g")
+        return
+    properties = "".join(f"property double {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz"))
+    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(rows)}\n{properties}end_header\n"
+    path.write_bytes(header.encode() + rows.astype("<f8").tobytes())
+
+
+def read_sdf(path):
+    """A NeuralSdf that `fit` saved."""
+    return _native.NeuralSdf.load(existing(path, STATE_SUFFIXES))
+
+
+def read_field(path):
+    """A DeformationField that `deform` or `stylize` saved."""
+    return _native.DeformationField.load(existing(path, STATE_SUFFIXES))
+
+
+def read_normals(path):
+    """Preferred normals (k, 3): a mesh's distinct face normals, or the rows of a text file or .npy array."""
+    path = existing(path, (*MESH_SUFFIXES, ".txt", ".csv", ".npy"))
+    if is_mesh(path):
+        return _face_normals(path)
+    try:
+        if path.suffix.lower() == ".npy":
+            normals = np.load(path, allow_pickle=False)
+        else:
+            normals = np.loadtxt(path.read_text().replace(",", " ").splitlines(), ndmin=2)
+    except (ValueError, UnicodeDecodeError) as error:
+        raise InvalidInput(f"{path}: not rows of three numbers ({error})") from error
+    if normals.ndim != 2 or normals.shape[1] != 3 or len(normals) == 0:
+        raise InvalidInput(
+            f"{path}: holds an array of shape {normals.shape}; rows of three numbers are needed"
+        )
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    if not (np.isfinite(lengths).all() and (lengths > 0).all()):
+        raise InvalidInput(f"{path}: a normal is zero or not finite; each must have a direction")
+    return normals / lengths
+
+
+def _face_normals(path):
+    vertices, triangles = read_mesh(path)
+    corners = vertices[triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1)
+    normals = normals[lengths > 0] / lengths[lengths > 0, None]
+    distinct = np.empty((0, 3))
+    for normal in normals:
+        if len(distinct) == 0 or (distinct @ normal).max() < 0.9995:  # 1.8 degrees
+            distinct = np.vstack([distinct, normal])
+        if len(distinct) > MOST_PREFERRED:
+            raise InvalidInput(
+                f"{path}: has over {MOST_PREFERRED} distinct face normals; a simpler mesh is needed"
+            )
+    if len(distinct) == 0:
+        raise InvalidInput(f"{path}: all faces are degenerate; they have no normals")
+    return distinct

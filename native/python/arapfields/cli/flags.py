@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Flags that several verbs share."""
+
+from .handles import AddHandle, MoveHandle, triple
+
+MESH = "mesh: .ply, .obj, .stl or .off"
+SOURCE = f"{MESH}; or .npz: a signed distance that fit saved"
+
+
+def solve_flags(parser):
+    parser.add_argument("input", help=SOURCE)
+    outputs = parser.add_argument_group("outputs (one or more)")
+    outputs.add_argument("-o", "--output", metavar="FILE", help="the input mesh with its vertices moved")
+    outputs.add_argument("--surface", metavar="FILE", help="the implicit surface, extracted and moved")
+    outputs.add_argument("--save-field", metavar="FILE", help=".npz with the deformation field")
+    report_flag(outputs)
+    resolution_flag(parser)
+    parser.add_argument(
+        "--samples", type=int, default=20000, metavar="N", help="surface samples the energy sees [20000]"
+    )
+    handles = parser.add_argument_group(
+        "handles (x, y, z in the mesh's coordinates; inf and -inf leave a side of a box open)"
+    )
+    handles.add_argument("--handles", metavar="FILE", help="JSON file, see docs/command-line.md")
+    settings = {"dest": "flagged", "default": None}
+    handles.add_argument(
+        "--box",
+        nargs=2,
+        type=triple,
+        metavar=("LOW", "HIGH"),
+        action=AddHandle,
+        **settings,
+        help="the surface in this box is held, or moved by what follows",
+    )
+    handles.add_argument(
+        "--turn",
+        nargs=2,
+        metavar=("AXIS", "DEGREES"),
+        action=MoveHandle,
+        **settings,
+        help="turns the last box",
+    )
+    handles.add_argument(
+        "--pivot",
+        type=triple,
+        metavar="POINT",
+        action=MoveHandle,
+        **settings,
+        help="about this point [the box's centre]",
+    )
+    handles.add_argument(
+        "--shift", type=triple, metavar="VECTOR", action=MoveHandle, **settings, help="shifts the last box"
+    )
+    handles.add_argument(
+        "--point",
+        nargs=2,
+        type=triple,
+        metavar=("FROM", "TO"),
+        action=AddHandle,
+        **settings,
+        help="one point of the surface goes there",
+    )
+
+
+def resolution_flag(parser):
+    parser.add_argument(
+        "--resolution", type=int, default=128, metavar="N", help="cells along an edge of the cube [128]"
+    )
+
+
+def report_flag(parser):
+    parser.add_argument("--report", metavar="FILE", help=".json with what was measured")

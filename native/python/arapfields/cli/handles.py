@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Handles from a JSON file and from flags; docs/command-line.md describes the format."""
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+
+from .._native import Cuboid, InvalidInput, Point
+
+KEYS = {
+    "cuboid": {"rest", "target", "corners", "center", "half_extents", "rotation", "move", "weight"},
+    "point": {"rest", "target", "weight"},
+}
+
+
+def read_handles(path):
+    """The handles' descriptions in a JSON file: a list, or an object whose `handles` is one."""
+    path = Path(path)
+    if path.is_dir():
+        raise InvalidInput(f"{path}: is a directory, not a file")
+    if not path.exists():
+        raise InvalidInput(f"{path}: no such file")
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise InvalidInput(f"{path}: not JSON ({error})") from error
+    if isinstance(content, dict) and set(content) == {"handles"}:
+        content = content["handles"]
+    if not isinstance(content, list) or not all(isinstance(item, dict) for item in content):
+        raise InvalidInput(f'{path}: expected {{"handles": [...]}} with an object for each handle')
+    return [(f"{path}: handles[{i}]", item) for i, item in enumerate(content)]
+
+
+def build_handles(described, bounds):
+    """Handles of descriptions (name, dict); infinite box corners are cut to `bounds` (2, 3), widened."""
+    handles = []
+    for name, item in described:
+        kind = item.get("type")
+        if kind not in KEYS:
+            raise InvalidInput(f"{name}: type is {kind!r}; 'cuboid' or 'point' is needed")
+        unknown = set(item) - KEYS[kind] - {"type"}
+        if unknown:
+            raise InvalidInput(f"{name}: unknown key {sorted(unknown)[0]!r}; known are {sorted(KEYS[kind])}")
+        try:
+            make = _point if kind == "point" else _cuboid
+            handles.append(make(item, bounds))
+        except KeyError as error:
+            raise InvalidInput(f"{name}: {error.args[0]!r} is missing") from None
+        except (TypeError, ValueError) as error:
+            raise InvalidInput(f"{name}: {error}") from None
+    if not handles:
+        raise InvalidInput("handles: none are given; use --handles, --box or --point")
+    return handles
+
+
+def _point(item, _):
+    return Point(_numbers(item["rest"], (3,)), _numbers(item["target"], (3,)), item.get("weight", 1.0))
+
+
+def _cuboid(item, bounds):
+    if "rest" in item:
+        rest = _numbers(item["rest"], (4, 4))
+    else:
+        center, half = _corners(item["corners"], bounds) if "corners" in item else _box(item)
+        if (half <= 0).any():
+            raise ValueError("the box is empty; each half-extent must be positive")
+        rest = np.eye(4)
+        rest[:3, :3] = rotation(item.get("rotation")) * half
+        rest[:3, 3] = center
+    if "target" in item:
+        if "move" in item:
+            raise ValueError("'target' and 'move' exclude each other")
+        target = _numbers(item["target"], (4, 4))
+    else:
+        target = _motion(item.get("move", {}), rest[:3, 3]) @ rest
+    return Cuboid(rest, target, item.get("weight", 1.0))
+
+
+def _box(item):
+    return _numbers(item["center"], (3,)), _numbers(item["half_extents"], (3,))
+
+
+def _corners(corners, bounds):
+    """Centre and half-extents of a box by its low and high corner; null and infinite sides are open."""
+    low, high = (
+        [sign * np.inf if side is None else side for side in corner]
+        for sign, corner in zip((-1, 1), corners, strict=True)
+    )
+    corners = np.array([low, high], float)
+    if corners.shape != (2, 3) or np.isnan(corners).any():
+        raise ValueError(f"got {[low, high]!r}, expected two corners of three numbers")
+    room = 0.1 * (bounds[1] - bounds[0]).max()
+    low = np.where(np.isinf(corners[0]), np.minimum(bounds[0], corners[1]) - room, corners[0])
+    high = np.where(np.isinf(corners[1]), np.maximum(bounds[1], corners[0]) + room, corners[1])
+    if not np.isfinite([low, high]).all():
+        raise ValueError("both corners are infinite on the same side")
+    return (low + high) / 2, (high - low) / 2
+
+
+def _motion(move, center):
+    """(4, 4): a turn about the pivot (the box's centre where none is named), then a shift."""
+    unknown = set(move) - {"rotate", "pivot", "translate"}
+    if unknown:
+        raise ValueError(f"unknown key {sorted(unknown)[0]!r} in 'move'; known are rotate, pivot, translate")
+    motion = np.eye(4)
+    motion[:3, :3] = rotation(move.get("rotate"))
+    pivot = _numbers(move.get("pivot", center), (3,))
+    shift = _numbers(move.get("translate", (0, 0, 0)), (3,))
+    motion[:3, 3] = pivot - motion[:3, :3] @ pivot + shift
+    return motion
+
+
+def rotation(value):
+    """(3, 3) from None, a matrix, or {"axis": [x, y, z], "degrees": d}."""
+    if value is None:
+        return np.eye(3)
+    if not isinstance(value, dict):
+        return _numbers(value, (3, 3))
+    axis, angle = _numbers(value["axis"], (3,)), np.radians(float(value["degrees"]))
+    if not np.linalg.norm(axis) > 0:
+        raise ValueError("a rotation's axis is zero")
+    x, y, z = axis / np.linalg.norm(axis)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def _numbers(value, shape):
+    array = np.asarray(value, float)
+    if array.shape != shape or not np.isfinite(array).all():
+        raise ValueError(f"got {value!r}, expected finite numbers of shape {shape}")
+    return array
+
+
+def triple(text):
+    """x,y,z of a flag."""
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text.strip()!r} is not x,y,z") from None
+    return [x, y, z]
+
+
+class AddHandle(argparse.Action):
+    """--box LOW HIGH and --point FROM TO append a handle's description."""
+
+    def __call__(self, parser, namespace, values, option_string=None):
+        if option_string == "--point":
+            item = {"type": "point", "rest": values[0], "target": values[1]}
+        else:
+            item = {"type": "cuboid", "corners": values}
+        described = [
+            *(namespace.flagged or []),
+            (f"{option_string} number {len(namespace.flagged or []) + 1}", item),
+        ]
+        namespace.flagged = described
+
+
+class MoveHandle(argparse.Action):
+    """--turn AXIS DEGREES, --pivot POINT and --shift VECTOR move the box named last."""
+
+    def __call__(self, parser, namespace, values, option_string=None):
+        if not namespace.flagged or namespace.flagged[-1][1]["type"] != "cuboid":
+            raise argparse.ArgumentError(self, "follows the --box that it moves")
+        move = namespace.flagged[-1][1].setdefault("move", {})
+        if option_string == "--turn":
+            try:
+                move["rotate"] = {"axis": triple(values[0]), "degrees": float(values[1])}
+            except (ValueError, argparse.ArgumentTypeError) as error:
+                raise argparse.ArgumentError(self, f"expected AXIS as x,y,z and DEGREES: {error}") from None
+        else:
+            move["pivot" if option_string == "--pivot" else "translate"] = values

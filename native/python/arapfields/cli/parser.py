@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The verbs, their flags and their help."""
+
+import argparse
+import re
+import sys
+
+import arapfields as af
+
+from . import verbs
+from .flags import MESH, SOURCE, report_flag, resolution_flag, solve_flags
+from .options import add_option_flags
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """Errors are one line, with exit code 2."""
+
+    def error(self, message):
+        print(f"{self.prog}: {message} (see {self.prog} --help)", file=sys.stderr)
+        raise SystemExit(2)
+
+
+def parse(arguments):
+    """The parsed arguments; `run` is the verb's function."""
+    # A token such as -inf,0,1 is a value: a blank in front tells argparse so.
+    return _parser().parse_args([" " + a if re.match(r"-(\d|\.\d|inf)", a) else a for a in arguments])
+
+
+def _parser():
+    parser = OneLineParser(
+        prog="arapfields",
+        description="Neural implicit surfaces from meshes, deformed as rigidly as possible.",
+        epilog="Exit codes: 0 done, 1 failed, 2 bad input or usage, 130 interrupted. "
+        "`arapfields VERB --help` shows a verb's flags and examples.",
+    )
+    parser.add_argument("--version", action="version", version=f"arapfields {af.__version__}")
+    added = parser.add_subparsers(dest="verb", metavar="VERB", required=True, parser_class=OneLineParser)
+    for add in (_fit, _sample, _deform, _stylize, _extract, _warp, _grid):
+        verb = add(added)
+        verb.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
+    return parser
+
+
+def _verb(added, name, run, summary, *examples):
+    shown = "examples:\n" + "\n".join(f"  arapfields {name} {example}" for example in examples)
+    parser = added.add_parser(
+        name,
+        help=summary,
+        description=summary,
+        epilog=shown,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.set_defaults(run=run)
+    return parser
+
+
+def _fit(added):
+    parser = _verb(
+        added,
+        "fit",
+        verbs.fit,
+        "fit a neural signed distance function to a mesh",
+        "spot.obj --output spot.npz",
+        "scan.ply --output scan.npz --seed 1 --report scan.json",
+    )
+    parser.add_argument("input", help=MESH)
+    parser.add_argument("-o", "--output", required=True, metavar="FILE", help=".npz for the signed distance")
+    report_flag(parser)
+    add_option_flags(parser, af.FitOptions, "fitting")
+    return parser
+
+
+def _sample(added):
+    parser = _verb(
+        added,
+        "sample",
+        verbs.sample,
+        "points spread uniformly over a surface, with normals",
+        "spot.npz --output points.ply --count 50000",
+        "spot.obj --output points.npz --deformed-by field.npz",
+    )
+    parser.add_argument("input", help=SOURCE)
+    parser.add_argument(
+        "-o", "--output", required=True, metavar="FILE", help=".ply, .npz (points, normals) or .xyz"
+    )
+    parser.add_argument("--count", type=int, default=20000, metavar="N", help="points [20000]")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the random points [0]")
+    parser.add_argument("--deformed-by", metavar="FIELD", help="move the points and normals by a saved field")
+    return parser
+
+
+def _deform(added):
+    parser = _verb(
+        added,
+        "deform",
+        verbs.deform,
+        "move parts of a shape; the rest follows as rigidly as possible",
+        "spot.obj -o bent.obj --box -inf,-inf,-inf inf,-0.2,inf --point 0,0.9,-0.4 0.3,1.0,-0.4",
+        "bunny.off -o turned.ply --save-field field.npz --box -inf,-inf,-inf inf,0.06,inf \\\n"
+        "      --box -inf,0.14,-inf inf,inf,inf --turn 0,1,0 40 --iterations 200",
+        "spot.npz --surface bent.ply --resolution 192 --handles pose.json --exact-handles",
+    )
+    solve_flags(parser)
+    add_option_flags(parser, af.DeformOptions, "deformation")
+    return parser
+
+
+def _stylize(added):
+    parser = _verb(
+        added,
+        "stylize",
+        verbs.stylize,
+        "turn a shape's normals to those of a style",
+        "spot.obj -o cubic.obj --style cube --strength 0.8",
+        "spot.npz --surface crystal.ply --normals gem.stl",
+    )
+    solve_flags(parser)
+    style = parser.add_mutually_exclusive_group(required=True)
+    style.add_argument("--style", metavar="NAME", help=f"one of {', '.join(af.style_names())}")
+    style.add_argument(
+        "--normals", metavar="FILE", help="rows x y z (.txt, .csv, .npy), or the face normals of a mesh"
+    )
+    parser.add_argument(
+        "--style-turn", nargs=2, metavar=("AXIS", "DEGREES"), help="turns the style's normals"
+    )
+    add_option_flags(parser, af.StylizeOptions, "stylization")
+    return parser
+
+
+def _extract(added):
+    parser = _verb(
+        added,
+        "extract",
+        verbs.extract,
+        "triangles of an implicit surface",
+        "spot.npz -o spot.ply --resolution 256",
+        "spot.npz -o bent.stl --deformed-by field.npz",
+    )
+    parser.add_argument("input", help=SOURCE + " (a mesh is fitted first)")
+    parser.add_argument("-o", "--output", required=True, metavar="FILE", help=MESH)
+    parser.add_argument("--deformed-by", metavar="FIELD", help="move the surface by a saved field")
+    resolution_flag(parser)
+    return parser
+
+
+def _warp(added):
+    parser = _verb(
+        added,
+        "warp",
+        verbs.warp,
+        "move any mesh by a saved field",
+        "field.npz teeth.obj -o moved.obj",
+    )
+    parser.add_argument("field", help=".npz that deform or stylize saved")
+    parser.add_argument("input", help=MESH)
+    parser.add_argument("-o", "--output", required=True, metavar="FILE", help=MESH)
+    return parser
+
+
+def _grid(added):
+    parser = _verb(
+        added,
+        "grid",
+        verbs.grid,
+        "signed distances on a regular grid",
+        "spot.npz -o spot_grid.npz --resolution 128",
+        "spot.npz -o spot.vdb --resolution 256",
+    )
+    parser.add_argument("input", help=SOURCE + " (a mesh's distances are exact)")
+    parser.add_argument(
+        "-o",
+        "--output",
+        required=True,
+        metavar="FILE",
+        help=".npz (values, origin, spacing), or .vdb where Blender's openvdb module is found",
+    )
+    resolution_flag(parser)
+    return parser

@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What each verb does: read, check the outputs' places, compute, write."""
+
+import json
+import sys
+
+import numpy as np
+
+import arapfields as af
+
+from .. import grids
+from . import files
+from .handles import build_handles, read_handles, rotation, triple
+from .options import given_options
+from .running import Outputs, with_progress
+
+SOURCES = (*files.MESH_SUFFIXES, *files.STATE_SUFFIXES)
+
+
+def fit(args):
+    with Outputs() as outputs:
+        output = outputs.check(args.output, files.STATE_SUFFIXES, "--output")
+        report = _report_place(outputs, args)
+        options = given_options(af.FitOptions, args)
+        vertices, triangles = files.read_mesh(args.input)
+        sdf = _fitted(vertices, triangles, options, args)
+        outputs.write(output, sdf.save)
+        _write_report(outputs, report, sdf.report)
+    _summary(args, f"wrote {args.output}", sdf.report)
+
+
+def sample(args):
+    with Outputs() as outputs:
+        output = outputs.check(args.output, files.CLOUD_SUFFIXES, "--output")
+        field = files.read_field(args.deformed_by) if args.deformed_by else None
+        samples = _samples(_Source(args), args.count, args.seed, args)
+        points, normals = samples.points, samples.normals
+        if field is not None:
+            normals = np.linalg.solve(np.swapaxes(field.jacobian(points), 1, 2), normals[..., None])[..., 0]
+            normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+            points = field(points)
+        outputs.write(output, lambda path: files.write_cloud(path, points, normals))
+    _summary(args, f"wrote {len(points)} points to {args.output}")
+
+
+def deform(args):
+    options = given_options(af.DeformOptions, args)
+
+    def solve(samples, handles, task):
+        return af.deform(samples, handles, options, task)
+
+    _solve(args, solve, options.seed, needs_handles=True)
+
+
+def stylize(args):
+    options = given_options(af.StylizeOptions, args)
+    if args.style is not None and args.style not in af.style_names():
+        raise af.InvalidInput(
+            f"--style: unknown style {args.style!r}; known are {', '.join(af.style_names())}"
+        )
+    normals = af.preferred_normals(args.style) if args.style else files.read_normals(args.normals)
+    if args.style_turn:
+        try:
+            turn = {"axis": triple(args.style_turn[0]), "degrees": float(args.style_turn[1])}
+            normals = normals @ rotation(turn).T
+        except Exception as error:
+            raise af.InvalidInput(f"--style-turn: expected AXIS as x,y,z and DEGREES ({error})") from error
+
+    def solve(samples, handles, task):
+        return af.stylize(samples, normals, options, task, handles=handles)
+
+    _solve(args, solve, options.seed, needs_handles=False)
+
+
+def extract(args):
+    with Outputs() as outputs:
+        output = outputs.check(args.output, files.MESH_SUFFIXES, "--output")
+        field = files.read_field(args.deformed_by) if args.deformed_by else None
+        vertices, triangles = _extracted(_Source(args).sdf(), args)
+        if field is not None:
+            vertices = field(vertices)
+        outputs.write(output, lambda path: files.write_mesh(path, vertices, triangles))
+    _summary(args, f"wrote {len(vertices)} vertices and {len(triangles)} triangles to {args.output}")
+
+
+def warp(args):
+    with Outputs() as outputs:
+        output = outputs.check(args.output, files.MESH_SUFFIXES, "--output")
+        field = files.read_field(args.field)
+        mesh = files.read_mesh(args.input)
+        outputs.write(output, lambda path: files.write_moved_mesh(path, args.input, mesh, field))
+    _summary(args, f"wrote {args.output}")
+
+
+def grid(args):
+    with Outputs() as outputs:
+        output = outputs.check(args.output, grids.SUFFIXES, "--output")
+        if output.suffix.lower() == ".vdb":
+            grids.openvdb_module()
+        function = _Source(args).distances()
+        made = with_progress(
+            "grid", lambda task: grids.sdf_grid(function, args.resolution, task=task), args.quiet
+        )
+        outputs.write(output, lambda path: grids.save_grid(path, *made))
+    shape = " × ".join(map(str, made[0].shape))
+    _summary(args, f"wrote {shape} distances, {made[2]:.4g} apart, to {args.output}")
+
+
+class _Source:
+    """A verb's input: a mesh or a saved signed distance, and what can be made of each."""
+
+    def __init__(self, args):
+        self._args = args
+        self.path = files.existing(args.input, SOURCES)
+        self.mesh = files.read_mesh(self.path) if files.is_mesh(self.path) else None
+        self._sdf = None if self.mesh else files.read_sdf(self.path)
+
+    def sdf(self):
+        if self._sdf is None:
+            self._sdf = _fitted(*self.mesh, af.FitOptions(), self._args)
+        return self._sdf
+
+    def distances(self):
+        return grids.MeshDistance(*self.mesh) if self.mesh else self._sdf
+
+
+def _fitted(vertices, triangles, options, args):
+    return with_progress("fit", lambda task: af.fit_sdf(vertices, triangles, options, task), args.quiet)
+
+
+def _samples(source, count, seed, args):
+    if source.mesh:
+        return af.sample_mesh(*source.mesh, count, seed)
+    return with_progress(
+        "sample", lambda task: af.sample_surface(source.sdf(), count=count, seed=seed, task=task), args.quiet
+    )
+
+
+def _extracted(sdf, args):
+    return with_progress(
+        "extract", lambda task: af.extract_surface(sdf, resolution=args.resolution, task=task), args.quiet
+    )
+
+
+def _solve(args, solve, seed, needs_handles):
+    """What deform and stylize share."""
+    with Outputs() as outputs:
+        places = {
+            flag: outputs.check(path, suffixes, flag)
+            for flag, path, suffixes in (
+                ("--output", args.output, files.MESH_SUFFIXES),
+                ("--surface", args.surface, files.MESH_SUFFIXES),
+                ("--save-field", args.save_field, files.STATE_SUFFIXES),
+            )
+            if path is not None
+        }
+        if not places:
+            raise af.InvalidInput("no output: give --output, --surface or --save-field")
+        report = _report_place(outputs, args)
+        described = (read_handles(args.handles) if args.handles else []) + (args.flagged or [])
+        source = _Source(args)
+        if source.mesh is None and "--output" in places:
+            raise af.InvalidInput(f"--output: {source.path} holds no mesh to move; use --surface")
+        samples = _samples(source, args.samples, seed, args)
+        points = samples.points
+        bounds = np.array([points.min(0), points.max(0)])
+        handles = build_handles(described, bounds) if described or needs_handles else []
+        field = with_progress(args.verb, lambda task: solve(samples, handles, task), args.quiet)
+        if "--output" in places:
+            outputs.write(
+                places["--output"],
+                lambda path: files.write_moved_mesh(path, source.path, source.mesh, field),
+            )
+        if "--surface" in places:
+            vertices, triangles = _extracted(source.sdf(), args)
+            outputs.write(
+                places["--surface"], lambda path: files.write_mesh(path, field(vertices), triangles)
+            )
+        if "--save-field" in places:
+            outputs.write(places["--save-field"], field.save)
+        _write_report(outputs, report, field.report)
+    _summary(args, "wrote " + ", ".join(str(path) for path in places.values()), field.report)
+
+
+def _report_place(outputs, args):
+    return outputs.check(args.report, (".json",), "--report") if args.report else None
+
+
+def _write_report(outputs, place, report):
+    if place is not None:
+        outputs.write(
+            place, lambda path: path.write_text(json.dumps(report, indent=2, default=_plain) + "\n")
+        )
+
+
+def _plain(value):
+    return value.tolist() if hasattr(value, "tolist") else str(value)
+
+
+def _summary(args, text, report=None):
+    if args.quiet:
+        return
+    numbers = {
+        k: v for k, v in (report or {}).items() if isinstance(v, (int, float)) and not isinstance(v, bool)
+    }
+    if numbers:
+        text += "; " + ", ".join(f"{name.replace('_', ' ')} {value:.4g}" for name, value in numbers.items())
+    print(text, file=sys.stdout)

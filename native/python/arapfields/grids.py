@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Signed distances on a regular grid, as arrays, .npz files and OpenVDB volumes."""
+
+import importlib
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from ._native import Cancelled, Frame, InvalidInput, signed_distance
+
+SUFFIXES = (".npz", ".vdb")
+CHUNK = 200_000  # points evaluated between two looks at the task
+LARGEST = 2048
+BAND = 3  # voxels on either side of the surface that a level set keeps
+
+
+class MeshDistance:
+    """The exact signed distance of a mesh with the frame that its samples have."""
+
+    def __init__(self, vertices, triangles):
+        self.vertices = np.asarray(vertices, float)
+        self.triangles = triangles
+        used = self.vertices[np.unique(triangles)]
+        low, high = used.min(0), used.max(0)
+        self.frame = Frame((low + high) / 2, (high - low).max() / 2 / 0.75)
+
+    def __call__(self, points):
+        return signed_distance(self.vertices, self.triangles, points)
+
+
+def sdf_grid(sdf, resolution=128, bounds=None, task=None):
+    """Distances at the nodes of a regular grid: (values, origin, spacing).
+
+    `values` (nx, ny, nz) float32, negative inside; node (i, j, k) lies at origin + spacing · (i, j, k), in
+    the coordinates of `sdf`, a NeuralSdf or any function of points (p, 3) → (p,) with a `frame`.
+    `resolution` cells span the longest side of `bounds` ((2, 3): low and high corner; without it the
+    frame's cube).
+    InvalidInput for a resolution or bounds that make no grid; Cancelled where `task` is.
+    """
+    if not isinstance(resolution, (int, np.integer)) or not 1 <= resolution <= LARGEST:
+        raise InvalidInput(f"resolution: got {resolution!r}; an integer from 1 to {LARGEST} is needed")
+    if bounds is None:
+        bounds = sdf.frame.to_mesh([[-1.0] * 3, [1.0] * 3])
+    bounds = np.array(bounds, float)
+    if bounds.shape != (2, 3) or not np.isfinite(bounds).all() or not (bounds[0] < bounds[1]).all():
+        raise InvalidInput(f"bounds: got {bounds.tolist()}; low and high corner, shape (2, 3), are needed")
+    size = bounds[1] - bounds[0]
+    spacing = float(size.max() / resolution)
+    counts = np.maximum(np.ceil(size / spacing - 1e-9).astype(int), 1) + 1
+    values = np.empty(counts, np.float32)
+    flat = values.reshape(-1)
+    for begin in range(0, flat.size, CHUNK):
+        if task is not None:
+            if task.cancelled:
+                raise Cancelled("cancelled")
+            task.report(begin / flat.size, "distances")
+        nodes = np.stack(np.unravel_index(np.arange(begin, min(begin + CHUNK, flat.size)), counts), axis=1)
+        flat[begin : begin + CHUNK] = sdf(bounds[0] + spacing * nodes)
+    return values, bounds[0], spacing
+
+
+def save_grid(path, values, origin, spacing):
+    """Writes a grid of sdf_grid as .npz (`values`, `origin`, `spacing`) or .vdb, by the path's extension.
+
+    A .vdb holds one float grid, `surface`: a level set whose values are cut off BAND voxels from the surface.
+    ImportError where no openvdb module is found, InvalidInput for another extension.
+    """
+    path = Path(path)
+    if path.suffix.lower() == ".npz":
+        np.savez(path, values=values, origin=origin, spacing=spacing)
+    elif path.suffix.lower() == ".vdb":
+        _write_vdb(openvdb_module(), path, values, origin, spacing)
+    else:
+        raise InvalidInput(f"{path}: unknown extension; allowed are {', '.join(SUFFIXES)}")
+
+
+def openvdb_module():
+    """OpenVDB's Python module: Blender's own, also beside an installed `bpy`. ImportError for none."""
+    try:
+        return importlib.import_module("openvdb")
+    except ImportError:
+        pass
+    found = importlib.util.find_spec("bpy")
+    for place in (found and found.submodule_search_locations) or []:
+        for library in Path(place).glob("*/python/lib/python3*/site-packages/openvdb*"):
+            sys.path.append(str(library.parent))
+            try:
+                return importlib.import_module("openvdb")
+            except ImportError:
+                continue
+            finally:
+                sys.path.remove(str(library.parent))
+    raise ImportError("writing .vdb needs the module openvdb: run inside Blender, or install the package bpy")
+
+
+def _write_vdb(openvdb, path, values, origin, spacing):
+    band = BAND * spacing
+    grid = openvdb.FloatGrid(band)
+    grid.copyFromArray(np.clip(values, -band, band).astype(np.float32))
+    grid.name = "surface"
+    grid.gridClass = openvdb.GridClass.LEVEL_SET
+    matrix = np.diag([spacing] * 3 + [1.0])
+    matrix[3, :3] = origin  # OpenVDB multiplies row vectors
+    grid.transform = openvdb.createLinearTransform(matrix.tolist())
+    openvdb.write(str(path), grids=[grid])

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Signed distances on grids, in memory and as files."""
+
+import numpy as np
+import pytest
+from meshes import sphere
+
+import arapfields as af
+from arapfields import grids
+
+
+class Ball:
+    """The exact distance of a sphere around (1, 2, 3)."""
+
+    radius = 0.8
+    frame = af.Frame([1.0, 2.0, 3.0], 1.5)
+
+    def __call__(self, points):
+        return np.linalg.norm(points - self.frame.center, axis=1) - self.radius
+
+
+def nodes(values, origin, spacing):
+    return origin + spacing * np.moveaxis(np.indices(values.shape), 0, -1)
+
+
+@pytest.mark.parametrize("bounds", [None, [[0.0, 1.0, 2.5], [2.0, 3.0, 3.2]]])
+def test_values_lie_where_origin_and_spacing_say(bounds):
+    ball = Ball()
+    values, origin, spacing = af.sdf_grid(ball, 20, bounds)
+    expected = ball(nodes(values, origin, spacing).reshape(-1, 3)).reshape(values.shape)
+    assert values.dtype == np.float32 and np.abs(values - expected).max() < 1e-6
+    low, high = np.array(bounds) if bounds else ball.frame.to_mesh([[-1.0] * 3, [1.0] * 3])
+    assert np.array_equal(origin, low)
+    last = origin + spacing * (np.array(values.shape) - 1)
+    assert (last >= high - 1e-9).all() and (last < high + spacing).all()
+    assert max(values.shape) == 21
+
+
+def test_mesh_distance_has_the_frame_of_its_samples():
+    vertices, triangles = sphere(2.0, 2)
+    vertices = np.vstack(
+        [vertices + np.array([3.0, 0, 0]), [[100.0, 0, 0]]]
+    )  # the last one is in no triangle
+    distance = grids.MeshDistance(vertices, triangles)
+    assert distance.frame == af.sample_mesh(vertices, triangles, 10).frame
+    assert distance([[3.0, 0, 0]])[0] < -1.8
+
+
+def test_npz(tmp_path):
+    made = af.sdf_grid(Ball(), 8)
+    af.save_grid(tmp_path / "grid.npz", *made)
+    with np.load(tmp_path / "grid.npz") as read:
+        assert np.array_equal(read["values"], made[0])
+        assert np.array_equal(read["origin"], made[1]) and read["spacing"] == made[2]
+
+
+def test_vdb_is_a_level_set_at_its_place(tmp_path):
+    try:
+        openvdb = grids.openvdb_module()
+    except ImportError:
+        pytest.skip("no openvdb module")
+    values, origin, spacing = af.sdf_grid(Ball(), 24)
+    af.save_grid(tmp_path / "grid.vdb", values, origin, spacing)
+    grid = openvdb.read(str(tmp_path / "grid.vdb"), "surface")
+    assert grid.gridClass == openvdb.GridClass.LEVEL_SET
+    assert grid.transform.indexToWorld((1, 2, 3)) == pytest.approx(origin + spacing * np.array([1, 2, 3]))
+    read = np.empty(values.shape, np.float32)
+    grid.copyToArray(read)
+    band = np.float32(grids.BAND * spacing)
+    assert np.array_equal(read, np.clip(values, -band, band))
+
+
+def test_vdb_without_openvdb_says_what_is_needed(tmp_path, monkeypatch):
+    monkeypatch.setitem(grids.sys.modules, "openvdb", None)
+    monkeypatch.setattr(grids.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(ImportError, match="openvdb"):
+        af.save_grid(tmp_path / "grid.vdb", *af.sdf_grid(Ball(), 4))
+    assert not list(tmp_path.iterdir())
+
+
+def test_bad_input_is_named(tmp_path):
+    for resolution in (0, 1.5, "8", grids.LARGEST + 1):
+        with pytest.raises(af.InvalidInput, match="resolution"):
+            af.sdf_grid(Ball(), resolution)
+    for bounds in ([[0, 0, 0]], [[0, 0, 0], [1, 0, 1]], [[0, 0, 0], [1, 1, np.nan]]):
+        with pytest.raises(af.InvalidInput, match="bounds"):
+            af.sdf_grid(Ball(), 4, bounds)
+    with pytest.raises(af.InvalidInput, match="extension"):
+        af.save_grid(tmp_path / "grid.txt", *af.sdf_grid(Ball(), 4))
+
+
+def test_cancel():
+    task = af.Task()
+    task.cancel()
+    with pytest.raises(af.Cancelled):
+        af.sdf_grid(Ball(), 8, task=task)
