@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the tests of the command line share: running it, and files that it must refuse."""
 
+import os
+import sys
 from pathlib import Path
 
 import numpy as np
 
+import arapfields
 from arapfields.__main__ import main
 
 SMALL_FIT = [
@@ -37,6 +40,13 @@ TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 def run(*arguments):
     """The exit code of the command line."""
     return main([str(argument) for argument in arguments])
+
+
+def process(*arguments):
+    """Command and environment of the command line as a process of its own, in any folder."""
+    places = [str(Path(arapfields.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
+    command = [sys.executable, "-m", "arapfields", *(str(argument) for argument in arguments)]
+    return command, {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, places))}
 
 
 def write_octahedron(path, quads=False):

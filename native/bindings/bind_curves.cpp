@@ -101,7 +101,9 @@ void bind_curves(py::module_& module) {
       .def_readonly("handle_error_mean", &CurveReport::handle_error_mean, "In the curve's units.")
       .def_readonly("handle_error_max", &CurveReport::handle_error_max, "In the curve's units.")
       .def_readonly("min_determinant", &CurveReport::min_determinant, "Smallest det J at the samples.")
-      .def_readonly("energies", &CurveReport::energies, "The whole loss after each quasi-Newton step.");
+      .def_readonly("steps", &CurveReport::steps, "Quasi-Newton steps taken.")
+      .def_readonly("loss", &CurveReport::loss, "Reached: stretch + bending · bend, handles, smoothness.")
+      .def_readonly("converged", &CurveReport::converged, "A further step would gain next to nothing.");
 
   py::class_<CurveSolution>(module, "CurveField",
                             "A deformation of the plane, made for a curve by deform_curve.")

@@ -8,7 +8,7 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "energies/arap2d.h"
-#include "solve/lbfgs.h"
+#include "solve/quasi_newton.h"
 
 namespace arapfields {
 namespace {
@@ -16,7 +16,7 @@ namespace {
 using Rows = RowMatrix<double>;
 
 constexpr int local_global_steps = 8;
-constexpr double gain_tolerance = 1e-6;
+constexpr double gain_tolerance = 1e-5;
 
 void check(const CurveOptions& options) {
   const auto positive = [](const char* name, double value) {
@@ -48,14 +48,18 @@ void check(const CurveHandle& handle, std::size_t position, Index samples) {
           "must be positive");
 }
 
-/// The deformation of one curve: basis rows at its samples, targets, and the factor of the linear problem.
-class CurveProblem {
+/// The deformation of one curve. What it measures of the coefficients: the jets at the samples, then the
+/// second derivatives at the bumps, scaled so that their squares add up to the smoothness term.
+class CurveProblem final : public MeasuredObjective {
  public:
   CurveProblem(Points2In points, const std::vector<CurveHandle>& handles, const CurveOptions& options)
-      : options_(options),
-        count_(points.rows()),
-        field_(CurveField::around(points, options.spacing)),
-        rows_(field_.basis.rows(field_.to_square(points))) {
+      : options_(options), count_(points.rows()), field_(CurveField::around(points, options.spacing)) {
+    const Rows jets = field_.basis.rows(field_.to_square(points));
+    const Index bumps = field_.basis.centers.rows();
+    Rows second = field_.basis.rows(field_.basis.centers).bottomRows(3 * bumps);
+    second.bottomRows(bumps) *= std::sqrt(2.0);  // the mixed derivative counts twice in ‖D‖²
+    rows_.resize(jets.rows() + second.rows(), field_.basis.size());
+    rows_ << jets, std::sqrt(options.smoothness / static_cast<double>(bumps)) * second;
     for (const CurveHandle& handle : handles) {
       const double share =
           options.handle_weight * handle.weight / static_cast<double>(handles.size() * handle.samples.size());
@@ -65,19 +69,13 @@ class CurveProblem {
         held_.push_back({s, share, field_.to_square(moved.transpose())});
       }
     }
-    smooth_ = Rows::Zero(size(), size());
-    add_second(smooth_, field_.basis.rows(field_.basis.centers), options.smoothness);
-    Rows quadratic = smooth_;
-    for (int c = 1; c <= 2; ++c) add_square(quadratic, rows_, c, 1);
-    add_second(quadratic, rows_, options.bending);
-    for (const Held& h : held_) quadratic += h.weight * rows_.row(h.sample).transpose() * rows_.row(h.sample);
-    quadratic.diagonal().array() += 1e-9 * quadratic.diagonal().mean();
-    factor_ = cholesky<double>(quadratic);
+    factorise();
   }
 
   /// Minimises the quadratic surrogate for the rotations that are closest now.
   void local_global_step() {
-    const Rows jets = evaluate(field_.coefficients);
+    Rows jets;
+    multiply(field_.coefficients, jets);
     Rows wanted = Rows::Zero(rows_.rows(), 2);
     for (Index p = 0; p < count_; ++p) {
       Mat2 jacobian;
@@ -87,32 +85,46 @@ class CurveProblem {
         wanted.row((1 + k) * count_ + p) = rotation.col(k).transpose() / static_cast<double>(count_);
     }
     for (const Held& h : held_) wanted.row(h.sample) += h.weight * h.target;
-    field_.coefficients = cholesky_solve<double>(factor_, pull_back(wanted));
+    field_.coefficients = cholesky_solve<double>(factor_, multiply_transposed(wanted));
   }
 
-  double energy(const Rows& coefficients, Rows& gradient) const {
-    const Rows jets = evaluate(coefficients);
-    Rows cotangents = Rows::Zero(jets.rows(), 2);
+  void measure(const Rows& coefficients, Vector& u) const override {
+    Rows product;
+    multiply(coefficients, product);
+    u = Eigen::Map<const Vector>(product.data(), product.size());
+  }
+
+  double value(const Vector& u, Vector* cotangents) const override {
+    const Eigen::Map<const Rows> measured(u.data(), rows_.rows(), 2);
+    Rows out = Rows::Zero(rows_.rows(), 2);
+    const Index tail = rows_.rows() - columns2 * count_;
     const ArapValue arap =
-        arap_energy2<double>({jets.data(), count_}, options_.bending, 1.0, {cotangents.data(), count_});
-    double value = arap.stretch + options_.bending * arap.bend;
+        arap_energy2<double>({u.data(), count_}, options_.bending, 1.0, {out.data(), count_});
+    double total = arap.stretch + options_.bending * arap.bend + measured.bottomRows(tail).squaredNorm();
+    out.bottomRows(tail) = 2 * measured.bottomRows(tail);
     for (const Held& h : held_) {
-      const Eigen::RowVector2d gap = jets.row(h.sample) - h.target;
-      value += h.weight * gap.squaredNorm();
-      cotangents.row(h.sample) += 2 * h.weight * gap;
+      const Eigen::RowVector2d gap = measured.row(h.sample) - h.target;
+      total += h.weight * gap.squaredNorm();
+      out.row(h.sample) += 2 * h.weight * gap;
     }
-    const Rows pull = smooth_ * coefficients;
-    value += pull.cwiseProduct(coefficients).sum();
-    gradient = pull_back(cotangents) + 2 * pull;
-    return value;
+    if (cotangents != nullptr) *cotangents = Eigen::Map<const Vector>(out.data(), out.size());
+    return total;
   }
 
-  Rows precondition(const Rows& direction) const { return cholesky_solve<double>(factor_, 0.5 * direction); }
+  Rows pull_back(const Vector& cotangents) const override {
+    return multiply_transposed(Eigen::Map<const Rows>(cotangents.data(), rows_.rows(), 2));
+  }
+
+  Rows precondition(const Rows& gradient) const override {
+    return cholesky_solve<double>(factor_, 0.5 * gradient);
+  }
 
   CurveField& field() { return field_; }
 
-  void finish(CurveReport& report) const {
-    const Rows jets = evaluate(field_.coefficients);
+  CurveReport report() const {
+    Rows jets;
+    multiply(field_.coefficients, jets);
+    CurveReport report;
     const ArapValue arap = arap_energy2<double>({jets.data(), count_}, 0.0, 1.0, {});
     report.stretch = arap.stretch;
     report.bend = arap.bend;
@@ -121,10 +133,9 @@ class CurveProblem {
       report.handle_error_mean += gap / static_cast<double>(held_.size());
       report.handle_error_max = std::max(report.handle_error_max, gap);
     }
-    report.min_determinant =
-        (jets.middleRows(count_, count_).col(0).array() * jets.middleRows(2 * count_, count_).col(1).array() -
-         jets.middleRows(count_, count_).col(1).array() * jets.middleRows(2 * count_, count_).col(0).array())
-            .minCoeff();
+    const auto x = jets.middleRows(count_, count_).array(), y = jets.middleRows(2 * count_, count_).array();
+    report.min_determinant = (x.col(0) * y.col(1) - x.col(1) * y.col(0)).minCoeff();
+    return report;
   }
 
  private:
@@ -134,26 +145,26 @@ class CurveProblem {
     Eigen::RowVector2d target;
   };
 
-  Index size() const { return field_.basis.size(); }
-
-  /// Adds the quadratic form of weight times the mean square of one jet column.
-  static void add_square(Rows& quadratic, const Rows& rows, int column, double weight) {
-    const Index n = rows.rows() / columns2;
-    const auto block = rows.middleRows(column * n, n);
-    gemm<double>(Transpose::yes, Transpose::no, weight / static_cast<double>(n), block, block, 1.0,
-                 quadratic);
+  /// Half the Hessian of the surrogate mean ‖J − R‖² + λ_bend mean ‖D‖² + handles + smoothness, R fixed.
+  void factorise() {
+    const double share = 1.0 / static_cast<double>(count_);
+    const double weights[columns2] = {
+        0.0, share, share, options_.bending * share, options_.bending * share, 2 * options_.bending * share};
+    Vector weight = Vector::Ones(rows_.rows());
+    for (int c = 0; c < columns2; ++c) weight.segment(c * count_, count_).setConstant(weights[c]);
+    for (const Held& h : held_) weight(h.sample) += h.weight;
+    const Rows scaled = weight.asDiagonal() * rows_;
+    Rows quadratic(rows_.cols(), rows_.cols());
+    gemm<double>(Transpose::yes, Transpose::no, 1.0, rows_, scaled, 0.0, quadratic);
+    quadratic.diagonal().array() += 1e-9 * quadratic.diagonal().mean();
+    factor_ = cholesky<double>(quadratic);
   }
-  /// The same for all second derivatives, ‖D‖².
-  static void add_second(Rows& quadratic, const Rows& rows, double weight) {
-    for (int c = 3; c < columns2; ++c) add_square(quadratic, rows, c, c == 5 ? 2 * weight : weight);
+  void multiply(const Rows& coefficients, Rows& product) const {
+    product.resize(rows_.rows(), 2);
+    gemm<double>(Transpose::no, Transpose::no, 1.0, rows_, coefficients, 0.0, product);
   }
-  Rows evaluate(const Rows& coefficients) const {
-    Rows jets(rows_.rows(), 2);
-    gemm<double>(Transpose::no, Transpose::no, 1.0, rows_, coefficients, 0.0, jets);
-    return jets;
-  }
-  Rows pull_back(const Rows& cotangents) const {
-    Rows result(size(), 2);
+  Rows multiply_transposed(const Eigen::Ref<const Rows>& cotangents) const {
+    Rows result(rows_.cols(), 2);
     gemm<double>(Transpose::yes, Transpose::no, 1.0, rows_, cotangents, 0.0, result);
     return result;
   }
@@ -162,7 +173,6 @@ class CurveProblem {
   Index count_;
   CurveField field_;
   Rows rows_;
-  Rows smooth_;  // quadratic form of the smoothness
   Rows factor_;
   std::vector<Held> held_;
 };
@@ -181,20 +191,13 @@ CurveSolution deform_curve(Points2In points, const std::vector<CurveHandle>& han
     progress.report(0.2 * step / local_global_steps, "rotations");
     problem.local_global_step();
   }
-  CurveSolution solution;
-  minimise_lbfgs<Rows>(
-      problem.field().coefficients, options.iterations, gain_tolerance,
-      [&](const Rows& x, Rows& gradient) {
-        progress.check();
-        return problem.energy(x, gradient);
-      },
-      [&](const Rows& direction) { return problem.precondition(direction); },
-      [&](int step, double value) {
-        solution.report.energies.push_back(value);
-        progress.report(0.2 + 0.8 * step / options.iterations, "quasi-Newton");
-      });
-  problem.finish(solution.report);
-  solution.field = problem.field();
+  QuasiNewton descent;
+  const QuasiNewtonReport done = descent.minimise(problem, {options.iterations, gain_tolerance},
+                                                  problem.field().coefficients, progress.part(0.2, 1.0));
+  CurveSolution solution{problem.field(), problem.report()};
+  solution.report.steps = done.steps;
+  solution.report.loss = done.value;
+  solution.report.converged = done.converged;
   return solution;
 }
 

@@ -28,7 +28,9 @@ struct CurveReport {
   double stretch = 0.0, bend = 0.0;                        ///< means over the samples, in the square
   double handle_error_mean = 0.0, handle_error_max = 0.0;  ///< in the curve's units
   double min_determinant = 0.0;                            ///< smallest det J at the samples
-  std::vector<double> energies;                            ///< after each quasi-Newton step
+  Index steps = 0;                                         ///< quasi-Newton steps taken
+  double loss = 0.0;       ///< reached: stretch + λ_bend·bend, handles and smoothness
+  bool converged = false;  ///< a further step would gain next to nothing
 };
 
 struct CurveSolution {

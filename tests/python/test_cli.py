@@ -5,12 +5,12 @@ import json
 import os
 import pty
 import subprocess
-import sys
+import termios
 
 import numpy as np
 import pytest
 import trimesh
-from cli_cases import HELD_AND_SHIFTED, SMALL_FIT, SMALL_SOLVE, run, write_octahedron
+from cli_cases import HELD_AND_SHIFTED, SMALL_FIT, SMALL_SOLVE, process, run, write_octahedron
 
 import arapfields as af
 from arapfields.cli import files
@@ -210,31 +210,25 @@ def test_real_meshes(name, data_dir, tmp_path):
 
 
 def test_a_bar_is_drawn_on_a_terminal_alone(made, tmp_path):
-    command = [
-        sys.executable,
-        "-m",
-        "arapfields",
-        "deform",
-        str(made / "mesh.obj"),
-        "-o",
-        str(tmp_path / "a.obj"),
-    ]
-    command += [*HELD_AND_SHIFTED, *SMALL_SOLVE]
-    silent = subprocess.run(command, capture_output=True, text=True, check=True)
+    arguments = ["deform", made / "mesh.obj", "-o", tmp_path / "a.obj", *HELD_AND_SHIFTED, *SMALL_SOLVE]
+    command, environment = process(*arguments)
+    silent = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     assert silent.stderr == "" and silent.stdout.startswith("wrote ")
-    drawn = {}
-    for flags in ((), ("--quiet",)):
-        terminal, side = pty.openpty()
-        environment = {**os.environ, "COLUMNS": "100", "LINES": "30"}
-        process = subprocess.Popen([*command, *flags], stderr=side, stdout=subprocess.PIPE, env=environment)
-        os.close(side)
-        text = b""
-        try:
-            while chunk := os.read(terminal, 4096):
-                text += chunk
-        except OSError:  # what Linux reports once the other side is closed
-            pass
-        assert process.wait(timeout=60) == 0
-        drawn[flags] = text.decode()
-    assert "100%" in drawn[()] and "deform" in drawn[()]
-    assert drawn[("--quiet",)] == ""
+    assert "100%" in on_a_terminal(command, environment)
+    assert on_a_terminal([*command, "--quiet"], environment) == ""
+
+
+def on_a_terminal(command, environment):
+    """What a command prints on stderr where that is a terminal of 100 columns."""
+    terminal, side = pty.openpty()
+    termios.tcsetwinsize(side, (30, 100))
+    running = subprocess.Popen(command, stderr=side, stdout=subprocess.DEVNULL, env=environment)
+    os.close(side)
+    text = b""
+    try:
+        while chunk := os.read(terminal, 4096):
+            text += chunk
+    except OSError:  # what Linux reports once the other side is closed
+        pass
+    assert running.wait(timeout=60) == 0
+    return text.decode()

@@ -4,11 +4,10 @@
 import json
 import signal
 import subprocess
-import sys
 import time
 
 import pytest
-from cli_cases import HELD_AND_SHIFTED, SMALL_SOLVE, bad_meshes, run, write_octahedron
+from cli_cases import HELD_AND_SHIFTED, SMALL_SOLVE, bad_meshes, process, run, write_octahedron
 
 VERBS = {
     "fit": ["--output", "out.npz"],
@@ -139,27 +138,24 @@ def test_handles_that_scale_are_named(folder, capsys):
 def test_interrupt_cancels_and_leaves_nothing(folder):
     write_octahedron(folder / "mesh.obj")
     arguments = [
-        "deform",
-        "mesh.obj",
         "-o",
         "a.obj",
         *HELD_AND_SHIFTED,
         *SMALL_SOLVE,
         "--iterations",
-        "1000000",
+        1000000,
+        "--report",
+        "r.json",
     ]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "arapfields", *arguments, "--report", "r.json"],
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    command, environment = process("deform", "mesh.obj", *arguments)
+    running = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
     try:
         time.sleep(4.0)
-        assert process.poll() is None, process.stderr.read()
-        process.send_signal(signal.SIGINT)
-        _, printed = process.communicate(timeout=30)
+        assert running.poll() is None, running.stderr.read()
+        running.send_signal(signal.SIGINT)
+        _, printed = running.communicate(timeout=30)
     finally:
-        process.kill()
-    assert process.returncode == 130
+        running.kill()
+    assert running.returncode == 130
     assert printed == "arapfields deform: interrupted\n"
     assert contents(folder) == [str(folder / "mesh.obj")]
