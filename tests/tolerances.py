@@ -33,3 +33,15 @@ FIT_REPORT = 0.15
 LIVE_IDENTITY = 1e-8
 # A pose solved again after others, as a share of the shape's length: what the last steps still gain.
 LIVE_DRIFT = 1e-4
+# Single-precision fields against differences of fourth order with step 2e-3: rounding over the step, and
+# truncation where the encoding's highest octave bends most.
+FLOAT_FIELD_DIFFERENCES = 1e-3
+# Newton's inverse of a single-precision field: rounding of the field over its smallest stretch.
+NEWTON_INVERSE = 1e-6
+# Exact handles: rounding of single precision on lengths of order one.
+EXACT_HANDLE = 1e-6
+# Energies of a field and of the same field turned rigidly: rounding of the turn alone.
+RIGID_INVARIANCE = 1e-10
+# Slopes of whole losses: eighth-order differences with step 5e-3 of a function with kinks in its third
+# derivative (barrier, fall-off), relative.
+LOSS_GRADIENT = 1e-6

@@ -16,4 +16,5 @@ PYBIND11_MODULE(_native, module) {
   bind_solve(module);
   bind_live(module);
   bind_curves(module);
+  bind_solve_testing(module);
 }

@@ -128,6 +128,11 @@ void NeuralField::pull_back(const at::Tensor& cotangents) {
   network_.pull_back(factor_ ? product_pull_back(*factor_, cotangents) : cotangents);
 }
 
+void NeuralField::translate(const Vec3& offset) {
+  at::Tensor bias = network_.bias(shape().layers);
+  bias.add_(tensor_of(offset.data(), {3}, bias.options()));
+}
+
 VectorF NeuralField::weights() const {
   const at::Tensor host = network_.parameters().to(at::kCPU, at::kFloat).contiguous();
   return Eigen::Map<const VectorF>(host.const_data_ptr<float>(), host.numel());

@@ -33,6 +33,8 @@ class NeuralField final : public TrainableField {
   at::Tensor& parameters() override { return network_.parameters(); }
   at::Tensor& gradient() override { return network_.gradient(); }
 
+  /// Adds an offset to Ψ, by the output layer's bias.
+  void translate(const Vec3& offset);
   /// Weights and biases in the order of Mlp::parameters(), for files.
   VectorF weights() const;
   /// Throws InvalidInput where the count does not fit the shape.

@@ -29,7 +29,7 @@ struct LoopOptions {
   double final_share = 0.05;
   double hold = 0.5;
   int warm_up = 0;  ///< iterations over which the rate rises from 0
-  double first_decay = 0.9, second_decay = 0.99;
+  double first_decay = 0.8, second_decay = 0.9;
   double time_budget = 0.0;  ///< seconds; 0: none. The schedule then follows the clock if that is ahead.
   std::uint64_t seed = 0;
 };

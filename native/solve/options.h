@@ -45,8 +45,8 @@ struct StylizeOptions {
   int batch = 500;
   double handle_weight = 100;
   int handle_batch = 256;
-  double barrier = 0.0;
-  double barrier_threshold = 0.1;
+  double barrier = 10.0;
+  double barrier_threshold = 0.2;
   double learning_rate = 1e-3;
   int width = 256, layers = 4, octaves = 4;
   double frequency = 1.0, softplus_sharpness = 30.0;

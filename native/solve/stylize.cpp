@@ -19,7 +19,7 @@ void check_samples(const SurfaceSamples& samples, const Vector& weights) {
           "all must be 0 or larger");
 }
 
-/// The surface's lowest sample stays where it is.
+/// The surface's lowest sample, asked to stay where it is.
 Handle hold_lowest(const SurfaceSamples& samples) {
   Index lowest = 0;
   samples.points.col(2).minCoeff(&lowest);
@@ -27,6 +27,13 @@ Handle hold_lowest(const SurfaceSamples& samples) {
   handle.kind = Handle::Kind::point;
   handle.rest_point = handle.target_point = samples.points.row(lowest);
   return handle;
+}
+
+/// No other term of the loss changes by a translation, so the point may be put back exactly.
+void hold(NeuralField& field, const Handle& handle) {
+  Points value(1, 3);
+  field.evaluate(handle.rest_point.transpose(), {value.data(), 1, JetOrder::value});
+  field.translate(handle.rest_point - value.row(0).transpose());
 }
 
 }  // namespace
@@ -45,7 +52,8 @@ Solution stylize(const SurfaceSamples& samples, PointsIn preferred, const Styliz
   terms.preference_weights = weights;
   terms.barrier = options.barrier;
   terms.barrier_threshold = options.barrier_threshold;
-  terms.handles = handles.empty() ? BoundHandles({hold_lowest(samples)}, samples.points)
+  const Handle lowest = hold_lowest(samples);
+  terms.handles = handles.empty() ? BoundHandles({lowest}, samples.points)
                                   : BoundHandles(in_cube(handles, samples.frame), samples.points);
   terms.handle_weight = handles.empty() ? 1.0 : options.handle_weight;
   terms.handle_batch = options.handle_batch;
@@ -60,7 +68,13 @@ Solution stylize(const SurfaceSamples& samples, PointsIn preferred, const Styliz
   loop.learning_rate = options.learning_rate;
   loop.time_budget = options.time_budget;
   loop.seed = seed;
-  return solve_field(field, samples, std::move(terms), loop, progress);
+  Solution solution = solve_field(field, samples, std::move(terms), loop, progress);
+  if (handles.empty()) {
+    hold(*field, lowest);
+    solution.report.handle_mean.clear();
+    solution.report.handle_max.clear();
+  }
+  return solution;
 }
 
 }  // namespace arapfields

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Deformation problems that several tests and benchmarks share: boxes, motions, the bunny's bend, samples."""
+
+import functools
+
+import numpy as np
+from network_oracle import Network
+
+import arapfields as af
+
+
+def box(low, high):
+    """(4, 4) placing the cube [-1, 1]³ on the box between two corners."""
+    low, high = np.asarray(low, float), np.asarray(high, float)
+    matrix = np.diag([*(high - low) / 2, 1.0])
+    matrix[:3, 3] = (low + high) / 2
+    return matrix
+
+
+def turn(axis, degrees, pivot=(0.0, 0.0, 0.0)):
+    """(4, 4) rotation about an axis through a pivot, by Rodrigues' formula."""
+    x, y, z = np.asarray(axis, float) / np.linalg.norm(axis)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    angle = np.radians(degrees)
+    matrix = np.eye(4)
+    matrix[:3, :3] += np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    matrix[:3, 3] = pivot - matrix[:3, :3] @ pivot
+    return matrix
+
+
+def shift(offset):
+    matrix = np.eye(4)
+    matrix[:3, 3] = offset
+    return matrix
+
+
+def moved(rest, motion=None, **keywords):
+    """A cuboid handle that makes a motion, or stays."""
+    return af.Cuboid(rest, rest if motion is None else motion @ rest, **keywords)
+
+
+def bar_samples(count=1500, seed=0):
+    """Samples of the box [-0.8, 0.8] × [-0.15, 0.15]² in its own cube: frame identity."""
+    rng = np.random.default_rng(seed)
+    size = np.array([0.8, 0.15, 0.15])
+    areas = np.array([size[1] * size[2], size[0] * size[2], size[0] * size[1]])
+    axis = rng.choice(3, size=count, p=areas / areas.sum())
+    points = rng.uniform(-1, 1, size=(count, 3))
+    side = rng.choice([-1.0, 1.0], size=count)
+    points[np.arange(count), axis] = side
+    normals = np.zeros((count, 3))
+    normals[np.arange(count), axis] = side
+    return af.SurfaceSamples(points * size, normals, frame=af.Frame([0, 0, 0], 1.0))
+
+
+def bar_handles(degrees=60.0):
+    """The bar's left end held, its right end turned about y."""
+    left, right = box([-0.9, -0.3, -0.3], [-0.6, 0.3, 0.3]), box([0.6, -0.3, -0.3], [0.9, 0.3, 0.3])
+    return [moved(left), moved(right, turn([0, 1, 0], degrees, (0.0, 0.0, 0.0)))]
+
+
+@functools.cache
+def published_samples(path, count=20000, seed=0):
+    """Area-uniform samples of a published network's zero set (cubes of 2/95); frame identity."""
+    import skimage.measure
+
+    sdf = af.NeuralSdf.from_layers(*Network.published(path).layers)
+    axis = np.linspace(-1, 1, 96)
+    grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3)
+    vertices, faces, _, _ = skimage.measure.marching_cubes(np.asarray(sdf(grid)).reshape(96, 96, 96), 0.0)
+    flat = af.sample_mesh(vertices * (2 / 95) - 1, faces[:, ::-1].astype(np.int32), count=count, seed=seed)
+    normals = sdf.gradient(flat.points)
+    return af.SurfaceSamples(flat.points, normals, frame=af.Frame([0, 0, 0], 1.0))
+
+
+def bunny_handles():
+    """The bend of the method's figures: the bottom held, the ears turned by 70 degrees."""
+    bottom, ears = box([-1, -1, -1], [1, 1, -0.35]), box([-1, -1, 0.6], [1, 1, 1])
+    return [moved(bottom), moved(ears, turn([0, 1, 0], 70, (-0.1, 0, 0.3)))]

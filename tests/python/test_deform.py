@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""deform: what it reaches, rigid motions, exact handles, options, bad input, cancelling, repeatability."""
+
+import threading
+
+import cases
+import numpy as np
+import pytest
+import tolerances
+
+import arapfields as af
+
+
+@pytest.fixture(scope="module")
+def samples():
+    return cases.bar_samples()
+
+
+def quick(**changes):
+    settings = dict(width=32, layers=3, learning_rate=5e-3, iterations=120, batch=100, handle_batch=50)
+    return af.DeformOptions(**(settings | changes))
+
+
+def test_handles_follow_and_the_rest_bends_smoothly(samples):
+    field = af.deform(samples, cases.bar_handles(), quick(iterations=250))
+    report = field.report
+    assert report["handle_error_mean"] < 0.02
+    assert report["stretch"] < 0.05 and report["flipped_share"] == 0.0 and report["min_determinant"] > 0.3
+    stretch, bend = af.arap_energy(field, samples.points)
+    assert stretch == pytest.approx(report["stretch"], rel=1e-6)
+    assert bend == pytest.approx(report["bend"], rel=1e-6)
+    assert report["energy"] == pytest.approx(stretch + 0.01 * bend, rel=1e-6)
+    assert [h["error_mean"] for h in report["handles"]] == pytest.approx(
+        2 * [report["handle_error_mean"]], abs=report["handle_error_max"]
+    )
+    assert report["loss"][-1][1] < 0.3 * report["loss"][0][1]
+
+
+def test_no_motion_is_the_identity(samples):
+    """The start is the optimum already: nothing may move."""
+    rest = cases.box([-0.9, -0.3, -0.3], [-0.6, 0.3, 0.3])
+    field = af.deform(samples, [cases.moved(rest)], quick(iterations=20))
+    assert np.abs(field(samples.points) - samples.points).max() < 1e-5
+
+
+def test_rigid_motion_of_a_solution_changes_no_energy(samples):
+    """f and C∘f have the same energies: the derivatives of a turned copy, fed to the same formula."""
+    field = af.deform(samples, cases.bar_handles(), quick())
+    points = samples.points[:500]
+    from arapfields._native import testing
+
+    jets = np.zeros((10, len(points), 3))
+    jets[0], jacobian, hessian = field(points), field.jacobian(points), field.hessian(points)
+    jets[1:4] = np.moveaxis(jacobian, 2, 0)
+    for column, (j, k) in enumerate([(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]):
+        jets[4 + column] = hessian[:, :, j, k]
+    before = testing.arap_energy(jets, 0.01, 1.0)[:2]
+    rotation = cases.turn([1, 2, 3], 77.0)[:3, :3]
+    after = testing.arap_energy(np.ascontiguousarray(jets @ rotation.T), 0.01, 1.0)[:2]
+    assert after == pytest.approx(before, rel=tolerances.RIGID_INVARIANCE)
+    assert before == pytest.approx(af.arap_energy(field, points), rel=1e-6)
+
+
+@pytest.mark.parametrize("motion", ["shift", "turn"])
+def test_exact_handles_interpolate(samples, motion):
+    left, right = (h.rest for h in cases.bar_handles())
+    matrix = cases.shift([0, 0.1, 0.2]) if motion == "shift" else cases.turn([1, 1, 0], 40, (0.5, 0, 0))
+    field = af.deform(samples, [cases.moved(left), cases.moved(right, matrix)], quick(exact_handles=True))
+    assert field.report["handle_error_max"] < tolerances.EXACT_HANDLE
+    assert field.report["flipped_share"] == 0.0
+    inside = np.abs((samples.points - right[:3, 3]) @ np.linalg.inv(right[:3, :3]).T).max(1) <= 1
+    expected = samples.points[inside] @ matrix[:3, :3].T + matrix[:3, 3]
+    assert np.abs(field(samples.points[inside]) - expected).max() < tolerances.EXACT_HANDLE
+
+
+def test_exact_handles_that_overlap_are_named(samples):
+    a = cases.box([-0.9, -0.3, -0.3], [0.1, 0.3, 0.3])
+    b = cases.box([-0.1, -0.3, -0.3], [0.9, 0.3, 0.3])
+    with pytest.raises(af.InvalidInput, match=r"handles\[0\] and handles\[1\].*overlap"):
+        af.deform(
+            samples, [cases.moved(a), cases.moved(b, cases.shift([0, 0, 0.1]))], quick(exact_handles=True)
+        )
+    together = cases.shift([0, 0, 0.1])
+    field = af.deform(
+        samples, [cases.moved(a, together), cases.moved(b, together)], quick(exact_handles=True)
+    )
+    assert field.report["handle_error_max"] < tolerances.EXACT_HANDLE
+
+
+def test_exact_handles_that_nearly_overlap_stay_exact_and_are_named(samples):
+    a = cases.box([-0.9, -0.3, -0.3], [-0.03, 0.3, 0.3])
+    b = cases.box([0.03, -0.3, -0.3], [0.9, 0.3, 0.3])
+    handles = [cases.moved(a), cases.moved(b, cases.turn([0, 1, 0], 20))]
+    field = af.deform(samples, handles, quick(exact_handles=True))
+    assert field.report["handle_error_max"] < tolerances.EXACT_HANDLE
+    assert "handles[0] and handles[1]" in field.report["notes"][0]
+
+
+def test_points_and_regions(samples):
+    """A region's samples move with it; a point handle, exact, arrives."""
+    left = cases.bar_handles()[0].rest
+    listed = np.flatnonzero(samples.points[:, 0] > 0.7)
+    lift = cases.shift([0.0, 0.0, 0.1])
+    region = af.Region(listed.tolist(), np.eye(4), lift)
+    field = af.deform(samples, [cases.moved(left), region], quick(iterations=250))
+    assert np.abs(field(samples.points[listed]) - samples.points[listed] - [0, 0, 0.1]).max() < 0.05
+    tip = [0.8, 0.0, 0.0]
+    point = af.Point(tip, [0.8, 0.0, 0.1])
+    field = af.deform(samples, [cases.moved(left), point], quick(exact_handles=True))
+    assert np.abs(field([tip])[0] - point.target).max() < tolerances.EXACT_HANDLE
+    with pytest.raises(af.InvalidInput, match=r"handles\[0\].*region"):
+        af.deform(samples, [region], quick(exact_handles=True))
+
+
+def test_a_heavier_handle_is_followed_more_closely(samples):
+    left, right = (h.rest for h in cases.bar_handles())
+    pull = cases.shift([0.3, 0, 0])
+    errors = []
+    for weight in (0.02, 1.0):
+        handles = [cases.moved(left), cases.moved(right, pull, weight=weight)]
+        errors.append(
+            af.deform(samples, handles, quick(handle_weight=10.0)).report["handles"][1]["error_mean"]
+        )
+    assert errors[1] < 0.5 * errors[0]
+
+
+def test_the_barrier_unfolds(samples):
+    """Pushed through itself, the bar folds; the barrier keeps det J up."""
+    left, right = (h.rest for h in cases.bar_handles())
+    handles = [cases.moved(left), cases.moved(right, cases.shift([-1.45, 0.0, 0.0]))]
+    free = af.deform(samples, handles, quick(bending=0.0, iterations=250)).report
+    kept = af.deform(samples, handles, quick(bending=0.0, iterations=250, barrier=10.0)).report
+    assert free["flipped_share"] > 0.0 and free["min_determinant"] < 0.0
+    assert kept["flipped_share"] == 0.0 and kept["min_determinant"] > 0.0
+
+
+def test_same_seed_same_result(samples):
+    options = quick(iterations=30)
+    first, second = (af.deform(samples, cases.bar_handles(), options) for _ in range(2))
+    other = af.deform(samples, cases.bar_handles(), quick(iterations=30, seed=1))
+    points = samples.points[:50]
+    assert np.array_equal(first(points), second(points))
+    assert not np.array_equal(first(points), other(points))
+
+
+def test_a_task_changes_nothing_and_sees_progress(samples):
+    task = af.Task()
+    options = quick(iterations=30)
+    with_task = af.deform(samples, cases.bar_handles(), options, task=task)
+    without = af.deform(samples, cases.bar_handles(), options)
+    assert np.array_equal(with_task(samples.points[:9]), without(samples.points[:9]))
+    assert task.progress == 1.0 and "deform" in task.message
+
+
+def test_cancel_from_another_thread(samples):
+    task = af.Task()
+    timer = threading.Timer(0.3, task.cancel)
+    timer.start()
+    with pytest.raises(af.Cancelled):
+        af.deform(samples, cases.bar_handles(), quick(iterations=10_000_000), task=task)
+    assert 0.0 < task.progress < 0.1
+
+
+def test_time_budget_ends_the_run(samples):
+    field = af.deform(samples, cases.bar_handles(), quick(iterations=10_000_000, time_budget=0.5))
+    assert field.report["out_of_time"] and 0 < field.report["iterations"] < 10_000_000
+
+
+def test_divergence_keeps_the_last_good_state(samples):
+    with pytest.raises(af.Diverged, match="iteration") as caught:
+        af.deform(samples, cases.bar_handles(), quick(learning_rate=1e30))
+    assert np.isfinite(caught.value.field(samples.points)).all()
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        dict(iterations=-1),
+        dict(batch=0),
+        dict(bending=-1.0),
+        dict(learning_rate=0.0),
+        dict(field="splines"),
+        dict(start="nowhere"),
+        dict(device="abacus"),
+        dict(threads=-1),
+        dict(width=0),
+        dict(octaves=-1),
+        dict(sharpness=float("nan")),
+        dict(margin=0.0, exact_handles=True),
+    ],
+)
+def test_bad_options_are_named(samples, changes):
+    with pytest.raises(af.InvalidInput, match=next(iter(changes))):
+        af.deform(samples, cases.bar_handles(), quick(**changes))
+
+
+def test_bad_handles_are_named(samples):
+    rest = cases.box([-0.9, -0.3, -0.3], [-0.6, 0.3, 0.3])
+    with pytest.raises(af.InvalidInput, match="handles"):
+        af.deform(samples, [], quick())
+    with pytest.raises(af.InvalidInput, match=r"handles\[1\].*no surface sample"):
+        af.deform(samples, [cases.moved(rest), cases.moved(cases.box([2, 2, 2], [3, 3, 3]))], quick())
+    with pytest.raises(af.InvalidInput, match="scales or shears"):
+        cases.moved(rest, np.diag([2.0, 1.0, 1.0, 1.0]))
+    with pytest.raises(af.InvalidInput, match="mirror"):
+        cases.moved(rest, np.diag([-1.0, 1.0, 1.0, 1.0]))
+    with pytest.raises(af.InvalidInput, match="rest"):
+        af.Cuboid(np.eye(3), np.eye(4))
+    with pytest.raises(TypeError):
+        af.deform(samples.points, [cases.moved(rest)], quick())
+
+
+@pytest.mark.slow
+def test_the_bunnys_figures(data_dir):
+    """The reference case: 300 iterations of the 4×256 network."""
+    samples = cases.published_samples(data_dir / "neural_sdf" / "bunny.pt")
+    report = af.deform(samples, cases.bunny_handles(), af.DeformOptions(iterations=300)).report
+    assert report["energy"] <= 0.0285 and report["handle_error_mean"] <= 0.005
+    assert report["flipped_share"] == 0.0
+
+
+@pytest.mark.slow
+def test_the_bunny_with_exact_handles(data_dir):
+    samples = cases.published_samples(data_dir / "neural_sdf" / "bunny.pt")
+    options = af.DeformOptions(iterations=400, exact_handles=True, width=128)
+    report = af.deform(samples, cases.bunny_handles(), options).report
+    assert report["energy"] <= 0.050 and report["handle_error_max"] <= tolerances.EXACT_HANDLE
+    assert report["flipped_share"] == 0.0
