@@ -22,9 +22,6 @@ def bar(name="Bar", length=1.0):
 
     mesh = bpy.data.meshes.new(name)
     made = bmesh.new()
-    bmesh.ops.create_grid(made, x_segments=2, y_segments=2, size=0.25)
-    bmesh.ops.delete(made, geom=made.faces, context="FACES_ONLY")
-    bmesh.ops.delete(made, geom=made.verts, context="VERTS")
     bmesh.ops.create_cube(made, size=1.0)
     bmesh.ops.subdivide_edges(made, edges=made.edges, cuts=7, use_grid_fill=True)
     bmesh.ops.scale(made, vec=(2 * length, 0.5, 0.5), verts=made.verts)
@@ -133,3 +130,8 @@ def everything(item):
     found["group names"] = [g.name for g in item.vertex_groups]
     found["groups"] = [[(g.group, g.weight) for g in v.groups] for v in mesh.vertices]
     return found
+
+
+def set_positions(mesh, points):
+    mesh.vertices.foreach_set("co", np.asarray(points, np.float32).ravel())
+    mesh.update()

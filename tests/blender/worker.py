@@ -7,6 +7,7 @@ Reads lines of JSON, {"file", "function", "arguments"}, and answers each with on
 import functools
 import importlib.util
 import json
+import os
 import sys
 import traceback
 from pathlib import Path
@@ -37,8 +38,8 @@ def run(order):
 
 
 def main():
-    answers = sys.stdout
-    sys.stdout = sys.stderr
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)  # what Blender prints must not pass for an answer
     for line in sys.stdin:
         print(json.dumps(run(json.loads(line))), file=answers, flush=True)
 

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes that artists really have: each ends in a result or in an error that names what is wrong."""
+
+import pytest
+from inside import in_blender
+
+BROKEN = {  # name → what the message says
+    "empty": "Mesh: the mesh is empty",
+    "one vertex": "Mesh: the mesh has no faces",
+    "loose edges": "Mesh: the mesh has no faces",
+    "not finite": "Mesh: 1 vertices have no finite position, the first is 5",
+    "flat object": "Mesh: its scale flattens it",
+    "no handle": "Add a handle first",
+    "handle outside": "no part of the surface lies in the rest region of Moving",
+    "edit mode": "Mesh is in Edit Mode",
+    "all faces degenerate": "Mesh: ",
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+@in_blender
+def test_what_cannot_be_deformed_is_named(case):
+    import bpy
+    import numpy as np
+    import scenes
+    from test_torture import BROKEN
+
+    item, _, moving = scenes.bar_with_handles("Mesh")
+    mesh = item.data
+    if case in ("empty", "one vertex", "loose edges"):
+        mesh.clear_geometry()
+        points = {"empty": [], "one vertex": [(0, 0, 0)], "loose edges": [(0, 0, 0), (1, 0, 0)]}[case]
+        mesh.from_pydata(points, [(0, 1)] if case == "loose edges" else [], [])
+    elif case == "not finite":
+        mesh.vertices[5].co.x = float("nan")
+    elif case == "flat object":
+        item.scale.z = 0
+    elif case == "no handle":
+        for _ in range(2):
+            bpy.ops.arapfields.remove_handle()
+    elif case == "handle outside":
+        moving.location.y += 50
+        bpy.ops.arapfields.set_rest(all=True)
+    elif case == "edit mode":
+        bpy.ops.object.mode_set(mode="EDIT")
+    elif case == "all faces degenerate":
+        scenes.set_positions(mesh, np.zeros((len(mesh.vertices), 3)))
+    objects = set(bpy.data.objects)
+    try:
+        with pytest.raises(RuntimeError) as caught:
+            bpy.ops.arapfields.deform(**scenes.QUICK)
+    finally:
+        if case == "edit mode":
+            bpy.ops.object.mode_set(mode="OBJECT")
+    print(caught.value)
+    assert BROKEN[case] in str(caught.value), str(caught.value)
+    assert "Error" not in str(caught.value).replace("Error: ", "", 1), str(caught.value)
+    assert set(bpy.data.objects) == objects
+
+
+@in_blender
+def test_without_a_mesh_the_operators_say_so():
+    import bpy
+
+    for name in ("fit", "deform", "stylize", "extract", "add_handle"):
+        with pytest.raises(RuntimeError, match="Select a mesh object"):
+            getattr(bpy.ops.arapfields, name)()
+
+
+ODD = [
+    "open",
+    "non-manifold",
+    "n-gons",
+    "loose parts beside",
+    "zero-area faces",
+    "inside out",
+    "two islands",
+    "doubled vertices",
+    "multi-user",
+    "instanced by a collection",
+    "hidden",
+]
+
+
+@pytest.mark.parametrize("case", ODD)
+@in_blender
+def test_odd_meshes_deform(case):
+    import bmesh
+    import bpy
+    import numpy as np
+    import scenes
+
+    item, _, moving = scenes.bar_with_handles("Mesh")
+    made = bmesh.new()
+    made.from_mesh(item.data)
+    made.verts.ensure_lookup_table()
+    made.faces.ensure_lookup_table()
+    if case == "open":
+        bmesh.ops.delete(made, geom=made.faces[:40], context="FACES")
+    elif case == "non-manifold":
+        made.faces.new([made.verts[0], made.verts[20], made.verts[60]])
+        made.faces.new([made.verts[0], made.verts[20], made.verts[90]])
+    elif case == "n-gons":
+        bmesh.ops.dissolve_limit(made, angle_limit=0.1, verts=made.verts, edges=made.edges)
+    elif case == "loose parts beside":
+        loose = [made.verts.new((0, 0, z)) for z in (1, 2)]
+        made.edges.new(loose)
+        made.verts.new((0, 2, 0))
+    elif case == "zero-area faces":
+        point = made.verts[0].co.copy()
+        made.faces.new([made.verts.new(point) for _ in range(3)])
+    elif case == "inside out":
+        bmesh.ops.reverse_faces(made, faces=made.faces)
+    elif case == "two islands":
+        copied = bmesh.ops.duplicate(made, geom=[*made.verts, *made.edges, *made.faces])["geom"]
+        moved = [v for v in copied if isinstance(v, bmesh.types.BMVert)]
+        bmesh.ops.translate(made, vec=(0, 1.2, 0), verts=moved)
+    elif case == "doubled vertices":
+        bmesh.ops.split_edges(made, edges=made.edges)
+    made.to_mesh(item.data)
+    made.free()
+    if case == "multi-user":
+        other = bpy.data.objects.new("Other", item.data)
+        bpy.context.collection.objects.link(other)
+    elif case == "instanced by a collection":
+        group = bpy.data.collections.new("Group")
+        group.objects.link(item)
+        instance = bpy.data.objects.new("Instance", None)
+        instance.instance_type, instance.instance_collection = "COLLECTION", group
+        bpy.context.collection.objects.link(instance)
+    elif case == "hidden":
+        item.hide_render = True
+    bpy.context.view_layer.update()
+    before = scenes.world_points(item)
+    moving.location.z += 0.3
+    assert bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK) == {"FINISHED"}
+    after = scenes.world_points(bpy.data.objects["Mesh_deformed"])
+    assert len(after) == len(before) and np.isfinite(after).all()
+    right = before[:, 0] > 0.8
+    assert np.abs((after - before)[right].mean(axis=0)[2] - 0.3) < 0.15
+    assert np.array_equal(scenes.world_points(item), before)
