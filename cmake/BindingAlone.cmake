@@ -19,7 +19,7 @@ target_include_directories(_native SYSTEM PRIVATE
   "${ARAPFIELDS_BINDING_HEADERS}" "${PYBIND11_INCLUDE_DIR}" "${EIGEN_INCLUDE_DIR}")
 # Debian keeps pyconfig.h beside other libraries' headers, which must not win over this system's.
 cmake_path(GET ARAPFIELDS_BINDING_HEADERS PARENT_PATH include_dir)
-target_compile_options(_native PRIVATE "SHELL:-idirafter \"${include_dir}\"" -Wall -Wextra -fno-gnu-unique)
+target_compile_options(_native PRIVATE "SHELL:-idirafter \"${include_dir}\"" -Wall -Wextra -fno-gnu-unique -O1)
 target_compile_definitions(_native PRIVATE
   ARAPFIELDS_VERSION="${PROJECT_VERSION}" EIGEN_DONT_PARALLELIZE EIGEN_MPL2_ONLY)
 target_link_libraries(_native PRIVATE arapfields_built)
