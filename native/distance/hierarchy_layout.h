@@ -28,6 +28,7 @@ struct alignas(64) WideNode {
 struct alignas(64) NodeMoments {
   float center[3][tree_width];
   float radius_squared[tree_width];  ///< of a sphere about the center that holds the child
+  float area[tree_width];            ///< of the child's triangles, over 4π
   float dipole[3][tree_width];       ///< N
   float quadrupole[5][tree_width];   ///< Q: xx, yy, 2 xy, 2 xz, 2 yz (zz = −xx − yy)
   float octupole[7][tree_width];     ///< S: xxx, yyy, 3 xxy, 3 xyy, xxz, yyz, 6 xyz

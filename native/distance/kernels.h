@@ -20,9 +20,10 @@ ARAPFIELDS_DECLARE(void nearest(const HierarchyView& tree, const double* points,
 ARAPFIELDS_DECLARE(void nearest_of_all(const HierarchyView& tree, const double* points, std::int64_t count,
                                        Nearest* results))
 /// Winding number of each point. A child is replaced by its moments where the distance to its center exceeds
-/// `opening` times its radius.
+/// `opening` times its radius. `remainders`, if not null, gets the sum over replaced children of
+/// area / (4π R²) · (radius / R)⁴, a scale for what was left out.
 ARAPFIELDS_DECLARE(void winding(const HierarchyView& tree, const double* points, std::int64_t count,
-                                double opening, double* numbers))
+                                double opening, double* numbers, double* remainders))
 /// Bit j of links[i]: the empty balls about points i and j overlap. count ≤ linked_points.
 ARAPFIELDS_DECLARE(void overlapping(const double* points, const Nearest* nearest, int count,
                                     std::uint64_t* links))

@@ -71,6 +71,7 @@ void store(const Multipole& m, NodeMoments& moments, int lane) {
   for (int k = 0; k < 3; ++k) moments.center[k][lane] = static_cast<float>(m.center[k]);
   const double radius = m.radius * (1.0 + 1e-6);  // the center moved when it was rounded
   moments.radius_squared[lane] = static_cast<float>(radius * radius);
+  moments.area[lane] = static_cast<float>(solid * m.area);
   for (int k = 0; k < 3; ++k) moments.dipole[k][lane] = static_cast<float>(solid * m.dipole[k]);
 
   // −3 (sym Q − tr Q / 3 I)

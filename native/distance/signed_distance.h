@@ -34,7 +34,7 @@ class SignedDistance {
   void unsigned_distance(PointsIn points, Eigen::Ref<Vector> distances, const Progress& progress = {}) const;
   ClosestPoints closest(PointsIn points, const Progress& progress = {}) const;
   /// How often the soup winds around each point: 1 inside and 0 outside of a closed surface, fractions near
-  /// the gaps of an open one. Off by at most about 1e-4 per sheet that a point sees.
+  /// the gaps of an open one. Off by less than 1e-3 for a single sheet.
   void winding_number(PointsIn points, Eigen::Ref<Vector> numbers, const Progress& progress = {}) const;
   /// Whether the triangles' oriented edges cancel (vertices at equal positions taken as one): then the
   /// winding number is an integer, constant wherever one can go without touching a triangle.

@@ -53,9 +53,9 @@ inline void add_half_angles(const TrianglePacket& t, const double* p, double* su
   }
 }
 
-/// Adds the multipole field of every child that is far enough; marks those.
+/// Adds the multipole field of every child that is far enough, and what it may lack; marks those children.
 inline void add_far_fields(const NodeMoments& m, const float* q, float opening_squared, double* sums,
-                           std::int32_t* is_far) {
+                           float* remainders, std::int32_t* is_far) {
   for (int i = 0; i < W; ++i) {
     const float rx = m.center[0][i] - q[0], ry = m.center[1][i] - q[1], rz = m.center[2][i] - q[2];
     const float squared = rx * rx + ry * ry + rz * rz;
@@ -72,14 +72,22 @@ inline void add_far_fields(const NodeMoments& m, const float* q, float opening_s
                            m.octupole[6][i] * x * y * z;
     const float field = ((octupole * inverse + quadrupole) * inverse + dipole) * inverse * inverse;
     const bool far = squared > opening_squared * m.radius_squared[i];
+    const float spread = m.radius_squared[i] * inverse * inverse;
+    const float remainder = m.area[i] * inverse * inverse * spread * spread;
     sums[i] += static_cast<double>(far ? field : 0.0f);
+    remainders[i] += far ? remainder : 0.0f;
     is_far[i] = far ? 1 : 0;
   }
 }
 
-double winding_at(const HierarchyView& tree, const double* p, float opening_squared) {
+struct Winding {
+  double number = 0.0, remainder = 0.0;
+};
+
+Winding winding_at(const HierarchyView& tree, const double* p, float opening_squared) {
   const float q[3] = {static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
   alignas(64) double fields[W] = {}, half_angles[W] = {};
+  alignas(64) float remainders[W] = {};
   std::int32_t stack[stack_size];
   std::int32_t* top = stack;
   *top++ = 0;
@@ -90,29 +98,31 @@ double winding_at(const HierarchyView& tree, const double* p, float opening_squa
       continue;
     }
     alignas(64) std::int32_t is_far[W];
-    add_far_fields(tree.moments[index], q, opening_squared, fields, is_far);
+    add_far_fields(tree.moments[index], q, opening_squared, fields, remainders, is_far);
     const WideNode& node = tree.nodes[index];
     for (int i = 0; i < node.count; ++i)
       if (is_far[i] == 0) *top++ = node.child[i];
   }
-  double sum = 0.0, angles = 0.0;
+  Winding result;
   for (int i = 0; i < W; ++i) {
-    sum += fields[i];
-    angles += half_angles[i];
+    result.number += fields[i] + half_angles[i] / (2.0 * pi);
+    result.remainder += static_cast<double>(remainders[i]);
   }
-  return sum + angles / (2.0 * pi);
+  return result;
 }
 
 }  // namespace
 
 void winding(const HierarchyView& tree, const double* points, std::int64_t count, double opening,
-             double* numbers) {
+             double* numbers, double* remainders) {
   const float opening_squared = static_cast<float>(opening * opening);
   for (std::int64_t i = 0; i < count; ++i) {
     const double* p = points + 3 * i;
     // So far away the mesh is a speck, and single precision would overflow.
     const bool remote = std::fabs(p[0]) > 1e9 || std::fabs(p[1]) > 1e9 || std::fabs(p[2]) > 1e9;
-    numbers[i] = remote ? 0.0 : winding_at(tree, p, opening_squared);
+    const Winding found = remote ? Winding{} : winding_at(tree, p, opening_squared);
+    numbers[i] = found.number;
+    if (remainders != nullptr) remainders[i] = found.remainder;
   }
 }
 
