@@ -111,37 +111,43 @@ inline unsigned at_most(const float* values, float limit) {
 #endif
 }
 
-struct Entry {
-  float squared;
-  std::int32_t child;
+/// What is left to visit, nearest on top. An entry is a bound from below, its bits in the upper half so that
+/// entries sort by it, and a child.
+struct Stack {
+  std::uint64_t entries[stack_size];
+  std::uint64_t* top = entries;
+
+  /// Adds a node's children within the limit, sorted among themselves.
+  void push(const WideNode& node, const Query& query, float limit) {
+    alignas(64) float squared[W];
+    bounds_from_below(node, query, squared);
+    const std::uint64_t* const floor = top;
+    for (unsigned hits = at_most(squared, limit) & ((1u << node.count) - 1u); hits != 0; hits &= hits - 1) {
+      const int i = std::countr_zero(hits);
+      const std::uint64_t bits = std::bit_cast<std::uint32_t>(squared[i]);
+      const std::uint64_t entry = bits << 32 | static_cast<std::uint32_t>(node.child[i]);
+      std::uint64_t* place = top++;
+      for (; place != floor && place[-1] < entry; --place) *place = place[-1];
+      *place = entry;
+    }
+  }
 };
 
 void search(const HierarchyView& tree, const double* p, Nearest& best) {
   const Query query = rounded(p);
   const std::int32_t seen = best.packet;
-  Entry stack[stack_size];
-  Entry* top = stack;
-  *top++ = {0.0f, 0};
   float limit = limit_of(best);
-  while (top != stack) {
-    const Entry entry = *--top;
-    if (entry.squared > limit) continue;
-    if (entry.child < 0) {
-      if (~entry.child == seen) continue;
-      visit(tree.packets[~entry.child], ~entry.child, p, best);
+  Stack stack;
+  stack.push(tree.nodes[0], query, limit);
+  while (stack.top != stack.entries) {
+    const std::uint64_t entry = *--stack.top;
+    if (std::bit_cast<float>(static_cast<std::uint32_t>(entry >> 32)) > limit) continue;
+    const auto child = static_cast<std::int32_t>(static_cast<std::uint32_t>(entry));
+    if (child >= 0) {
+      stack.push(tree.nodes[child], query, limit);
+    } else if (~child != seen) {
+      visit(tree.packets[~child], ~child, p, best);
       limit = limit_of(best);
-      continue;
-    }
-    const WideNode& node = tree.nodes[entry.child];
-    alignas(64) float squared[W];
-    bounds_from_below(node, query, squared);
-    // Farther children go below nearer ones on the stack.
-    Entry* const floor = top;
-    for (unsigned hits = at_most(squared, limit) & ((1u << node.count) - 1u); hits != 0; hits &= hits - 1) {
-      const int i = std::countr_zero(hits);
-      Entry* place = top++;
-      for (; place != floor && place[-1].squared < squared[i]; --place) *place = place[-1];
-      *place = {squared[i], node.child[i]};
     }
   }
 }
