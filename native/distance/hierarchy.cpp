@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/errors.h"
 #include "core/parallel.h"
 #include "distance/disk.h"
 #include "distance/multipole.h"
@@ -104,6 +105,8 @@ class Summarizer {
 Hierarchy::Hierarchy(PointsIn vertices, TrianglesIn triangles) {
   const Points used = used_vertices(vertices, triangles);
   const Vec3 low = used.colwise().minCoeff(), high = used.colwise().maxCoeff();
+  require((high - low).allFinite(), "vertices", "their bounding box is too large for floating point",
+          "its sides must be finite");
   center_ = 0.5 * low + 0.5 * high;
   const double half = std::max((high - center_).maxCoeff(), std::numeric_limits<double>::min());
   factor_ = std::ldexp(1.0, std::clamp(-std::ilogb(half) - 1, -1000, 1000));

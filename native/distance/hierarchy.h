@@ -15,7 +15,7 @@ namespace arapfields {
 /// The tree depends on the mesh alone, not on the thread count.
 class Hierarchy {
  public:
-  /// The mesh must be valid (mesh/triangle_mesh.h).
+  /// The mesh must be valid (mesh/triangle_mesh.h). Throws InvalidInput where its extent is not finite.
   Hierarchy(PointsIn vertices, TrianglesIn triangles);
 
   HierarchyView view() const;

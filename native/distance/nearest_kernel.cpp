@@ -117,10 +117,11 @@ struct Stack {
   std::uint64_t entries[stack_size];
   std::uint64_t* top = entries;
 
+  bool empty() const { return top == entries; }
+  std::int32_t top_child() const { return static_cast<std::int32_t>(static_cast<std::uint32_t>(top[-1])); }
+  float top_bound() const { return std::bit_cast<float>(static_cast<std::uint32_t>(top[-1] >> 32)); }
   /// Adds a node's children within the limit, sorted among themselves.
-  void push(const WideNode& node, const Query& query, float limit) {
-    alignas(64) float squared[W];
-    bounds_from_below(node, query, squared);
+  void push(const WideNode& node, const float* squared, float limit) {
     const std::uint64_t* const floor = top;
     for (unsigned hits = at_most(squared, limit) & ((1u << node.count) - 1u); hits != 0; hits &= hits - 1) {
       const int i = std::countr_zero(hits);
@@ -138,17 +139,28 @@ void search(const HierarchyView& tree, const double* p, Nearest& best) {
   const std::int32_t seen = best.packet;
   float limit = limit_of(best);
   Stack stack;
-  stack.push(tree.nodes[0], query, limit);
-  while (stack.top != stack.entries) {
-    const std::uint64_t entry = *--stack.top;
-    if (std::bit_cast<float>(static_cast<std::uint32_t>(entry >> 32)) > limit) continue;
-    const auto child = static_cast<std::int32_t>(static_cast<std::uint32_t>(entry));
-    if (child >= 0) {
-      stack.push(tree.nodes[child], query, limit);
-    } else if (~child != seen) {
+  *stack.top++ = 0;  // the root, at no distance
+  while (!stack.empty()) {
+    const std::int32_t child = stack.top_child();
+    const bool near = stack.top_bound() <= limit;
+    --stack.top;
+    if (!near) continue;
+    if (child < 0) {
+      if (~child == seen) continue;
       visit(tree.packets[~child], ~child, p, best);
       limit = limit_of(best);
+      continue;
     }
+    alignas(64) float first[W], second[W];
+    bounds_from_below(tree.nodes[child], query, first);
+    // The next node is likely to be needed as well; both at a time hide each other's latency.
+    if (!stack.empty() && stack.top_child() >= 0) {
+      const std::int32_t other = stack.top_child();
+      --stack.top;
+      bounds_from_below(tree.nodes[other], query, second);
+      stack.push(tree.nodes[other], second, limit);
+    }
+    stack.push(tree.nodes[child], first, limit);
   }
 }
 

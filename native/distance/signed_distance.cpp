@@ -142,9 +142,6 @@ struct SignedDistance::Parts {
 
 SignedDistance::SignedDistance(PointsIn vertices, TrianglesIn triangles) {
   validate(vertices, triangles);
-  const Points used = used_vertices(vertices, triangles);
-  require((used.colwise().maxCoeff() - used.colwise().minCoeff()).allFinite(), "vertices",
-          "their bounding box is too large for floating point", "its sides must be finite");
   parts_.reset(new Parts{Hierarchy(vertices, triangles), arapfields::is_closed(vertices, triangles)});
 }
 
