@@ -14,6 +14,7 @@ PYBIND11_MODULE(_native, module) {
   bind_fields(module);
   bind_energies(module);
   bind_solve(module);
+  bind_extraction(module);
   bind_live(module);
   bind_curves(module);
   bind_solve_testing(module);

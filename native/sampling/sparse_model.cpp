@@ -59,8 +59,8 @@ int SparseModel::position(double x) const {
 
 int SparseModel::block_start(int position) const { return std::clamp(position - 1, 0, resolution_ - 3); }
 
-float SparseModel::slope_error(Index cell) const {
-  return slope_factor / error_safety * error(cell) / static_cast<float>(spacing());
+float SparseModel::slope_error_of(float error) const {
+  return slope_factor / error_safety * error / static_cast<float>(spacing());
 }
 
 Box SparseModel::bounds() const {

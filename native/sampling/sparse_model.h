@@ -42,7 +42,9 @@ class SparseModel {
   int side(Index cell) const { return side_[static_cast<std::size_t>(cell)]; }
   /// Bounds in an active cell on |Φ − p| and on |∇(Φ − p)|.
   float error(Index cell) const { return error_[static_cast<std::size_t>(cell)]; }
-  float slope_error(Index cell) const;
+  float slope_error(Index cell) const { return slope_error_of(error(cell)); }
+  /// The latter from the former.
+  float slope_error_of(float error) const;
 
   /// p's coefficients in an active cell; at(block, …) evaluates them at a point of the cube.
   CubicBlock block(Index cell) const;

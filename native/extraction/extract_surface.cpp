@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "extraction/extract_surface.h"
+
+#include <chrono>
+#include <optional>
+
+#include "core/errors.h"
+#include "extraction/marching_cubes.h"
+
+namespace arapfields {
+namespace {
+
+constexpr int coarsest_grid = 8, finest_grid = 512;
+constexpr int smallest_with_model = 32;  // below, the model would cost more than the grid
+constexpr int grid_steps_a_cell = 4;
+
+}  // namespace
+
+TriangleMesh extract_surface(const ImplicitFunction& implicit, const Frame& frame, int resolution,
+                             const Progress& progress, ExtractionReport* report) {
+  require(resolution >= coarsest_grid && resolution <= finest_grid, "resolution", std::to_string(resolution),
+          "8 to 512 grid points a side are allowed");
+  const auto start = std::chrono::steady_clock::now();
+  progress.report(0.0, "finding the surface");
+  CountedFunction function(implicit, progress);
+  std::optional<SparseModel> model;
+  if (resolution >= smallest_with_model)
+    model.emplace(function, SparseModelOptions{.wanted_cells = std::numeric_limits<Index>::max(),
+                                               .max_resolution = resolution / grid_steps_a_cell});
+  progress.report(0.4, "evaluating the grid");
+  SparseGrid grid(resolution, model ? &*model : nullptr);
+  grid.refine(function);
+  progress.report(0.9, "marching cubes");
+  TriangleMesh mesh = marching_cubes(grid, progress);
+  require(mesh.triangles.rows() > 0, "sdf",
+          "its values have one sign on the whole grid of " + std::to_string(resolution) + " points a side",
+          "a function with a zero surface inside the cube [-1, 1]^3 is needed");
+  const bool open = (mesh.vertices.array().abs() == 1.0).any();
+  mesh.vertices = frame.to_mesh(mesh.vertices);
+  if (report != nullptr)
+    *report = {.evaluations = function.value_count() + function.gradient_count(),
+               .dense_evaluations = static_cast<Index>(resolution) * resolution * resolution,
+               .open = open,
+               .seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()};
+  progress.report(1.0, "extracted the surface");
+  return mesh;
+}
+
+}  // namespace arapfields

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/frame.h"
+#include "core/implicit.h"
+#include "core/task.h"
+#include "mesh/triangle_mesh.h"
+
+namespace arapfields {
+
+/// What a call of extract_surface did.
+struct ExtractionReport {
+  Index evaluations = 0;        ///< points at which Φ was evaluated, those with gradients included
+  Index dense_evaluations = 0;  ///< points of the grid
+  bool open = false;            ///< the surface leaves the cube, the mesh has a boundary there
+  double seconds = 0.0;
+};
+
+/// {Φ = 0} in mesh coordinates by marching cubes on the grid of `resolution`³ points (8 to 512) over the cube
+/// [-1,1]³: the vertices that the whole grid's values would give, from values near the surface alone.
+/// Throws InvalidInput for a bad resolution, a function that is not finite, or one that has no zero surface
+/// which the grid resolves.
+TriangleMesh extract_surface(const ImplicitFunction& function, const Frame& frame, int resolution = 256,
+                             const Progress& progress = {}, ExtractionReport* report = nullptr);
+
+}  // namespace arapfields

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "extraction/sparse_grid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/parallel.h"
+
+namespace arapfields {
+namespace {
+
+constexpr float far = 1e30f;
+constexpr float nowhere = std::numeric_limits<float>::quiet_NaN();
+constexpr Index blocks_per_chunk = 16;
+
+constexpr int neighbours[6][3] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
+
+bool differs(float a, float b) { return (a < 0.0f) != (b < 0.0f) && !std::isnan(a) && !std::isnan(b); }
+
+}  // namespace
+
+SparseGrid::SparseGrid(int resolution, const SparseModel* model)
+    : resolution_(resolution),
+      width_((resolution + side - 1) / side),
+      spacing_(2.0 / (resolution - 1)),
+      model_(model),
+      table_(static_cast<std::size_t>(width_) * width_ * width_, -1) {
+  std::vector<std::uint8_t> marked(table_.size(), model == nullptr ? 1 : 0);
+  if (model != nullptr) {
+    for (const Index cell : model->active()) {
+      const auto place = model->coordinates(cell);
+      int low[3], high[3];  // blocks that reach within a grid step of the cell
+      for (int axis = 0; axis < 3; ++axis) {
+        const double from = place[axis] * model->spacing() / spacing_,
+                     to = from + model->spacing() / spacing_;
+        low[axis] = std::max(0, static_cast<int>(std::floor(from)) - 1) / side;
+        high[axis] = std::min(resolution - 1, static_cast<int>(std::ceil(to)) + 1) / side;
+      }
+      for (int i = low[0]; i <= high[0]; ++i)
+        for (int j = low[1]; j <= high[1]; ++j)
+          for (int k = low[2]; k <= high[2]; ++k) marked[static_cast<std::size_t>(entry(i, j, k))] = 1;
+    }
+    for (int i = 0; i < width_; ++i)
+      for (int j = 0; j < width_; ++j)
+        for (int k = 0; k < width_; ++k) {
+          const auto position = [&](int block) { return model->position(coordinate(block * side)); };
+          if (model->side(model->cell(position(i), position(j), position(k))) < 0)
+            table_[static_cast<std::size_t>(entry(i, j, k))] = -2;
+        }
+  }
+  Index count = 0;
+  for (const auto each : marked) count += each;
+  blocks_.reserve(static_cast<std::size_t>(count));
+  for (std::size_t i = 0; i < marked.size(); ++i)
+    if (marked[i]) keep(static_cast<Index>(i));
+}
+
+Index SparseGrid::find(int i, int j, int k) const {
+  if (i < 0 || j < 0 || k < 0 || i >= width_ || j >= width_ || k >= width_) return -1;
+  return std::max(-1, table_[static_cast<std::size_t>(entry(i, j, k))]);
+}
+
+void SparseGrid::keep(Index entry) {
+  blocks_.emplace_back();
+  Block& block = blocks_.back();
+  block.place[0] = static_cast<int>(entry / (static_cast<Index>(width_) * width_));
+  block.place[1] = static_cast<int>(entry / width_ % width_);
+  block.place[2] = static_cast<int>(entry % width_);
+  table_[static_cast<std::size_t>(entry)] = static_cast<std::int32_t>(blocks_.size()) - 1;
+  std::fill_n(block.exact, points, std::uint8_t{0});
+  std::fill_n(block.error, points, model_ == nullptr ? 2.0f * far : 0.0f);
+  for (int i = 0; i < side; ++i)
+    for (int j = 0; j < side; ++j)
+      for (int k = 0; k < side; ++k) {
+        const int last =
+            std::max({block.place[0] * side + i, block.place[1] * side + j, block.place[2] * side + k});
+        block.value[local(i, j, k)] = last < resolution_ ? far : nowhere;
+      }
+  if (model_ != nullptr) predict(block);
+}
+
+/// Signs and values as the model has them, cell by cell.
+void SparseGrid::predict(Block& block) const {
+  int cells[3][side];
+  float weights[3][side][4];
+  int count[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    count[axis] = std::min(side, resolution_ - block.place[axis] * side);
+    for (int i = 0; i < count[axis]; ++i) {
+      const double x = coordinate(block.place[axis] * side + i);
+      cells[axis][i] = model_->position(x);
+      const double u = (x + 1.0) / model_->spacing() - model_->block_start(cells[axis][i]);
+      cubic_weights(static_cast<float>(u), weights[axis][i]);
+    }
+  }
+  const auto run_end = [&](int axis, int begin) {
+    int end = begin;
+    while (end < count[axis] && cells[axis][end] == cells[axis][begin]) ++end;
+    return end;
+  };
+  for (int i0 = 0, i1; i0 < count[0]; i0 = i1) {
+    i1 = run_end(0, i0);
+    for (int j0 = 0, j1; j0 < count[1]; j0 = j1) {
+      j1 = run_end(1, j0);
+      for (int k0 = 0, k1; k0 < count[2]; k0 = k1) {
+        k1 = run_end(2, k0);
+        const Index cell = model_->cell(cells[0][i0], cells[1][j0], cells[2][k0]);
+        const int sign = model_->side(cell);
+        CubicBlock nodes;
+        if (sign == 0) nodes = model_->block(cell);
+        for (int i = i0; i < i1; ++i) {
+          float plane[16];
+          for (int n = 0; n < 16 && sign == 0; ++n) {
+            plane[n] = 0.0f;
+            for (int a = 0; a < 4; ++a) plane[n] += weights[0][i][a] * nodes.node[16 * a + n];
+          }
+          for (int j = j0; j < j1; ++j)
+            for (int k = k0; k < k1; ++k) {
+              const int at = local(i, j, k);
+              if (sign != 0) {
+                block.value[at] = static_cast<float>(sign) * far;
+                continue;
+              }
+              float value = 0.0f;
+              for (int b = 0; b < 4; ++b)
+                for (int c = 0; c < 4; ++c) value += weights[1][j][b] * weights[2][k][c] * plane[4 * b + c];
+              block.value[at] = value;
+              block.error[at] = model_->error(cell);
+            }
+        }
+      }
+    }
+  }
+}
+
+void SparseGrid::look(const Block& block, Window& window) const {
+  int from[3], to[3];
+  for (int di = -1; di <= 1; ++di)
+    for (int dj = -1; dj <= 1; ++dj)
+      for (int dk = -1; dk <= 1; ++dk) {
+        const int step[3] = {di, dj, dk};
+        bool inside = true;
+        for (int axis = 0; axis < 3; ++axis) {
+          from[axis] = step[axis] < 0 ? -1 : step[axis] == 0 ? 0 : side;
+          to[axis] = step[axis] < 0 ? 0 : step[axis] == 0 ? side : side + 1;
+          const int place = block.place[axis] + step[axis];
+          inside = inside && place >= 0 && place < width_;
+        }
+        const int i0 = block.place[0] + di, j0 = block.place[1] + dj, k0 = block.place[2] + dk;
+        const std::int32_t found = inside ? table_[static_cast<std::size_t>(entry(i0, j0, k0))] : -1;
+        const Block* source = found >= 0 ? &blocks_[static_cast<std::size_t>(found)] : nullptr;
+        for (int i = from[0]; i < to[0]; ++i)
+          for (int j = from[1]; j < to[1]; ++j)
+            for (int k = from[2]; k < to[2]; ++k) {
+              const int at = Window::at(i, j, k), there = local(i & 7, j & 7, k & 7);
+              window.kept[at] = source != nullptr || !inside;
+              window.exact[at] = source != nullptr ? source->exact[there] : 0;
+              window.error[at] = source != nullptr ? source->error[there] : 0.0f;
+              window.value[at] = source != nullptr ? source->value[there]
+                                 : !inside         ? nowhere
+                                 : found == -2     ? -far
+                                                   : far;
+            }
+      }
+}
+
+/// All cells around a point at a change of sign must be in blocks that are kept.
+void SparseGrid::keep_around(const Block& block, const Window& window, int i, int j, int k,
+                             std::vector<Index>& missing) const {
+  const auto shift = [](int at) { return at < 0 ? -1 : at / side; };
+  for (int x = i - 1; x <= i + 1; ++x)
+    for (int y = j - 1; y <= j + 1; ++y)
+      for (int z = k - 1; z <= k + 1; ++z)
+        if (!window.kept[Window::at(x, y, z)])
+          missing.push_back(
+              entry(block.place[0] + shift(x), block.place[1] + shift(y), block.place[2] + shift(z)));
+}
+
+/// Points of a block to evaluate: ends of edges on which the sign changes, and points whose sign is in doubt.
+/// A doubt is settled without an evaluation where a neighbour's Φ − p, which varies slowly, leaves no choice.
+void SparseGrid::wish(std::int32_t index, bool first_round, Wish& out) const {
+  const Block& block = blocks_[static_cast<std::size_t>(index)];
+  Window window;
+  look(block, window);
+  for (int i = 0; i < side; ++i)
+    for (int j = 0; j < side; ++j)
+      for (int k = 0; k < side; ++k) {
+        const int at = Window::at(i, j, k);
+        const float value = window.value[at];
+        if (std::isnan(value)) continue;
+        bool change = false, settled = !(std::abs(value) <= window.error[at]);
+        const float reach = model_ == nullptr
+                                ? 0.0f
+                                : model_->slope_error_of(window.error[at]) * static_cast<float>(spacing_);
+        for (const auto& step : neighbours) {
+          const int next = Window::at(i + step[0], j + step[1], k + step[2]);
+          change = change || differs(value, window.value[next]);
+          if (!window.exact[next]) continue;
+          const float corrected = value + window.error[next];
+          settled = settled || (!differs(corrected, value) && std::abs(corrected) > reach);
+        }
+        if (change) keep_around(block, window, i, j, k, out.neighbours);
+        if (!window.exact[at] && (change || (!settled && (!first_round || model_ == nullptr))))
+          out.points.push_back({index, local(i, j, k)});
+      }
+}
+
+void SparseGrid::refine(CountedFunction& function) {
+  for (bool first_round = true;; first_round = false) {
+    const auto count = static_cast<Index>(blocks_.size());
+    const Index chunks = (count + blocks_per_chunk - 1) / blocks_per_chunk;
+    std::vector<Wish> wishes(static_cast<std::size_t>(chunks));
+    parallel_for(0, chunks, 1, [&](Index begin, Index end) {
+      for (Index chunk = begin; chunk < end; ++chunk)
+        for (Index b = chunk * blocks_per_chunk; b < std::min(count, (chunk + 1) * blocks_per_chunk); ++b)
+          wish(static_cast<std::int32_t>(b), first_round, wishes[static_cast<std::size_t>(chunk)]);
+    });
+    std::vector<Point> wanted;
+    bool grown = false;
+    for (const Wish& each : wishes) {
+      wanted.insert(wanted.end(), each.points.begin(), each.points.end());
+      for (const Index neighbour : each.neighbours)
+        if (table_[static_cast<std::size_t>(neighbour)] < 0) {
+          keep(neighbour);
+          grown = true;
+        }
+    }
+    if (wanted.empty() && !grown && !first_round) return;
+    PointsF places(static_cast<Index>(wanted.size()), 3);
+    for (std::size_t row = 0; row < wanted.size(); ++row) {
+      const Block& block = blocks_[static_cast<std::size_t>(wanted[row].block)];
+      const int at = wanted[row].local, within[3] = {at / (side * side), at / side % side, at % side};
+      for (int axis = 0; axis < 3; ++axis)
+        places(static_cast<Index>(row), axis) =
+            static_cast<float>(coordinate(block.place[axis] * side + within[axis]));
+    }
+    const VectorF values = function.values(places);
+    for (std::size_t row = 0; row < wanted.size(); ++row) {
+      Block& block = blocks_[static_cast<std::size_t>(wanted[row].block)];
+      const int at = wanted[row].local;
+      block.error[at] = values[static_cast<Index>(row)] - block.value[at];
+      block.value[at] = values[static_cast<Index>(row)];
+      block.exact[at] = 1;
+    }
+  }
+}
+
+}  // namespace arapfields

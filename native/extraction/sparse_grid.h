@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "sampling/sparse_model.h"
+
+namespace arapfields {
+
+/// Φ on a grid of resolution³ points over [-1,1]³, kept in blocks of 8³ points near the surface only. Away
+/// from it, and wherever the model is sure, only Φ's sign is known. After refine() the sign is right
+/// everywhere, as far as the model's bounds hold, and both ends of every edge on which it changes have Φ's
+/// own value.
+class SparseGrid {
+ public:
+  static constexpr int side = 8, points = side * side * side;
+  static constexpr int window_side = side + 2, window_points = window_side * window_side * window_side;
+
+  struct Block {
+    int place[3];                ///< in blocks
+    float value[points];         ///< Φ, the model's p, or ±1e30 where only the sign is known
+    float error[points];         ///< bound on |Φ − p|; where Φ is known Φ − p itself
+    std::uint8_t exact[points];  ///< whether value is Φ's own
+  };
+  /// A block with one layer of points around it; NaN outside the grid.
+  struct Window {
+    float value[window_points], error[window_points];
+    std::uint8_t exact[window_points];
+    bool kept[window_points];  ///< whether the point's block is kept
+    /// i, j, k from −1 to 8
+    static int at(int i, int j, int k) { return ((i + 1) * window_side + j + 1) * window_side + k + 1; }
+  };
+
+  /// Without a model (nullptr) all blocks are kept and every point is evaluated.
+  SparseGrid(int resolution, const SparseModel* model);
+  void refine(CountedFunction& function);
+
+  int resolution() const { return resolution_; }
+  /// Coordinate of the i-th grid point along an axis.
+  double coordinate(int i) const { return i + 1 == resolution_ ? 1.0 : i * spacing_ - 1.0; }
+  const std::vector<Block>& blocks() const { return blocks_; }
+  /// Index into blocks(), or −1.
+  Index find(int i, int j, int k) const;
+  /// Point of a block in its arrays, from coordinates within it.
+  static int local(int i, int j, int k) { return (i * side + j) * side + k; }
+  void look(const Block& block, Window& window) const;
+
+ private:
+  struct Point {
+    std::int32_t block, local;
+  };
+  struct Wish {
+    std::vector<Point> points;      // to evaluate
+    std::vector<Index> neighbours;  // blocks to keep from now on, as indices into table_
+  };
+  Index entry(int i, int j, int k) const { return (static_cast<Index>(i) * width_ + j) * width_ + k; }
+  void keep(Index entry);
+  void predict(Block& block) const;
+  void keep_around(const Block& block, const Window& window, int i, int j, int k,
+                   std::vector<Index>& missing) const;
+  void wish(std::int32_t block, bool first_round, Wish& out) const;
+
+  int resolution_;
+  int width_;  // blocks a side
+  double spacing_;
+  const SparseModel* model_;
+  std::vector<std::int32_t>
+      table_;  // width³: index into blocks_, −1 for the positive and −2 for the negative
+  std::vector<Block> blocks_;
+};
+
+}  // namespace arapfields

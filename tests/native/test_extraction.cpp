@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <Eigen/Geometry>
+#include <array>
+#include <boost/test/unit_test.hpp>
+#include <map>
+#include <numbers>
+
+#include "core/errors.h"
+#include "core/parallel.h"
+#include "core/random.h"
+#include "extraction/extract_surface.h"
+#include "implicit_shapes.h"
+
+using namespace arapfields;
+
+BOOST_AUTO_TEST_SUITE(extraction)
+
+namespace {
+
+/// Crossings on all edges of the whole grid, sorted: what marching cubes must find.
+std::vector<std::array<double, 3>> dense_crossings(const ImplicitFunction& function, int n) {
+  const auto coordinate = [&](int i) { return i + 1 == n ? 1.0 : i * (2.0 / (n - 1)) - 1.0; };
+  PointsF points(static_cast<Index>(n) * n * n, 3);
+  for (Index row = 0; row < points.rows(); ++row)
+    points.row(row) << static_cast<float>(coordinate(static_cast<int>(row / (n * n)))),
+        static_cast<float>(coordinate(static_cast<int>(row / n % n))),
+        static_cast<float>(coordinate(static_cast<int>(row % n)));
+  VectorF values(points.rows());
+  function.evaluate(points, values);
+  std::vector<std::array<double, 3>> found;
+  const Index stride[3] = {static_cast<Index>(n) * n, n, 1};
+  for (Index row = 0; row < points.rows(); ++row)
+    for (int axis = 0; axis < 3; ++axis) {
+      const int place[3] = {static_cast<int>(row / (n * n)), static_cast<int>(row / n % n),
+                            static_cast<int>(row % n)};
+      if (place[axis] + 1 == n) continue;
+      const double a = values[row], b = values[row + stride[axis]];
+      if ((a < 0.0) == (b < 0.0)) continue;
+      std::array<double, 3> x{coordinate(place[0]), coordinate(place[1]), coordinate(place[2])};
+      x[static_cast<std::size_t>(axis)] +=
+          a / (a - b) * (coordinate(place[axis] + 1) - coordinate(place[axis]));
+      found.push_back(x);
+    }
+  return found;
+}
+
+/// Largest distance between two sets of equally many points, by greedy matching in sorted cells.
+double set_distance(const std::vector<std::array<double, 3>>& a, const Points& b) {
+  std::map<std::array<Index, 3>, std::vector<std::size_t>> cells;
+  const auto key = [](const double* x) {
+    return std::array<Index, 3>{std::lround(x[0] * 1e4), std::lround(x[1] * 1e4), std::lround(x[2] * 1e4)};
+  };
+  for (std::size_t i = 0; i < a.size(); ++i) cells[key(a[i].data())].push_back(i);
+  double worst = 0.0;
+  for (Index row = 0; row < b.rows(); ++row) {
+    const double x[3] = {b(row, 0), b(row, 1), b(row, 2)};
+    const auto base = key(x);
+    double best = 1.0;
+    for (Index n = 0; n < 27; ++n) {
+      const auto cell = cells.find({base[0] + n / 9 - 1, base[1] + n / 3 % 3 - 1, base[2] + n % 3 - 1});
+      if (cell == cells.end()) continue;
+      for (const std::size_t i : cell->second)
+        best = std::min(best, std::hypot(a[i][0] - x[0], a[i][1] - x[1], a[i][2] - x[2]));
+    }
+    worst = std::max(worst, best);
+  }
+  return worst;
+}
+
+struct Topology {
+  Index euler = 0;
+  Index boundary = 0;      // edges with one triangle
+  Index inconsistent = 0;  // edges that two triangles run through in the same direction, or that have three
+  double volume = 0.0;
+};
+
+Topology topology(const TriangleMesh& mesh) {
+  std::map<std::pair<int, int>, std::pair<int, int>> edges;  // uses forwards, backwards
+  Topology result;
+  for (Index t = 0; t < mesh.triangles.rows(); ++t) {
+    for (int c = 0; c < 3; ++c) {
+      const int a = mesh.triangles(t, c), b = mesh.triangles(t, (c + 1) % 3);
+      auto& uses = edges[{std::min(a, b), std::max(a, b)}];
+      ++(a < b ? uses.first : uses.second);
+    }
+    const Vec3 a = mesh.vertices.row(mesh.triangles(t, 0)), b = mesh.vertices.row(mesh.triangles(t, 1)),
+               c = mesh.vertices.row(mesh.triangles(t, 2));
+    result.volume += a.dot(b.cross(c)) / 6.0;
+  }
+  for (const auto& [edge, uses] : edges) {
+    result.boundary += uses.first + uses.second == 1;
+    result.inconsistent += uses.first > 1 || uses.second > 1;
+  }
+  result.euler = mesh.vertices.rows() - static_cast<Index>(edges.size()) + mesh.triangles.rows();
+  return result;
+}
+
+TriangleMesh extract(const ImplicitFunction& function, int resolution, ExtractionReport* report = nullptr) {
+  return extract_surface(function, Frame(), resolution, {}, report);
+}
+
+void check_closed(const TriangleMesh& mesh) {
+  const Topology found = topology(mesh);
+  BOOST_TEST(found.boundary == 0);
+  BOOST_TEST(found.inconsistent == 0);
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(topology_volume_and_orientation) {
+  const TriangleMesh ball = extract(shapes::sphere(0.6, Vec3(0.05, 0.1, -0.1)), 64);
+  check_closed(ball);
+  BOOST_TEST(topology(ball).euler == 2);
+  // The polyhedron is inscribed: its volume falls short by the order of (grid step / radius)².
+  BOOST_TEST(std::abs(topology(ball).volume / (4.0 / 3.0 * std::numbers::pi * 0.216) - 1.0) < 5e-3);
+  const TriangleMesh ring = extract(shapes::torus(0.55, 0.25), 64);
+  check_closed(ring);
+  BOOST_TEST(topology(ring).euler == 0);
+  BOOST_TEST(topology(ring).volume > 0.0);
+}
+
+BOOST_AUTO_TEST_CASE(vertices_are_those_of_the_whole_grid) {
+  const shapes::Analytic needle([](const Vec3& x) {  // steep where gradient samples hardly fall
+    return x.norm() - 0.4 - 0.3 * std::exp(-(x[1] * x[1] + x[2] * x[2]) / (2.0 * 0.012 * 0.012));
+  });
+  const shapes::Analytic shell([](const Vec3& x) { return std::abs(x.norm() - 0.6) - 0.02; });
+  const shapes::Analytic all[] = {shapes::sphere(0.6),
+                                  shapes::torus(0.5, 0.1),
+                                  shapes::ball_and_box(),
+                                  shapes::box(Vec3(0.8, 0.6, 0.01)),
+                                  needle,
+                                  shell};
+  for (const auto& shape : all) {
+    for (const int n : {17, 63, 101}) {
+      ExtractionReport report;
+      const TriangleMesh mesh = extract(shape, n, &report);
+      const auto expected = dense_crossings(shape, n);
+      BOOST_TEST(static_cast<Index>(expected.size()) == mesh.vertices.rows());
+      BOOST_TEST(set_distance(expected, mesh.vertices) < 1e-6);
+      check_closed(mesh);
+    }
+  }
+  ExtractionReport report;
+  extract(shapes::sphere(0.6), 128, &report);
+  BOOST_TEST(report.evaluations < 0.06 * static_cast<double>(report.dense_evaluations));
+  BOOST_TEST(!report.open);
+}
+
+BOOST_AUTO_TEST_CASE(noise_gives_closed_manifolds) {
+  // Independent signs at all grid points but the outermost: every pattern of cells and ambiguous faces.
+  for (const int magnitude : {1, 5}) {  // whole numbers from −magnitude: zeros and equal saddles as well
+    const int n = 20;
+    const shapes::Analytic noise([&](const Vec3& x) {
+      Eigen::Array3d place = (x.array() + 1.0) * (0.5 * (n - 1));
+      const Eigen::Array3i grid = place.round().cast<int>();
+      if ((grid == 0).any() || (grid == n - 1).any()) return 1.0;
+      Random random(3, static_cast<std::uint64_t>((grid[0] * n + grid[1]) * n + grid[2]));
+      return static_cast<double>(random.below(2 * magnitude + 1)) - magnitude;
+    });
+    const TriangleMesh mesh = extract(noise, n);
+    BOOST_TEST(mesh.triangles.rows() > 10000);
+    check_closed(mesh);
+    for (Index t = 0; t < mesh.triangles.rows(); ++t) {
+      const Vec3 a = mesh.vertices.row(mesh.triangles(t, 0)), b = mesh.vertices.row(mesh.triangles(t, 1)),
+                 c = mesh.vertices.row(mesh.triangles(t, 2));
+      BOOST_REQUIRE((b - a).cross(c - a).norm() > 0.0);
+    }
+  }
+}
+
+BOOST_AUTO_TEST_CASE(zeros_on_grid_points) {
+  // On 17 points a side the faces of this cube lie in grid planes, and so do the sphere's poles.
+  check_closed(extract(shapes::box(Vec3::Constant(0.5)), 17));
+  check_closed(extract(shapes::box(Vec3::Constant(0.5)), 65));
+  check_closed(extract(shapes::sphere(0.5), 65));
+}
+
+BOOST_AUTO_TEST_CASE(a_surface_that_leaves_the_cube_is_open_there) {
+  ExtractionReport report;
+  const TriangleMesh mesh = extract(shapes::sphere(0.8, Vec3(0.9, 0, 0)), 64, &report);
+  BOOST_TEST(report.open);
+  const Topology found = topology(mesh);
+  BOOST_TEST(found.inconsistent == 0);
+  BOOST_TEST(found.euler == 1);  // a disk
+  std::map<std::pair<int, int>, int> uses;
+  for (Index t = 0; t < mesh.triangles.rows(); ++t)
+    for (int c = 0; c < 3; ++c) {
+      const int a = mesh.triangles(t, c), b = mesh.triangles(t, (c + 1) % 3);
+      ++uses[{std::min(a, b), std::max(a, b)}];
+    }
+  for (const auto& [edge, count] : uses)
+    if (count == 1)
+      BOOST_REQUIRE((mesh.vertices(edge.first, 0) == 1.0 && mesh.vertices(edge.second, 0) == 1.0));
+}
+
+BOOST_AUTO_TEST_CASE(extraction_repeats_and_does_not_depend_on_threads) {
+  const auto shape = shapes::ball_and_box();
+  const TriangleMesh a = extract(shape, 80);
+  const ThreadScope one(1);
+  const TriangleMesh b = extract(shape, 80);
+  BOOST_TEST((a.vertices == b.vertices));
+  BOOST_TEST((a.triangles == b.triangles));
+}
+
+BOOST_AUTO_TEST_CASE(frame_cancel_and_bad_input) {
+  const auto shape = shapes::sphere(0.5);
+  const Frame frame{Vec3(1, 2, 3), 2.0};
+  const TriangleMesh moved = extract_surface(shape, frame, 40), plain = extract(shape, 40);
+  BOOST_TEST((moved.vertices - frame.to_mesh(plain.vertices)).norm() == 0.0);
+  BOOST_CHECK_THROW(extract(shape, 7), InvalidInput);
+  BOOST_CHECK_THROW(extract(shape, 513), InvalidInput);
+  BOOST_CHECK_THROW(extract(shapes::Analytic([](const Vec3&) { return 1.0; }), 64), InvalidInput);
+  BOOST_CHECK_THROW(extract(shapes::Analytic([](const Vec3& x) { return std::sqrt(x[0]); }), 64),
+                    InvalidInput);
+  Task task;
+  task.cancel();
+  BOOST_CHECK_THROW(extract_surface(shape, Frame(), 64, Progress(&task)), Cancelled);
+  Task watched;
+  extract_surface(shape, Frame(), 64, Progress(&watched));
+  BOOST_TEST(watched.progress() == 1.0);
+}
+
+BOOST_AUTO_TEST_SUITE_END()
