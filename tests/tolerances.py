@@ -45,3 +45,7 @@ RIGID_INVARIANCE = 1e-10
 # Slopes of whole losses: eighth-order differences with step 5e-3 of a function with kinks in its third
 # derivative (barrier, fall-off), relative.
 LOSS_GRADIENT = 1e-6
+# Vertices of marching cubes against scikit-image's in the cube: rounding of float32 grids.
+SAME_VERTICES = 1e-6
+# |Φ| at samples of the surface, in cube units.
+ON_SURFACE = 1e-4
