@@ -28,7 +28,7 @@ def made(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("verb", ["", "fit", "sample", "deform", "stylize", "warp", "grid"])
+@pytest.mark.parametrize("verb", ["", "fit", "sample", "deform", "stylize", "extract", "warp", "grid"])
 def test_help_has_examples(verb, capsys):
     assert run(*([verb] if verb else []), "--help") == 0
     text = capsys.readouterr().out
@@ -88,6 +88,18 @@ def test_deformed_samples_follow_the_field(made, tmp_path):
     tangent = np.cross(rest["normals"], [0.3, 0.5, 0.8])
     image = np.einsum("nij,nj->ni", field.jacobian(rest["points"]), tangent)
     assert np.abs(np.sum(image * moved["normals"], 1)).max() < 1e-9
+
+
+def test_deform_writes_mesh_surface_field_and_report(made, tmp_path):
+    outputs = ["--save-field", tmp_path / "field.npz", "--surface", tmp_path / "surface.ply"]
+    outputs += ["--report", tmp_path / "report.json", "--resolution", "24"]
+    assert run("deform", made / "sdf.npz", *outputs, *HELD_AND_SHIFTED, *SMALL_SOLVE, "--quiet") == 0
+    field = af.DeformationField.load(tmp_path / "field.npz")
+    vertices, _ = af.extract_surface(af.NeuralSdf.load(made / "sdf.npz"), resolution=24)
+    written = trimesh.load(tmp_path / "surface.ply", process=False)
+    assert np.asarray(written.vertices) == pytest.approx(field(vertices), abs=1e-5)
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert report["iterations"] == 15 and report["stretch"] == pytest.approx(field.report["stretch"])
 
 
 def test_flags_and_handle_file_mean_the_same(made, tmp_path):
@@ -163,7 +175,10 @@ def test_stylize_by_name_and_by_normals(made, tmp_path):
     assert results == pytest.approx([results[0]] * 3, rel=1e-4)
 
 
-def test_grid(made, tmp_path):
+def test_extract_and_grid(made, tmp_path):
+    assert run("extract", made / "sdf.npz", "-o", tmp_path / "s.stl", "--resolution", "24", "--quiet") == 0
+    vertices, triangles = files.read_mesh(tmp_path / "s.stl")
+    assert len(triangles) > 100 and np.abs(vertices).max() < 1.3
     assert run("grid", made / "sdf.npz", "-o", tmp_path / "grid.npz", "--resolution", "16", "--quiet") == 0
     grid = np.load(tmp_path / "grid.npz")
     assert grid["values"].shape == (17, 17, 17)
@@ -185,10 +200,12 @@ def test_real_meshes(name, data_dir, tmp_path):
     )
     assert run("sample", mesh, "-o", tmp_path / "points.ply", "--count", "500", "--quiet") == 0
     assert run("fit", mesh, "-o", tmp_path / "sdf.npz", "--quiet", *SMALL_FIT) == 0
+    extraction = ["-o", tmp_path / "surface.ply", "--resolution", "24", "--quiet"]
+    assert run("extract", tmp_path / "sdf.npz", *extraction) == 0
     v, f = files.read_mesh(moved)
     assert v.shape == vertices.shape and np.array_equal(f, triangles)
     assert sorted(path.name for path in tmp_path.iterdir()) == [
-        "moved.ply", "points.ply", "sdf.npz", "styled.ply"
+        "moved.ply", "points.ply", "sdf.npz", "styled.ply", "surface.ply"
     ]  # fmt: skip
 
 

@@ -13,7 +13,8 @@ VERBS = {
     "fit": ["--output", "out.npz"],
     "sample": ["--output", "out.ply"],
     "deform": ["--output", "out.obj", "--save-field", "field.npz", *HELD_AND_SHIFTED],
-    "stylize": ["--save-field", "out.npz", "--style", "cube"],
+    "stylize": ["--surface", "out.stl", "--style", "cube"],
+    "extract": ["--output", "out.ply"],
     "grid": ["--output", "out.npz"],
 }
 
@@ -48,7 +49,7 @@ def test_bad_files_are_named(verb, folder, data_dir, capsys):
     assert contents(folder) == before
 
 
-@pytest.mark.parametrize("verb", ["fit", "sample", "deform", "grid"])
+@pytest.mark.parametrize("verb", ["fit", "sample", "deform", "extract", "grid"])
 @pytest.mark.parametrize(
     "output", ["missing/out{}", "out.xyzw", "folder{}", "noextension"], ids=lambda name: name[:4]
 )

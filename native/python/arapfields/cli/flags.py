@@ -11,8 +11,10 @@ def solve_flags(parser):
     parser.add_argument("input", help=SOURCE)
     outputs = parser.add_argument_group("outputs (one or more)")
     outputs.add_argument("-o", "--output", metavar="FILE", help="the input mesh with its vertices moved")
+    outputs.add_argument("--surface", metavar="FILE", help="the implicit surface, extracted and moved")
     outputs.add_argument("--save-field", metavar="FILE", help=".npz with the deformation field")
     report_flag(outputs)
+    resolution_flag(parser)
     parser.add_argument(
         "--samples", type=int, default=20000, metavar="N", help="surface samples the energy sees [20000]"
     )

@@ -35,7 +35,7 @@ def _parser():
     )
     parser.add_argument("--version", action="version", version=f"arapfields {af.__version__}")
     added = parser.add_subparsers(dest="verb", metavar="VERB", required=True, parser_class=OneLineParser)
-    for add in (_fit, _sample, _deform, _stylize, _warp, _grid):
+    for add in (_fit, _sample, _deform, _stylize, _extract, _warp, _grid):
         verb = add(added)
         verb.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
     return parser
@@ -98,7 +98,7 @@ def _deform(added):
         "spot.obj -o bent.obj --box -inf,-inf,-inf inf,-0.2,inf --point 0,0.9,-0.4 0.3,1.0,-0.4",
         "bunny.off -o turned.ply --save-field field.npz --box -inf,-inf,-inf inf,0.06,inf \\\n"
         "      --box -inf,0.14,-inf inf,inf,inf --turn 0,1,0 40 --iterations 200",
-        "spot.npz --save-field bend.npz --handles pose.json --exact-handles",
+        "spot.npz --surface bent.ply --resolution 192 --handles pose.json --exact-handles",
     )
     solve_flags(parser)
     add_option_flags(parser, af.DeformOptions, "deformation")
@@ -112,7 +112,7 @@ def _stylize(added):
         verbs.stylize,
         "turn a shape's normals to those of a style",
         "spot.obj -o cubic.obj --style cube --strength 0.8",
-        "spot.obj -o crystal.ply --normals gem.stl",
+        "spot.npz --surface crystal.ply --normals gem.stl",
     )
     solve_flags(parser)
     style = parser.add_mutually_exclusive_group(required=True)
@@ -124,6 +124,22 @@ def _stylize(added):
         "--style-turn", nargs=2, metavar=("AXIS", "DEGREES"), help="turns the style's normals"
     )
     add_option_flags(parser, af.StylizeOptions, "stylization")
+    return parser
+
+
+def _extract(added):
+    parser = _verb(
+        added,
+        "extract",
+        verbs.extract,
+        "triangles of an implicit surface",
+        "spot.npz -o spot.ply --resolution 256",
+        "spot.npz -o bent.stl --deformed-by field.npz",
+    )
+    parser.add_argument("input", help=SOURCE + " (a mesh is fitted first)")
+    parser.add_argument("-o", "--output", required=True, metavar="FILE", help=MESH)
+    parser.add_argument("--deformed-by", metavar="FIELD", help="move the surface by a saved field")
+    resolution_flag(parser)
     return parser
 
 

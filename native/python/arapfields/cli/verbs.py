@@ -72,6 +72,17 @@ def stylize(args):
     _solve(args, solve, options.seed, needs_handles=False)
 
 
+def extract(args):
+    with Outputs() as outputs:
+        output = outputs.check(args.output, files.MESH_SUFFIXES, "--output")
+        field = files.read_field(args.deformed_by) if args.deformed_by else None
+        vertices, triangles = _extracted(_Source(args).sdf(), args)
+        if field is not None:
+            vertices = field(vertices)
+        outputs.write(output, lambda path: files.write_mesh(path, vertices, triangles))
+    _summary(args, f"wrote {len(vertices)} vertices and {len(triangles)} triangles to {args.output}")
+
+
 def warp(args):
     with Outputs() as outputs:
         output = outputs.check(args.output, files.MESH_SUFFIXES, "--output")
@@ -125,6 +136,12 @@ def _samples(source, count, seed, args):
     )
 
 
+def _extracted(sdf, args):
+    return with_progress(
+        "extract", lambda task: af.extract_surface(sdf, resolution=args.resolution, task=task), args.quiet
+    )
+
+
 def _solve(args, solve, seed, needs_handles):
     """What deform and stylize share."""
     with Outputs() as outputs:
@@ -132,17 +149,18 @@ def _solve(args, solve, seed, needs_handles):
             flag: outputs.check(path, suffixes, flag)
             for flag, path, suffixes in (
                 ("--output", args.output, files.MESH_SUFFIXES),
+                ("--surface", args.surface, files.MESH_SUFFIXES),
                 ("--save-field", args.save_field, files.STATE_SUFFIXES),
             )
             if path is not None
         }
         if not places:
-            raise af.InvalidInput("no output: give --output or --save-field")
+            raise af.InvalidInput("no output: give --output, --surface or --save-field")
         report = _report_place(outputs, args)
         described = (read_handles(args.handles) if args.handles else []) + (args.flagged or [])
         source = _Source(args)
         if source.mesh is None and "--output" in places:
-            raise af.InvalidInput(f"--output: {source.path} holds no mesh to move; use --save-field")
+            raise af.InvalidInput(f"--output: {source.path} holds no mesh to move; use --surface")
         samples = _samples(source, args.samples, seed, args)
         points = samples.points
         bounds = np.array([points.min(0), points.max(0)])
@@ -152,6 +170,11 @@ def _solve(args, solve, seed, needs_handles):
             outputs.write(
                 places["--output"],
                 lambda path: files.write_moved_mesh(path, source.path, source.mesh, field),
+            )
+        if "--surface" in places:
+            vertices, triangles = _extracted(source.sdf(), args)
+            outputs.write(
+                places["--surface"], lambda path: files.write_mesh(path, field(vertices), triangles)
             )
         if "--save-field" in places:
             outputs.write(places["--save-field"], field.save)
