@@ -66,6 +66,9 @@ def read_mesh(path):
         raise InvalidInput(f"{path}: vertex {first} is NaN or infinite; coordinates must be finite")
     if triangles.min() < 0 or triangles.max() >= len(vertices):
         raise InvalidInput(f"{path}: a face names a vertex beyond the {len(vertices)} there are")
+    corners = vertices[triangles]
+    if not np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).any():
+        raise InvalidInput(f"{path}: all faces are degenerate; there is no surface")
     if path.suffix.lower() == ".stl":
         vertices, triangles = _merged(vertices, triangles)
     return vertices, triangles.astype(np.int32)
@@ -167,6 +170,4 @@ def _face_normals(path):
             raise InvalidInput(
                 f"{path}: has over {MOST_PREFERRED} distinct face normals; a simpler mesh is needed"
             )
-    if len(distinct) == 0:
-        raise InvalidInput(f"{path}: all faces are degenerate; they have no normals")
     return distinct

@@ -14,7 +14,7 @@ def solve_flags(parser):
     outputs.add_argument("--surface", metavar="FILE", help="the implicit surface, extracted and moved")
     outputs.add_argument("--save-field", metavar="FILE", help=".npz with the deformation field")
     report_flag(outputs)
-    resolution_flag(parser)
+    resolution_flag(parser, "grid points")
     parser.add_argument(
         "--samples", type=int, default=20000, metavar="N", help="surface samples the energy sees [20000]"
     )
@@ -62,9 +62,9 @@ def solve_flags(parser):
     )
 
 
-def resolution_flag(parser):
+def resolution_flag(parser, unit):
     parser.add_argument(
-        "--resolution", type=int, default=128, metavar="N", help="cells along an edge of the cube [128]"
+        "--resolution", type=int, default=128, metavar="N", help=f"{unit} along an edge of the cube [128]"
     )
 
 

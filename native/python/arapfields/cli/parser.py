@@ -139,7 +139,7 @@ def _extract(added):
     parser.add_argument("input", help=SOURCE + " (a mesh is fitted first)")
     parser.add_argument("-o", "--output", required=True, metavar="FILE", help=MESH)
     parser.add_argument("--deformed-by", metavar="FIELD", help="move the surface by a saved field")
-    resolution_flag(parser)
+    resolution_flag(parser, "grid points")
     return parser
 
 
@@ -174,5 +174,5 @@ def _grid(added):
         metavar="FILE",
         help=".npz (values, origin, spacing), or .vdb where Blender's openvdb module is found",
     )
-    resolution_flag(parser)
+    resolution_flag(parser, "cells")
     return parser

@@ -84,7 +84,9 @@ class Outputs:
         if not path.parent.is_dir():
             raise InvalidInput(f"{flag}: {path} cannot be made; there is no directory {path.parent}")
         if not os.access(path.parent, os.W_OK):
-            raise InvalidInput(f"{flag}: {path} cannot be made; the directory {path.parent} cannot be written to")
+            raise InvalidInput(
+                f"{flag}: {path} cannot be made; the directory {path.parent} cannot be written to"
+            )
         return path
 
     def write(self, path, writer):

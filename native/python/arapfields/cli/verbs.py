@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What each verb does: read, check the outputs' places, compute, write."""
 
+import argparse
 import json
 import sys
 
@@ -63,7 +64,7 @@ def stylize(args):
         try:
             turn = {"axis": triple(args.style_turn[0]), "degrees": float(args.style_turn[1])}
             normals = normals @ rotation(turn).T
-        except Exception as error:
+        except (ValueError, argparse.ArgumentTypeError) as error:
             raise af.InvalidInput(f"--style-turn: expected AXIS as x,y,z and DEGREES ({error})") from error
 
     def solve(samples, handles, task):
