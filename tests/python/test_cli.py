@@ -176,9 +176,10 @@ def test_stylize_by_name_and_by_normals(made, tmp_path):
 
 
 def test_extract_and_grid(made, tmp_path):
-    assert run("extract", made / "sdf.npz", "-o", tmp_path / "s.stl", "--resolution", "24", "--quiet") == 0
-    vertices, triangles = files.read_mesh(tmp_path / "s.stl")
-    assert len(triangles) > 100 and np.abs(vertices).max() < 1.3
+    assert run("extract", made / "sdf.npz", "-o", tmp_path / "s.ply", "--resolution", "24", "--quiet") == 0
+    vertices, triangles = files.read_mesh(tmp_path / "s.ply")
+    expected = af.extract_surface(af.NeuralSdf.load(made / "sdf.npz"), resolution=24)
+    assert np.array_equal(triangles, expected[1]) and vertices == pytest.approx(expected[0], abs=1e-6)
     assert run("grid", made / "sdf.npz", "-o", tmp_path / "grid.npz", "--resolution", "16", "--quiet") == 0
     grid = np.load(tmp_path / "grid.npz")
     assert grid["values"].shape == (17, 17, 17)
