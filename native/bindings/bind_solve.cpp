@@ -71,6 +71,7 @@ void bind_options(py::module_& module) {
       .field("field", &DeformOptions::field,
              "'neural': a network trained by Adam. 'radial': bumps, solved directly at interactive rates.")
       .field("start", &DeformOptions::start, "What the network refines: 'identity' or the 'radial' result.")
+      .field("bumps", &DeformOptions::bumps, "Fine bumps of a radial field; a fifth of coarse ones is added.")
       .field("iterations", &DeformOptions::iterations, "Steps of the optimization.")
       .field("batch", &DeformOptions::batch, "Surface samples a step.")
       .field("bending", &DeformOptions::bending, "λ_bend, the weight of the bend against the stretch.")
@@ -83,7 +84,10 @@ void bind_options(py::module_& module) {
       .field("barrier_threshold", &DeformOptions::barrier_threshold, "det J below which the barrier acts.")
       .field("invertibility", &DeformOptions::invertibility,
              "Weight of the cycle loss with an inverse trained along, which penalises folds; 0: none.")
-      .field("learning_rate", &DeformOptions::learning_rate, "Adam's, before its schedule.")
+      .field("optimizer", &DeformOptions::optimizer,
+             "'orthogonal': orthogonalised momentum, which needs about a third of the steps; or 'adam'.")
+      .field("learning_rate", &DeformOptions::learning_rate,
+             "At its peak; 0: 0.03 for orthogonal, 0.002 for adam.")
       .field("width", &DeformOptions::width, "Units of a hidden layer.")
       .field("layers", &DeformOptions::layers, "Hidden layers.")
       .field("octaves", &DeformOptions::octaves, "Octaves of the positional encoding.")
@@ -107,7 +111,10 @@ void bind_options(py::module_& module) {
       .field("handle_batch", &StylizeOptions::handle_batch, "Most samples of each handle a step.")
       .field("barrier", &StylizeOptions::barrier, "Weight of the barrier that keeps det J up; 0: none.")
       .field("barrier_threshold", &StylizeOptions::barrier_threshold, "det J below which the barrier acts.")
-      .field("learning_rate", &StylizeOptions::learning_rate, "Adam's, before its schedule.")
+      .field("optimizer", &StylizeOptions::optimizer,
+             "'orthogonal': orthogonalised momentum, which needs about a third of the steps; or 'adam'.")
+      .field("learning_rate", &StylizeOptions::learning_rate,
+             "At its peak; 0: 0.03 for orthogonal, 0.002 for adam.")
       .field("width", &StylizeOptions::width, "Units of a hidden layer.")
       .field("layers", &StylizeOptions::layers, "Hidden layers.")
       .field("octaves", &StylizeOptions::octaves, "Octaves of the positional encoding.")

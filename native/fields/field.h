@@ -11,6 +11,8 @@ class Tensor;
 
 namespace arapfields {
 
+class Mlp;
+
 /// A deformation f: R³ → R³ of the unit cube's space that knows its jets: all that energies, extraction and
 /// results ask of it. The frame says where the cube lies in mesh coordinates.
 class DeformationField {
@@ -41,6 +43,9 @@ class TrainableField : public DeformationField {
   /// All parameters, and their gradient, as one contiguous vector (p).
   virtual at::Tensor& parameters() = 0;
   virtual at::Tensor& gradient() = 0;
+  /// The network that holds the parameters, for optimizers that treat its weight matrices as matrices; null
+  /// where there is none.
+  virtual Mlp* network() { return nullptr; }
 };
 
 }  // namespace arapfields

@@ -32,6 +32,7 @@ class NeuralField final : public TrainableField {
   void pull_back(const at::Tensor& cotangents) override;
   at::Tensor& parameters() override { return network_.parameters(); }
   at::Tensor& gradient() override { return network_.gradient(); }
+  Mlp* network() override { return &network_; }
 
   /// Adds an offset to Ψ, by the output layer's bias.
   void translate(const Vec3& offset);

@@ -4,40 +4,13 @@
 #include <ATen/ATen.h>
 
 #include <algorithm>
-#include <numeric>
 
 #include "energies/arap.h"
 #include "energies/distortion.h"
+#include "fields/radial_basis.h"
 
 namespace arapfields {
 namespace {
-
-/// Interleaves the bits of the three coordinates' cells of the cube [-1,1]³, 21 bits each.
-std::uint64_t morton_code(const Vec3& point) {
-  std::uint64_t code = 0;
-  for (int i = 0; i < 3; ++i) {
-    const double unit = std::clamp(0.5 * (point[i] + 1.0), 0.0, 1.0);
-    std::uint64_t bits = static_cast<std::uint64_t>(unit * 2097151.0);
-    bits = (bits | bits << 32) & 0x1f00000000ffffULL;
-    bits = (bits | bits << 16) & 0x1f0000ff0000ffULL;
-    bits = (bits | bits << 8) & 0x100f00f00f00f00fULL;
-    bits = (bits | bits << 4) & 0x10c30c30c30c30c3ULL;
-    bits = (bits | bits << 2) & 0x1249249249249249ULL;
-    code |= bits << i;
-  }
-  return code;
-}
-
-std::vector<Index> morton_order(PointsIn points) {
-  std::vector<std::uint64_t> codes(static_cast<std::size_t>(points.rows()));
-  for (std::size_t i = 0; i < codes.size(); ++i) codes[i] = morton_code(points.row(static_cast<Index>(i)));
-  std::vector<Index> order(codes.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) {
-    return codes[static_cast<std::size_t>(a)] < codes[static_cast<std::size_t>(b)];
-  });
-  return order;
-}
 
 template <class Scalar>
 at::Tensor to_tensor(const PointsOf<Scalar>& points, const at::Tensor& like) {
@@ -68,7 +41,7 @@ struct HostJets {
 }  // namespace
 
 FieldObjective::FieldObjective(const SurfaceSamples& samples, ObjectiveTerms terms)
-    : samples_(samples), terms_(std::move(terms)), order_(morton_order(samples.points)) {}
+    : samples_(samples), terms_(std::move(terms)), order_(spatial_order(samples.points)) {}
 
 double FieldObjective::accumulate(TrainableField& field, Random& random) {
   return field.parameters().scalar_type() == at::kDouble ? accumulate_as<double>(field, random)

@@ -6,7 +6,7 @@
 #include "energies/gauss.h"
 #include "energies/handles.h"
 #include "mesh/surface_samples.h"
-#include "solve/adam_loop.h"
+#include "solve/training_loop.h"
 
 namespace arapfields {
 
@@ -24,9 +24,9 @@ struct ObjectiveTerms {
   Index handle_batch = 256;
 };
 
-/// Estimates the terms on random subsets of the samples: the samples are put in Morton order and one is drawn
-/// from each of `batch` equal stretches of it, which covers the surface more evenly than independent draws.
-/// Jets are of the lowest order that the terms allow; handles need values alone.
+/// Estimates the terms on random subsets of the samples: the samples are put in spatial order and one is
+/// drawn from each of `batch` equal stretches of it, which covers the surface more evenly than independent
+/// draws. Jets are of the lowest order that the terms allow; handles need values alone.
 class FieldObjective final : public Objective {
  public:
   FieldObjective(const SurfaceSamples& samples, ObjectiveTerms terms);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "solve/live_solver.h"
 
-#include <chrono>
 #include <cmath>
 #include <string>
 
@@ -21,16 +20,6 @@ constexpr double anchor_weight = 1.0;
 /// Samples × bumps below which a step takes about a millisecond: waking other threads, which may be busy with
 /// drawing, would cost more than they do.
 constexpr Index worth_threads = 1000000;
-
-class Stopwatch {
- public:
-  double seconds() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
-};
 
 template <class Number>
 void require_range(const char* name, Number value, double low, double high) {

@@ -39,7 +39,9 @@ void validate_common(const Options& o) {
   not_negative("handle_weight", o.handle_weight);
   not_negative("barrier", o.barrier);
   positive("barrier_threshold", o.barrier_threshold);
-  positive("learning_rate", o.learning_rate);
+  not_negative("learning_rate", o.learning_rate);
+  require(o.optimizer == "orthogonal" || o.optimizer == "adam", "optimizer", "'" + o.optimizer + "'",
+          "'orthogonal' or 'adam' is allowed");
   not_negative("time_budget", o.time_budget);
   in_range("threads", o.threads, 0, 1024);
   resolve_device(o.device);
@@ -53,7 +55,15 @@ void DeformOptions::validate() const {
   require(start == "identity" || start == "radial", "start", "'" + start + "'",
           "'identity' or 'radial' is allowed");
   validate_common(*this);
+  in_range("bumps", bumps, 5, 3000);
   positive("margin", margin);
+  const bool radial = field == "radial";
+  require(!(radial && exact_handles), "exact_handles", "True with field='radial'",
+          "they need field='neural'");
+  require(!(radial && barrier > 0.0), "barrier", text(barrier) + " with field='radial'",
+          "it needs field='neural'");
+  require(!(radial && invertibility > 0.0), "invertibility", text(invertibility) + " with field='radial'",
+          "it needs field='neural'");
   not_negative("invertibility", invertibility);
 }
 

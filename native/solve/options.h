@@ -12,6 +12,7 @@ namespace arapfields {
 struct DeformOptions {
   std::string field = "neural";    ///< "neural" or "radial"
   std::string start = "identity";  ///< neural: what the network refines, "identity" or "radial"
+  int bumps = 300;                 ///< fine bumps of a radial field, to which a fifth of coarse ones is added
   int iterations = 300;
   int batch = 300;             ///< surface samples an iteration
   double bending = 0.01;       ///< λ_bend
@@ -21,8 +22,9 @@ struct DeformOptions {
   double margin = 0.1;         ///< width of the exact handles' fall-off
   double barrier = 0.0;        ///< weight of the barrier against folds
   double barrier_threshold = 0.1;
-  double invertibility = 0.0;  ///< weight of the cycle loss with an inverse that is trained along
-  double learning_rate = 1e-3;
+  double invertibility = 0.0;            ///< weight of the cycle loss with an inverse that is trained along
+  std::string optimizer = "orthogonal";  ///< or "adam"
+  double learning_rate = 0.0;            ///< at its peak; 0: 0.03 for orthogonal, 0.002 for adam
   int width = 256, layers = 4, octaves = 4;
   double frequency = 1.0, sharpness = 30.0;
   double time_budget = 0.0;  ///< seconds; 0: none
@@ -47,7 +49,8 @@ struct StylizeOptions {
   int handle_batch = 256;
   double barrier = 10.0;
   double barrier_threshold = 0.2;
-  double learning_rate = 1e-3;
+  std::string optimizer = "orthogonal";  ///< or "adam"
+  double learning_rate = 0.0;            ///< at its peak; 0: 0.03 for orthogonal, 0.002 for adam
   int width = 256, layers = 4, octaves = 4;
   double frequency = 1.0, softplus_sharpness = 30.0;
   double time_budget = 0.0;

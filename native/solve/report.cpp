@@ -67,23 +67,28 @@ SolveReport measure(const DeformationField& field, const SurfaceSamples& samples
   return report;
 }
 
+Solution measured(std::shared_ptr<DeformationField> field, const SurfaceSamples& samples,
+                  const ObjectiveTerms& terms, LoopResult loop) {
+  Solution solution{std::move(field), {}};
+  solution.report = measure(*solution.field, samples, terms);
+  solution.report.loop = std::move(loop);
+  return solution;
+}
+
 Solution solve_field(std::shared_ptr<TrainableField> field, const SurfaceSamples& samples,
                      ObjectiveTerms terms, const LoopOptions& options, const Progress& progress) {
   field->set_frame(samples.frame);
   field->set_rest_points(samples.points.topRows(std::min(samples.size(), kept_rest_points)));
   FieldObjective objective(samples, std::move(terms));
-  Solution solution{field, {}};
   try {
-    const LoopResult loop = minimise(*field, objective, options, progress.part(0.0, 0.95));
+    LoopResult loop = minimise(*field, objective, options, progress.part(0.0, 0.95));
     progress.report(0.95, "measuring the result");
-    solution.report = measure(*field, samples, objective.terms());
-    solution.report.loop = loop;
+    Solution solution = measured(field, samples, objective.terms(), std::move(loop));
+    progress.report(1.0, options.stage + ": done");
+    return solution;
   } catch (const Diverged& cause) {
-    solution.report = measure(*field, samples, objective.terms());
-    throw SolveDiverged(cause, solution);
+    throw SolveDiverged(cause, measured(field, samples, objective.terms(), {}));
   }
-  progress.report(1.0, options.stage + ": done");
-  return solution;
 }
 
 }  // namespace arapfields

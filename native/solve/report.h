@@ -6,8 +6,8 @@
 
 #include "energies/arap.h"
 #include "energies/distortion.h"
-#include "solve/adam_loop.h"
 #include "solve/field_objective.h"
+#include "solve/training_loop.h"
 
 namespace arapfields {
 
@@ -39,6 +39,10 @@ class SolveDiverged : public Diverged {
 /// `max_samples` of the samples, evenly spread in their order.
 SolveReport measure(const DeformationField& field, const SurfaceSamples& samples, const ObjectiveTerms& terms,
                     Index max_samples = 4000);
+
+/// A report on a field that another solver made.
+Solution measured(std::shared_ptr<DeformationField> field, const SurfaceSamples& samples,
+                  const ObjectiveTerms& terms, LoopResult loop);
 
 /// Runs the loop, measures the result, and turns Diverged into SolveDiverged.
 Solution solve_field(std::shared_ptr<TrainableField> field, const SurfaceSamples& samples,

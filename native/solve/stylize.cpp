@@ -65,6 +65,7 @@ Solution stylize(const SurfaceSamples& samples, PointsIn preferred, const Styliz
   LoopOptions loop;
   loop.stage = "stylize";
   loop.iterations = terms.gauss == 0.0 && handles.empty() ? 0 : options.iterations;
+  loop.optimizer = options.optimizer;
   loop.learning_rate = options.learning_rate;
   loop.time_budget = options.time_budget;
   loop.seed = seed;

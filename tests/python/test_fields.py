@@ -14,7 +14,7 @@ def samples():
     return cases.bar_samples()
 
 
-QUICK = dict(width=32, layers=3, learning_rate=5e-3, iterations=60, batch=100, handle_batch=50)
+QUICK = dict(width=32, layers=3, iterations=60, batch=100, handle_batch=50)
 
 
 @pytest.fixture(scope="module")
@@ -25,6 +25,13 @@ def bent(samples):
 @pytest.fixture(scope="module")
 def exact(samples):
     return af.deform(samples, cases.bar_handles(), af.DeformOptions(exact_handles=True, **QUICK))
+
+
+@pytest.fixture(scope="module")
+def refined(samples):
+    """A network on a radial field, between exact handles."""
+    options = af.DeformOptions(start="radial", bumps=60, exact_handles=True, **QUICK)
+    return af.deform(samples, cases.bar_handles(), options)
 
 
 def differences(function, points, step=2e-3):
@@ -38,7 +45,7 @@ def differences(function, points, step=2e-3):
     return np.stack(columns, -1)
 
 
-@pytest.mark.parametrize("kind", ["bent", "exact"])
+@pytest.mark.parametrize("kind", ["bent", "exact", "refined"])
 def test_derivatives_against_differences(kind, samples, request):
     field = request.getfixturevalue(kind)
     points = samples.points[:40] * 0.97
@@ -83,7 +90,7 @@ def test_inverse_reports_what_it_cannot_find(bent):
     assert np.isnan(unreachable).all()
 
 
-@pytest.mark.parametrize("kind", ["bent", "exact"])
+@pytest.mark.parametrize("kind", ["bent", "exact", "refined"])
 def test_files_round_trip(kind, request, tmp_path, samples):
     field = request.getfixturevalue(kind)
     field.save(tmp_path / "field.npz")

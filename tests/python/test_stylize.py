@@ -10,7 +10,7 @@ import arapfields as af
 
 
 def quick(**changes):
-    settings = dict(width=48, layers=3, learning_rate=5e-3, iterations=80, batch=200)
+    settings = dict(width=48, layers=3, iterations=80, batch=200)
     return af.StylizeOptions(**(settings | changes))
 
 

@@ -1,51 +1,51 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/adam_loop.h"
+#include "solve/training_loop.h"
 
 #include <ATen/ATen.h>
 
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <optional>
+
+#include "neural/orthogonal_step.h"
+#include "solve/setup.h"
 
 namespace arapfields {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
-
-double rate(const LoopOptions& options, double done, int iteration) {
-  const double warm = options.warm_up > 0 ? std::min(1.0, (iteration + 1.0) / options.warm_up) : 1.0;
+double rate(const LoopOptions& options, double peak, double done) {
   const double falling = std::clamp((done - options.hold) / std::max(1e-9, 1.0 - options.hold), 0.0, 1.0);
   const double share = 0.5 * (1.0 + std::cos(std::numbers::pi * falling));
-  return warm * options.learning_rate * (options.final_share + (1.0 - options.final_share) * share);
+  return peak * (options.final_share + (1.0 - options.final_share) * share);
 }
 
-class Adam {
+/// One of the two optimizers, with its default rate.
+class Stepper {
  public:
-  Adam(const at::Tensor& parameters, double first_decay, double second_decay)
-      : mean_(at::zeros_like(parameters)),
-        square_(at::zeros_like(parameters)),
-        first_decay_(first_decay),
-        second_decay_(second_decay) {}
-
-  void step(at::Tensor& parameters, const at::Tensor& gradient, double learning_rate) {
-    ++steps_;
-    mean_.mul_(first_decay_).add_(gradient, 1.0 - first_decay_);
-    square_.mul_(second_decay_).addcmul_(gradient, gradient, 1.0 - second_decay_);
-    const double correction = std::sqrt(1.0 - std::pow(second_decay_, steps_));
-    at::sqrt_out(scratch_, square_).add_(1e-8 * correction);
-    parameters.addcdiv_(mean_, scratch_,
-                        -learning_rate * correction / (1.0 - std::pow(first_decay_, steps_)));
+  Stepper(TrainableField& field, const LoopOptions& options) : field_(field), peak_(options.learning_rate) {
+    const AdamOptions adam{options.first_decay, options.second_decay, 1e-8};
+    if (options.optimizer == "orthogonal" && field.network() != nullptr) {
+      orthogonal_.emplace(*field.network(), OrthogonalOptions{options.momentum, 5, options.adam_share, adam});
+      if (peak_ == 0.0) peak_ = 0.03;
+    } else {
+      adam_.emplace(field.parameters(), adam);
+      if (peak_ == 0.0) peak_ = 0.002;
+    }
+  }
+  double peak() const { return peak_; }
+  void step(double learning_rate) {
+    if (orthogonal_)
+      orthogonal_->step(*field_.network(), learning_rate);
+    else
+      adam_->step(field_.parameters(), field_.gradient(), learning_rate);
   }
 
  private:
-  at::Tensor mean_, square_, scratch_ = at::empty_like(mean_);
-  double first_decay_, second_decay_;
-  int steps_ = 0;
+  TrainableField& field_;
+  double peak_;
+  std::optional<OrthogonalStep> orthogonal_;
+  std::optional<AdamStep> adam_;
 };
 
 std::string message(const LoopOptions& options, int done, double loss, double left) {
@@ -74,16 +74,16 @@ struct GoodState {
 LoopResult minimise(TrainableField& field, Objective& objective, const LoopOptions& options,
                     const Progress& progress, const LoopObserver& observer) {
   constexpr int snapshot_every = 10;
-  const auto begin = Clock::now();
+  const Stopwatch watch;
   const int history_every = std::max(1, options.iterations / 200);
   LoopResult result;
   Random random(options.seed, 0x5eed);
-  Adam adam(field.parameters(), options.first_decay, options.second_decay);
+  Stepper stepper(field, options);
   GoodState good{field.parameters().clone(), 0};
   double smooth = 0.0, reported = -1.0;
   for (int iteration = 0; iteration < options.iterations; ++iteration) {
     progress.check();
-    const double elapsed = seconds_since(begin);
+    const double elapsed = watch.seconds();
     double done = static_cast<double>(iteration) / options.iterations;
     if (options.time_budget > 0.0) {
       if (elapsed >= options.time_budget) {
@@ -101,7 +101,7 @@ LoopResult minimise(TrainableField& field, Objective& objective, const LoopOptio
       good.parameters.copy_(field.parameters());
       good.iteration = iteration;
     }
-    adam.step(field.parameters(), field.gradient(), rate(options, done, iteration));
+    stepper.step(rate(options, stepper.peak(), done));
     result.iterations = iteration + 1;
     if (elapsed - reported > 0.1) {
       reported = elapsed;
@@ -111,7 +111,7 @@ LoopResult minimise(TrainableField& field, Objective& objective, const LoopOptio
     if (observer) observer(iteration + 1);
   }
   if (!at::isfinite(field.parameters()).all().item<bool>()) diverge(field, good, options, result.iterations);
-  result.seconds = seconds_since(begin);
+  result.seconds = watch.seconds();
   progress.report(1.0);
   return result;
 }
