@@ -60,6 +60,9 @@ def build_wheel(options, version, headers, work):
     for module in modules:
         libraries.strip(module)
         libraries.make_private(module, {})
+        missing = libraries.missing_symbols(module, shipped[0])
+        if missing:
+            raise RuntimeError(f"{module.name} was built for another library: {missing[0]} is missing")
     foreign = libraries.foreign_needs([*shipped, *modules], [path.name for path in shipped])
     if foreign:
         raise RuntimeError(f"the libraries need what would not be shipped: {', '.join(foreign)}")

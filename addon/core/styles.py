@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Settings of the stylization, and the styles there are."""
 
+from dataclasses import replace
+
 from .parameters import BARRIER, LAYERS, OCTAVES, SAMPLES, SEED, TIME, WIDTH, Parameter
 
 STYLIZE = [
@@ -42,7 +44,7 @@ STYLIZE = [
     Parameter(
         "batch", 500, "Samples per Step", "Samples that each step looks at", 16, 100000, 4000, advanced=True
     ),
-    BARRIER,
+    replace(BARRIER, default=10.0),  # a style without it folds at its edges
     Parameter(
         "learning_rate",
         1e-3,

@@ -74,6 +74,18 @@ def foreign_needs(paths, bundled):
     return sorted(name for name in needs - set(bundled) if not system.match(name))
 
 
+def missing_symbols(module, library):
+    """Our symbols that the binding `module` asks for and `library` does not have."""
+
+    def names(path, which):
+        command = ["nm", "-D", which, "--format=posix", str(path)]
+        listed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        return {line.split()[0].split("@")[0] for line in listed.splitlines()}
+
+    wanted = {name for name in names(module, "--undefined-only") if "10arapfields" in name}
+    return sorted(wanted - names(library, "--defined-only"))
+
+
 def glibc_floor(paths):
     """The newest GLIBC_x.y version that any of the libraries asks for, as (x, y)."""
     floor = (2, 0)

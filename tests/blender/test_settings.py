@@ -3,9 +3,6 @@
 
 from inside import in_blender
 
-# Defaults that are the add-on's own, with the reason.
-OWN_DEFAULTS = set()
-
 
 @in_blender
 def test_names_and_defaults_are_the_librarys():
@@ -21,8 +18,7 @@ def test_names_and_defaults_are_the_librarys():
             if parameter.name in OURS:
                 continue
             assert parameter.name in type(options).fields, (name, parameter.name)
-            if (name, parameter.name) not in OWN_DEFAULTS:
-                assert getattr(options, parameter.name) == parameter.default, (name, parameter.name)
+            assert getattr(options, parameter.name) == parameter.default, (name, parameter.name)
 
 
 @in_blender

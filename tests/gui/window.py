@@ -26,7 +26,7 @@ import addon  # noqa: E402
 
 FOUND = {}
 LONG = {**scenes.QUICK, "iterations": 20000}
-TAB = (1590, 330)  # where the sidebar's last tab lies in a window of 1600 × 1000
+TAB = (1299, 340)  # where the sidebar's last tab lies in a window of 1600 × 1000
 
 
 def override():
@@ -146,6 +146,7 @@ def drive(sequence):
 
 
 def main():
+    bpy.context.preferences.view.show_splash = False
     OUTPUT.mkdir(parents=True, exist_ok=True)
     addon.register()
     sequence = steps()

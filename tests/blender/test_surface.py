@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The fitted surface inside Blender: fit, cache, extraction, and deforming the surface itself."""
+
+from inside import in_blender
+
+FIT = {"steps": 150, "width": 48, "layers": 2, "near_points": 20000}
+NEAR = 0.06  # of the bar's size: what so short a fit reaches
+
+
+@in_blender
+def test_a_fit_is_cached_and_goes_stale_with_the_mesh():
+    import json
+
+    import bpy
+    import scenes
+    from test_surface import FIT
+
+    from addon.bridge.settings import fit_cache
+    from addon.bridge.work import read_surface
+
+    fit_cache().clear()
+    bar = scenes.bar()
+    for name, value in FIT.items():
+        setattr(bar.arapfields.fit, name, value)
+    assert bpy.ops.arapfields.fit() == {"FINISHED"}
+    ours = bar.arapfields
+    assert fit_cache().path(ours.fit_key).exists() and fit_cache().size() > 0
+    assert json.loads(ours.fit_report)["near_mean"] < 0.05
+    assert read_surface(bpy.context, bar).is_cached
+    bar.location.x += 3  # where it is does not matter
+    assert read_surface(bpy.context, bar).key == ours.fit_key
+    bar.data.vertices[0].co.x += 0.1
+    assert not read_surface(bpy.context, bar).is_cached
+    bpy.ops.arapfields.clear_cache()
+    assert fit_cache().size() == 0
+
+
+@in_blender
+def test_extraction_lies_on_the_source_in_world_space():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_surface import FIT, NEAR
+
+    bar = scenes.bar()
+    bar.scale, bar.location, bar.rotation_euler = (1, -1, 1), (4, 5, 6), (0.3, 0.4, 0.5)
+    bar.data.materials.append(bpy.data.materials.new("skin"))
+    bpy.context.view_layer.update()
+    for name, value in FIT.items():
+        setattr(bar.arapfields.fit, name, value)
+    bpy.ops.arapfields.extract(resolution=48)
+    result = bpy.data.objects["Bar_implicit"]
+    made, source = scenes.world_points(result), scenes.world_points(bar)
+    assert len(result.data.polygons) > 500
+    assert np.abs(made.mean(axis=0) - source.mean(axis=0)).max() < NEAR
+    assert np.abs(np.ptp(made, axis=0) - np.ptp(source, axis=0)).max() < 4 * NEAR
+    assert [m.name for m in result.data.materials] == ["skin"]
+    centre = np.array(result.matrix_local.inverted() @ bar.location)
+    outward = [f.normal.dot(f.center) > 0 for f in result.data.polygons]
+    assert np.mean(outward) > 0.95 and np.abs(centre).max() < 1e-3
+
+
+@in_blender
+def test_the_surface_is_deformed_like_the_mesh():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_surface import FIT, NEAR
+
+    bar, _, moving = scenes.bar_with_handles()
+    for name, value in FIT.items():
+        setattr(bar.arapfields.fit, name, value)
+    moving.location.z += 0.4
+    settings = scenes.QUICK | {"iterations": 120, "learning_rate": 5e-3}
+    bpy.ops.arapfields.deform(output="SURFACE", resolution=48, **settings)
+    surface = bpy.context.view_layer.objects.active
+    scenes.activate(bar)
+    bpy.ops.arapfields.deform(output="WARP", surface="FIT", **settings)
+    warped = bpy.context.view_layer.objects.active
+    assert surface != warped
+    from mathutils.bvhtree import BVHTree
+
+    tree = BVHTree.FromObject(surface, bpy.context.evaluated_depsgraph_get())
+    off = [tree.find_nearest(v.co)[3] for v in warped.data.vertices]
+    assert np.mean(off) < NEAR
