@@ -32,7 +32,7 @@ void bind_distance(py::module_& module) {
         return run_long(task, [&](const Progress& progress) {
           const ThreadScope scope(threads);
           Vector numbers(p.rows());
-          SignedDistance(v, f).winding_number(p, numbers, progress);
+          SignedDistance(v, f, progress).winding_number(p, numbers, progress);
           return numbers;
         });
       },

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "core/errors.h"
 #include "core/parallel.h"
@@ -36,8 +35,9 @@ class Summarizer {
         packets_(packets),
         finished_(topology.subtrees.size()) {}
 
-  void run() {
+  void run(const Progress& progress) {
     parallel_jobs(static_cast<Index>(finished_.size()), [&](Index job) {
+      progress.check();
       const auto i = static_cast<std::size_t>(job);
       finished_[i] = node(topology_.subtrees[i]);
     });
@@ -102,22 +102,24 @@ class Summarizer {
 
 }  // namespace
 
-Hierarchy::Hierarchy(PointsIn vertices, TrianglesIn triangles) {
+Hierarchy::Hierarchy(PointsIn vertices, TrianglesIn triangles, const Progress& progress) {
   const Points used = used_vertices(vertices, triangles);
   const Vec3 low = used.colwise().minCoeff(), high = used.colwise().maxCoeff();
   require((high - low).allFinite(), "vertices", "their bounding box is too large for floating point",
           "its sides must be finite");
   center_ = 0.5 * low + 0.5 * high;
-  const double half = std::max((high - center_).maxCoeff(), std::numeric_limits<double>::min());
-  factor_ = std::ldexp(1.0, std::clamp(-std::ilogb(half) - 1, -1000, 1000));
+  const double half = (high - center_).maxCoeff();
+  if (half > 0.0) factor_ = std::ldexp(1.0, std::clamp(-std::ilogb(half) - 1, -1000, 1000));
   const Points normalized_vertices = (vertices.rowwise() - center_.transpose()) * factor_;
 
-  Topology topology = build_topology(normalized_vertices, triangles);
+  progress.check();
+  Topology topology = build_topology(normalized_vertices, triangles, progress);
   nodes_ = std::move(topology.nodes);
   moments_.resize(nodes_.size());
   packet_count_ = static_cast<std::int32_t>(topology.leaves.size());
   packets_.reset(new TrianglePacket[topology.leaves.size()]);
-  Summarizer(normalized_vertices, triangles, topology, nodes_.data(), moments_.data(), packets_.get()).run();
+  Summarizer(normalized_vertices, triangles, topology, nodes_.data(), moments_.data(), packets_.get())
+      .run(progress);
 }
 
 HierarchyView Hierarchy::view() const {

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "core/task.h"
 #include "core/types.h"
 #include "distance/hierarchy_layout.h"
 
@@ -16,7 +17,7 @@ namespace arapfields {
 class Hierarchy {
  public:
   /// The mesh must be valid (mesh/triangle_mesh.h). Throws InvalidInput where its extent is not finite.
-  Hierarchy(PointsIn vertices, TrianglesIn triangles);
+  Hierarchy(PointsIn vertices, TrianglesIn triangles, const Progress& progress = {});
 
   HierarchyView view() const;
   /// Mesh coordinates → the centred and scaled ones of the hierarchy; the factor is a power of two.

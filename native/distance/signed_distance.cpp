@@ -43,11 +43,12 @@ struct Block {
 void require_usable(PointsIn points, const Hierarchy& hierarchy) {
   for (Index i = 0; i < points.rows(); ++i) {
     const Vec3 p = points.row(i).transpose();
-    require(p.allFinite(), "points", "point " + std::to_string(i) + " is NaN or infinite",
-            "all coordinates must be finite");
-    require(hierarchy.normalized(p).cwiseAbs().maxCoeff() < farthest, "points",
-            "point " + std::to_string(i) + " is too far away",
-            "the distance must be below 1e90 times the mesh's size");
+    if (!p.allFinite())
+      throw InvalidInput("points", "point " + std::to_string(i) + " is NaN or infinite",
+                         "all coordinates must be finite");
+    if (!(hierarchy.normalized(p).cwiseAbs().maxCoeff() < farthest))
+      throw InvalidInput("points", "point " + std::to_string(i) + " is too far away",
+                         "the distance must be below 1e90 times the mesh's size");
   }
 }
 
@@ -140,9 +141,11 @@ struct SignedDistance::Parts {
   bool closed;
 };
 
-SignedDistance::SignedDistance(PointsIn vertices, TrianglesIn triangles) {
+SignedDistance::SignedDistance(PointsIn vertices, TrianglesIn triangles, const Progress& progress) {
   validate(vertices, triangles);
-  parts_.reset(new Parts{Hierarchy(vertices, triangles), arapfields::is_closed(vertices, triangles)});
+  progress.check();
+  parts_.reset(
+      new Parts{Hierarchy(vertices, triangles, progress), arapfields::is_closed(vertices, triangles)});
 }
 
 SignedDistance::~SignedDistance() = default;
@@ -221,7 +224,7 @@ Vector signed_distance(PointsIn vertices, TrianglesIn triangles, PointsIn points
                        const Progress& progress) {
   const ThreadScope scope(threads);
   Vector distances(points.rows());
-  SignedDistance(vertices, triangles).evaluate(points, distances, progress);
+  SignedDistance(vertices, triangles, progress).evaluate(points, distances, progress);
   return distances;
 }
 

@@ -22,8 +22,9 @@ struct ClosestPoints {
 /// Generalized Winding Numbers"; for that the soup may be open, self-intersecting and partly degenerate.
 class SignedDistance {
  public:
-  /// Builds the hierarchy; throws InvalidInput as validate(vertices, triangles) does.
-  SignedDistance(PointsIn vertices, TrianglesIn triangles);
+  /// Builds the hierarchy; throws InvalidInput as validate(vertices, triangles) does. `progress` is only
+  /// asked whether to stop.
+  SignedDistance(PointsIn vertices, TrianglesIn triangles, const Progress& progress = {});
   ~SignedDistance();
   SignedDistance(SignedDistance&&) noexcept;
 

@@ -27,9 +27,10 @@ Box outer_box(const Points& vertices, TrianglesIn triangles, Index t) {
 
 class Builder {
  public:
-  Builder(const Points& vertices, TrianglesIn triangles)
-      : primitives_(static_cast<std::size_t>(triangles.rows())) {
+  Builder(const Points& vertices, TrianglesIn triangles, const Progress& progress)
+      : primitives_(static_cast<std::size_t>(triangles.rows())), progress_(progress) {
     parallel_for(0, triangles.rows(), grain, [&](Index begin, Index end) {
+      progress.check();
       for (Index t = begin; t < end; ++t)
         primitives_[static_cast<std::size_t>(t)] = {outer_box(vertices, triangles, t),
                                                     static_cast<std::int32_t>(t)};
@@ -82,6 +83,7 @@ class Builder {
         if (part.size() > tree_width && (!widest || part.box.half_area() > widest->box.half_area()))
           widest = &part;
       if (widest == nullptr) break;
+      progress_.check();
       const auto [left, right] = split(primitives_, *widest);
       *widest = left;
       parts.push_back(right);
@@ -130,12 +132,13 @@ class Builder {
   }
 
   std::vector<Primitive> primitives_;
+  const Progress& progress_;
 };
 
 }  // namespace
 
-Topology build_topology(const Points& vertices, TrianglesIn triangles) {
-  return Builder(vertices, triangles).build();
+Topology build_topology(const Points& vertices, TrianglesIn triangles, const Progress& progress) {
+  return Builder(vertices, triangles, progress).build();
 }
 
 }  // namespace arapfields

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/task.h"
 #include "core/types.h"
 #include "distance/hierarchy_layout.h"
 
@@ -23,6 +24,6 @@ struct Topology {
 };
 
 /// Depends on the mesh alone, not on the thread count. Coordinates must fit single precision.
-Topology build_topology(const Points& vertices, TrianglesIn triangles);
+Topology build_topology(const Points& vertices, TrianglesIn triangles, const Progress& progress = {});
 
 }  // namespace arapfields

@@ -15,22 +15,26 @@ void validate(PointsIn vertices, TrianglesIn triangles) {
   require(triangles.rows() > 0, "triangles", "there are none", "a mesh needs at least one");
   require(triangles.rows() <= INT32_MAX, "triangles", std::to_string(triangles.rows()) + " of them",
           "at most " + std::to_string(INT32_MAX) + " are supported");
+  // Texts are made only where something is wrong: there are millions of vertices to look at.
   for (Index i = 0; i < vertices.rows(); ++i)
-    require(vertices.row(i).allFinite(), "vertices", "vertex " + std::to_string(i) + " is NaN or infinite",
-            "all coordinates must be finite");
+    if (!vertices.row(i).allFinite())
+      throw InvalidInput("vertices", "vertex " + std::to_string(i) + " is NaN or infinite",
+                         "all coordinates must be finite");
   const auto count = static_cast<std::int32_t>(vertices.rows());
   for (Index t = 0; t < triangles.rows(); ++t)
     for (int corner = 0; corner < 3; ++corner) {
       const std::int32_t index = triangles(t, corner);
-      require(index >= 0 && index < count, "triangles",
-              "triangle " + std::to_string(t) + " refers to vertex " + std::to_string(index),
-              "indices 0 to " + std::to_string(count - 1) + " exist");
+      if (index < 0 || index >= count)
+        throw InvalidInput("triangles",
+                           "triangle " + std::to_string(t) + " refers to vertex " + std::to_string(index),
+                           "indices 0 to " + std::to_string(count - 1) + " exist");
     }
 }
 
 Points used_vertices(PointsIn vertices, TrianglesIn triangles) {
   std::vector<char> used(static_cast<std::size_t>(vertices.rows()), 0);
-  for (Index i = 0; i < triangles.size(); ++i) used[static_cast<std::size_t>(triangles.data()[i])] = 1;
+  for (Index t = 0; t < triangles.rows(); ++t)
+    for (int k = 0; k < 3; ++k) used[static_cast<std::size_t>(triangles(t, k))] = 1;
   Points result(vertices.rows(), 3);
   Index count = 0;
   for (Index i = 0; i < vertices.rows(); ++i)

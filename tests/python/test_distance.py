@@ -146,6 +146,10 @@ def test_points_on_the_surface_and_no_points():
     assert np.allclose(far, [1e30, 1e12 - 1], rtol=1e-15)
 
 
+def test_a_mesh_without_extent_has_distances():
+    assert af.signed_distance([[1, 2, 3]], [[0, 0, 0]], [[1, 2, 5]]).tolist() == [2.0]
+
+
 def test_a_cancelled_task_stops_the_call():
     task = af.Task()
     v, f = meshes.sphere()
