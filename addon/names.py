@@ -24,6 +24,8 @@ class Op(StrEnum):
     DEFORM = "arapfields.deform"
     EXTRACT = "arapfields.extract"
     STYLIZE = "arapfields.stylize"
+    LIVE = "arapfields.live"
+    BAKE = "arapfields.bake"
     CANCEL = "arapfields.cancel"
     CLEAR_CACHE = "arapfields.clear_cache"
     COPY_REPORT = "arapfields.copy_report"

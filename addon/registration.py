@@ -5,12 +5,13 @@ import bpy
 
 from . import panels, preferences
 from .bridge import jobs
-from .operators import deform, extract, fit, handles, status, stylize
+from .bridge import live as live_mode
+from .operators import deform, extract, fit, handles, live, status, stylize
 from .properties import handle, item, settings
 
 MODULES = [
-    *(handle, settings, item, preferences, jobs),
-    *(fit, handles, deform, stylize, extract, status),
+    *(handle, settings, item, preferences, jobs, live_mode),
+    *(fit, handles, deform, live, stylize, extract, status),
     *panels.SECTIONS,
 ]
 

@@ -120,14 +120,31 @@ def warp_mesh(context, source, before, after):
             arrays.set_positions(copied, after)
         return copied
     bpy.data.meshes.remove(copied)
+    applied = shown_mesh(context, source, len(after))
+    arrays.set_positions(applied, after)
+    return applied
+
+
+def shown_mesh(context, source, count):
+    """A mesh of its own of what is shown of the source: modifiers and shape keys applied."""
     depsgraph = context.evaluated_depsgraph_get()
     evaluated = source.evaluated_get(depsgraph)
     applied = bpy.data.meshes.new_from_object(evaluated, preserve_all_data_layers=True, depsgraph=depsgraph)
-    if len(applied.vertices) != len(after):
+    if len(applied.vertices) != count:
         bpy.data.meshes.remove(applied)
         raise UserError(f"{source.name} changed while it was worked on; run again")
-    arrays.set_positions(applied, after)
     return applied
+
+
+def add_frames(item, frames, shapes):
+    """One shape key a frame, each at full value on its frame and at none on its neighbours."""
+    item.shape_key_add(name="Basis", from_mix=False)
+    for number, (frame, shape) in enumerate(zip(frames, shapes, strict=True)):
+        key = item.shape_key_add(name=f"frame {frame}", from_mix=False)
+        key.data.foreach_set("co", np.ascontiguousarray(shape, dtype=np.float32).ravel())
+        for at, value in zip(frames[max(0, number - 1) : number + 2], (0.0, 1.0, 0.0), strict=False):
+            key.value = value if number else float(at == frame)
+            key.keyframe_insert("value", frame=at)
 
 
 def keeps_vertices(source, mesh, before):

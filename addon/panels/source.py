@@ -2,8 +2,9 @@
 import bpy
 
 from ..bridge import lookup
-from ..core import native
+from ..core import jobs, native
 from .section import Section, wrapped
+from .status import draw_progress
 
 
 class ARAPFIELDS_PT_source(Section, bpy.types.Panel):
@@ -21,6 +22,8 @@ class ARAPFIELDS_PT_source(Section, bpy.types.Panel):
         if native.problem():
             wrapped(layout, native.problem(), icon="ERROR")
             return
+        if jobs.running() is not None:
+            draw_progress(layout, jobs.running())
         if source is None:
             layout.label(text="Select a mesh object", icon="INFO")
             return

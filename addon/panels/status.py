@@ -8,6 +8,16 @@ from .section import Section, wrapped
 ICONS = {"INFO": "CHECKMARK", "WARNING": "ERROR", "ERROR": "CANCEL"}
 
 
+def draw_progress(layout, job):
+    """The running job, at the top of the panel where it is seen: how far, what, how long, and the way out."""
+    box = layout.box()
+    box.progress(factor=job.fraction, text=f"{job.title} {job.fraction:.0%}")
+    wrapped(box, job.message)
+    left = job.remaining
+    box.label(text=f"{job.elapsed:.0f} s" + (f", about {left:.0f} s left" if left is not None else ""))
+    box.operator(Op.CANCEL, icon="X")
+
+
 class ARAPFIELDS_PT_status(Section, bpy.types.Panel):
     bl_label = "Status"
     bl_idname = "ARAPFIELDS_PT_status"
@@ -18,13 +28,7 @@ class ARAPFIELDS_PT_status(Section, bpy.types.Panel):
         layout = self.layout
         job = jobs.running()
         if job is not None:
-            layout.progress(factor=job.fraction, text=f"{job.fraction:.0%}")
-            wrapped(layout, job.message)
-            left = job.remaining
-            layout.label(
-                text=f"{job.elapsed:.0f} s" + (f", about {left:.0f} s left" if left is not None else "")
-            )
-            layout.operator(Op.CANCEL, icon="X")
+            layout.label(text=f"{job.title} is running (see the top)", icon="TIME")
         for level, text in jobs.notes():
             wrapped(layout, text, icon=ICONS[level])
         if job is None and not jobs.notes():

@@ -20,7 +20,7 @@ class ARAPFIELDS_PT_surface(Section, bpy.types.Panel):
         settings_column(layout, ours.fit, FIT)
         layout.operator(Op.FIT, icon="MOD_REMESH")
         if not ours.fit_key:
-            layout.label(text="Not fitted yet: optional for Original Mesh", icon="INFO")
+            layout.label(text="Not fitted yet", icon="INFO")
             return
         kept = fit_cache().path(ours.fit_key).exists()
         layout.label(
