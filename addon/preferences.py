@@ -25,12 +25,19 @@ class ARAPFIELDS_AP_preferences(bpy.types.AddonPreferences):
         subtype="DIR_PATH",
     )
 
+    show_boxes: bpy.props.BoolProperty(
+        name="Show Boxes",
+        description="Draw the handles' boxes, at rest and now, in the viewport",
+        default=True,
+    )
+
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
         layout.prop(self, "threads")
         layout.prop(self, "device")
         layout.prop(self, "cache_folder")
+        layout.prop(self, "show_boxes")
         cache = settings.fit_cache()
         row = layout.row()
         row.label(text=f"{cache.size() / 1e6:.1f} MB of fitted surfaces in {cache.folder}")

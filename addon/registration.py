@@ -4,13 +4,13 @@
 import bpy
 
 from . import panels, preferences
-from .bridge import jobs
+from .bridge import jobs, overlay
 from .bridge import live as live_mode
 from .operators import deform, extract, fit, handles, live, status, stylize
 from .properties import handle, item, settings
 
 MODULES = [
-    *(handle, settings, item, preferences, jobs, live_mode),
+    *(handle, settings, item, preferences, jobs, live_mode, overlay),
     *(fit, handles, deform, live, stylize, extract, status),
     *panels.SECTIONS,
 ]

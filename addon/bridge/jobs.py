@@ -13,6 +13,13 @@ from . import lookup
 TICK = 0.1  # seconds between looks at the worker
 
 
+SCOPES = (
+    ("ACTIVE", "Active", "The active object alone"),
+    ("SELECTED", "Selected", "Every selected mesh object, one after another"),
+    ("COLLECTION", "Collection", "Every mesh object of the active object's collections"),
+)
+
+
 class JobOperator:
     """Mixin of operators whose work runs on the worker thread.
 
@@ -21,6 +28,10 @@ class JobOperator:
     """
 
     title = ""
+
+    scope: bpy.props.EnumProperty(
+        items=SCOPES, name="Objects", description="Which objects to work on", options={"SKIP_SAVE"}
+    )
 
     @classmethod
     def poll(cls, context):
@@ -31,7 +42,18 @@ class JobOperator:
         return not reason
 
     def sources(self, context):
-        return [lookup.source_of(context)]
+        """The objects to work on; none is ignored silently, what cannot be worked on becomes a failure."""
+        if self.scope == "ACTIVE":
+            return [lookup.source_of(context)]
+        active = lookup.source_of(context)
+        within = context.selected_objects
+        if self.scope == "COLLECTION":
+            within = [item for home in active.users_collection for item in home.all_objects]
+        meshes = [item for item in within if item.type == "MESH"]
+        owners = [lookup.settings_of(item).result_of or item for item in meshes]
+        found = list(dict.fromkeys(owners))
+        self.failures += [lookup.refusal(item) for item in found if lookup.refusal(item)]
+        return [item for item in found if not lookup.refusal(item)]
 
     def prepare(self, context):
         """The job for all sources; what cannot be planned is kept as a failure of its own."""

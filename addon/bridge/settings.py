@@ -58,6 +58,12 @@ def machine_options():
     return {"threads": ours.threads, "device": ours.device} if ours else {}
 
 
+def show_boxes():
+    """Whether the handles' boxes are drawn in the viewport."""
+    ours = preferences()
+    return ours is None or ours.show_boxes
+
+
 def cache_folder():
     """Where fits are kept: the user's choice, Blender's folder for extensions, or a temporary one."""
     ours = preferences()

@@ -174,3 +174,20 @@ def test_same_seed_same_result():
         bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK)
         found.append(scenes.world_points(bpy.data.objects["Bar_deformed"]))
     assert np.array_equal(*found)
+
+
+@in_blender
+def test_several_objects_in_one_call_and_one_that_fails():
+    import bpy
+    import scenes
+
+    bars = [scenes.bar_with_handles(name)[0] for name in ("One", "Two")]
+    bare = scenes.bar("Bare")
+    scenes.activate(bare, *bars)
+    assert bpy.ops.arapfields.deform(scope="SELECTED", **scenes.QUICK) == {"FINISHED"}
+    assert {"One_deformed", "Two_deformed"} <= set(bpy.data.objects.keys())
+    assert "Bare_deformed" not in bpy.data.objects
+    from addon.core import jobs
+
+    assert [level for level, _ in jobs.notes()] == ["INFO", "INFO", "WARNING"]
+    assert "Bare has no handle" in jobs.notes()[-1][1]

@@ -115,6 +115,8 @@ def steps():
         bpy.ops.arapfields.deform("EXEC_DEFAULT", **scenes.QUICK)
     FOUND["modal_against_blocking"] = float(np.abs(positions("Bar_deformed") - modal).max())
 
+    yield from live_rate()
+
     invoke(LONG)
     yield 0.5
     FOUND["running_before_load"] = jobs.running() is not None
@@ -123,6 +125,38 @@ def steps():
     yield 1.0
     addon.unregister()
     FOUND["disabled"] = not hasattr(bpy.types.Object, "arapfields")
+
+
+def live_rate():
+    """Drags a handle of a mesh of 50,000 vertices: how often the viewport shows a new shape."""
+    from addon.bridge import live
+
+    with override():
+        for name in ("Bar_deformed",):
+            bpy.data.objects.remove(bpy.data.objects[name])
+        bar, moving = bpy.data.objects["Bar"], bpy.data.objects["Moving"]
+        scenes.activate(bar)
+        bar.modifiers.new("Subdivision", "SUBSURF").levels = 3
+        bpy.context.view_layer.update()
+        begin = time.perf_counter()
+        bpy.ops.arapfields.live()
+        FOUND["live_setup_s"] = time.perf_counter() - begin
+    bar.hide_set(True)
+    FOUND["live_vertices"] = len(bpy.data.objects["Bar_deformed"].data.vertices)
+    shown = []
+    original = live.Session.show
+    live.Session.show = lambda self: original(self) and (shown.append(time.perf_counter()) or True)
+    begin = time.perf_counter()
+    while time.perf_counter() - begin < 5.0:
+        share = (time.perf_counter() - begin) / 5.0
+        moving.location.z = 0.6 * share
+        moving.rotation_euler.x = 1.2 * share
+        yield 0.01
+    live.Session.show = original
+    FOUND["live_updates_per_second"] = len(shown) / 5.0
+    picture("live")
+    bar.hide_set(False)
+    live.end_all()
 
 
 def undo_removes_the_result():
