@@ -2,6 +2,7 @@
 #include "extraction/cell_table.h"
 
 #include <algorithm>
+#include <bit>
 
 namespace arapfields {
 namespace {
@@ -113,6 +114,30 @@ void triangulate(const Loop& loop, Triples& out) {
   }
 }
 
+/// A band between two polygons and around the cell's own point: two triangles between a side of the one and a
+/// side of the other where no diagonal lies in a face, and a fan over what is left.
+Triples band(const Loop& first, const Loop& second) {
+  Triples out;
+  const Loop a(first.rbegin(), first.rend()), b(second.rbegin(), second.rend());
+  const auto n = a.size(), m = b.size();
+  for (std::size_t i = 0; i < n && out.empty(); ++i)
+    for (std::size_t j = 0; j < m && out.empty(); ++j) {
+      const int a0 = a[i], a1 = a[(i + 1) % n], b0 = b[j], b1 = b[(j + 1) % m];
+      if (share_face(a1, b0) || share_face(b1, a0) || share_face(a0, b0)) continue;
+      Loop rest;
+      for (std::size_t k = 1; k <= n; ++k) rest.push_back(a[(i + k) % n]);
+      for (std::size_t k = 1; k <= m; ++k) rest.push_back(b[(j + k) % m]);
+      const auto triple = [](int x, int y, int z) {
+        return std::array<std::uint8_t, 3>{static_cast<std::uint8_t>(x), static_cast<std::uint8_t>(y),
+                                           static_cast<std::uint8_t>(z)};
+      };
+      out = {triple(a0, a1, b0), triple(a0, b0, b1)};
+      for (std::size_t k = 0; k < rest.size(); ++k)
+        out.push_back(triple(rest[k], rest[(k + 1) % rest.size()], CellTable::centre));
+    }
+  return out;
+}
+
 /// The choice of ambiguous faces as a dense number: their bits in `joined`, packed.
 unsigned packed(unsigned joined, unsigned ambiguous) {
   unsigned result = 0, bit = 0;
@@ -148,7 +173,11 @@ CellTable::CellTable() {
       if ((joined & ~faces) != 0) continue;
       auto& choices = triangles_[pattern];
       choices.resize(std::max<std::size_t>(choices.size(), packed(joined, faces) + 1));
-      for (const Loop& loop : trace(pattern, joined)) triangulate(loop, choices[packed(joined, faces)]);
+      const std::vector<Loop> loops = trace(pattern, joined);
+      for (const Loop& loop : loops) triangulate(loop, choices[packed(joined, faces)]);
+      if (std::popcount(faces) != 1 || loops.size() != 2) continue;
+      if (std::minmax({loops[0].size(), loops[1].size()}) == std::pair<std::size_t, std::size_t>(3, 4))
+        tunnels_[pattern] = band(loops[0], loops[1]);
     }
   }
 }

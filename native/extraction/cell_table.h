@@ -16,6 +16,10 @@ namespace arapfields {
 struct CellTable {
   /// Edge triples, counter-clockwise seen from outside; edge 12 means the cell's own additional point.
   const std::vector<std::array<std::uint8_t, 3>>& triangles(unsigned pattern, unsigned joined) const;
+  /// For patterns with one ambiguous face, on which a single corner meets the end of a pair of corners, both
+  /// of the other sign than the cell's remaining five: the triangles where single and pair are separate on
+  /// the face but connected through the cell. Empty for all other patterns.
+  const std::vector<std::array<std::uint8_t, 3>>& tunnel(unsigned pattern) const { return tunnels_[pattern]; }
   /// Faces of a pattern whose corners alternate, as bits.
   unsigned ambiguous(unsigned pattern) const { return ambiguous_[pattern]; }
 
@@ -33,6 +37,7 @@ struct CellTable {
   CellTable();
   using Triples = std::vector<std::array<std::uint8_t, 3>>;
   std::array<unsigned, 256> ambiguous_{};
+  std::array<Triples, 256> tunnels_;
   std::array<std::vector<Triples>, 256> triangles_;  // one entry for each choice of its ambiguous faces
 };
 

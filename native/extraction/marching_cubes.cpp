@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <functional>
 #include <numeric>
@@ -31,6 +32,31 @@ struct Numbers {
   Index count() const { return edges + static_cast<Index>(centres.size()); }
 };
 
+/// Whether a plane across an axis cuts the cell so that two opposite corners of the cut are negative, the
+/// others positive, and the bilinear interpolant between them joins the negative ones.
+bool joined_across(const double (&corner)[8], int axis) {
+  const int u = 1 << (2 - (axis + 1) % 3), v = 1 << (2 - (axis + 2) % 3), w = 1 << (2 - axis);
+  for (const bool other : {false, true}) {
+    const int lines[4] = {other ? u : 0, other ? v : u | v, other ? 0 : u, other ? u | v : v};
+    double from = 0.0, to = 1.0;  // where lines 0, 1 are negative and 2, 3 positive
+    double low[4], rate[4];
+    for (int i = 0; i < 4; ++i) {
+      low[i] = corner[lines[i]];
+      rate[i] = corner[lines[i] | w] - low[i];
+      const double value = i < 2 ? low[i] : -low[i], slope = i < 2 ? rate[i] : -rate[i];
+      if (slope > 0.0) to = std::min(to, -value / slope);
+      if (slope < 0.0) from = std::max(from, -value / slope);
+      if (slope == 0.0 && value >= 0.0) to = -1.0;
+    }
+    // (line 0)(line 1) − (line 2)(line 3) = a t² + b t + c; not positive at either end of the range.
+    const double a = rate[0] * rate[1] - rate[2] * rate[3];
+    const double b = low[0] * rate[1] + low[1] * rate[0] - low[2] * rate[3] - low[3] * rate[2];
+    const double c = low[0] * low[1] - low[2] * low[3], t = -0.5 * b / a;
+    if (from < to && a < 0.0 && t > from && t < to && (a * t + b) * t + c > 0.0) return true;
+  }
+  return false;
+}
+
 /// A cell's corner values and what its table entry says.
 struct Cell {
   float corner[8];
@@ -55,6 +81,14 @@ struct Cell {
       double inside = 1.0, outside = 1.0;
       for (const int c : CellTable::face_corners(face)) (corner[c] < 0.0f ? inside : outside) *= corner[c];
       if (outside < inside) joined |= 1u << face;
+    }
+    const auto& tunnel = table.tunnel(pattern);
+    const bool many_inside = std::popcount(pattern) > 4;  // then the outside corners are the ones to connect
+    if (!tunnel.empty() && (joined != 0) == many_inside) {
+      double signed_corner[8];
+      for (int c = 0; c < 8; ++c) signed_corner[c] = many_inside ? -corner[c] : corner[c];
+      for (int axis = 0; axis < 3; ++axis)
+        if (joined_across(signed_corner, axis)) return tunnel;
     }
     return table.triangles(pattern, joined);
   }
@@ -145,14 +179,7 @@ class Tile {
       Index own_vertex = -1;
       if (centre < own_.centres.size() && own_.centres[centre] == SparseGrid::local(i, j, k)) {
         own_vertex = own_.first + own_.edges + static_cast<Index>(centre++);
-        Vec3 sum = Vec3::Zero();
-        int corners = 0;
-        for (const auto& t : list)
-          if (t[2] == CellTable::centre) {
-            sum += vertices.row(vertex(i, j, k, t[0]));
-            ++corners;
-          }
-        vertices.row(own_vertex) = sum / corners;
+        vertices.row(own_vertex) = centre_of(cell, i, j, k);
       }
       for (const auto& t : list) {
         std::array<std::int32_t, 3> triangle;
@@ -165,6 +192,19 @@ class Tile {
   }
 
  private:
+  Vec3 centre_of(const Cell& cell, int i, int j, int k) const {
+    double largest = 0.0, sum = 0.0;
+    for (const float value : cell.corner) largest = std::max<double>(largest, std::abs(value));
+    Vec3 mean = Vec3::Zero();
+    for (int c = 0; c < 8; ++c) {
+      const double weight = 1.0 / std::max<double>(std::abs(cell.corner[c]), clearance * largest);
+      const int at[3] = {i, j, k};
+      for (int a = 0; a < 3; ++a)
+        mean[a] += weight * grid_.coordinate(block_.place[a] * side + at[a] + CellTable::corner_at(c, a));
+      sum += weight;
+    }
+    return mean / sum;
+  }
   Index vertex(int i, int j, int k, int edge) const {
     const int corner = CellTable::edge_corner(edge);
     const int x = i + CellTable::corner_at(corner, 0), y = j + CellTable::corner_at(corner, 1),

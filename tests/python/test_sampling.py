@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""sample_surface on a published network: uniform, on the surface, repeatable. Native tests have analytic shapes."""
+"""sample_surface on a published network: uniform, on the surface, repeatable (shapes: native tests)."""
 
 import numpy as np
 import pytest
