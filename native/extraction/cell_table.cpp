@@ -7,6 +7,8 @@
 namespace arapfields {
 namespace {
 
+constexpr int shortest_fan = 8;
+
 using Loop = std::vector<int>;
 using Triples = std::vector<std::array<std::uint8_t, 3>>;
 
@@ -73,7 +75,7 @@ std::vector<Loop> trace(unsigned pattern, unsigned joined) {
 }
 
 /// Triangles of a polygon without a diagonal inside a face of the cell, where the neighbour might have the
-/// same one; where there are none, a fan around the cell's own point.
+/// same one; for long polygons, and where there are none, a fan around the cell's own point.
 void triangulate(const Loop& loop, Triples& out) {
   const auto size = static_cast<int>(loop.size());
   const auto at = [&](int i) { return static_cast<std::uint8_t>(loop[static_cast<std::size_t>(i)]); };
@@ -98,7 +100,7 @@ void triangulate(const Loop& loop, Triples& out) {
       cost[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] =
           best + (!whole && share_face(at(i), at(j)) ? 1 : 0);
     }
-  if (cost[0][static_cast<std::size_t>(size - 1)] > 0) {
+  if (size >= shortest_fan || cost[0][static_cast<std::size_t>(size - 1)] > 0) {
     for (int i = 0; i < size; ++i) out.push_back({at((i + 1) % size), at(i), CellTable::centre});
     return;
   }

@@ -168,6 +168,29 @@ BOOST_AUTO_TEST_CASE(noise_gives_closed_manifolds) {
   }
 }
 
+BOOST_AUTO_TEST_CASE(tunnels_through_a_cell) {
+  // Three negative grid points, a pair and a single one diagonal to it; on the face between them the positive
+  // corners prevail. Small values at the cell's far corners join the two inside it: one sphere instead of
+  // two.
+  for (const double sign : {1.0, -1.0})
+    for (const bool joined : {true, false}) {
+      const shapes::Analytic cell([&](const Vec3& x) {
+        const int n = 8;
+        const Eigen::Array3i grid = ((x.array() + 1.0) * (0.5 * (n - 1))).round().cast<int>();
+        if ((grid == 0).any() || (grid == n - 1).any()) return 1.0;  // the whole is closed for either sign
+        const Eigen::Array3i at = grid - 3;
+        if ((at < 0).any() || (at > 1).any()) return sign;
+        const int corner = 4 * at[0] + 2 * at[1] + at[2];
+        const double far = joined ? 0.05 : 1.0;
+        const double values[8] = {-1.0, -1.0, 1.05, far, 1.05, far, -1.0, far};
+        return sign * values[corner];
+      });
+      const TriangleMesh mesh = extract(cell, 8);
+      check_closed(mesh);
+      BOOST_TEST(topology(mesh).euler == (joined ? 2 : 4) + (sign < 0.0 ? 2 : 0));
+    }
+}
+
 BOOST_AUTO_TEST_CASE(zeros_on_grid_points) {
   // On 17 points a side the faces of this cube lie in grid planes, and so do the sphere's poles.
   check_closed(extract(shapes::box(Vec3::Constant(0.5)), 17));
