@@ -2,6 +2,7 @@
 #include "neural/mlp.h"
 
 #include <ATen/ATen.h>
+#include <ATen/core/LegacyTypeDispatch.h>
 
 #include <algorithm>
 #include <cmath>
@@ -42,6 +43,7 @@ struct Mlp::State {
   LayerViews layers;  // into parameters
   // Of the last forward call:
   Blocks kept;
+  std::vector<GradientPart> parts;  // the first is the gradient itself
   at::Tensor result;
   bool fresh = false;
 
@@ -72,11 +74,12 @@ void Mlp::State::prepare(const at::Tensor& points, int columns) {
     allocate(shape, parameters, true, block);
     largest = std::max(largest, block.count);
   }
-  for (int t = 0; t < threads; ++t) {
+  for (int t = 0; t < threads; ++t)
     kept.workspaces.push_back(make_workspace(shape, parameters, largest, columns));
-    Workspace& space = kept.workspaces.back();
-    space.gradient = t == 0 ? gradient : at::empty_like(gradient);
-    space.gradients = LayerViews(shape, space.gradient);
+  parts.clear();
+  for (Index g = 0; g < kept.gradient_groups(); ++g) {
+    const at::Tensor flat = g == 0 ? gradient : at::empty_like(gradient);
+    parts.push_back({flat, LayerViews(shape, flat)});
   }
   result = at::empty({columns, n, shape.outputs}, parameters.options());
 }
@@ -114,6 +117,7 @@ at::Tensor Mlp::bias(int layer) const { return state_->layers.biases.at(static_c
 
 void Mlp::release_buffers() {
   state_->kept = {};
+  state_->parts.clear();
   state_->result = at::Tensor();
   state_->fresh = false;
 }
@@ -122,7 +126,7 @@ at::Tensor Mlp::forward(const at::Tensor& points, JetOrder order) {
   State& s = *state_;
   check_points(points, s.parameters);
   s.prepare(points, columns(order));
-  s.kept.for_each([&](Block& block, Workspace& space) {
+  s.kept.for_each(s.kept.count(), [&](Block& block, Workspace& space, Index, bool) {
     sweep_forward(s.shape, s.layers, points, block, space, s.result);
   });
   s.fresh = true;
@@ -135,11 +139,18 @@ void Mlp::pull_back(const at::Tensor& cotangents) {
   require(cotangents.sizes() == s.result.sizes() && cotangents.scalar_type() == s.result.scalar_type(),
           "cotangents", "another shape or dtype than the jets", "they must match");
   s.fresh = false;
-  const std::size_t threads = s.kept.workspaces.size();
-  for (std::size_t t = 1; t < threads; ++t) s.kept.workspaces[t].gradient.zero_();
-  s.kept.for_each(
-      [&](Block& block, Workspace& space) { sweep_back(s.shape, s.layers, cotangents, block, space); });
-  for (std::size_t t = 1; t < threads; ++t) s.gradient.add_(s.kept.workspaces[t].gradient);
+  const Index groups = static_cast<Index>(s.parts.size());
+  s.kept.for_each(groups, [&](Block& block, Workspace& space, Index group, bool first) {
+    GradientPart& part = s.parts[static_cast<std::size_t>(group)];
+    if (first && group > 0) part.flat.zero_();
+    sweep_back(s.shape, s.layers, cotangents, block, space, part.layers);
+  });
+  if (groups < 2) return;
+  parallel_for(0, s.gradient.numel(), 16384, [&](Index begin, Index end) {
+    const at::AutoDispatchBelowADInplaceOrView quick;
+    at::Tensor sum = s.gradient.slice(0, begin, end);
+    for (std::size_t g = 1; g < s.parts.size(); ++g) sum.add_(s.parts[g].flat.slice(0, begin, end));
+  });
 }
 
 namespace {
@@ -159,7 +170,7 @@ void in_passing(const MlpShape& shape, const at::Tensor& like, Index n, int colu
     allocate(shape, like, keep, block);
     passing.workspaces.push_back(make_workspace(shape, like, largest, columns));
   }
-  passing.for_each([&](Block& block, Workspace& space) {
+  passing.for_each(passing.count(), [&](Block& block, Workspace& space, Index, bool) {
     const Block& own = memory[static_cast<std::size_t>(&space - passing.workspaces.data())];
     borrow(own, block);
     body(block, space);

@@ -6,6 +6,7 @@
 #include <ATen/core/LegacyTypeDispatch.h>
 
 #include <algorithm>
+#include <atomic>
 
 #include "core/parallel.h"
 #include "neural/jet_layer.h"
@@ -114,13 +115,21 @@ Workspace make_workspace(const MlpShape& shape, const at::Tensor& like, Index po
   return space;
 }
 
-void Blocks::for_each(const std::function<void(Block&, Workspace&)>& body) {
-  const Index threads = static_cast<Index>(workspaces.size()), count = static_cast<Index>(blocks.size());
-  parallel_for(0, threads, 1, [&](Index first, Index last) {
+Index Blocks::gradient_groups() const {
+  const Index threads = static_cast<Index>(workspaces.size());
+  return std::min(count(), std::max(threads, std::min<Index>(4 * threads, count() / 4)));
+}
+
+void Blocks::for_each(Index groups, const std::function<void(Block&, Workspace&, Index, bool)>& body) {
+  std::atomic<Index> next{0};
+  parallel_for(0, static_cast<Index>(workspaces.size()), 1, [&](Index first, Index last) {
     const at::AutoDispatchBelowADInplaceOrView quick;  // plain kernels, no bookkeeping
     for (Index t = first; t < last; ++t)
-      for (Index b = t * count / threads; b < (t + 1) * count / threads; ++b)
-        body(blocks[static_cast<std::size_t>(b)], workspaces[static_cast<std::size_t>(t)]);
+      for (Index g = next++; g < groups; g = next++) {
+        const Index begin = g * count() / groups, end = (g + 1) * count() / groups;
+        for (Index b = begin; b < end; ++b)
+          body(blocks[static_cast<std::size_t>(b)], workspaces[static_cast<std::size_t>(t)], g, b == begin);
+      }
   });
 }
 
@@ -147,25 +156,24 @@ void sweep_forward(const MlpShape& shape, const LayerViews& layers, const at::Te
 }
 
 void sweep_back(const MlpShape& shape, const LayerViews& layers, const at::Tensor& cotangents, Block& block,
-                Workspace& space) {
+                Workspace& space, LayerViews& gradient) {
   if (block.count == 0) return;
   const Index rows = block.columns * block.count;
-  LayerViews& out = space.gradients;
   at::Tensor upper = matrix(space.output, rows, shape.outputs);
   upper.view({block.columns, block.count, shape.outputs})
       .copy_(cotangents.narrow(1, block.begin, block.count));
-  out.biases.back().add_(upper.narrow(0, 0, block.count).sum(0));
+  gradient.biases.back().add_(upper.narrow(0, 0, block.count).sum(0));
   at::Tensor here = matrix(space.jets, rows, shape.width), spare = matrix(space.other, rows, shape.width);
   for (int l = shape.layers - 1; l >= 0; --l) {
     at::Tensor& planes = block.planes[at_(l)];
     product(here, upper, layers.weights[at_(l + 1)]);
     activate_layer_back({shape.sharpness, block.columns, l > 0}, planes, block.slope[at_(l)], here,
-                        out.biases[at_(l)]);
-    add_product(out.weights[at_(l + 1)], upper.t(), planes);
+                        gradient.biases[at_(l)]);
+    add_product(gradient.weights[at_(l + 1)], upper.t(), planes);
     upper = here;
     std::swap(here, spare);
   }
-  encode_layer_back(shape, upper, block, out.weights[0]);
+  encode_layer_back(shape, upper, block, gradient.weights[0]);
 }
 
 void sweep_to_points(const MlpShape& shape, const LayerViews& layers, Block& block, Workspace& space,

@@ -28,19 +28,30 @@ struct Block {
   std::vector<at::Tensor> planes, slope;
 };
 
-/// What one thread needs besides: flat buffers for its largest block, and its own gradient.
+/// What one thread needs besides: flat buffers for the largest block.
 struct Workspace {
   at::Tensor jets, other, output;
-  at::Tensor gradient;
-  LayerViews gradients;
 };
 
-/// The blocks and workspaces of one size of call, as equal shares for the threads in force.
+/// Where a group of blocks adds up its part of the parameter gradient.
+struct GradientPart {
+  at::Tensor flat;
+  LayerViews layers;
+};
+
+/// The blocks of one size of call. Threads take groups of blocks as they come free, so that a slow or busy
+/// core costs little; each group has its own order and its own sum, so that the result does not depend on who
+/// did what.
 struct Blocks {
   std::vector<Block> blocks;
-  std::vector<Workspace> workspaces;  // one a thread; thread t owns an equal run of the blocks
+  std::vector<Workspace> workspaces;  // one a thread
 
-  void for_each(const std::function<void(Block&, Workspace&)>& body);
+  /// `groups` runs of consecutive blocks: body(block, its thread's workspace, its group, whether it is the
+  /// first).
+  void for_each(Index groups, const std::function<void(Block&, Workspace&, Index group, bool first)>& body);
+  Index count() const { return static_cast<Index>(blocks.size()); }
+  /// Few enough groups that adding their sums up costs little beside the products.
+  Index gradient_groups() const;
 };
 
 /// Ranges of about the best number of points for `columns`, as many for each thread.
@@ -58,9 +69,9 @@ Workspace make_workspace(const MlpShape& shape, const at::Tensor& like, Index po
 /// Jets of the block's points into result[:, begin:begin+count].
 void sweep_forward(const MlpShape& shape, const LayerViews& layers, const at::Tensor& points, Block& block,
                    Workspace& space, at::Tensor& result);
-/// Adds to space.gradients; consumes the block.
+/// Adds to `gradient`; consumes the block.
 void sweep_back(const MlpShape& shape, const LayerViews& layers, const at::Tensor& cotangents, Block& block,
-                Workspace& space);
+                Workspace& space, LayerViews& gradient);
 /// ∂(the one output)/∂point after a kept forward sweep with one column; consumes the block.
 void sweep_to_points(const MlpShape& shape, const LayerViews& layers, Block& block, Workspace& space,
                      at::Tensor& gradients);

@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Loads the native library so that its idle worker threads sleep.
+
+OpenMP's threads by default spin for milliseconds at the end of each parallel loop. On a computer that has
+other things to do, or few cores, they then take the time of those that still work: steps of a fit took ten
+times as long. OpenMP reads its settings when it is loaded; whoever set them, or loaded it, is obeyed.
+"""
+
+import os
+
+if not {"OMP_WAIT_POLICY", "GOMP_SPINCOUNT"} & set(os.environ):
+    os.environ["GOMP_SPINCOUNT"] = "0"
+    from . import _native  # noqa: F401
+
+    del os.environ["GOMP_SPINCOUNT"]
