@@ -2,6 +2,7 @@
 #include "bindings/bind.h"
 #include "energies/styles.h"
 #include "solve/deform.h"
+#include "solve/inverse_training.h"
 #include "solve/setup.h"
 #include "solve/stylize.h"
 
@@ -173,6 +174,38 @@ void bind_solve(py::module_& module) {
       "handles\n"
       "the lowest sample stays in place; strength 0 is the identity. field.report['preference'] is the mean\n"
       "preference reached. Raises as deform does.");
+  OptionsBinding<InverseTrainingOptions>(module, "InverseOptions", "Options of train_inverse.")
+      .field("iterations", &InverseTrainingOptions::iterations, "Steps of the optimization.")
+      .field("batch", &InverseTrainingOptions::batch, "Points a step, half on the deformed surface.")
+      .field("optimizer", &InverseTrainingOptions::optimizer, "'orthogonal' or 'adam'.")
+      .field("learning_rate", &InverseTrainingOptions::learning_rate, "0: the optimizer's default.")
+      .field("width", &InverseTrainingOptions::width, "Units of a hidden layer.")
+      .field("layers", &InverseTrainingOptions::layers, "Hidden layers.")
+      .field("octaves", &InverseTrainingOptions::octaves, "Octaves of the positional encoding.")
+      .field("frequency", &InverseTrainingOptions::frequency, "Angular frequency of its first octave.")
+      .field("sharpness", &InverseTrainingOptions::sharpness, "β of softplus.")
+      .field("time_budget", &InverseTrainingOptions::time_budget, "Seconds after which to stop; 0: none.")
+      .field("threads", &InverseTrainingOptions::threads, "Worker threads; 0: all.")
+      .field("device", &InverseTrainingOptions::device, "'auto', 'cpu' or 'cuda'.")
+      .field("seed", &InverseTrainingOptions::seed, "Of weights and subsets; same seed, same result.");
+  module.def(
+      "train_inverse",
+      [](const DeformationField& field, const SurfaceSamples& samples, const InverseTrainingOptions& options,
+         Task* task) {
+        const Solution solution =
+            run_long(task, [&](const Progress& p) { return train_inverse(field, samples, options, p); });
+        py::object result = py::cast(solution.field);
+        const SolveReport& r = solution.report;
+        result.attr("_report") = py::dict("error_mean"_a = r.handle_mean[0], "error_max"_a = r.handle_max[0],
+                                          "iterations"_a = r.loop.iterations, "seconds"_a = r.loop.seconds);
+        return result;
+      },
+      "field"_a, "samples"_a, py::arg_v("options", InverseTrainingOptions(), "InverseOptions()"),
+      "task"_a = nullptr,
+      "A network that approximates field's inverse, as a DeformationField: trained so that the field takes\n"
+      "its values back, at deformed samples and in their box (the paper's cycle loss), and on the samples'\n"
+      "own pairs. report: error_mean and error_max over the samples, in mesh units. For exact inverses of\n"
+      "single points use field.inverse.");
   module.def("arap_energy", &energy_of, "field"_a, "points"_a,
              "(stretch, bend), means over the points (p, 3) of the rest surface, in the field's unit cube:\n"
              "stretch ‖J − R‖² with R the rotation closest to J, bend the squared speed at which R turns.");

@@ -3,6 +3,7 @@
 
 #include "core/parallel.h"
 #include "fields/neural_field.h"
+#include "solve/inverse_training.h"
 #include "solve/live_solver.h"
 #include "solve/setup.h"
 
@@ -108,7 +109,13 @@ Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handle
   loop.learning_rate = options.learning_rate;
   loop.time_budget = options.time_budget;
   loop.seed = seed;
-  Solution solution = solve_field(field, samples, std::move(terms), loop, progress.part(share, 1.0));
+  WrapObjective wrap;
+  if (options.invertibility > 0.0)
+    wrap = [&](Objective& inner) {
+      return std::make_unique<InvertibleObjective>(inner, samples, options.batch, options.invertibility,
+                                                   shape, loop, resolve_device(options.device));
+    };
+  Solution solution = solve_field(field, samples, std::move(terms), loop, progress.part(share, 1.0), wrap);
   solution.report.notes = notes;
   return solution;
 }

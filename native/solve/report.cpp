@@ -76,12 +76,14 @@ Solution measured(std::shared_ptr<DeformationField> field, const SurfaceSamples&
 }
 
 Solution solve_field(std::shared_ptr<TrainableField> field, const SurfaceSamples& samples,
-                     ObjectiveTerms terms, const LoopOptions& options, const Progress& progress) {
+                     ObjectiveTerms terms, const LoopOptions& options, const Progress& progress,
+                     const WrapObjective& wrap) {
   field->set_frame(samples.frame);
   field->set_rest_points(samples.points.topRows(std::min(samples.size(), kept_rest_points)));
   FieldObjective objective(samples, std::move(terms));
+  const std::unique_ptr<Objective> wrapped = wrap ? wrap(objective) : nullptr;
   try {
-    LoopResult loop = minimise(*field, objective, options, progress.part(0.0, 0.95));
+    LoopResult loop = minimise(*field, wrapped ? *wrapped : objective, options, progress.part(0.0, 0.95));
     progress.report(0.95, "measuring the result");
     Solution solution = measured(field, samples, objective.terms(), std::move(loop));
     progress.report(1.0, options.stage + ": done");

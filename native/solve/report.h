@@ -44,8 +44,12 @@ SolveReport measure(const DeformationField& field, const SurfaceSamples& samples
 Solution measured(std::shared_ptr<DeformationField> field, const SurfaceSamples& samples,
                   const ObjectiveTerms& terms, LoopResult loop);
 
+/// Puts another objective around the one that solve_field makes.
+using WrapObjective = std::function<std::unique_ptr<Objective>(Objective& inner)>;
+
 /// Runs the loop, measures the result, and turns Diverged into SolveDiverged.
 Solution solve_field(std::shared_ptr<TrainableField> field, const SurfaceSamples& samples,
-                     ObjectiveTerms terms, const LoopOptions& options, const Progress& progress);
+                     ObjectiveTerms terms, const LoopOptions& options, const Progress& progress,
+                     const WrapObjective& wrap = {});
 
 }  // namespace arapfields

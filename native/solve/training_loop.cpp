@@ -5,48 +5,12 @@
 
 #include <cmath>
 #include <cstdio>
-#include <numbers>
-#include <optional>
 
-#include "neural/orthogonal_step.h"
 #include "solve/setup.h"
+#include "solve/stepper.h"
 
 namespace arapfields {
 namespace {
-
-double rate(const LoopOptions& options, double peak, double done) {
-  const double falling = std::clamp((done - options.hold) / std::max(1e-9, 1.0 - options.hold), 0.0, 1.0);
-  const double share = 0.5 * (1.0 + std::cos(std::numbers::pi * falling));
-  return peak * (options.final_share + (1.0 - options.final_share) * share);
-}
-
-/// One of the two optimizers, with its default rate.
-class Stepper {
- public:
-  Stepper(TrainableField& field, const LoopOptions& options) : field_(field), peak_(options.learning_rate) {
-    const AdamOptions adam{options.first_decay, options.second_decay, 1e-8};
-    if (options.optimizer == "orthogonal" && field.network() != nullptr) {
-      orthogonal_.emplace(*field.network(), OrthogonalOptions{options.momentum, 5, options.adam_share, adam});
-      if (peak_ == 0.0) peak_ = 0.03;
-    } else {
-      adam_.emplace(field.parameters(), adam);
-      if (peak_ == 0.0) peak_ = 0.002;
-    }
-  }
-  double peak() const { return peak_; }
-  void step(double learning_rate) {
-    if (orthogonal_)
-      orthogonal_->step(*field_.network(), learning_rate);
-    else
-      adam_->step(field_.parameters(), field_.gradient(), learning_rate);
-  }
-
- private:
-  TrainableField& field_;
-  double peak_;
-  std::optional<OrthogonalStep> orthogonal_;
-  std::optional<AdamStep> adam_;
-};
 
 std::string message(const LoopOptions& options, int done, double loss, double left) {
   char text[160];
@@ -101,7 +65,7 @@ LoopResult minimise(TrainableField& field, Objective& objective, const LoopOptio
       good.parameters.copy_(field.parameters());
       good.iteration = iteration;
     }
-    stepper.step(rate(options, stepper.peak(), done));
+    stepper.step(stepper.rate(done));
     result.iterations = iteration + 1;
     if (elapsed - reported > 0.1) {
       reported = elapsed;

@@ -21,6 +21,7 @@ from ._native import (
     Frame,
     Handle,
     InvalidInput,
+    InverseOptions,
     LiveDeformer,
     LiveOptions,
     NeuralSdf,
@@ -46,6 +47,7 @@ from ._native import (
     style_names,
     stylize,
     thread_count,
+    train_inverse,
     winding_number,
 )
 from .grids import save_grid, sdf_grid
@@ -66,6 +68,7 @@ __all__ = [
     "Frame",
     "Handle",
     "InvalidInput",
+    "InverseOptions",
     "LiveDeformer",
     "LiveOptions",
     "NeuralSdf",
@@ -93,5 +96,6 @@ __all__ = [
     "style_names",
     "stylize",
     "thread_count",
+    "train_inverse",
     "winding_number",
 ]

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fields/neural_field.h"
+#include "solve/report.h"
+#include "solve/stepper.h"
+
+namespace arapfields {
+
+struct InverseTrainingOptions {
+  int iterations = 1000;
+  int batch = 1000;  ///< half of them deformed samples, half uniform in the deformed surface's box
+  double learning_rate = 0.0;
+  std::string optimizer = "orthogonal";
+  int width = 256, layers = 4, octaves = 4;
+  double frequency = 1.0, sharpness = 30.0;
+  double time_budget = 0.0;
+  int threads = 0;
+  std::string device = "auto";
+  std::int64_t seed = 0;
+
+  /// Throws InvalidInput that names the option.
+  void validate() const;
+};
+
+/// A network g ≈ f⁻¹, trained on the cycle ‖f(g(y)) − y‖² at deformed samples and at uniform points of their
+/// box (enlarged by a tenth), and at the samples x on ‖g(f(x)) − x‖² too, which decides where f has several
+/// preimages. Its report's energy is that mean square cycle error; the frame is f's.
+Solution train_inverse(const DeformationField& field, const SurfaceSamples& samples,
+                       const InverseTrainingOptions& options, const Progress& progress = {});
+
+/// Another objective, and weight × mean ‖g(f(x)) − x‖² with an inverse g that learns beside f, over samples
+/// and uniform points of the cube: where f folds no g exists, so folds cost.
+class InvertibleObjective final : public Objective {
+ public:
+  InvertibleObjective(Objective& inner, const SurfaceSamples& samples, Index batch, double weight,
+                      const MlpShape& shape, const LoopOptions& options, const std::string& device);
+  double accumulate(TrainableField& field, Random& random) override;
+
+ private:
+  Objective& inner_;
+  const SurfaceSamples& samples_;
+  Index batch_;
+  double weight_;
+  int iterations_, done_ = 0;
+  NeuralField inverse_;
+  Stepper stepper_;
+};
+
+}  // namespace arapfields

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Inverses: trained networks, Newton's on published shapes, and the cycle loss beside a deformation."""
+
+import cases
+import numpy as np
+import pytest
+import tolerances
+
+import arapfields as af
+
+
+@pytest.fixture(scope="module")
+def samples():
+    return cases.bar_samples()
+
+
+@pytest.fixture(scope="module")
+def bent(samples):
+    options = af.DeformOptions(width=32, layers=3, iterations=80, batch=100, handle_batch=50)
+    return af.deform(samples, cases.bar_handles(), options)
+
+
+def test_a_trained_inverse_returns(bent, samples):
+    inverse = af.train_inverse(
+        bent, samples, af.InverseOptions(width=64, layers=3, iterations=300, batch=300)
+    )
+    others = cases.bar_samples(500, seed=9).points
+    error = np.linalg.norm(inverse(bent(others)) - others, axis=1)
+    moved = np.linalg.norm(bent(others) - others, axis=1)
+    assert np.quantile(error, 0.95) < 0.02 * moved.max()
+    assert inverse.report["error_mean"] == pytest.approx(error.mean(), rel=0.2)
+
+
+def test_a_trained_inverse_is_a_field_with_a_file(bent, samples, tmp_path):
+    inverse = af.train_inverse(bent, samples, af.InverseOptions(width=16, layers=2, iterations=5, batch=50))
+    inverse.save(tmp_path / "inverse.npz")
+    again = af.DeformationField.load(tmp_path / "inverse.npz")
+    assert np.array_equal(again(samples.points), inverse(samples.points))
+    assert inverse.frame == bent.frame
+
+
+def test_bad_options_are_named(bent, samples):
+    with pytest.raises(af.InvalidInput, match="batch"):
+        af.train_inverse(bent, samples, af.InverseOptions(batch=0))
+    with pytest.raises(af.InvalidInput, match="device"):
+        af.train_inverse(bent, samples, af.InverseOptions(device="abacus"))
+
+
+def test_invertibility_penalises_folds(samples):
+    """A strong push, which folds the bar unless an inverse must keep up."""
+    left, right = (h.rest for h in cases.bar_handles())
+    handles = [cases.moved(left), cases.moved(right, cases.shift([-1.0, 0.0, 0.0]))]
+    settings = dict(width=32, layers=3, iterations=250, batch=100, handle_batch=50, bending=0.0)
+    settings |= dict(optimizer="adam", learning_rate=5e-3)
+    free = af.deform(samples, handles, af.DeformOptions(**settings)).report
+    kept = af.deform(samples, handles, af.DeformOptions(invertibility=100.0, **settings)).report
+    assert free["min_determinant"] < 0.0
+    assert kept["min_determinant"] > free["min_determinant"]
+    assert kept["flipped_share"] < free["flipped_share"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["bunny", "spot", "whale"])
+def test_inverses_on_published_shapes(data_dir, name):
+    """A bend by 40 degrees; Newton's inverse and a trained one at uniform points of the surface."""
+    samples = cases.published_samples(data_dir / "neural_sdf" / f"{name}.pt")
+    low, high = samples.points.min(0) - 0.01, samples.points.max(0) + 0.01
+    axis = int(np.argmax(high - low))
+    ends = []
+    for begin, end in ((0.0, 0.3), (0.7, 1.0)):
+        a, b = low.copy(), high.copy()
+        a[axis], b[axis] = low[axis] + np.array([begin, end]) * (high - low)[axis]
+        ends.append(cases.box(a, b))
+    bend = cases.turn(np.eye(3)[(axis + 1) % 3], 40, (low + high) / 2)
+    field = af.deform(
+        samples, [cases.moved(ends[0]), cases.moved(ends[1], bend)], af.DeformOptions(iterations=100)
+    )
+    points = cases.published_samples(data_dir / "neural_sdf" / f"{name}.pt", 5000, seed=1).points
+    images = field(points)
+    error = np.linalg.norm(field.inverse(images) - points, axis=1)
+    assert np.isnan(error).mean() <= 0.01
+    assert np.nanquantile(error, 0.95) < tolerances.NEWTON_INVERSE
+    trained = af.train_inverse(field, samples)
+    assert np.quantile(np.linalg.norm(trained(images) - points, axis=1), 0.95) < 1e-3
