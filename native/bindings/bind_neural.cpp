@@ -128,9 +128,22 @@ void bind_sdf(py::module_& module) {
       });
 }
 
+JetOrder order_of(int order) {
+  require(order >= 0 && order <= 2, "order", std::to_string(order), "0, 1 and 2 are allowed");
+  return order == 0 ? JetOrder::value : order == 1 ? JetOrder::first : JetOrder::second;
+}
+
 void bind_testing(py::module_& module) {
   py::module_ testing =
       module.def_submodule("testing", "What the tests call directly; not part of the interface.");
+  py::class_<JetTrial>(testing, "JetTrial", "A random network's forward sweep and pull-back, for timing.")
+      .def(py::init([](Index points, int order, int width, int layers) {
+             MlpShape shape;
+             shape.width = width, shape.layers = layers;
+             return std::make_unique<JetTrial>(shape, points, order_of(order), 0);
+           }),
+           "points"_a, "order"_a, "width"_a = 256, "layers"_a = 4)
+      .def("run", &JetTrial::run, py::call_guard<py::gil_scoped_release>());
   testing.def(
       "mlp_jets",
       [](const py::sequence& weights, const py::sequence& biases, int octaves, double frequency,
@@ -140,10 +153,11 @@ void bind_testing(py::module_& module) {
         const MlpShape shape = shape_of(layers, octaves, frequency, sharpness);
         Mlp mlp = make_mlp(layers, shape, double_precision);
         const Points where = as_points(points, "points");
-        const int count = order == 0 ? 1 : order == 1 ? 4 : 10;
+        const JetOrder jet_order = order_of(order);
         const Vector given = cotangents.is_none() ? Vector() : as_vector(cotangents, "cotangents");
-        const JetSweeps sweeps = sweep_jets(mlp, where, static_cast<JetOrder>(count), given);
-        return py::make_tuple(as_array(sweeps.jets, {count, where.rows(), shape.outputs}), sweeps.gradient);
+        const JetSweeps sweeps = sweep_jets(mlp, where, jet_order, given);
+        return py::make_tuple(as_array(sweeps.jets, {columns(jet_order), where.rows(), shape.outputs}),
+                              sweeps.gradient);
       },
       "weights"_a, "biases"_a, "octaves"_a, "frequency"_a, "sharpness"_a, "points"_a, "order"_a,
       "cotangents"_a = py::none(), "double_precision"_a = true,

@@ -4,6 +4,7 @@
 #include <ATen/ATen.h>
 
 #include "core/errors.h"
+#include "core/random.h"
 
 namespace arapfields {
 namespace {
@@ -87,6 +88,31 @@ JetSweeps sweep_jets(Mlp& mlp, PointsIn points, JetOrder order, const Vector& co
   mlp.pull_back(as_tensor(cotangents.data(), jets.sizes(), jets));
   result.gradient = plain(mlp.gradient());
   return result;
+}
+
+struct JetTrial::State {
+  Mlp mlp;
+  JetOrder order;
+  at::Tensor points, cotangents;
+};
+
+JetTrial::JetTrial(const MlpShape& shape, Index points, JetOrder order, std::uint64_t seed) {
+  Random random(seed, 0x72a1);
+  const auto draw = [&](at::IntArrayRef sizes) {
+    at::Tensor tensor = at::empty(sizes, at::kFloat);
+    float* values = tensor.data_ptr<float>();
+    for (Index i = 0; i < tensor.numel(); ++i) values[i] = static_cast<float>(random.uniform(-1.0, 1.0));
+    return tensor;
+  };
+  state_ = std::make_unique<State>(State{Mlp(shape, seed, false), order, draw({points, 3}),
+                                         draw({columns(order), points, shape.outputs})});
+}
+JetTrial::~JetTrial() = default;
+
+void JetTrial::run() {
+  state_->mlp.forward(state_->points, state_->order);
+  state_->mlp.gradient().zero_();
+  state_->mlp.pull_back(state_->cotangents);
 }
 
 }  // namespace arapfields

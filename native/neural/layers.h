@@ -30,4 +30,16 @@ struct JetSweeps {
 };
 JetSweeps sweep_jets(Mlp& mlp, PointsIn points, JetOrder order, const Vector& cotangents);
 
+/// A network with random numbers, points and cotangents, whose two sweeps can be run and timed.
+class JetTrial {
+ public:
+  JetTrial(const MlpShape& shape, Index points, JetOrder order, std::uint64_t seed);
+  ~JetTrial();
+  void run();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
 }  // namespace arapfields
