@@ -47,7 +47,7 @@ def timed(title, progress=job_progress):
     begin = time.perf_counter()
 
     def draw():
-        while not done.wait(0.5):
+        while not done.wait(0.5 if sys.stdout.isatty() else 5):
             share, text = progress()
             bar = "#" * round(24 * share)
             print(f"\r{title:26} [{bar:24}] {100 * share:3.0f} %  {text[:44]:44}", end="", flush=True)
