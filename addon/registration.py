@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the extension registers, in order: a table of contents."""
 
+import atexit
+
 import bpy
 
 from . import panels, preferences
@@ -26,9 +28,14 @@ def register():
         for module in reversed(done):
             _unregister(module)
         raise
+    if bpy.app.module:
+        # Python's own bpy shuts down as its last reference goes; classes still registered would keep it
+        # alive into the process's exit handlers, where it waits for a thread of its own for ever.
+        atexit.register(unregister)
 
 
 def unregister():
+    atexit.unregister(unregister)
     for module in reversed(MODULES):
         _unregister(module)
 
