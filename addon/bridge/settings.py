@@ -27,7 +27,7 @@ def definition(parameter, **extra):
     limits = {"min": p.low, "max": p.high, "soft_max": p.high if p.soft_high is None else p.soft_high}
     if isinstance(p.default, int):
         return bpy.props.IntProperty(default=p.default, **limits, **common)
-    precision = 4 if p.default < 0.1 else 2
+    precision = 4 if 0 < p.default < 0.1 else 2
     return bpy.props.FloatProperty(default=p.default, precision=precision, **limits, **common)
 
 
