@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""20,000 uniform samples of published networks against iarap.sampling (the paper's authors' own), per point.
+
+iarap takes a number of lines, not of points, and 2 ms a point: it gets LINES of them, and the same network in
+PyTorch. `uniformity` is the total-variation distance (216 cells) of our samples to area-uniform ones of the
+extracted mesh, over that between two area-uniform sets: 1 is ideal.
+"""
+
+import sys
+from pathlib import Path
+
+import iarap.sampling
+import numpy as np
+import torch
+
+import arapfields as af
+
+from . import timing
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from conftest import DATA
+from network_oracle import Network
+
+NAMES = ["bunny", "whale", "cube"]
+COUNT = 20_000
+LINES = 2_000
+THREADS = 2
+
+
+class Counted:
+    """The published network in single precision, as its authors evaluate it; counts points."""
+
+    def __init__(self, path):
+        state = torch.load(path, map_location="cpu")
+        self.layers = [(state[f"net.net.{i}.weight"], state[f"net.net.{i}.bias"]) for i in (0, 2, 4, 6, 8)]
+        self.evaluations = 0
+
+    @torch.no_grad()
+    def __call__(self, x):
+        self.evaluations += len(x)
+        angles = x.unsqueeze(-1) * 2.0 ** torch.arange(4)
+        h = torch.stack([torch.cos(angles), torch.sin(angles)], -1).flatten(-3)
+        for weight, bias in self.layers[:-1]:
+            h = torch.nn.functional.softplus(h @ weight.T + bias, beta=30)
+        return h @ self.layers[-1][0].T + self.layers[-1][1]
+
+
+def cells(points):
+    return np.histogramdd(points, bins=6, range=[(-1, 1)] * 3)[0].ravel() / len(points)
+
+
+def uniformity(sdf, points):
+    V, F = af.extract_surface(sdf, 128)
+    areas = [cells(af.sample_mesh(V, F, COUNT, seed=seed).points) for seed in range(6)]
+    between = np.mean([np.abs(a - b).sum() for a, b in zip(areas[::2], areas[1::2], strict=True)])
+    return np.mean([np.abs(cells(points) - a).sum() for a in areas]) / between
+
+
+def run(rounds=3):
+    """A row a network: milliseconds and evaluations a point of both, and how much faster ours is."""
+    torch.set_num_threads(THREADS)
+    rows = []
+    for name in NAMES:
+        path = DATA / "neural_sdf" / f"{name}.pt"
+        sdf, network = af.NeuralSdf.from_layers(*Network.published(path).layers), Counted(path)
+        report, theirs_points = {}, []
+
+        def ours(sdf=sdf, report=report):
+            af.sample_surface(sdf, COUNT, threads=THREADS, report=report)
+
+        def theirs(network=network, points=theirs_points):
+            points.append(len(iarap.sampling.uniform_sample(network, LINES, device="cpu")))
+
+        torch.manual_seed(0)
+        times = timing.paired(ours, theirs, rounds, warm_up=False)
+        share = COUNT / np.mean(theirs_points)
+        rows.append(
+            {
+                "case": name,
+                "ours_ms_a_point": round(1e3 * times["ours_s"] / COUNT, 4),
+                "iarap_ms_a_point": round(1e3 * times["theirs_s"] * share / COUNT, 3),
+                "times_faster": round(times["times_faster"] * share, 1),
+                "ours_evaluations_a_point": round(report["evaluations"] / COUNT, 2),
+                "iarap_evaluations_a_point": round(network.evaluations / sum(theirs_points), 1),
+                "uniformity": round(uniformity(sdf, af.sample_surface(sdf, COUNT).points), 3),
+            }
+        )
+    return rows
