@@ -61,16 +61,9 @@ def bar_handles(degrees=60.0):
 
 @functools.cache
 def published_samples(path, count=20000, seed=0):
-    """Area-uniform samples of a published network's zero set (cubes of 2/95); frame identity."""
-    import skimage.measure
-
+    """Uniform samples of a published network's zero set; frame identity."""
     sdf = af.NeuralSdf.from_layers(*Network.published(path).layers)
-    axis = np.linspace(-1, 1, 96)
-    grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3)
-    vertices, faces, _, _ = skimage.measure.marching_cubes(np.asarray(sdf(grid)).reshape(96, 96, 96), 0.0)
-    flat = af.sample_mesh(vertices * (2 / 95) - 1, faces[:, ::-1].astype(np.int32), count=count, seed=seed)
-    normals = sdf.gradient(flat.points)
-    return af.SurfaceSamples(flat.points, normals, frame=af.Frame([0, 0, 0], 1.0))
+    return af.sample_surface(sdf, count=count, seed=seed)
 
 
 def bunny_handles():
