@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Renders the documentation's pictures that are out of date, headless, each in a process of its own.
+
+    python blender_scripts/gallery.py [--output docs/gallery] [--only NAME ...] [--all] [--list]
+
+A picture is up to date when its module, the modules that all share and the library's version are those it was made
+with (manifest.json in the output folder, which also holds the figures measured on the way). Figures of published
+shapes need ../shared/data (or ARAPFIELDS_DATA) and go to out/gallery, outside the repository.
+"""
+
+import argparse
+import hashlib
+import importlib
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent
+sys.path[:0] = [str(HERE)]
+
+from figures import FIGURES  # noqa: E402
+
+SHARED = ["stage.py", "shapes.py", "menagerie.py", "figures/common.py"]
+
+
+def content_hash(figure):
+    from arapfields import __version__
+
+    digest = hashlib.sha256(__version__.encode())
+    for name in [*SHARED, f"figures/{figure.name}.py"]:
+        digest.update((HERE / name).read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def data_folder():
+    return Path(os.environ.get("ARAPFIELDS_DATA", ROOT.parent / "shared" / "data"))
+
+
+def draw(name, folder):
+    """In the figure's own process: renders, and leaves the measured figures beside the pictures."""
+    folder.mkdir(parents=True, exist_ok=True)
+    before = {path: path.stat().st_mtime_ns for path in folder.glob("*.png")}
+    figures = importlib.import_module(f"figures.{name}").render(folder)
+    files = sorted(p.name for p in folder.glob("*.png") if before.get(p) != p.stat().st_mtime_ns)
+    (folder / f".{name}.json").write_text(json.dumps({"files": files, "measured": figures}))
+
+
+def bring_up_to_date(figure, folder, force):
+    """One line on the screen; False where rendering failed."""
+    manifest_path = folder / "manifest.json"
+    manifest = json.loads(manifest_path.read_text()) if manifest_path.exists() else {}
+    known, wanted = manifest.get(figure.name, {}), content_hash(figure)
+    there = known.get("files") and all((folder / file).exists() for file in known["files"])
+    if there and known.get("hash") == wanted and not force:
+        print(f"{figure.name:16} up to date", flush=True)
+        return True
+    print(f"{figure.name:16} {figure.shows} ...", end=" ", flush=True)
+    begin = time.perf_counter()
+    command = [sys.executable, str(HERE / "gallery.py"), "--draw", figure.name, "--output", str(folder)]
+    made = subprocess.run(command, capture_output=True, text=True)
+    if made.returncode:
+        print(f"failed\n{made.stdout[-2000:]}{made.stderr[-2000:]}", flush=True)
+        return False
+    result = folder / f".{figure.name}.json"
+    manifest[figure.name] = {"shows": figure.shows, "hash": wanted, **json.loads(result.read_text())}
+    result.unlink()
+    manifest_path.write_text(json.dumps(dict(sorted(manifest.items())), indent=1) + "\n")
+    print(f"{time.perf_counter() - begin:.0f} s", flush=True)
+    return True
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--output", type=Path, default=ROOT / "docs" / "gallery")
+    parser.add_argument("--only", nargs="+", default=[], metavar="NAME")
+    parser.add_argument("--all", action="store_true", help="render what is up to date as well")
+    parser.add_argument("--list", action="store_true", help="name the figures and stop")
+    parser.add_argument("--draw", help=argparse.SUPPRESS)
+    options = parser.parse_args(sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else None)
+    if options.draw:
+        draw(options.draw, options.output)
+        return 0
+    if options.list:
+        print("\n".join(f"{figure.name:16} {figure.shows}" for figure in FIGURES))
+        return 0
+    unknown = set(options.only) - {figure.name for figure in FIGURES}
+    if unknown:
+        parser.error(f"no figure {', '.join(sorted(unknown))}; --list names them")
+    done = []
+    for figure in FIGURES:
+        if options.only and figure.name not in options.only:
+            continue
+        if figure.published and not data_folder().is_dir():
+            print(f"{figure.name:16} skipped: no published shapes at {data_folder()}", flush=True)
+            continue
+        folder = ROOT / "out" / "gallery" if figure.published else options.output
+        folder.mkdir(parents=True, exist_ok=True)
+        done.append(bring_up_to_date(figure, folder.resolve(), options.all))
+    return 0 if all(done) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

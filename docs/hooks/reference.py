@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The API reference, written from the docstrings of the installed package while the site is built."""
+
+import importlib
+import inspect
+import re
+
+from mkdocs.structure.files import File
+
+PAGE = "reference.md"
+INTRODUCTION = """# API reference
+
+Written from the docstrings of `arapfields` {version}. Arrays are NumPy; `n`, `m`, `p`, `k` are counts. All coordinates
+are the mesh's own unless a docstring says *cube*; distances are negative inside. Invalid arguments raise
+`InvalidInput`, a `ValueError` that names the argument, what was found and what is allowed.
+"""
+
+
+def on_files(files, config, **_):
+    previous = files.get_file_from_path(PAGE)
+    if previous:
+        files.remove(previous)
+    files.append(File.generated(config, PAGE, content=page()))
+    return files
+
+
+def page():
+    package = importlib.import_module("arapfields")
+    text = [INTRODUCTION.format(version=package.__version__)]
+    names = [name for name in in_pipeline_order(package) if not name.startswith("__")]
+    kinds = {
+        "Functions": [n for n in names if not inspect.isclass(getattr(package, n))],
+        "Classes": [n for n in names if is_class(package, n) and not is_error(package, n)],
+        "Errors": [n for n in names if is_error(package, n)],
+    }
+    for title, members in kinds.items():
+        text.append(f"## {title}\n")
+        text += [entry(getattr(package, name), name) for name in members]
+    return "\n".join(text)
+
+
+def in_pipeline_order(package):
+    """Names as the package's __init__ imports them."""
+    order = {name: i for i, name in enumerate(re.findall(r"\w+", inspect.getsource(package)))}
+    return sorted(package.__all__, key=lambda name: order.get(name, len(order)))
+
+
+def is_class(package, name):
+    return inspect.isclass(getattr(package, name))
+
+
+def is_error(package, name):
+    value = getattr(package, name)
+    return inspect.isclass(value) and issubclass(value, BaseException)
+
+
+def entry(value, name):
+    if inspect.isclass(value):
+        return "\n".join([f"### {name}\n", body(value), *members(value, name)])
+    return "\n".join([f"### {name}\n", signature(value, name), body(value)])
+
+
+def members(owner, name):
+    rows, calls = [], []
+    for key, member in vars(owner).items():
+        if key.startswith("_") and key not in {"__init__", "__call__"}:
+            continue
+        if isinstance(member, property) or type(member).__name__ == "pybind11_static_property":
+            rows.append(f"| `{key}` | {one_line(inspect.getdoc(member))} |")
+        elif callable(member) or isinstance(member, staticmethod | classmethod):
+            call = getattr(owner, key)
+            if not text_of(call) and key == "__init__" and not signature(call, name):
+                continue
+            shown = name if key == "__init__" else f"{name.lower()}" if key == "__call__" else f"{name}.{key}"
+            calls += [signature(call, shown), body(call)]
+    table = ["| attribute | |", "|---|---|", *rows, ""] if rows else []
+    return ["\n".join(table), *calls]
+
+
+def signature(value, shown):
+    """The signature as a code block: pybind11 writes it as the docstring's first line."""
+    first = (value.__doc__ or "").split("\n", 1)[0]
+    found = re.match(r"\w+(\(.*\))( -> .*)?$", first)
+    if found:
+        text = f"{shown}{found[1]}{found[2] or ''}"
+    else:
+        try:
+            text = f"{shown}{inspect.signature(value)}"
+        except (TypeError, ValueError):
+            return ""
+    text = re.sub(r"self: [\w.]+(, )?", "", text)
+    text = re.sub(r"(arapfields\._native|collections\.abc|numpy\.typing|typing)\.", "", text)
+    text = re.sub(r" -> (object|None)$", "", text.replace("(self, ", "(").replace("(self)", "()"))
+    if len(text) > 100:
+        head, tail = text.split("(", 1)
+        text = head + "(\n    " + ",\n    ".join(arguments(tail[: tail.rindex(")")])) + ",\n" + tail[tail.rindex(")") :]
+    return f"```text\n{text}\n```\n"
+
+
+def arguments(text):
+    """Splits at commas outside brackets and quotes."""
+    parts, depth, quote = [""], 0, ""
+    for letter in text:
+        quote = "" if letter == quote else letter if not quote and letter in "'\"" else quote
+        depth += 0 if quote else (letter in "([{") - (letter in ")]}")
+        if letter == "," and not depth and not quote:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    return [part.strip() for part in parts if part.strip()]
+
+
+def text_of(value):
+    text = inspect.getdoc(value) or ""
+    if re.match(r"\w+\(.*\)( -> .*)?$", text.split("\n", 1)[0]):
+        text = text.split("\n", 1)[1] if "\n" in text else ""
+    return text.strip()
+
+
+def body(value):
+    return re.sub(r"([*_<>|\\])", r"\\\1", text_of(value)) + "\n"
+
+
+def one_line(text):
+    text = re.sub(r"([*_<>|\\])", r"\\\1", text or "")
+    return " ".join(text.split())
