@@ -93,7 +93,9 @@ def mirrored(parts):
     twins = []
     for part in parts:
         if isinstance(part, Cone):
-            twins.append(Cone(tuple(flip * part.a), tuple(flip * part.b), part.ra, part.rb, part.colour, part.blend))
+            twins.append(
+                Cone(tuple(flip * part.a), tuple(flip * part.b), part.ra, part.rb, part.colour, part.blend)
+            )
         else:
             fields = {**vars(part), "centre": tuple(flip * part.centre)}
             twins.append(type(part)(**fields))

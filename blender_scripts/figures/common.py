@@ -47,6 +47,8 @@ def samples_of(shape, count=SAMPLES, seed=0):
 
 def deformed(shape, boxes, samples=None, **options):
     """The field that moves the boxes' parts, and the warped shape."""
+    if stage.DRAFT:
+        options = {"width": 64, "iterations": 80, "learning_rate": 4e-3, **options}
     handles = [box.handle if isinstance(box, Box) else box for box in boxes]
     samples = samples_of(shape) if samples is None else samples
     field = af.deform(samples, handles, af.DeformOptions(**options))
@@ -87,16 +89,25 @@ def add_boxes(boxes, place, targets, edge=0.011):
     return drawn
 
 
-def turned(x, degrees, z=0.0, scale=1.0, y=0.0):
-    """Where a shape stands: moved along the row and turned about its vertical axis."""
+def turned(shape, x, degrees, scale=1.0, y=0.0):
+    """Where a shape stands: on the floor, moved along the row and turned about its vertical axis."""
     turn = Matrix.Rotation(math.radians(degrees), 4, "Z")
-    return Matrix.Translation((x, y, z)) @ turn @ Matrix.Scale(scale, 4)
+    lift = -scale * shape.vertices[:, 2].min()
+    return Matrix.Translation((x, y, lift)) @ turn @ Matrix.Scale(scale, 4)
 
 
 def measured(field):
     """The figures of a solve that captions and pages quote."""
     report = field.report
-    names = ("stretch", "bend", "energy", "handle_error_mean", "min_determinant", "flipped_share", "preference")
+    names = (
+        "stretch",
+        "bend",
+        "energy",
+        "handle_error_mean",
+        "min_determinant",
+        "flipped_share",
+        "preference",
+    )
     return {name: round(float(report[name]), 5) for name in names if name in report}
 
 

@@ -66,7 +66,7 @@ def row(names, shapes, targets, path):
     shown = []
     for column, name in enumerate(names):
         degrees, boxes = CASES[name]
-        place = turned((column - (len(names) - 1) / 2) * SPACING, degrees)
+        place = turned(shape(name), (column - (len(names) - 1) / 2) * SPACING, degrees)
         shown.append(add(shapes[name], name, place))
         shown += add_boxes(boxes, place, targets)
     stage.photograph(shown, path, size=(1440, 560), elevation=14)

@@ -93,7 +93,13 @@ def signature(value, shown):
     text = re.sub(r" -> (object|None)$", "", text.replace("(self, ", "(").replace("(self)", "()"))
     if len(text) > 100:
         head, tail = text.split("(", 1)
-        text = head + "(\n    " + ",\n    ".join(arguments(tail[: tail.rindex(")")])) + ",\n" + tail[tail.rindex(")") :]
+        text = (
+            head
+            + "(\n    "
+            + ",\n    ".join(arguments(tail[: tail.rindex(")")]))
+            + ",\n"
+            + tail[tail.rindex(")") :]
+        )
     return f"```text\n{text}\n```\n"
 
 

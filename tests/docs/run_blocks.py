@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs a page's Python blocks one after the other in one namespace: run_blocks.py PAGE, in an empty folder.
+
+Solves and fits are cut to a few steps, so that what is tested is that the code runs, not how well it solves.
+Blocks that import bpy get Blender with the extension registered.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pages
+
+import arapfields as af
+
+LIMITS = {"iterations": 12, "steps": 40, "width": 32, "resolution": 48, "time_budget": 3.0}
+
+
+def shortened(kind):
+    """An options class whose instances never ask for much."""
+
+    def make(**given):
+        options = kind(**given)
+        for name, most in LIMITS.items():
+            if hasattr(options, name) and (getattr(options, name) > most or getattr(options, name) == 0):
+                setattr(options, name, most)
+        return options
+
+    return make
+
+
+def with_short_options(call, position, make):
+    def shortened_call(*arguments, **named):
+        if len(arguments) <= position and "options" not in named:
+            named["options"] = make()
+        return call(*arguments, **named)
+
+    return shortened_call
+
+
+def shorten_library():
+    for kind in [name for name in vars(af) if name.endswith("Options")]:
+        setattr(af, kind, shortened(getattr(af, kind)))
+    for call, kind in (("deform", "DeformOptions"), ("stylize", "StylizeOptions"), ("fit_sdf", "FitOptions")):
+        if hasattr(af, call):
+            setattr(af, call, with_short_options(getattr(af, call), 2, getattr(af, kind)))
+
+
+def readme_names():
+    """What the README's reader has: a mesh, a box around each end, and where the second is to go."""
+    from meshes import sphere
+
+    V, F = sphere(1.0, 3)
+    box_a, box_b = np.diag([1.1, 1.1, 0.2, 1.0]), np.diag([1.1, 1.1, 0.2, 1.0])
+    box_a[2, 3], box_b[2, 3] = -0.9, 0.9
+    moved = box_b.copy()
+    moved[2, 3] += 0.2
+    return {"V": V, "F": F, "box_a": box_a, "box_b": box_b, "moved_box_b": moved}
+
+
+def shorten_blender():
+    import addon
+
+    addon.register()
+    from addon.core import parameters
+
+    for parameter in parameters.DEFORM:
+        if parameter.name in LIMITS:
+            print(f"(documented default of {parameter.name}: {parameter.default})")
+
+
+def main(page):
+    blocks = pages.python_blocks(page)
+    if any("import bpy" in code for _, code in blocks):
+        sys.path.insert(0, str(pages.ROOT))
+        import bpy  # noqa: F401
+
+        shorten_blender()
+    shorten_library()
+    namespace = readme_names() if page.name == "README.md" else {}
+    for line, code in blocks:
+        exec(compile("\n" * (line - 1) + code, pages.name(page), "exec"), namespace)
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+    main(Path(sys.argv[1]))

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The documentation is true: its code runs, its links and pictures exist, the site builds without a warning."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pages
+import pytest
+
+HERE = Path(__file__).parent
+WITH_CODE = [page for page in pages.PAGES if pages.python_blocks(page)]
+
+
+def test_there_is_code_to_run():
+    assert {"README.md", "scripting.md"} <= {page.name for page in WITH_CODE}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", WITH_CODE, ids=pages.name)
+def test_code_blocks_run(page, tmp_path):
+    run = subprocess.run(
+        [sys.executable, str(HERE / "run_blocks.py"), str(page)], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert run.returncode == 0, run.stdout[-2000:] + run.stderr[-4000:]
+
+
+@pytest.mark.parametrize("page", pages.PAGES, ids=pages.name)
+def test_links_and_pictures_exist(page):
+    broken = []
+    for target in re.findall(r"\]\(([^)\s]+)\)", pages.without_code(page)):
+        if re.match(r"[a-z]+:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        there = (page.parent / path).resolve() if path else page
+        if there.name == "reference.md":
+            continue  # written while the site is built
+        if not there.exists():
+            broken.append(target)
+        elif anchor and there.suffix == ".md" and anchor not in pages.anchors(there):
+            broken.append(target)
+    assert not broken
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_warnings(tmp_path):
+    pytest.importorskip("material", reason="mkdocs-material is installed by make docs")
+    command = [
+        sys.executable,
+        "-m",
+        "mkdocs",
+        "build",
+        "--strict",
+        "--quiet",
+        "--site-dir",
+        str(tmp_path / "site"),
+    ]
+    run = subprocess.run(command, cwd=pages.ROOT, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr[-4000:]
+    html = (tmp_path / "site" / "method" / "index.html").read_text()
+    assert html.count("<math") > 20 and "arithmatex" not in html
+    for built in (tmp_path / "site").rglob("*.html"):
+        loaded = re.findall(r'<(?:script|link|img)[^>]*(?:src|href)="(https?:[^"]+)', built.read_text())
+        assert not loaded, f"{built.name} loads {loaded}"
