@@ -3,9 +3,9 @@
 
     python blender_scripts/gallery.py [--output docs/gallery] [--only NAME ...] [--all] [--list]
 
-A picture is up to date when its module, the modules that all share and the library's version are those it was made
-with (manifest.json in the output folder, which also holds the figures measured on the way). Figures of published
-shapes need ../shared/data (or ARAPFIELDS_DATA) and go to out/gallery, outside the repository.
+A picture is up to date when its module, the modules that all share and the library's version are those it was
+made with (manifest.json in the output folder, which also holds the figures measured on the way). Figures of
+published shapes need ../shared/data (or ARAPFIELDS_DATA) and go to out/gallery, outside the repository.
 """
 
 import argparse
@@ -24,7 +24,7 @@ sys.path[:0] = [str(HERE)]
 
 from figures import FIGURES  # noqa: E402
 
-SHARED = ["stage.py", "shapes.py", "menagerie.py", "figures/common.py"]
+SHARED = ["stage.py", "shapes.py", "creatures.py", "menagerie.py", "figures/common.py"]
 
 
 def content_hash(figure):

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shapes of our own for pictures, the demo and tests: smooth unions of round cones, extracted from a grid.
 
-Each shape is a function without arguments that returns a Shape: vertices (n,3), triangles (m,3) counter-clockwise
-from outside, colours (n,3). z is up, the shape looks towards -y, stands near z = 0 and is about two units long.
+Each shape is a function without arguments that returns a Shape: vertices (n,3), triangles (m,3)
+counter-clockwise from outside, colours (n,3). z is up, the shape looks towards -y and is about two units long.
 Needs NumPy and scikit-image, no Blender.
 """
 
-import math
 from dataclasses import dataclass
 from typing import NamedTuple
 

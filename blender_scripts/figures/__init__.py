@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The documentation's pictures, one module each: `render(output)` writes PNGs and returns the figures it measured."""
+"""The documentation's pictures, one module each: `render(output)` writes PNGs, returns what it measured."""
 
 from typing import NamedTuple
 

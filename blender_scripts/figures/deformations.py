@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Six shapes under cuboid handles: at rest above, deformed below, handles of one colour belonging together."""
+"""Six shapes under cuboid handles: at rest above, deformed below; a handle keeps its colour."""
 
 import stage
 

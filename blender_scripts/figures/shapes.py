@@ -5,7 +5,6 @@ import stage
 
 from .common import add, shape, turned
 
-
 ROWS = (
     (("lizard", 38), ("octopus", 0), ("dog", 50), ("bar", 30)),
     (("hand", -8), ("dinosaur", 55), ("mug", 25), ("ring", 30)),

@@ -10,9 +10,9 @@ from mkdocs.structure.files import File
 PAGE = "reference.md"
 INTRODUCTION = """# API reference
 
-Written from the docstrings of `arapfields` {version}. Arrays are NumPy; `n`, `m`, `p`, `k` are counts. All coordinates
-are the mesh's own unless a docstring says *cube*; distances are negative inside. Invalid arguments raise
-`InvalidInput`, a `ValueError` that names the argument, what was found and what is allowed.
+Written from the docstrings of `arapfields` {version}. Arrays are NumPy; `n`, `m`, `p`, `k` are counts. All
+coordinates are the mesh's own unless a docstring says *cube*; distances are negative inside. Invalid arguments
+raise `InvalidInput`, a `ValueError` that names the argument, what was found and what is allowed.
 """
 
 
