@@ -68,12 +68,18 @@ def bar(length=1.6, width=0.22):
 
 
 @functools.cache
+def slender_bar():
+    """A thinner one, for bending."""
+    return bar(1.64, 0.12)
+
+
+@functools.cache
 def ring():
     """A torus about the y axis: the simplest shape that rigid parts cannot unroll."""
     return build([Ring((0, 0, 0.8), 0.6, 0.2)], base=(0.10, 0.30, 0.55), cells=64)
 
 
-SHAPES = {f.__name__: f for f in (hand, lizard, dinosaur, dog, octopus, mug, bar, ring)}
+SHAPES = {f.__name__: f for f in (hand, lizard, dinosaur, dog, octopus, mug, bar, slender_bar, ring)}
 
 
 def load(name) -> Shape:

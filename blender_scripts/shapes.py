@@ -2,7 +2,7 @@
 """Shapes of our own for pictures, the demo and tests: smooth unions of round cones, extracted from a grid.
 
 Each shape is a function without arguments that returns a Shape: vertices (n,3), triangles (m,3)
-counter-clockwise from outside, colours (n,3). z is up, the shape looks towards -y and is about two units long.
+counter-clockwise from outside, colours (n,3). z is up, a shape looks towards -y and is about two units long.
 Needs NumPy and scikit-image, no Blender.
 """
 

@@ -116,8 +116,13 @@ def look_at(eye, target):
     return Matrix.Translation(eye) @ (target - eye).to_track_quat("-Z", "Y").to_matrix().to_4x4()
 
 
-def photograph(objects, path, size=(1440, 600), samples=24, elevation=12.0, azimuth=0.0, threads=0):
-    """Frames the objects from the front (looking along +y), lights them and renders a PNG with Cycles."""
+def photograph(
+    objects, path, size=(1440, 600), samples=24, elevation=12.0, azimuth=0.0, threads=0, closer=1.0
+):
+    """Frames the objects from the front (looking along +y), lights them and renders a PNG with Cycles.
+
+    `closer` above 1 crops: for groups whose corners are empty.
+    """
     bpy.context.view_layer.update()
     low, high = bounds(objects)
     middle, extent = (low + high) / 2, high - low
@@ -137,7 +142,7 @@ def photograph(objects, path, size=(1440, 600), samples=24, elevation=12.0, azim
     bpy.context.collection.objects.link(camera)
     a, e = math.radians(azimuth), math.radians(elevation)
     towards = Vector((math.sin(a) * math.cos(e), -math.cos(a) * math.cos(e), math.sin(e)))
-    distance = 1.02 * span / 2 / math.tan(data.angle / 2) + extent.y / 2
+    distance = (1.02 * span / 2 / math.tan(data.angle / 2) + extent.y / 2) / closer
     camera.matrix_world = look_at(middle + towards * distance, middle)
 
     scene = bpy.context.scene

@@ -11,9 +11,20 @@ PAGE = "reference.md"
 INTRODUCTION = """# API reference
 
 Written from the docstrings of `arapfields` {version}. Arrays are NumPy; `n`, `m`, `p`, `k` are counts. All
-coordinates are the mesh's own unless a docstring says *cube*; distances are negative inside. Invalid arguments
-raise `InvalidInput`, a `ValueError` that names the argument, what was found and what is allowed.
+coordinates are the mesh's own unless a docstring says *cube*; distances are negative inside. Options go
+by name, `DeformOptions(bending=0.1)`, and have a method `to_dict()`. Bad arguments raise `InvalidInput`, a
+`ValueError` that names the argument, what was found and what is allowed.
 """
+
+
+# What signatures say more plainly.
+PLAIN = {
+    r"SupportsInt \| SupportsIndex": "int",
+    r"SupportsFloat \| SupportsIndex": "float",
+    r'Annotated\[(NDArray)\[numpy\.\w+\](, "[^"]*")*\]': r"\1",
+    r"NDArray\[numpy\.\w+\]": "NDArray",
+    r"(\w+Options)\([^()]+\)": r"\1()",
+}
 
 
 def on_files(files, config, **_):
@@ -40,8 +51,9 @@ def page():
 
 
 def in_pipeline_order(package):
-    """Names as the package's __init__ imports them."""
-    order = {name: i for i, name in enumerate(re.findall(r"\w+", inspect.getsource(package)))}
+    """Names as the native module defines them, which is the order of the pipeline."""
+    native = list(vars(importlib.import_module("arapfields._native")))
+    order = {name: i for i, name in enumerate(native)}
     return sorted(package.__all__, key=lambda name: order.get(name, len(order)))
 
 
@@ -62,19 +74,26 @@ def entry(value, name):
 
 def members(owner, name):
     rows, calls = [], []
+    defaults = owner().to_dict() if name.endswith("Options") else {}
     for key, member in vars(owner).items():
         if key.startswith("_") and key not in {"__init__", "__call__"}:
             continue
-        if isinstance(member, property) or type(member).__name__ == "pybind11_static_property":
-            rows.append(f"| `{key}` | {one_line(inspect.getdoc(member))} |")
+        if isinstance(member, property):
+            given = f"| `{defaults[key]!r}` " if defaults else ""
+            rows.append(f"| `{key}` {given}| {one_line(inspect.getdoc(member))} |")
         elif callable(member) or isinstance(member, staticmethod | classmethod):
             call = getattr(owner, key)
-            if not text_of(call) and key == "__init__" and not signature(call, name):
+            if key == "__init__" and (defaults or "Initialize self" in (call.__doc__ or "")):
                 continue
-            shown = name if key == "__init__" else f"{name.lower()}" if key == "__call__" else f"{name}.{key}"
+            if key == "to_dict" and defaults:
+                continue
+            instance = "live" if name == "LiveDeformer" else re.findall(r"[A-Z][a-z]*", name)[-1].lower()
+            shown = {"__init__": name, "__call__": instance}.get(key, f"{instance}.{key}")
+            if isinstance(member, staticmethod | classmethod):
+                shown = f"{name}.{key}"
             calls += [signature(call, shown), body(call)]
-    table = ["| attribute | |", "|---|---|", *rows, ""] if rows else []
-    return ["\n".join(table), *calls]
+    columns = "| option | default | |\n|---|---|---|" if defaults else "| attribute | |\n|---|---|"
+    return [*calls, "\n".join([columns, *rows, ""]) if rows else ""]
 
 
 def signature(value, shown):
@@ -89,7 +108,9 @@ def signature(value, shown):
         except (TypeError, ValueError):
             return ""
     text = re.sub(r"self: [\w.]+(, )?", "", text)
-    text = re.sub(r"(arapfields\._native|collections\.abc|numpy\.typing|typing)\.", "", text)
+    text = re.sub(r"(arapfields\._native|collections\.abc|numpy\.typing|typing|pathlib|os)\.", "", text)
+    for long, short in PLAIN.items():
+        text = re.sub(long, short, text)
     text = re.sub(r" -> (object|None)$", "", text.replace("(self, ", "(").replace("(self)", "()"))
     if len(text) > 100:
         head, tail = text.split("(", 1)
