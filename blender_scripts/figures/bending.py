@@ -8,10 +8,11 @@ import arapfields as af
 
 from .common import Box, add, add_boxes, deformed, measured, samples_of, shape, stack, turned
 
+SPACING = 1.5
 WEIGHTS = [0.0, 1e-3, 1e-2, 1e-1]
 BOXES = [
     Box((-0.66, 0, 0.12), (0.16, 0.17, 0.17)),
-    Box((0.66, 0, 0.12), (0.16, 0.17, 0.17), -105, "Y", (0.0, 0.0, 0.12), (0.0, 0.0, 0.1)),
+    Box((0.66, 0, 0.12), (0.16, 0.17, 0.17), -90, "Y", (0.0, 0.0, 0.12), (0.05, 0.0, 0.05)),
 ]
 
 
@@ -21,7 +22,7 @@ def render(output):
     stage.clear()
     shown, results = [], {}
     for column, weight in enumerate([None, *WEIGHTS]):
-        place = turned(bar, 1.75 * column, 12)
+        place = turned(bar, SPACING * column, 12)
         if weight is None:
             moved = bar
         else:
@@ -31,8 +32,8 @@ def render(output):
         shown.append(add(moved, f"bar {weight}", place))
         shown += add_boxes(BOXES, place, weight is not None)
         text = "rest" if weight is None else f"λ = {weight:g}"
-        shown.append(stage.caption(text, (1.75 * column, -0.5, -0.32), 0.16))
-    stage.photograph(shown, output / "bending-row.png", size=(1440, 420), elevation=14)
+        shown.append(stage.caption(text, (SPACING * column - 0.25, -0.75, 0.0), 0.15))
+    stage.photograph(shown, output / "bending-row.png", size=(1440, 400), elevation=14, closer=1.06)
     plot(results, output / "bending-plot.png")
     stack([output / "bending-row.png"], output / "bending.png")
     return results
