@@ -83,7 +83,8 @@ def main():
     options = parser.parse_args(sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else None)
     if options.draw:
         draw(options.draw, options.output)
-        return 0
+        sys.stdout.flush()
+        os._exit(0)  # bpy 4.5 may wait forever for a thread of its own while the process ends
     if options.list:
         print("\n".join(f"{figure.name:16} {figure.shows}" for figure in FIGURES))
         return 0

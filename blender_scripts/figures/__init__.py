@@ -14,4 +14,8 @@ FIGURES = [
     Figure("shapes", "our own shapes"),
     Figure("deformations", "six shapes under cuboid handles, at rest and deformed"),
     Figure("bending", "one bar, four weights of the bend"),
+    Figure("exact", "soft and exact handles"),
+    Figure("styles", "six styles of three shapes, with their preferences on a sphere"),
+    Figure("live", "six frames of a handle dragged live"),
+    Figure("character", "materials and UVs of a deformed and a stylized mesh"),
 ]

@@ -22,7 +22,8 @@ def render(output):
     stage.clear()
     shown, results = [], {}
     for column, weight in enumerate([None, *WEIGHTS]):
-        place = turned(bar, SPACING * column, 12)
+        at = SPACING * column + (0.3 if column else -0.1)
+        place = turned(bar, at, 12)
         if weight is None:
             moved = bar
         else:
@@ -32,8 +33,8 @@ def render(output):
         shown.append(add(moved, f"bar {weight}", place))
         shown += add_boxes(BOXES, place, weight is not None)
         text = "rest" if weight is None else f"λ = {weight:g}"
-        shown.append(stage.caption(text, (SPACING * column - 0.25, -0.75, 0.0), 0.15))
-    stage.photograph(shown, output / "bending-row.png", size=(1440, 400), elevation=14, closer=1.06)
+        shown.append(stage.caption(text, (at, -1.0, 0.0), 0.15))
+    stage.photograph(shown, output / "bending-row.png", size=(1440, 400), elevation=14, closer=1.04)
     plot(results, output / "bending-plot.png")
     stack([output / "bending-row.png"], output / "bending.png")
     return results

@@ -10,6 +10,7 @@ import menagerie
 import numpy as np
 import stage
 from mathutils import Matrix, Vector
+from shapes import Shape
 
 import arapfields as af
 
@@ -130,3 +131,17 @@ def stack(paths, target, gap=6, horizontal=False):
 
 def shape(name):
     return menagerie.load(name)
+
+
+def suzanne(levels=2):
+    """Blender's monkey, subdivided, in one colour; her triangles as Blender splits her faces."""
+    bpy.ops.mesh.primitive_monkey_add()
+    item = bpy.context.object
+    item.modifiers.new("Subdivision", "SUBSURF").levels = levels
+    bpy.ops.object.modifier_apply(modifier="Subdivision")
+    mesh = item.data
+    mesh.calc_loop_triangles()
+    vertices = np.array([vertex.co for vertex in mesh.vertices], float)
+    triangles = np.array([triangle.vertices for triangle in mesh.loop_triangles], np.int64)
+    bpy.data.objects.remove(item, do_unlink=True)
+    return Shape(vertices, triangles, np.tile((0.42, 0.20, 0.08), (len(vertices), 1)))

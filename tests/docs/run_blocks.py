@@ -5,6 +5,7 @@ Solves and fits are cut to a few steps, so that what is tested is that the code 
 Blocks that import bpy get Blender with the extension registered.
 """
 
+import os
 import sys
 from pathlib import Path
 
@@ -58,24 +59,15 @@ def readme_names():
     return {"V": V, "F": F, "box_a": box_a, "box_b": box_b, "moved_box_b": moved}
 
 
-def shorten_blender():
-    import addon
-
-    addon.register()
-    from addon.core import parameters
-
-    for parameter in parameters.DEFORM:
-        if parameter.name in LIMITS:
-            print(f"(documented default of {parameter.name}: {parameter.default})")
-
-
 def main(page):
     blocks = pages.python_blocks(page)
     if any("import bpy" in code for _, code in blocks):
         sys.path.insert(0, str(pages.ROOT))
         import bpy  # noqa: F401
 
-        shorten_blender()
+        import addon
+
+        addon.register()
     shorten_library()
     namespace = readme_names() if page.name == "README.md" else {}
     for line, code in blocks:
@@ -85,3 +77,5 @@ def main(page):
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
     main(Path(sys.argv[1]))
+    sys.stdout.flush()
+    os._exit(0)  # bpy 4.5 may wait forever for a thread of its own while the process ends

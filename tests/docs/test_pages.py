@@ -17,7 +17,6 @@ def test_there_is_code_to_run():
     assert {"README.md", "scripting.md"} <= {page.name for page in WITH_CODE}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("page", WITH_CODE, ids=pages.name)
 def test_code_blocks_run(page, tmp_path):
     run = subprocess.run(

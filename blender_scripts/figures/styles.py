@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Gauss styles: a column a style with its preference on a sphere, a row a shape, in the radial field."""
+
+import numpy as np
+import stage
+
+import arapfields as af
+
+from .common import add, samples_of, shape, stack, suzanne, turned, warped
+
+STYLES = ["cube", "octahedron", "dodecahedron", "hexagonal prism", "square pyramid", "cylinder"]
+ROWS = [("dog", 48), ("suzanne", 28), ("octopus", 0)]
+SPACING = 2.15
+OPTIONS = {
+    "samples": 4000,
+    "coarse_bumps": 200,
+    "fine_bumps": 1000,
+    "bending": 1e-3,
+    "steps": 80,
+    "tolerance": 1e-4,
+}
+LOW, HIGH = np.array((0.10, 0.13, 0.20)), np.array((0.90, 0.36, 0.06))
+
+
+def ball(colours_of, rings=64):
+    """A sphere of the Shape kind, coloured by its normals."""
+    from shapes import Shape
+
+    u, v = np.meshgrid(np.linspace(0, np.pi, rings + 1), np.linspace(0, 2 * np.pi, 2 * rings, endpoint=False))
+    points = np.stack([np.sin(u) * np.cos(v), np.sin(u) * np.sin(v), np.cos(u)], -1).reshape(-1, 3)
+    a, i = np.meshgrid(np.arange(2 * rings), np.arange(rings), indexing="ij")
+    b = (a + 1) % (2 * rings)
+    one, two = a * (rings + 1) + i, b * (rings + 1) + i
+    triangles = np.concatenate(
+        [np.stack(t, -1).reshape(-1, 3) for t in ((one, one + 1, two), (two, one + 1, two + 1))]
+    )
+    return Shape(points, triangles, colours_of(points))
+
+
+def preference_colours(style):
+    def colours(normals):
+        g = np.clip(af.gauss_preference(normals, af.preferred_normals(style)), 0, 1)[:, None]
+        return LOW + (HIGH - LOW) * g**1.5
+
+    return colours
+
+
+def stylized(rest, live, style):
+    live.reset()
+    live.set_style(style)
+    field = live.solve()
+    return warped(rest, field), {
+        "preference_rest": round(
+            float(np.mean(af.gauss_preference(live.normals, af.preferred_normals(style)))), 3
+        ),
+        "preference": round(live.deformer.report["preference"], 3),
+        "flipped_share": round(live.deformer.report["flipped_share"], 4),
+        "min_determinant": round(live.deformer.report["min_determinant"], 3),
+    }
+
+
+class Live:
+    """A live deformer with the normals of the samples it was given."""
+
+    def __init__(self, samples):
+        self.normals = samples.normals
+        self.deformer = af.LiveDeformer(samples, options=af.LiveOptions(**OPTIONS))
+        self.reset, self.set_style, self.solve = (
+            self.deformer.reset,
+            self.deformer.set_style,
+            self.deformer.solve,
+        )
+
+
+def place(made, column, degrees):
+    return turned(made, column * SPACING, degrees, scale=1.7 / np.ptp(made.vertices, axis=0).max())
+
+
+def render(output):
+    paths, results = [output / "styles-0.png"], {}
+    stage.clear()
+    balls = [ball(preference_colours(style)) for style in STYLES]
+    shown = [
+        add(made, style, place(made, 1 + i, 25))
+        for i, (style, made) in enumerate(zip(STYLES, balls, strict=True))
+    ]
+    shown += [stage.caption(style, (SPACING * (1 + i), -0.9, -0.42), 0.24) for i, style in enumerate(STYLES)]
+    shown += [stage.caption("at rest", (0, -0.9, -0.42), 0.24), spacer(0)]
+    stage.photograph(shown, paths[0], size=(1440, 270), elevation=10)
+    for name, degrees in ROWS:
+        rest = suzanne() if name == "suzanne" else shape(name)
+        live = Live(samples_of(rest))
+        stage.clear()
+        shown = [add(rest, name, place(rest, 0, degrees))]
+        for column, style in enumerate(STYLES, 1):
+            moved, results[f"{name}, {style}"] = stylized(rest, live, style)
+            shown.append(add(moved, style, place(rest, column, degrees)))
+        paths.append(output / f"styles-{name}.png")
+        stage.photograph(shown, paths[-1], size=(1440, 270), elevation=12)
+    stack(paths, output / "styles.png", gap=0)
+    return results
+
+
+def spacer(column):
+    """Something invisible where the row of spheres has nothing, so that all rows are framed alike."""
+    import bpy
+
+    made = bpy.data.objects.new("spacer", None)
+    made.empty_display_size, made.location = 0.01, (column * SPACING - 0.85, 0, 0.5)
+    bpy.context.collection.objects.link(made)
+    return made
