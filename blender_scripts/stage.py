@@ -159,5 +159,8 @@ def photograph(
         render.threads_mode, render.threads = "FIXED", threads
     scene.cycles.device, scene.cycles.samples = "CPU", 6 if DRAFT else samples
     scene.cycles.use_denoising = True
-    scene.view_settings.view_transform = "Standard"
+    # The denoiser makes up for early stopping: by eye the same picture for two thirds of the time.
+    scene.cycles.adaptive_threshold, scene.cycles.adaptive_min_samples = 0.1, 6
+    scene.cycles.max_bounces, scene.cycles.diffuse_bounces, scene.cycles.glossy_bounces = 3, 2, 2
+    scene.view_settings.view_transform, scene.view_settings.look = "Standard", "Medium High Contrast"
     bpy.ops.render.render(write_still=True)

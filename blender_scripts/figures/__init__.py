@@ -11,9 +11,11 @@ class Figure(NamedTuple):
 
 
 FIGURES = [
+    Figure("hero", "a shape at rest, deformed, and in two styles"),
     Figure("shapes", "our own shapes"),
     Figure("deformations", "six shapes under cuboid handles, at rest and deformed"),
     Figure("bending", "one bar, four weights of the bend"),
+    Figure("inverse", "the surface moved forward beside the zero set of Φ∘f⁻¹"),
     Figure("exact", "soft and exact handles"),
     Figure("styles", "six styles of three shapes, with their preferences on a sphere"),
     Figure("live", "six frames of a handle dragged live"),

@@ -113,7 +113,7 @@ def render(output):
         samples, [box.handle for box in BOXES], af.DeformOptions(iterations=60 if stage.DRAFT else 300)
     )
     live = af.LiveDeformer(samples, options=af.LiveOptions(**OPTIONS))
-    live.set_style("cube")
+    live.set_style("cube", 0.6)
     cubic = live.solve()
     shown = [item, copy_with(item, field(vertices), 1), copy_with(item, cubic(vertices), 2)]
     for column, targets in ((0, False), (1, True)):

@@ -10,14 +10,14 @@ from .common import add, samples_of, shape, stack, suzanne, turned, warped
 
 STYLES = ["cube", "octahedron", "dodecahedron", "hexagonal prism", "square pyramid", "cylinder"]
 ROWS = [("dog", 48), ("suzanne", 28), ("octopus", 0)]
-SPACING = 2.15
+SPACING, STRENGTH = 2.1, 0.6
 OPTIONS = {
-    "samples": 4000,
-    "coarse_bumps": 200,
-    "fine_bumps": 1000,
+    "samples": 3000,
+    "coarse_bumps": 150,
+    "fine_bumps": 800,
     "bending": 1e-3,
-    "steps": 80,
-    "tolerance": 1e-4,
+    "steps": 40,
+    "tolerance": 3e-4,
 }
 LOW, HIGH = np.array((0.10, 0.13, 0.20)), np.array((0.90, 0.36, 0.06))
 
@@ -47,7 +47,7 @@ def preference_colours(style):
 
 def stylized(rest, live, style):
     live.reset()
-    live.set_style(style)
+    live.set_style(style, STRENGTH)
     field = live.solve()
     return warped(rest, field), {
         "preference_rest": round(
@@ -73,7 +73,10 @@ class Live:
 
 
 def place(made, column, degrees):
-    return turned(made, column * SPACING, degrees, scale=1.7 / np.ptp(made.vertices, axis=0).max())
+    """In its column, as large as the column's width allows from the front."""
+    turn = np.radians(degrees)
+    width = np.ptp(made.vertices[:, :2] @ (np.cos(turn), -np.sin(turn)))
+    return turned(made, column * SPACING, degrees, scale=min(1.8 / width, 2.2 / np.ptp(made.vertices[:, 2])))
 
 
 def render(output):

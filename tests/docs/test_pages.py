@@ -40,6 +40,13 @@ def test_links_and_pictures_exist(page):
     assert not broken
 
 
+def test_the_diagram_is_that_of_the_code():
+    sys.path.insert(0, str(pages.ROOT / "docs" / "hooks"))
+    import diagram
+
+    assert diagram.PICTURE.read_text() == diagram.svg(), "run python docs/hooks/diagram.py"
+
+
 @pytest.mark.slow
 def test_the_site_builds_without_warnings(tmp_path):
     pytest.importorskip("material", reason="mkdocs-material is installed by make docs")
