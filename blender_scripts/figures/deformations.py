@@ -69,7 +69,7 @@ def row(names, shapes, targets, path):
         place = turned(shape(name), (column - (len(names) - 1) / 2) * SPACING, degrees)
         shown.append(add(shapes[name], name, place))
         shown += add_boxes(boxes, place, targets)
-    stage.photograph(shown, path, size=(1440, 500), elevation=17)
+    stage.photograph(shown, path, size=(1200, 417), elevation=17)
 
 
 def render(output):

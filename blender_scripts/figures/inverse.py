@@ -46,7 +46,7 @@ def render(output):
         place = turned(rest, SPACING * column, degrees)
         shown += [add(made, text, place), *add_boxes(boxes, place, column > 0)]
         shown.append(stage.caption(text, (SPACING * column, -1.3, 0.0), 0.17))
-    stage.photograph(shown, output / "inverse.png", size=(1440, 520), elevation=12)
+    stage.photograph(shown, output / "inverse.png", size=(1200, 433), elevation=12)
     return {
         "deformed": measured(field),
         "fit_near_error": round(float(sdf.report["near_mean"]), 5),

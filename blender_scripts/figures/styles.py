@@ -89,7 +89,7 @@ def render(output):
     ]
     shown += [stage.caption(style, (SPACING * (1 + i), -0.9, -0.42), 0.24) for i, style in enumerate(STYLES)]
     shown += [stage.caption("at rest", (0, -0.9, -0.42), 0.24), spacer(0)]
-    stage.photograph(shown, paths[0], size=(1440, 270), elevation=10)
+    stage.photograph(shown, paths[0], size=(1200, 225), elevation=10)
     for name, degrees in ROWS:
         rest = suzanne() if name == "suzanne" else shape(name)
         live = Live(samples_of(rest))
@@ -99,7 +99,7 @@ def render(output):
             moved, results[f"{name}, {style}"] = stylized(rest, live, style)
             shown.append(add(moved, style, place(rest, column, degrees)))
         paths.append(output / f"styles-{name}.png")
-        stage.photograph(shown, paths[-1], size=(1440, 270), elevation=12)
+        stage.photograph(shown, paths[-1], size=(1200, 225), elevation=12)
     stack(paths, output / "styles.png", gap=0)
     return results
 
