@@ -3,8 +3,6 @@
 
 import atexit
 
-import atexit
-
 import bpy
 
 from . import panels, preferences
@@ -26,7 +24,6 @@ def register():
         for module in MODULES:
             done.append(module)
             _register(module)
-        atexit.register(end_workers)
     except Exception:
         for module in reversed(done):
             _unregister(module)
@@ -37,15 +34,7 @@ def register():
         atexit.register(unregister)
 
 
-def end_workers():
-    """No thread of ours outlives the add-on or Blender."""
-    jobs.stop()
-    live_mode.end_all()
-
-
 def unregister():
-    atexit.unregister(end_workers)
-    end_workers()
     atexit.unregister(unregister)
     for module in reversed(MODULES):
         _unregister(module)
