@@ -72,6 +72,8 @@ void bind_options(py::module_& module) {
       .field("handle_weight", &LiveOptions::handle_weight, "Weight of the handles' mean squared distance.")
       .field("handle_samples", &LiveOptions::handle_samples, "Samples at which a handle pulls, at most.")
       .field("gauss_weight", &LiveOptions::gauss_weight, "λ_Gauss of a style at strength 1.")
+      .field("barrier", &LiveOptions::barrier, "Weight of the barrier that keeps det J up; 0: none.")
+      .field("barrier_threshold", &LiveOptions::barrier_threshold, "det J below which the barrier acts.")
       .field("steps", &LiveOptions::steps, "Quasi-Newton steps of one solve, at most.")
       .field("tolerance", &LiveOptions::tolerance,
              "A solve ends where the next step is expected to gain less than this share of the energy.")

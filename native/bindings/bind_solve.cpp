@@ -100,6 +100,7 @@ void bind_options(py::module_& module) {
       .field("seed", &DeformOptions::seed, "Of weights and subsets; same seed, same result.");
   OptionsBinding<StylizeOptions>(module, "StylizeOptions",
                                  "Options of stylize. Lengths and weights refer to the samples' unit cube.")
+      .field("field", &StylizeOptions::field, "'neural' or 'radial', as in DeformOptions.")
       .field("strength", &StylizeOptions::strength, "From 0, the shape itself, to 1.")
       .field("sharpness", &StylizeOptions::sharpness,
              "How narrow the preference is about each normal (σ): low rounds edges, high keeps them crisp.")

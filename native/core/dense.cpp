@@ -43,6 +43,15 @@ RowMatrix<Scalar> cholesky(const Eigen::Ref<const RowMatrix<Scalar>>& a) {
 }
 
 template <class Scalar>
+RowMatrix<Scalar> lower_inverse(const Eigen::Ref<const RowMatrix<Scalar>>& factor) {
+  const at::Tensor l = view<Scalar>(factor);
+  RowMatrix<Scalar> result(factor.rows(), factor.cols());
+  view(result.data(), result.rows(), result.cols(), result.cols())
+      .copy_(at::linalg_solve_triangular(l, at::eye(l.size(0), l.options()), /*upper=*/false));
+  return result;
+}
+
+template <class Scalar>
 RowMatrix<Scalar> cholesky_solve(const Eigen::Ref<const RowMatrix<Scalar>>& factor,
                                  const Eigen::Ref<const RowMatrix<Scalar>>& b) {
   RowMatrix<Scalar> result(b.rows(), b.cols());
@@ -55,7 +64,8 @@ RowMatrix<Scalar> cholesky_solve(const Eigen::Ref<const RowMatrix<Scalar>>& fact
   template void gemm<Scalar>(Transpose, Transpose, Scalar, const Eigen::Ref<const RowMatrix<Scalar>>&,       \
                              const Eigen::Ref<const RowMatrix<Scalar>>&, Scalar,                             \
                              Eigen::Ref<RowMatrix<Scalar>>);                                                 \
-  template RowMatrix<Scalar> cholesky<Scalar>(const Eigen::Ref<const RowMatrix<Scalar>>&);                   \
+  template RowMatrix<Scalar> cholesky<Scalar>(const Eigen::Ref<const RowMatrix<Scalar>>&); \
+  template RowMatrix<Scalar> lower_inverse<Scalar>(const Eigen::Ref<const RowMatrix<Scalar>>&);                   \
   template RowMatrix<Scalar> cholesky_solve<Scalar>(const Eigen::Ref<const RowMatrix<Scalar>>&,              \
                                                     const Eigen::Ref<const RowMatrix<Scalar>>&);
 ARAPFIELDS_DENSE(float)

@@ -19,6 +19,10 @@ void gemm(Transpose transpose_a, Transpose transpose_b, Scalar alpha,
 template <class Scalar>
 RowMatrix<Scalar> cholesky(const Eigen::Ref<const RowMatrix<Scalar>>& a);
 
+/// L⁻¹ of a lower triangular L, which must have no zero on its diagonal.
+template <class Scalar>
+RowMatrix<Scalar> lower_inverse(const Eigen::Ref<const RowMatrix<Scalar>>& factor);
+
 /// Solves L Lᵀ X = B for X (n,k).
 template <class Scalar>
 RowMatrix<Scalar> cholesky_solve(const Eigen::Ref<const RowMatrix<Scalar>>& factor,

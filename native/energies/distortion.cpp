@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "energies/distortion.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "core/errors.h"
+#include "energies/kernels.h"
 #include "energies/ranges.h"
 
 namespace arapfields {
@@ -37,17 +37,9 @@ Distortion distortion(JetView<const Scalar> jets) {
   if (jets.count == 0) return result;
   std::vector<Distortion> parts(static_cast<std::size_t>((jets.count + range_size - 1) / range_size));
   for_ranges(jets.count, [&](Index begin, Index end) {
-    Distortion part{INFINITY, 0.0, 0.0, INFINITY};
-    for (Index p = begin; p < end; ++p) {
-      const Mat3 j = jacobian_at(jets, p);
-      const double determinant = j.determinant();
-      Eigen::SelfAdjointEigenSolver<Mat3> eigen;
-      eigen.computeDirect(j.transpose() * j, Eigen::EigenvaluesOnly);
-      part.min_determinant = std::min(part.min_determinant, determinant);
-      part.flipped_share += determinant > 0.0 ? 0.0 : 1.0;
-      part.max_stretch = std::max(part.max_stretch, std::sqrt(std::max(0.0, eigen.eigenvalues()[2])));
-      part.min_stretch = std::min(part.min_stretch, std::sqrt(std::max(0.0, eigen.eigenvalues()[0])));
-    }
+    double values[4] = {INFINITY, 0.0, 0.0, INFINITY};
+    ARAPFIELDS_DISPATCH(distortion_range(jets.data, jets.count, begin, end, values));
+    const Distortion part{values[0], values[1], values[2], values[3]};
     parts[static_cast<std::size_t>(begin / range_size)] = part;
   });
   result = {INFINITY, 0.0, 0.0, INFINITY};
@@ -73,11 +65,12 @@ double fold_barrier(JetView<const Scalar> jets, double threshold, double weight,
   const auto sums = sum_over_ranges<1>(jets.count, [&](Index begin, Index end, double* out) {
     for (Index p = begin; p < end; ++p) {
       const Mat3 j = jacobian_at(jets, p);
-      const double gap = 1.0 - j.determinant() / threshold;
+      const Mat3 minors = cofactors(j);
+      const double gap = 1.0 - minors.col(0).dot(j.col(0)) / threshold;
       if (gap <= 0.0) continue;
       out[0] += gap * gap;
       if (cotangents.data == nullptr) continue;
-      const Mat3 gradient = (-2.0 * gap / threshold * weight / n) * cofactors(j);
+      const Mat3 gradient = (-2.0 * gap / threshold * weight / n) * minors;
       for (int k = 0; k < 3; ++k)
         for (int i = 0; i < 3; ++i)
           cotangents.at(first_column(k), p)[i] += static_cast<Scalar>(gradient(i, k));

@@ -44,4 +44,10 @@ ARAPFIELDS_DECLARE(void rotation_range(const float*, std::int64_t count, std::in
 ARAPFIELDS_DECLARE(void rotation_range(const double*, std::int64_t count, std::int64_t begin,
                                        std::int64_t end, double*))
 
+// Joins (min det, share ≤ 0 as a count, max and min singular value) of the range to out[4].
+ARAPFIELDS_DECLARE(void distortion_range(const float* jets, std::int64_t count, std::int64_t begin,
+                                         std::int64_t end, double* out))
+ARAPFIELDS_DECLARE(void distortion_range(const double* jets, std::int64_t count, std::int64_t begin,
+                                         std::int64_t end, double* out))
+
 }  // namespace arapfields

@@ -3,49 +3,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <numeric>
 #include <string>
 
 #include "core/errors.h"
+#include "fields/radial_kernel.h"
 
 namespace arapfields {
-namespace {
-
-/// Interleaves the lowest ten bits of three numbers: the order of a space-filling curve.
-std::uint32_t morton(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
-  std::uint32_t code = 0;
-  for (int bit = 0; bit < 10; ++bit)
-    code |= ((x >> bit & 1u) << (3 * bit + 2)) | ((y >> bit & 1u) << (3 * bit + 1)) |
-            ((z >> bit & 1u) << (3 * bit));
-  return code;
-}
-
-}  // namespace
-
 RowMatrix<double> RadialBasis::identity() const {
   RowMatrix<double> result = RowMatrix<double>::Zero(size(), 3);
   result.bottomRows<3>().setIdentity();
   return result;
-}
-
-std::vector<Index> spatial_order(PointsIn points) {
-  std::vector<Index> order(static_cast<std::size_t>(points.rows()));
-  std::iota(order.begin(), order.end(), 0);
-  if (points.rows() == 0) return order;
-  const Eigen::RowVector3d low = points.colwise().minCoeff(), high = points.colwise().maxCoeff();
-  const double scale = 1023.0 / std::max((high - low).maxCoeff(), 1e-300);
-  std::vector<std::uint32_t> codes(order.size());
-  for (std::size_t i = 0; i < codes.size(); ++i) {
-    const Eigen::RowVector3d cell = (points.row(static_cast<Index>(i)) - low) * scale;
-    codes[i] = morton(static_cast<std::uint32_t>(cell[0]), static_cast<std::uint32_t>(cell[1]),
-                      static_cast<std::uint32_t>(cell[2]));
-  }
-  std::sort(order.begin(), order.end(), [&](Index a, Index b) {
-    const auto x = codes[static_cast<std::size_t>(a)], y = codes[static_cast<std::size_t>(b)];
-    return x != y ? x < y : a < b;
-  });
-  return order;
 }
 
 FarthestPoints farthest_points(PointsIn points, Index count) {

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "core/errors.h"
+#include "fields/radial_sites.h"
 
 namespace arapfields {
 
@@ -22,7 +23,7 @@ RadialField::RadialField(RadialBasis basis, RowMatrix<double> coefficients)
 }
 
 void RadialField::evaluate(PointsIn points, JetView<double> out) const {
-  RadialSites(basis_, points).evaluate(coefficients_, out);
+  RadialSites<double>(basis_, points).evaluate(coefficients_, out);
 }
 
 }  // namespace arapfields

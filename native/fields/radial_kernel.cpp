@@ -6,54 +6,47 @@
 namespace arapfields::SIMD_LEVEL {
 namespace {
 
-using P = Pack<double>;
-constexpr int width = lanes<double>;
 constexpr int block_size = 16;
 
 /// φ(s) = (1 − s/κ)₊^κ and, where asked for, twice φ' and four times φ'' by |x|² (g = 1/r²).
+template <class Scalar>
 struct Bump {
-  P value, slope, curvature;
+  Pack<Scalar> value, slope, curvature;
 };
 
-template <int order>
-inline Bump bump(P square, double g) {
-  const P zero = {};
-  P base = 1.0 - square * (g / radial_power);
-  base = base > zero ? base : zero;
-  const P second = base * base * base * base;
+template <int order, class Scalar>
+inline Bump<Scalar> bump(Pack<Scalar> square, Scalar g) {
+  using P = Pack<Scalar>;
   static_assert(radial_power == 6);
-  Bump result;
-  result.value = second * base * base;
-  if constexpr (order >= 1) result.slope = (-2.0 * g) * (second * base);
-  if constexpr (order >= 2) result.curvature = (4.0 * g * g * (radial_power - 1) / radial_power) * second;
+  const P zero = {};
+  P base = Scalar(1) - square * (g / Scalar(radial_power));
+  base = base > zero ? base : zero;
+  const P second = base * base, fourth = second * second;
+  Bump<Scalar> result;
+  result.value = fourth * second;
+  if constexpr (order >= 1) result.slope = (Scalar(-2) * g) * (fourth * base);
+  if constexpr (order >= 2)
+    result.curvature = (Scalar(4) * g * g * Scalar(radial_power - 1) / radial_power) * fourth;
   return result;
 }
 
-struct Arm {
-  P d[3], square;
-};
-
-inline Arm arm(const RadialBlock& block, int offset, const double* center) {
-  Arm result;
-  for (int k = 0; k < 3; ++k) result.d[k] = load(block.points + k * block_size + offset) - center[k];
-  result.square = result.d[0] * result.d[0] + result.d[1] * result.d[1] + result.d[2] * result.d[2];
-  return result;
-}
-
-/// The ten (four, one) jet columns of one bump.
-template <int order>
-inline void jet_of(const Arm& a, double g, P* out) {
-  const Bump b = bump<order>(a.square, g);
+/// The ten (four, one) jet columns of bump m at some lanes of the block.
+template <int order, class Scalar>
+inline void jet_of(const RadialBlock<Scalar>& block, int offset, std::int64_t m, Pack<Scalar>* out) {
+  const Scalar* center = block.bumps + 4 * m;
+  Pack<Scalar> d[3];
+  for (int k = 0; k < 3; ++k) d[k] = load(block.points + k * block_size + offset) - center[k];
+  const Bump<Scalar> b = bump<order, Scalar>(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], center[3]);
   out[0] = b.value;
   if constexpr (order >= 1)
-    for (int k = 0; k < 3; ++k) out[1 + k] = b.slope * a.d[k];
+    for (int k = 0; k < 3; ++k) out[1 + k] = b.slope * d[k];
   if constexpr (order >= 2) {
-    P curved[3];
-    for (int k = 0; k < 3; ++k) curved[k] = b.curvature * a.d[k];
-    for (int k = 0; k < 3; ++k) out[4 + k] = curved[k] * a.d[k] + b.slope;
-    out[7] = curved[0] * a.d[1];
-    out[8] = curved[0] * a.d[2];
-    out[9] = curved[1] * a.d[2];
+    Pack<Scalar> curved[3];
+    for (int k = 0; k < 3; ++k) curved[k] = b.curvature * d[k];
+    for (int k = 0; k < 3; ++k) out[4 + k] = curved[k] * d[k] + b.slope;
+    out[7] = curved[0] * d[1];
+    out[8] = curved[0] * d[2];
+    out[9] = curved[1] * d[2];
   }
 }
 
@@ -62,17 +55,16 @@ constexpr int columns_of = order == 0   ? 1
                            : order == 1 ? 4
                                         : 10;
 
-template <int order>
-void forward(const RadialBlock& block, const double* coefficients, double* jets) {
+template <int order, class Scalar>
+void forward(const RadialBlock<Scalar>& block, const Scalar* coefficients, Scalar* jets) {
   constexpr int columns = columns_of<order>;
-  for (int offset = 0; offset < block_size; offset += width) {
-    P sums[columns][3] = {};
+  for (int offset = 0; offset < block_size; offset += lanes<Scalar>) {
+    Pack<Scalar> sums[columns][3] = {};
     for (std::int64_t a = 0; a < block.active_count; ++a) {
       const std::int64_t m = block.active[a];
-      const double* center = block.bumps + 4 * m;
-      P basis[columns];
-      jet_of<order>(arm(block, offset, center), center[3], basis);
-      const double* c = coefficients + 3 * m;
+      Pack<Scalar> basis[columns];
+      jet_of<order>(block, offset, m, basis);
+      const Scalar* c = coefficients + 3 * m;
       for (int column = 0; column < columns; ++column)
         for (int i = 0; i < 3; ++i) sums[column][i] += basis[column] * c[i];
     }
@@ -81,22 +73,21 @@ void forward(const RadialBlock& block, const double* coefficients, double* jets)
   }
 }
 
-template <int order>
-void backward(const RadialBlock& block, const double* cotangents, double* gradient) {
+template <int order, class Scalar>
+void backward(const RadialBlock<Scalar>& block, const Scalar* cotangents, Scalar* gradient) {
   constexpr int columns = columns_of<order>;
-  for (int offset = 0; offset < block_size; offset += width) {
-    P cotangent[columns][3];
+  for (int offset = 0; offset < block_size; offset += lanes<Scalar>) {
+    Pack<Scalar> cotangent[columns][3];
     for (int column = 0; column < columns; ++column)
       for (int i = 0; i < 3; ++i)
         cotangent[column][i] = load(cotangents + (column * 3 + i) * block_size + offset);
     for (std::int64_t a = 0; a < block.active_count; ++a) {
       const std::int64_t m = block.active[a];
-      const double* center = block.bumps + 4 * m;
-      P basis[columns];
-      jet_of<order>(arm(block, offset, center), center[3], basis);
-      double* sums = gradient + m * 3 * radial_lanes;
+      Pack<Scalar> basis[columns];
+      jet_of<order>(block, offset, m, basis);
+      Scalar* sums = gradient + m * 3 * radial_lanes;
       for (int i = 0; i < 3; ++i) {
-        P sum = load(sums + i * radial_lanes);
+        Pack<Scalar> sum = load(sums + i * radial_lanes);
         for (int column = 0; column < columns; ++column) sum += basis[column] * cotangent[column][i];
         store(sums + i * radial_lanes, sum);
       }
@@ -105,42 +96,52 @@ void backward(const RadialBlock& block, const double* cotangents, double* gradie
 }
 
 template <int order>
-void rows_of(const RadialBlock& block, double* rows) {
+void rows_of(const RadialBlock<double>& block, double* rows) {
   constexpr int columns = columns_of<order>;
-  for (int offset = 0; offset < block_size; offset += width)
+  for (int offset = 0; offset < block_size; offset += lanes<double>)
     for (std::int64_t a = 0; a < block.active_count; ++a) {
-      const double* center = block.bumps + 4 * static_cast<std::int64_t>(block.active[a]);
-      P basis[columns];
-      jet_of<order>(arm(block, offset, center), center[3], basis);
+      Pack<double> basis[columns];
+      jet_of<order>(block, offset, block.active[a], basis);
       for (int column = 0; column < columns; ++column)
         store(rows + (a * columns + column) * block_size + offset, basis[column]);
     }
 }
 
-}  // namespace
-
-/// Jets (columns, 3, 16) of the bumps' part.
-void radial_forward(const RadialBlock& block, const double* coefficients, int columns, double* jets) {
+template <class Scalar>
+void forward_any(const RadialBlock<Scalar>& block, const Scalar* coefficients, int columns, Scalar* jets) {
   if (columns == 1) return forward<0>(block, coefficients, jets);
   if (columns == 4) return forward<1>(block, coefficients, jets);
   forward<2>(block, coefficients, jets);
 }
 
-/// Cotangents (columns, 3, 16).
-void radial_backward(const RadialBlock& block, const double* cotangents, int columns, double* gradient) {
-  if (columns == 1) return backward<0>(block, cotangents, gradient);
-  if (columns == 4) return backward<1>(block, cotangents, gradient);
-  backward<2>(block, cotangents, gradient);
+template <class Scalar>
+void backward_any(const RadialBlock<Scalar>& block, const Scalar* cotangents, int columns, Scalar* sums) {
+  if (columns == 1) return backward<0>(block, cotangents, sums);
+  if (columns == 4) return backward<1>(block, cotangents, sums);
+  backward<2>(block, cotangents, sums);
 }
 
-/// Jets of each active bump: (active, columns, 16).
-void radial_rows(const RadialBlock& block, int columns, double* rows) {
+}  // namespace
+
+void radial_forward(const RadialBlock<float>& block, const float* coefficients, int columns, float* jets) {
+  forward_any(block, coefficients, columns, jets);
+}
+void radial_forward(const RadialBlock<double>& block, const double* coefficients, int columns, double* jets) {
+  forward_any(block, coefficients, columns, jets);
+}
+void radial_backward(const RadialBlock<float>& block, const float* cotangents, int columns, float* sums) {
+  backward_any(block, cotangents, columns, sums);
+}
+void radial_backward(const RadialBlock<double>& block, const double* cotangents, int columns, double* sums) {
+  backward_any(block, cotangents, columns, sums);
+}
+
+void radial_rows(const RadialBlock<double>& block, int columns, double* rows) {
   if (columns == 1) return rows_of<0>(block, rows);
   if (columns == 4) return rows_of<1>(block, rows);
   rows_of<2>(block, rows);
 }
 
-/// Lists the bumps whose support meets the ball of radius `reach` around `center`.
 std::int64_t radial_active(const double* center, double reach, const double* bumps, std::int64_t count,
                            std::int32_t* active) {
   std::int64_t found = 0;
@@ -154,12 +155,11 @@ std::int64_t radial_active(const double* center, double reach, const double* bum
   return found;
 }
 
-/// distance ← min(distance, |point − from|²) for points (3, stride), of which the first `count` (a multiple
-/// of 16) are used; returns the largest.
 double farthest_update(const double* points, std::int64_t stride, std::int64_t count, const double* from,
                        double* distance) {
+  using P = Pack<double>;
   P worst = {};
-  for (std::int64_t i = 0; i < count; i += width) {
+  for (std::int64_t i = 0; i < count; i += lanes<double>) {
     const P x = load(points + i) - from[0], y = load(points + stride + i) - from[1],
             z = load(points + 2 * stride + i) - from[2];
     const P square = x * x + y * y + z * z, before = load(distance + i);
@@ -168,7 +168,7 @@ double farthest_update(const double* points, std::int64_t stride, std::int64_t c
     worst = now > worst ? now : worst;
   }
   double result = 0;
-  for (int i = 0; i < width; ++i) result = worst[i] > result ? worst[i] : result;
+  for (int i = 0; i < lanes<double>; ++i) result = worst[i] > result ? worst[i] : result;
   return result;
 }
 

@@ -4,7 +4,7 @@
 #include "core/parallel.h"
 #include "fields/neural_field.h"
 #include "solve/inverse_training.h"
-#include "solve/live_solver.h"
+#include "solve/radial.h"
 #include "solve/setup.h"
 
 namespace arapfields {
@@ -45,51 +45,16 @@ ObjectiveTerms terms_of(const SurfaceSamples& samples, const std::vector<Handle>
   return terms;
 }
 
-LiveOptions live_options(const DeformOptions& options) {
-  LiveOptions live;
-  live.coarse_bumps = options.bumps / 5;
-  live.fine_bumps = options.bumps;
-  live.samples = std::max(live.samples, 4 * options.bumps);
-  live.bending = options.bending;
-  live.handle_weight = options.handle_weight;
-  live.threads = options.threads;
-  live.seed = options.seed;
-  return live;
-}
-
-/// Quasi-Newton steps until they gain nothing, or until `steps` or the time budget is spent.
-Solution solve_radial(const SurfaceSamples& samples, const std::vector<Handle>& handles,
-                      const ObjectiveTerms& terms, const DeformOptions& options, int steps,
-                      const Progress& progress) {
-  constexpr int stride = 4;
-  const Stopwatch watch;
-  LiveSolver live(samples, handles, live_options(options), progress.part(0.0, 0.4));
-  std::shared_ptr<RadialField> field = live.field();
-  LoopResult loop;
-  while (loop.iterations < steps) {
-    loop.out_of_time = options.time_budget > 0.0 && watch.seconds() >= options.time_budget;
-    if (loop.out_of_time) break;
-    field = live.solve(std::min(stride, steps - loop.iterations), 1e-6, progress.part(0.4, 0.9));
-    loop.iterations += static_cast<int>(live.report().steps);
-    loop.history.emplace_back(loop.iterations, live.report().value);
-    if (live.report().converged || live.report().steps == 0) break;
-  }
-  loop.seconds = watch.seconds();
-  return measured(field, samples, terms, loop);
-}
-
 }  // namespace
 
 Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handles,
                 const DeformOptions& options, const Progress& progress) {
-  constexpr int start_steps = 20;
   options.validate();
   require_samples(samples);
   require(!handles.empty(), "handles", "none were given", "at least one is needed");
+  if (options.field == "radial") return deform_radial(samples, handles, options, progress);
   const ThreadScope threads(options.threads);
   ObjectiveTerms terms = terms_of(samples, handles, options);
-  if (options.field == "radial")
-    return solve_radial(samples, handles, terms, options, options.iterations, progress);
 
   const MlpShape shape{
       3, options.width, options.layers, options.octaves, options.frequency, options.sharpness};
@@ -99,8 +64,7 @@ Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handle
   if (options.exact_handles) field->set_handles(exact_blend(terms.handles, options.margin, notes));
   const double share = options.start == "radial" ? 0.1 : 0.0;
   if (options.start == "radial")
-    field->set_base(
-        solve_radial(samples, handles, terms, options, start_steps, progress.part(0.0, share)).field);
+    field->set_base(radial_start(samples, handles, options, progress.part(0.0, share)));
 
   LoopOptions loop;
   loop.stage = "deform";

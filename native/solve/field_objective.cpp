@@ -5,9 +5,9 @@
 
 #include <algorithm>
 
+#include "distance/morton.h"
 #include "energies/arap.h"
 #include "energies/distortion.h"
-#include "fields/radial_basis.h"
 
 namespace arapfields {
 namespace {
@@ -41,7 +41,7 @@ struct HostJets {
 }  // namespace
 
 FieldObjective::FieldObjective(const SurfaceSamples& samples, ObjectiveTerms terms)
-    : samples_(samples), terms_(std::move(terms)), order_(spatial_order(samples.points)) {}
+    : samples_(samples), terms_(std::move(terms)), order_(morton_order(samples.points)) {}
 
 double FieldObjective::accumulate(TrainableField& field, Random& random) {
   return field.parameters().scalar_type() == at::kDouble ? accumulate_as<double>(field, random)

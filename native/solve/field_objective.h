@@ -43,7 +43,7 @@ class FieldObjective final : public Objective {
 
   const SurfaceSamples& samples_;
   ObjectiveTerms terms_;
-  std::vector<Index> order_;
+  std::vector<std::uint32_t> order_;
 };
 
 }  // namespace arapfields

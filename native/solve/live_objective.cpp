@@ -1,114 +1,109 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "solve/live_objective.h"
 
-#include "core/dense.h"
 #include "core/errors.h"
+#include "energies/distortion.h"
 
 namespace arapfields {
 namespace {
 
 /// Pull of each bump's coefficient towards zero: removes what no sample can see, and no more.
 constexpr double bump_weight = 1e-10;
-/// Added to the preconditioner's diagonal, as a share of its mean: bumps overlap so much that the matrix is
-/// singular to rounding.
-constexpr double preconditioner_ridge = 1e-9;
-constexpr Index preconditioner_samples = 1000;
-
-/// mean ‖J‖² + bending · mean ‖D‖² as a matrix of the basis.
-RowMatrix<double> surface_stiffness(const RadialSites& samples, double bending) {
-  const Index stride = std::max<Index>(1, samples.size() / preconditioner_samples);
-  RowMatrix<double> rows = samples.rows(JetOrder::second, stride);
-  const Index taken = rows.rows() / 10;
-  rows.middleRows(4 * taken, 3 * taken) *= std::sqrt(bending);
-  rows.middleRows(7 * taken, 3 * taken) *= std::sqrt(2.0 * bending);
-  RowMatrix<double> result(rows.cols(), rows.cols());
-  const auto used = rows.bottomRows(9 * taken);
-  gemm<double>(Transpose::yes, Transpose::no, 1.0 / static_cast<double>(taken), used, used, 0.0, result);
-  return result;
-}
 
 }  // namespace
 
-LiveObjective::LiveObjective(const RadialBasis& basis, PointsIn samples, double bending, double handle_weight)
-    : bumps_(basis.bumps()),
-      bending_(bending),
-      handle_weight_(handle_weight),
-      samples_(basis, samples),
-      stiffness_(surface_stiffness(samples_, bending)),
-      basis_(basis) {}
+template <class Scalar>
+LiveObjective<Scalar>::LiveObjective(const RadialBasis& basis, PointsIn samples, double bending,
+                                     double handle_weight)
+    : bumps_(basis.bumps()), bending_(bending), handle_weight_(handle_weight), samples_(basis, samples) {}
 
-void LiveObjective::set_handles(HandleBatch<double> pairs) {
-  pairs_ = std::move(pairs);
-  handle_basis_ = RadialSites(basis_, pairs_.sources).rows(JetOrder::value);
-  RowMatrix<double> matrix = stiffness_;
-  const RowMatrix<double> weighted =
-      (handle_weight_ * pairs_.weights).cwiseSqrt().asDiagonal() * handle_basis_;
-  gemm<double>(Transpose::yes, Transpose::no, 1.0, weighted, weighted, 1.0, matrix);
-  // Without handles (a style alone) translations are free: the affine part is held as lightly as bumps are.
-  matrix.diagonal().array() += preconditioner_ridge * matrix.diagonal().mean() + bump_weight;
-  factor_ = cholesky<double>(matrix);
+template <class Scalar>
+void LiveObjective<Scalar>::set_barrier(double weight, double threshold) {
+  barrier_ = weight;
+  barrier_threshold_ = threshold;
 }
 
-void LiveObjective::set_targets(Points targets) {
+template <class Scalar>
+void LiveObjective<Scalar>::set_handles(const HandleBatch<double>& pairs,
+                                        const RowMatrix<double>& values_of_basis,
+                                        const RowMatrix<double>& inverse_factor) {
+  pairs_ = {pairs.sources.cast<Scalar>(), pairs.targets.cast<Scalar>(), pairs.weights.cast<Scalar>()};
+  handle_basis_ = SkinnyMatrix<Scalar>(values_of_basis);
+  inverse_factor_ = SkinnyMatrix<float>(inverse_factor, true);
+}
+
+template <class Scalar>
+void LiveObjective<Scalar>::set_targets(PointsIn targets) {
   require(targets.rows() == pairs_.sources.rows(), "targets", std::to_string(targets.rows()) + " rows",
           std::to_string(pairs_.sources.rows()) + " are needed");
-  pairs_.targets = std::move(targets);
+  pairs_.targets = targets.cast<Scalar>();
 }
 
-void LiveObjective::set_style(std::optional<LiveStyle> style) { style_ = std::move(style); }
+template <class Scalar>
+void LiveObjective<Scalar>::set_style(const std::optional<LiveStyle>& style) {
+  style_ = style;
+  if (!style) return;
+  style_normals_ = style->normals.template cast<Scalar>();
+  style_weights_ = style->sample_weights.template cast<Scalar>();
+}
 
-void LiveObjective::measure(const RowMatrix<double>& c, Vector& u) const {
+template <class Scalar>
+void LiveObjective<Scalar>::measure(const RowMatrix<double>& c, Measurements& u) const {
   u.resize(bump_offset() + 3 * bumps_);
   samples_.evaluate(c, {u.data(), samples_.size(), JetOrder::second});
-  Eigen::Map<RowMatrix<double>> values(u.data() + handle_offset(), pairs_.sources.rows(), 3);
-  if (values.rows() > 0) gemm<double>(Transpose::no, Transpose::no, 1.0, handle_basis_, c, 0.0, values);
-  u.tail(3 * bumps_) = Eigen::Map<const Vector>(c.data(), 3 * bumps_);
+  const PointsOf<Scalar> rounded = c.cast<Scalar>();
+  Eigen::Map<PointsOf<Scalar>>(u.data() + handle_offset(), pairs_.sources.rows(), 3) =
+      handle_basis_.times(rounded);
+  u.tail(3 * bumps_) = Eigen::Map<const Measurements>(rounded.data(), 3 * bumps_);
 }
 
-LiveTerms LiveObjective::evaluate(const Vector& u, Vector* cotangents) const {
+template <class Scalar>
+LiveTerms LiveObjective<Scalar>::evaluate(const Measurements& u, Measurements* cotangents) const {
   if (cotangents != nullptr) cotangents->setZero(u.size());
-  double* out = cotangents != nullptr ? cotangents->data() : nullptr;
-  const auto at = [&](Index offset) { return out != nullptr ? out + offset : nullptr; };
-  const Index n = samples_.size();
+  Scalar* out = cotangents != nullptr ? cotangents->data() : nullptr;
+  const JetView<Scalar> jet_cotangents{out, samples_.size(), JetOrder::second};
   LiveTerms terms;
-  terms.arap = arap_energy<double>(jets(u), bending_, 1.0, {out, n, JetOrder::second});
+  terms.arap = arap_energy<Scalar>(jets(u), bending_, 1.0, jet_cotangents);
   const Index pairs = pairs_.sources.rows();
-  terms.handles = handle_energy<double>({u.data() + handle_offset(), pairs, JetOrder::value}, pairs_,
-                                        handle_weight_, {at(handle_offset()), pairs, JetOrder::value});
+  terms.handles =
+      handle_energy<Scalar>({u.data() + handle_offset(), pairs, JetOrder::value}, pairs_, handle_weight_,
+                            {out != nullptr ? out + handle_offset() : nullptr, pairs, JetOrder::value});
   if (style_)
-    terms.gauss = gauss_energy<double>(jets(u), style_->normals, style_->sample_weights, style_->preference,
-                                       style_->weight, {out, n, JetOrder::second});
+    terms.gauss = gauss_energy<Scalar>(jets(u), style_normals_, style_weights_, style_->preference,
+                                       style_->weight, jet_cotangents);
+  if (barrier_ > 0.0)
+    terms.barrier = fold_barrier<Scalar>(jets(u), barrier_threshold_, barrier_, jet_cotangents);
   return terms;
 }
 
-HandleError LiveObjective::handle_distance(const Vector& u) const {
-  const Eigen::Map<const Points> values(u.data() + handle_offset(), pairs_.sources.rows(), 3);
-  if (values.rows() == 0) return {};
-  const Vector distance = (values - pairs_.targets).rowwise().norm();
-  return {distance.dot(pairs_.weights) / pairs_.weights.sum(), distance.maxCoeff()};
-}
-
-double LiveObjective::value(const Vector& u, Vector* cotangents) const {
+template <class Scalar>
+double LiveObjective<Scalar>::value(const Measurements& u, Measurements* cotangents) const {
   const LiveTerms terms = evaluate(u, cotangents);
   const auto bumps = u.tail(3 * bumps_);
-  if (cotangents != nullptr) cotangents->tail(3 * bumps_) = 2.0 * bump_weight * bumps;
+  if (cotangents != nullptr) cotangents->tail(3 * bumps_) = Scalar(2.0 * bump_weight) * bumps;
   return terms.arap.stretch + bending_ * terms.arap.bend + handle_weight_ * terms.handles +
-         (style_ ? style_->weight * terms.gauss : 0.0) + bump_weight * bumps.squaredNorm();
+         (style_ ? style_->weight * terms.gauss : 0.0) + barrier_ * terms.barrier +
+         bump_weight * static_cast<double>(bumps.squaredNorm());
 }
 
-RowMatrix<double> LiveObjective::pull_back(const Vector& cotangents) const {
+template <class Scalar>
+RowMatrix<double> LiveObjective<Scalar>::pull_back(const Measurements& cotangents) const {
   RowMatrix<double> gradient = RowMatrix<double>::Zero(bumps_ + 4, 3);
   samples_.pull_back({cotangents.data(), samples_.size(), JetOrder::second}, gradient);
-  const Eigen::Map<const RowMatrix<double>> values(cotangents.data() + handle_offset(), pairs_.sources.rows(),
-                                                   3);
-  if (values.rows() > 0)
-    gemm<double>(Transpose::yes, Transpose::no, 1.0, handle_basis_, values, 1.0, gradient);
-  Eigen::Map<Vector>(gradient.data(), 3 * bumps_) += cotangents.tail(3 * bumps_);
+  gradient += handle_basis_.transpose_times(handle_values(cotangents)).template cast<double>();
+  Eigen::Map<Vector>(gradient.data(), 3 * bumps_) += cotangents.tail(3 * bumps_).template cast<double>();
   return gradient;
 }
 
-RowMatrix<double> LiveObjective::precondition(const RowMatrix<double>& gradient) const {
-  return 0.5 * cholesky_solve<double>(factor_, gradient);
+template <class Scalar>
+RowMatrix<double> LiveObjective<Scalar>::precondition(const RowMatrix<double>& gradient) const {
+  const double size = gradient.norm();
+  if (!(size > 0.0)) return gradient;
+  const PointsF scaled = (gradient / size).cast<float>();
+  return (0.5 * size) * inverse_factor_.transpose_times(inverse_factor_.times(scaled)).cast<double>();
 }
+
+template class LiveObjective<float>;
+template class LiveObjective<double>;
 
 }  // namespace arapfields

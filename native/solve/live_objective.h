@@ -3,10 +3,11 @@
 
 #include <optional>
 
+#include "core/skinny.h"
 #include "energies/arap.h"
 #include "energies/gauss.h"
 #include "energies/handles.h"
-#include "fields/radial_basis.h"
+#include "fields/radial_sites.h"
 #include "solve/quasi_newton.h"
 
 namespace arapfields {
@@ -24,44 +25,55 @@ struct LiveTerms {
   ArapValue arap;
   double handles = 0.0;  ///< mean squared distance to the targets
   double gauss = 0.0;    ///< mean(1 − g), where there is a style
+  double barrier = 0.0;  ///< energies/distortion.h
 };
 
-/// stretch + λ_bend·bend + weight·handles + λ_Gauss·gauss + a vanishing pull of all bumps towards zero, of
-/// the fields of one radial basis. Measurements: jets at the samples, values at the handles' sources, bumps.
-class LiveObjective : public MeasuredObjective {
+/// stretch + λ_bend·bend + weight·handles + λ_Gauss·gauss + barrier + a vanishing pull of all bumps towards
+/// zero, of the fields of one radial basis. Measurements: jets at the samples, values at the handles'
+/// sources, bumps. In single precision a step costs half, and the value is good to some 1e-6 of itself.
+template <class Scalar>
+class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
  public:
+  using Measurements = Eigen::VectorX<Scalar>;
+
   LiveObjective(const RadialBasis& basis, PointsIn samples, double bending, double handle_weight);
-
-  /// Replaces the handles (all cube coordinates) and refactors the preconditioner.
-  void set_handles(HandleBatch<double> pairs);
+  /// A barrier against folds with this weight and threshold; 0: none.
+  void set_barrier(double weight, double threshold);
+  /// Other handles (cube coordinates), with the factor of the preconditioner that goes with them.
+  void set_handles(const HandleBatch<double>& pairs, const RowMatrix<double>& values_of_basis,
+                   const RowMatrix<double>& inverse_factor);
   /// New targets for the pairs in place.
-  void set_targets(Points targets);
-  void set_style(std::optional<LiveStyle> style);
+  void set_targets(PointsIn targets);
+  void set_style(const std::optional<LiveStyle>& style);
 
-  LiveTerms terms(const Vector& u) const { return evaluate(u, nullptr); }
-  /// Weighted mean and largest distance of the pairs from their targets.
-  HandleError handle_distance(const Vector& u) const;
-  JetView<const double> jets(const Vector& u) const { return {u.data(), samples_.size(), JetOrder::second}; }
+  LiveTerms terms(const Measurements& u) const { return evaluate(u, nullptr); }
+  JetView<const Scalar> jets(const Measurements& u) const {
+    return {u.data(), samples_.size(), JetOrder::second};
+  }
+  /// Where the pairs' sources are.
+  Eigen::Map<const PointsOf<Scalar>> handle_values(const Measurements& u) const {
+    return {u.data() + handle_offset(), pairs_.sources.rows(), 3};
+  }
 
-  void measure(const RowMatrix<double>& c, Vector& u) const override;
-  double value(const Vector& u, Vector* cotangents) const override;
-  RowMatrix<double> pull_back(const Vector& cotangents) const override;
+  void measure(const RowMatrix<double>& c, Measurements& u) const override;
+  double value(const Measurements& u, Measurements* cotangents) const override;
+  RowMatrix<double> pull_back(const Measurements& cotangents) const override;
   RowMatrix<double> precondition(const RowMatrix<double>& gradient) const override;
 
  private:
-  LiveTerms evaluate(const Vector& u, Vector* cotangents) const;
+  LiveTerms evaluate(const Measurements& u, Measurements* cotangents) const;
   Index handle_offset() const { return 30 * samples_.size(); }
   Index bump_offset() const { return handle_offset() + 3 * pairs_.sources.rows(); }
 
   Index bumps_;
-  double bending_, handle_weight_;
-  RadialSites samples_;
-  RowMatrix<double> stiffness_;  // the surface's part of the preconditioner's matrix
-  HandleBatch<double> pairs_;
-  RowMatrix<double> handle_basis_;  // (pairs, size)
-  RowMatrix<double> factor_;
+  double bending_, handle_weight_, barrier_ = 0.0, barrier_threshold_ = 0.1;
+  RadialSites<Scalar> samples_;
+  HandleBatch<Scalar> pairs_;
+  SkinnyMatrix<Scalar> handle_basis_;   // (pairs, size)
+  SkinnyMatrix<float> inverse_factor_;  // L⁻¹ of the preconditioner's matrix L Lᵀ
   std::optional<LiveStyle> style_;
-  const RadialBasis basis_;
+  PointsOf<Scalar> style_normals_;
+  Eigen::VectorX<Scalar> style_weights_;
 };
 
 }  // namespace arapfields

@@ -7,6 +7,9 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "core/random.h"
+#include "distance/morton.h"
+#include "solve/live_setup.h"
+#include "solve/live_stiffness.h"
 #include "solve/setup.h"
 
 namespace arapfields {
@@ -21,40 +24,20 @@ constexpr double anchor_weight = 1.0;
 /// drawing, would cost more than they do.
 constexpr Index worth_threads = 1000000;
 
+/// Single precision serves down to this tolerance; what it cannot see is an energy of about the second
+/// number.
+constexpr double single_tolerance = 3e-5, single_floor = 1e-10;
+/// Solves after which measurements that were only updated are taken afresh.
+constexpr int most_uses = 16;
+
+/// Share of the handles' part of the energy below which a rigid motion of everything must bring it.
+constexpr double worthwhile_gain = 0.1;
+
 template <class Number>
 void require_range(const char* name, Number value, double low, double high) {
   require(std::isfinite(static_cast<double>(value)) && value >= low && value <= high, name,
           std::to_string(value),
           "from " + std::to_string(low) + " to " + std::to_string(high) + " is allowed");
-}
-
-/// `count` different numbers below n in random order (all of them where n is not larger).
-std::vector<Index> random_subset(Index n, Index count, Random& random) {
-  std::vector<Index> all(static_cast<std::size_t>(n));
-  for (Index i = 0; i < n; ++i) all[static_cast<std::size_t>(i)] = i;
-  const Index taken = std::min(n, count);
-  for (Index i = 0; i < taken; ++i)
-    std::swap(all[static_cast<std::size_t>(i)], all[static_cast<std::size_t>(i + random.below(n - i))]);
-  all.resize(static_cast<std::size_t>(taken));
-  return all;
-}
-
-/// One random entry of each of `count` equal parts of the list: even coverage where the list is in spatial
-/// order.
-std::vector<Index> stratified(const std::vector<Index>& list, Index count, Random& random) {
-  const Index n = static_cast<Index>(list.size()), taken = std::min(n, count);
-  std::vector<Index> result;
-  for (Index i = 0; i < taken; ++i) {
-    const Index begin = i * n / taken, end = (i + 1) * n / taken;
-    result.push_back(list[static_cast<std::size_t>(begin + random.below(end - begin))]);
-  }
-  return result;
-}
-
-Points rows_of(PointsIn points, const std::vector<Index>& rows) {
-  Points result(static_cast<Index>(rows.size()), 3);
-  for (std::size_t i = 0; i < rows.size(); ++i) result.row(static_cast<Index>(i)) = points.row(rows[i]);
-  return result;
 }
 
 }  // namespace
@@ -71,6 +54,8 @@ void LiveOptions::validate() const {
   require_range("steps", steps, 1, 1e6);
   require_range("tolerance", tolerance, 0, 1);
   require_range("gauss_weight", gauss_weight, 0, 1e6);
+  require_range("barrier", barrier, 0, 1e6);
+  require_range("barrier_threshold", barrier_threshold, 1e-6, 1);
   require_range("threads", threads, 0, 1024);
 }
 
@@ -82,50 +67,73 @@ LiveSolver::LiveSolver(const SurfaceSamples& samples, const std::vector<Handle>&
   const Stopwatch watch;
   const ThreadScope threads(options.threads);
   Random random(static_cast<std::uint64_t>(options.seed));
-  const std::vector<Index> order = spatial_order(surface_);
+  const std::vector<std::uint32_t> order = morton_order(surface_);
   chosen_ = stratified(order, options.samples, random);
   const std::vector<Index> candidates = stratified(order, center_candidates, random);
   std::vector<RadialScale> scales;
   if (options.coarse_bumps > 0) scales.push_back({options.coarse_bumps, options.coarse_reach});
   scales.push_back({options.fine_bumps, options.fine_reach});
   basis_ = radial_basis(rows_of(surface_, candidates), scales);
-  progress.report(0.2, "bumps placed");
-  objective_ = std::make_unique<LiveObjective>(basis_, rows_of(surface_, chosen_), options.bending,
-                                               options.handle_weight);
-  progress.report(0.8, "stiffness");
   coefficients_ = basis_.identity();
+  progress.report(0.2, "bumps placed");
+  stiffness_ = surface_stiffness(basis_, rows_of(surface_, chosen_), options.bending);
+  progress.report(0.8, "stiffness");
+  prepare(fast_);
   set_handles(handles);
   report_.setup_seconds = watch.seconds();
 }
 
-void LiveSolver::set_handles(const std::vector<Handle>& handles) {
-  const ThreadScope threads(options_.threads);
-  BoundHandles bound(in_cube(handles, frame_), surface_);
-  HandleBatch<double> pairs;
+template <class Scalar>
+void LiveSolver::prepare(Precision<Scalar>& precision) {
+  precision.objective = std::make_unique<LiveObjective<Scalar>>(basis_, rows_of(surface_, chosen_),
+                                                                options_.bending, options_.handle_weight);
+  precision.objective->set_barrier(options_.barrier, options_.barrier_threshold);
+  if (pairs_.sources.rows() > 0) precision.objective->set_handles(pairs_, pair_values_, inverse_factor_);
+  precision.objective->set_style(style_);
+}
+
+template <class Call>
+void LiveSolver::for_each_precision(Call&& call) {
+  if (fast_.objective) call(fast_);
+  if (exact_.objective) call(exact_);
+}
+
+void LiveSolver::choose_pairs() {
   pair_rows_.clear();
-  if (handles.empty()) {
+  if (handles_.empty()) {
     Index lowest = 0;
     surface_.col(2).minCoeff(&lowest);
-    pairs = {surface_.row(lowest), surface_.row(lowest),
-             Vector::Constant(1, anchor_weight / options_.handle_weight)};
-  } else {
-    Random random(static_cast<std::uint64_t>(options_.seed), 1);
-    std::vector<double> weights;
-    for (Index i = 0; i < bound.count(); ++i) {
-      const std::vector<Index> rows =
-          random_subset(bound.begin(i + 1) - bound.begin(i), options_.handle_samples, random);
-      for (const Index row : rows) {
-        pair_rows_.push_back(bound.begin(i) + row);
-        weights.push_back(bound.handle(i).weight /
-                          static_cast<double>(static_cast<Index>(rows.size()) * bound.count()));
-      }
-    }
-    pairs = {rows_of(bound.sources(), pair_rows_), rows_of(bound.targets(), pair_rows_),
-             Eigen::Map<const Vector>(weights.data(), static_cast<Index>(weights.size()))};
+    pairs_ = {surface_.row(lowest), surface_.row(lowest),
+              Vector::Constant(1, anchor_weight / options_.handle_weight)};
+    return;
   }
-  objective_->set_handles(std::move(pairs));
-  bound_ = std::move(bound);
+  Random random(static_cast<std::uint64_t>(options_.seed), 1);
+  std::vector<double> weights;
+  for (Index i = 0; i < bound_.count(); ++i) {
+    const std::vector<Index> rows =
+        random_subset(bound_.begin(i + 1) - bound_.begin(i), options_.handle_samples, random);
+    const double share = 1.0 / static_cast<double>(static_cast<Index>(rows.size()) * bound_.count());
+    for (const Index row : rows) {
+      pair_rows_.push_back(bound_.begin(i) + row);
+      weights.push_back(bound_.handle(i).weight * share);
+    }
+  }
+  pairs_ = {rows_of(bound_.sources(), pair_rows_), rows_of(bound_.targets(), pair_rows_),
+            Eigen::Map<const Vector>(weights.data(), static_cast<Index>(weights.size()))};
+}
+
+void LiveSolver::set_handles(const std::vector<Handle>& handles) {
+  const ThreadScope threads(options_.threads);
+  bound_ = BoundHandles(in_cube(handles, frame_), surface_);
   handles_ = handles;
+  choose_pairs();
+  pair_values_ = radial_rows(basis_, pairs_.sources, JetOrder::value);
+  inverse_factor_ = inverse_factor(stiffness_, pair_values_, options_.handle_weight * pairs_.weights);
+  for_each_precision([&](auto& precision) {
+    precision.objective->set_handles(pairs_, pair_values_, inverse_factor_);
+    precision.u.resize(0);
+  });
+  u_before_.resize(0);
   optimizer_.forget();
 }
 
@@ -135,7 +143,9 @@ void LiveSolver::set_targets(const std::vector<Handle>& moved) {
     handles_[i].target = moved[i].target;
     handles_[i].target_point = moved[i].target_point;
   }
-  if (!handles_.empty()) objective_->set_targets(rows_of(bound_.targets(), pair_rows_));
+  if (handles_.empty()) return;
+  pairs_.targets = rows_of(bound_.targets(), pair_rows_);
+  for_each_precision([&](auto& precision) { precision.objective->set_targets(pairs_.targets); });
 }
 
 void LiveSolver::set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights) {
@@ -148,23 +158,22 @@ void LiveSolver::set_style(PointsIn preferred, double strength, double sharpness
   if (strength == 0.0) return clear_style();
   require(surface_normals_.rows() == surface_.rows(), "samples", "they have no normals",
           "a style needs samples with normals");
-  LiveStyle style{gauss_preference(preferred, sharpness),
-                  rows_of(surface_normals_, chosen_),
-                  {},
-                  strength * options_.gauss_weight};
+  style_ = LiveStyle{gauss_preference(preferred, sharpness),
+                     rows_of(surface_normals_, chosen_),
+                     {},
+                     strength * options_.gauss_weight};
   if (weights.size() > 0) {
-    style.sample_weights.resize(static_cast<Index>(chosen_.size()));
+    style_->sample_weights.resize(static_cast<Index>(chosen_.size()));
     for (std::size_t i = 0; i < chosen_.size(); ++i)
-      style.sample_weights[static_cast<Index>(i)] = weights[chosen_[i]];
+      style_->sample_weights[static_cast<Index>(i)] = weights[chosen_[i]];
   }
-  objective_->set_style(std::move(style));
-  styled_ = true;
+  for_each_precision([&](auto& precision) { precision.objective->set_style(style_); });
   optimizer_.forget();
 }
 
 void LiveSolver::clear_style() {
-  objective_->set_style(std::nullopt);
-  styled_ = false;
+  style_.reset();
+  for_each_precision([&](auto& precision) { precision.objective->set_style(style_); });
   optimizer_.forget();
 }
 
@@ -173,37 +182,104 @@ int LiveSolver::solve_threads() const {
   return options_.threads == 0 && work < worth_threads ? 1 : options_.threads;
 }
 
+template <class Scalar>
+QuasiNewtonReport LiveSolver::descend(Precision<Scalar>& precision, const QuasiNewtonOptions& options,
+                                      const Progress& progress) {
+  const QuasiNewtonReport found =
+      optimizer_.minimise(*precision.objective, options, coefficients_, precision.u, progress);
+  if (++precision.uses >= most_uses) precision.u.resize(0), precision.uses = 0;
+  report_.steps += found.steps;
+  report_.evaluations += found.evaluations;
+  report_.converged = found.converged;
+  report_.value = found.value;
+  return found;
+}
+
 std::shared_ptr<RadialField> LiveSolver::solve(Index steps, double tolerance, const Progress& progress) {
   const ThreadScope threads(solve_threads());
   const Stopwatch watch;
-  const QuasiNewtonReport found = optimizer_.minimise(
-      *objective_, {steps > 0 ? steps : options_.steps, tolerance > 0.0 ? tolerance : options_.tolerance},
-      coefficients_, progress);
-  report_.steps = found.steps;
-  report_.evaluations = found.evaluations;
-  report_.converged = found.converged;
-  report_.value = found.value;
-  measure(watch.seconds());
+  if (steps <= 0) steps = options_.steps;
+  if (tolerance <= 0.0) tolerance = options_.tolerance;
+  report_.steps = report_.evaluations = 0;
+  if (!handles_.empty() && !style_) follow_rigidly();
+  extrapolate();
+  const bool fast_alone = tolerance >= single_tolerance;
+  descend(fast_, {steps, std::max(tolerance, single_tolerance), single_floor}, progress);
+  if (!fast_alone) {
+    if (!exact_.objective) prepare(exact_);
+    exact_.u.resize(0);
+    if (report_.steps < steps) descend(exact_, {steps - report_.steps, tolerance}, progress);
+    fast_.u.resize(0);
+  }
+  if (handles_.empty()) hold_lowest();
+  if (fast_alone)
+    measure(fast_);
+  else
+    measure(exact_);
+  report_.seconds = watch.seconds();
   return field();
 }
 
-void LiveSolver::measure(double seconds) {
-  Vector u;
-  objective_->measure(coefficients_, u);
-  const LiveTerms terms = objective_->terms(u);
+/// Where handles moved together, the whole shape moves along first: no energy but theirs feels it.
+void LiveSolver::follow_rigidly() {
+  if (fast_.u.size() == 0) fast_.objective->measure(coefficients_, fast_.u);
+  const Points values = fast_.objective->handle_values(fast_.u).cast<double>();
+  const Alignment alignment = best_alignment(values, pairs_.targets, pairs_.weights);
+  if (alignment.gain > worthwhile_gain) return;
+  coefficients_ *= alignment.rotation.transpose();
+  coefficients_.row(basis_.bumps()) += alignment.translation.transpose();
+  fast_.u.resize(0);
+  u_before_.resize(0);
+  optimizer_.forget();
+}
+
+/// A drag goes on as it went: starts one step further along the last change where that is better.
+void LiveSolver::extrapolate() {
+  if (fast_.u.size() == 0) fast_.objective->measure(coefficients_, fast_.u);
+  const VectorF start = fast_.u;
+  const RowMatrix<double> from = coefficients_;
+  if (u_before_.size() == start.size()) {
+    const VectorF further = 2.0f * start - u_before_;
+    if (fast_.objective->value(further, nullptr) < fast_.objective->value(start, nullptr)) {
+      coefficients_ += from - coefficients_before_;
+      fast_.u = further;
+      exact_.u.resize(0);
+    }
+  }
+  u_before_ = start;
+  coefficients_before_ = from;
+}
+
+/// No energy feels a translation: what is left of one is taken out exactly.
+void LiveSolver::hold_lowest() {
+  Points value(1, 3);
+  RadialSites<double>(basis_, pairs_.sources).evaluate(coefficients_, {value.data(), 1, JetOrder::value});
+  coefficients_.row(basis_.bumps()) += pairs_.sources.row(0) - value.row(0);
+  fast_.u.resize(0);
+  exact_.u.resize(0);
+}
+
+template <class Scalar>
+void LiveSolver::measure(Precision<Scalar>& precision) {
+  const LiveObjective<Scalar>& objective = *precision.objective;
+  if (precision.u.size() == 0) objective.measure(coefficients_, precision.u);
+  const LiveTerms terms = objective.terms(precision.u);
   report_.arap = terms.arap;
   report_.energy = terms.arap.stretch + options_.bending * terms.arap.bend;
   report_.preference.reset();
-  if (styled_) report_.preference = 1.0 - terms.gauss;
-  report_.distortion = distortion<double>(objective_->jets(u));
-  const HandleError error = objective_->handle_distance(u);
-  report_.handle_mean = error.mean * frame_.scale;
-  report_.handle_max = error.max * frame_.scale;
-  report_.seconds = seconds;
+  if (style_) report_.preference = 1.0 - terms.gauss;
+  report_.distortion = distortion<Scalar>(objective.jets(precision.u));
+  const Points values = objective.handle_values(precision.u).template cast<double>();
+  const Vector distance = (values - pairs_.targets).rowwise().norm();
+  report_.handle_mean = frame_.scale * distance.dot(pairs_.weights) / pairs_.weights.sum();
+  report_.handle_max = frame_.scale * distance.maxCoeff();
 }
 
 void LiveSolver::reset() {
   coefficients_ = basis_.identity();
+  u_before_.resize(0);
+  fast_.u.resize(0);
+  exact_.u.resize(0);
   optimizer_.forget();
   std::vector<Handle> at_rest = handles_;
   for (Handle& handle : at_rest) {

@@ -23,7 +23,9 @@ struct LiveOptions {
   int steps = 12;              ///< quasi-Newton steps of one solve, at most
   double tolerance = 1e-4;     ///< a solve ends where a step is expected to gain less than this share
   double gauss_weight = 6.0;   ///< λ_Gauss of a style at strength 1
-  int threads = 0;             ///< 0: all for the set-up, and for a solve where that is large
+  double barrier = 0.0;        ///< weight of the barrier against folds
+  double barrier_threshold = 0.1;
+  int threads = 0;  ///< 0: all for the set-up, and for a solve where that is large
   std::int64_t seed = 0;
 
   /// Throws InvalidInput that names the option.
@@ -69,7 +71,25 @@ class LiveSolver {
   const std::vector<Handle>& handles() const { return handles_; }
 
  private:
-  void measure(double seconds);
+  template <class Scalar>
+  struct Precision {
+    std::unique_ptr<LiveObjective<Scalar>> objective;
+    Eigen::VectorX<Scalar> u;  // measurements of the coefficients; empty: not known
+    int uses = 0;              // solves since u was measured afresh
+  };
+  template <class Scalar>
+  void prepare(Precision<Scalar>& precision);
+  template <class Scalar>
+  QuasiNewtonReport descend(Precision<Scalar>& precision, const QuasiNewtonOptions& options,
+                            const Progress& progress);
+  template <class Scalar>
+  void measure(Precision<Scalar>& precision);
+  template <class Call>
+  void for_each_precision(Call&& call);
+  void choose_pairs();
+  void follow_rigidly();
+  void extrapolate();
+  void hold_lowest();
   int solve_threads() const;
 
   LiveOptions options_;
@@ -81,10 +101,16 @@ class LiveSolver {
   BoundHandles bound_;
   std::vector<Index> pair_rows_;  // rows of bound_ that pull
   RadialBasis basis_;
-  std::unique_ptr<LiveObjective> objective_;
+  HandleBatch<double> pairs_;
+  RowMatrix<double> stiffness_, pair_values_, inverse_factor_;
+  std::optional<LiveStyle> style_;
+  double style_strength_ = 0.0;
+  Precision<float> fast_;    // what a drag needs
+  Precision<double> exact_;  // what follows where more is asked for; made when it first is
   QuasiNewton optimizer_;
   RowMatrix<double> coefficients_;
-  bool styled_ = false;
+  RowMatrix<double> coefficients_before_;  // where the solve before the last one ended; empty: not known
+  VectorF u_before_;
   LiveReport report_;
 };
 

@@ -32,6 +32,8 @@ void not_negative(const char* name, double value) {
 
 template <class Options>
 void validate_common(const Options& o) {
+  require(o.field == "neural" || o.field == "radial", "field", "'" + o.field + "'",
+          "'neural' or 'radial' is allowed");
   in_range("iterations", o.iterations, 0, 1e7);
   in_range("batch", o.batch, 1, 1e6);
   in_range("handle_batch", o.handle_batch, 1, 1e6);
@@ -50,8 +52,6 @@ void validate_common(const Options& o) {
 }  // namespace
 
 void DeformOptions::validate() const {
-  require(field == "neural" || field == "radial", "field", "'" + field + "'",
-          "'neural' or 'radial' is allowed");
   require(start == "identity" || start == "radial", "start", "'" + start + "'",
           "'identity' or 'radial' is allowed");
   validate_common(*this);

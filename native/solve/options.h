@@ -38,11 +38,12 @@ struct DeformOptions {
 
 /// Options of stylize.
 struct StylizeOptions {
-  double strength = 1.0;      ///< 0 (the shape itself) … 1
-  double gauss_weight = 6.0;  ///< λ_Gauss at full strength
-  double rigidity = 1.0;      ///< λ_ARAP
-  double bending = 1e-3;      ///< λ_bend
-  double sharpness = 5.0;     ///< σ: how narrow the preference is about each normal
+  std::string field = "neural";  ///< "neural" or "radial"
+  double strength = 1.0;         ///< 0 (the shape itself) … 1
+  double gauss_weight = 6.0;     ///< λ_Gauss at full strength
+  double rigidity = 1.0;         ///< λ_ARAP
+  double bending = 1e-3;         ///< λ_bend
+  double sharpness = 5.0;        ///< σ: how narrow the preference is about each normal
   int iterations = 300;
   int batch = 500;
   double handle_weight = 100;

@@ -16,13 +16,15 @@ constexpr double armijo = 1e-4, wolfe = 0.9;
 double dot(const RowMatrix<double>& a, const RowMatrix<double>& b) { return a.cwiseProduct(b).sum(); }
 
 /// A point of the line u + t du: value, slope, and the cotangents there.
+template <class Scalar>
 struct Trial {
   double t = 0.0, value = 0.0, slope = 0.0;
-  Vector u, cotangents;
+  Eigen::VectorX<Scalar> u, cotangents;
 };
 
 /// Minimiser of the cubic through two points' values and slopes, kept inside the middle of their interval.
-double cubic_minimum(const Trial& a, const Trial& b) {
+template <class Scalar>
+double cubic_minimum(const Trial<Scalar>& a, const Trial<Scalar>& b) {
   const double d1 = a.slope + b.slope - 3.0 * (a.value - b.value) / (a.t - b.t);
   const double square = d1 * d1 - a.slope * b.slope;
   const double low = std::min(a.t, b.t), high = std::max(a.t, b.t), margin = 0.1 * (high - low);
@@ -36,22 +38,23 @@ double cubic_minimum(const Trial& a, const Trial& b) {
 }
 
 /// A step that lowers the value enough and leaves no steep slope; t = 0 where there is none.
-Trial search_line(const MeasuredObjective& objective, const Trial& start, const Vector& du,
-                  Index& evaluations) {
+template <class Scalar>
+Trial<Scalar> search_line(const MeasuredObjectiveOf<Scalar>& objective, const Trial<Scalar>& start,
+                          const Eigen::VectorX<Scalar>& du, Index& evaluations) {
   const auto at = [&](double t) {
-    Trial trial;
+    Trial<Scalar> trial;
     trial.t = t;
-    trial.u = start.u + t * du;
+    trial.u = start.u + static_cast<Scalar>(t) * du;
     trial.value = objective.value(trial.u, &trial.cotangents);
-    trial.slope = trial.cotangents.dot(du);
+    trial.slope = static_cast<double>(trial.cotangents.dot(du));
     ++evaluations;
     return trial;
   };
-  const auto falls = [&](const Trial& trial) {
+  const auto falls = [&](const Trial<Scalar>& trial) {
     return std::isfinite(trial.value) && std::isfinite(trial.slope) &&
            trial.value <= start.value + armijo * trial.t * start.slope;
   };
-  Trial low = start, next = at(1.0);
+  Trial<Scalar> low = start, next = at(1.0);
   for (int tries = 0; tries < 12; ++tries) {
     if (!falls(next) || (next.value >= low.value && low.t > 0.0)) {  // the minimum lies between low and next
       const bool usable = std::isfinite(next.value) && std::isfinite(next.slope);
@@ -68,7 +71,8 @@ Trial search_line(const MeasuredObjective& objective, const Trial& start, const 
 
 }  // namespace
 
-RowMatrix<double> QuasiNewton::direction(const MeasuredObjective& objective,
+template <class Scalar>
+RowMatrix<double> QuasiNewton::direction(const MeasuredObjectiveOf<Scalar>& objective,
                                          const RowMatrix<double>& gradient) const {
   RowMatrix<double> q = gradient;
   std::vector<double> weights(pairs_.size());
@@ -82,16 +86,19 @@ RowMatrix<double> QuasiNewton::direction(const MeasuredObjective& objective,
   return -q;
 }
 
-QuasiNewtonReport QuasiNewton::minimise(const MeasuredObjective& objective, const QuasiNewtonOptions& options,
-                                        RowMatrix<double>& c, const Progress& progress) {
+template <class Scalar>
+QuasiNewtonReport QuasiNewton::minimise(const MeasuredObjectiveOf<Scalar>& objective,
+                                        const QuasiNewtonOptions& options, RowMatrix<double>& c,
+                                        Eigen::VectorX<Scalar>& u, const Progress& progress) {
   QuasiNewtonReport report;
-  Trial now;
-  objective.measure(c, now.u);
+  Trial<Scalar> now;
+  if (u.size() == 0) objective.measure(c, u);
+  now.u = u;
   now.value = objective.value(now.u, &now.cotangents);
   report.evaluations = 1;
   if (!std::isfinite(now.value)) throw Diverged("live solve: the energy is not finite at the start");
   RowMatrix<double> gradient = objective.pull_back(now.cotangents);
-  Vector du;
+  Eigen::VectorX<Scalar> du;
   while (report.steps < options.steps) {
     progress.report(static_cast<double>(report.steps) / static_cast<double>(options.steps));
     RowMatrix<double> step = direction(objective, gradient);
@@ -101,14 +108,14 @@ QuasiNewtonReport QuasiNewton::minimise(const MeasuredObjective& objective, cons
       forget();
       continue;
     }
-    if (-0.5 * slope < options.tolerance * std::abs(now.value)) {
+    if (-0.5 * slope < options.tolerance * std::abs(now.value) + options.floor) {
       report.converged = true;
       break;
     }
     objective.measure(step, du);
     now.slope = slope;
     now.t = 0.0;
-    Trial next = search_line(objective, now, du, report.evaluations);
+    Trial<Scalar> next = search_line(objective, now, du, report.evaluations);
     if (next.t == 0.0) {
       if (pairs_.empty()) break;
       forget();
@@ -128,7 +135,15 @@ QuasiNewtonReport QuasiNewton::minimise(const MeasuredObjective& objective, cons
     ++report.steps;
   }
   report.value = now.value;
+  u = std::move(now.u);
   return report;
 }
+
+#define ARAPFIELDS_MINIMISE(Scalar)                                                                       \
+  template QuasiNewtonReport QuasiNewton::minimise<Scalar>(const MeasuredObjectiveOf<Scalar>&,            \
+                                                           const QuasiNewtonOptions&, RowMatrix<double>&, \
+                                                           Eigen::VectorX<Scalar>&, const Progress&);
+ARAPFIELDS_MINIMISE(float)
+ARAPFIELDS_MINIMISE(double)
 
 }  // namespace arapfields

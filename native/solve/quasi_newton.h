@@ -9,22 +9,26 @@
 namespace arapfields {
 
 /// A function of coefficients c (n,3) that sees them through linear measurements u = Φ c alone.
-class MeasuredObjective {
+template <class Scalar>
+class MeasuredObjectiveOf {
  public:
-  virtual ~MeasuredObjective() = default;
+  virtual ~MeasuredObjectiveOf() = default;
   /// u = Φ c.
-  virtual void measure(const RowMatrix<double>& c, Vector& u) const = 0;
+  virtual void measure(const RowMatrix<double>& c, Eigen::VectorX<Scalar>& u) const = 0;
   /// The function's value; `cotangents`, unless null, is resized and becomes its derivative by u.
-  virtual double value(const Vector& u, Vector* cotangents) const = 0;
+  virtual double value(const Eigen::VectorX<Scalar>& u, Eigen::VectorX<Scalar>* cotangents) const = 0;
   /// Φᵀ cotangents.
-  virtual RowMatrix<double> pull_back(const Vector& cotangents) const = 0;
+  virtual RowMatrix<double> pull_back(const Eigen::VectorX<Scalar>& cotangents) const = 0;
   /// An approximation of the inverse Hessian, times a gradient.
   virtual RowMatrix<double> precondition(const RowMatrix<double>& gradient) const = 0;
 };
 
+using MeasuredObjective = MeasuredObjectiveOf<double>;
+
 struct QuasiNewtonOptions {
   Index steps = 12;         ///< at most so many
   double tolerance = 1e-4;  ///< stops where a step is expected to gain less than this share of the value
+  double floor = 1e-18;     ///< or less than this
 };
 
 struct QuasiNewtonReport {
@@ -38,9 +42,16 @@ struct QuasiNewtonReport {
 /// accepted step lowers the value. The pairs of past steps serve the next call too, until forget().
 class QuasiNewton {
  public:
-  /// Improves c in place. Throws Diverged where the value at the start is not finite.
+  /// Improves c in place, and with it its measurements u (empty: not known yet). Throws Diverged where the
+  /// value at the start is not finite.
+  template <class Scalar>
+  QuasiNewtonReport minimise(const MeasuredObjectiveOf<Scalar>& objective, const QuasiNewtonOptions& options,
+                             RowMatrix<double>& c, Eigen::VectorX<Scalar>& u, const Progress& progress = {});
   QuasiNewtonReport minimise(const MeasuredObjective& objective, const QuasiNewtonOptions& options,
-                             RowMatrix<double>& c, const Progress& progress = {});
+                             RowMatrix<double>& c, const Progress& progress = {}) {
+    Vector u;
+    return minimise(objective, options, c, u, progress);
+  }
   void forget() { pairs_.clear(); }
 
  private:
@@ -48,7 +59,9 @@ class QuasiNewton {
     RowMatrix<double> step, change;
     double product;
   };
-  RowMatrix<double> direction(const MeasuredObjective& objective, const RowMatrix<double>& gradient) const;
+  template <class Scalar>
+  RowMatrix<double> direction(const MeasuredObjectiveOf<Scalar>& objective,
+                              const RowMatrix<double>& gradient) const;
 
   std::deque<Pair> pairs_;
 };

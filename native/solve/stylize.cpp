@@ -3,6 +3,7 @@
 
 #include "core/parallel.h"
 #include "fields/neural_field.h"
+#include "solve/radial.h"
 #include "solve/setup.h"
 
 namespace arapfields {
@@ -42,6 +43,8 @@ Solution stylize(const SurfaceSamples& samples, PointsIn preferred, const Styliz
                  const Progress& progress, const Vector& weights, const std::vector<Handle>& handles) {
   options.validate();
   check_samples(samples, weights);
+  if (options.field == "radial")
+    return stylize_radial(samples, preferred, options, progress, weights, handles);
   const ThreadScope threads(options.threads);
   ObjectiveTerms terms;
   terms.batch = options.batch;

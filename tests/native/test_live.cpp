@@ -2,9 +2,11 @@
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 
+#include "core/dense.h"
 #include "core/errors.h"
 #include "core/random.h"
-#include "fields/radial_field.h"
+#include "core/skinny.h"
+#include "fields/radial_sites.h"
 #include "solve/quasi_newton.h"
 
 using namespace arapfields;
@@ -64,30 +66,45 @@ BOOST_AUTO_TEST_CASE(farthest_points_spread_and_stop_at_duplicates) {
   BOOST_CHECK_THROW(farthest_points(Points(0, 3), 7), InvalidInput);
 }
 
-BOOST_AUTO_TEST_CASE(spatial_order_is_a_permutation) {
-  const auto order = spatial_order(random_points(300, 2));
-  std::vector<bool> seen(300, false);
-  for (const Index i : order) seen[static_cast<std::size_t>(i)] = true;
-  BOOST_TEST(order.size() == 300u);
-  BOOST_TEST(std::all_of(seen.begin(), seen.end(), [](bool b) { return b; }));
+template <class Scalar>
+void check_sites(double tolerance) {
+  const Points points = random_points(77, 5);
+  const RadialBasis basis = radial_basis(random_points(400, 6), {{10, 1.5}, {60, 2.0}});
+  const RadialSites<Scalar> sites(basis, points);
+  const RowMatrix<double> c = random_matrix(basis.size(), 3, 7);
+  for (const JetOrder order : {JetOrder::value, JetOrder::first, JetOrder::second}) {
+    JetBlock<Scalar> jets(points.rows(), order);
+    sites.evaluate(c, jets.view());
+    const Index size = columns(order) * points.rows();
+    const RowMatrix<double> found =
+        Eigen::Map<const RowMatrix<Scalar>>(jets.view().data, size, 3).template cast<double>();
+    const RowMatrix<double> rows = radial_rows(basis, points, order);
+    BOOST_TEST((rows * c - found).norm() < tolerance * found.norm());
+    const RowMatrix<Scalar> cotangents = random_matrix(size, 3, 8).cast<Scalar>();
+    RowMatrix<double> gradient = RowMatrix<double>::Zero(basis.size(), 3);
+    sites.pull_back({cotangents.data(), points.rows(), order}, gradient);
+    const RowMatrix<double> expected = rows.transpose() * cotangents.template cast<double>();
+    BOOST_TEST((expected - gradient).norm() < tolerance * gradient.norm());
+  }
 }
 
 BOOST_AUTO_TEST_CASE(sites_agree_with_their_rows_and_pull_back_is_the_transpose) {
-  const Points points = random_points(77, 5);
-  const RadialBasis basis = radial_basis(random_points(400, 6), {{10, 1.5}, {60, 2.0}});
-  const RadialSites sites(basis, points);
-  const RowMatrix<double> c = random_matrix(basis.size(), 3, 7);
-  for (const JetOrder order : {JetOrder::value, JetOrder::first, JetOrder::second}) {
-    JetBlock<double> jets(points.rows(), order);
-    sites.evaluate(c, jets.view());
-    const Index size = columns(order) * points.rows();
-    const Eigen::Map<const RowMatrix<double>> found(jets.view().data, size, 3);
-    const RowMatrix<double> rows = sites.rows(order);
-    BOOST_TEST((rows * c - found).norm() < 1e-11 * found.norm());
-    const RowMatrix<double> cotangents = random_matrix(size, 3, 8);
-    RowMatrix<double> gradient = RowMatrix<double>::Zero(basis.size(), 3);
-    sites.pull_back({cotangents.data(), points.rows(), order}, gradient);
-    BOOST_TEST((rows.transpose() * cotangents - gradient).norm() < 1e-11 * gradient.norm());
+  check_sites<double>(1e-11);
+  check_sites<float>(1e-5);
+}
+
+BOOST_AUTO_TEST_CASE(skinny_products_agree_with_eigen) {
+  for (const Index n : {1, 5, 64, 131}) {
+    const RowMatrix<double> a = random_matrix(n + 3, n, 9), square = random_matrix(n, n, 10);
+    const Points b = random_matrix(n, 3, 11), c = random_matrix(n + 3, 3, 12);
+    const SkinnyMatrix<double> whole(a), lower(square, true);
+    BOOST_TEST((whole.times(b) - a * b).norm() < 1e-11);
+    BOOST_TEST((whole.transpose_times(c) - a.transpose() * c).norm() < 1e-11);
+    const RowMatrix<double> triangle = square.triangularView<Eigen::Lower>();
+    BOOST_TEST((lower.times(b) - triangle * b).norm() < 1e-11);
+    BOOST_TEST((lower.transpose_times(b) - triangle.transpose() * b).norm() < 1e-11);
+    const RowMatrix<double> solid = triangle + 20.0 * RowMatrix<double>::Identity(n, n);
+    BOOST_TEST((lower_inverse<double>(solid) * solid - RowMatrix<double>::Identity(n, n)).norm() < 1e-11);
   }
 }
 

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "solve/live_stiffness.h"
+
+#include <cmath>
+
+#include "core/dense.h"
+#include "fields/radial_sites.h"
+
+namespace arapfields {
+namespace {
+
+/// Bumps overlap so much that the matrix is singular to rounding.
+constexpr double ridge = 1e-9;
+constexpr Index most_samples = 1000;
+
+}  // namespace
+
+RowMatrix<double> surface_stiffness(const RadialBasis& basis, PointsIn samples, double bending) {
+  const Index taken = std::min(samples.rows(), most_samples);
+  Points some(taken, 3);
+  for (Index i = 0; i < taken; ++i) some.row(i) = samples.row(i * samples.rows() / taken);
+  RowMatrix<double> rows = radial_rows(basis, some, JetOrder::second);
+  rows.middleRows(4 * taken, 3 * taken) *= std::sqrt(bending);
+  rows.middleRows(7 * taken, 3 * taken) *= std::sqrt(2.0 * bending);
+  RowMatrix<double> result(rows.cols(), rows.cols());
+  const auto used = rows.bottomRows(9 * taken);
+  gemm<double>(Transpose::yes, Transpose::no, 1.0 / static_cast<double>(taken), used, used, 0.0, result);
+  return result;
+}
+
+RowMatrix<double> inverse_factor(RowMatrix<double> stiffness, const RowMatrix<double>& values,
+                                 const Vector& weights) {
+  const RowMatrix<double> weighted = weights.cwiseSqrt().asDiagonal() * values;
+  gemm<double>(Transpose::yes, Transpose::no, 1.0, weighted, weighted, 1.0, stiffness);
+  stiffness.diagonal().array() += ridge * stiffness.diagonal().mean();
+  return lower_inverse<double>(cholesky<double>(stiffness));
+}
+
+}  // namespace arapfields

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "solve/radial.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "solve/live_solver.h"
+#include "solve/setup.h"
+
+namespace arapfields {
+namespace {
+
+/// Steps between two looks at the clock.
+constexpr int steps_at_once = 10;
+
+template <class Options>
+LiveOptions live_options(const Options& options) {
+  LiveOptions live;
+  live.bending = options.bending;
+  live.handle_samples = options.handle_batch;
+  live.barrier = options.barrier;
+  live.barrier_threshold = options.barrier_threshold;
+  live.threads = options.threads;
+  live.seed = options.seed;
+  live.tolerance = 1e-6;
+  return live;
+}
+
+/// Solves until it converges, is out of steps, or out of time.
+LoopResult run(LiveSolver& live, int iterations, double time_budget, const Progress& progress) {
+  const Stopwatch watch;
+  LoopResult result;
+  while (result.iterations < iterations) {
+    const int steps = std::min(steps_at_once, iterations - result.iterations);
+    const double done = static_cast<double>(result.iterations) / iterations;
+    live.solve(steps, 0.0, progress.part(done, done + static_cast<double>(steps) / iterations));
+    result.iterations += static_cast<int>(live.report().steps);
+    result.history.emplace_back(result.iterations, live.report().value);
+    result.seconds = watch.seconds();
+    if (live.report().steps < steps) break;
+    if (time_budget > 0.0 && result.seconds > time_budget) {
+      result.out_of_time = true;
+      break;
+    }
+  }
+  return result;
+}
+
+Solution finish(const LiveSolver& live, const SurfaceSamples& samples, const ObjectiveTerms& terms,
+                LoopResult loop, const Progress& progress) {
+  progress.report(0.98, "measuring the result");
+  return measured(live.field(), samples, terms, std::move(loop));
+}
+
+}  // namespace
+
+Solution deform_radial(const SurfaceSamples& samples, const std::vector<Handle>& handles,
+                       const DeformOptions& options, const Progress& progress) {
+  require(options.handle_weight > 0.0, "handle_weight", "0", "must be positive for 'radial'");
+  LiveOptions live = live_options(options);
+  live.samples = std::max(live.samples, 8 * options.bumps);
+  live.coarse_bumps = options.bumps / 5;
+  live.fine_bumps = options.bumps;
+  live.handle_weight = options.handle_weight;
+  LiveSolver solver(samples, handles, live, progress.part(0.0, 0.3));
+  const LoopResult loop = run(solver, options.iterations, options.time_budget, progress.part(0.3, 0.95));
+  ObjectiveTerms terms;
+  terms.bending = options.bending;
+  terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
+  return finish(solver, samples, terms, loop, progress);
+}
+
+std::shared_ptr<const DeformationField> radial_start(const SurfaceSamples& samples,
+                                                     const std::vector<Handle>& handles,
+                                                     DeformOptions options, const Progress& progress) {
+  constexpr int start_steps = 30;
+  options.exact_handles = false;
+  options.invertibility = 0.0;
+  options.iterations = start_steps;
+  return deform_radial(samples, handles, options, progress).field;
+}
+
+Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const StylizeOptions& options,
+                        const Progress& progress, const Vector& weights, const std::vector<Handle>& handles) {
+  // The live solver's energy has weight 1: all other weights are divided by this one's.
+  LiveOptions live = live_options(options);
+  live.samples = 6000;
+  live.coarse_bumps = 200;
+  live.fine_bumps = 1000;
+  live.tolerance = 1e-4;
+  live.handle_weight = std::max(options.handle_weight, 1e-3) / options.rigidity;
+  live.barrier = options.barrier / options.rigidity;
+  live.gauss_weight = options.gauss_weight / options.rigidity;
+  LiveSolver solver(samples, handles, live, progress.part(0.0, 0.3));
+  solver.set_style(preferred, options.strength, options.sharpness, weights);
+  const LoopResult loop = run(solver, options.iterations, options.time_budget, progress.part(0.3, 0.95));
+  ObjectiveTerms terms;
+  terms.rigidity = options.rigidity;
+  terms.bending = options.bending;
+  terms.preference = gauss_preference(preferred, options.sharpness);
+  terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
+  return finish(solver, samples, terms, loop, progress);
+}
+
+}  // namespace arapfields

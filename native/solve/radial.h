@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// deform and stylize over a radial field: the live solver's work, brought to its end in one call.
+#pragma once
+
+#include "solve/options.h"
+#include "solve/report.h"
+
+namespace arapfields {
+
+/// As deform (solve/deform.h) for options.field "radial". `iterations` bounds the quasi-Newton steps; options
+/// of networks do not matter.
+Solution deform_radial(const SurfaceSamples& samples, const std::vector<Handle>& handles,
+                       const DeformOptions& options, const Progress& progress);
+
+/// What a network may refine: deform_radial's field after some tens of steps, whatever options.field says and
+/// without exact handles, which the network's own blend adds.
+std::shared_ptr<const DeformationField> radial_start(const SurfaceSamples& samples,
+                                                     const std::vector<Handle>& handles,
+                                                     DeformOptions options, const Progress& progress);
+
+/// As stylize (solve/stylize.h) for options.field "radial".
+Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const StylizeOptions& options,
+                        const Progress& progress, const Vector& weights, const std::vector<Handle>& handles);
+
+}  // namespace arapfields
