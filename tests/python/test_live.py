@@ -3,45 +3,13 @@
 
 import numpy as np
 import pytest
+from bar import LEFT, RIGHT, bar_samples, box, turned
 from energy_oracles import random_rotations
 from tolerances import LIVE_DRIFT, LIVE_IDENTITY
 
 import arapfields as af
 
 QUICK = {"samples": 800, "coarse_bumps": 30, "fine_bumps": 120}
-
-
-def bar_samples(count=6000, seed=0):
-    """Uniform samples of the surface of a bar of size 4 × 1 × 1 along x, with normals."""
-    rng = np.random.default_rng(seed)
-    half = np.array([2.0, 0.5, 0.5])
-    areas = np.array([half[1] * half[2], half[0] * half[2], half[0] * half[1]])
-    axis = rng.choice(3, size=count, p=areas / areas.sum())
-    side = rng.choice([-1.0, 1.0], size=count)
-    points = rng.uniform(-1, 1, size=(count, 3)) * half
-    normals = np.zeros((count, 3))
-    normals[np.arange(count), axis] = side
-    points[np.arange(count), axis] = side * half[axis]
-    return af.SurfaceSamples(points, normals)
-
-
-def box(center, half):
-    matrix = np.diag([*map(float, half), 1.0])
-    matrix[:3, 3] = center
-    return matrix
-
-
-def turned(degrees, axis=1, shift=(0, 0, 0)):
-    angle = np.radians(degrees)
-    i, j = [(1, 2), (2, 0), (0, 1)][axis]
-    matrix = np.eye(4)
-    matrix[i, i] = matrix[j, j] = np.cos(angle)
-    matrix[i, j], matrix[j, i] = -np.sin(angle), np.sin(angle)
-    matrix[:3, 3] = shift
-    return matrix
-
-
-LEFT, RIGHT = box([-1.8, 0, 0], [0.3, 0.6, 0.6]), box([1.8, 0, 0], [0.3, 0.6, 0.6])
 
 
 @pytest.fixture(scope="module")
