@@ -8,6 +8,7 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "core/random.h"
+#include "extraction/batch_function.h"
 #include "extraction/extract_surface.h"
 #include "implicit_shapes.h"
 
@@ -214,6 +215,21 @@ BOOST_AUTO_TEST_CASE(a_surface_that_leaves_the_cube_is_open_there) {
   for (const auto& [edge, count] : uses)
     if (count == 1)
       BOOST_REQUIRE((mesh.vertices(edge.first, 0) == 1.0 && mesh.vertices(edge.second, 0) == 1.0));
+}
+
+BOOST_AUTO_TEST_CASE(any_call_can_be_extracted) {
+  // The sphere seen through the inverse of a stretch along x is an ellipsoid.
+  const auto ball = shapes::sphere(0.4);
+  const BatchFunction stretched([&](ConstPointsRef<float> points, Eigen::Ref<VectorF> values) {
+    PointsF rest = points;
+    rest.col(0) /= 2.0f;
+    ball.evaluate(rest, values);
+  });
+  const TriangleMesh mesh = extract(stretched, 72);
+  check_closed(mesh);
+  BOOST_TEST(mesh.vertices.col(0).maxCoeff() > 0.79);
+  BOOST_TEST(mesh.vertices.col(1).maxCoeff() < 0.401);
+  BOOST_TEST(set_distance(dense_crossings(stretched, 72), mesh.vertices) < 1e-6);
 }
 
 BOOST_AUTO_TEST_CASE(extraction_repeats_and_does_not_depend_on_threads) {

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <functional>
+#include <utility>
+
+#include "core/implicit.h"
+
+namespace arapfields {
+
+/// An implicit function from any batched call, for instance a signed distance at the inverse images of a
+/// deformation. Gradients are central differences, exact to about 1e-3 for values in single precision: enough
+/// for the bound on |∇Φ| by which extraction leaves out empty space.
+class BatchFunction final : public ImplicitFunction {
+ public:
+  /// Writes the values (n) at points (n,3) in cube coordinates; must be finite, and defined up to 1e-3
+  /// outside the cube.
+  using Call = std::function<void(ConstPointsRef<float> points, Eigen::Ref<VectorF> values)>;
+  explicit BatchFunction(Call call) : call_(std::move(call)) {}
+
+  void evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> values) const override {
+    call_(points, values);
+  }
+  void evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> values,
+                Eigen::Ref<PointsF> gradients) const override {
+    constexpr float step = 1e-3f;
+    call_(points, values);
+    VectorF above(points.rows()), below(points.rows());
+    for (int axis = 0; axis < 3; ++axis) {
+      PointsF shifted = points;
+      shifted.col(axis).array() += step;
+      call_(shifted, above);
+      shifted.col(axis).array() -= 2.0f * step;
+      call_(shifted, below);
+      gradients.col(axis) = (above - below) / (2.0f * step);
+    }
+  }
+
+ private:
+  Call call_;
+};
+
+}  // namespace arapfields
