@@ -28,7 +28,9 @@ class CountedFunction {
 };
 
 /// A bound on |∇Φ| over the cube: the largest of a stratified sample of gradients (strata³ of them,
-/// jittered), times a safety factor of 1.25. The published networks reach 1.1 times what such a sample sees.
+/// jittered), times a safety factor of 1.25. The largest of 40,000 gradients of the published networks
+/// is 1.04 to 1.23 times what such a sample sees. SparseModel raises the bound where grid values contradict
+/// it.
 double measure_lipschitz(CountedFunction& function, int strata = 12);
 
 }  // namespace arapfields

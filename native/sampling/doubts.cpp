@@ -9,8 +9,8 @@
 namespace arapfields {
 namespace {
 
-// Curvature of Φ − p along a line, over the model's slope error per spacing (published networks: 99 % are
-// below).
+// Curvature of Φ − p along a line, over the model's slope error per spacing. On four published networks 90 %
+// of the points are below half of this; the 99 % point is 0.5 to 1.4 times it.
 constexpr double curvature_factor = 5.0;
 constexpr int probes = 5;  // parameters at which p is looked at in a piece, ends included
 

@@ -12,13 +12,13 @@ namespace {
 
 constexpr int coarsest = 16;
 // Bound on |Φ − p| in a cell: the largest residual among its own and its neighbours' centres times the first,
-// plus the largest third difference of its block times the second (creases may pass centres by). On the
-// published networks none of 100,000 points in 2,500 cells exceeded it; at creases of exact distances 1 in
-// 10,000.
+// plus the largest third difference of its block times the second (creases may pass centres by). By the first
+// alone at most 2 of 100,000 points exceed it on two published networks, 8 at creases of exact distances.
 constexpr float error_safety = 3.0f;
 constexpr float roughness_factor = 0.1f;
 constexpr float error_floor = 1e-6f;  // rounding of float32 networks
-// |∇(Φ − p)| of a residual that vanishes on the corners, against its height over the spacing.
+// |∇(Φ − p)| against the largest of those residuals over the spacing. On four published networks the 99 %
+// point along random directions is 2.3 to 5.5.
 constexpr float slope_factor = 5.0f;
 constexpr int max_rebuilds = 8;
 constexpr double half_diagonal = 0.8660254037844386;  // √3/2, in spacings
