@@ -14,7 +14,20 @@ import pages
 
 import arapfields as af
 
-LIMITS = {"iterations": 12, "steps": 40, "width": 32, "resolution": 48, "time_budget": 3.0}
+LIMITS = {
+    "iterations": 12,
+    "steps": 120,
+    "width": 64,
+    "near_points": 20000,
+    "uniform_points": 5000,
+    "time_budget": 3.0,
+}
+TAKE_OPTIONS = {  # as their third argument
+    "fit_sdf": "FitOptions",
+    "deform": "DeformOptions",
+    "stylize": "StylizeOptions",
+    "train_inverse": "InverseOptions",
+}
 
 
 def shortened(kind):
@@ -42,9 +55,8 @@ def with_short_options(call, position, make):
 def shorten_library():
     for kind in [name for name in vars(af) if name.endswith("Options")]:
         setattr(af, kind, shortened(getattr(af, kind)))
-    for call, kind in (("deform", "DeformOptions"), ("stylize", "StylizeOptions"), ("fit_sdf", "FitOptions")):
-        if hasattr(af, call):
-            setattr(af, call, with_short_options(getattr(af, call), 2, getattr(af, kind)))
+    for call, kind in TAKE_OPTIONS.items():
+        setattr(af, call, with_short_options(getattr(af, call), 2, getattr(af, kind)))
 
 
 def readme_names():

@@ -6,10 +6,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pages
 import pytest
 
 HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+
+import pages  # noqa: E402
+
 WITH_CODE = [page for page in pages.PAGES if pages.python_blocks(page)]
 
 
