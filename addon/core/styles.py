@@ -47,12 +47,12 @@ STYLIZE = [
     replace(BARRIER, default=10.0),  # a style without it folds at its edges
     Parameter(
         "learning_rate",
-        1e-3,
+        0.0,
         "Learning Rate",
-        "Size of the steps of the solve",
-        1e-6,
+        "Size of the steps of the solve; 0 for what suits most shapes",
+        0.0,
         0.1,
-        0.01,
+        0.05,
         advanced=True,
     ),
     WIDTH,

@@ -71,7 +71,7 @@ def test_the_surface_is_deformed_like_the_mesh():
     for name, value in FIT.items():
         setattr(bar.arapfields.fit, name, value)
     moving.location.z += 0.4
-    settings = scenes.QUICK | {"iterations": 120, "learning_rate": 5e-3}
+    settings = scenes.QUICK | {"iterations": 120}
     bpy.ops.arapfields.deform(output="SURFACE", resolution=48, **settings)
     surface = bpy.context.view_layer.objects.active
     scenes.activate(bar)
