@@ -20,4 +20,5 @@ FIGURES = [
     Figure("styles", "six styles of three shapes, with their preferences on a sphere"),
     Figure("live", "six frames of a handle dragged live"),
     Figure("character", "materials and UVs of a deformed and a stylized mesh"),
+    Figure("published", "the published bunny by three methods", published=True),
 ]

@@ -43,6 +43,25 @@ def test_links_and_pictures_exist(page):
     assert not broken
 
 
+def test_messages_of_the_troubleshooting_page_are_in_the_code():
+    folders = ("native", "addon")
+    sources = [
+        p
+        for folder in folders
+        for p in (pages.ROOT / folder).rglob("*.*")
+        if p.suffix in (".cpp", ".h", ".py")
+    ]
+    code = re.sub(r'"\s*\n\s*"', "", "\n".join(path.read_text() for path in sources))
+    missing = []
+    for message in re.findall(
+        r"^\| `([^`]+)`", (pages.ROOT / "docs" / "troubleshooting.md").read_text(), re.M
+    ):
+        missing += [
+            part for part in re.split(r"…| i | j ", message) if part.strip() and part.strip() not in code
+        ]
+    assert not missing
+
+
 def test_the_diagram_is_that_of_the_code():
     sys.path.insert(0, str(pages.ROOT / "docs" / "hooks"))
     import diagram
