@@ -20,7 +20,7 @@ SurfaceSamples checked_samples(const py::object& points, const py::object& norma
     n.row(i) /= length;
   }
   const Frame used = frame ? *frame : Frame::around(p);
-  return {used.to_cube(p), n, used};
+  return {used.to_cube(p), n, used, {}};
 }
 
 std::string text(const Frame& frame) {

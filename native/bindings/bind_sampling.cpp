@@ -7,15 +7,18 @@
 namespace arapfields::python {
 namespace {
 
-SurfaceSamples sample(const ImplicitFunction& sdf, Index count, std::uint64_t seed, Task* task, int threads,
-                      const std::optional<py::dict>& report) {
-  const auto* network = dynamic_cast<const NeuralSdf*>(&sdf);
+SurfaceSamples sample(const std::shared_ptr<ImplicitFunction>& sdf, Index count, std::uint64_t seed,
+                      Task* task, int threads, const std::optional<py::dict>& report) {
+  const auto* network = dynamic_cast<const NeuralSdf*>(sdf.get());
+  const Frame frame = network != nullptr ? network->frame() : Frame();
   SampleReport done;
   SurfaceSamples samples = run_long(task, [&](const Progress& progress) {
     const ThreadScope scope(threads);
-    return sample_surface(sdf, network != nullptr ? network->frame() : Frame(),
-                          {.count = count, .seed = seed}, progress, &done);
+    return sample_surface(*sdf, frame, {.count = count, .seed = seed}, progress, &done);
   });
+  samples.redraw = [sdf, frame](Index again, std::uint64_t other) {
+    return sample_surface(*sdf, frame, {.count = again, .seed = other});
+  };
   if (report)
     report->attr("update")(
         "lines"_a = done.lines, "evaluations"_a = done.value_evaluations + done.gradient_evaluations,

@@ -75,6 +75,10 @@ void bind_options(py::module_& module) {
       .field("bumps", &DeformOptions::bumps, "Fine bumps of a radial field; a fifth of coarse ones is added.")
       .field("iterations", &DeformOptions::iterations, "Steps of the optimization.")
       .field("batch", &DeformOptions::batch, "Surface samples a step.")
+      .field(
+          "fresh_samples", &DeformOptions::fresh_samples,
+          "Of the batch, samples newly drawn from the surface at each step: the estimate is then unbiased\n"
+          "where the fixed samples miss something. Needs samples of sample_mesh or sample_surface.")
       .field("bending", &DeformOptions::bending, "λ_bend, the weight of the bend against the stretch.")
       .field("handle_weight", &DeformOptions::handle_weight, "Weight of the handles' mean squared distance.")
       .field("handle_batch", &DeformOptions::handle_batch, "Most samples of each handle a step.")

@@ -70,6 +70,9 @@ SurfaceSamples sample_mesh(PointsIn vertices, TrianglesIn triangles, Index count
   require(count > 0, "count", std::to_string(count), "at least 1 is needed");
   SurfaceSamples samples;
   samples.frame = mesh_frame(vertices, triangles);
+  samples.redraw = [v = Points(vertices), t = Triangles(triangles)](Index again, std::uint64_t other) {
+    return sample_mesh(v, t, again, other);
+  };
   const AreaSampler sampler(samples.frame.to_cube(vertices), triangles);
   samples.points.resize(count, 3);
   samples.normals.resize(count, 3);

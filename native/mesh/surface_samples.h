@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
+#include <functional>
+
 #include "core/frame.h"
 #include "core/types.h"
 
@@ -11,6 +14,9 @@ struct SurfaceSamples {
   Points points;   ///< (n,3)
   Points normals;  ///< (n,3)
   Frame frame;     ///< cube ↔ mesh coordinates; fields solved on the samples inherit it
+  /// Draws `count` other samples of the same surface, in the same frame; empty where the surface is not
+  /// known.
+  std::function<SurfaceSamples(Index count, std::uint64_t seed)> redraw;
   Index size() const { return points.rows(); }
 };
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "solve/deform.h"
 
+#include <algorithm>
+
 #include "core/parallel.h"
 #include "fields/neural_field.h"
 #include "solve/inverse_training.h"
@@ -36,6 +38,7 @@ ObjectiveTerms terms_of(const SurfaceSamples& samples, const std::vector<Handle>
                         const DeformOptions& options) {
   ObjectiveTerms terms;
   terms.batch = options.batch;
+  terms.fresh = std::min(options.fresh_samples, options.batch);
   terms.bending = options.bending;
   terms.barrier = options.barrier;
   terms.barrier_threshold = options.barrier_threshold;
@@ -52,6 +55,9 @@ Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handle
   options.validate();
   require_samples(samples);
   require(!handles.empty(), "handles", "none were given", "at least one is needed");
+  require(options.fresh_samples == 0 || samples.redraw, "options.fresh_samples",
+          "the samples are a plain list of points",
+          "samples of sample_mesh or sample_surface are needed, which know their surface");
   if (options.field == "radial") return deform_radial(samples, handles, options, progress);
   const ThreadScope threads(options.threads);
   ObjectiveTerms terms = terms_of(samples, handles, options);

@@ -43,24 +43,40 @@ struct HostJets {
 FieldObjective::FieldObjective(const SurfaceSamples& samples, ObjectiveTerms terms)
     : samples_(samples), terms_(std::move(terms)), order_(morton_order(samples.points)) {}
 
+Index FieldObjective::next_fresh(Random& random) {
+  if (used_ == pool_.size()) {
+    pool_ = samples_.redraw(samples_.size(), random.bits() >> 1);
+    used_ = 0;
+  }
+  return used_++;
+}
+
 double FieldObjective::accumulate(TrainableField& field, Random& random) {
   return field.parameters().scalar_type() == at::kDouble ? accumulate_as<double>(field, random)
                                                          : accumulate_as<float>(field, random);
 }
 
 template <class Scalar>
-double FieldObjective::accumulate_as(TrainableField& field, Random& random) const {
+double FieldObjective::accumulate_as(TrainableField& field, Random& random) {
   const double surface = surface_terms<Scalar>(field, random);
   return surface + handle_terms<Scalar>(field, random);
 }
 
 template <class Scalar>
-double FieldObjective::surface_terms(TrainableField& field, Random& random) const {
+double FieldObjective::surface_terms(TrainableField& field, Random& random) {
   const Index available = samples_.size(), batch = std::min(terms_.batch, available);
   const bool styled = terms_.preference && terms_.gauss > 0.0;
   PointsOf<Scalar> points(batch, 3), normals(styled ? batch : 0, 3);
   Eigen::VectorX<Scalar> weights(styled && terms_.preference_weights.size() > 0 ? batch : 0);
+  // Fresh samples stand evenly among the others: stretch b has one where b·fresh/batch steps up.
   for (Index b = 0; b < batch; ++b) {
+    if (terms_.fresh > 0 && b * terms_.fresh / batch != (b + 1) * terms_.fresh / batch) {
+      const Index i = next_fresh(random);
+      points.row(b) = pool_.points.row(i).cast<Scalar>();
+      if (styled) normals.row(b) = pool_.normals.row(i).cast<Scalar>();
+      if (weights.size() > 0) weights[b] = Scalar(1);
+      continue;
+    }
     const double place = (static_cast<double>(b) + random.uniform()) * static_cast<double>(available) /
                          static_cast<double>(batch);
     const Index i = order_[static_cast<std::size_t>(std::min(available - 1, static_cast<Index>(place)))];

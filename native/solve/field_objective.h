@@ -14,6 +14,7 @@ namespace arapfields {
 ///   rigidity·(stretch + bending·bend) + gauss·mean(1 − g) + barrier·fold_barrier + handles.
 struct ObjectiveTerms {
   Index batch = 300;
+  Index fresh = 0;  ///< of the batch, samples that the surface is asked for anew; needs samples.redraw
   double rigidity = 1.0, bending = 0.01;
   std::optional<GaussPreference> preference;
   double gauss = 0.0;
@@ -35,15 +36,20 @@ class FieldObjective final : public Objective {
 
  private:
   template <class Scalar>
-  double accumulate_as(TrainableField& field, Random& random) const;
+  double accumulate_as(TrainableField& field, Random& random);
   template <class Scalar>
-  double surface_terms(TrainableField& field, Random& random) const;
+  double surface_terms(TrainableField& field, Random& random);
   template <class Scalar>
   double handle_terms(TrainableField& field, Random& random) const;
+
+  /// The next fresh sample; draws another pool of as many as there are samples when one is used up.
+  Index next_fresh(Random& random);
 
   const SurfaceSamples& samples_;
   ObjectiveTerms terms_;
   std::vector<std::uint32_t> order_;
+  SurfaceSamples pool_;
+  Index used_ = 0;
 };
 
 }  // namespace arapfields

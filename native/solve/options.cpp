@@ -52,6 +52,7 @@ void validate_common(const Options& o) {
 }  // namespace
 
 void DeformOptions::validate() const {
+  in_range("fresh_samples", fresh_samples, 0, 1e6);
   require(start == "identity" || start == "radial", "start", "'" + start + "'",
           "'identity' or 'radial' is allowed");
   validate_common(*this);

@@ -15,6 +15,7 @@ struct DeformOptions {
   int bumps = 300;                 ///< fine bumps of a radial field, to which a fifth of coarse ones is added
   int iterations = 300;
   int batch = 300;             ///< surface samples an iteration
+  int fresh_samples = 0;       ///< of these, newly drawn from the surface at each iteration
   double bending = 0.01;       ///< λ_bend
   double handle_weight = 100;  ///< factor of the handles' mean squared distance
   int handle_batch = 256;      ///< samples a handle an iteration
