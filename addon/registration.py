@@ -18,15 +18,16 @@ MODULES = [
 ]
 
 
+_done = []  # what is registered, in order
+
+
 def register():
-    done = []
     try:
         for module in MODULES:
-            done.append(module)
+            _done.append(module)
             _register(module)
     except Exception:
-        for module in reversed(done):
-            _unregister(module)
+        unregister()
         raise
     if bpy.app.module:
         # Python's own bpy shuts down as its last reference goes; classes still registered would keep it
@@ -35,9 +36,10 @@ def register():
 
 
 def unregister():
+    """Undoes register(), once: Blender calls it too when it ends and switches its add-ons off."""
     atexit.unregister(unregister)
-    for module in reversed(MODULES):
-        _unregister(module)
+    while _done:
+        _unregister(_done.pop())
 
 
 def _register(module):
