@@ -49,3 +49,5 @@ LOSS_GRADIENT = 1e-6
 SAME_VERTICES = 1e-6
 # |Φ| at samples of the surface, in cube units.
 ON_SURFACE = 1e-4
+
+TRACKED = 5e-4  # single precision; large coefficients of neighbouring bumps of opposite sign cancel

@@ -99,7 +99,19 @@ void bind_core(py::module_& module) {
       .def_property_readonly("progress", &Task::progress, "Share of the work done, in [0, 1]; never falls.")
       .def_property_readonly("message", &Task::message, "What is being done, in a few words.")
       .def("report", &Task::report, "fraction"_a, "message"_a = "",
-           "Sets progress (kept if larger already) and message.");
+           "Sets progress (kept if larger already) and message.")
+      .def(
+          "watch",
+          [](Task& self, const py::object& points, double seconds) {
+            self.watch(as_points(points, "points"), seconds);
+          },
+          "points"_a, "seconds"_a = 0.4,
+          "Before a call of deform or stylize: it shall say about every `seconds` where its field takes "
+          "these\n"
+          "points (n, 3), given a third of its time at most. The result of the call stays the same.")
+      .def_property_readonly("looks", &Task::looks, "How often the watched points were looked at.")
+      .def_property_readonly("watched", &Task::watched,
+                             "Where the watched points were then, (n, 3) single precision; empty at first.");
 
   py::class_<Frame>(module, "Frame",
                     "Mesh coordinates and the unit cube: x_cube = (x_mesh - center) / scale.")

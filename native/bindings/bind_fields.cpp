@@ -20,9 +20,9 @@ JetBlock<double> evaluate(const DeformationField& field, const py::object& point
 }
 
 Points values(const DeformationField& field, const py::object& points) {
-  Index count = 0;
-  JetBlock<double> block = evaluate(field, points, JetOrder::value, count);
-  return field.frame().to_mesh(Eigen::Map<const Points>(block.view().data, count, 3));
+  const Points mesh = as_points(points, "points");
+  require(mesh.allFinite(), "points", "some coordinates are NaN or infinite", "all must be finite");
+  return run_long(nullptr, [&](const Progress&) { return field.at(mesh); });
 }
 
 FieldArray jacobian(const DeformationField& field, const py::object& points) {

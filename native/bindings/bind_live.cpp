@@ -111,6 +111,20 @@ void bind_live(py::module_& module) {
            "they are) and returns a DeformationField of its own. `steps` and `tolerance` replace the "
            "options' for\n"
            "this call, for instance to finish a drag: steps=100, tolerance=1e-6.")
+      .def(
+          "track",
+          [](LiveSolver& live, const py::object& points) {
+            const Points mesh = as_points(points, "points");
+            run_long(nullptr, [&](const Progress&) { live.track(mesh); });
+          },
+          "points"_a, "Prepares points (n, 3), a mesh's vertices for instance, for tracked().")
+      .def(
+          "tracked",
+          [](const LiveSolver& live) {
+            return run_long(nullptr, [&](const Progress&) { return live.tracked(); });
+          },
+          "Where the deformation at hand takes the points given to track: (n, 3), single precision. Several\n"
+          "times faster than the field itself.")
       .def("set_handles", &LiveSolver::set_handles, "handles"_a,
            "Other handles for the same surface; the shape at hand is kept as the start of the next solve.")
       .def("set_style", &set_style, "normals"_a, "strength"_a = 1.0, "sharpness"_a = 5.0,

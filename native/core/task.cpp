@@ -6,6 +6,14 @@
 #include "core/errors.h"
 
 namespace arapfields {
+namespace {
+
+std::chrono::steady_clock::duration seconds(double count) {
+  return std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+      std::chrono::duration<double>(count));
+}
+
+}  // namespace
 
 std::string Task::message() const {
   std::lock_guard lock(mutex_);
@@ -22,6 +30,24 @@ void Task::report(double fraction, const std::string& message) {
   message_ = message;
 }
 
+void Task::watch(PointsIn points, double pause) {
+  require(points.allFinite(), "points", "some are NaN or infinite", "all must be finite");
+  require(pause >= 0.0, "seconds", std::to_string(pause), "must not be negative");
+  watch_ = points;
+  pause_ = pause;
+  next_look_ = Clock::now() + seconds(pause_);
+}
+
+Index Task::looks() const {
+  std::lock_guard lock(mutex_);
+  return looks_;
+}
+
+PointsF Task::watched() const {
+  std::lock_guard lock(mutex_);
+  return watched_;
+}
+
 Progress Progress::part(double from, double to) const {
   const double length = end_ - begin_;
   return Progress(task_, begin_ + from * length, begin_ + to * length);
@@ -35,6 +61,20 @@ void Progress::report(double fraction, const std::string& message) const {
 
 void Progress::check() const {
   if (cancelled()) throw Cancelled();
+}
+
+void Progress::look(const std::function<Points(PointsIn)>& where) const {
+  constexpr int rest_over_look = 2;
+  if (task_ == nullptr || task_->watch_.rows() == 0) return;
+  const auto begin = Task::Clock::now();
+  if (begin < task_->next_look_) return;
+  PointsF found = where(task_->watch_).cast<float>();
+  const auto took = Task::Clock::now() - begin;
+  const auto pause = std::max<Task::Clock::duration>(seconds(task_->pause_), rest_over_look * took + took);
+  task_->next_look_ = begin + pause;
+  std::lock_guard lock(task_->mutex_);
+  task_->watched_ = std::move(found);
+  ++task_->looks_;
 }
 
 }  // namespace arapfields

@@ -2,8 +2,12 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
+#include <functional>
 #include <mutex>
 #include <string>
+
+#include "core/types.h"
 
 namespace arapfields {
 
@@ -17,11 +21,26 @@ class Task {
   std::string message() const;
   void report(double fraction, const std::string& message);
 
+  /// Asks the running call to say, about every `seconds`, where its present field takes these points. Called
+  /// before the call begins. Looks take a third of the call's time at most.
+  void watch(PointsIn points, double seconds);
+  /// How often that was done, and where the points (n,3) were at the last time; (0, 3) at first.
+  Index looks() const;
+  PointsF watched() const;
+
  private:
+  friend class Progress;
+  using Clock = std::chrono::steady_clock;
+
   std::atomic<bool> cancelled_{false};
   std::atomic<double> progress_{0.0};
   mutable std::mutex mutex_;
   std::string message_;
+  Points watch_;
+  PointsF watched_;
+  Index looks_ = 0;
+  double pause_ = 0.0;
+  Clock::time_point next_look_;
 };
 
 /// A stage's share of a Task's progress; what native functions take. Without a Task it does nothing.
@@ -38,6 +57,8 @@ class Progress {
   void report(double fraction, const std::string& message = {}) const;
   /// Throws Cancelled if the task was cancelled.
   void check() const;
+  /// For whoever watches: where a look is due, asks `where` for the watched points' present places.
+  void look(const std::function<Points(PointsIn)>& where) const;
   /// For loops on worker threads, which must not throw: they leave early and the caller then check()s.
   bool cancelled() const { return task_ != nullptr && task_->cancelled(); }
 

@@ -21,6 +21,13 @@ class DeformationField {
   /// Jets at points (n,3), all in cube coordinates; `out` has count n and any order. Batched and parallel.
   virtual void evaluate(PointsIn points, JetView<double> out) const = 0;
 
+  /// Where points (n,3) of mesh coordinates go, in mesh coordinates.
+  Points at(PointsIn mesh_points) const {
+    Points values(mesh_points.rows(), 3);
+    evaluate(frame_.to_cube(mesh_points), {values.data(), values.rows(), JetOrder::value});
+    return frame_.to_mesh(values);
+  }
+
   const Frame& frame() const { return frame_; }
   void set_frame(const Frame& frame) { frame_ = frame; }
   /// Points (n,3) of the rest surface in cube coordinates, near which inverses are looked for; may be empty.

@@ -5,6 +5,7 @@
 
 #include "energies/distortion.h"
 #include "fields/radial_field.h"
+#include "fields/tracked_points.h"
 #include "mesh/surface_samples.h"
 #include "solve/live_objective.h"
 
@@ -27,16 +28,14 @@ struct LiveOptions {
   double barrier_threshold = 0.1;
   int threads = 0;  ///< 0: all for the set-up, and for a solve where that is large
   std::int64_t seed = 0;
-
-  /// Throws InvalidInput that names the option.
-  void validate() const;
+  void validate() const;  ///< throws InvalidInput that names the option
 };
 
 /// What a solve reached, measured at its own samples; energies in the unit cube, lengths in mesh units.
 struct LiveReport {
   ArapValue arap;
   double energy = 0.0;  ///< stretch + bending · bend
-  double value = 0.0;   ///< all that the solve minimises
+  double value = 0.0;   ///< all that is minimised
   double handle_mean = 0.0, handle_max = 0.0;
   std::optional<double> preference;  ///< mean g of the deformed normals, where there is a style
   Distortion distortion;
@@ -66,6 +65,10 @@ class LiveSolver {
   /// Back to the identity, and the handles' targets to rest.
   void reset();
 
+  /// Points (n,3) of mesh coordinates whose places tracked() tells cheaply.
+  void track(PointsIn points) { tracked_ = TrackedPoints(basis_, frame_, points); }
+  PointsF tracked() const { return tracked_.moved(coefficients_); }
+
   std::shared_ptr<RadialField> field() const;
   const LiveReport& report() const { return report_; }
   const std::vector<Handle>& handles() const { return handles_; }
@@ -94,9 +97,8 @@ class LiveSolver {
 
   LiveOptions options_;
   Frame frame_;
-  Points surface_;  // all samples, cube coordinates
-  Points surface_normals_;
-  std::vector<Index> chosen_;  // those that the energy sees
+  Points surface_, surface_normals_;  // all samples, cube coordinates
+  std::vector<Index> chosen_;         // those that the energy sees
   std::vector<Handle> handles_;
   BoundHandles bound_;
   std::vector<Index> pair_rows_;  // rows of bound_ that pull
@@ -111,6 +113,7 @@ class LiveSolver {
   RowMatrix<double> coefficients_;
   RowMatrix<double> coefficients_before_;  // where the solve before the last one ended; empty: not known
   VectorF u_before_;
+  TrackedPoints tracked_;
   LiveReport report_;
 };
 

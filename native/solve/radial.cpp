@@ -34,6 +34,7 @@ LoopResult run(LiveSolver& live, int iterations, double time_budget, const Progr
     const int steps = std::min(steps_at_once, iterations - result.iterations);
     const double done = static_cast<double>(result.iterations) / iterations;
     live.solve(steps, 0.0, progress.part(done, done + static_cast<double>(steps) / iterations));
+    progress.look([&](PointsIn points) { return live.field()->at(points); });
     result.iterations += static_cast<int>(live.report().steps);
     result.history.emplace_back(result.iterations, live.report().value);
     result.seconds = watch.seconds();

@@ -83,7 +83,11 @@ Solution solve_field(std::shared_ptr<TrainableField> field, const SurfaceSamples
   FieldObjective objective(samples, std::move(terms));
   const std::unique_ptr<Objective> wrapped = wrap ? wrap(objective) : nullptr;
   try {
-    LoopResult loop = minimise(*field, wrapped ? *wrapped : objective, options, progress.part(0.0, 0.95));
+    const LoopObserver shown = [&](int) {
+      progress.look([&](PointsIn points) { return field->at(points); });
+    };
+    LoopResult loop =
+        minimise(*field, wrapped ? *wrapped : objective, options, progress.part(0.0, 0.95), shown);
     progress.report(0.95, "measuring the result");
     Solution solution = measured(field, samples, objective.terms(), std::move(loop));
     progress.report(1.0, options.stage + ": done");

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from bar import LEFT, RIGHT, bar_samples, box, turned
 from energy_oracles import random_rotations
-from tolerances import LIVE_DRIFT, LIVE_IDENTITY
+from tolerances import LIVE_DRIFT, LIVE_IDENTITY, TRACKED
 
 import arapfields as af
 
@@ -206,3 +206,15 @@ def test_bad_options_are_named(samples):
     ]:
         with pytest.raises(af.InvalidInput, match=name):
             deformer(samples, **{name: value})
+
+
+def test_tracked_points_are_the_fields(samples):
+    live = deformer(samples)
+    points = np.random.default_rng(3).permutation(samples.points) + [0, 0, 0.01]
+    live.track(points)
+    assert np.abs(live.tracked() - points).max() < 1e-6
+    live.solve([LEFT, turned(50) @ RIGHT])
+    assert np.abs(live.tracked() - live.field(points)).max() < TRACKED
+    assert live.tracked().dtype == np.float32 and live.tracked().shape == points.shape
+    with pytest.raises(af.InvalidInput, match="points"):
+        live.track(points[:, :2])

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fields/tracked_points.h"
+
+#include "core/errors.h"
+#include "distance/morton.h"
+
+namespace arapfields {
+
+TrackedPoints::TrackedPoints(const RadialBasis& basis, const Frame& frame, PointsIn mesh_points)
+    : frame_(frame) {
+  require(mesh_points.allFinite(), "points", "some are NaN or infinite", "all must be finite");
+  if (mesh_points.rows() == 0) return;
+  order_ = morton_order(mesh_points);
+  Points sorted(mesh_points.rows(), 3);
+  for (Index i = 0; i < sorted.rows(); ++i)
+    sorted.row(i) = mesh_points.row(order_[static_cast<std::size_t>(i)]);
+  sites_ = RadialSites<float>(basis, frame.to_cube(sorted));
+}
+
+PointsF TrackedPoints::moved(const RowMatrix<double>& coefficients) const {
+  PointsF result(size(), 3);
+  if (size() == 0) return result;
+  PointsF sorted(size(), 3);
+  sites_.evaluate(coefficients, {sorted.data(), size(), JetOrder::value});
+  const Eigen::RowVector3d center = frame_.center.transpose();
+  for (Index i = 0; i < size(); ++i)
+    result.row(order_[static_cast<std::size_t>(i)]) =
+        (frame_.scale * sorted.row(i).cast<double>() + center).cast<float>();
+  return result;
+}
+
+}  // namespace arapfields

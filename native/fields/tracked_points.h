@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/frame.h"
+#include "fields/radial_sites.h"
+
+namespace arapfields {
+
+/// Points of mesh coordinates, a mesh's vertices say, that radial fields of one basis move again and again;
+/// in any order, in single precision.
+class TrackedPoints {
+ public:
+  TrackedPoints() = default;
+  TrackedPoints(const RadialBasis& basis, const Frame& frame, PointsIn mesh_points);
+  /// Where the field with these coefficients takes them, (n,3) in mesh coordinates.
+  PointsF moved(const RowMatrix<double>& coefficients) const;
+  Index size() const { return sites_.size(); }
+
+ private:
+  Frame frame_;
+  std::vector<std::uint32_t> order_;
+  RadialSites<float> sites_;
+};
+
+}  // namespace arapfields
