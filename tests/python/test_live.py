@@ -210,7 +210,7 @@ def test_bad_options_are_named(samples):
 
 def test_tracked_points_are_the_fields(samples):
     live = deformer(samples)
-    points = np.random.default_rng(3).permutation(samples.points) + [0, 0, 0.01]
+    points = np.random.default_rng(3).permutation(samples.points) + 0.01
     live.track(points)
     assert np.abs(live.tracked() - points).max() < 1e-6
     live.solve([LEFT, turned(50) @ RIGHT])
