@@ -8,7 +8,7 @@
 namespace arapfields {
 
 /// One layer's softplus on the jets of a block of points. `planes` = (columns, points, width), contiguous.
-/// Before: plane 0 holds z without its bias; after activate(): φ(z + bias). The planes of ∂ and ∂∂ keep z
+/// Before: plane 0 holds z without its bias; after activate(): φ(z + bias). The planes of ∂ keep z
 /// until activate_back() turns them into those of h. `slope` (points, width) receives φ'.
 template <class Scalar>
 struct ActivationBlock {
@@ -19,8 +19,7 @@ struct ActivationBlock {
   Scalar sharpness = 1;
   std::int64_t points = 0;
   std::int64_t width = 0;
-  int columns = 1;
-  bool mixed = true;  ///< false at the first layer: the mixed second derivatives of z are zero and not stored
+  int columns = 1;  ///< 1: values; 4: values and first derivatives
 };
 
 /// The encoding of a block of points and its derivatives by the coordinate that each entry depends on.
@@ -35,11 +34,12 @@ struct EncodingBlock {
   int octaves = 4;
 };
 
-#define ARAPFIELDS_JET_KERNELS(Scalar)                                                                     \
-  ARAPFIELDS_DECLARE(void activate(const ActivationBlock<Scalar>& block))                                  \
-  /* cotangents (columns, points, width) of h become those of z; bias_gradient (width) is added to */      \
-  ARAPFIELDS_DECLARE(                                                                                      \
-      void activate_back(const ActivationBlock<Scalar>& block, Scalar* cotangents, Scalar* bias_gradient)) \
+#define ARAPFIELDS_JET_KERNELS(Scalar)                                                                    \
+  ARAPFIELDS_DECLARE(void activate(const ActivationBlock<Scalar>& block))                                 \
+  /* cotangents (columns, points, width) of h become those of z, with `partial` (of their shape, or null) \
+     added; bias_gradient (width) is added to */                                                          \
+  ARAPFIELDS_DECLARE(void activate_back(const ActivationBlock<Scalar>& block, const Scalar* partial,      \
+                                        Scalar* cotangents, Scalar* bias_gradient))                       \
   ARAPFIELDS_DECLARE(void encode(const EncodingBlock<Scalar>& block))
 ARAPFIELDS_JET_KERNELS(float)
 ARAPFIELDS_JET_KERNELS(double)

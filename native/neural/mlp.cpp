@@ -47,7 +47,7 @@ struct Mlp::State {
   at::Tensor result;
   bool fresh = false;
 
-  void prepare(const at::Tensor& points, int columns);
+  void prepare(const at::Tensor& points, JetOrder order);
 };
 
 namespace {
@@ -59,29 +59,30 @@ void check_points(const at::Tensor& points, const at::Tensor& like) {
           "expected a contiguous (n,3) tensor like the parameters");
 }
 
+const Block& largest_of(const std::vector<Block>& blocks) {
+  return *std::max_element(blocks.begin(), blocks.end(),
+                           [](const Block& a, const Block& b) { return a.count < b.count; });
+}
+
 }  // namespace
 
-void Mlp::State::prepare(const at::Tensor& points, int columns) {
+void Mlp::State::prepare(const at::Tensor& points, JetOrder order) {
   const int threads = sweep_threads(parameters);
   const Index n = points.size(0);
-  const bool same = result.defined() && result.size(0) == columns && result.size(1) == n &&
+  const bool same = result.defined() && result.size(0) == columns(order) && result.size(1) == n &&
                     static_cast<int>(kept.workspaces.size()) == threads;
   if (same) return;
   kept = {};  // frees before it allocates
-  kept.blocks = split_points(n, columns, threads, parameters.is_cpu());
-  Index largest = 0;
-  for (Block& block : kept.blocks) {
-    allocate(shape, parameters, true, block);
-    largest = std::max(largest, block.count);
-  }
+  kept.blocks = split_points(n, order, threads, parameters.is_cpu());
+  for (Block& block : kept.blocks) allocate(shape, parameters, true, block);
   for (int t = 0; t < threads; ++t)
-    kept.workspaces.push_back(make_workspace(shape, parameters, largest, columns));
+    kept.workspaces.push_back(make_workspace(shape, parameters, largest_of(kept.blocks)));
   parts.clear();
   for (Index g = 0; g < kept.gradient_groups(); ++g) {
     const at::Tensor flat = g == 0 ? gradient : at::empty_like(gradient);
     parts.push_back({flat, LayerViews(shape, flat)});
   }
-  result = at::empty({columns, n, shape.outputs}, parameters.options());
+  result = at::empty({columns(order), n, shape.outputs}, parameters.options());
 }
 
 Mlp::Mlp(const MlpShape& shape, std::uint64_t seed, bool zero_last_layer, bool double_precision,
@@ -125,7 +126,7 @@ void Mlp::release_buffers() {
 at::Tensor Mlp::forward(const at::Tensor& points, JetOrder order) {
   State& s = *state_;
   check_points(points, s.parameters);
-  s.prepare(points, columns(order));
+  s.prepare(points, order);
   s.kept.for_each(s.kept.count(), [&](Block& block, Workspace& space, Index, bool) {
     sweep_forward(s.shape, s.layers, points, block, space, s.result);
   });
@@ -156,25 +157,21 @@ void Mlp::pull_back(const at::Tensor& cotangents) {
 namespace {
 
 /// Runs body(block, workspace) over all points with one block's memory a thread.
-void in_passing(const MlpShape& shape, const at::Tensor& like, Index n, int columns, bool keep,
+void in_passing(const MlpShape& shape, const at::Tensor& like, Index n, JetOrder order, bool keep,
                 const std::function<void(Block&, Workspace&)>& body) {
   Blocks passing;
   const int threads = sweep_threads(like);
-  passing.blocks = split_points(n, columns, threads, like.is_cpu());
-  Index largest = 0;
-  for (const Block& block : passing.blocks) largest = std::max(largest, block.count);
-  std::vector<Block> memory(static_cast<std::size_t>(threads));
+  passing.blocks = split_points(n, order, threads, like.is_cpu());
+  std::vector<Block> memory(static_cast<std::size_t>(threads), largest_of(passing.blocks));
   for (Block& block : memory) {
-    block.count = largest;
-    block.columns = columns;
     allocate(shape, like, keep, block);
-    passing.workspaces.push_back(make_workspace(shape, like, largest, columns));
+    passing.workspaces.push_back(make_workspace(shape, like, block));
   }
   passing.for_each(passing.count(), [&](Block& block, Workspace& space, Index, bool) {
     const Block& own = memory[static_cast<std::size_t>(&space - passing.workspaces.data())];
     borrow(own, block);
     body(block, space);
-    block.planes.clear(), block.slope.clear(), block.encoding = at::Tensor();
+    block = {};
   });
 }
 
@@ -184,7 +181,7 @@ at::Tensor Mlp::evaluate(const at::Tensor& points, JetOrder order) const {
   const State& s = *state_;
   check_points(points, s.parameters);
   at::Tensor result = at::empty({columns(order), points.size(0), s.shape.outputs}, s.parameters.options());
-  in_passing(s.shape, s.parameters, points.size(0), columns(order), false,
+  in_passing(s.shape, s.parameters, points.size(0), order, order == JetOrder::second,
              [&](Block& block, Workspace& space) {
                sweep_forward(s.shape, s.layers, points, block, space, result);
              });
@@ -197,10 +194,11 @@ void Mlp::evaluate_with_gradient(const at::Tensor& points, at::Tensor& values, a
   require(s.shape.outputs == 1, "network", std::to_string(s.shape.outputs) + " outputs", "expected one");
   values = at::empty({1, points.size(0), 1}, s.parameters.options());
   gradients = at::empty({points.size(0), 3}, s.parameters.options());
-  in_passing(s.shape, s.parameters, points.size(0), 1, true, [&](Block& block, Workspace& space) {
-    sweep_forward(s.shape, s.layers, points, block, space, values);
-    sweep_to_points(s.shape, s.layers, block, space, gradients);
-  });
+  in_passing(s.shape, s.parameters, points.size(0), JetOrder::value, true,
+             [&](Block& block, Workspace& space) {
+               sweep_forward(s.shape, s.layers, points, block, space, values);
+               sweep_to_points(s.shape, s.layers, block, space, gradients);
+             });
   values = values.view({-1});
 }
 

@@ -31,10 +31,12 @@ struct MlpShape {
   bool operator==(const MlpShape&) const = default;
 };
 
-/// The network with explicit jets: values and input derivatives up to second order travel through the layers
-/// as columns (core/jets.h), one matrix product a layer for all of them, and so do their cotangents
-/// backwards. Tensors are (columns, n, outputs), points (n,3); all have the network's dtype and device. Work
-/// is split over threads by points; same seed, same thread count: same result, bit for bit.
+/// The network with explicit jets. Values and first input derivatives travel through the layers as columns
+/// (core/jets.h), one matrix product a layer for all of them. Second derivatives need no columns of their
+/// own: they are sums over the layers of the outputs' derivatives by each unit, which one sweep downwards
+/// finds, times what the units' softplus bends: seven columns instead of ten for three outputs. Cotangents
+/// take the same ways back. Tensors are (columns, n, outputs), points (n,3); all have the network's dtype and
+/// device. Work is split over threads by points; same seed, same thread count: same result, bit for bit.
 class Mlp {
  public:
   /// Weights and biases uniform in ±1/√fan-in; the output layer zero where `zero_last_layer` asks for it.

@@ -25,7 +25,7 @@ at::Tensor matrix(const at::Tensor& flat, Index rows, Index cols) {
 void product(at::Tensor c, const at::Tensor& a, const at::Tensor& b) { at::mm_out(c, a, b); }
 void add_product(at::Tensor c, const at::Tensor& a, const at::Tensor& b) { at::addmm_out(c, c, a, b); }
 
-int derivatives_of(const Block& block) { return block.columns == 10 ? 3 : block.columns == 4 ? 2 : 1; }
+int derivatives_of(const Block& block) { return block.columns == 4 ? 2 : 1; }
 
 /// Pre-activations of the first layer: each coordinate's derivatives meet their own part of the weight alone.
 void encode_layer(const MlpShape& shape, const at::Tensor& weight, const at::Tensor& points, Block& block) {
@@ -50,6 +50,63 @@ void encode_layer_back(const MlpShape& shape, const at::Tensor& cotangents, Bloc
                   block.encoding[derivative].narrow(1, i * part, part));
 }
 
+/// The derivatives of the outputs by the activations of layer l: rows for each point, at the top for all.
+const at::Tensor& adjoints_of(const LayerViews& layers, const Block& block, int l) {
+  return at_(l) < block.adjoints.size() ? block.adjoints[at_(l)] : layers.weights.back();
+}
+
+/// The encoding's entries as (count, 3, 2·octaves): an entry depends on one coordinate alone, so its second
+/// derivatives are one number each.
+at::Tensor by_coordinate(const at::Tensor& entries, const MlpShape& shape) {
+  return entries.view({-1, 3, 2 * shape.octaves});
+}
+
+/// Downwards after the forward sweep: the outputs' derivatives by every layer, and with them the second
+/// derivatives into result[4:10, begin:begin+count].
+void sweep_adjoints(const MlpShape& shape, const LayerViews& layers, Block& block, Workspace& space,
+                    at::Tensor& result) {
+  const Index m = block.count, rows = shape.outputs * m;
+  at::Tensor below = matrix(space.jets, rows, shape.width);
+  at::Tensor second = space.second.narrow(0, 0, m * 6 * shape.outputs).view({m, 6, shape.outputs}).zero_();
+  for (int l = shape.layers - 1; l >= 0; --l) {
+    adjoint_layer(shape.sharpness, block.planes[at_(l)], block.slope[at_(l)], adjoints_of(layers, block, l),
+                  below, second);
+    if (l > 0) product(block.adjoints[at_(l - 1)], below, layers.weights[at_(l)]);
+  }
+  at::Tensor encoded = matrix(space.below, rows, shape.encoded());
+  product(encoded, below, layers.weights[0]);
+  const at::Tensor bent = encoded.view({shape.outputs, m, 3, 2 * shape.octaves})
+                              .mul_(by_coordinate(block.encoding[2], shape))
+                              .sum(3);
+  second.narrow(1, 0, 3).add_(bent.permute({1, 2, 0}));
+  result.narrow(0, 4, 6).narrow(1, block.begin, m).copy_(second.transpose(0, 1));
+}
+
+/// The way back of sweep_adjoints(), upwards: adds to `gradient`, and leaves in space.partial what the planes
+/// of each layer receive.
+void sweep_adjoints_back(const MlpShape& shape, const LayerViews& layers, const at::Tensor& cotangents,
+                         Block& block, Workspace& space, LayerViews& gradient) {
+  const Index m = block.count, rows = shape.outputs * m;
+  at::Tensor second = space.second.narrow(0, 0, m * 6 * shape.outputs).view({m, 6, shape.outputs});
+  second.copy_(cotangents.narrow(0, 4, 6).narrow(1, block.begin, m).transpose(0, 1));
+  at::Tensor here = matrix(space.jets, rows, shape.width), spare = matrix(space.other, rows, shape.width);
+  at::Tensor encoded = at::empty({shape.outputs, m, 3, 2 * shape.octaves}, second.options());
+  at::mul_out(encoded, second.narrow(1, 0, 3).permute({2, 0, 1}).unsqueeze(3),
+              by_coordinate(block.encoding[2], shape));
+  at::Tensor lower = encoded.view({rows, shape.encoded()});
+  for (int l = 0; l < shape.layers; ++l) {
+    product(here, lower, layers.weights[at_(l)].t());
+    at::Tensor below = matrix(space.below, rows, shape.width);
+    at::Tensor partial = matrix(space.partial[at_(l)], block.columns * m, shape.width);
+    adjoint_layer_back(shape.sharpness, block.planes[at_(l)], block.slope[at_(l)],
+                       adjoints_of(layers, block, l), second, here, below, partial);
+    add_product(gradient.weights[at_(l)], below.t(), lower);
+    lower = here;
+    std::swap(here, spare);
+  }
+  gradient.weights.back().add_(lower.view({shape.outputs, m, shape.width}).sum(1));
+}
+
 }  // namespace
 
 LayerViews::LayerViews(const MlpShape& shape, const at::Tensor& flat) {
@@ -66,25 +123,26 @@ int sweep_threads(const at::Tensor& like) {
   return like.is_cpu() && !at::in_parallel_region() ? thread_count() : 1;
 }
 
-std::vector<Block> split_points(Index n, int columns, int threads, bool on_cpu) {
+std::vector<Block> split_points(Index n, JetOrder order, int threads, bool on_cpu) {
   // Blocks whose planes fit a core's second-level cache; elsewhere one block that memory bounds.
-  const Index best = on_cpu ? (columns == 1 ? 512 : columns == 4 ? 128 : 64) : (Index(1) << 19) / columns;
+  const Index best = !on_cpu ? (Index(1) << 19) / columns(order) : order == JetOrder::value ? 512 : 128;
   Index count = (n + best - 1) / best;
-  count = std::min((count + threads - 1) / threads * threads, std::max<Index>(n, 1));
+  count = std::clamp<Index>((count + threads - 1) / threads * threads, 1, std::max<Index>(n, 1));
   std::vector<Block> blocks(static_cast<std::size_t>(count));
   for (Index b = 0; b < count; ++b) {
     Block& block = blocks[static_cast<std::size_t>(b)];
     block.begin = b * n / count;
     block.count = (b + 1) * n / count - block.begin;
-    block.columns = columns;
+    block.columns = std::min(columns(order), 4);
+    block.second = order == JetOrder::second;
   }
   return blocks;
 }
 
 void allocate(const MlpShape& shape, const at::Tensor& like, bool keep, Block& block) {
-  const Index m = block.count, stored = block.columns == 10 ? 3 : 2;
+  const Index m = block.count, stored = block.second ? 3 : 2;
   block.encoding = at::empty({stored, m, shape.encoded()}, like.options());
-  block.planes.clear(), block.slope.clear();
+  block.planes.clear(), block.slope.clear(), block.adjoints.clear();
   // Where nothing is kept, two buffers take turns.
   for (int l = 0; l < shape.layers; ++l) {
     const bool own = keep || l < 2;
@@ -92,6 +150,8 @@ void allocate(const MlpShape& shape, const at::Tensor& like, bool keep, Block& b
                                : block.planes[at_(l - 2)]);
     block.slope.push_back(keep ? at::empty({m, shape.width}, like.options()) : at::Tensor());
   }
+  for (int l = 0; l + 1 < shape.layers && block.second; ++l)
+    block.adjoints.push_back(at::empty({shape.outputs * m, shape.width}, like.options()));
 }
 
 void borrow(const Block& memory, Block& block) {
@@ -99,19 +159,27 @@ void borrow(const Block& memory, Block& block) {
   block.encoding = memory.encoding.view({-1})
                        .narrow(0, 0, memory.encoding.size(0) * m * memory.encoding.size(2))
                        .view({memory.encoding.size(0), m, memory.encoding.size(2)});
-  block.planes.clear(), block.slope.clear();
+  block.planes.clear(), block.slope.clear(), block.adjoints.clear();
   for (const at::Tensor& planes : memory.planes)
     block.planes.push_back(planes.narrow(0, 0, block.columns * m));
   for (const at::Tensor& slope : memory.slope)
     block.slope.push_back(slope.defined() ? slope.narrow(0, 0, m) : slope);
+  for (const at::Tensor& adjoints : memory.adjoints)
+    block.adjoints.push_back(adjoints.narrow(0, 0, adjoints.size(0) / memory.count * m));
 }
 
-Workspace make_workspace(const MlpShape& shape, const at::Tensor& like, Index points, int columns) {
+Workspace make_workspace(const MlpShape& shape, const at::Tensor& like, const Block& largest) {
   Workspace space;
-  const Index size = columns * points * shape.width;
-  space.jets = at::empty({size}, like.options());
-  space.other = at::empty({size}, like.options());
-  space.output = at::empty({columns * points * shape.outputs}, like.options());
+  const Index m = largest.count, plane = m * shape.width;
+  const Index wide = largest.second ? std::max(largest.columns, shape.outputs) : largest.columns;
+  space.jets = at::empty({wide * plane}, like.options());
+  space.other = at::empty({wide * plane}, like.options());
+  space.output = at::empty({largest.columns * m * shape.outputs}, like.options());
+  if (!largest.second) return space;
+  space.below = at::empty({shape.outputs * std::max(plane, m * shape.encoded())}, like.options());
+  space.second = at::empty({m * 6 * shape.outputs}, like.options());
+  for (int l = 0; l < shape.layers; ++l)
+    space.partial.push_back(at::empty({largest.columns * plane}, like.options()));
   return space;
 }
 
@@ -145,14 +213,17 @@ void sweep_forward(const MlpShape& shape, const LayerViews& layers, const at::Te
       encode_layer(shape, layers.weights[0], points, block);
     else
       product(planes, below, layers.weights[at_(l)].t());
-    activate_layer({shape.sharpness, block.columns, l > 0}, planes, block.slope[at_(l)], jets,
+    activate_layer({shape.sharpness, block.columns}, planes, block.slope[at_(l)], jets,
                    layers.biases[at_(l)]);
   }
   const at::Tensor& top = block.columns == 1 ? block.planes.back() : jets;
   at::Tensor output = matrix(space.output, rows, shape.outputs);
   product(output, top, layers.weights.back().t());
   output.narrow(0, 0, block.count).add_(layers.biases.back());
-  result.narrow(1, block.begin, block.count).copy_(output.view({block.columns, block.count, shape.outputs}));
+  result.narrow(0, 0, block.columns)
+      .narrow(1, block.begin, block.count)
+      .copy_(output.view({block.columns, block.count, shape.outputs}));
+  if (block.second) sweep_adjoints(shape, layers, block, space, result);
 }
 
 void sweep_back(const MlpShape& shape, const LayerViews& layers, const at::Tensor& cotangents, Block& block,
@@ -161,13 +232,15 @@ void sweep_back(const MlpShape& shape, const LayerViews& layers, const at::Tenso
   const Index rows = block.columns * block.count;
   at::Tensor upper = matrix(space.output, rows, shape.outputs);
   upper.view({block.columns, block.count, shape.outputs})
-      .copy_(cotangents.narrow(1, block.begin, block.count));
+      .copy_(cotangents.narrow(0, 0, block.columns).narrow(1, block.begin, block.count));
+  if (block.second) sweep_adjoints_back(shape, layers, cotangents, block, space, gradient);
   gradient.biases.back().add_(upper.narrow(0, 0, block.count).sum(0));
   at::Tensor here = matrix(space.jets, rows, shape.width), spare = matrix(space.other, rows, shape.width);
   for (int l = shape.layers - 1; l >= 0; --l) {
     at::Tensor& planes = block.planes[at_(l)];
     product(here, upper, layers.weights[at_(l + 1)]);
-    activate_layer_back({shape.sharpness, block.columns, l > 0}, planes, block.slope[at_(l)], here,
+    const at::Tensor partial = block.second ? matrix(space.partial[at_(l)], rows, shape.width) : at::Tensor();
+    activate_layer_back({shape.sharpness, block.columns}, planes, block.slope[at_(l)], partial, here,
                         gradient.biases[at_(l)]);
     add_product(gradient.weights[at_(l + 1)], upper.t(), planes);
     upper = here;

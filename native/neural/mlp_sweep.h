@@ -19,18 +19,23 @@ struct LayerViews {
 
 /// A range of points and what the forward sweep computes for it. planes[l] is (columns·count, width): the
 /// pre-activations of layer l, then as in ActivationBlock; slope[l] (count, width) is φ', or undefined where
-/// nothing is kept; encoding (1 to 3, count, 6·octaves).
+/// nothing is kept; encoding (1 to 3, count, 6·octaves). Second derivatives come from a sweep downwards:
+/// adjoints[l] (outputs·count, width) are the outputs' derivatives by the activations of layer l, but the
+/// last, whose row of the output layer's weight serves all points.
 struct Block {
   Index begin = 0;
   Index count = 0;
   int columns = 1;
+  bool second = false;
   at::Tensor encoding;
-  std::vector<at::Tensor> planes, slope;
+  std::vector<at::Tensor> planes, slope, adjoints;
 };
 
-/// What one thread needs besides: flat buffers for the largest block.
+/// What one thread needs besides: flat buffers for the largest block, the last three for second derivatives.
 struct Workspace {
   at::Tensor jets, other, output;
+  at::Tensor below, second;
+  std::vector<at::Tensor> partial;
 };
 
 /// Where a group of blocks adds up its part of the parameter gradient.
@@ -54,19 +59,19 @@ struct Blocks {
   Index gradient_groups() const;
 };
 
-/// Ranges of about the best number of points for `columns`, as many for each thread.
-std::vector<Block> split_points(Index n, int columns, int threads, bool on_cpu);
+/// Ranges of about the best number of points for the order, as many for each thread.
+std::vector<Block> split_points(Index n, JetOrder order, int threads, bool on_cpu);
 /// Threads that the sweeps of tensors like `like` are split over.
 int sweep_threads(const at::Tensor& like);
 
 /// Gives a block its memory; for every layer where `keep` asks for the activations. With one column the
 /// encoding always has its first derivatives, for sweep_to_points().
 void allocate(const MlpShape& shape, const at::Tensor& like, bool keep, Block& block);
-/// Lends the memory of a block of at least as many points and the same columns.
+/// Lends the memory of a block of at least as many points and the same order.
 void borrow(const Block& memory, Block& block);
-Workspace make_workspace(const MlpShape& shape, const at::Tensor& like, Index points, int columns);
+Workspace make_workspace(const MlpShape& shape, const at::Tensor& like, const Block& largest);
 
-/// Jets of the block's points into result[:, begin:begin+count].
+/// Jets of the block's points into result[:, begin:begin+count]. Second derivatives need a kept block.
 void sweep_forward(const MlpShape& shape, const LayerViews& layers, const at::Tensor& points, Block& block,
                    Workspace& space, at::Tensor& result);
 /// Adds to `gradient`; consumes the block.
