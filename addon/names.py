@@ -9,7 +9,13 @@ RESULTS = "ARAP Fields"  # collection that holds results
 PROPERTY = "arapfields"  # object.arapfields
 REPORT = "arapfields_report"  # custom property of results: figures as JSON
 WARP_KEY = "ARAP Fields"  # shape key that carries the motion
-RESULT_SUFFIX = {"DEFORM": "_deformed", "STYLIZE": "_stylized", "EXTRACT": "_implicit"}
+RESULT_SUFFIX = {
+    "DEFORM": "_deformed",
+    "STYLIZE": "_stylized",
+    "EXTRACT": "_implicit",
+    "LIVE": "_live",
+    "BAKE": "_baked",
+}
 HANDLE_SUFFIX = "_handle"
 
 
@@ -25,6 +31,8 @@ class Op(StrEnum):
     EXTRACT = "arapfields.extract"
     STYLIZE = "arapfields.stylize"
     LIVE = "arapfields.live"
+    LIVE_KEEP = "arapfields.live_keep"
+    MIRROR_HANDLE = "arapfields.mirror_handle"
     BAKE = "arapfields.bake"
     CANCEL = "arapfields.cancel"
     CLEAR_CACHE = "arapfields.clear_cache"

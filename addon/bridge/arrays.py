@@ -81,6 +81,13 @@ def read(context, source):
 def new_mesh(name, vertices, corners):
     """A smooth-shaded triangle mesh from (n, 3) positions and (m, 3) corners."""
     mesh = bpy.data.meshes.new(name)
+    fill(mesh, vertices, corners)
+    return mesh
+
+
+def fill(mesh, vertices, corners):
+    """Makes these (n, 3) positions and (m, 3) corners the mesh's geometry."""
+    mesh.clear_geometry()
     mesh.vertices.add(len(vertices))
     mesh.loops.add(3 * len(corners))
     mesh.polygons.add(len(corners))
@@ -88,4 +95,3 @@ def new_mesh(name, vertices, corners):
     mesh.loops.foreach_set("vertex_index", np.ascontiguousarray(corners, dtype=np.int32).ravel())
     mesh.polygons.foreach_set("loop_start", np.arange(0, 3 * len(corners), 3, dtype=np.int32))
     mesh.update(calc_edges=True)
-    return mesh

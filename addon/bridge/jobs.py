@@ -3,14 +3,18 @@
 
 import contextlib
 import sys
+import time
+import types
 
 import bpy
 
 from ..core import jobs, native
 from ..core.errors import UserError
-from . import lookup
+from ..core.stages import JobCancelled
+from . import lookup, preview
 
 TICK = 0.1  # seconds between looks at the worker
+BUDGET = 0.02  # seconds that the main thread works at once
 
 
 SCOPES = (
@@ -28,6 +32,7 @@ class JobOperator:
     """
 
     title = ""
+    has_window = False  # whether it runs beside the window's events
 
     scope: bpy.props.EnumProperty(
         items=SCOPES, name="Objects", description="Which objects to work on", options={"SKIP_SAVE"}
@@ -66,73 +71,99 @@ class JobOperator:
                 self.failures.append(str(error))
         return jobs.Job(self.title, items, native.library().Task)
 
+    def course(self, context):
+        """All that the main thread does, as a generator: yields True to wait for the worker, False when the
+        window may redraw. Returns the operator's result."""
+        job = self.prepare(context)
+        jobs.begin(job)
+        while not job.done:
+            yield True
+        return (yield from self.conclude(context, job))
+
     def execute(self, context):
+        course = self.course(context)
         try:
-            job = self.prepare(context)
-            jobs.begin(job)
-            try:
-                while not job.join(0.05):
-                    pass
-            except KeyboardInterrupt:
-                job.cancel()
-                job.join()
-            return self.conclude(context, job)
+            while True:
+                if next(course):
+                    jobs.running().join(0.05)
+        except StopIteration as ended:
+            return ended.value
+        except KeyboardInterrupt:
+            course.close()
+            return {"CANCELLED"}
         finally:
-            jobs.end()
+            jobs.stop()
 
     def invoke(self, context, event):
         if bpy.app.background or context.window is None:
             return self.execute(context)
-        job = self.prepare(context)
-        jobs.begin(job)
+        self.has_window, self._looks = True, 0
+        self._course = self.course(context)
         self._timer = context.window_manager.event_timer_add(TICK, window=context.window)
         context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
+        return self.advance(context)
 
     def modal(self, context, event):
         job = jobs.running()
-        if job is None:  # stopped from outside: a file is loaded, the add-on disabled
-            self.stop_timer(context)
+        if job is None:  # stopped from outside: a file is loaded, a step undone, the add-on disabled
+            self.leave(context)
             return {"CANCELLED"}
         if event.type == "ESC" and event.value == "PRESS":
             job.cancel()
             return {"RUNNING_MODAL"}
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
-        redraw(context)
-        context.workspace.status_text_set(f"{job.message}  {job.fraction:.0%}  (ESC cancels)")
-        if not job.done:
-            return {"PASS_THROUGH"}
-        self.stop_timer(context)
+        return self.advance(context)
+
+    def advance(self, context):
+        """Works for a moment on what the main thread has to do, and shows how far the job is."""
+        until = time.monotonic() + BUDGET
         try:
-            return self.conclude(context, job)
-        finally:
-            jobs.end()
-            redraw(context)
+            while not next(self._course) and time.monotonic() < until:
+                pass
+        except StopIteration as ended:
+            self.leave(context)
+            return ended.value
+        except Exception:
+            self.leave(context)
+            raise
+        self.show_progress(context, jobs.running())
+        return {"RUNNING_MODAL"}
+
+    def show_progress(self, context, job):
+        item, looks, points = job.sight()
+        if looks and looks != self._looks and item.preview is not None:
+            item.preview.show(points)
+            redraw(context, "WINDOW")
+        self._looks = looks
+        redraw(context, "UI")
+        context.workspace.status_text_set(f"{job.message}  {job.fraction:.0%}  (ESC cancels)")
 
     def cancel(self, context):
         """Blender ends the operator: its window closes or a file is loaded."""
-        jobs.stop()
-        self.stop_timer(context)
+        self.leave(context)
 
-    def stop_timer(self, context):
+    def leave(self, context):
+        self._course.close()
+        jobs.stop()
+        preview.clear()
         context.window_manager.event_timer_remove(self._timer)
         if context.workspace:
             context.workspace.status_text_set(None)
+        redraw(context, "UI", "WINDOW")
 
     def conclude(self, context, job):
-        """Applies what the worker made, reports it, and ends the operator."""
-        cancelled = False
+        """Applies what the worker made, reports it, and returns the operator's result."""
+        cancelled = job.cancelled and not job.items
         for outcome in job.take_outcomes():
             if outcome.cancelled:
                 cancelled = True
             elif outcome.error:
                 self.failures.append(f"{outcome.item.label}: {outcome.error}")
             else:
-                self.apply_one(context, outcome)
+                cancelled |= yield from self.apply_one(outcome)
         if cancelled and not self.successes and not self.failures:
-            jobs.note("INFO", f"{self.title} cancelled")
-            self.report({"INFO"}, f"{self.title} cancelled")
+            self.note("INFO", f"{self.title} cancelled")
             return {"CANCELLED"}
         for text in self.successes:
             self.note("INFO", text)
@@ -140,36 +171,51 @@ class JobOperator:
             self.note("ERROR" if not self.successes else "WARNING", text)
         return {"FINISHED"} if self.successes else {"CANCELLED"}
 
-    def apply_one(self, context, outcome):
+    def apply_one(self, outcome):
+        """Puts one item's result into the scene; returns whether the user cancelled meanwhile."""
         try:
             text = outcome.item.apply(outcome.value)
+            if isinstance(text, types.GeneratorType):
+                text = yield from text
             self.successes.append(f"{outcome.item.label}: {text} in {outcome.seconds:.1f} s")
         except UserError as error:
             self.failures.append(str(error))
+        except JobCancelled:
+            return True
+        return False
 
     def note(self, level, text):
         jobs.note(level, text)
         self.report({level}, text)
 
 
-def redraw(context):
+def redraw(context, *kinds):
+    """Has regions of these kinds of every 3D view drawn again."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
-                area.tag_redraw()
+                for region in area.regions:
+                    if region.type in kinds:
+                        region.tag_redraw()
 
 
 @bpy.app.handlers.persistent
-def before_load(*_):
+def stop(*_):
+    """The file is about to change under the job: another is loaded, or a step undone."""
     jobs.stop()
 
 
+HANDLERS = ("load_pre", "undo_pre", "redo_pre")
+
+
 def register():
-    bpy.app.handlers.load_pre.append(before_load)
+    for name in HANDLERS:
+        getattr(bpy.app.handlers, name).append(stop)
 
 
 def unregister():
     jobs.stop()
-    with contextlib.suppress(ValueError):
-        bpy.app.handlers.load_pre.remove(before_load)
+    for name in HANDLERS:
+        with contextlib.suppress(ValueError):
+            getattr(bpy.app.handlers, name).remove(stop)
     sys.stdout.flush()

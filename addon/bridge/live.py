@@ -1,130 +1,80 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live mode: while handles move, by hand, script or animation, a result follows them."""
+"""Live mode: while handles move or a style's sliders change, results follow; off, all is as it was."""
 
 import contextlib
 
 import bpy
-import numpy as np
 
-from ..core import jobs, native
+from ..core import jobs
 from ..core.errors import UserError
-from ..core.follower import Follower
-from ..core.spaces import space_of
-from . import arrays, groups, handles, results
-from .lookup import ObjectId, settings_of
-from .settings import plain
-from .work import read_surface
+from . import live_result
+from .live_session import Changed, Session
+from .lookup import settings_of
 
 TICK = 1 / 60  # seconds between looks at the handles
-SAMPLES = 4000
+WAIT = 30.0  # seconds at most that a script waits for the first shape
 _sessions = {}  # session_uid of the source → Session
 
 
-class Session:
-    """One source that is live, its solver and its result."""
-
-    def __init__(self, context, source, output="LIVE"):
-        af = native.library()
-        surface = read_surface(context, source)
-        wanted = handles.solve_handles(context, source, surface.space)
-        samples = af.sample_mesh(surface.vertices, surface.triangles, count=SAMPLES, seed=0)
-        settings = settings_of(source).deform
-        options = af.LiveOptions(bending=plain(settings.bending), handle_weight=plain(settings.handle_weight))
-        self.source, self.layout = ObjectId(source), layout_of(source)
-        self.surface = surface
-        self.solver = af.LiveDeformer(samples, groups.native_handles(af, wanted, surface, samples), options)
-        mesh = results.shown_mesh(context, source, len(surface.local))
-        self.result = ObjectId(results.show(context, source, "DEFORM", output, mesh, {"output": output}))
-        self.goal = None
-        self.follower = Follower(self.moved)
-
-    def moved(self, targets):
-        """(n, 3) vertices in local coordinates, for these targets of the handles."""
-        field = self.solver.solve(targets)
-        moved = self.surface.space.to_local(field(self.surface.vertices))
-        if not np.isfinite(moved).all():
-            raise UserError("the shape has left the finite numbers")
-        return moved
-
-    def look(self, context):
-        """Sends the handles' poses to the worker when they changed."""
-        source = self.source.get()
-        if layout_of(source) != self.layout:
-            raise Changed
-        goal = targets_of(context, source)
-        if self.goal is None or any(not np.array_equal(a, b) for a, b in zip(goal, self.goal, strict=True)):
-            self.goal = goal
-            self.follower.follow(goal)
-
-    def show(self):
-        """Puts the newest shape on the result; True when there was one."""
-        moved, error = self.follower.take()
-        if error:
-            raise UserError(error)
-        if moved is None:
-            return False
-        item = self.result.get()
-        if item.mode == "EDIT" or len(item.data.vertices) != len(moved):
-            return False
-        arrays.set_positions(item.data, moved)
-        return True
+def is_live(source, kind=None):
+    session = _sessions.get(source.session_uid) if source is not None else None
+    return session is not None and kind in (None, session.kind)
 
 
-class Changed(Exception):
-    """Handles were added, removed or given another rest pose."""
-
-
-def layout_of(source):
-    """What the solver was set up for: the handles and their rest regions."""
-    return [(e.empty.session_uid, e.kind, e.group, tuple(e.rest)) for e in handles.used(source)]
-
-
-def targets_of(context, source):
-    space = space_of(source.matrix_world, source.name)
-    found = handles.solve_handles(context, source, space)
-    return [h.target[:3, 3] if h.kind == "POINT" else h.target for h in found]
-
-
-def is_live(source):
-    return source is not None and source.session_uid in _sessions
-
-
-def begin(context, source):
-    end(source)
-    _sessions[source.session_uid] = Session(context, source)
+def begin(context, source, kind="DEFORM"):
+    """Makes the source live; UserError when that cannot be. The shape appears when the worker has it."""
+    if source.session_uid in _sessions:
+        _sessions.pop(source.session_uid).follower.stop()
+    _sessions[source.session_uid] = Session(context, source, kind)
     if not bpy.app.timers.is_registered(tick):
         bpy.app.timers.register(tick, persistent=True)
 
 
-def end(source):
+def end(context, source, keep=False):
+    """Ends live mode: the result goes and the source looks as before; or the result stays (`keep`)."""
     session = _sessions.pop(source.session_uid, None)
     if session is not None:
         session.follower.stop()
+        session.show_last()
+    if keep:
+        return live_result.keep(context, source, session.kind if session else "DEFORM")
+    live_result.drop(source)
+    return None
 
 
-def end_all(*_):
-    for session in list(_sessions.values()):
+def stop_all(*_):
+    """Ends every worker; what is in the file stays as it is."""
+    for session in _sessions.values():
         session.follower.stop()
     _sessions.clear()
 
 
-def update(context, wait=0.0):
+def update(context, wait=0.0, refined=False):
     """Looks at every live source once, waiting at most so many seconds for the shapes to follow."""
     for uid, session in list(_sessions.items()):
         try:
             session.look(context)
             if wait:
-                session.follower.wait(wait)
+                session.follower.wait(wait, refined)
             session.show()
         except Changed:
-            source = session.source.get()
-            end(source)
-            with contextlib.suppress(UserError):  # the last handle was removed
-                begin(context, source)
+            restart(context, uid, session)
         except (UserError, ValueError, ReferenceError) as error:
             _sessions.pop(uid, None)
             session.follower.stop()
             jobs.note("ERROR", f"{session.source.name}: {error}; live mode ended")
+            with contextlib.suppress(UserError, ReferenceError):
+                live_result.drop(session.source.get())
+
+
+def restart(context, uid, session):
+    """Handles were added or removed: the solver is set up anew, the result stays the same object."""
+    source = session.source.get()
+    try:
+        begin(context, source, session.kind)
+    except UserError:  # the last handle was removed
+        _sessions.pop(uid, None)
+        live_result.drop(source)
 
 
 def tick():
@@ -137,16 +87,34 @@ def tick():
 
 @bpy.app.handlers.persistent
 def before_load(*_):
-    end_all()
+    stop_all()
+
+
+@bpy.app.handlers.persistent
+def recover(*_):
+    """After a file is loaded or a step undone: live results that no session moves any more are taken away."""
+    for source in bpy.data.objects:
+        if settings_of(source).live_display and not is_live(source):
+            with contextlib.suppress(UserError, RuntimeError, AttributeError):
+                live_result.drop(source)
+
+
+HANDLERS = (("load_pre", before_load), ("load_post", recover), ("undo_post", recover), ("redo_post", recover))
 
 
 def register():
-    bpy.app.handlers.load_pre.append(before_load)
+    for name, function in HANDLERS:
+        getattr(bpy.app.handlers, name).append(function)
 
 
 def unregister():
-    end_all()
+    for uid in list(_sessions):
+        session = _sessions.pop(uid)
+        session.follower.stop()
+        with contextlib.suppress(UserError, ReferenceError, AttributeError):
+            live_result.drop(session.source.get())
     if bpy.app.timers.is_registered(tick):
         bpy.app.timers.unregister(tick)
-    with contextlib.suppress(ValueError):
-        bpy.app.handlers.load_pre.remove(before_load)
+    for name, function in HANDLERS:
+        with contextlib.suppress(ValueError):
+            getattr(bpy.app.handlers, name).remove(function)

@@ -8,7 +8,8 @@ import numpy as np
 
 from ..core.errors import UserError
 from ..core.jobs import Item
-from . import results
+from .delivery import deliver, refuse
+from .preview import Preview
 from .settings import chosen
 from .work import read_surface, settings_of
 
@@ -29,9 +30,16 @@ def plan_move(context, operator, source, kind, samples, seed, solve):
     output = chosen("output", ours, operator)
     cells = chosen("resolution", ours, operator)
     choice = chosen("surface", ours, operator)
-    use_fit = choice == "FIT" or output == "SURFACE" or (choice == "AUTO" and surface.is_cached)
+    target = chosen("target", ours, operator)
+    if target != "NEW":
+        refuse(source, output, target, surface.local)
+
+    preview = Preview(surface) if operator.has_window else None
 
     def work(stages):
+        if preview is not None:
+            stages.watched_points = preview.points
+        use_fit = choice == "FIT" or output == "SURFACE" or (choice == "AUTO" and surface.is_cached)
         field = solve(stages, surface, surface.samples(stages, samples, seed, use_fit))
         before, corners = surface.vertices, None
         if output == "SURFACE":
@@ -45,16 +53,10 @@ def plan_move(context, operator, source, kind, samples, seed, solve):
 
     def apply(moved):
         owner = surface.who.get()
-        if moved.corners is not None:
-            mesh = results.surface_mesh(owner, moved.vertices, moved.corners)
-        else:
-            mesh = results.warp_mesh(bpy.context, owner, surface.local, moved.vertices)
-        item = results.show(bpy.context, owner, kind, output, mesh, moved.report)
-        if mesh.shape_keys is not None:
-            results.add_warp_key(item, surface.local, moved.vertices)
+        item = deliver(bpy.context, owner, kind, output, target, moved, surface.local)
         return describe(item, moved.report)
 
-    return Item(source.name, work, apply)
+    return Item(source.name, work, apply, preview)
 
 
 def describe(item, report):

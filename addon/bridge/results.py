@@ -22,6 +22,21 @@ def collection(context):
     return made
 
 
+def discard(item):
+    """Takes a result away with all that was made for it: mesh, keys' animation, an empty collection."""
+    mesh, homes = item.data, list(item.users_collection)
+    keys = mesh.shape_keys
+    action = keys.animation_data.action if keys is not None and keys.animation_data else None
+    bpy.data.objects.remove(item)
+    if mesh.users == 0:
+        bpy.data.meshes.remove(mesh)
+        if action is not None and action.users == 0:
+            bpy.data.actions.remove(action)
+    for home in homes:
+        if home.name.split(".")[0] == RESULTS and not home.all_objects and not home.children:
+            bpy.data.collections.remove(home)
+
+
 def existing(context, source, kind, output):
     """The result that an earlier run made, where it can be written to."""
     for entry in settings_of(source).results:
@@ -43,7 +58,7 @@ def register(source, kind, output, item):
     settings_of(item).result_of = source
 
 
-def show(context, source, kind, output, mesh, report):
+def show(context, source, kind, output, mesh, report, select=True):
     """Puts the mesh on the source's result object of that kind, exactly where the source is."""
     item = existing(context, source, kind, output)
     mesh.name = f"{source.name}{RESULT_SUFFIX[kind]}"
@@ -57,7 +72,7 @@ def show(context, source, kind, output, mesh, report):
     register(source, kind, output, item)
     place(context, source, item)
     item[REPORT] = json.dumps(report)
-    if context.view_layer.objects.active == source:
+    if select and context.view_layer.objects.active == source:
         select_only(context, item)
     return item
 
@@ -136,15 +151,15 @@ def shown_mesh(context, source, count):
     return applied
 
 
-def add_frames(item, frames, shapes):
-    """One shape key a frame, each at full value on its frame and at none on its neighbours."""
-    item.shape_key_add(name="Basis", from_mix=False)
-    for number, (frame, shape) in enumerate(zip(frames, shapes, strict=True)):
-        key = item.shape_key_add(name=f"frame {frame}", from_mix=False)
-        key.data.foreach_set("co", np.ascontiguousarray(shape, dtype=np.float32).ravel())
-        for at, value in zip(frames[max(0, number - 1) : number + 2], (0.0, 1.0, 0.0), strict=False):
-            key.value = value if number else float(at == frame)
-            key.keyframe_insert("value", frame=at)
+def add_frame(item, frames, number, shape):
+    """A shape key for one of the frames, at full value there and at none on its neighbours."""
+    if number == 0:
+        item.shape_key_add(name="Basis", from_mix=False)
+    key = item.shape_key_add(name=f"frame {frames[number]}", from_mix=False)
+    key.data.foreach_set("co", np.ascontiguousarray(shape, dtype=np.float32).ravel())
+    for frame in frames[max(0, number - 1) : number + 2]:
+        key.value = float(frame == frames[number])
+        key.keyframe_insert("value", frame=frame)
 
 
 def keeps_vertices(source, mesh, before):

@@ -2,6 +2,7 @@
 """The work of one object, read on the main thread and run on the worker: surface, samples, extraction."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -26,9 +27,13 @@ class Surface:
     vertices: np.ndarray  # (n, 3) the same in solve space
     triangles: np.ndarray
     fit_options: dict
-    key: str
     cache: FitCache
     machine: dict = field(default_factory=dict)
+
+    @cached_property
+    def key(self):
+        """Name of the fit in the cache; reading a large mesh takes a while, so workers ask for it."""
+        return fit_key(self.vertices, self.triangles, self.fit_options, VERSION)
 
     @property
     def is_cached(self):
@@ -90,7 +95,6 @@ def read_surface(context, source, operator=None):
         vertices=vertices,
         triangles=mesh.triangles,
         fit_options=options,
-        key=fit_key(vertices, mesh.triangles, options, VERSION),
         cache=settings.fit_cache(),
         machine=settings.machine_options(),
     )

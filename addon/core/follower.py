@@ -3,15 +3,47 @@
 
 import threading
 
+REST = 0.4  # seconds that a goal rests before what was found for it is refined
+
+
+class Interrupt:
+    """Tells a refinement that a newer goal is there; cancels the native calls that it runs."""
+
+    def __init__(self):
+        self._lock = threading.Lock()
+        self._raised, self._tasks = False, []
+
+    @property
+    def raised(self):
+        return self._raised
+
+    def watch(self, task):
+        """A native task that is cancelled when the interrupt is raised; returns it."""
+        with self._lock:
+            self._tasks.append(task)
+            if self._raised:
+                task.cancel()
+        return task
+
+    def throw(self):
+        with self._lock:
+            self._raised = True
+            for task in self._tasks:
+                task.cancel()
+
 
 class Follower:
-    """`solve(goal)` runs on the thread; `take` hands over its newest result, or what it raised."""
+    """`prepare()` runs on the thread first, then `solve(goal)` for the newest goal whenever there is one.
 
-    def __init__(self, solve, name="arapfields live"):
-        self._solve = solve
+    Where a goal has rested, `refine(goal, interrupt)` yields better and better results until the interrupt is
+    raised. `take` hands over the newest result, or what was raised.
+    """
+
+    def __init__(self, solve, prepare=None, refine=None, rest=REST, name="arapfields live"):
+        self._solve, self._prepare, self._refine, self._rest = solve, prepare, refine, rest
         self._changed = threading.Condition()
-        self._goal = self._result = self._error = None
-        self._working = self._ended = False
+        self._goal = self._result = self._error = self._interrupt = None
+        self._working, self._ended, self._refined = prepare is not None, False, True
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
@@ -19,7 +51,7 @@ class Follower:
         """Makes this the goal; one that waits is forgotten."""
         with self._changed:
             self._goal = goal
-            self._changed.notify_all()
+            self._wake()
 
     def take(self):
         """(result or None, error text) since the last call."""
@@ -28,30 +60,78 @@ class Follower:
             self._result = self._error = None
             return found
 
-    def wait(self, timeout):
-        """Until the newest goal is reached; False when that takes longer."""
+    def wait(self, timeout, refined=False):
+        """Until the newest goal is reached (and `refined`); False when that takes longer."""
+
+        def reached():
+            idle = self._goal is None and not self._working
+            return idle and (self._refined or not refined or self._refine is None)
+
         with self._changed:
-            return self._changed.wait_for(lambda: self._goal is None and not self._working, timeout)
+            return self._changed.wait_for(reached, timeout)
+
+    @property
+    def resting(self):
+        """Whether nothing is left to do for the newest goal."""
+        with self._changed:
+            return self._goal is None and not self._working and (self._refined or self._refine is None)
 
     def stop(self):
         """Ends the thread and waits for it."""
         with self._changed:
             self._ended = True
-            self._changed.notify_all()
+            self._wake()
         self._thread.join()
 
+    def _wake(self):
+        if self._interrupt is not None:
+            self._interrupt.throw()
+        self._changed.notify_all()
+
     def _run(self):
+        goal = None
+        if self._prepare is not None:
+            self._attempt(self._prepare)
         while True:
             with self._changed:
-                self._changed.wait_for(lambda: self._goal is not None or self._ended)
+                due = self._refine is not None and not self._refined
+                self._changed.wait_for(
+                    lambda: self._goal is not None or self._ended, self._rest if due else None
+                )
                 if self._ended:
                     return
-                goal, self._goal, self._working = self._goal, None, True
-            result = error = None
-            try:
-                result = self._solve(goal)
-            except Exception as caught:
+                if self._goal is not None:
+                    goal, self._goal = self._goal, None
+                    self._working, self._refined, due = True, False, False
+                else:
+                    self._working, self._interrupt = True, Interrupt()
+            if due:
+                self._improve(goal, self._interrupt)
+            else:
+                self._attempt(lambda goal=goal: self._solve(goal))
+
+    def _improve(self, goal, interrupt):
+        def steps():
+            for better in self._refine(goal, interrupt):
+                if interrupt.raised:
+                    break
+                with self._changed:
+                    self._result = better
+
+        self._attempt(steps)
+        with self._changed:
+            self._refined, self._interrupt = not interrupt.raised, None
+            self._changed.notify_all()
+
+    def _attempt(self, call):
+        result = error = None
+        try:
+            result = call()
+        except Exception as caught:
+            if type(caught).__name__ != "Cancelled":
                 error = str(caught) or type(caught).__name__
-            with self._changed:
-                self._result, self._error, self._working = result, error, False
-                self._changed.notify_all()
+        with self._changed:
+            if result is not None:
+                self._result = result
+            self._error, self._working = error or self._error, False
+            self._changed.notify_all()

@@ -9,59 +9,21 @@ from dataclasses import dataclass
 from typing import Any
 
 from .errors import UserError
-
-
-class JobCancelled(Exception):
-    """The user cancelled the job."""
-
-
-class Stages:
-    """Progress of one item through several native calls, each with a task of its own."""
-
-    def __init__(self, make_task):
-        self._make_task = make_task
-        self._lock = threading.Lock()
-        self._task = None
-        self._name = ""
-        self._begun = self._share = 0.0
-        self._cancelled = False
-
-    def start(self, name, share):
-        """A task for the next native call, which is about `share` of the item's work."""
-        with self._lock:
-            self._begun = min(1.0, self._begun + self._share)
-            self._name, self._share, self._task = name, share, self._make_task()
-            if self._cancelled:
-                self._task.cancel()
-                raise JobCancelled
-            return self._task
-
-    def cancel(self):
-        with self._lock:
-            self._cancelled = True
-            if self._task is not None:
-                self._task.cancel()
-
-    @property
-    def fraction(self):
-        with self._lock:
-            done = self._task.progress if self._task is not None else 0.0
-            return min(1.0, self._begun + self._share * done)
-
-    @property
-    def message(self):
-        with self._lock:
-            detail = self._task.message if self._task is not None else ""
-            return f"{self._name}: {detail}" if detail else self._name
+from .stages import JobCancelled, Stages
 
 
 @dataclass
 class Item:
-    """One object's work. `work(stages)` runs on the worker and returns what `apply` needs."""
+    """One object's work. `work(stages)` runs on the worker and returns what `apply` needs on the main thread.
+
+    `apply` returns the line to report, or is a generator that yields whenever the window may redraw.
+    `preview` shows the points that the worker's stages watch.
+    """
 
     label: str
     work: Callable[[Stages], Any]
-    apply: Callable[[Any], str] | None = None
+    apply: Callable[[Any], Any] | None = None
+    preview: Any = None
 
 
 @dataclass
@@ -86,12 +48,29 @@ class Job:
         self._cancelled = False
         self._outcomes = []
         self._taken = 0
+        self._outside = None  # (share, message) while the main thread works
         self._begin = time.monotonic()
         self._thread = threading.Thread(target=self._run, name=f"arapfields {title}", daemon=True)
 
-    def start(self):
-        self._begin = time.monotonic()
+    def start(self, items=None):
+        """Starts the worker, on these items where they are known only now."""
+        if items is not None:
+            self.items = list(items)
+        self._outside, self._begin = None, time.monotonic()
         self._thread.start()
+
+    def outside(self, fraction, message):
+        """Progress of what the main thread does before the worker starts or after it has ended."""
+        if self._cancelled:
+            raise JobCancelled
+        self._outside = fraction, message
+
+    def sight(self):
+        """(the item at work, how often its points were looked at, where they were)."""
+        with self._lock:
+            item = self.items[self._current] if self._current < len(self.items) else None
+            stages = self._stages
+        return item, *stages.sight()
 
     def cancel(self):
         """Asks the worker to stop; `join` waits for it."""
@@ -115,12 +94,16 @@ class Job:
 
     @property
     def fraction(self):
+        if self._outside is not None:
+            return self._outside[0]
         with self._lock:
             part = self._stages.fraction if self._current < len(self.items) else 0.0
             return min(1.0, (self._current + part) / max(1, len(self.items)))
 
     @property
     def message(self):
+        if self._outside is not None:
+            return self._outside[1]
         with self._lock:
             if self._current >= len(self.items):
                 return self.title
@@ -186,12 +169,13 @@ _running = None
 _notes = []
 
 
-def begin(job):
-    """Starts a job as the one that runs."""
+def begin(job, start=True):
+    """Makes a job the one that runs; without `start` the main thread prepares it first."""
     global _running
     _notes.clear()
     _running = job
-    job.start()
+    if start:
+        job.start()
 
 
 def end():

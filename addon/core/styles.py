@@ -78,6 +78,11 @@ STYLES = [  # as the native library names them, and how the menu does
     ("plane pair", "Flat Top and Bottom"),
 ]
 
+CUSTOM = {  # styles whose normals an object of the scene gives: identifier → label, tip
+    "AXES": ("Axes of an Object", "Turns the surface along the axes of an object of your choice"),
+    "FACES": ("Faces of a Mesh", "Turns the surface towards the faces of a mesh object of your choice"),
+}
+
 
 def style_identifier(name):
     """Blender's identifier of a native style: "square prism" → "SQUARE_PRISM"."""

@@ -11,7 +11,7 @@ from ..core import native
 from ..core.parameters import DEFORM, native_options
 from ..core.spaces import space_of
 from ..names import Op
-from ..properties.item import output, resolution, surface
+from ..properties.item import output, resolution, surface, target
 
 
 class ARAPFIELDS_OT_deform(JobOperator, bpy.types.Operator):
@@ -26,6 +26,7 @@ class ARAPFIELDS_OT_deform(JobOperator, bpy.types.Operator):
         **annotations(DEFORM, options={"SKIP_SAVE"}),
         "output": output(options={"SKIP_SAVE"}),
         "surface": surface(options={"SKIP_SAVE"}),
+        "target": target(options={"SKIP_SAVE"}),
         "resolution": resolution(options={"SKIP_SAVE"}),
     }
 

@@ -1,94 +1,90 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..bridge import handles, live, results
+from ..bridge import handles, live
 from ..bridge.lookup import refusal, source_of
-from ..core import native
+from ..core import jobs, native
 from ..core.errors import UserError
 from ..names import Op
 
-
-class LiveOperator:
-    """Mixin: needs a source with handles."""
-
-    @classmethod
-    def poll(cls, context):
-        source = source_of(context)
-        reason = native.problem() or refusal(source)
-        if not reason and not handles.used(source):
-            reason = "Add a handle first"
-        if reason:
-            cls.poll_message_set(reason)
-        return not reason
+KINDS = (
+    ("DEFORM", "Deform", "The shape follows its handles"),
+    ("STYLIZE", "Stylize", "The shape follows the style's settings, and its handles where the style does"),
+)
 
 
-class ARAPFIELDS_OT_live(LiveOperator, bpy.types.Operator):
-    """Let a result follow the handles while they move; again to stop"""
+class ARAPFIELDS_OT_live(bpy.types.Operator):
+    """Let a result follow the handles or the style while they change; again to stop, which takes it away"""
 
     bl_idname = Op.LIVE
     bl_label = "Live"
     bl_options = {"UNDO"}
 
-    def execute(self, context):
+    kind: bpy.props.EnumProperty(
+        items=KINDS, name="Kind", description="What the shape follows", options={"SKIP_SAVE"}
+    )
+
+    @classmethod
+    def poll(cls, context):
         source = source_of(context)
-        if live.is_live(source):
-            live.end(source)
+        reason = native.problem() or refusal(source)
+        if not reason and jobs.running():
+            reason = "Wait for the running job, or cancel it"
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
+
+    def execute(self, context):
+        return self.toggle(context, live.WAIT)
+
+    def invoke(self, context, event):
+        return self.toggle(context, live.WAIT if bpy.app.background else 0.0)
+
+    def toggle(self, context, wait):
+        """`wait`: seconds at most for the first shape; a window does not wait."""
+        source = source_of(context)
+        if live.is_live(source, self.kind):
+            live.end(context, source)
             return {"FINISHED"}
         try:
-            live.begin(context, source)
-            live.update(context, wait=10.0)
+            if self.kind == "DEFORM" and not handles.used(source):
+                raise UserError(f"{source.name} has no handle; add one in the panel's Handles section")
+            context.view_layer.update()
+            live.begin(context, source, self.kind)
         except (UserError, ValueError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        if wait:
+            live.update(context, wait)
+            if not live.is_live(source):
+                self.report({"ERROR"}, jobs.notes()[-1][1])
+                return {"CANCELLED"}
         return {"FINISHED"}
 
 
-class ARAPFIELDS_OT_bake(LiveOperator, bpy.types.Operator):
-    """Make an object with one shape key a frame that plays what the animated handles do"""
+class ARAPFIELDS_OT_live_keep(bpy.types.Operator):
+    """End live mode and keep the shape as an ordinary result"""
 
-    bl_idname = Op.BAKE
-    bl_label = "Bake Animation"
+    bl_idname = Op.LIVE_KEEP
+    bl_label = "Keep Shape"
     bl_options = {"UNDO"}
 
-    start: bpy.props.IntProperty(
-        name="Start", description="First frame; 0 for the scene's", default=0, min=0, options={"SKIP_SAVE"}
-    )
-    end: bpy.props.IntProperty(
-        name="End", description="Last frame; 0 for the scene's", default=0, min=0, options={"SKIP_SAVE"}
-    )
-    step: bpy.props.IntProperty(
-        name="Step", description="Frames from one key to the next", default=1, min=1, options={"SKIP_SAVE"}
-    )
+    @classmethod
+    def poll(cls, context):
+        if not live.is_live(source_of(context)):
+            cls.poll_message_set("The object is not live")
+            return False
+        return True
 
     def execute(self, context):
-        source, scene = source_of(context), context.scene
-        frames = range(self.start or scene.frame_start, (self.end or scene.frame_end) + 1, self.step)
-        present, manager = scene.frame_current, context.window_manager
-        if not frames:
-            self.report({"ERROR"}, "the last frame comes before the first")
-            return {"CANCELLED"}
-        manager.progress_begin(0, len(frames))
-        shapes = []
+        source = source_of(context)
         try:
-            scene.frame_set(frames[0])
-            session = live.Session(context, source, output="BAKE")
-            try:
-                for number, frame in enumerate(frames):
-                    scene.frame_set(frame)
-                    goal = live.targets_of(context, source)
-                    shapes.append(session.moved(goal))
-                    manager.progress_update(number)
-            finally:
-                session.follower.stop()
-            results.add_frames(session.result.get(), list(frames), shapes)
-        except (UserError, ValueError) as error:
+            item = live.end(context, source, keep=True)
+        except UserError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        finally:
-            manager.progress_end()
-            scene.frame_set(present)
-        self.report({"INFO"}, f"{source.name}: {len(frames)} frames baked")
+        self.report({"INFO"}, f"{source.name}: {item.name} kept")
         return {"FINISHED"}
 
 
-CLASSES = [ARAPFIELDS_OT_live, ARAPFIELDS_OT_bake]
+CLASSES = [ARAPFIELDS_OT_live, ARAPFIELDS_OT_live_keep]

@@ -1,20 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
-import numpy as np
 
-from ..bridge import groups, handles
+from ..bridge import groups, handles, styling
 from ..bridge.jobs import JobOperator
 from ..bridge.lookup import settings_of
 from ..bridge.moving import plan_move
-from ..bridge.settings import annotations, chosen, in_force, machine_options
+from ..bridge.settings import annotations, in_force, machine_options
 from ..bridge.work import known
 from ..core import native
-from ..core.errors import UserError
 from ..core.parameters import native_options
-from ..core.spaces import pose, space_of
-from ..core.styles import STYLIZE, style_name
+from ..core.spaces import space_of
+from ..core.styles import STYLIZE
 from ..names import Op
-from ..properties.item import output, resolution, surface
+from ..properties.item import output, resolution, surface, target
 from ..properties.settings import frame, style
 
 
@@ -32,6 +30,7 @@ class ARAPFIELDS_OT_stylize(JobOperator, bpy.types.Operator):
         "frame": frame(options={"SKIP_SAVE"}),
         "output": output(options={"SKIP_SAVE"}),
         "surface": surface(options={"SKIP_SAVE"}),
+        "target": target(options={"SKIP_SAVE"}),
         "resolution": resolution(options={"SKIP_SAVE"}),
     }
 
@@ -41,37 +40,23 @@ class ARAPFIELDS_OT_stylize(JobOperator, bpy.types.Operator):
         values = in_force(STYLIZE, ours, self)
         af = native.library()
         options = af.StylizeOptions(**native_options(values), **known(af.StylizeOptions, machine_options()))
-        name = style_name(chosen("style", ours, self))
         space = space_of(source.matrix_world, source.name)
-        turn = orientation(space, chosen("frame", ours, self), ours.frame_object)
+        style = styling.wanted_style(ours, space, self)
         wanted = handles.solve_handles(context, source, space) if ours.use_handles else []
-        weights = groups.vertex_weights(context, source, ours.region) if ours.region else None
+        weights = styling.region_weights(context, source, ours)
 
         def solve(stages, rest, samples):
             blend = None if weights is None else groups.at_points(rest.vertices, weights, samples.points)
             return af.stylize(
                 samples,
-                name,
+                style.directions(af),
                 options,
                 stages.start("Stylizing", 0.5),
                 weights=blend,
                 handles=groups.native_handles(af, wanted, rest, samples),
-                orientation=turn,
             )
 
         return plan_move(context, self, source, "STYLIZE", values["samples"], values["seed"], solve)
-
-
-def orientation(space, which, item):
-    """(3, 3) axes of the style in solve space."""
-    if which == "OBJECT":
-        return np.eye(3)
-    axes = np.eye(4)
-    if which == "EMPTY":
-        if item is None:
-            raise UserError("choose the object along whose axes the style stands")
-        axes = pose(handles.matrix_of(item))
-    return (pose(space.world_to_solve) @ axes)[:3, :3]
 
 
 CLASSES = [ARAPFIELDS_OT_stylize]

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..bridge import live
 from ..core.parameters import DEFORM
 from ..names import Op
-from .section import Section, settings_column
+from .section import Section, live_buttons, settings_column
 
 
 class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
@@ -16,11 +15,11 @@ class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
         layout = self.layout
         layout.prop(ours, "output")
         layout.prop(ours, "surface")
+        layout.prop(ours, "target")
         settings_column(layout, ours.deform, DEFORM)
         layout.operator(Op.DEFORM, icon="MOD_SIMPLEDEFORM")
-        row = layout.row(align=True)
-        row.operator(Op.LIVE, icon="PLAY", depress=live.is_live(source))
-        row.operator(Op.BAKE, icon="REC")
+        live_buttons(layout, source, "DEFORM")
+        layout.operator(Op.BAKE, icon="REC")
 
 
 CLASSES = [ARAPFIELDS_PT_deform]

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What every section of the side panel shares."""
 
-from ..bridge import lookup
+from ..bridge import live, lookup
 from ..core import native
-from ..names import CATEGORY
+from ..names import CATEGORY, Op
 
 
 class Section:
@@ -40,6 +40,15 @@ def settings_column(layout, group, parameters, skip=()):
         if body:
             for parameter in further:
                 body.prop(group, parameter.name)
+
+
+def live_buttons(layout, source, kind):
+    """Live on and off, and while it is on a way to keep the shape."""
+    on = live.is_live(source, kind)
+    row = layout.row(align=True)
+    row.operator(Op.LIVE, icon="PAUSE" if on else "PLAY", depress=on).kind = kind
+    if on:
+        row.operator(Op.LIVE_KEEP, icon="CHECKMARK")
 
 
 def wrapped(layout, text, icon="NONE", width=46):

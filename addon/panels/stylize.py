@@ -3,7 +3,7 @@ import bpy
 
 from ..core.styles import STYLIZE
 from ..names import Op
-from .section import Section, settings_column
+from .section import Section, live_buttons, settings_column
 
 
 class ARAPFIELDS_PT_stylize(Section, bpy.types.Panel):
@@ -22,6 +22,7 @@ class ARAPFIELDS_PT_stylize(Section, bpy.types.Panel):
         layout.prop(ours.stylize, "use_handles")
         settings_column(layout, ours.stylize, STYLIZE)
         layout.operator(Op.STYLIZE, icon="MOD_EDGESPLIT")
+        live_buttons(layout, source, "STYLIZE")
 
 
 CLASSES = [ARAPFIELDS_PT_stylize]

@@ -3,6 +3,7 @@
 
 import bpy
 
+from ..bridge.delivery import TARGETS
 from ..names import PROPERTY
 from .handle import ARAPFIELDS_PG_handle
 from .settings import ARAPFIELDS_PG_deform, ARAPFIELDS_PG_fit, ARAPFIELDS_PG_stylize
@@ -32,6 +33,10 @@ def surface(**extra):
     return bpy.props.EnumProperty(
         items=SURFACES, name="Surface", description="What the solve takes for the surface at rest", **extra
     )
+
+
+def target(**extra):
+    return bpy.props.EnumProperty(items=TARGETS, name="Result", description="Where the result goes", **extra)
 
 
 def resolution(**extra):
@@ -78,7 +83,11 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     )
     output: output()
     surface: surface()
+    target: target()
     resolution: resolution()
+    live_display: bpy.props.StringProperty(
+        name="Display before Live", description="How the object was displayed before it became live"
+    )
     fit_key: bpy.props.StringProperty(name="Fit", description="Name of the object's last fit in the cache")
     fit_report: bpy.props.StringProperty(
         name="Fit Report", description="Figures of the object's last fit, as JSON"

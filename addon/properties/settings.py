@@ -6,13 +6,13 @@ import bpy
 from ..bridge.settings import annotations
 from ..core.fitting import FIT, QUALITIES
 from ..core.parameters import DEFORM
-from ..core.styles import STYLES, STYLIZE, style_identifier
+from ..core.styles import CUSTOM, STYLES, STYLIZE, style_identifier
 
 QUALITY_ITEMS = tuple((key, label, tip) for key, (label, tip, _) in QUALITIES.items())
 STYLE_ITEMS = tuple(
     (style_identifier(name), label, f"Turns the surface towards the faces of: {label.lower()}")
     for name, label in STYLES
-)
+) + tuple((key, label, tip) for key, (label, tip) in CUSTOM.items())
 FRAMES = (
     ("OBJECT", "Object", "The style stands along the object's own axes"),
     ("WORLD", "World", "The style stands along the world's axes"),
@@ -68,6 +68,16 @@ ARAPFIELDS_PG_stylize = group(
     region=bpy.props.StringProperty(
         name="Region",
         description="Vertex group whose weights say how strongly the style acts; empty for everywhere",
+    ),
+    style_object=bpy.props.PointerProperty(
+        type=bpy.types.Object,
+        name="Normals Of",
+        description="Object whose axes or faces the surface turns towards, for styles of that kind",
+    ),
+    region_material=bpy.props.PointerProperty(
+        type=bpy.types.Material,
+        name="Material",
+        description="Material on whose faces the style acts; empty for everywhere",
     ),
     use_handles=bpy.props.BoolProperty(
         name="Follow Handles", description="Handles hold and move their parts while the rest is stylized"

@@ -1,7 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live mode and baking, stepped by hand: without a window Blender runs no timers."""
+"""Live mode, stepped by hand: without a window Blender runs no timers."""
 
 from inside import in_blender
+
+WAIT = 30  # seconds for a shape to follow
+
+
+def step(refined=False):
+    import bpy
+    from test_live import WAIT
+
+    from addon.bridge import live
+
+    bpy.context.view_layer.update()
+    live.update(bpy.context, wait=WAIT, refined=refined)
 
 
 @in_blender
@@ -9,34 +21,167 @@ def test_the_result_follows_moves_and_returns():
     import bpy
     import numpy as np
     import scenes
+    from test_live import step
 
     from addon.bridge import live
 
     bar, _, moving = scenes.bar_with_handles()
     before = scenes.world_points(bar)
     assert bpy.ops.arapfields.live() == {"FINISHED"} and live.is_live(bar)
-    result = bpy.data.objects["Bar_deformed"]
+    result = bpy.data.objects["Bar_live"]
     assert np.abs(scenes.world_points(result) - before).max() < 1e-3
     moving.location.z += 0.4
-    bpy.context.view_layer.update()
-    live.update(bpy.context, wait=20)
+    step()
     shift = scenes.world_points(result) - before
     assert np.abs(shift[before[:, 0] < -0.8]).max() < 0.1
     assert np.abs(shift[before[:, 0] > 0.8] - [0, 0, 0.4]).max() < 0.1
+    step(refined=True)
+    finer = scenes.world_points(result) - before
+    assert 0 < np.abs(finer - shift).max() < 0.1
     scenes.activate(bar)
     bpy.ops.arapfields.reset_handle(all=True)
-    bpy.context.view_layer.update()
-    live.update(bpy.context, wait=20)
+    step(refined=True)
     assert np.abs(scenes.world_points(result) - before).max() < 0.02
+
+
+@in_blender
+def test_off_restores_what_was_there():
+    import bpy
+    import scenes
+    from test_live import step
+
+    bar, _, moving = scenes.bar_with_handles()
+    bar.display_type = "SOLID"
+
+    def names():
+        kinds = bpy.data.objects, bpy.data.meshes, bpy.data.collections
+        return [sorted(kind.keys()) for kind in kinds]
+
+    before = scenes.everything(bar), names()
+    bpy.ops.arapfields.live()
+    assert bar.display_type == "BOUNDS"
+    moving.location.z += 0.4
+    step()
+    moving.location.z -= 0.4
     scenes.activate(bar)
     bpy.ops.arapfields.live()
-    assert not live.is_live(bar)
+    assert before == (scenes.everything(bar), names())
+    assert bar.display_type == "SOLID" and not bar.arapfields.results
+
+
+@in_blender
+def test_a_live_shape_can_be_kept():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_live import step
+
+    bar, _, moving = scenes.bar_with_handles()
+    scenes.decorate(bar)
+    whole = scenes.everything(bar)
+    bpy.ops.arapfields.live()
+    moving.location.z += 0.4
+    step()
+    shown = scenes.world_points(bpy.data.objects["Bar_live"])
+    scenes.activate(bar)
+    assert bpy.ops.arapfields.live_keep() == {"FINISHED"}
+    assert "Bar_live" not in bpy.data.objects and bar.display_type == "TEXTURED"
+    kept = bpy.data.objects["Bar_deformed"]
+    assert np.abs(scenes.world_points(kept) - shown).max() < 0.1
+    assert scenes.everything(kept) == whole
+
+
+@in_blender
+def test_several_objects_are_live_at_once():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_live import step
+
+    pairs = [scenes.bar_with_handles(name) for name in ("One", "Two")]
+    for bar, _, _ in pairs:
+        scenes.activate(bar)
+        bpy.ops.arapfields.live()
+    rest = [scenes.world_points(bpy.data.objects[f"{name}_live"]) for name in ("One", "Two")]
+    pairs[0][2].location.z += 0.3
+    pairs[1][2].location.z -= 0.3
+    step()
+    for name, before, sign in zip(("One", "Two"), rest, (1, -1), strict=True):
+        moved = scenes.world_points(bpy.data.objects[f"{name}_live"]) - before
+        assert np.abs(moved[before[:, 0] > 0.9][:, 2].mean() - 0.3 * sign) < 0.05
+
+
+@in_blender
+def test_a_style_follows_its_sliders_without_handles():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_live import step
+
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
+    ball = bpy.context.object
+    assert bpy.ops.arapfields.live(kind="STYLIZE") == {"FINISHED"}
+    result = bpy.data.objects[f"{ball.name}_live"]
+
+    def corners():
+        points = scenes.world_points(result)
+        points = points - points.mean(axis=0)
+        return np.linalg.norm(points, axis=1).max() / np.abs(points).max()
+
+    step(refined=True)
+    cube = corners()
+    assert cube > 1.25
+    ball.arapfields.stylize.strength = 0.0
+    step(refined=True)
+    assert abs(corners() - 1) < 0.05
+    ball.arapfields.stylize.strength, ball.arapfields.stylize.style = 1.0, "OCTAHEDRON"
+    step(refined=True)
+    assert corners() < cube - 0.1
+
+
+@in_blender
+def test_handles_and_a_style_together():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_live import step
+
+    bar, _, moving = scenes.bar_with_handles()
+    before = scenes.world_points(bar)
+    bar.arapfields.stylize.style, bar.arapfields.stylize.use_handles = "CYLINDER", True
+    bpy.ops.arapfields.live(kind="STYLIZE")
+    moving.location.z += 0.3
+    step()
+    shift = scenes.world_points(bpy.data.objects["Bar_live"]) - before
+    assert np.abs(shift[before[:, 0] > 0.9].mean(axis=0) - [0, 0, 0.3]).max() < 0.12
+
+
+@in_blender
+def test_the_implicit_surface_follows_too():
+    import bpy
+    import scenes
+    from test_live import step
+    from test_surface import FIT
+
+    bar, _, moving = scenes.bar_with_handles()
+    for name, value in FIT.items():
+        setattr(bar.arapfields.fit, name, value)
+    bar.arapfields.output, bar.arapfields.resolution = "SURFACE", 40
+    bpy.ops.arapfields.live()
+    result = bpy.data.objects["Bar_live"]
+    before = scenes.world_points(result)
+    assert len(before) != len(bar.data.vertices) and len(result.data.polygons) > 500
+    moving.location.z += 0.3
+    step()
+    shift = scenes.world_points(result) - before
+    assert abs(shift[before[:, 0] > 0.9][:, 2].mean() - 0.3) < 0.05
 
 
 @in_blender
 def test_a_new_handle_sets_the_solver_up_again():
     import bpy
     import scenes
+    from test_live import step
 
     from addon.bridge import live
 
@@ -44,41 +189,66 @@ def test_a_new_handle_sets_the_solver_up_again():
     bpy.ops.arapfields.live()
     scenes.activate(bar)
     bpy.ops.arapfields.add_handle()
-    live.update(bpy.context, wait=20)
-    assert live.is_live(bar) and len(live._sessions[bar.session_uid].layout) == 3
+    step()
+    assert live.is_live(bar) and len(live._sessions[bar.session_uid].layout[0]) == 3
+    for _ in range(3):
+        scenes.activate(bar)
+        bpy.ops.arapfields.remove_handle()
+    step()
+    assert not live.is_live(bar) and "Bar_live" not in bpy.data.objects
 
 
 @in_blender
-def test_animated_handles_are_baked_into_keys():
+def test_playback_is_followed():
     import bpy
     import numpy as np
     import scenes
+    from test_live import step
 
     bar, _, moving = scenes.bar_with_handles()
-    for frame, height in ((1, 0.0), (5, 0.4)):
+    for frame, height in ((1, 0.0), (9, 0.4)):
         moving.location.z = height
         moving.keyframe_insert("location", frame=frame)
     scenes.activate(bar)
-    assert bpy.ops.arapfields.bake(start=1, end=5, step=2) == {"FINISHED"}
-    result = bpy.data.objects["Bar_deformed"]
-    assert [k.name for k in result.data.shape_keys.key_blocks[1:]] == ["frame 1", "frame 3", "frame 5"]
-    heights = []
-    for frame in (1, 3, 5):
+    bpy.ops.arapfields.live()
+    right, heights = scenes.world_points(bar)[:, 0] > 0.9, []
+    for frame in (1, 5, 9):
         bpy.context.scene.frame_set(frame)
-        points = scenes.world_points(result)
-        heights.append(points[scenes.world_points(bar)[:, 0] > 0.9][:, 2].mean())
-    assert abs(heights[0]) < 0.03 and abs(heights[2] - 0.4) < 0.05
-    assert np.all(np.diff(heights) > 0.1)
+        step()
+        heights.append(scenes.world_points(bpy.data.objects["Bar_live"])[right][:, 2].mean())
+    assert abs(heights[0]) < 0.02 and abs(heights[2] - 0.4) < 0.05 and np.all(np.diff(heights) > 0.1)
 
 
 @in_blender
-def test_unloading_ends_live_mode():
+def test_loading_a_file_ends_live_mode_and_cleans_what_was_saved_of_it():
+    import tempfile
+
     import bpy
     import scenes
 
     from addon.bridge import live
 
-    scenes.bar_with_handles()
+    bar, *_ = scenes.bar_with_handles()
+    bar.display_type = "WIRE"
     bpy.ops.arapfields.live()
+    path = tempfile.mktemp(suffix=".blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.read_homefile(use_empty=True)
     assert not live._sessions
+    bpy.ops.wm.open_mainfile(filepath=path)
+    assert "Bar_live" not in bpy.data.objects
+    bar = bpy.data.objects["Bar"]
+    assert bar.display_type == "WIRE" and not bar.arapfields.results
+
+
+@in_blender
+def test_what_cannot_be_live_is_named():
+    import bpy
+    import pytest
+    import scenes
+
+    scenes.bar()
+    with pytest.raises(RuntimeError, match="Bar has no handle"):
+        bpy.ops.arapfields.live()
+    with pytest.raises(RuntimeError, match="not live"):
+        bpy.ops.arapfields.live_keep()

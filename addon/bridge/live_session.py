@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One source that is live: its solver, on a thread of its own, and the result that follows."""
+
+import contextlib
+
+import numpy as np
+
+from ..core import native
+from ..core.errors import UserError
+from ..core.follower import Follower
+from ..core.spaces import space_of
+from ..core.stages import Stages
+from . import arrays, groups, handles, live_result, results, styling
+from .lookup import ObjectId, settings_of
+from .settings import machine_options, plain
+from .work import known, read_surface
+
+SAMPLES = 6000
+PREVIEW_CELLS = 96  # at most, of the implicit surface that is shown while it moves
+REFINEMENTS, STEPS_AT_ONCE, FINE = 40, 10, 1e-6
+STYLE_BUMPS = {"samples": 3000, "coarse_bumps": 100, "fine_bumps": 500, "bending": 1e-3, "tolerance": 3e-4}
+
+
+class Changed(Exception):
+    """Handles were added, removed or given another rest pose: the solver must be set up again."""
+
+
+class Session:
+    """Reads its source when made, on the main thread; everything that takes time is done by the worker."""
+
+    def __init__(self, context, source, kind="DEFORM", shown=True, follow=True):
+        ours = settings_of(source)
+        self.source, self.kind, self.layout = ObjectId(source), kind, layout_of(source, kind)
+        self.surface = read_surface(context, source)
+        self.output, self.choice, self.cells = ours.output, ours.surface, min(ours.resolution, PREVIEW_CELLS)
+        self.wanted = (
+            handles.solve_handles(context, source, self.surface.space) if uses_handles(ours, kind) else []
+        )
+        self.weights = styling.region_weights(context, source, ours.stylize) if kind == "STYLIZE" else None
+        self.bending = plain(ours.deform.bending)
+        self.handle_weight = plain(ours.deform.handle_weight)
+        self.goal = self.solver = self.samples = self.corners = self.style_set = None
+        self.result = None
+        if shown:
+            mesh = results.shown_mesh(context, source, len(self.surface.local))
+            self.result = ObjectId(live_result.show(context, source, mesh))
+        self.follower = Follower(self.moved, self.prepare, self.refined) if follow else None
+
+    def prepare(self):
+        """Sets the solver up; on the worker."""
+        af, surface = native.library(), self.surface
+        use_fit = self.output == "SURFACE" or self.choice == "FIT"
+        use_fit = use_fit or (self.choice == "AUTO" and surface.is_cached)
+        self.samples = surface.samples(Stages(af.Task), SAMPLES, 0, use_fit)
+        options = {"bending": self.bending, "handle_weight": self.handle_weight}
+        if self.kind == "STYLIZE":
+            options |= STYLE_BUMPS
+            if self.weights is not None:
+                self.weights = groups.at_points(surface.vertices, self.weights, self.samples.points)
+        ready = groups.native_handles(af, self.wanted, surface, self.samples)
+        options |= known(af.LiveOptions, machine_options())
+        self.solver = af.LiveDeformer(self.samples, ready, af.LiveOptions(**options))
+        self.rest = surface.vertices
+        if self.output == "SURFACE":
+            self.rest, self.corners = surface.extract(Stages(af.Task), self.cells, 0.1)
+            if not len(self.corners):
+                raise UserError("the fitted surface is empty; fit with more quality")
+        self.solver.track(self.rest)
+
+    def moved(self, goal):
+        """(n, 3) vertices in local coordinates for this goal, quickly; on the worker."""
+        self.solve(goal)
+        return self.local(self.solver.tracked())
+
+    def solve(self, goal, **further):
+        targets, style = goal
+        if style is not None and style[0] != self.style_set:
+            directions, strength, sharpness = style[1:]
+            self.solver.set_style(directions, strength, sharpness, self.weights)
+            self.style_set = style[0]
+        self.solver.solve(targets if self.wanted else None, **further)
+
+    def refined(self, goal, interrupt):
+        """Better and better vertices, until the energy falls no more; on the worker."""
+        for _ in range(REFINEMENTS):
+            self.solve(goal, steps=STEPS_AT_ONCE, tolerance=FINE)
+            if interrupt.raised:
+                return
+            if self.solver.report["steps"] < STEPS_AT_ONCE:
+                break
+            yield self.local(self.solver.tracked())
+        yield self.local(self.solver.field(self.rest))
+
+    def local(self, solved):
+        if not np.isfinite(solved).all():
+            raise UserError("the shape has left the finite numbers")
+        return np.ascontiguousarray(self.surface.space.to_local(solved), dtype=np.float32)
+
+    def look(self, context):
+        """Sends what is asked for to the worker when it changed."""
+        source = self.source.get()
+        if layout_of(source, self.kind) != self.layout:
+            raise Changed
+        goal = self.goal_now(context, source)
+        if self.goal is None or not same(goal, self.goal):
+            self.goal = goal
+            self.follower.follow(goal)
+
+    def goal_now(self, context, source):
+        """(targets of the handles, (key, directions, strength, sharpness) of the style or None)."""
+        space, ours = space_of(source.matrix_world, source.name), settings_of(source).stylize
+        targets = []
+        if self.wanted:
+            found = handles.solve_handles(context, source, space)
+            targets = [h.target[:3, 3] if h.kind == "POINT" else h.target for h in found]
+        if self.kind != "STYLIZE":
+            return targets, None
+        style = styling.wanted_style(ours, space)
+        strength, sharpness = plain(ours.strength), plain(ours.sharpness)
+        directions = style.directions(native.library())
+        return targets, ((*style.key(), strength, sharpness), directions, strength, sharpness)
+
+    def show(self):
+        """Puts the newest shape on the result; True when there was one."""
+        moved, error = self.follower.take()
+        if error:
+            raise UserError(error)
+        if moved is None:
+            return False
+        item = self.result.get()
+        if item.mode == "EDIT":
+            return False
+        if len(item.data.vertices) != len(moved):
+            if self.corners is None or len(moved) != len(self.rest):
+                return False
+            arrays.fill(item.data, moved, self.corners)
+        arrays.set_positions(item.data, moved)
+        return True
+
+    def show_last(self):
+        """What the worker made before it ended; an error of it no longer matters."""
+        with contextlib.suppress(UserError, ReferenceError):
+            self.show()
+
+
+def uses_handles(ours, kind):
+    return kind == "DEFORM" or ours.stylize.use_handles
+
+
+def layout_of(source, kind):
+    """What the solver was set up for: the handles and their rest regions, and what is shown."""
+    ours = settings_of(source)
+    held = [(e.empty.session_uid, e.kind, e.group, e.weight, tuple(e.rest)) for e in handles.used(source)]
+    style = ours.stylize.region, ours.stylize.region_material
+    further = (plain(ours.deform.bending), plain(ours.deform.handle_weight), ours.output, ours.surface)
+    if kind == "STYLIZE":
+        further += (*style, ours.stylize.use_handles)
+    return (held if uses_handles(ours, kind) else [], further)
+
+
+def same(a, b):
+    """Whether two goals ask for the same."""
+    if (a[1] and a[1][0]) != (b[1] and b[1][0]):
+        return False
+    return all(np.array_equal(x, y) for x, y in zip(a[0], b[0], strict=True))

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A coarse stand-in for a mesh, quick to make and to draw: vertices of one cell of a grid become one."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+MOST = 12000  # vertices of a stand-in
+
+
+@dataclass(frozen=True)
+class Coarse:
+    vertices: np.ndarray  # (k, 3) some of the mesh's own
+    triangles: np.ndarray  # (m, 3) int32
+
+
+def coarsened(vertices, triangles, most=MOST):
+    """The mesh itself where it is small; else one vertex a cell, cells as small as `most` vertices allow."""
+    if len(vertices) <= most:
+        return Coarse(vertices, np.ascontiguousarray(triangles, dtype=np.int32))
+    low, size = vertices.min(axis=0), np.ptp(vertices, axis=0).max() or 1.0
+    cells = int(np.sqrt(most))
+    while True:
+        places = np.minimum(((vertices - low) * (cells / size)).astype(np.int64), cells - 1)
+        numbers = (places[:, 0] * cells + places[:, 1]) * cells + places[:, 2]
+        _, first, which = np.unique(numbers, return_index=True, return_inverse=True)
+        if len(first) <= most:
+            break
+        cells = int(cells * 0.8)
+    corners = which.reshape(-1)[triangles]
+    a, b, c = corners.T
+    kept = corners[(a != b) & (b != c) & (c != a)]
+    return Coarse(vertices[first], np.ascontiguousarray(kept, dtype=np.int32))
+
+
+def vertex_normals(vertices, triangles):
+    """(n, 3) unit normals of vertices, by the areas of their triangles; float32."""
+    corners = vertices[triangles]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    flat = triangles.ravel()
+    sums = [np.bincount(flat, np.repeat(across[:, k], 3), minlength=len(vertices)) for k in range(3)]
+    normals = np.stack(sums, axis=1)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return (normals / np.where(lengths > 0, lengths, 1.0)).astype(np.float32)

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import contextlib
+
+import bpy
+
+from ..bridge import handles, live_session, results
+from ..bridge.jobs import JobOperator
+from ..bridge.lookup import ObjectId, refusal, source_of
+from ..core import jobs, native
+from ..core.errors import UserError
+from ..core.stages import JobCancelled
+from ..names import Op
+
+
+class ARAPFIELDS_OT_bake(JobOperator, bpy.types.Operator):
+    """Make an object with one shape key a frame that plays what the animated handles do"""
+
+    bl_idname = Op.BAKE
+    bl_label = "Bake Animation"
+    bl_options = {"UNDO"}
+    title = "Bake"
+
+    start: bpy.props.IntProperty(
+        name="Start", description="First frame; 0 for the scene's", default=0, min=0, options={"SKIP_SAVE"}
+    )
+    end: bpy.props.IntProperty(
+        name="End", description="Last frame; 0 for the scene's", default=0, min=0, options={"SKIP_SAVE"}
+    )
+    step: bpy.props.IntProperty(
+        name="Step", description="Frames from one key to the next", default=1, min=1, options={"SKIP_SAVE"}
+    )
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        source = source_of(context)
+        if not refusal(source) and not handles.used(source):
+            cls.poll_message_set("Add a handle first")
+            return False
+        return True
+
+    def course(self, context):
+        self.failures, self.successes = [], []
+        job = jobs.Job(self.title, [], native.library().Task)
+        jobs.begin(job, start=False)
+        try:
+            item = yield from self.read(context, job)
+        except JobCancelled:
+            self.note("INFO", "Bake cancelled")
+            return {"CANCELLED"}
+        except (UserError, ValueError) as error:
+            self.note("ERROR", str(error))
+            return {"CANCELLED"}
+        job.start([item])
+        while not job.done:
+            yield True
+        return (yield from self.conclude(context, job))
+
+    def read(self, context, job):
+        """Plays the frames once and notes where the handles are; the scene ends where it was."""
+        source, scene, present = source_of(context), context.scene, context.scene.frame_current
+        frames = list(range(self.start or scene.frame_start, (self.end or scene.frame_end) + 1, self.step))
+        if not frames:
+            raise UserError("the last frame comes before the first")
+        goals = []
+        try:
+            scene.frame_set(frames[0])
+            session = live_session.Session(context, source, shown=False, follow=False)
+            for number, frame in enumerate(frames):
+                job.outside(0.1 * number / len(frames), f"Reading frame {frame}")
+                scene.frame_set(frame)
+                goals.append(session.goal_now(context, source))
+                yield False
+        finally:
+            with contextlib.suppress(ReferenceError):
+                scene.frame_set(present)
+        who = ObjectId(source)
+
+        def work(stages):
+            task = stages.start("Solving", 1.0)
+            session.prepare()
+            shapes = []
+            for number, goal in enumerate(goals):
+                if task.cancelled:
+                    raise JobCancelled
+                task.report(number / len(goals), f"frame {frames[number]}")
+                session.solve(goal, steps=30)
+                shapes.append(session.local(session.solver.field(session.rest)))
+            return shapes
+
+        def apply(shapes):
+            return (yield from add_keys(context, who.get(), session, frames, shapes, job))
+
+        return jobs.Item(source.name, work, apply)
+
+
+def add_keys(context, source, session, frames, shapes, job):
+    """The baked object, key by key; taken away again where the user cancels."""
+    if session.corners is not None:
+        mesh = results.surface_mesh(source, shapes[0], session.corners)
+    else:
+        mesh = results.shown_mesh(context, source, len(session.rest))
+    item = results.show(context, source, "BAKE", "BAKE", mesh, {"frames": len(frames)})
+    kept = False
+    try:
+        for number in range(len(frames)):
+            job.outside(number / len(frames), f"Storing frame {frames[number]}")
+            results.add_frame(item, frames, number, shapes[number])
+            yield False
+        kept = True
+    finally:
+        if not kept:
+            with contextlib.suppress(ReferenceError):
+                results.discard(item)
+    return f"{len(frames)} frames baked"
+
+
+CLASSES = [ARAPFIELDS_OT_bake]
