@@ -59,6 +59,9 @@ void bind_solve_testing(py::module_& module) {
            "gauss"_a = 0.0, "barrier"_a = 0.0, "margin"_a = 0.0)
       .def("__call__", &Probe::operator(), "parameters"_a, "seed"_a = 0)
       .def_property_readonly("size", &Probe::size);
+  py::class_<EnergyTrial>(testing, "EnergyTrial", "The energy and its parameter gradient, for timing.")
+      .def(py::init<const SurfaceSamples&, Index, double>(), "samples"_a, "batch"_a, "bending"_a)
+      .def("run", &EnergyTrial::run, py::call_guard<py::gil_scoped_release>());
 }
 
 }  // namespace arapfields::python

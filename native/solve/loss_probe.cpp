@@ -22,4 +22,28 @@ LossProbe probe_loss(NeuralField& field, FieldObjective& objective, const Vector
   return probe;
 }
 
+namespace {
+
+ObjectiveTerms rigidity_alone(Index batch, double bending) {
+  ObjectiveTerms terms;
+  terms.batch = batch;
+  terms.bending = bending;
+  return terms;
+}
+
+}  // namespace
+
+EnergyTrial::EnergyTrial(const SurfaceSamples& samples, Index batch, double bending)
+    : samples_(samples),
+      field_(MlpShape{}, 0),
+      objective_(samples_, rigidity_alone(batch, bending)),
+      random_(0) {
+  field_.network()->weight(field_.shape().layers).fill_(0.01);
+}
+
+double EnergyTrial::run() {
+  field_.gradient().zero_();
+  return objective_.accumulate(field_, random_);
+}
+
 }  // namespace arapfields
