@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live styles, and the implicit surface that follows its handles."""
+
+from inside import in_blender
+
+
+@in_blender
+def test_a_style_follows_its_sliders_without_handles():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_live import step
+
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
+    ball = bpy.context.object
+    assert bpy.ops.arapfields.live(kind="STYLIZE") == {"FINISHED"}
+    result = bpy.data.objects[f"{ball.name}_live"]
+
+    def corners():
+        points = scenes.world_points(result)
+        points = points - points.mean(axis=0)
+        return np.linalg.norm(points, axis=1).max() / np.abs(points).max()
+
+    step(refined=True)
+    cube = corners()
+    assert cube > 1.25
+    ball.arapfields.stylize.strength = 0.0
+    step(refined=True)
+    assert abs(corners() - 1) < 0.05
+    ball.arapfields.stylize.strength, ball.arapfields.stylize.style = 1.0, "OCTAHEDRON"
+    step(refined=True)
+    assert corners() < cube - 0.1
+
+
+@in_blender
+def test_handles_and_a_style_together():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_live import step
+
+    bar, _, moving = scenes.bar_with_handles()
+    before = scenes.world_points(bar)
+    bar.arapfields.stylize.style, bar.arapfields.stylize.use_handles = "CYLINDER", True
+    bpy.ops.arapfields.live(kind="STYLIZE")
+    moving.location.z += 0.3
+    step()
+    shift = scenes.world_points(bpy.data.objects["Bar_live"]) - before
+    assert np.abs(shift[before[:, 0] > 0.9].mean(axis=0) - [0, 0, 0.3]).max() < 0.12
+
+
+@in_blender
+def test_the_implicit_surface_follows_too():
+    import bpy
+    import scenes
+    from test_live import step
+    from test_surface import FIT
+
+    bar, _, moving = scenes.bar_with_handles()
+    for name, value in FIT.items():
+        setattr(bar.arapfields.fit, name, value)
+    bar.arapfields.output, bar.arapfields.resolution = "SURFACE", 40
+    bpy.ops.arapfields.live()
+    result = bpy.data.objects["Bar_live"]
+    before = scenes.world_points(result)
+    assert len(before) != len(bar.data.vertices) and len(result.data.polygons) > 500
+    moving.location.z += 0.3
+    step()
+    shift = scenes.world_points(result) - before
+    assert abs(shift[before[:, 0] > 0.9][:, 2].mean() - 0.3) < 0.05
