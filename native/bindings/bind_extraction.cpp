@@ -1,23 +1,46 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bindings/bind.h"
 #include "core/parallel.h"
-#include "extraction/extract_surface.h"
+#include "extraction/extract_deformed.h"
 #include "neural/neural_sdf.h"
 
 namespace arapfields::python {
 namespace {
 
+Frame frame_of(const ImplicitFunction& sdf) {
+  const auto* network = dynamic_cast<const NeuralSdf*>(&sdf);
+  return network != nullptr ? network->frame() : Frame();
+}
+
+void fill(const py::dict& report, const ExtractionReport& done) {
+  report.attr("update")("evaluations"_a = done.evaluations, "dense_evaluations"_a = done.dense_evaluations,
+                        "open"_a = done.open, "seconds"_a = done.seconds);
+}
+
 py::tuple extract(const ImplicitFunction& sdf, int resolution, Task* task, int threads,
                   const std::optional<py::dict>& report) {
-  const auto* network = dynamic_cast<const NeuralSdf*>(&sdf);
   ExtractionReport done;
   const TriangleMesh mesh = run_long(task, [&](const Progress& progress) {
     const ThreadScope scope(threads);
-    return extract_surface(sdf, network != nullptr ? network->frame() : Frame(), resolution, progress, &done);
+    return extract_surface(sdf, frame_of(sdf), resolution, progress, &done);
   });
-  if (report)
-    report->attr("update")("evaluations"_a = done.evaluations, "dense_evaluations"_a = done.dense_evaluations,
-                           "open"_a = done.open, "seconds"_a = done.seconds);
+  if (report) fill(*report, done);
+  return py::make_tuple(mesh.vertices, mesh.triangles);
+}
+
+py::tuple extract_moved(const ImplicitFunction& sdf, const DeformationField& field, int resolution,
+                        const DeformationField* inverse, Task* task, int threads,
+                        const std::optional<py::dict>& report) {
+  DeformedReport done;
+  const TriangleMesh mesh = run_long(task, [&](const Progress& progress) {
+    const ThreadScope scope(threads);
+    return extract_deformed(sdf, frame_of(sdf), field, inverse, resolution, progress, &done);
+  });
+  if (report) {
+    fill(*report, done);
+    report->attr("update")("inverted"_a = done.inverted, "failures"_a = done.failures,
+                           "spacing"_a = done.spacing);
+  }
   return py::make_tuple(mesh.vertices, mesh.triangles);
 }
 
@@ -34,6 +57,23 @@ void bind_extraction(py::module_& module) {
       "Triangles are counter-clockwise seen from outside; the mesh is a closed manifold unless the surface\n"
       "leaves the cube. A dict given as `report` receives evaluations and dense_evaluations (points of the\n"
       "grid), open (the mesh has a boundary) and seconds. InvalidInput for a bad resolution or no surface.");
+  module.def(
+      "extract_deformed", &extract_moved, "sdf"_a, "field"_a, "resolution"_a = 256, "inverse"_a = py::none(),
+      "task"_a = py::none(), "threads"_a = 0, "report"_a = py::none(),
+      "The deformed surface as the zero set of sdf ∘ field⁻¹: V (n,3), F (m,3), in mesh coordinates.\n\n"
+      "Marching cubes on `resolution` (8 to 512) grid points a side over a cube around the deformed "
+      "surface;\n"
+      "triangles are evenly sized also where the field stretches, which those of extract_surface moved by "
+      "the\n"
+      "field are not. Rest positions come from Newton's method, or from `inverse`, the field that\n"
+      "train_inverse made of this one. They are asked for near the deformed surface alone; farther away\n"
+      "extract_surface's mesh, moved, decides the sides. A dict given as `report` receives what "
+      "extract_surface's does,\n"
+      "and inverted (points asked for), failures (those without a rest position beside the surface, where "
+      "the\n"
+      "distance to that mesh stands in) and spacing (of the grid, a length). Raises as extract_surface does, "
+      "and\n"
+      "InvalidInput for a field that is not finite on the surface.");
 }
 
 }  // namespace arapfields::python

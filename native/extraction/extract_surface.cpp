@@ -16,10 +16,14 @@ constexpr int grid_steps_a_cell = 4;
 
 }  // namespace
 
-TriangleMesh extract_surface(const ImplicitFunction& implicit, const Frame& frame, int resolution,
-                             const Progress& progress, ExtractionReport* report) {
+void require_resolution(int resolution) {
   require(resolution >= coarsest_grid && resolution <= finest_grid, "resolution", std::to_string(resolution),
           "8 to 512 grid points a side are allowed");
+}
+
+TriangleMesh extract_surface(const ImplicitFunction& implicit, const Frame& frame, int resolution,
+                             const Progress& progress, ExtractionReport* report) {
+  require_resolution(resolution);
   const auto start = std::chrono::steady_clock::now();
   progress.report(0.0, "finding the surface");
   CountedFunction function(implicit, progress);

@@ -16,6 +16,9 @@ struct ExtractionReport {
   double seconds = 0.0;
 };
 
+/// Throws InvalidInput unless 8 to 512.
+void require_resolution(int resolution);
+
 /// {Φ = 0} in mesh coordinates by marching cubes on the grid of `resolution`³ points (8 to 512) over the cube
 /// [-1,1]³: the vertices that the whole grid's values would give, from values near the surface alone.
 /// Throws InvalidInput for a bad resolution, a function that is not finite, or one that has no zero surface

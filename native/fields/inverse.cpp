@@ -75,7 +75,7 @@ Points grid(int side) {
 /// One point's state: the best x so far, its residual r = f(x) − y, and the Newton step d from it.
 struct Walker {
   Index row;
-  Vec3 target, best, step;
+  Vec3 target, start, best, step;
   double residual = std::numeric_limits<double>::infinity();
   double damping = 1.0;
   bool done = false;
@@ -131,12 +131,22 @@ void walk(const DeformationField& field, std::vector<Walker>& walkers, const Inv
 
 }  // namespace
 
-InverseResult invert(const DeformationField& field, PointsIn targets, const InverseOptions& options,
-                     const Progress& progress) {
+struct NewtonInverse::Parts {
+  const DeformationField& field;
+  Starts surface, space;
+};
+
+NewtonInverse::NewtonInverse(const DeformationField& field, Points rest)
+    : parts_(new Parts{field, Starts(field, std::move(rest)), Starts(field, grid(17))}) {}
+NewtonInverse::~NewtonInverse() = default;
+NewtonInverse::NewtonInverse(NewtonInverse&&) noexcept = default;
+
+InverseResult NewtonInverse::operator()(PointsIn targets, const InverseOptions& options,
+                                        const Progress& progress) const {
   require(options.iterations > 0, "iterations", std::to_string(options.iterations), "must be positive");
   require(options.tolerance > 0.0, "tolerance", std::to_string(options.tolerance), "must be positive");
   constexpr Index chunk = 4096;
-  const Starts surface(field, field.rest_points()), space(field, grid(17));
+  const auto& [field, surface, space] = *parts_;
   InverseResult result{Points::Constant(targets.rows(), 3, std::numeric_limits<double>::quiet_NaN()), 0, 0.0};
   for (Index begin = 0; begin < targets.rows(); begin += chunk) {
     progress.report(static_cast<double>(begin) / static_cast<double>(targets.rows()), "inverting");
@@ -144,7 +154,8 @@ InverseResult invert(const DeformationField& field, PointsIn targets, const Inve
     std::vector<Index> left;
     for (Index i = begin; i < begin + rows; ++i)
       if (targets.row(i).allFinite()) left.push_back(i);
-    for (int attempt = 0; attempt < 3 && !left.empty(); ++attempt) {
+    const int attempts = std::isfinite(options.reach) ? 1 : 3;
+    for (int attempt = 0; attempt < attempts && !left.empty(); ++attempt) {
       const Starts* starts = attempt == 0 ? &surface : attempt == 1 ? &space : nullptr;
       if (starts != nullptr && starts->empty()) continue;
       std::vector<Walker> walkers(left.size());
@@ -153,13 +164,13 @@ InverseResult invert(const DeformationField& field, PointsIn targets, const Inve
           Walker& w = walkers[static_cast<std::size_t>(k)];
           w.row = left[static_cast<std::size_t>(k)];
           w.target = targets.row(w.row);
-          w.best = starts != nullptr ? starts->nearest(w.target) : w.target;
+          w.start = w.best = starts != nullptr ? starts->nearest(w.target) : w.target;
         }
       });
       walk(field, walkers, options, progress);
       left.clear();
       for (const Walker& w : walkers) {
-        if (w.residual <= options.tolerance) {
+        if (w.residual <= options.tolerance && (w.best - w.start).norm() <= options.reach) {
           result.points.row(w.row) = w.best;
           result.worst_residual = std::max(result.worst_residual, w.residual);
         } else {
@@ -172,6 +183,11 @@ InverseResult invert(const DeformationField& field, PointsIn targets, const Inve
     if (!result.points.row(i).allFinite()) ++result.failures;
   progress.report(1.0);
   return result;
+}
+
+InverseResult invert(const DeformationField& field, PointsIn targets, const InverseOptions& options,
+                     const Progress& progress) {
+  return NewtonInverse(field, field.rest_points())(targets, options, progress);
 }
 
 }  // namespace arapfields

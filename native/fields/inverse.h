@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <vector>
+#include <limits>
+#include <memory>
 
 #include "core/task.h"
 #include "fields/field.h"
@@ -13,6 +14,9 @@ struct InverseOptions {
   int iterations = 50;      ///< most evaluations a point and start
   double tolerance = 2e-6;  ///< largest residual ‖f(x) − y‖ of a point that counts as found
   double longest_step = 0.25;
+  /// Farthest that x may lie from its start. If finite, the nearest rest point is the only start: what is
+  /// found is the preimage beside the surface.
+  double reach = std::numeric_limits<double>::infinity();
 };
 
 struct InverseResult {
@@ -21,10 +25,26 @@ struct InverseResult {
   double worst_residual = 0.0;  ///< over the points found
 };
 
-/// x with f(x) = y for every row y of `targets` (cube coordinates), by Newton's method with the field's own
-/// Jacobian, its steps halved until the residual falls. It starts from the field's rest point whose image is
-/// nearest to y, and where that fails from the nearest image of a grid over [-1,1]³, then from y itself.
-/// Where f folds space there are several x: the start then decides.
+/// Solves f(x) = y by Newton's method with the field's own Jacobian, its steps halved until the residual
+/// falls. It starts from that of `rest` whose image is nearest to y, and where that fails from the nearest
+/// image of a grid over [-1,1]³, then from y itself. Where f folds space there are several x: the start then
+/// decides. Built once for many calls; the field must outlive it.
+class NewtonInverse {
+ public:
+  NewtonInverse(const DeformationField& field, Points rest);
+  ~NewtonInverse();
+  NewtonInverse(NewtonInverse&&) noexcept;
+
+  /// x for every row y of `targets`, all in cube coordinates.
+  InverseResult operator()(PointsIn targets, const InverseOptions& options = {},
+                           const Progress& progress = {}) const;
+
+ private:
+  struct Parts;
+  std::unique_ptr<const Parts> parts_;
+};
+
+/// The same for one use, from the field's rest points.
 InverseResult invert(const DeformationField& field, PointsIn targets, const InverseOptions& options = {},
                      const Progress& progress = {});
 

@@ -102,6 +102,16 @@ def test_deform_writes_mesh_surface_field_and_report(made, tmp_path):
     assert report["iterations"] == 15 and report["stretch"] == pytest.approx(field.report["stretch"])
 
 
+def test_extract_through_the_inverse(made, tmp_path):
+    through = ["--through", "inverse", "--deformed-by", made / "field.npz", "--resolution", "40", "--quiet"]
+    assert run("extract", made / "sdf.npz", "-o", tmp_path / "even.ply", *through) == 0
+    even = trimesh.load(tmp_path / "even.ply", process=False)
+    sdf, field = af.NeuralSdf.load(made / "sdf.npz"), af.DeformationField.load(made / "field.npz")
+    expected, triangles = af.extract_deformed(sdf, field, 40)
+    assert np.asarray(even.vertices) == pytest.approx(expected, abs=1e-5)
+    assert np.array_equal(even.faces, triangles)
+
+
 def test_flags_and_handle_file_mean_the_same(made, tmp_path):
     described = [
         {"type": "cuboid", "corners": [[None, None, None], [None, None, -0.3]]},

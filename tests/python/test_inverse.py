@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Inverses: trained networks, Newton's on published shapes, and the cycle loss beside a deformation."""
 
+import threading
+import time
+
 import cases
 import numpy as np
 import pytest
 import tolerances
+from network_oracle import Network
 
 import arapfields as af
 
@@ -59,10 +63,59 @@ def test_invertibility_penalises_folds(samples):
     assert kept["flipped_share"] < free["flipped_share"]
 
 
+def gap_in_voxels(sdf, field, resolution, **keywords):
+    """Symmetric Hausdorff distance, at vertices, of extract_deformed and the warped extraction."""
+    report = {}
+    V, F = af.extract_deformed(sdf, field, resolution, report=report, **keywords)
+    rest, G = af.extract_surface(sdf, resolution)
+    W = field(rest)
+    apart = max(np.abs(af.signed_distance(W, G, V)).max(), np.abs(af.signed_distance(V, F, W)).max())
+    return apart / report["spacing"], report
+
+
+@pytest.fixture(scope="module")
+def bunny(data_dir):
+    """The published bunny, bent by a radial field until an ear runs into the back."""
+    path = data_dir / "neural_sdf" / "bunny.pt"
+    sdf = af.NeuralSdf.from_layers(*Network.published(path).layers)
+    samples = af.sample_surface(sdf, count=2000)
+    return sdf, af.deform(samples, cases.bunny_handles(), af.DeformOptions(field="radial"))
+
+
+def test_extraction_through_newtons_inverse(bunny):
+    sdf, field = bunny
+    apart, report = gap_in_voxels(sdf, field, 40)
+    assert apart <= 1.5
+    assert report["failures"] < 0.05 * report["inverted"] and not report["open"]
+    assert report["inverted"] < report["dense_evaluations"] / 2
+
+
+def test_extraction_stops_and_names_bad_input(bunny):
+    sdf, field = bunny
+    with pytest.raises(af.InvalidInput, match="resolution"):
+        af.extract_deformed(sdf, field, 5)
+    with pytest.raises(af.InvalidInput, match="threads"):
+        af.extract_deformed(sdf, field, 32, threads=-1)
+    task, seen = af.Task(), []
+
+    def watch():
+        while task.progress < 0.2:
+            seen.append(task.progress)
+            time.sleep(0.01)
+        task.cancel()
+
+    watcher = threading.Thread(target=watch)
+    watcher.start()
+    with pytest.raises(af.Cancelled):
+        af.extract_deformed(sdf, field, 256, task=task)
+    watcher.join()
+    assert seen == sorted(seen)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["bunny", "spot", "whale"])
 def test_inverses_on_published_shapes(data_dir, name):
-    """A bend by 40 degrees; Newton's inverse and a trained one at uniform points of the surface."""
+    """A bend by 40 degrees; Newton's inverse and a trained one, at uniform points and in extraction."""
     samples = cases.published_samples(data_dir / "neural_sdf" / f"{name}.pt")
     low, high = samples.points.min(0) - 0.01, samples.points.max(0) + 0.01
     axis = int(np.argmax(high - low))
@@ -80,5 +133,9 @@ def test_inverses_on_published_shapes(data_dir, name):
     error = np.linalg.norm(field.inverse(images) - points, axis=1)
     assert np.isnan(error).mean() <= 0.01
     assert np.nanquantile(error, 0.95) < tolerances.NEWTON_INVERSE
+    sdf = af.NeuralSdf.from_layers(*Network.published(data_dir / "neural_sdf" / f"{name}.pt").layers)
+    apart, report = gap_in_voxels(sdf, field, 128)
+    assert apart <= 1.5 and report["failures"] <= 0.01 * report["inverted"]
     trained = af.train_inverse(field, samples)
+    assert gap_in_voxels(sdf, field, 128, inverse=trained)[0] <= 1.5
     assert np.quantile(np.linalg.norm(trained(images) - points, axis=1), 0.95) < 1e-3

@@ -11,10 +11,11 @@ def solve_flags(parser):
     parser.add_argument("input", help=SOURCE)
     outputs = parser.add_argument_group("outputs (one or more)")
     outputs.add_argument("-o", "--output", metavar="FILE", help="the input mesh with its vertices moved")
-    outputs.add_argument("--surface", metavar="FILE", help="the implicit surface, extracted and moved")
+    outputs.add_argument("--surface", metavar="FILE", help="the implicit surface, deformed (see --through)")
     outputs.add_argument("--save-field", metavar="FILE", help=".npz with the deformation field")
     report_flag(outputs)
     resolution_flag(parser, "grid points")
+    inverse_flag(parser)
     parser.add_argument(
         "--samples", type=int, default=20000, metavar="N", help="surface samples the energy sees [20000]"
     )
@@ -65,6 +66,16 @@ def solve_flags(parser):
 def resolution_flag(parser, unit):
     parser.add_argument(
         "--resolution", type=int, default=128, metavar="N", help=f"{unit} along an edge of the cube [128]"
+    )
+
+
+def inverse_flag(parser):
+    parser.add_argument(
+        "--through",
+        choices=("warp", "inverse"),
+        default="warp",
+        help="a deformed surface's triangles: those at rest, moved (warp), or new and even ones, extracted "
+        "through the field's inverse [warp]",
     )
 
 

@@ -8,7 +8,7 @@ import sys
 import arapfields as af
 
 from . import verbs
-from .flags import MESH, SOURCE, report_flag, resolution_flag, solve_flags
+from .flags import MESH, SOURCE, inverse_flag, report_flag, resolution_flag, solve_flags
 from .options import add_option_flags
 
 
@@ -135,10 +135,12 @@ def _extract(added):
         "triangles of an implicit surface",
         "spot.npz -o spot.ply --resolution 256",
         "spot.npz -o bent.stl --deformed-by field.npz",
+        "spot.npz -o even.ply --deformed-by field.npz --through inverse",
     )
     parser.add_argument("input", help=SOURCE + " (a mesh is fitted first)")
     parser.add_argument("-o", "--output", required=True, metavar="FILE", help=MESH)
     parser.add_argument("--deformed-by", metavar="FIELD", help="move the surface by a saved field")
+    inverse_flag(parser)
     resolution_flag(parser, "grid points")
     return parser
 

@@ -77,9 +77,7 @@ def extract(args):
     with Outputs() as outputs:
         output = outputs.check(args.output, files.MESH_SUFFIXES, "--output")
         field = files.read_field(args.deformed_by) if args.deformed_by else None
-        vertices, triangles = _extracted(_Source(args).sdf(), args)
-        if field is not None:
-            vertices = field(vertices)
+        vertices, triangles = _extracted(_Source(args).sdf(), args, field)
         outputs.write(output, lambda path: files.write_mesh(path, vertices, triangles))
     _summary(args, f"wrote {len(vertices)} vertices and {len(triangles)} triangles to {args.output}")
 
@@ -137,10 +135,17 @@ def _samples(source, count, seed, args):
     )
 
 
-def _extracted(sdf, args):
-    return with_progress(
-        "extract", lambda task: af.extract_surface(sdf, resolution=args.resolution, task=task), args.quiet
-    )
+def _extracted(sdf, args, field=None):
+    """The surface at rest, or deformed by a field in the way --through says."""
+    through = field is not None and args.through == "inverse"
+
+    def extract(task):
+        if through:
+            return af.extract_deformed(sdf, field, resolution=args.resolution, task=task)
+        return af.extract_surface(sdf, resolution=args.resolution, task=task)
+
+    vertices, triangles = with_progress("extract", extract, args.quiet)
+    return (vertices if through or field is None else field(vertices)), triangles
 
 
 def _solve(args, solve, seed, needs_handles):
@@ -173,10 +178,8 @@ def _solve(args, solve, seed, needs_handles):
                 lambda path: files.write_moved_mesh(path, source.path, source.mesh, field),
             )
         if "--surface" in places:
-            vertices, triangles = _extracted(source.sdf(), args)
-            outputs.write(
-                places["--surface"], lambda path: files.write_mesh(path, field(vertices), triangles)
-            )
+            surface = _extracted(source.sdf(), args, field)
+            outputs.write(places["--surface"], lambda path: files.write_mesh(path, *surface))
         if "--save-field" in places:
             outputs.write(places["--save-field"], field.save)
         _write_report(outputs, report, field.report)

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "extraction/deformed_function.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "extraction/batch_function.h"
+
+namespace arapfields {
+namespace {
+
+constexpr double newton_tolerance = 1e-4;  // a fiftieth of it is aimed at
+constexpr Index most_starts = 50000;
+constexpr double reach_in_bands = 10.0;    // room for compressions to a fifth
+constexpr double probe_in_bands = 0.5;     // how far outside of a sheet to ask for others
+constexpr double residual_in_bands = 0.5;  // what a trained inverse may be off by
+
+Points some_rows(const Points& points, Index most) {
+  const Index every = std::max<Index>(1, points.rows() / most), count = points.rows() / every;
+  Points result(count, 3);
+  for (Index i = 0; i < count; ++i) result.row(i) = points.row(i * every);
+  return result;
+}
+
+/// 0 up to `band`, 1 from twice that on, smooth between.
+double farness(double distance, double band) {
+  const double t = std::clamp(distance / band - 1.0, 0.0, 1.0);
+  return t * t * (3.0 - 2.0 * t);
+}
+
+}  // namespace
+
+DeformedFunction::DeformedFunction(const DeformedShape& shape, const Frame& frame, const Progress& progress)
+    : shape_(shape),
+      frame_(frame),
+      check_(progress.part(0.0, 0.0)),
+      distance_(shape.moved, shape.mesh.triangles, progress),
+      newton_(shape.field, shape.inverse != nullptr
+                               ? Points(0, 3)
+                               : shape.field.frame().to_cube(some_rows(shape.mesh.vertices, most_starts))) {}
+
+Points DeformedFunction::by_newton(PointsIn moved) const {
+  const Frame& cube = shape_.field.frame();
+  InverseOptions options;
+  options.tolerance = newton_tolerance;
+  options.reach = reach_in_bands * shape_.band / cube.scale;
+  return cube.to_mesh(newton_(cube.to_cube(moved), options, check_).points);
+}
+
+Points DeformedFunction::by_network(PointsIn moved) const {
+  const Frame &inner = shape_.inverse->frame(), &outer = shape_.field.frame();
+  Points rest(moved.rows(), 3), back(moved.rows(), 3);
+  shape_.inverse->evaluate(inner.to_cube(moved), {rest.data(), rest.rows(), JetOrder::value});
+  rest = inner.to_mesh(rest);
+  shape_.field.evaluate(outer.to_cube(rest), {back.data(), back.rows(), JetOrder::value});
+  const Vector residual = (outer.to_mesh(back) - moved).rowwise().norm();
+  for (Index i = 0; i < rest.rows(); ++i)
+    if (!(residual[i] <= residual_in_bands * shape_.band))
+      rest.row(i).setConstant(std::numeric_limits<double>::quiet_NaN());
+  return rest;
+}
+
+std::vector<bool> DeformedFunction::covered(PointsIn points) const {
+  ClosestPoints closest = distance_.closest(points, check_);
+  for (Index i = 0; i < points.rows(); ++i) {
+    const auto corners = shape_.mesh.triangles.row(closest.triangles[static_cast<std::size_t>(i)]);
+    const Vec3 a = shape_.moved.row(corners[0]), b = shape_.moved.row(corners[1]),
+               c = shape_.moved.row(corners[2]);
+    closest.points.row(i) += probe_in_bands * shape_.band * (b - a).cross(c - a).normalized().transpose();
+  }
+  Vector winding(points.rows());
+  distance_.winding_number(closest.points, winding, check_);
+  std::vector<bool> result;
+  for (const double number : winding) result.push_back(number > 0.5);
+  return result;
+}
+
+void DeformedFunction::evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> values) const {
+  const Points mesh = frame_.to_mesh(points.cast<double>());
+  Vector distances(mesh.rows());
+  distance_.evaluate(mesh, distances, check_);
+  std::vector<Index> near;
+  for (Index i = 0; i < mesh.rows(); ++i)
+    if (std::abs(distances[i]) < 2.0 * shape_.band) near.push_back(i);
+  const Points moved = mesh(near, Eigen::all);
+  const Points rest = shape_.inverse != nullptr ? by_network(moved) : by_newton(moved);
+  std::vector<Index> found, rows, doubtful;  // rows of near, of points; of points again
+  for (std::size_t k = 0; k < near.size(); ++k)
+    if (rest.row(static_cast<Index>(k)).allFinite()) {
+      found.push_back(static_cast<Index>(k));
+      rows.push_back(near[k]);
+    }
+  const PointsF at = shape_.rest_frame.to_cube(rest(found, Eigen::all)).cast<float>();
+  VectorF phi(at.rows());
+  shape_.rest.evaluate(at, phi);
+  Vector exact = distances;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    double& value = exact[rows[k]];
+    value = static_cast<double>(phi[static_cast<Index>(k)]) * shape_.rest_frame.scale;
+    if (value > 0.0 && distances[rows[k]] < 0.0) doubtful.push_back(rows[k]);
+  }
+  const std::vector<bool> inside = covered(mesh(doubtful, Eigen::all));
+  for (std::size_t k = 0; k < doubtful.size(); ++k)
+    if (inside[k] || distances[doubtful[k]] < -probe_in_bands * shape_.band)
+      exact[doubtful[k]] = distances[doubtful[k]];
+  for (Index i = 0; i < mesh.rows(); ++i)
+    exact[i] += farness(std::abs(distances[i]), shape_.band) * (distances[i] - exact[i]);
+  inverted_ += static_cast<Index>(near.size());
+  failures_ += static_cast<Index>(near.size() - found.size());
+  values = (exact / frame_.scale).cast<float>();
+}
+
+void DeformedFunction::evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> values,
+                                Eigen::Ref<PointsF> gradients) const {
+  BatchFunction([this](ConstPointsRef<float> at, Eigen::Ref<VectorF> out) {
+    evaluate(at, out);
+  }).evaluate(points, values, gradients);
+}
+
+}  // namespace arapfields

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "extraction/extract_deformed.h"
+
+#include <algorithm>
+
+#include "core/errors.h"
+#include "extraction/deformed_function.h"
+
+namespace arapfields {
+namespace {
+
+constexpr double half_extent = 0.9;     // of the deformed surface in the cube
+constexpr double band_in_cells = 2.0;   // where Φ∘f⁻¹ is the function, and its steepest
+constexpr double share_at_rest = 0.15;  // of the work
+
+}  // namespace
+
+TriangleMesh extract_deformed(const ImplicitFunction& rest, const Frame& rest_frame,
+                              const DeformationField& field, const DeformationField* inverse, int resolution,
+                              const Progress& progress, DeformedReport* report) {
+  require_resolution(resolution);
+  const TriangleMesh mesh = extract_surface(rest, rest_frame, resolution, progress.part(0.0, share_at_rest));
+  Points moved(mesh.vertices.rows(), 3);
+  field.evaluate(field.frame().to_cube(mesh.vertices), {moved.data(), moved.rows(), JetOrder::value});
+  require(moved.allFinite(), "field", "its values are NaN or infinite on the surface",
+          "a finite deformation is needed");
+  moved = field.frame().to_mesh(moved);
+  const Frame frame = Frame::around(moved, half_extent);
+  const double spacing = 2.0 / (resolution - 1) * std::max(frame.scale, rest_frame.scale);
+  const DeformedShape shape{.rest = rest,
+                            .rest_frame = rest_frame,
+                            .field = field,
+                            .inverse = inverse,
+                            .mesh = mesh,
+                            .moved = moved,
+                            .band = band_in_cells * spacing};
+  progress.report(share_at_rest, "inverting the field");
+  const DeformedFunction function(shape, frame, progress);
+  ExtractionReport done;
+  TriangleMesh result =
+      extract_surface(function, frame, resolution, progress.part(share_at_rest, 1.0), &done);
+  if (report != nullptr) {
+    static_cast<ExtractionReport&>(*report) = done;
+    report->inverted = function.inverted();
+    report->failures = function.failures();
+    report->spacing = 2.0 / (resolution - 1) * frame.scale;
+  }
+  return result;
+}
+
+}  // namespace arapfields

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "extraction/extract_surface.h"
+#include "fields/field.h"
+
+namespace arapfields {
+
+/// What a call of extract_deformed did.
+struct DeformedReport : ExtractionReport {
+  Index inverted = 0;    ///< points at which f⁻¹ was asked for
+  Index failures = 0;    ///< of these, points where none was found beside the surface
+  double spacing = 0.0;  ///< of the grid, in mesh coordinates
+};
+
+/// {Φ∘f⁻¹ = 0} in mesh coordinates: marching cubes as in extract_surface, on a cube around the deformed
+/// surface. f⁻¹ is Newton's method, or `inverse` where it is not null (a trained one). It is evaluated near
+/// the deformed surface alone, known from a mesh that is extracted at rest and moved (see DeformedFunction).
+/// Throws InvalidInput as extract_surface does, and where the field is not finite.
+TriangleMesh extract_deformed(const ImplicitFunction& rest, const Frame& rest_frame,
+                              const DeformationField& field, const DeformationField* inverse,
+                              int resolution = 256, const Progress& progress = {},
+                              DeformedReport* report = nullptr);
+
+}  // namespace arapfields
