@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bindings/bind.h"
 #include "core/frame.h"
+#include "core/memory.h"
 #include "core/parallel.h"
 #include "core/simd.h"
 
@@ -133,6 +134,8 @@ void bind_core(py::module_& module) {
 
   module.def("thread_count", &thread_count,
              "Threads that native calls use unless their options say otherwise.");
+  module.def("require_memory", &require_memory, "argument"_a, "bytes"_a,
+             "InvalidInput naming the argument where the machine has less memory to spare than `bytes`.");
   module.def("simd_level", &simd_level_name, "Instruction set of the kernels: baseline, avx2 or avx512.");
 }
 

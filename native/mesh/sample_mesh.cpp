@@ -7,6 +7,7 @@
 #include <string>
 
 #include "core/errors.h"
+#include "core/memory.h"
 #include "core/parallel.h"
 
 namespace arapfields {
@@ -68,6 +69,7 @@ Frame mesh_frame(PointsIn vertices, TrianglesIn triangles) {
 
 SurfaceSamples sample_mesh(PointsIn vertices, TrianglesIn triangles, Index count, std::uint64_t seed) {
   require(count > 0, "count", std::to_string(count), "at least 1 is needed");
+  require_memory("count", 6.0 * sizeof(double) * static_cast<double>(count));
   SurfaceSamples samples;
   samples.frame = mesh_frame(vertices, triangles);
   samples.redraw = [v = Points(vertices), t = Triangles(triangles)](Index again, std::uint64_t other) {

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "core/errors.h"
+#include "core/memory.h"
 #include "core/parallel.h"
 #include "core/random.h"
 #include "neural/mlp_sweep.h"
@@ -59,6 +60,12 @@ void check_points(const at::Tensor& points, const at::Tensor& like) {
           "expected a contiguous (n,3) tensor like the parameters");
 }
 
+/// Numbers that forward() keeps for pull_back().
+double kept_numbers(const MlpShape& shape, Index n, JetOrder order) {
+  const int planes = std::min(columns(order), 4) + 1 + (order == JetOrder::second ? shape.outputs : 0);
+  return static_cast<double>(n) * shape.layers * planes * shape.width;
+}
+
 const Block& largest_of(const std::vector<Block>& blocks) {
   return *std::max_element(blocks.begin(), blocks.end(),
                            [](const Block& a, const Block& b) { return a.count < b.count; });
@@ -73,6 +80,7 @@ void Mlp::State::prepare(const at::Tensor& points, JetOrder order) {
                     static_cast<int>(kept.workspaces.size()) == threads;
   if (same) return;
   kept = {};  // frees before it allocates
+  if (parameters.is_cpu()) require_memory("batch", kept_numbers(shape, n, order) * parameters.element_size());
   kept.blocks = split_points(n, order, threads, parameters.is_cpu());
   for (Block& block : kept.blocks) allocate(shape, parameters, true, block);
   for (int t = 0; t < threads; ++t)

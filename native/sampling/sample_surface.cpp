@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/errors.h"
+#include "core/memory.h"
 #include "core/random.h"
 #include "sampling/crossings.h"
 
@@ -90,6 +91,7 @@ SurfaceSamples sample_surface(const ImplicitFunction& implicit, const Frame& fra
           "1 to 100 million points are allowed");
   require(options.tolerance > 0.0 && options.tolerance <= 1e-4, "tolerance",
           std::to_string(options.tolerance), "must be positive and at most 1e-4");
+  require_memory("count", 12.0 * sizeof(double) * static_cast<double>(options.count));
   const auto start = std::chrono::steady_clock::now();
   progress.report(0.0, "measuring the implicit function");
   CountedFunction function(implicit, progress);

@@ -16,7 +16,7 @@ import arapfields as af
 from . import timing
 from .sampling import DATA, THREADS, Counted, Network
 
-CASES = [("bunny", 256), ("whale", 256)]
+CASES = [("bunny", 256), ("whale", 256), ("cube", 256)]
 
 
 def dense(network, resolution):

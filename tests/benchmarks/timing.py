@@ -21,3 +21,13 @@ def paired(ours, theirs, rounds=5, warm_up=True):
         "theirs_s": round(statistics.median(b for _, b in pairs), 5),
         "times_faster": round(statistics.median(b / a for a, b in pairs), 2),
     }
+
+
+def product_rate(size=256, rows=10_000, rounds=9):
+    """GFLOP/s of bare single-precision matrix products of a network's size, now."""
+    import torch
+
+    a, b, c = torch.randn(rows, size), torch.randn(size, size), torch.empty(rows, size)
+    torch.mm(a, b, out=c)
+    seconds = statistics.median(once(lambda: torch.mm(a, b, out=c)) for _ in range(rounds))
+    return 2e-9 * rows * size * size / seconds

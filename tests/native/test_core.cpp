@@ -8,6 +8,7 @@
 #include "core/dense.h"
 #include "core/errors.h"
 #include "core/frame.h"
+#include "core/memory.h"
 #include "core/parallel.h"
 #include "core/random.h"
 #include "core/task.h"
@@ -65,6 +66,14 @@ BOOST_AUTO_TEST_CASE(frame_round_trip_and_motions) {
                             in_cube.topRightCorner<3, 1>().transpose();
   BOOST_TEST((frame.to_mesh(moved_cube) - moved).norm() < 1e-11);
   BOOST_CHECK_THROW(Frame::around(Points::Zero(3, 3)), InvalidInput);
+}
+
+BOOST_AUTO_TEST_CASE(more_memory_than_any_machine_has_is_refused_by_name) {
+  require_memory("batch", 1024.0);
+  BOOST_TEST(available_memory() > 0.0);
+  BOOST_CHECK_EXCEPTION(require_memory("batch", 1e18), InvalidInput, [](const InvalidInput& error) {
+    return std::string(error.what()).starts_with("batch: this would take about 931322574.6 GiB");
+  });
 }
 
 BOOST_AUTO_TEST_CASE(parallel_for_covers_once_and_passes_exceptions) {

@@ -100,3 +100,9 @@ def test_samples_from_arrays():
 def test_bad_input_is_named(vertices, triangles, count, argument):
     with pytest.raises(af.InvalidInput, match=f"^{argument}: "):
         af.sample_mesh(vertices, triangles, count=count)
+
+
+def test_more_points_than_memory_holds_are_refused():
+    v, f = meshes.box()
+    with pytest.raises(af.InvalidInput, match=r"count: this would take about .* GiB"):
+        af.sample_mesh(v, f, count=10**12)

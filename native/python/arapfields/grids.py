@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ._native import Cancelled, Frame, InvalidInput, signed_distance
+from ._native import Cancelled, Frame, InvalidInput, require_memory, signed_distance
 
 SUFFIXES = (".npz", ".vdb")
 CHUNK = 200_000  # points evaluated between two looks at the task
@@ -49,6 +49,7 @@ def sdf_grid(sdf, resolution=128, bounds=None, task=None):
     size = bounds[1] - bounds[0]
     spacing = float(size.max() / resolution)
     counts = np.maximum(np.ceil(size / spacing - 1e-9).astype(int), 1) + 1
+    require_memory("resolution", 4.0 * float(np.prod(counts, dtype=float)))
     values = np.empty(counts, np.float32)
     flat = values.reshape(-1)
     for begin in range(0, flat.size, CHUNK):

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/memory.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <fstream>
+#include <limits>
+
+#include "core/errors.h"
+
+namespace arapfields {
+namespace {
+
+constexpr double unknown = std::numeric_limits<double>::infinity();
+constexpr double gib = 1024.0 * 1024.0 * 1024.0;
+
+/// The one number in a file; infinity where there is none ("max" included).
+double number_in(const char* path) {
+  std::ifstream file(path);
+  double value = 0.0;
+  return file >> value ? value : unknown;
+}
+
+double system_memory() {
+  std::ifstream file("/proc/meminfo");
+  for (std::string name, rest; file >> name && name != "MemAvailable:";) std::getline(file, rest);
+  double kilobytes = 0.0;
+  return file >> kilobytes ? kilobytes * 1024.0 : unknown;
+}
+
+double group_memory() {
+  const double limit = number_in("/sys/fs/cgroup/memory.max"),
+               used = number_in("/sys/fs/cgroup/memory.current");
+  return limit < unknown && used < unknown ? std::max(0.0, limit - used) : unknown;
+}
+
+std::string in_gib(double bytes) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f GiB", bytes / gib);
+  return text;
+}
+
+}  // namespace
+
+double available_memory() { return std::min(system_memory(), group_memory()); }
+
+void require_memory(const std::string& argument, double bytes) {
+  if (bytes < gib / 4) return;  // not worth a look
+  const double there = available_memory();
+  require(bytes <= there, argument, "this would take about " + in_gib(bytes) + " of memory",
+          in_gib(there) + " are free: use less");
+}
+
+}  // namespace arapfields

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cost against size: seconds and peak memory above the idle process, each in a process of its own."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+SAMPLES = (300, 1000, 3000, 10_000, 30_000)
+WIDTHS = (64, 128, 256, 512)
+RESOLUTIONS = (64, 128, 256, 512)
+TRIANGLES = (1_000, 20_000, 300_000, 2_000_000)
+
+SETTING = """
+import json, sys, time
+from pathlib import Path
+import numpy as np
+import arapfields as af
+sys.path[:0] = [{tests!r}]
+import cases, meshes
+from network_oracle import Network
+data = Path({data!r})
+def peak(): return int(Path('/proc/self/status').read_text().split('VmHWM:')[1].split()[0]) / 1024
+def torus(count):
+    n = int(np.sqrt(count / 2))
+    return meshes.torus(around=n, tube=n)
+{prepare}
+before, begin = peak(), time.perf_counter()
+{work}
+seconds = time.perf_counter() - begin
+print(json.dumps(dict(seconds=round(seconds, 3), peak_MiB=round(peak() - before))))
+"""
+
+
+def measured(prepare, work):
+    """The figures of one run, or the error that it ended with."""
+    tests = str(Path(__file__).resolve().parents[1])
+    code = SETTING.format(tests=tests, data=os.environ["ARAPFIELDS_DATA"], prepare=prepare, work=work)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    if done.returncode:
+        return {"error": done.stderr.strip().splitlines()[-1][:100]}
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def run():
+    bunny = "cases.published_samples(data / 'neural_sdf' / 'bunny.pt', 30000)"
+    solve = "af.deform(samples, cases.bunny_handles(), af.DeformOptions(iterations=5, {}))"
+    warm = solve.format("batch=8")
+    rows = []
+    for count in SAMPLES:
+        cost = measured(f"samples = {bunny}\n{warm}", solve.format(f"batch={count}"))
+        rows.append({"what": "5 iterations, 4x256, samples", "size": count, **cost})
+    for width in WIDTHS:
+        cost = measured(f"samples = {bunny}\n{warm}", solve.format(f"batch=1000, width={width}"))
+        rows.append({"what": "5 iterations, 1,000 samples, width", "size": width, **cost})
+    for resolution in RESOLUTIONS:
+        prepare = (
+            "sdf = af.NeuralSdf.from_layers(*Network.published(data / 'neural_sdf' / 'bunny.pt').layers)"
+        )
+        rows.append(
+            {
+                "what": "extraction, points a side",
+                "size": resolution,
+                **measured(prepare, f"af.extract_surface(sdf, {resolution})"),
+            }
+        )
+    for count in TRIANGLES:
+        prepare = f"v, f = torus({count}); points = np.random.default_rng(0).uniform(-1, 1, (100000, 3))"
+        cost = measured(prepare, "af.signed_distance(v, f, points)")
+        rows.append({"what": "100,000 signed distances, triangles", "size": count, **cost})
+    return rows
