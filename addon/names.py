@@ -30,6 +30,7 @@ class Op(StrEnum):
     DEFORM = "arapfields.deform"
     EXTRACT = "arapfields.extract"
     STYLIZE = "arapfields.stylize"
+    SET_STYLE = "arapfields.set_style"
     LIVE = "arapfields.live"
     LIVE_KEEP = "arapfields.live_keep"
     MIRROR_HANDLE = "arapfields.mirror_handle"

@@ -2,6 +2,7 @@
 import bpy
 
 from .bridge import settings
+from .bridge.language import translated
 from .core import native
 from .names import PACKAGE, Op
 
@@ -40,11 +41,17 @@ class ARAPFIELDS_AP_preferences(bpy.types.AddonPreferences):
         layout.prop(self, "show_boxes")
         cache = settings.fit_cache()
         row = layout.row()
-        row.label(text=f"{cache.size() / 1e6:.1f} MB of fitted surfaces in {cache.folder}")
+        row.label(
+            text=translated(
+                "{size} MB of fitted surfaces in {folder}",
+                size=f"{cache.size() / 1e6:.1f}",
+                folder=cache.folder,
+            )
+        )
         row.operator(Op.CLEAR_CACHE)
         box = layout.box()
         for line in native.report():
-            box.label(text=line, icon="ERROR" if line == native.problem() else "NONE")
+            box.label(text=line, icon="ERROR" if line == str(native.problem()) else "NONE")
         box.operator(Op.COPY_REPORT, icon="COPYDOWN")
 
 

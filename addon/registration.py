@@ -6,14 +6,14 @@ import atexit
 import bpy
 
 from . import panels, preferences
-from .bridge import jobs, overlay, preview
+from .bridge import jobs, overlay, pictures, preview
 from .bridge import live as live_mode
-from .operators import bake, deform, extract, fit, handles, live, status, stylize
+from .operators import bake, deform, extract, fit, handles, live, presets, status, styles, stylize
 from .properties import handle, item, settings
 
 MODULES = [
-    *(handle, settings, item, preferences, jobs, live_mode, overlay, preview),
-    *(fit, handles, deform, live, bake, stylize, extract, status),
+    *(handle, settings, item, preferences, jobs, live_mode, overlay, preview, pictures),
+    *(fit, handles, deform, live, bake, stylize, styles, presets, extract, status),
     *panels.SECTIONS,
 ]
 

@@ -25,7 +25,7 @@ def evaluated_mesh(context, source):
     evaluated = source.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     if mesh is None:
-        raise UserError(f"{source.name}: Blender gives no mesh for it")
+        raise UserError("{name}: Blender gives no mesh for it", name=source.name)
     try:
         yield mesh
     finally:
@@ -67,14 +67,17 @@ def read(context, source):
     with evaluated_mesh(context, source) as mesh:
         arrays = MeshArrays(positions(mesh), triangles(mesh))
     if not len(arrays.vertices):
-        raise UserError(f"{source.name}: the mesh is empty")
+        raise UserError("{name}: the mesh is empty", name=source.name)
     broken = np.flatnonzero(~np.isfinite(arrays.vertices).all(axis=1))
     if len(broken):
         raise UserError(
-            f"{source.name}: {len(broken)} vertices have no finite position, the first is {broken[0]}"
+            "{name}: {count} vertices have no finite position, the first is {first}",
+            name=source.name,
+            count=len(broken),
+            first=broken[0],
         )
     if not len(arrays.triangles):
-        raise UserError(f"{source.name}: the mesh has no faces")
+        raise UserError("{name}: the mesh has no faces", name=source.name)
     return arrays
 
 

@@ -56,14 +56,17 @@ def new_object(context, source, kind, output, moved, before):
 def refuse(source, output, target, before):
     """UserError where the source itself cannot take the result."""
     if source.library is not None or source.data.library is not None:
-        raise UserError(f"{source.name} is linked from another file; choose New Object for the result")
+        raise UserError(
+            "{name} is linked from another file; choose New Object for the result", name=source.name
+        )
     if settings_of(source).live_display:
-        raise UserError(f"{source.name} is live; end live mode first")
+        raise UserError("{name} is live; end live mode first", name=source.name)
     if output == "SURFACE" and target == "KEY":
         raise UserError("a shape key keeps the mesh; choose Original Mesh for the output")
     if output != "SURFACE" and not results.keeps_vertices(source, source.data, before):
         raise UserError(
-            f"modifiers of {source.name} change its vertices; apply them, or choose New Object for the result"
+            "modifiers of {name} change its vertices; apply them, or choose New Object for the result",
+            name=source.name,
         )
 
 

@@ -13,7 +13,7 @@ def vertex_weights(context, source, name):
     """(n,) weights of the shown vertices in the object's vertex group of that name."""
     group = source.vertex_groups.get(name)
     if group is None:
-        raise UserError(f"{source.name} has no vertex group {name}")
+        raise UserError("{name} has no vertex group {group}", name=source.name, group=name)
     with arrays.evaluated_mesh(context, source) as mesh:
         weights = np.zeros(len(mesh.vertices))
         for vertex in mesh.vertices:
@@ -21,7 +21,7 @@ def vertex_weights(context, source, name):
                 if entry.group == group.index:
                     weights[vertex.index] = entry.weight
     if not weights.any():
-        raise UserError(f"the vertex group {name} of {source.name} holds no vertex")
+        raise UserError("the vertex group {group} of {name} holds no vertex", group=name, name=source.name)
     return weights
 
 

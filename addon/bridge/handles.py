@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
+from ..core import native
 from ..core.errors import UserError
 from ..core.handles import box_matrix, solve_handle
 from ..core.spaces import transform
@@ -53,19 +54,20 @@ def solve_handles(context, source, space):
         further = {"weights": weights, "weight": entry.weight}
         found.append(solve_handle(entry.empty.name, entry.kind, *where, space, **further))
     if not found:
-        raise UserError(f"{source.name} has no handle; add one in the panel's Handles section")
+        raise UserError("{name} has no handle; add one in the panel's Handles section", name=source.name)
     return found
 
 
+PALETTE = [(0.27, 0.55, 1.0), (1.0, 0.42, 0.30), (0.35, 0.80, 0.40), (0.85, 0.45, 0.90), (1.0, 0.80, 0.25)]
 SHAPES = {"CUBE": "CUBE", "POINT": "SPHERE", "GROUP": "ARROWS"}
 
 
 def add(source, empty, kind="CUBE"):
     """Turns an Empty into a handle of the source, at rest where it is; one it was already is only reset."""
     if empty.empty_display_type == "IMAGE":
-        raise UserError(f"{empty.name} shows an image; take another kind of Empty")
+        raise UserError("{name} shows an image; take another kind of Empty", name=empty.name)
     if abs(np.linalg.det(box_now(empty)[:3, :3])) == 0:
-        raise UserError(f"{empty.name} is flat; give it a size and a scale other than zero")
+        raise UserError("{name} is flat; give it a size and a scale other than zero", name=empty.name)
     ours = settings_of(source)
     owner = settings_of(empty).handle_of
     if owner is not None and owner != source:
@@ -76,6 +78,7 @@ def add(source, empty, kind="CUBE"):
         ours.handles.add()
     entry = ours.handles[index]
     entry.empty, entry.kind = empty, kind
+    entry.colour = PALETTE[index % len(PALETTE)]
     settings_of(empty).handle_of = source
     empty.empty_display_type = SHAPES[kind]
     store_rest(source, entry)
@@ -98,17 +101,66 @@ def editable(context):
     return [context.scene.collection, *context.scene.collection.children_recursive]
 
 
-def new_empty(context, source, kind, group):
-    """A new Empty a sixth of the source's size: at the 3D cursor, or amid the vertex group."""
+PLACES = (
+    ("AUTO", "Selected Empties", "The selected Empties; where none is selected, a new one at the 3D cursor"),
+    ("CURSOR", "3D Cursor", "A new box at the 3D cursor"),
+    ("SELECTION", "Selected Vertices", "A new box around the mesh's selected vertices"),
+)
+
+
+def new_empty(context, source, kind, group, place):
+    """A new Empty: about the selected vertices, amid the vertex group, or at the 3D cursor."""
     corners = transform(matrix_of(source), np.array(source.bound_box))
     size = float(np.ptp(corners, axis=0).max()) / 6 or 1.0
-    place = context.scene.cursor.location
+    if place == "SELECTION":
+        return make_empty(context, source, Matrix(selection_box(source, size).tolist()), 1.0)
+    where = context.scene.cursor.location
     if kind == "GROUP":
         weights = groups.vertex_weights(context, source, group)
         with arrays.evaluated_mesh(context, source) as mesh:
             middle = np.average(arrays.positions(mesh), axis=0, weights=weights)
-        place = source.matrix_world @ Vector(middle)
-    return make_empty(context, source, Matrix.Translation(place), size)
+        where = source.matrix_world @ Vector(middle)
+    return make_empty(context, source, Matrix.Translation(where), size)
+
+
+def selection_box(source, size):
+    """(4, 4) the cube [-1, 1]³ → world, of the box along the source's axes around its selected vertices."""
+    if source.mode == "EDIT":
+        source.update_from_editmode()
+    mesh = source.data
+    chosen = np.empty(len(mesh.vertices), dtype=bool)
+    mesh.vertices.foreach_get("select", chosen)
+    if not chosen.any():
+        raise UserError("{name} has no selected vertices", name=source.name)
+    points = arrays.positions(mesh)[chosen]
+    low, high = points.min(axis=0), points.max(axis=0)
+    world = matrix_of(source)
+    scales = np.linalg.norm(world[:3, :3], axis=0)
+    least = 0.1 * size / np.where(scales > 0, scales, 1.0)  # a single vertex still makes a box
+    box = np.eye(4)
+    box[:3, :3] = np.diag(np.maximum(1.05 * (high - low) / 2, least))
+    box[:3, 3] = (low + high) / 2
+    return world @ box
+
+
+def mirror(context, source, entry, axis):
+    """A new handle like this one on the other side of the source's axis (0, 1 or 2)."""
+    flip = np.eye(4)
+    flip[axis, axis] = -1.0
+    world = matrix_of(source)
+    group = bpy.utils.flip_name(entry.group) if entry.kind == "GROUP" else ""
+    if group and group not in source.vertex_groups:
+        raise UserError("{name} has no vertex group {group}", name=source.name, group=group)
+    rest = flip @ np.array(entry.rest, dtype=np.float64).reshape(4, 4) @ flip
+    now = flip @ np.linalg.inv(world) @ matrix_of(entry.empty) @ flip
+    name, size = entry.empty.name, entry.empty.empty_display_size
+    flipped = bpy.utils.flip_name(name)
+    weight, kind = entry.weight, entry.kind
+    empty = make_empty(context, source, Matrix((world @ now).tolist()), size)
+    empty.name = flipped if flipped != name else f"{name}_mirrored"
+    made = add(source, empty, kind)
+    made.rest, made.group, made.weight = rest.ravel(), group, weight
+    return made
 
 
 def reset(source, entry):
@@ -128,14 +180,18 @@ def remove(source, index):
     ours.active_handle = max(0, min(ours.active_handle, len(ours.handles) - 1))
 
 
+COUNTED = 4000  # samples of the surface of which a handle's share is told
+
+
 def count_inside(context, source):
-    """Stores how many of the shown vertices each handle holds at rest."""
-    with arrays.evaluated_mesh(context, source) as mesh:
-        vertices = arrays.positions(mesh)
+    """Stores how many of some thousand points of the surface each handle holds at rest."""
+    mesh = arrays.read(context, source)
+    points = native.library().sample_mesh(mesh.vertices, mesh.triangles, count=COUNTED, seed=0).points
     for entry in used(source):
         if entry.kind == "GROUP":
-            held = groups.vertex_weights(context, source, entry.group) >= groups.HELD
-        else:
-            box = np.array(entry.rest, dtype=np.float64).reshape(4, 4)
-            held = (np.abs((vertices - box[:3, 3]) @ np.linalg.inv(box[:3, :3]).T) <= 1).all(axis=1)
-        entry.inside = int(held.sum()) if entry.kind != "POINT" else -1
+            weights = groups.vertex_weights(context, source, entry.group)
+            entry.inside = int((groups.at_points(mesh.vertices, weights, points) >= groups.HELD).sum())
+            continue
+        box = np.array(entry.rest, dtype=np.float64).reshape(4, 4)
+        held = (np.abs((points - box[:3, 3]) @ np.linalg.inv(box[:3, :3]).T) <= 1).all(axis=1)
+        entry.inside = int(held.sum()) if entry.kind == "CUBE" else -1

@@ -12,6 +12,7 @@ from ..core import jobs, native
 from ..core.errors import UserError
 from ..core.stages import JobCancelled
 from . import lookup, preview
+from .language import translated
 
 TICK = 0.1  # seconds between looks at the worker
 BUDGET = 0.02  # seconds that the main thread works at once
@@ -40,10 +41,9 @@ class JobOperator:
 
     @classmethod
     def poll(cls, context):
-        reason = native.problem() or lookup.refusal(lookup.source_of(context))
-        reason = reason or ("Wait for the running job, or cancel it" if jobs.running() else "")
+        reason = native.problem() or lookup.refusal(lookup.source_of(context)) or busy()
         if reason:
-            cls.poll_message_set(reason)
+            cls.poll_message_set(translated(reason))
         return not reason
 
     def sources(self, context):
@@ -57,7 +57,7 @@ class JobOperator:
         meshes = [item for item in within if item.type == "MESH"]
         owners = [lookup.settings_of(item).result_of or item for item in meshes]
         found = list(dict.fromkeys(owners))
-        self.failures += [lookup.refusal(item) for item in found if lookup.refusal(item)]
+        self.failures += [translated(lookup.refusal(item)) for item in found if lookup.refusal(item)]
         return [item for item in found if not lookup.refusal(item)]
 
     def prepare(self, context):
@@ -68,7 +68,7 @@ class JobOperator:
             try:
                 items.append(self.plan(context, source))
             except (UserError, ValueError) as error:
-                self.failures.append(str(error))
+                self.failures.append(translated(error))
         return jobs.Job(self.title, items, native.library().Task)
 
     def course(self, context):
@@ -137,7 +137,7 @@ class JobOperator:
             redraw(context, "WINDOW")
         self._looks = looks
         redraw(context, "UI")
-        context.workspace.status_text_set(f"{job.message}  {job.fraction:.0%}  (ESC cancels)")
+        context.workspace.status_text_set(f"{job.message}  {job.fraction:.0%}  {translated('(ESC cancels)')}")
 
     def cancel(self, context):
         """Blender ends the operator: its window closes or a file is loaded."""
@@ -159,11 +159,11 @@ class JobOperator:
             if outcome.cancelled:
                 cancelled = True
             elif outcome.error:
-                self.failures.append(f"{outcome.item.label}: {outcome.error}")
+                self.failures.append(f"{outcome.item.label}: {translated(outcome.error)}")
             else:
                 cancelled |= yield from self.apply_one(outcome)
         if cancelled and not self.successes and not self.failures:
-            self.note("INFO", f"{self.title} cancelled")
+            self.note("INFO", translated("{job} cancelled", job=translated(self.title)))
             return {"CANCELLED"}
         for text in self.successes:
             self.note("INFO", text)
@@ -177,9 +177,10 @@ class JobOperator:
             text = outcome.item.apply(outcome.value)
             if isinstance(text, types.GeneratorType):
                 text = yield from text
-            self.successes.append(f"{outcome.item.label}: {text} in {outcome.seconds:.1f} s")
+            took = translated("in {seconds} s", seconds=f"{outcome.seconds:.1f}")
+            self.successes.append(f"{outcome.item.label}: {text} {took}")
         except UserError as error:
-            self.failures.append(str(error))
+            self.failures.append(translated(error))
         except JobCancelled:
             return True
         return False
@@ -187,6 +188,11 @@ class JobOperator:
     def note(self, level, text):
         jobs.note(level, text)
         self.report({level}, text)
+
+
+def busy():
+    """Why nothing can be started while a job runs; None when none does."""
+    return UserError("Wait for the running job, or cancel it") if jobs.running() else None
 
 
 def redraw(context, *kinds):

@@ -8,6 +8,7 @@ import bpy
 from ..core import jobs
 from ..core.errors import UserError
 from . import live_result
+from .language import translated
 from .live_session import Changed, Session
 from .lookup import settings_of
 
@@ -62,7 +63,8 @@ def update(context, wait=0.0, refined=False):
         except (UserError, ValueError, ReferenceError) as error:
             _sessions.pop(uid, None)
             session.follower.stop()
-            jobs.note("ERROR", f"{session.source.name}: {error}; live mode ended")
+            told = translated("{error}; live mode ended", error=translated(error))
+            jobs.note("ERROR", f"{session.source.name}: {told}")
             with contextlib.suppress(UserError, ReferenceError):
                 live_result.drop(session.source.get())
 

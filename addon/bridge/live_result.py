@@ -52,7 +52,7 @@ def keep(context, source, kind):
     """Turns the live result into an ordinary one of that kind; returns it."""
     item = of(source)
     if item is None:
-        raise UserError(f"{source.name} has no live result")
+        raise UserError("{name} has no live result", name=source.name)
     restore(source)
     mesh = item.data
     bpy.data.objects.remove(item)

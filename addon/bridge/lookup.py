@@ -17,7 +17,7 @@ class ObjectId:
         for item in bpy.data.objects:
             if item.session_uid == self.uid:
                 return item
-        raise UserError(f"{self.name} was deleted while it was worked on")
+        raise UserError("{name} was deleted while it was worked on", name=self.name)
 
 
 def settings_of(item):
@@ -43,12 +43,12 @@ def source_of(context):
     return ours.result_of if ours.result_of is not None else active
 
 
-def refusal(item):
-    """Why an object cannot be worked on, or an empty text."""
+def refusal(item, in_edit_mode=False):
+    """Why an object cannot be worked on, as a UserError; None where it can."""
     if item is None:
-        return "Select a mesh object"
+        return UserError("Select a mesh object")
     if item.type != "MESH":
-        return f"{item.name} is no mesh object"
-    if item.mode == "EDIT":
-        return f"{item.name} is in Edit Mode; leave it first"
-    return ""
+        return UserError("{name} is no mesh object", name=item.name)
+    if item.mode == "EDIT" and not in_edit_mode:
+        return UserError("{name} is in Edit Mode; leave it first", name=item.name)
+    return None

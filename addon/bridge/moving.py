@@ -9,6 +9,7 @@ import numpy as np
 from ..core.errors import UserError
 from ..core.jobs import Item
 from .delivery import deliver, refuse
+from .language import translated
 from .preview import Preview
 from .settings import chosen
 from .work import read_surface, settings_of
@@ -60,11 +61,13 @@ def plan_move(context, operator, source, kind, samples, seed, solve):
 
 
 def describe(item, report):
-    figures = [f"{item.name}"]
+    figures = [item.name]
     if "energy" in report:
-        figures.append(f"energy {report['energy']:.4g}")
+        figures.append(translated("energy {value}", value=f"{report['energy']:.4g}"))
     if report.get("handle_error_mean"):
-        figures.append(f"handles off by {report['handle_error_mean']:.2g} on average")
+        figures.append(
+            translated("handles off by {value} on average", value=f"{report['handle_error_mean']:.2g}")
+        )
     if report.get("flipped_share"):
-        figures.append(f"{report['flipped_share']:.1%} folded")
+        figures.append(translated("{share} folded", share=f"{report['flipped_share']:.1%}"))
     return ", ".join(figures)

@@ -11,13 +11,8 @@ from .lookup import settings_of, source_of
 
 CORNERS = np.array([(x, y, z, 1.0) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 EDGES = [(a, b) for a in range(8) for b in range(a) if (CORNERS[a] != CORNERS[b]).sum() == 1]
-PALETTE = [(0.27, 0.55, 1.0), (1.0, 0.42, 0.30), (0.35, 0.80, 0.40), (0.85, 0.45, 0.90), (1.0, 0.80, 0.25)]
 REST_ALPHA, NOW_ALPHA = 0.35, 0.95
 _handler = None
-
-
-def colour(index):
-    return PALETTE[index % len(PALETTE)]
 
 
 def box_lines(matrix):
@@ -29,14 +24,14 @@ def box_lines(matrix):
 def segments(source):
     """((r, g, b, alpha), line ends in world space) of all handles of a source."""
     found = []
-    for index, entry in enumerate(settings_of(source).handles):
+    for entry in settings_of(source).handles:
         if entry.empty is None or not entry.empty.visible_get():
             continue
         rest, now = handles.rest_box(source, entry), handles.box_now(entry.empty)
-        found.append(((*colour(index), REST_ALPHA), box_lines(rest)))
+        found.append(((*entry.colour, REST_ALPHA), box_lines(rest)))
         if not np.allclose(rest, now, atol=1e-6):
-            found.append(((*colour(index), NOW_ALPHA), box_lines(now)))
-            found.append(((*colour(index), NOW_ALPHA), [rest[:3, 3].tolist(), now[:3, 3].tolist()]))
+            found.append(((*entry.colour, NOW_ALPHA), box_lines(now)))
+            found.append(((*entry.colour, NOW_ALPHA), [rest[:3, 3].tolist(), now[:3, 3].tolist()]))
     return found
 
 

@@ -147,7 +147,7 @@ def shown_mesh(context, source, count):
     applied = bpy.data.meshes.new_from_object(evaluated, preserve_all_data_layers=True, depsgraph=depsgraph)
     if len(applied.vertices) != count:
         bpy.data.meshes.remove(applied)
-        raise UserError(f"{source.name} changed while it was worked on; run again")
+        raise UserError("{name} changed while it was worked on; run again", name=source.name)
     return applied
 
 

@@ -64,7 +64,7 @@ def custom(which, item, to_solve):
     if which == "AXES":
         return Style(np.concatenate([np.eye(3), -np.eye(3)]), to_solve @ pose(matrix_of(item))[:3, :3])
     if item.type != "MESH" or not len(item.data.polygons):
-        raise UserError(f"{item.name} has no faces that could give the style its normals")
+        raise UserError("{name} has no faces that could give the style its normals", name=item.name)
     normals = np.empty(3 * len(item.data.polygons), dtype=np.float32)
     item.data.polygons.foreach_get("normal", normals)
     across = np.linalg.inv(matrix_of(item)[:3, :3]).T  # normals transform by the inverse transpose
@@ -73,7 +73,10 @@ def custom(which, item, to_solve):
     found = np.unique(np.round(found / np.linalg.norm(found, axis=1, keepdims=True), 3), axis=0)
     if not 0 < len(found) <= MOST_NORMALS:
         raise UserError(
-            f"{item.name} has {len(found)} different face normals; from 1 to {MOST_NORMALS} make a style"
+            "{name} has {count} different face normals; from 1 to {most} make a style",
+            name=item.name,
+            count=len(found),
+            most=MOST_NORMALS,
         )
     return Style(found / np.linalg.norm(found, axis=1, keepdims=True), to_solve)
 
@@ -87,7 +90,7 @@ def region_weights(context, source, ours):
         held = material_weights(context, source, ours.region_material)
         weights = held if weights is None else weights * held
     if weights is not None and not weights.any():
-        raise UserError(f"the region of {source.name} holds no vertex")
+        raise UserError("the region of {name} holds no vertex", name=source.name)
     return weights
 
 
@@ -95,7 +98,9 @@ def material_weights(context, source, material):
     """(n,) 1 at the shown vertices of faces with that material."""
     slots = [index for index, slot in enumerate(source.material_slots) if slot.material == material]
     if not slots:
-        raise UserError(f"{source.name} does not use the material {material.name}")
+        raise UserError(
+            "{name} does not use the material {material}", name=source.name, material=material.name
+        )
     with arrays.evaluated_mesh(context, source) as mesh:
         numbers = np.empty(len(mesh.polygons), dtype=np.int32)
         counts, corners = np.empty_like(numbers), np.empty(len(mesh.loops), dtype=np.int32)

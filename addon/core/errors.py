@@ -2,4 +2,11 @@
 
 
 class UserError(Exception):
-    """What the user should read: which object, what is wrong, what to do."""
+    """What the user should read: which object, what is wrong, what to do.
+
+    A template with its values, so that the template can be translated where it is shown.
+    """
+
+    def __init__(self, template, **values):
+        super().__init__(template.format(**values) if values else template)
+        self.template, self.values = template, values

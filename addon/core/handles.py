@@ -43,7 +43,9 @@ def solve_handle(name, kind, rest_world, now_world, space, **further):
     to_solve = space.world_to_solve
     rest = to_solve @ rest_world
     if abs(np.linalg.det(rest[:3, :3])) <= 1e-18 * np.abs(rest[:3, :3]).max() ** 3:
-        raise UserError(f"{name}: its box is flat; give the Empty a size and a scale other than zero")
+        raise UserError(
+            "{name}: its box is flat; give the Empty a size and a scale other than zero", name=name
+        )
     if np.linalg.det(rest[:3, :3]) < 0:
         rest = rest @ MIRROR  # the same box, right-handed
     motion = to_solve @ rigid_motion(rest_world, now_world) @ space.solve_to_world
@@ -59,4 +61,4 @@ def require_held(counts):
     """`counts`: samples by handle name. UserError that names the handles that hold none."""
     empty = [name for name, count in counts.items() if count == 0]
     if empty:
-        raise UserError(f"no part of the surface lies in the rest region of {', '.join(empty)}")
+        raise UserError("no part of the surface lies in the rest region of {names}", names=", ".join(empty))

@@ -30,7 +30,7 @@ class Item:
 class Outcome:
     item: Item
     value: Any = None
-    error: str = ""
+    error: UserError | None = None
     cancelled: bool = False
     seconds: float = 0.0
 
@@ -150,15 +150,17 @@ def run_item(item, stages):
         outcome.value = item.work(stages)
     except JobCancelled:
         outcome.cancelled = True
-    except (UserError, ValueError, OSError) as error:
-        outcome.error = str(error)
+    except UserError as error:
+        outcome.error = error
+    except (ValueError, OSError) as error:
+        outcome.error = UserError("{error}", error=error)
     except MemoryError:
-        outcome.error = "not enough memory for these settings"
+        outcome.error = UserError("not enough memory for these settings")
     except Exception as error:
         if type(error).__name__ == "Cancelled":
             outcome.cancelled = True
         else:
-            outcome.error = f"{type(error).__name__}: {error}"
+            outcome.error = UserError("{error}", error=f"{type(error).__name__}: {error}")
             traceback.print_exc()
     outcome.seconds = time.monotonic() - begin
     return outcome

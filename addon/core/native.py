@@ -13,19 +13,20 @@ ADVICE = "Install arapfields-<version>-<platform>.zip of a release, not the sour
 
 def library():
     """The package `arapfields`; UserError when it cannot be used."""
-    text = problem()
-    if text:
-        raise UserError(text)
+    reason = problem()
+    if reason:
+        raise reason
     return sys.modules["arapfields"]
 
 
-_problem = None
+UNKNOWN = object()
+_problem = UNKNOWN
 
 
 def problem():
-    """Why the native library cannot be used, in one sentence; empty when it can."""
+    """Why the native library cannot be used, as a UserError; None when it can."""
     global _problem
-    if _problem is None:
+    if _problem is UNKNOWN:
         _problem = _try_import()
     return _problem
 
@@ -33,22 +34,24 @@ def problem():
 def forget():
     """Lets the next call of `problem` try again."""
     global _problem
-    _problem = None
+    _problem = UNKNOWN
 
 
 def _try_import():
     try:
         module = importlib.import_module("arapfields")
-        return "" if hasattr(module, "deform") else f"Another package named arapfields is installed. {ADVICE}"
+        if hasattr(module, "deform"):
+            return None
+        return UserError(f"Another package named arapfields is installed. {ADVICE}")
     except ModuleNotFoundError as error:
         return _missing(error)
     except Exception as error:  # a broken library must not keep the add-on from loading
-        return f"The native library cannot be loaded: {error}"
+        return UserError("The native library cannot be loaded: {error}", error=error)
 
 
 def _missing(error):
     if error.name == "arapfields":
-        return f"The native library is not part of this installation. {ADVICE}"
+        return UserError(f"The native library is not part of this installation. {ADVICE}")
     if error.name == "arapfields._native":
         package = (
             Path(sys.modules["arapfields"].__file__).parent if "arapfields" in sys.modules else _folder()
@@ -56,8 +59,12 @@ def _missing(error):
         served = sorted(path.name.split("-")[1] for path in package.glob("_native.cpython-*"))
         here = f"{sys.version_info.major}.{sys.version_info.minor}"
         which = ", ".join(f"{tag[0]}.{tag[1:]}" for tag in served) or "none"
-        return f"This build has no module for Python {here} (it has: {which}). Take a build for this Blender"
-    return f"The native library lacks {error.name}. {ADVICE}"
+        return UserError(
+            "This build has no module for Python {here} (it has: {which}). Take a build for this Blender",
+            here=here,
+            which=which,
+        )
+    return UserError(f"The native library lacks {{module}}. {ADVICE}", module=error.name)
 
 
 def _folder():
@@ -69,7 +76,7 @@ def report():
     """Lines about the library and the machine, for the preferences and for bug reports."""
     lines = [f"Python {platform.python_version()}, {platform.system()} {platform.machine()}"]
     if problem():
-        return [*lines, problem()]
+        return [*lines, str(problem())]
     native = library()
     lines.append(f"arapfields {native.__version__} in {Path(native.__file__).parent}")
     lines.append(f"{native.thread_count()} threads, kernels for {native.simd_level()}")

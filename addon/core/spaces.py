@@ -46,10 +46,10 @@ def space_of(matrix_world, name="object"):
     """The solve space of an object with this world matrix; UserError when its scale flattens it."""
     world = np.asarray(matrix_world, dtype=np.float64)
     if not np.isfinite(world).all():
-        raise UserError(f"{name}: its world matrix is not finite")
+        raise UserError("{name}: its world matrix is not finite", name=name)
     left, scales, right = np.linalg.svd(world[:3, :3])
     if scales[-1] <= FLAT * scales[0]:
-        raise UserError(f"{name}: its scale flattens it; give every axis a scale other than zero")
+        raise UserError("{name}: its scale flattens it; give every axis a scale other than zero", name=name)
     if scales[0] - scales[-1] <= EVEN * scales[0]:
         return Space(np.eye(4), world)
     scale = float(np.prod(scales) ** (1 / 3))

@@ -5,6 +5,7 @@ import bpy
 
 from ..bridge import handles, live_session, results
 from ..bridge.jobs import JobOperator
+from ..bridge.language import translated
 from ..bridge.lookup import ObjectId, refusal, source_of
 from ..core import jobs, native
 from ..core.errors import UserError
@@ -36,7 +37,7 @@ class ARAPFIELDS_OT_bake(JobOperator, bpy.types.Operator):
             return False
         source = source_of(context)
         if not refusal(source) and not handles.used(source):
-            cls.poll_message_set("Add a handle first")
+            cls.poll_message_set(translated("Add a handle first"))
             return False
         return True
 
@@ -47,10 +48,10 @@ class ARAPFIELDS_OT_bake(JobOperator, bpy.types.Operator):
         try:
             item = yield from self.read(context, job)
         except JobCancelled:
-            self.note("INFO", "Bake cancelled")
+            self.note("INFO", translated("{job} cancelled", job=translated(self.title)))
             return {"CANCELLED"}
         except (UserError, ValueError) as error:
-            self.note("ERROR", str(error))
+            self.note("ERROR", translated(error))
             return {"CANCELLED"}
         job.start([item])
         while not job.done:
@@ -68,7 +69,7 @@ class ARAPFIELDS_OT_bake(JobOperator, bpy.types.Operator):
             scene.frame_set(frames[0])
             session = live_session.Session(context, source, shown=False, follow=False)
             for number, frame in enumerate(frames):
-                job.outside(0.1 * number / len(frames), f"Reading frame {frame}")
+                job.outside(0.1 * number / len(frames), translated("Reading frame {frame}", frame=frame))
                 scene.frame_set(frame)
                 goals.append(session.goal_now(context, source))
                 yield False
@@ -84,7 +85,7 @@ class ARAPFIELDS_OT_bake(JobOperator, bpy.types.Operator):
             for number, goal in enumerate(goals):
                 if task.cancelled:
                     raise JobCancelled
-                task.report(number / len(goals), f"frame {frames[number]}")
+                task.report(number / len(goals), translated("frame {frame}", frame=frames[number]))
                 session.solve(goal, steps=30)
                 shapes.append(session.local(session.solver.field(session.rest)))
             return shapes
@@ -105,7 +106,7 @@ def add_keys(context, source, session, frames, shapes, job):
     kept = False
     try:
         for number in range(len(frames)):
-            job.outside(number / len(frames), f"Storing frame {frames[number]}")
+            job.outside(number / len(frames), translated("Storing frame {frame}", frame=frames[number]))
             results.add_frame(item, frames, number, shapes[number])
             yield False
         kept = True
@@ -113,7 +114,7 @@ def add_keys(context, source, session, frames, shapes, job):
         if not kept:
             with contextlib.suppress(ReferenceError):
                 results.discard(item)
-    return f"{len(frames)} frames baked"
+    return translated("{count} frames baked", count=len(frames))
 
 
 CLASSES = [ARAPFIELDS_OT_bake]

@@ -3,6 +3,7 @@ import bpy
 
 from ..bridge import groups, handles
 from ..bridge.jobs import JobOperator
+from ..bridge.language import translated
 from ..bridge.lookup import refusal, settings_of, source_of
 from ..bridge.moving import plan_move
 from ..bridge.settings import annotations, in_force, machine_options
@@ -36,7 +37,7 @@ class ARAPFIELDS_OT_deform(JobOperator, bpy.types.Operator):
             return False
         source = source_of(context)
         if not refusal(source) and not handles.used(source):
-            cls.poll_message_set("Add a handle first")
+            cls.poll_message_set(translated("Add a handle first"))
             return False
         return True
 

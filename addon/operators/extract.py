@@ -3,6 +3,7 @@ import bpy
 
 from ..bridge import results
 from ..bridge.jobs import JobOperator
+from ..bridge.language import translated
 from ..bridge.lookup import settings_of
 from ..bridge.settings import chosen
 from ..bridge.work import read_surface
@@ -38,7 +39,7 @@ class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):
             item = results.show(
                 bpy.context, owner, "EXTRACT", "SURFACE", results.surface_mesh(owner, *made), report
             )
-            return f"{item.name} with {len(made[1]):,} triangles"
+            return translated("{name} with {count} triangles", name=item.name, count=f"{len(made[1]):,}")
 
         return Item(source.name, work, apply)
 

@@ -4,6 +4,7 @@ import json
 import bpy
 
 from ..bridge.jobs import JobOperator
+from ..bridge.language import translated
 from ..bridge.lookup import settings_of
 from ..bridge.settings import annotations
 from ..bridge.work import read_surface
@@ -40,7 +41,7 @@ class ARAPFIELDS_OT_fit(JobOperator, bpy.types.Operator):
             ours = settings_of(surface.who.get())
             ours.fit_key = surface.key
             ours.fit_report = json.dumps(sdf.report)
-            return "surface fitted"
+            return translated("surface fitted")
 
         return Item(source.name, work, apply)
 

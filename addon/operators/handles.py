@@ -2,6 +2,8 @@
 import bpy
 
 from ..bridge import handles, lookup
+from ..bridge.language import translated
+from ..core import native
 from ..core.errors import UserError
 from ..names import Op
 from ..properties.handle import KINDS
@@ -12,15 +14,16 @@ class HandleOperator:
 
     bl_options = {"REGISTER", "UNDO"}
     needs_handle = True
+    in_edit_mode = False
 
     @classmethod
     def poll(cls, context):
         source = lookup.source_of(context)
-        reason = lookup.refusal(source)
+        reason = native.problem() or lookup.refusal(source, cls.in_edit_mode)
         if not reason and cls.needs_handle and not lookup.settings_of(source).handles:
             reason = "The object has no handle"
         if reason:
-            cls.poll_message_set(reason)
+            cls.poll_message_set(translated(reason))
         return not reason
 
     def execute(self, context):
@@ -28,7 +31,7 @@ class HandleOperator:
         try:
             self.report({"INFO"}, self.change(context, lookup.source_of(context)))
         except UserError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, translated(error))
             return {"CANCELLED"}
         return {"FINISHED"}
 
@@ -44,13 +47,17 @@ def chosen_entries(context, source):
 
 
 class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
-    """Make the selected Empties handles of the object, or make one at the 3D cursor"""
+    """Make the selected Empties handles of the object, or make a new box at the cursor or around vertices"""
 
     bl_idname = Op.ADD_HANDLE
     bl_label = "Add Handle"
     needs_handle = False
+    in_edit_mode = True
 
     kind: bpy.props.EnumProperty(items=KINDS, name="Kind", description="What of the surface the handle holds")
+    place: bpy.props.EnumProperty(
+        items=handles.PLACES, name="Place", description="Where the handle is", options={"SKIP_SAVE"}
+    )
     group: bpy.props.StringProperty(
         name="Vertex Group", description="The group to hold, for that kind; empty for the object's active one"
     )
@@ -58,14 +65,36 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
     def change(self, context, source):
         group = self.group or (source.vertex_groups.active.name if source.vertex_groups else "")
         if self.kind == "GROUP" and not group:
-            raise UserError(f"{source.name} has no vertex group")
+            raise UserError("{name} has no vertex group", name=source.name)
         empties = [item for item in context.selected_objects if item.type == "EMPTY"]
-        empties = empties or [handles.new_empty(context, source, self.kind, group)]
+        if not empties or self.place != "AUTO" or source.mode == "EDIT":
+            empties = [handles.new_empty(context, source, self.kind, group, self.place)]
         for empty in empties:
             entry = handles.add(source, empty, self.kind)
             entry.group = group if self.kind == "GROUP" else ""
         handles.count_inside(context, source)
-        return f"{len(empties)} handle{'s' if len(empties) > 1 else ''} of {source.name}"
+        return translated("{count} handles added to {name}", count=len(empties), name=source.name)
+
+
+class ARAPFIELDS_OT_mirror_handle(HandleOperator, bpy.types.Operator):
+    """Make handles like the selected ones on the other side of the object"""
+
+    bl_idname = Op.MIRROR_HANDLE
+    bl_label = "Mirror Handle"
+
+    axis: bpy.props.EnumProperty(
+        items=[(axis, axis, f"Across the object's {axis} axis") for axis in "XYZ"],
+        name="Axis",
+        description="Axis of the object across which to mirror",
+    )
+
+    def change(self, context, source):
+        entries = [entry.empty for entry in chosen_entries(context, source) if entry.empty is not None]
+        for empty in entries:
+            entry = lookup.settings_of(source).handles[handles.find(source, empty)]
+            handles.mirror(context, source, entry, "XYZ".index(self.axis))
+        handles.count_inside(context, source)
+        return translated("{count} handles mirrored", count=len(entries))
 
 
 class ARAPFIELDS_OT_set_rest(HandleOperator, bpy.types.Operator):
@@ -82,7 +111,7 @@ class ARAPFIELDS_OT_set_rest(HandleOperator, bpy.types.Operator):
             if entry.empty is not None:
                 handles.store_rest(source, entry)
         handles.count_inside(context, source)
-        return f"rest pose of {len(entries)} handles stored"
+        return translated("{count} rest poses stored", count=len(entries))
 
 
 class ARAPFIELDS_OT_reset_handle(HandleOperator, bpy.types.Operator):
@@ -98,7 +127,7 @@ class ARAPFIELDS_OT_reset_handle(HandleOperator, bpy.types.Operator):
         for entry in entries:
             if entry.empty is not None:
                 handles.reset(source, entry)
-        return f"{len(entries)} handles moved back"
+        return translated("{count} handles moved back", count=len(entries))
 
 
 class ARAPFIELDS_OT_remove_handle(HandleOperator, bpy.types.Operator):
@@ -117,11 +146,12 @@ class ARAPFIELDS_OT_remove_handle(HandleOperator, bpy.types.Operator):
             handles.remove(source, index)
             if self.delete and empty is not None:
                 bpy.data.objects.remove(empty)
-        return f"{len(rows)} handles removed"
+        return translated("{count} handles removed", count=len(rows))
 
 
 CLASSES = [
     ARAPFIELDS_OT_add_handle,
+    ARAPFIELDS_OT_mirror_handle,
     ARAPFIELDS_OT_set_rest,
     ARAPFIELDS_OT_reset_handle,
     ARAPFIELDS_OT_remove_handle,

@@ -2,6 +2,8 @@
 import bpy
 
 from ..bridge import handles, live
+from ..bridge.jobs import busy
+from ..bridge.language import translated
 from ..bridge.lookup import refusal, source_of
 from ..core import jobs, native
 from ..core.errors import UserError
@@ -27,11 +29,9 @@ class ARAPFIELDS_OT_live(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         source = source_of(context)
-        reason = native.problem() or refusal(source)
-        if not reason and jobs.running():
-            reason = "Wait for the running job, or cancel it"
+        reason = native.problem() or refusal(source) or busy()
         if reason:
-            cls.poll_message_set(reason)
+            cls.poll_message_set(translated(reason))
         return not reason
 
     def execute(self, context):
@@ -48,11 +48,13 @@ class ARAPFIELDS_OT_live(bpy.types.Operator):
             return {"FINISHED"}
         try:
             if self.kind == "DEFORM" and not handles.used(source):
-                raise UserError(f"{source.name} has no handle; add one in the panel's Handles section")
+                raise UserError(
+                    "{name} has no handle; add one in the panel's Handles section", name=source.name
+                )
             context.view_layer.update()
             live.begin(context, source, self.kind)
         except (UserError, ValueError) as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, translated(error))
             return {"CANCELLED"}
         if wait:
             live.update(context, wait)
@@ -72,7 +74,7 @@ class ARAPFIELDS_OT_live_keep(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         if not live.is_live(source_of(context)):
-            cls.poll_message_set("The object is not live")
+            cls.poll_message_set(translated("The object is not live"))
             return False
         return True
 
@@ -81,9 +83,9 @@ class ARAPFIELDS_OT_live_keep(bpy.types.Operator):
         try:
             item = live.end(context, source, keep=True)
         except UserError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, translated(error))
             return {"CANCELLED"}
-        self.report({"INFO"}, f"{source.name}: {item.name} kept")
+        self.report({"INFO"}, translated("{name} kept", name=item.name))
         return {"FINISHED"}
 
 

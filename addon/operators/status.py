@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
+from ..bridge.jobs import busy
+from ..bridge.language import translated
 from ..bridge.settings import fit_cache
 from ..core import jobs, native
 from ..names import Op
@@ -15,7 +17,7 @@ class ARAPFIELDS_OT_cancel(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         if jobs.running() is None:
-            cls.poll_message_set("No job is running")
+            cls.poll_message_set(translated("No job is running"))
         return jobs.running() is not None
 
     def execute(self, context):
@@ -31,12 +33,12 @@ class ARAPFIELDS_OT_clear_cache(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if jobs.running() is not None:
-            cls.poll_message_set("Wait for the running job, or cancel it")
-        return jobs.running() is None
+        if busy():
+            cls.poll_message_set(translated(busy()))
+        return not busy()
 
     def execute(self, context):
-        self.report({"INFO"}, f"{fit_cache().clear()} fitted surfaces deleted")
+        self.report({"INFO"}, translated("{count} fitted surfaces deleted", count=fit_cache().clear()))
         return {"FINISHED"}
 
 

@@ -3,13 +3,16 @@ import bpy
 
 from ..core.parameters import DEFORM
 from ..names import Op
-from .section import Section, live_buttons, settings_column
+from .section import Section, live_buttons, presets, settings_column
 
 
 class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
     bl_label = "Deform"
     bl_idname = "ARAPFIELDS_PT_deform"
     bl_order = 3
+
+    def draw_header_preset(self, context):
+        presets(self.layout, "deform")
 
     def fill(self, context, source, ours):
         layout = self.layout

@@ -42,6 +42,15 @@ def settings_column(layout, group, parameters, skip=()):
                 body.prop(group, parameter.name)
 
 
+def presets(layout, name):
+    """The user's own presets of a section, in its header."""
+    row = layout.row(align=True)
+    row.emboss = "NONE"
+    row.menu(f"ARAPFIELDS_MT_{name}_presets", text="", icon="PRESET")
+    row.operator(f"arapfields.{name}_preset", text="", icon="ADD")
+    row.operator(f"arapfields.{name}_preset", text="", icon="REMOVE").remove_active = True
+
+
 def live_buttons(layout, source, kind):
     """Live on and off, and while it is on a way to keep the shape."""
     on = live.is_live(source, kind)

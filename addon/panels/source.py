@@ -2,6 +2,7 @@
 import bpy
 
 from ..bridge import lookup
+from ..bridge.language import translated
 from ..core import jobs, native
 from .section import Section, wrapped
 from .status import draw_progress
@@ -20,7 +21,7 @@ class ARAPFIELDS_PT_source(Section, bpy.types.Panel):
     def fill(self, context, source, ours):
         layout = self.layout
         if native.problem():
-            wrapped(layout, native.problem(), icon="ERROR")
+            wrapped(layout, translated(native.problem()), icon="ERROR")
             return
         if jobs.running() is not None:
             draw_progress(layout, jobs.running())
@@ -29,7 +30,7 @@ class ARAPFIELDS_PT_source(Section, bpy.types.Panel):
             return
         layout.label(text=source.name, icon="MESH_DATA")
         if lookup.refusal(source):
-            wrapped(layout, lookup.refusal(source), icon="ERROR")
+            wrapped(layout, translated(lookup.refusal(source)), icon="ERROR")
         for text in remarks(source):
             wrapped(layout, text, icon="INFO")
 
@@ -38,11 +39,11 @@ def remarks(source):
     """What the user should know about how the source is read."""
     shown = [modifier for modifier in source.modifiers if modifier.show_viewport]
     if shown:
-        yield f"Read with its {len(shown)} modifier{'s' if len(shown) > 1 else ''} applied"
+        yield translated("Read with {count} modifiers applied", count=len(shown))
     if source.data.shape_keys:
-        yield "Read with its shape keys as they are set"
+        yield translated("Read with its shape keys as they are set")
     if not len(source.data.polygons) and not shown:
-        yield "The mesh has no faces"
+        yield translated("The mesh has no faces")
 
 
 CLASSES = [ARAPFIELDS_PT_source]

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
+from ..bridge.language import translated
 from ..core import jobs
 from ..names import Op
 from .section import Section, wrapped
@@ -11,10 +12,13 @@ ICONS = {"INFO": "CHECKMARK", "WARNING": "ERROR", "ERROR": "CANCEL"}
 def draw_progress(layout, job):
     """The running job, at the top of the panel where it is seen: how far, what, how long, and the way out."""
     box = layout.box()
-    box.progress(factor=job.fraction, text=f"{job.title} {job.fraction:.0%}")
+    box.progress(factor=job.fraction, text=f"{translated(job.title)} {job.fraction:.0%}")
     wrapped(box, job.message)
     left = job.remaining
-    box.label(text=f"{job.elapsed:.0f} s" + (f", about {left:.0f} s left" if left is not None else ""))
+    text = f"{job.elapsed:.0f} s"
+    if left is not None:
+        text += translated(", about {seconds} s left", seconds=f"{left:.0f}")
+    box.label(text=text, translate=False)
     box.operator(Op.CANCEL, icon="X")
 
 
@@ -28,7 +32,9 @@ class ARAPFIELDS_PT_status(Section, bpy.types.Panel):
         layout = self.layout
         job = jobs.running()
         if job is not None:
-            layout.label(text=f"{job.title} is running (see the top)", icon="TIME")
+            layout.label(
+                text=translated("{job} is running (see the top)", job=translated(job.title)), icon="TIME"
+            )
         for level, text in jobs.notes():
             wrapped(layout, text, icon=ICONS[level])
         if job is None and not jobs.notes():

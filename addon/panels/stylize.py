@@ -1,9 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..core.styles import STYLIZE
+from ..bridge.pictures import icon
+from ..core.styles import CUSTOM, STYLIZE
 from ..names import Op
-from .section import Section, live_buttons, settings_column
+from ..properties.settings import STYLE_ITEMS
+from .section import Section, live_buttons, presets, settings_column
+
+
+class ARAPFIELDS_MT_styles(bpy.types.Menu):
+    """The styles, with a picture of each"""
+
+    bl_label = "Style"
+
+    def draw(self, context):
+        flow = self.layout.grid_flow(columns=2, row_major=True)
+        for identifier, label, _ in STYLE_ITEMS:
+            plain = "EMPTY_AXIS" if identifier in CUSTOM else "NONE"
+            picture = {"icon_value": icon(identifier)} if icon(identifier) else {"icon": plain}
+            flow.operator(Op.SET_STYLE, text=label, **picture).style = identifier
 
 
 class ARAPFIELDS_PT_stylize(Section, bpy.types.Panel):
@@ -12,17 +27,31 @@ class ARAPFIELDS_PT_stylize(Section, bpy.types.Panel):
     bl_order = 4
     bl_options = {"DEFAULT_CLOSED"}
 
+    def draw_header_preset(self, context):
+        presets(self.layout, "stylize")
+
     def fill(self, context, source, ours):
-        layout = self.layout
-        layout.prop(ours.stylize, "style")
-        layout.prop(ours.stylize, "frame")
-        if ours.stylize.frame == "EMPTY":
-            layout.prop(ours.stylize, "frame_object")
-        layout.prop_search(ours.stylize, "region", source, "vertex_groups")
-        layout.prop(ours.stylize, "use_handles")
-        settings_column(layout, ours.stylize, STYLIZE)
+        layout, style = self.layout, ours.stylize
+        label = next(label for identifier, label, _ in STYLE_ITEMS if identifier == style.style)
+        if icon(style.style):
+            row = layout.row()
+            row.alignment = "CENTER"
+            row.template_icon(icon(style.style), scale=4.0)
+        layout.menu("ARAPFIELDS_MT_styles", text=label)
+        if style.style in CUSTOM:
+            layout.prop(style, "style_object")
+        else:
+            layout.prop(style, "frame")
+            if style.frame == "EMPTY":
+                layout.prop(style, "frame_object")
+        layout.prop_search(style, "region", source, "vertex_groups")
+        layout.prop(style, "region_material")
+        layout.prop(style, "use_handles")
+        settings_column(layout, style, STYLIZE)
+        layout.prop(ours, "output")
+        layout.prop(ours, "target")
         layout.operator(Op.STYLIZE, icon="MOD_EDGESPLIT")
         live_buttons(layout, source, "STYLIZE")
 
 
-CLASSES = [ARAPFIELDS_PT_stylize]
+CLASSES = [ARAPFIELDS_MT_styles, ARAPFIELDS_PT_stylize]

@@ -6,13 +6,16 @@ import bpy
 from ..bridge.settings import fit_cache
 from ..core.fitting import FIT
 from ..names import Op
-from .section import Section, settings_column
+from .section import Section, presets, settings_column
 
 
 class ARAPFIELDS_PT_surface(Section, bpy.types.Panel):
     bl_label = "Implicit Surface"
     bl_idname = "ARAPFIELDS_PT_surface"
     bl_order = 1
+
+    def draw_header_preset(self, context):
+        presets(self.layout, "fit")
 
     def fill(self, context, source, ours):
         layout = self.layout

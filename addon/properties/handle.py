@@ -23,6 +23,14 @@ class ARAPFIELDS_PG_handle(bpy.types.PropertyGroup):
         min=0.0,
         soft_max=10.0,
     )
+    colour: bpy.props.FloatVectorProperty(
+        name="Colour",
+        description="Colour of the handle's boxes in the viewport",
+        subtype="COLOR",
+        default=(0.27, 0.55, 1.0),
+        min=0.0,
+        max=1.0,
+    )
     rest: bpy.props.FloatVectorProperty(
         size=16,
         name="Rest Box",
@@ -30,7 +38,8 @@ class ARAPFIELDS_PG_handle(bpy.types.PropertyGroup):
     )
     inside: bpy.props.IntProperty(
         name="Points Inside",
-        description="Vertices in the rest box when it was stored; -1 when not counted",
+        description="How many of 4000 points of the surface the handle held when its rest pose was stored; "
+        "-1 when not counted",
         default=-1,
     )
 

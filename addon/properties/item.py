@@ -93,6 +93,12 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
         name="Fit Report", description="Figures of the object's last fit, as JSON"
     )
 
+    @property
+    def owner(self):
+        """The settings of the object that this one, a handle or a result, belongs to; its own for others."""
+        source = self.handle_of or self.result_of
+        return getattr(source, PROPERTY) if source is not None else self
+
 
 CLASSES = [ARAPFIELDS_PG_result, ARAPFIELDS_PG_object]
 
