@@ -5,7 +5,7 @@ import atexit
 
 import bpy
 
-from . import panels, preferences
+from . import commands, panels, preferences
 from .bridge import jobs, overlay, pictures, preview
 from .bridge import live as live_mode
 from .operators import bake, deform, extract, fit, handles, live, presets, status, styles, stylize
@@ -15,6 +15,7 @@ MODULES = [
     *(handle, settings, item, preferences, jobs, live_mode, overlay, preview, pictures),
     *(fit, handles, deform, live, bake, stylize, styles, presets, extract, status),
     *panels.SECTIONS,
+    commands,
 ]
 
 

@@ -67,10 +67,10 @@ def build_wheel(options, version, headers, work):
     if foreign:
         raise RuntimeError(f"the libraries need what would not be shipped: {', '.join(foreign)}")
     print("needs glibc {}.{} or newer".format(*libraries.glibc_floor([shipped[0], *modules])))
-    scripts = [
-        path for path in package.iterdir() if path.suffix in (".py", ".pyi") or path.name == "py.typed"
-    ]
-    files = {f"arapfields/{path.name}": path for path in [*shipped, *modules, *scripts]}
+    files = {f"arapfields/{path.name}": path for path in [*shipped, *modules]}
+    for path in package.rglob("*"):
+        if path.suffix in (".py", ".pyi") or path.name == "py.typed":
+            files[f"arapfields/{path.relative_to(package).as_posix()}"] = path
     licence = (ROOT / "LICENSE").read_text()
     return wheel.write_wheel(options.output / "wheels", "arapfields", version, WHEEL_TAG, files, licence)
 

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes and .blend files by Blender, in the file's own coordinates; outputs appear whole."""
+
+import contextlib
+import os
+import re
+import tempfile
+from pathlib import Path
+
+import bpy
+
+from ..core.errors import UserError
+from .parser import FORMATS
+
+AXES = {"forward_axis": "Y", "up_axis": "Z"}  # coordinates stay as they are in the file
+READ = {
+    ".ply": lambda path: bpy.ops.wm.ply_import(filepath=path, **AXES),
+    ".obj": lambda path: bpy.ops.wm.obj_import(filepath=path, **AXES),
+    ".stl": lambda path: bpy.ops.wm.stl_import(filepath=path, **AXES),
+}
+
+
+def check(path):
+    """The path with a suffix that can be read and written; UserError otherwise."""
+    if path.suffix.lower().lstrip(".") not in FORMATS:
+        known = ", ".join(f".{name}" for name in FORMATS)
+        raise UserError(f"{path}: unknown extension; known are {known}")
+    return path
+
+
+def read(path):
+    """Makes the file's content all that is in this Blender."""
+    if not check(path).is_file():
+        raise UserError(f"{path}: no such file")
+    try:
+        if path.suffix.lower() == ".blend":
+            bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False)
+            return
+        bpy.ops.wm.read_homefile(use_empty=True)
+        READ[path.suffix.lower()](str(path))
+    except RuntimeError as error:
+        reason = str(error).removeprefix("Error: ").strip()
+        raise UserError(f"{path}: Blender cannot read it ({reason})") from error
+    if not any(item.type == "MESH" for item in bpy.data.objects):
+        raise UserError(f"{path}: holds no mesh, or is damaged")
+
+
+def write(path, items):
+    """Writes the objects to a mesh file, or everything to a .blend: all of it or nothing."""
+    check(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.suffix.lower() == ".blend":
+        write_blend(path)
+        return
+    for other in list(bpy.context.selected_objects):
+        other.select_set(False)
+    for item in items:
+        item.hide_set(False)
+        item.hide_viewport = False
+        item.select_set(True)
+    with tempfile.TemporaryDirectory(prefix=".arapfields-", dir=path.parent) as folder:
+        partial = Path(folder) / path.name
+        export(partial, items)
+        if not partial.is_file() or not partial.stat().st_size:
+            raise UserError(f"{path}: Blender wrote nothing")
+        materials = partial.with_suffix(".mtl")
+        if materials.exists():
+            materials.write_text(relative_textures(materials.read_text(errors="replace"), path.parent))
+            os.replace(materials, path.with_suffix(".mtl"))
+        os.replace(partial, path)
+
+
+def export(path, items):
+    where, suffix = {"filepath": str(path), **AXES, "export_selected_objects": True}, path.suffix.lower()
+    if suffix == ".ply":
+        bpy.ops.wm.ply_export(**where, apply_modifiers=False)
+    elif suffix == ".stl":
+        bpy.ops.wm.stl_export(**where, apply_modifiers=False)
+    else:
+        materials = any(item.data.materials for item in items)
+        further = {"apply_modifiers": False, "path_mode": "ABSOLUTE", "export_materials": materials}
+        bpy.ops.wm.obj_export(**where, **further)
+
+
+def relative_textures(text, folder):
+    """Texture paths of a material file, told from the folder where it will lie."""
+
+    def relative(match):
+        path = Path(match[2].strip())
+        with contextlib.suppress(ValueError):  # another drive
+            path = Path(os.path.relpath(path, folder)) if path.is_absolute() else path
+        return f"{match[1]}{path.as_posix()}"
+
+    return re.sub(r"^(\s*map_\w+\s+(?:-\w+\s+\S+\s+)*)(\S.*)$", relative, text, flags=re.M)
+
+
+def write_blend(path):
+    """Beside its place first, so that paths relative to the file hold."""
+    partial = path.with_name(f".arapfields-{os.getpid()}-{path.name}")
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=str(partial), copy=True, relative_remap=True)
+        os.replace(partial, path)
+    except RuntimeError as error:
+        raise UserError(f"{path}: {error}") from error
+    finally:
+        partial.unlink(missing_ok=True)

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How to start another Blender like this one: a batch gives each file a process of its own."""
+
+import os
+import sys
+from pathlib import Path
+
+
+class Launch:
+    """The way in which this Blender was started, to start others for single files."""
+
+    def __init__(self, script=None):
+        self.script = Path(script).resolve() if script else None
+
+    def command(self, verb, arguments):
+        """The command line that runs a verb on one file."""
+        import bpy
+
+        if self.script and bpy.app.module:
+            return [sys.executable, str(self.script.with_name(f"{verb}.py")), *arguments]
+        given = list(sys.argv[1:])
+        if self.script:
+            place = given.index("--")
+            before = [*given[:place], "--"]
+            at = next(i for i, text in enumerate(before) if text in ("-P", "--python")) + 1
+            before[at] = str(self.script.with_name(f"{verb}.py"))
+            return [bpy.app.binary_path, *before, *arguments]
+        at = next(i for i, text in enumerate(given) if text in ("-c", "--command"))
+        return [bpy.app.binary_path, *given[: at + 2], verb, *arguments]
+
+    def environment(self, jobs):
+        """The processors shared between so many Blenders at work."""
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        wanted = os.environ.get("OMP_NUM_THREADS") or str(max(1, cores // jobs))
+        return {**os.environ, "OMP_NUM_THREADS": wanted, "PYTHONUNBUFFERED": "1"}

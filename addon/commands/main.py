@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One command from its arguments to its exit code."""
+
+import contextlib
+import signal
+import sys
+
+from ..core import native
+from ..core.errors import UserError
+from .launch import Launch
+from .parser import parse
+
+
+def run(arguments, script=None):
+    """Runs one verb and returns the exit code; errors are one line on stderr.
+
+    `script` is the Python file that Blender was started with; None for a command of Blender's own.
+    """
+    try:
+        options = parse(arguments)
+    except SystemExit as stop:
+        return stop.code or 0
+    with interruptible():
+        try:
+            if native.problem():
+                raise UserError(native.problem())
+            return verb(options.verb)(options, Launch(script))
+        except KeyboardInterrupt:
+            return fail("interrupted", 130)
+        except (UserError, OSError, ValueError) as error:
+            return fail(error, 2)
+
+
+def verb(name):
+    """The function behind a verb; bpy is imported for single files alone."""
+    if name == "batch":
+        from .batch import run_batch
+
+        return run_batch
+    from .single import run_single
+
+    return run_single
+
+
+def fail(reason, code):
+    print(f"arapfields: {' '.join(str(reason).split())}", file=sys.stderr, flush=True)
+    return code
+
+
+@contextlib.contextmanager
+def interruptible():
+    """Ctrl-C and SIGTERM raise KeyboardInterrupt: Blender catches the former for purposes of its own."""
+    both = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, signal.default_int_handler) for number in both]
+    try:
+        yield
+    finally:
+        for number, handler in zip(both, before, strict=True):
+            signal.signal(number, handler if handler is not None else signal.SIG_DFL)

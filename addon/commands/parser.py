@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The verbs, their flags and their help; the solves' flags come from the tables that make the panel."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from ..core.fitting import QUALITIES
+from ..core.parameters import DEFORM
+from ..core.styles import STYLES, STYLIZE
+
+FORMATS = ("ply", "obj", "stl", "blend")
+PARAMETERS = {"deform": DEFORM, "stylize": STYLIZE}
+FLAGS = {"deform": ("handles",), "stylize": ("style", "frame")}  # of one verb, beside its parameters
+SHARED = ("result", "surface", "resolution", "quality")
+FILE = "file: .ply, .obj, .stl, or a .blend, in which each object's own settings and handles count"
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """Errors are one line, with exit code 2."""
+
+    def error(self, message):
+        print(f"{self.prog}: {message} (see {self.prog} --help)", file=sys.stderr)
+        raise SystemExit(2)
+
+
+def parse(arguments):
+    """The parsed arguments; `solve` holds what was given of a solve's settings."""
+    options = parser().parse_args(arguments)
+    verb = options.verb
+    if verb == "batch":
+        wanted = [name for name, given in (("stylize", options.style), ("deform", options.deform)) if given]
+        if len(wanted) != 1:
+            parser().error("batch: say what to do, either --style NAME or --deform")
+        (options.solve_verb,) = wanted
+        refuse_foreign(options)
+    else:
+        options.solve_verb = verb
+    if options.handles and options.solve_verb != "deform":
+        parser().error("--handles belongs to --deform")
+    return options
+
+
+def refuse_foreign(options):
+    """A flag of the other verb would be ignored silently."""
+    other = "deform" if options.solve_verb == "stylize" else "stylize"
+    known = {p.name for p in PARAMETERS[options.solve_verb]}
+    foreign = [p.name for p in PARAMETERS[other] if p.name not in known]
+    for name in [*foreign, *FLAGS[other]]:
+        if getattr(options, name, None) is not None:
+            parser().error(f"--{name.replace('_', '-')} has no meaning for {options.solve_verb}")
+
+
+def solve_settings(options):
+    """What was given of the solve, by name: the same settings, the same result."""
+    names = [*(p.name for p in PARAMETERS[options.solve_verb]), *FLAGS[options.solve_verb], *SHARED]
+    return {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+
+
+def parser():
+    made = OneLineParser(
+        prog="arapfields",
+        description="Deform and stylize meshes in a Blender without a window.",
+        epilog="Exit codes: 0 done, 1 something failed, 2 bad input or usage, 130 interrupted.",
+    )
+    verbs = made.add_subparsers(dest="verb", metavar="VERB", required=True, parser_class=OneLineParser)
+    for name, text in (
+        ("deform", "deform the meshes of one file under handles"),
+        ("stylize", "turn the meshes of one file towards a style"),
+    ):
+        one = verbs.add_parser(name, help=text, description=text)
+        one.add_argument("-i", "--input", type=Path, required=True, metavar="FILE", help=FILE)
+        one.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="same formats")
+        add_solve_flags(one, [name])
+        one.add_argument("--objects", nargs="+", metavar="NAME", help="only these objects of a .blend")
+        one.add_argument("--report", type=Path, metavar="FILE", help="figures for each object, as JSON")
+        one.add_argument("--quiet", action="store_true", help="no progress")
+    add_batch(verbs)
+    return made
+
+
+def add_batch(verbs):
+    text = "do the same to every file of a folder, several at once; what is done already is skipped"
+    batch = verbs.add_parser("batch", help=text, description=text)
+    batch.add_argument("-i", "--input", type=Path, required=True, metavar="FOLDER")
+    batch.add_argument("-o", "--output", type=Path, required=True, metavar="FOLDER")
+    batch.add_argument("--deform", action="store_true", help="deform, under --handles or a .blend's own")
+    add_solve_flags(batch, ["stylize", "deform"])
+    batch.add_argument("-j", "--jobs", type=count, default=1, metavar="N", help="files at a time [1]")
+    batch.add_argument("--format", choices=FORMATS, help="of the results [each input's own]")
+    batch.add_argument("--pattern", default="*", metavar="GLOB", help="which files, such as 'chair*.ply'")
+    batch.add_argument("--recursive", action="store_true", help="folders within the folder too")
+    batch.add_argument("--again", action="store_true", help="also what is done already")
+    batch.add_argument("--dry-run", action="store_true", help="say what would be done, and do nothing")
+    batch.add_argument("--limit", type=float, metavar="SECONDS", help="give up a file after so long")
+
+
+def add_solve_flags(one, verbs):
+    """Flags of the solves; each defaults to None: to the object's own setting."""
+    group = one.add_argument_group("solve")
+    if "stylize" in verbs:
+        names = ", ".join(name for name, _ in STYLES)
+        group.add_argument("--style", type=style, metavar="NAME", help=names)
+        group.add_argument("--frame", choices=("object", "world"), help="whose axes the style stands along")
+    if "deform" in verbs:
+        group.add_argument(
+            "--handles", type=Path, metavar="FILE", help="handles as JSON, in the file's space"
+        )
+    if "deform" not in verbs:
+        one.set_defaults(handles=None)
+    if "stylize" not in verbs:
+        one.set_defaults(style=None, frame=None)
+    group.add_argument("--result", choices=("warp", "surface"), help="the mesh itself moved, or a new one")
+    group.add_argument("--surface", choices=("auto", "fit", "mesh"), help="what is taken for the rest shape")
+    group.add_argument("--resolution", type=count, metavar="N", help="cells of a new mesh's grid")
+    group.add_argument("--quality", choices=[name.lower() for name in QUALITIES], help="of a fit")
+    done = set()
+    for verb in verbs:
+        for parameter in PARAMETERS[verb]:
+            if parameter.name not in done:
+                add_parameter(group, parameter)
+                done.add(parameter.name)
+
+
+def add_parameter(group, p):
+    flag = "--" + p.name.replace("_", "-")
+    text = {"dest": p.name, "default": None, "help": p.tip.replace("%", "%%")}
+    if p.items:
+        group.add_argument(flag, choices=[item[0] for item in p.items], **text)
+    elif isinstance(p.default, bool):
+        group.add_argument(flag, action=argparse.BooleanOptionalAction, **text)
+    else:
+        kind = int if isinstance(p.default, int) else float
+        group.add_argument(flag, type=within(p, kind), metavar="N" if kind is int else "X", **text)
+
+
+def within(p, kind):
+    def number(text):
+        try:
+            value = kind(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"{text!r} is no number") from None
+        if not p.low <= value <= p.high:
+            raise argparse.ArgumentTypeError(f"{text} is not within {p.low} to {p.high}")
+        return value
+
+    return number
+
+
+def count(text):
+    if not text.isdigit() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of at least 1")
+    return int(text)
+
+
+def style(text):
+    """A style's native name; hyphens and underscores stand for blanks."""
+    name = text.lower().replace("-", " ").replace("_", " ")
+    if name not in {known for known, _ in STYLES}:
+        known = ", ".join(known for known, _ in STYLES)
+        raise argparse.ArgumentTypeError(f"{text!r} is no style; there are {known}")
+    return name

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""deform and stylize: one file in, one file out, an outcome for each of its objects."""
+
+import contextlib
+import json
+import os
+import sys
+import threading
+import time
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ..bridge import handles
+from ..bridge.lookup import settings_of
+from ..core import jobs, native
+from ..core.errors import UserError
+from ..core.styles import style_identifier
+from ..names import REPORT
+from . import files
+from .parser import solve_settings
+
+CALLS = {"deform": bpy.ops.arapfields.deform, "stylize": bpy.ops.arapfields.stylize}
+UPPER = ("result", "surface", "frame", "quality")
+
+
+def run_single(options, _):
+    """Exit code 0 when every object came out, 1 when some did; UserError when there is nothing to do."""
+    files.check(options.output)
+    files.read(options.input)
+    sources = wanted(options)
+    if options.handles:
+        for source in sources:
+            add_handles(source, options.handles)
+    outcomes, made = [], []
+    with progress(options.quiet):
+        for source in sources:
+            outcome, item = solve(source, options)
+            outcomes.append(outcome)
+            made += [item] if item else []
+    if made:
+        finish_names(options, made)
+        files.write(options.output, [item for _, item in made])
+    if options.report:
+        write_json(options.report, {"input": str(options.input), "objects": outcomes})
+    for outcome in outcomes:
+        stream = sys.stdout if outcome["status"] == "done" else sys.stderr
+        print(f"arapfields: {outcome['message']}", file=stream, flush=True)
+    return 0 if len(made) == len(outcomes) else 1
+
+
+def wanted(options):
+    """The objects to work on."""
+    meshes = [item for item in bpy.context.view_layer.objects if item.type == "MESH"]
+    meshes = [item for item in meshes if settings_of(item).result_of is None]
+    if options.objects:
+        by_name = {item.name: item for item in meshes}
+        unknown = [name for name in options.objects if name not in by_name]
+        if unknown:
+            there = ", ".join(sorted(by_name)) or "none"
+            raise UserError(f"{options.input}: no mesh object named {unknown[0]}; there are: {there}")
+        meshes = [by_name[name] for name in options.objects]
+    elif options.solve_verb == "deform" and not options.handles:
+        meshes = [item for item in meshes if handles.used(item)]
+        if not meshes:
+            raise UserError(f"{options.input}: no object has handles; give --handles FILE")
+    if not meshes:
+        raise UserError(f"{options.input}: holds no mesh object")
+    return meshes
+
+
+def add_handles(source, path):
+    """Empties for the handles described in a JSON file, moved to their targets."""
+    from arapfields.cli.handles import build_handles, read_handles
+
+    af = native.library()
+    described = read_handles(path)
+    corners = np.array(
+        [source.matrix_world @ Matrix.Translation(c).to_translation() for c in source.bound_box]
+    )
+    for made, (name, item) in zip(
+        build_handles(described, np.array([corners.min(axis=0), corners.max(axis=0)])), described, strict=True
+    ):
+        point = isinstance(made, af.Point)
+        rest, target = (np.eye(4), np.eye(4)) if point else (np.array(made.rest), np.array(made.target))
+        if point:
+            rest[:3, :3] *= max(np.ptp(corners, axis=0).max(), 1e-6) / 100
+            target[:3, :3] = rest[:3, :3]
+            rest[:3, 3], target[:3, 3] = made.rest, made.target
+        empty = handles.make_empty(bpy.context, source, Matrix(rest.tolist()), 1.0)
+        if not np.allclose(empty.matrix_world, rest, rtol=1e-4, atol=1e-6 * np.abs(rest).max()):
+            raise UserError(f"{name}: its box is sheared; an Empty cannot be")
+        entry = handles.add(source, empty, "POINT" if point else "CUBE")
+        entry.weight = item.get("weight", 1.0)
+        empty.matrix_world = Matrix(target.tolist())
+    bpy.context.view_layer.update()
+
+
+def solve(source, options):
+    """({"object", "status", "message", …}, (source, result) or None) of one object."""
+    call = CALLS[options.solve_verb]
+    given = solve_settings(options)
+    given.pop("handles", None)
+    given |= {name: given[name].upper() for name in UPPER if name in given}
+    if "style" in given:
+        given["style"] = style_identifier(given["style"])
+    if "result" in given:
+        given["output"] = given.pop("result")
+    if "quality" in given:
+        settings_of(source).fit.quality = given.pop("quality")
+    begin = time.perf_counter()
+    outcome = {"object": source.name, "status": "failed"}
+    try:
+        bpy.context.view_layer.objects.active = source
+        if call("EXEC_DEFAULT", **given) == {"CANCELLED"}:
+            raise KeyboardInterrupt
+    except (RuntimeError, TypeError) as error:
+        text = [line.removeprefix("Error: ") for line in str(error).splitlines() if line.strip()]
+        reason = " ".join(text).removeprefix(f"{source.name}: ")
+        return {**outcome, "message": f"{source.name}: {reason}"}, None
+    item = settings_of(source).results[-1].item
+    seconds = time.perf_counter() - begin
+    figures = json.loads(item[REPORT])
+    message = "; ".join(text for _, text in jobs.notes()) or source.name
+    outcome |= {"status": "done", "message": message, "seconds": seconds, "figures": figures}
+    return outcome, (source, item)
+
+
+def finish_names(options, made):
+    """In a mesh file a result bears its source's name."""
+    if options.output.suffix.lower() == ".blend":
+        return
+    for source, item in made:
+        name, mesh = source.name, source.data.name
+        source.name, source.data.name = f"{name}.source", f"{mesh}.source"
+        item.name, item.data.name = name, mesh
+
+
+def write_json(path, content):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f".{path.name}.{os.getpid()}")
+    partial.write_text(json.dumps(content, indent=1))
+    os.replace(partial, path)
+
+
+@contextlib.contextmanager
+def progress(quiet):
+    """A bar on a terminal; a line now and then elsewhere."""
+    ended = threading.Event()
+    live = sys.stderr.isatty()
+
+    def draw():
+        while not ended.wait(0.2 if live else 15.0):
+            share, text = jobs.progress()
+            if live:
+                print(
+                    f"\r[{'#' * round(24 * share):24}] {share:4.0%} {text[:60]:60}", end="", file=sys.stderr
+                )
+            else:
+                print(f"{share:4.0%} {text}", file=sys.stderr, flush=True)
+
+    if quiet:
+        yield
+        return
+    thread = threading.Thread(target=draw, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+        if live:
+            print(f"\r{'':96}\r", end="", file=sys.stderr, flush=True)

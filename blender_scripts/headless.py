@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What deform.py, stylize.py and batch.py share: they are commands of the add-on, run by a script.
+
+The add-on is the installed extension where that is enabled, else the one of this repository.
+"""
+
+import importlib
+import re
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def addon():
+    """The add-on's package, registered."""
+    import bpy
+
+    for entry in bpy.context.preferences.addons:
+        name = entry.module
+        if re.fullmatch(r"bl_ext\.\w+\.arapfields", name) and hasattr(bpy.types.Object, "arapfields"):
+            return importlib.import_module(name)
+    sys.path.insert(0, str(ROOT))
+    package = importlib.import_module("addon")
+    package.register()
+    return package
+
+
+def main(verb, script):
+    """Runs the verb with the arguments behind `--` (in Blender) or all of them (in Python); exits."""
+    try:
+        import bpy
+    except ImportError as error:
+        sys.exit(f"{script}: run it as `blender -b -P {script} -- …`, or where bpy is installed ({error})")
+    arguments = sys.argv[1:]
+    if not bpy.app.module:
+        arguments = arguments[arguments.index("--") + 1 :] if "--" in arguments else []
+    run = importlib.import_module(f"{addon().__name__}.commands.main").run
+    code = run([verb, *arguments], script)
+    sys.stdout.flush()
+    sys.exit(code)

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""deform, stylize and batch as scripts of Python's bpy: real files in, real files out."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import meshes
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+QUICK = ["--iterations", "20", "--samples", "1000", "--batch", "100", "--width", "16", "--layers", "1"]
+HOLD_AND_LIFT = {
+    "handles": [
+        {"type": "cuboid", "corners": [[None, None, None], [-0.5, None, None]]},
+        {
+            "type": "cuboid",
+            "corners": [[0.5, None, None], [None, None, None]],
+            "move": {"translate": [0, 0, 0.4]},
+        },
+    ]
+}
+
+
+@pytest.fixture(autouse=True)
+def needs_bpy():
+    pytest.importorskip("bpy", reason="PyPI's bpy is not installed")
+
+
+@pytest.fixture
+def script(user_folder):
+    def run(verb, *arguments, check=True):
+        command = [sys.executable, str(ROOT / f"blender_scripts/{verb}.py"), *map(str, arguments)]
+        done = subprocess.run(command, env=user_folder, capture_output=True, text=True)
+        assert not check or done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+        return done
+
+    return run
+
+
+def write_ball(path, level=3):
+    """An icosphere in the format of the path's suffix; returns its (n, 3) vertices."""
+    vertices, triangles = meshes.sphere(subdivisions=level)
+    if path.suffix == ".obj":
+        lines = ["mtllib none.mtl", "o Ball", *(f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in vertices)]
+        lines += [f"vt {x:.6f} {y:.6f}" for x, y, _ in vertices]
+        lines += ["f " + " ".join(f"{i + 1}/{i + 1}" for i in row) for row in triangles]
+        path.write_text("\n".join(lines) + "\n")
+    else:
+        import trimesh
+
+        trimesh.Trimesh(vertices, triangles, process=False).export(path)
+    return vertices
+
+
+def read(path):
+    from arapfields.cli.files import read_mesh
+
+    return read_mesh(path)
+
+
+def flatness(vertices, triangles):
+    """Mean of the largest component of the face normals: 1 for a cube along the axes."""
+    corners = vertices[triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(normals, axis=1)
+    return float((np.abs(normals).max(axis=1)).sum() / areas.sum())
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".obj", ".stl"])
+def test_stylize_a_file(script, tmp_path, suffix):
+    source, target = tmp_path / f"ball{suffix}", tmp_path / f"results/cubic{suffix}"
+    write_ball(source)
+    further = ["--report", tmp_path / "report.json", "--iterations", "60"]
+    script("stylize", "--style", "cube", "-i", source, "-o", target, *QUICK, *further)
+    before, after = read(source), read(target)
+    assert before[1].shape == after[1].shape
+    assert flatness(*after) > flatness(*before) + 0.03
+    (found,) = json.loads((tmp_path / "report.json").read_text())["objects"]
+    assert found["status"] == "done" and found["figures"]["iterations"] == 60
+    assert [path.name for path in target.parent.iterdir()] == [target.name]  # nothing partial
+    if suffix == ".obj":
+        assert target.read_text().count("\nvt ") and "o Ball\n" in target.read_text()
+
+
+def test_deform_a_file_under_handles(script, tmp_path):
+    source, target = tmp_path / "ball.ply", tmp_path / "lifted.ply"
+    before = write_ball(source)
+    (tmp_path / "pose.json").write_text(json.dumps(HOLD_AND_LIFT))
+    script(
+        "deform", "-i", source, "-o", target, "--handles", tmp_path / "pose.json", *QUICK, "--iterations", 150
+    )
+    moved = read(target)[0] - before
+    assert abs(moved[before[:, 0] > 0.7, 2].mean() - 0.4) < 0.1
+    assert abs(moved[before[:, 0] < -0.7]).max() < 0.1
+
+
+def test_a_blend_keeps_its_handles_and_gets_the_results(script, tmp_path):
+    make = f"""
+import sys; sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / "tests/blender")!r}]
+import addon, bpy; bpy.ops.wm.read_homefile(use_empty=True); addon.register()
+import scenes; bar, _, moving = scenes.bar_with_handles(); moving.location.z += 0.3
+scenes.bar("Other").location.y = 5
+bpy.ops.wm.save_as_mainfile(filepath={str(tmp_path / "bar.blend")!r})
+"""
+    subprocess.run([sys.executable, "-c", make], check=True, capture_output=True)
+    script("deform", "-i", tmp_path / "bar.blend", "-o", tmp_path / "out.blend", *QUICK)
+    look = f"import bpy; bpy.ops.wm.open_mainfile(filepath={str(tmp_path / 'out.blend')!r})\n"
+    look += "print('OBJECTS', sorted(o.name for o in bpy.data.objects))"
+    said = subprocess.run([sys.executable, "-c", look], check=True, capture_output=True, text=True).stdout
+    assert "['Bar', 'Bar_deformed', 'Fixed', 'Moving', 'Other']" in said
+    script("deform", "-i", tmp_path / "bar.blend", "-o", tmp_path / "bar.ply", *QUICK)
+    assert read(tmp_path / "bar.ply")[0][:, 2].max() > 0.3
+    failed = script(
+        "stylize", "-i", tmp_path / "bar.blend", "-o", tmp_path / "x.ply", "--objects", "Bax", check=False
+    )
+    assert failed.returncode == 2 and "no mesh object named Bax; there are: Bar, Other" in failed.stderr
+
+
+def test_a_batch_does_what_it_can_and_resumes(script, tmp_path):
+    (tmp_path / "in").mkdir()
+    for name in ("a.ply", "b.obj"):
+        write_ball(tmp_path / "in" / name, level=2)
+    (tmp_path / "in/broken.ply").write_text("ply\nnonsense")
+    call = ["batch", "--style", "cube", "--input", tmp_path / "in", "--output", tmp_path / "out", "--jobs", 2]
+    first = script(*call, *QUICK, check=False)
+    assert first.returncode == 1 and "2 done, 0 skipped, 1 failed" in first.stdout, first
+    assert "broken.ply: FAILED" in first.stdout and "cannot read it" in first.stdout
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["a.ply", "arapfields-batch.json", "b.obj"]
+    write_ball(tmp_path / "in/broken.ply", level=2)
+    second = script(*call, *QUICK)
+    assert "1 done, 2 skipped, 0 failed" in second.stdout
+
+
+def test_ctrl_c_leaves_no_partial_file(user_folder, tmp_path):
+    (tmp_path / "in").mkdir()
+    write_ball(tmp_path / "in/ball.ply")
+    call = [sys.executable, str(ROOT / "blender_scripts/batch.py"), "--style", "cube", "--input"]
+    call += [str(tmp_path / "in"), "--output", str(tmp_path / "out"), *QUICK, "--iterations", "100000"]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    process = subprocess.Popen(call, env=user_folder, **pipes)
+    while "files to do" not in process.stdout.readline():
+        assert process.poll() is None
+    time.sleep(3.0)
+    process.send_signal(signal.SIGINT)
+    said = process.communicate(timeout=60)[1]
+    assert process.returncode == 130 and "arapfields: interrupted" in said
+    assert not (tmp_path / "out").exists() or list((tmp_path / "out").iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "text"),
+    [("none.ply", None, "no such file"), ("a.gltf", "", "unknown extension"), ("empty.obj", "", "no mesh")],
+)
+def test_what_cannot_be_read_is_one_line(script, tmp_path, name, content, text):
+    if content is not None:
+        (tmp_path / name).write_text(content)
+    done = script("stylize", "-i", tmp_path / name, "-o", tmp_path / "x.ply", check=False)
+    said = [line for line in done.stderr.splitlines() if line.startswith("arapfields")]
+    assert done.returncode == 2 and len(said) == 1 and text in said[0] and name in said[0]
