@@ -55,7 +55,7 @@ def render(output):
     distances = surface_distances(forward, backward) / step
     stage.clear()
     shown = []
-    columns = ((rest, "fitted surface Φ = 0"), (forward, "moved by f"), (backward, "Φ∘f⁻¹ = 0"))
+    columns = ((rest, "fitted surface"), (forward, "moved by f"), (backward, "through the inverse"))
     for column, (made, text) in enumerate(columns):
         place = turned(rest, SPACING * column, degrees)
         shown += [add(made, text, place), *add_boxes(boxes, place, column > 0)]
