@@ -10,7 +10,7 @@ from ..core.styles import CUSTOM, STYLES, STYLIZE, style_identifier
 
 QUALITY_ITEMS = tuple((key, label, tip) for key, (label, tip, _) in QUALITIES.items())
 STYLE_ITEMS = tuple(
-    (style_identifier(name), label, f"Turns the surface towards the faces of: {label.lower()}")
+    (style_identifier(name), label, "Turns the surface towards the faces of this solid")
     for name, label in STYLES
 ) + tuple((key, label, tip) for key, (label, tip) in CUSTOM.items())
 FRAMES = (

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every text of the add-on that a user may read, found in its classes and in its source."""
+
+import ast
+import inspect
+from pathlib import Path
+
+import bpy
+
+ADDON = Path(__file__).resolve().parents[2] / "addon"
+UNTRANSLATED = {"", "X", "Y", "Z", "ARAP Fields", "{error}", "CUDA", "JSON", "Seed"}
+SAYS = {"translated", "UserError", "wrapped"}  # calls whose first argument is read by users
+MENU_ROWS = 2  # place of the text in the rows that menus are made of
+
+
+def of_classes(modules):
+    """Labels and tooltips of operators, panels, menus and properties."""
+    for module in modules:
+        for cls in getattr(module, "CLASSES", []):
+            rna = cls.bl_rna
+            if issubclass(cls, bpy.types.Operator):
+                group, name = cls.bl_idname.split(".")
+                rna = getattr(getattr(bpy.ops, group), name).get_rna_type()
+                yield rna.description
+            elif issubclass(cls, bpy.types.Menu):
+                yield cls.__doc__ or ""
+            yield getattr(cls, "bl_label", "")
+            theirs = {
+                p for base in cls.__mro__[1:] if "addon" not in base.__module__ for p in annotated(base)
+            }
+            for prop in rna.properties:
+                if prop.identifier in annotated(*cls.__mro__) - theirs:
+                    yield prop.name
+                    yield prop.description
+                    for item in prop.enum_items_static if prop.type == "ENUM" else []:
+                        yield item.name
+                        yield item.description
+
+
+def annotated(*classes):
+    return {name for cls in classes for name in inspect.get_annotations(cls)}
+
+
+def of_source():
+    """Literal texts of messages, buttons and labels."""
+    for path in sorted(ADDON.rglob("*.py")):
+        if "translations" in path.parts:
+            continue
+        for node in ast.walk(ast.parse(path.read_text())):
+            if not isinstance(node, ast.Call):
+                continue
+            name = getattr(node.func, "id", getattr(node.func, "attr", ""))
+            if name in SAYS and node.args:
+                yield from literal(node.args[0] if name != "wrapped" else ast.Constant(""))
+            if name == "start" and node.args:
+                yield from literal(node.args[0])
+            for keyword in node.keywords:
+                if keyword.arg == "text":
+                    yield from literal(keyword.value)
+        for node in ast.walk(ast.parse(path.read_text())):
+            targets = getattr(node, "targets", [])
+            if isinstance(node, ast.Assign) and getattr(targets[0], "id", "") == "title":
+                yield from literal(node.value)
+            if (
+                isinstance(node, ast.For)
+                and path.parent.name == "panels"
+                and isinstance(node.iter, ast.Tuple)
+            ):
+                for row in node.iter.elts:
+                    yield from literal(row.elts[MENU_ROWS])
+
+
+def literal(node):
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        yield node.value
+    elif isinstance(node, ast.IfExp):
+        yield from literal(node.body)
+        yield from literal(node.orelse)
+    elif isinstance(node, ast.BoolOp):
+        for value in node.values:
+            yield from literal(value)
+    elif isinstance(node, ast.JoinedStr):  # only texts that the module completes with its own constants
+        from addon.core.native import ADVICE
+
+        parts = [v.value if isinstance(v, ast.Constant) else "\0" for v in node.values]
+        if "\0" in parts and ADVICE and "ADVICE" in ast.unparse(node):
+            yield "".join(part.replace("\0", ADVICE) for part in parts)
+
+
+def every():
+    import addon.registration as registration
+
+    found = {*of_classes(registration.MODULES), *of_source()}
+    return sorted(found - UNTRANSLATED)
