@@ -68,6 +68,9 @@ void bind_options(py::module_& module) {
       .field("fine_bumps", &LiveOptions::fine_bumps, "Bumps of the fine scale.")
       .field("coarse_reach", &LiveOptions::coarse_reach, "Radius of the coarse bumps over their spacing.")
       .field("fine_reach", &LiveOptions::fine_reach, "Radius of the fine bumps over their spacing.")
+      .field("interior", &LiveOptions::interior,
+             "Bumps reach as far as ways through the shape's interior: parts near in space but apart in the\n"
+             "shape, such as fingers, do not pull at each other.")
       .field("bending", &LiveOptions::bending, "λ_bend, the weight of the bend against the stretch.")
       .field("handle_weight", &LiveOptions::handle_weight, "Weight of the handles' mean squared distance.")
       .field("handle_samples", &LiveOptions::handle_samples, "Samples at which a handle pulls, at most.")

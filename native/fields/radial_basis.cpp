@@ -15,6 +15,12 @@ RowMatrix<double> RadialBasis::identity() const {
   return result;
 }
 
+void RadialBasis::set_lift(std::shared_ptr<const RadialLift> other) {
+  lift = std::move(other);
+  lifted.resize(lift ? bumps() : 0, 3);
+  if (lift) lift->evaluate(centers, {lifted.data(), bumps(), JetOrder::value});
+}
+
 FarthestPoints farthest_points(PointsIn points, Index count) {
   require(points.rows() > 0 && points.allFinite(), "points", "none, or NaN or infinite ones",
           "finite points are needed");
@@ -56,7 +62,9 @@ RadialBasis radial_basis(PointsIn points, const std::vector<RadialScale>& scales
     radii.insert(radii.end(), chosen.indices.size(), scale.reach * fill);
   }
   RadialBasis basis{Points(static_cast<Index>(centers.size()), 3),
-                    Eigen::Map<const Vector>(radii.data(), static_cast<Index>(radii.size()))};
+                    Eigen::Map<const Vector>(radii.data(), static_cast<Index>(radii.size())),
+                    nullptr,
+                    {}};
   for (std::size_t m = 0; m < centers.size(); ++m)
     basis.centers.row(static_cast<Index>(m)) = points.row(centers[m]);
   return basis;

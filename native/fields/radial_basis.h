@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "core/types.h"
+#include "fields/radial_lift.h"
 
 namespace arapfields {
 
@@ -16,15 +18,19 @@ struct RadialScale {
 /// The space of maps f(x) = Σ_m c_m φ(|x − p_m|² / r_m²) + (1, x)·c_affine, φ(s) = (1 − s/κ)₊^κ: the Gaussian
 /// e^{−s} for large κ, κ = 6 (fields/radial_kernel.h), but with a bounded support, so that a
 /// point feels nearby bumps alone, and κ − 1 times continuously differentiable. Coefficients are (size, 3):
-/// bumps, then the constant, then x, y, z.
+/// bumps, then the constant, then x, y, z. With a lift ψ, s = (|x − p_m|² + |ψ(x) − ψ(p_m)|²) / r_m².
 struct RadialBasis {
   Points centers;  ///< (m,3)
   Vector radii;    ///< (m)
+  std::shared_ptr<const RadialLift> lift = nullptr;
+  Points lifted = {};  ///< (m,3) ψ(p_m); empty without a lift
 
   Index bumps() const { return centers.rows(); }
   Index size() const { return centers.rows() + 4; }
   /// Coefficients of f(x) = x.
   RowMatrix<double> identity() const;
+  /// Takes a lift, or none.
+  void set_lift(std::shared_ptr<const RadialLift> other);
 };
 
 /// Bumps at farthest-point samples of the points, scale by scale (a scale with as many bumps as there are

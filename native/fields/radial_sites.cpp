@@ -18,22 +18,37 @@ constexpr Index blocks_per_task = 4;
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 std::vector<double> bump_rows(const RadialBasis& basis) {
-  std::vector<double> rows;
+  std::vector<double> rows(at(radial_bump * basis.bumps()), 0.0);
   for (Index m = 0; m < basis.bumps(); ++m) {
-    for (int k = 0; k < 3; ++k) rows.push_back(basis.centers(m, k));
-    rows.push_back(1.0 / (basis.radii[m] * basis.radii[m]));
+    double* row = &rows[at(radial_bump * m)];
+    for (int k = 0; k < 3; ++k) row[k] = basis.centers(m, k);
+    row[3] = 1.0 / (basis.radii[m] * basis.radii[m]);
+    for (int k = 0; k < 3; ++k) row[4 + k] = basis.lift ? basis.lifted(m, k) : 0.0;
   }
   return rows;
+}
+
+/// The middle of the rows' bounding box and the radius of a ball around it that holds them.
+double ball_of(ConstPointsRef<double> rows, double* center) {
+  Eigen::Map<Eigen::RowVector3d> middle(center);
+  middle = 0.5 * (rows.colwise().minCoeff() + rows.colwise().maxCoeff());
+  return std::sqrt((rows.rowwise() - middle).rowwise().squaredNorm().maxCoeff());
 }
 
 }  // namespace
 
 template <class Scalar>
-RadialSites<Scalar>::RadialSites(const RadialBasis& basis, PointsIn points)
-    : bump_count_(basis.bumps()), count_(points.rows()) {
+RadialSites<Scalar>::RadialSites(const RadialBasis& basis, PointsIn points, JetOrder most)
+    : bump_count_(basis.bumps()), count_(points.rows()), most_(most) {
   const std::vector<double> exact = bump_rows(basis);
   bumps_.assign(exact.begin(), exact.end());
   points_.resize(at(blocks() * 3 * block_size));
+  JetBlock<double> jets(basis.lift ? count_ : 0, most);
+  if (basis.lift) {
+    basis.lift->evaluate(points, jets.view());
+    pack_lift(jets);
+  }
+  const Eigen::Map<const Points> lifted(jets.view().data, jets.view().count, 3);
   std::vector<std::vector<std::int32_t>> lists(at(blocks()));
   parallel_for(0, blocks(), 8, [&](Index first, Index last) {
     std::vector<std::int32_t> list(at(bump_count_ + 1));
@@ -44,12 +59,12 @@ RadialSites<Scalar>::RadialSites(const RadialBasis& basis, PointsIn points)
           block[k * block_size + i] =
               static_cast<Scalar>(points(std::min(b * block_size + i, count_ - 1), k));
       const Index rows = std::min(block_size, count_ - b * block_size);
-      const auto part = points.middleRows(b * block_size, rows);
-      const Vec3 center = 0.5 * (part.colwise().minCoeff() + part.colwise().maxCoeff()).transpose();
-      const double reach =
-          std::sqrt((part.rowwise() - center.transpose()).rowwise().squaredNorm().maxCoeff());
-      const Index found =
-          ARAPFIELDS_DISPATCH(radial_active(center.data(), reach, exact.data(), bump_count_, list.data()));
+      std::array<double, 6> center{};
+      std::array<double, 2> reach{};
+      reach[0] = ball_of(points.middleRows(b * block_size, rows), center.data());
+      if (basis.lift) reach[1] = ball_of(lifted.middleRows(b * block_size, rows), &center[3]);
+      const Index found = ARAPFIELDS_DISPATCH(
+          radial_active(center.data(), reach.data(), exact.data(), bump_count_, list.data()));
       lists[at(b)].assign(list.begin(), list.begin() + found);
     }
   });
@@ -61,8 +76,39 @@ RadialSites<Scalar>::RadialSites(const RadialBasis& basis, PointsIn points)
 }
 
 template <class Scalar>
+void RadialSites<Scalar>::pack_lift(const JetBlock<double>& jets) {
+  const int columns_count = columns(most_), rows = radial_lift_rows(columns_count);
+  lift_.resize(at(blocks() * rows * block_size));
+  parallel_for(0, blocks(), 8, [&](Index first, Index last) {
+    for (Index b = first; b < last; ++b)
+      for (Index i = 0; i < block_size; ++i) {
+        const Index p = std::min(b * block_size + i, count_ - 1);
+        Scalar* to = &lift_[at(b * rows * block_size + i)];
+        for (int c = 0; c < columns_count; ++c)
+          for (int k = 0; k < 3; ++k)
+            to[(3 * c + k) * block_size] = static_cast<Scalar>(jets.view().at(c, p)[k]);
+        if (most_ != JetOrder::second) continue;
+        for (int j = 0; j < 3; ++j)
+          for (int k = j; k < 3; ++k) {
+            const Eigen::Map<const Vec3> a(jets.view().at(first_column(j), p));
+            const Eigen::Map<const Vec3> c(jets.view().at(first_column(k), p));
+            to[(30 + second_column(j, k) - 4) * block_size] = static_cast<Scalar>(a.dot(c));
+          }
+      }
+  });
+}
+
+template <class Scalar>
+void RadialSites<Scalar>::require_order(JetOrder order) const {
+  require(columns(order) <= columns(most_), "order", std::to_string(columns(order)) + " columns",
+          "at most " + std::to_string(columns(most_)) + " were prepared");
+}
+
+template <class Scalar>
 RadialBlock<Scalar> RadialSites<Scalar>::block(Index b) const {
-  return {&points_[at(b * 3 * block_size)], bumps_.data(), active_.data() + start_[at(b)],
+  const Scalar* lift =
+      lift_.empty() ? nullptr : &lift_[at(b * radial_lift_rows(columns(most_)) * block_size)];
+  return {&points_[at(b * 3 * block_size)], lift, bumps_.data(), active_.data() + start_[at(b)],
           start_[at(b) + 1] - start_[at(b)]};
 }
 
@@ -81,6 +127,7 @@ void RadialSites<Scalar>::evaluate(const RowMatrix<double>& coefficients, JetVie
   require(coefficients.rows() == bump_count_ + 4 && coefficients.cols() == 3, "coefficients",
           std::to_string(coefficients.rows()) + " rows",
           std::to_string(bump_count_ + 4) + " rows of 3 are needed");
+  require_order(out.order);
   const int columns_count = columns(out.order);
   const RowMatrix<Scalar> rounded = coefficients.cast<Scalar>();
   const Scalar* affine = rounded.data() + 3 * bump_count_;
@@ -111,6 +158,7 @@ template <class Scalar>
 void RadialSites<Scalar>::pull_back(JetView<const Scalar> cotangents, RowMatrix<double>& gradient) const {
   require(cotangents.count == count_, "cotangents", std::to_string(cotangents.count) + " points",
           std::to_string(count_) + " are needed");
+  require_order(cotangents.order);
   const int columns_count = columns(cotangents.order);
   // A fixed number of partial sums: the result does not depend on the number of threads.
   constexpr Index tasks = 4;
@@ -151,7 +199,7 @@ void RadialSites<Scalar>::pull_back(JetView<const Scalar> cotangents, RowMatrix<
 }
 
 RowMatrix<double> radial_rows(const RadialBasis& basis, PointsIn points, JetOrder order) {
-  const RadialSites<double> sites(basis, points);
+  const RadialSites<double> sites(basis, points, order);
   const Index count = points.rows(), bumps = basis.bumps();
   const int columns_count = columns(order);
   RowMatrix<double> result = RowMatrix<double>::Zero(columns_count * count, basis.size());

@@ -16,7 +16,8 @@ template <class Scalar>
 class RadialSites {
  public:
   RadialSites() = default;
-  RadialSites(const RadialBasis& basis, PointsIn points);
+  /// `most`: the highest order that will be asked for.
+  RadialSites(const RadialBasis& basis, PointsIn points, JetOrder most = JetOrder::second);
   Index size() const { return count_; }
 
   /// Jets of the field with these coefficients (size, 3): overwrites `out` (count = size(), any order).
@@ -32,11 +33,15 @@ class RadialSites {
  private:
   Index blocks() const { return (count_ + 15) / 16; }
   RadialBlock<Scalar> block(Index b) const;
+  void pack_lift(const JetBlock<double>& jets);
+  void require_order(JetOrder order) const;
 
   Index bump_count_ = 0;
   Index count_ = 0;
-  std::vector<Scalar> points_;        // (blocks, 3, 16), the last point repeated
-  std::vector<Scalar> bumps_;         // (m, 4): center, 1/r²
+  std::vector<Scalar> points_;  // (blocks, 3, 16), the last point repeated
+  std::vector<Scalar> bumps_;   // (m, radial_bump)
+  std::vector<Scalar> lift_;    // (blocks, lift_rows_, 16); empty without a lift
+  JetOrder most_ = JetOrder::second;
   std::vector<std::int32_t> active_;  // bumps felt by block b: active_[start_[b]] … active_[start_[b+1]−1]
   std::vector<Index> start_;
 };

@@ -14,7 +14,7 @@ TrackedPoints::TrackedPoints(const RadialBasis& basis, const Frame& frame, Point
   Points sorted(mesh_points.rows(), 3);
   for (Index i = 0; i < sorted.rows(); ++i)
     sorted.row(i) = mesh_points.row(order_[static_cast<std::size_t>(i)]);
-  sites_ = RadialSites<float>(basis, frame.to_cube(sorted));
+  sites_ = RadialSites<float>(basis, frame.to_cube(sorted), JetOrder::value);
 }
 
 PointsF TrackedPoints::moved(const RowMatrix<double>& coefficients) const {

@@ -25,8 +25,8 @@ constexpr double anchor_weight = 1.0;
 constexpr Index worth_threads = 1000000;
 
 /// Single precision serves down to this tolerance; what it cannot see is an energy of about the second
-/// number.
-constexpr double single_tolerance = 3e-5, single_floor = 1e-10;
+/// number; its values are good to about the third share.
+constexpr double single_tolerance = 3e-5, single_floor = 1e-10, single_error = 1e-6;
 /// Solves after which measurements that were only updated are taken afresh.
 constexpr int most_uses = 16;
 
@@ -73,7 +73,10 @@ LiveSolver::LiveSolver(const SurfaceSamples& samples, const std::vector<Handle>&
   std::vector<RadialScale> scales;
   if (options.coarse_bumps > 0) scales.push_back({options.coarse_bumps, options.coarse_reach});
   scales.push_back({options.fine_bumps, options.fine_reach});
-  basis_ = radial_basis(rows_of(surface_, candidates), scales);
+  const Points spread = rows_of(surface_, candidates);
+  basis_ = radial_basis(spread, scales);
+  if (options.interior && surface_normals_.rows() == surface_.rows())
+    basis_.set_lift(interior_lift(spread, rows_of(surface_normals_, candidates)));
   coefficients_ = basis_.identity();
   progress.report(0.2, "bumps placed");
   stiffness_ = surface_stiffness(basis_, rows_of(surface_, chosen_), options.bending);
@@ -240,7 +243,8 @@ void LiveSolver::extrapolate() {
   const RowMatrix<double> from = coefficients_;
   if (u_before_.size() == start.size()) {
     const VectorF further = 2.0f * start - u_before_;
-    if (fast_.objective->value(further, nullptr) < fast_.objective->value(start, nullptr)) {
+    const double here = fast_.objective->value(start, nullptr);
+    if (fast_.objective->value(further, nullptr) < (1.0 - single_error) * here) {
       coefficients_ += from - coefficients_before_;
       fast_.u = further;
       exact_.u.resize(0);

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fields/interior_distance.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <queue>
+
+#include "core/parallel.h"
+
+namespace arapfields {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+/// Share of the smaller radius by which a center may lie outside the larger ball.
+constexpr double reach_share = 0.25;
+/// Neighbours on one sheet: at most so many spacings apart, normals with at least this cosine.
+constexpr double sheet_spacings = 2.5, sheet_cosine = 0.3;
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+/// Radii of the inner balls; `most` where nothing bounds one.
+Vector inner_radii(PointsIn nodes, PointsIn normals, double most) {
+  Vector radii(nodes.rows());
+  parallel_for(0, nodes.rows(), 32, [&](Index first, Index last) {
+    for (Index i = first; i < last; ++i) {
+      const Vec3 x = nodes.row(i), n = normals.row(i);
+      double curvature = 1.0 / most;  // of the ball: a larger one means a smaller ball
+      for (Index j = 0; j < nodes.rows(); ++j) {
+        const double a = nodes(j, 0) - x[0], b = nodes(j, 1) - x[1], c = nodes(j, 2) - x[2];
+        const double square = a * a + b * b + c * c, depth = -(a * n[0] + b * n[1] + c * n[2]);
+        if (2.0 * depth > curvature * square && square > 0.0) curvature = 2.0 * depth / square;
+      }
+      radii[i] = 1.0 / curvature;
+    }
+  });
+  return radii;
+}
+
+}  // namespace
+
+InteriorGraph::InteriorGraph(PointsIn nodes, PointsIn normals, double spacing) : edges_(at(nodes.rows())) {
+  const double extent = (nodes.colwise().maxCoeff() - nodes.colwise().minCoeff()).maxCoeff();
+  const Vector radii = inner_radii(nodes, normals, extent);
+  const Points centers = nodes - radii.asDiagonal() * normals;
+  const double near = sheet_spacings * spacing;
+  parallel_for(0, nodes.rows(), 32, [&](Index first, Index last) {
+    for (Index i = first; i < last; ++i)
+      for (Index j = 0; j < nodes.rows(); ++j) {
+        if (i == j) continue;
+        const double square = (nodes.row(i) - nodes.row(j)).squaredNorm();
+        const double larger = std::max(radii[i], radii[j]), smaller = std::min(radii[i], radii[j]);
+        const double reach = larger + reach_share * smaller;
+        if ((centers.row(i) - centers.row(j)).squaredNorm() < reach * reach ||
+            (square < near * near && normals.row(i).dot(normals.row(j)) > sheet_cosine))
+          edges_[at(i)].push_back({static_cast<std::int32_t>(j), static_cast<float>(std::sqrt(square))});
+      }
+  });
+  join_parts(nodes);
+}
+
+/// Prim's tree, in which edges that exist cost nothing: what it adds joins the parts.
+void InteriorGraph::join_parts(PointsIn nodes) {
+  const Index n = size();
+  std::vector<double> cost(at(n), infinity);
+  std::vector<Index> from(at(n), 0);
+  std::vector<bool> reached(at(n), false);
+  std::vector<Index> whole{0};
+  for (Index count = 0; count < n;) {
+    while (!whole.empty()) {  // all that edges reach
+      const Index i = whole.back();
+      whole.pop_back();
+      if (reached[at(i)]) continue;
+      reached[at(i)] = true;
+      ++count;
+      for (const Edge& edge : edges(i))
+        if (!reached[at(edge.to)]) whole.push_back(edge.to);
+      if (count == n) return;
+      cost[at(i)] = -1.0;  // not yet offered to the rest
+    }
+    for (Index i = 0; i < n; ++i) {
+      if (!reached[at(i)] || cost[at(i)] >= 0.0) continue;
+      cost[at(i)] = 0.0;
+      for (Index j = 0; j < n; ++j) {
+        if (reached[at(j)]) continue;
+        const double square = (nodes.row(i) - nodes.row(j)).squaredNorm();
+        if (square < cost[at(j)]) cost[at(j)] = square, from[at(j)] = i;
+      }
+    }
+    Index best = -1;
+    for (Index j = 0; j < n; ++j)
+      if (!reached[at(j)] && (best < 0 || cost[at(j)] < cost[at(best)])) best = j;
+    const Index other = from[at(best)];
+    const float length = static_cast<float>(std::sqrt(cost[at(best)]));
+    edges_[at(best)].push_back({static_cast<std::int32_t>(other), length});
+    edges_[at(other)].push_back({static_cast<std::int32_t>(best), length});
+    whole.push_back(best);
+  }
+}
+
+RowMatrix<double> InteriorGraph::distances(Index sources) const {
+  RowMatrix<double> result(size(), sources);
+  using Entry = std::pair<float, std::int32_t>;
+  parallel_for(0, sources, 1, [&](Index first, Index last) {
+    std::vector<float> distance(at(size()));
+    for (Index s = first; s < last; ++s) {
+      std::fill(distance.begin(), distance.end(), std::numeric_limits<float>::infinity());
+      std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> queue;
+      distance[at(s)] = 0.0f;
+      queue.emplace(0.0f, static_cast<std::int32_t>(s));
+      while (!queue.empty()) {
+        const auto [length, node] = queue.top();
+        queue.pop();
+        if (length > distance[at(node)]) continue;
+        for (const Edge& edge : edges(node))
+          if (length + edge.length < distance[at(edge.to)]) {
+            distance[at(edge.to)] = length + edge.length;
+            queue.emplace(distance[at(edge.to)], edge.to);
+          }
+      }
+      for (Index i = 0; i < size(); ++i) result(i, s) = static_cast<double>(distance[at(i)]);
+    }
+  });
+  return result;
+}
+
+}  // namespace arapfields

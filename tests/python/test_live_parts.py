@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live deformation of parts that are near in space but apart along the shape."""
+
+import numpy as np
+import pytest
+from bar import bar_samples
+from cases import shift
+from fork import BOTTOM, LEGS, TIP, fork_samples
+
+import arapfields as af
+
+
+@pytest.fixture(scope="module")
+def samples():
+    return fork_samples()
+
+
+def other_leg_moves(samples, interior):
+    """Distance by which the left tip moves when the right one is pulled aside, and the live deformer."""
+    handles = [af.Cuboid(BOTTOM, BOTTOM), af.Cuboid(TIP, TIP)]
+    live = af.LiveDeformer(samples, handles, af.LiveOptions(interior=interior))
+    field = live.solve([BOTTOM, shift([0, 0.4, 0]) @ TIP], steps=100, tolerance=1e-6)
+    assert live.report["handle_error_mean"] < 0.01
+    return np.linalg.norm(field(LEGS[-1]) - LEGS[-1]), live
+
+
+def test_a_leg_of_a_fork_moves_alone(samples):
+    apart, live = other_leg_moves(samples, True)
+    together, plain = other_leg_moves(samples, False)
+    assert apart < 0.04 * 1.5  # of the fork's length
+    assert together > 2 * apart
+    assert live.report["energy"] < plain.report["energy"]
+
+
+def test_derivatives_and_files_of_such_a_field(samples, tmp_path):
+    _, live = other_leg_moves(samples, True)
+    field = live.field
+    rng = np.random.default_rng(3)
+    points = np.r_[samples.points[:40], rng.uniform(-0.6, 0.6, size=(40, 3)), [[5.0, 5, 5]]]
+    step = 2e-6
+    for k in range(3):
+        offset = step * np.eye(3)[k]
+        slope = (field(points + offset) - field(points - offset)) / (2 * step)
+        jacobian, hessian = field.jacobian(points), field.hessian(points)
+        assert np.abs(slope - jacobian[:, :, k]).max() < 1e-6
+        slope = (field.jacobian(points + offset) - field.jacobian(points - offset)) / (2 * step)
+        assert np.abs(slope - hessian[:, :, :, k]).max() < 1e-5 * np.abs(hessian).max()
+    field.save(tmp_path / "fork.npz")
+    again = af.DeformationField.load(tmp_path / "fork.npz")
+    assert np.array_equal(again(points), field(points))
+    assert np.array_equal(again.hessian(points), field.hessian(points))
+    live.track(points)
+    assert np.abs(live.tracked() - field(points)).max() < 1e-5
+    live.reset()
+    assert np.abs(live.field(points) - points).max() < 1e-8
+
+
+def test_a_convex_shape_needs_no_lift(samples, tmp_path):
+    for surface, lifted in ((bar_samples(), False), (samples, True)):
+        live = af.LiveDeformer(surface, [af.Point(surface.points[0], surface.points[0])])
+        live.field.save(tmp_path / "field.npz")
+        names = np.load(tmp_path / "field.npz").files
+        assert any("lift" in name for name in names) == lifted
+
+
+def test_loose_parts_stay_together():
+    """Two balls that do not touch: what nothing joins is joined by the shortest line, and follows."""
+    rng = np.random.default_rng(5)
+    normals = rng.normal(size=(6000, 3))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    points = 0.5 * normals + np.where(np.arange(6000) < 3000, -0.6, 0.6)[:, None] * [1.0, 0, 0]
+    live = af.LiveDeformer(af.SurfaceSamples(points, normals), [af.Point([-1.1, 0, 0], [-1.1, 0, 0])])
+    field = live.solve([[-1.1, 0.5, 0]], steps=100)
+    assert np.abs(field(points) - points - [0, 0.5, 0]).max() < 0.05
