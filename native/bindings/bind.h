@@ -7,6 +7,7 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include "bindings/run_long.h"
 #include "core/errors.h"
 #include "core/task.h"
 #include "core/types.h"
@@ -25,13 +26,6 @@ Mat4 as_matrix4(const py::handle& value, const std::string& argument);
 Vec3 as_vec3(const py::handle& value, const std::string& argument);
 /// Any real array as (rows, cols) doubles.
 Eigen::MatrixXd as_matrix(const py::handle& value, const std::string& argument);
-
-/// Runs a long native call without the GIL. `task` is None or a Task.
-template <class Call>
-auto run_long(Task* task, Call&& call) {
-  py::gil_scoped_release release;
-  return call(Progress(task));
-}
 
 /// Binds a struct of options: keyword-only constructor with the struct's own defaults, read-write fields,
 /// repr, equality, `to_dict()`. An unknown keyword raises InvalidInput that lists what exists.
@@ -69,7 +63,7 @@ class OptionsBinding {
   }
 
   template <class Field>
-  OptionsBinding& field(const char* name, Field Options::*member, const char* doc) {
+  OptionsBinding& field(const char* name, Field Options::* member, const char* doc) {
     const std::string label = std::string(name_) + "." + name;
     class_.def_property(
         name, [member](const Options& self) { return self.*member; },
@@ -77,13 +71,13 @@ class OptionsBinding {
           try {
             self.*member = py::cast<Field>(value);
           } catch (const py::cast_error&) {
-            throw InvalidInput(label, "got " + py::cast<std::string>(py::repr(value)),
-                               std::string("expected ") +
-                                   (std::is_same_v<Field, bool>               ? "True or False"
-                                    : std::is_integral_v<Field>               ? "an integer"
-                                    : std::is_floating_point_v<Field>         ? "a number"
-                                    : std::is_same_v<Field, std::string>      ? "a string"
-                                                                              : "another type"));
+            throw InvalidInput(
+                label, "got " + py::cast<std::string>(py::repr(value)),
+                std::string("expected ") + (std::is_same_v<Field, bool>          ? "True or False"
+                                            : std::is_integral_v<Field>          ? "an integer"
+                                            : std::is_floating_point_v<Field>    ? "a number"
+                                            : std::is_same_v<Field, std::string> ? "a string"
+                                                                                 : "another type"));
           }
         },
         doc);

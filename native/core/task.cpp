@@ -50,13 +50,19 @@ PointsF Task::watched() const {
 
 Progress Progress::part(double from, double to) const {
   const double length = end_ - begin_;
-  return Progress(task_, begin_ + from * length, begin_ + to * length);
+  return Progress(task_, begin_ + from * length, begin_ + to * length, interruption_);
 }
 
 void Progress::report(double fraction, const std::string& message) const {
   if (task_ == nullptr) return;
   task_->report(begin_ + (end_ - begin_) * std::clamp(fraction, 0.0, 1.0), message);
   check();
+}
+
+bool Progress::cancelled() const {
+  if (task_ == nullptr) return false;
+  if (interruption_ != nullptr && (*interruption_)()) task_->cancel();
+  return task_->cancelled();
 }
 
 void Progress::check() const {

@@ -47,9 +47,14 @@ class Task {
 /// Call check() at least every 50 ms of work so that a cancel takes effect within 0.2 s.
 class Progress {
  public:
+  /// Asked at each look at the task, on the thread that looks: true cancels the task.
+  using Interruption = std::function<bool()>;
+
   Progress() = default;
-  explicit Progress(Task* task, double begin = 0.0, double end = 1.0)
-      : task_(task), begin_(begin), end_(end) {}
+  /// What `interruption` points to (null: nothing) must outlive all copies; it needs a task to cancel.
+  explicit Progress(Task* task, double begin = 0.0, double end = 1.0,
+                    const Interruption* interruption = nullptr)
+      : task_(task), begin_(begin), end_(end), interruption_(interruption) {}
 
   /// The part of this stage between two fractions of it.
   Progress part(double from, double to) const;
@@ -60,12 +65,13 @@ class Progress {
   /// For whoever watches: where a look is due, asks `where` for the watched points' present places.
   void look(const std::function<Points(PointsIn)>& where) const;
   /// For loops on worker threads, which must not throw: they leave early and the caller then check()s.
-  bool cancelled() const { return task_ != nullptr && task_->cancelled(); }
+  bool cancelled() const;
 
  private:
   Task* task_ = nullptr;
   double begin_ = 0.0;
   double end_ = 1.0;
+  const Interruption* interruption_ = nullptr;
 };
 
 }  // namespace arapfields

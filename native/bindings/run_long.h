@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+#include <chrono>
+#include <optional>
+#include <thread>
+
+#include "core/errors.h"
+#include "core/task.h"
+
+namespace arapfields::python {
+
+namespace py = pybind11;
+
+/// Ctrl-C during a native call: where Python's main thread makes the call, its signal handlers run now and
+/// then while it lasts, and the exception that one of them raises ends it.
+class SignalWatch {
+ public:
+  SignalWatch();  ///< with the GIL
+  /// Without it, on any thread.
+  Progress::Interruption interruption() {
+    return [this] { return look(); };
+  }
+  /// With the GIL: throws what a handler raised, if any did.
+  void rethrow() const {
+    if (raised_) throw py::error_already_set(*raised_);
+  }
+
+ private:
+  bool look();
+
+  bool main_thread_;
+  std::thread::id thread_ = std::this_thread::get_id();
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+  std::optional<py::error_already_set> raised_;
+};
+
+/// Runs a long native call without the GIL. `task` is None or a Task.
+template <class Call>
+auto run_long(Task* task, Call&& call) {
+  Task unwatched;
+  SignalWatch signals;
+  const Progress::Interruption interruption = signals.interruption();
+  try {
+    py::gil_scoped_release release;
+    return call(Progress(task != nullptr ? task : &unwatched, 0.0, 1.0, &interruption));
+  } catch (const Cancelled&) {
+    signals.rethrow();
+    throw;
+  }
+}
+
+}  // namespace arapfields::python

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Ctrl-C during a native call in the main thread: KeyboardInterrupt, and the library works on."""
+
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import cases
+import pytest
+
+import arapfields as af
+
+SCRIPT = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import cases, arapfields as af
+samples, handles = cases.bar_samples(), cases.bar_handles()
+options = dict(width=32, layers=3, batch=100)
+print("ready", flush=True)
+try:
+    af.deform(samples, handles, af.DeformOptions(iterations=10_000_000, **options))
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+print(af.deform(samples, handles, af.DeformOptions(iterations=3, **options)).report["iterations"])
+"""
+
+
+def test_ctrl_c_in_a_script():
+    running = subprocess.Popen(
+        [sys.executable, "-c", SCRIPT, cases.__file__.rsplit("/", 1)[0]], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert running.stdout.readline() == "ready\n"
+        time.sleep(0.5)
+        running.send_signal(signal.SIGINT)
+        printed, _ = running.communicate(timeout=60)
+    finally:
+        running.kill()
+    assert printed.split() == ["interrupted", "3"] and running.returncode == 0
+
+
+def interrupted_after(seconds, call):
+    """Sends this process SIGINT while the call runs in the main thread."""
+    timer = threading.Timer(seconds, signal.raise_signal, [signal.SIGINT])
+    timer.start()
+    try:
+        call()
+    finally:
+        timer.join()
+
+
+def test_a_task_is_cancelled_by_it():
+    task = af.Task()
+    options = af.DeformOptions(width=32, layers=3, batch=100, iterations=10_000_000)
+    with pytest.raises(KeyboardInterrupt):
+        interrupted_after(
+            0.3, lambda: af.deform(cases.bar_samples(), cases.bar_handles(), options, task=task)
+        )
+    assert task.cancelled
+
+
+def test_a_handler_that_raises_nothing_changes_nothing():
+    seen = []
+    before = signal.signal(signal.SIGINT, lambda *_: seen.append(time.monotonic()))
+    options = af.DeformOptions(width=32, layers=3, batch=100, iterations=10_000_000, time_budget=1.0)
+    try:
+        field = None
+
+        def call():
+            nonlocal field
+            field = af.deform(cases.bar_samples(), cases.bar_handles(), options)
+
+        interrupted_after(0.2, call)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert len(seen) == 1 and field.report["out_of_time"]
