@@ -6,13 +6,25 @@ import atexit
 import bpy
 
 from . import commands, panels, preferences
-from .bridge import jobs, overlay, pictures, preview, translations
+from .bridge import jobs, loading, overlay, pictures, preview, translations
 from .bridge import live as live_mode
 from .operators import bake, deform, extract, fit, handles, live, presets, status, styles, stylize
 from .properties import handle, item, settings
 
 MODULES = [
-    *(handle, settings, item, preferences, jobs, live_mode, overlay, preview, pictures, translations),
+    *(
+        handle,
+        settings,
+        item,
+        preferences,
+        jobs,
+        loading,
+        live_mode,
+        overlay,
+        preview,
+        pictures,
+        translations,
+    ),
     *(fit, handles, deform, live, bake, stylize, styles, presets, extract, status),
     *panels.SECTIONS,
     commands,

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The native library, or the reason why it cannot be used. Nothing here raises on import."""
 
+import contextlib
+import ctypes
 import importlib
+import importlib.util
 import platform
 import sys
+import threading
 from pathlib import Path
 
 from .errors import UserError
@@ -13,6 +17,8 @@ ADVICE = "Install arapfields-<version>-<platform>.zip of a release, not the sour
 
 def library():
     """The package `arapfields`; UserError when it cannot be used."""
+    if is_loading():
+        _loading.join()
     reason = problem()
     if reason:
         raise reason
@@ -21,11 +27,34 @@ def library():
 
 UNKNOWN = object()
 _problem = UNKNOWN
+_loading = None  # the thread that loads the library
+
+
+def preload():
+    """Loads the library on a thread: its file first, without Python's lock, then the module."""
+    global _loading
+    if _problem is UNKNOWN and _loading is None:
+        _loading = threading.Thread(target=_load, name="arapfields loading", daemon=True)
+        _loading.start()
+
+
+def is_loading():
+    return _loading is not None and _loading.is_alive()
+
+
+def _load():
+    with contextlib.suppress(Exception):
+        for path in sorted(_folder().glob("libarapfields*.so")):
+            ctypes.CDLL(str(path))  # waits for the disk while other threads run
+    global _problem
+    _problem = _try_import()
 
 
 def problem():
     """Why the native library cannot be used, as a UserError; None when it can."""
     global _problem
+    if is_loading():
+        return UserError("The native library is being loaded; wait a moment")
     if _problem is UNKNOWN:
         _problem = _try_import()
     return _problem
@@ -33,8 +62,8 @@ def problem():
 
 def forget():
     """Lets the next call of `problem` try again."""
-    global _problem
-    _problem = UNKNOWN
+    global _problem, _loading
+    _problem, _loading = UNKNOWN, None
 
 
 def _try_import():

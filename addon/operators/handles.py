@@ -63,6 +63,10 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
     )
 
     def change(self, context, source):
+        if source.library is not None:
+            raise UserError(
+                "{name} is linked from another file; make it local to give it handles", name=source.name
+            )
         group = self.group or (source.vertex_groups.active.name if source.vertex_groups else "")
         if self.kind == "GROUP" and not group:
             raise UserError("{name} has no vertex group", name=source.name)

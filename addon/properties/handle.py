@@ -26,7 +26,7 @@ class ARAPFIELDS_PG_handle(bpy.types.PropertyGroup):
     colour: bpy.props.FloatVectorProperty(
         name="Colour",
         description="Colour of the handle's boxes in the viewport",
-        subtype="COLOR",
+        subtype="COLOR_GAMMA",
         default=(0.27, 0.55, 1.0),
         min=0.0,
         max=1.0,

@@ -130,3 +130,83 @@ def test_a_vertex_group_is_a_handle():
     shift = scenes.world_points(bpy.data.objects["Bar_deformed"]) - before
     assert np.abs(shift[before[:, 0] < -0.8]).max() < 0.1
     assert np.abs(shift[before[:, 0] > 0.8] - [0, 0, 0.4]).max() < 0.15
+
+
+@in_blender
+def test_a_box_around_the_selected_vertices():
+    import bpy
+    import numpy as np
+    import pytest
+    import scenes
+
+    from addon.bridge import handles
+
+    bar = scenes.bar()
+    bar.rotation_euler.z, bar.scale = 0.5, (1, 2, 1)
+    bpy.context.view_layer.update()
+    local = np.array([v.co for v in bar.data.vertices])
+    bar.data.vertices.foreach_set("select", local[:, 0] > 0.8)
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert bpy.ops.arapfields.add_handle(place="SELECTION") == {"FINISHED"}
+    bpy.ops.object.mode_set(mode="OBJECT")
+    (entry,) = bar.arapfields.handles
+    box = np.linalg.inv(handles.rest_box(bar, entry))
+    points = scenes.world_points(bar)
+    inside = (np.abs(points @ box[:3, :3].T + box[:3, 3]) <= 1 + 1e-5).all(axis=1)
+    assert np.array_equal(inside, local[:, 0] > 0.8) and entry.inside > 0
+    bar.data.vertices.foreach_set("select", np.zeros(len(local), bool))
+    bar.data.polygons.foreach_set("select", np.zeros(len(bar.data.polygons), bool))
+    scenes.activate(bar)
+    with pytest.raises(RuntimeError, match="Bar has no selected vertices"):
+        bpy.ops.arapfields.add_handle(place="SELECTION")
+
+
+@in_blender
+def test_a_mirrored_handle_moves_as_the_mirror_image():
+    import bpy
+    import numpy as np
+    import scenes
+
+    from addon.bridge import handles
+
+    bar = scenes.bar()
+    bar.location, bar.rotation_euler.z = (1, 2, 3), 0.7
+    bpy.context.view_layer.update()
+    empty = scenes.cube_empty(bar.matrix_world @ bar.data.vertices[0].co, (0.3, 0.2, 0.4), "Arm.L")
+    empty.rotation_euler = (0.1, 0.2, 0.3)
+    bpy.context.view_layer.update()
+    scenes.activate(empty, bar)
+    bpy.ops.arapfields.add_handle()
+    empty.location.z += 0.3
+    empty.rotation_euler.x += 0.4
+    bpy.context.view_layer.update()
+    assert bpy.ops.arapfields.mirror_handle(axis="X") == {"FINISHED"}
+    one, two = bar.arapfields.handles
+    assert two.empty.name == "Arm.R" and tuple(two.colour) != tuple(one.colour)
+    flip = np.diag([-1.0, 1, 1, 1])
+    to_local = np.linalg.inv(np.array(bar.matrix_world))
+    for box in (handles.rest_box, lambda source, entry: handles.box_now(entry.empty)):
+        expected = flip @ to_local @ box(bar, one) @ flip
+        assert np.allclose(to_local @ box(bar, two), expected, atol=1e-5)
+    bpy.ops.arapfields.mirror_handle(axis="X")
+    assert len(bar.arapfields.handles) == 3
+
+
+@in_blender
+def test_a_mirrored_group_takes_the_other_sides_group():
+    import bpy
+    import pytest
+    import scenes
+
+    bar = scenes.bar()
+    for name, chosen in (("arm.L", [0, 1, 2]), ("arm.R", [5, 6, 7])):
+        bar.vertex_groups.new(name=name).add(chosen, 1.0, "REPLACE")
+    bpy.ops.arapfields.add_handle(kind="GROUP", group="arm.L")
+    scenes.activate(bar)
+    bpy.ops.arapfields.mirror_handle()
+    assert bar.arapfields.handles[1].group == "arm.R"
+    bar.vertex_groups.remove(bar.vertex_groups["arm.L"])
+    scenes.activate(bar)
+    bar.arapfields.active_handle = 1
+    with pytest.raises(RuntimeError, match=r"no vertex group arm\.L"):
+        bpy.ops.arapfields.mirror_handle()

@@ -85,3 +85,70 @@ def test_the_menu_lists_the_librarys_styles():
 
     assert [name for name, _ in STYLES] == list(arapfields.style_names())
     assert all(style_name(style_identifier(name)) == name for name, _ in STYLES)
+
+
+@in_blender
+def test_an_objects_axes_and_a_meshs_faces_are_styles():
+    """A box turned by 30°: both kinds flatten the ball along the box's axes."""
+    import math
+
+    import bpy
+    import numpy as np
+    import scenes
+    from test_stylize import SETTINGS, ball
+
+    item = ball()
+    bpy.ops.mesh.primitive_cube_add(location=(5, 0, 0), rotation=(0, 0, math.radians(30)))
+    box = bpy.context.object
+    for kind in ("AXES", "FACES"):
+        scenes.activate(item)
+        item.arapfields.stylize.style_object = box
+        bpy.ops.arapfields.stylize(style=kind, **SETTINGS)
+        points = scenes.world_points(bpy.data.objects["Ball_stylized"])
+        points -= points.mean(axis=0)
+        reach = [np.abs(points @ [math.cos(a), math.sin(a), 0]).max() for a in np.radians([30, 75])]
+        assert reach[0] < reach[1] - 0.02, kind
+
+
+@in_blender
+def test_custom_styles_that_give_no_normals_are_named():
+    import bpy
+    import pytest
+    import scenes
+    from test_stylize import SETTINGS, ball
+
+    item = ball()
+    for chosen, message in ((None, "choose the object"), (item, "different face normals")):
+        scenes.activate(item)
+        item.arapfields.stylize.style_object = chosen
+        with pytest.raises(RuntimeError, match=message):
+            bpy.ops.arapfields.stylize(style="FACES", **SETTINGS)
+    item.arapfields.stylize.style_object = scenes.cube_empty((0, 0, 0), (1, 1, 1))
+    scenes.activate(item)
+    with pytest.raises(RuntimeError, match="has no faces"):
+        bpy.ops.arapfields.stylize(style="FACES", **SETTINGS)
+
+
+@in_blender
+def test_a_material_bounds_the_region():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_stylize import SETTINGS, ball
+
+    item = ball()
+    for name in ("bottom", "top"):
+        item.data.materials.append(bpy.data.materials.new(name))
+    heights = np.array([face.center.z for face in item.data.polygons])
+    item.data.polygons.foreach_set("material_index", (heights > 0.2).astype(np.int32))
+    item.arapfields.stylize.region_material = bpy.data.materials["top"]
+    bpy.ops.arapfields.stylize(style="CUBE", **SETTINGS)
+    result = bpy.data.objects["Ball_stylized"]
+    agreement = np.abs(np.array([face.normal for face in result.data.polygons])).max(axis=1)
+    assert agreement[heights > 0.5].mean() > agreement[heights < -0.5].mean() + 0.03
+    scenes.activate(item)
+    item.arapfields.stylize.region_material = bpy.data.materials.new("unused")
+    import pytest
+
+    with pytest.raises(RuntimeError, match="does not use the material unused"):
+        bpy.ops.arapfields.stylize(style="CUBE", **SETTINGS)

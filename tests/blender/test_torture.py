@@ -139,3 +139,62 @@ def test_odd_meshes_deform(case):
     right = before[:, 0] > 0.8
     assert np.abs((after - before)[right].mean(axis=0)[2] - 0.3) < 0.15
     assert np.array_equal(scenes.world_points(item), before)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+@in_blender
+def test_tiny_and_huge_units(scale):
+    """Geometry itself of that size, and the scene's unit scale: results are the plain ones, scaled."""
+    import bpy
+    import numpy as np
+    import scenes
+
+    found = {}
+    for size in (1.0, scale):
+        item, fixed, moving = scenes.bar_with_handles("Mesh")
+        bpy.context.scene.unit_settings.scale_length = 1 / size
+        scenes.set_positions(item.data, size * scenes.world_points(item))
+        for empty in (fixed, moving):
+            empty.location, empty.scale = size * empty.location, size * empty.scale
+        bpy.context.view_layer.update()
+        bpy.ops.arapfields.set_rest(all=True)
+        moving.location.z += 0.3 * size
+        scenes.activate(item)
+        bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK)
+        found[size] = scenes.world_points(bpy.context.view_layer.objects.active) / size
+        for other in list(bpy.data.objects):
+            bpy.data.objects.remove(other)
+    assert np.abs(found[scale] - found[1.0]).max() < 0.02
+
+
+@in_blender
+def test_half_a_million_triangles():
+    """Deformed, styled and live, within the memory and patience of a test."""
+    import bpy
+    import numpy as np
+    import scenes
+
+    from addon.bridge import live
+
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=500, y_subdivisions=500, size=2)
+    item = bpy.context.object
+    points = scenes.world_points(item)
+    points[:, 2] = 0.1 * np.sin(3 * points[:, 0])
+    scenes.set_positions(item.data, points)
+    fixed = scenes.cube_empty((-1.0, 0, 0), (0.2, 1.1, 0.3), "Fixed")
+    moving = scenes.cube_empty((1.0, 0, 0), (0.2, 1.1, 0.3), "Moving")
+    bpy.context.view_layer.update()
+    scenes.activate(fixed, moving, item)
+    bpy.ops.arapfields.add_handle()
+    scenes.activate(item)
+    assert len(item.data.polygons) == 250000
+    moving.location.z += 0.3
+    bpy.ops.arapfields.deform(**scenes.QUICK)
+    after = scenes.world_points(bpy.data.objects[f"{item.name}_deformed"])
+    assert np.isfinite(after).all() and abs((after - points)[points[:, 0] > 0.9][:, 2].mean() - 0.3) < 0.1
+    scenes.activate(item)
+    bpy.ops.arapfields.live()
+    assert live.is_live(item)
+    live.update(bpy.context, wait=60)
+    moved = scenes.world_points(bpy.data.objects[f"{item.name}_live"]) - points
+    assert abs(moved[points[:, 0] > 0.9][:, 2].mean() - 0.3) < 0.1

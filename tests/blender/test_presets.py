@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings that users store under names, by Blender's own preset system."""
+
+import pytest
+from inside import in_blender
+
+CASES = {"fit": ("steps", 777), "deform": ("bending", 0.25), "stylize": ("sharpness", 9.0)}
+
+
+@pytest.mark.parametrize("section", CASES)
+@in_blender
+def test_presets_are_stored_applied_and_removed(section):
+    from pathlib import Path
+
+    import bpy
+    import scenes
+    from test_presets import CASES
+
+    bar, fixed, _ = scenes.bar_with_handles()
+    settings, (name, value) = getattr(bar.arapfields, section), CASES[section]
+    plain = getattr(settings, name)
+    setattr(settings, name, value)
+    operator = getattr(bpy.ops.arapfields, f"{section}_preset")
+    assert operator(name="Mine") == {"FINISHED"}
+    folder = Path(bpy.utils.user_resource("SCRIPTS", path=f"presets/arapfields/{section}"))
+    (path,) = folder.glob("*.py")
+    assert path.stem.lower() == "mine"
+    setattr(settings, name, plain)
+    scenes.activate(fixed)  # a handle is active: its source is meant
+    menu = f"ARAPFIELDS_MT_{section}_presets"
+    bpy.ops.script.execute_preset(filepath=str(path), menu_idname=menu)
+    assert getattr(settings, name) == pytest.approx(value)
+    assert getattr(fixed.arapfields, section) != settings
+    cls = getattr(bpy.types, menu)
+    assert cls.bl_label == "Mine"  # the header shows what was chosen
+    operator(name="Mine", remove_name=True)
+    cls.bl_label = f"{section.capitalize()} Presets"
+    assert not list(folder.glob("*.py"))
+
+
+@in_blender
+def test_each_style_has_its_picture():
+    from pathlib import Path
+
+    import addon
+    from addon.core.styles import STYLES
+
+    folder = Path(addon.__file__).parent / "icons"
+    assert {path.stem for path in folder.glob("*.png")} == {name.replace(" ", "_") for name, _ in STYLES}
+    assert all(
+        path.read_bytes()[:4] == b"\x89PNG" and path.stat().st_size < 8000 for path in folder.glob("*")
+    )

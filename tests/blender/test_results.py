@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where results go: a new object, the source itself, a shape key of it; and what refuses them."""
+
+import pytest
+from inside import in_blender
+
+
+@in_blender
+def test_replacing_moves_the_source_and_keeps_all_else():
+    import bpy
+    import numpy as np
+    import scenes
+
+    bar, _, moving = scenes.bar_with_handles()
+    scenes.decorate(bar)
+    before, points = scenes.everything(bar), scenes.world_points(bar)
+    other = bpy.data.objects.new("Other", bar.data)
+    bpy.context.collection.objects.link(other)
+    bar.keyframe_insert("location", frame=1)
+    moving.location.z += 0.4
+    bpy.ops.arapfields.deform(target="REPLACE", **scenes.QUICK)
+    moved = scenes.world_points(bar) - points
+    assert scenes.everything(bar) == before
+    assert np.abs(moved[points[:, 0] > 0.8].mean(axis=0) - [0, 0, 0.4]).max() < 0.1
+    assert other.data != bar.data and np.array_equal(scenes.world_points(other), points)
+    assert bar.animation_data.action is not None and "Bar_deformed" not in bpy.data.objects
+    again = scenes.world_points(bar)
+    bpy.ops.arapfields.deform(target="REPLACE", **scenes.QUICK)  # the handles are at rest now
+    assert np.abs(scenes.world_points(bar) - again).max() < 0.02
+
+
+@in_blender
+def test_a_shape_key_of_the_source_carries_the_motion():
+    import bpy
+    import numpy as np
+    import scenes
+
+    bar, _, moving = scenes.bar_with_handles()
+    before = scenes.world_points(bar)
+    moving.location.z += 0.4
+    for _ in range(2):
+        bpy.ops.arapfields.deform(target="KEY", **scenes.QUICK)
+        keys = bar.data.shape_keys.key_blocks
+        assert [key.name for key in keys] == ["Basis", "ARAP Fields"]
+        keys["ARAP Fields"].value = 0.0
+        bpy.context.view_layer.update()
+        assert np.array_equal(scenes.world_points(bar), before)
+    keys["ARAP Fields"].value = 1.0
+    bpy.context.view_layer.update()
+    assert np.abs(scenes.world_points(bar) - before).max() > 0.3
+
+
+@in_blender
+def test_the_surface_can_take_the_sources_place():
+    import bpy
+    import scenes
+    from test_surface import FIT
+
+    bar, _, moving = scenes.bar_with_handles()
+    for name, value in FIT.items():
+        setattr(bar.arapfields.fit, name, value)
+    moving.location.z += 0.2
+    count = len(bar.data.vertices)
+    bpy.ops.arapfields.deform(target="REPLACE", output="SURFACE", resolution=40, **scenes.QUICK)
+    assert len(bar.data.vertices) != count and len(bar.data.polygons) > 500
+    assert len(bpy.data.objects) == 3
+
+
+REFUSED = {
+    "a key on a surface": "a shape key keeps the mesh",
+    "modifiers": "modifiers of Bar change its vertices",
+    "live": "Bar is live; end live mode first",
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+@in_blender
+def test_what_the_source_cannot_take_is_refused_before_the_work(case):
+    import bpy
+    import scenes
+    from test_results import REFUSED
+
+    bar, *_ = scenes.bar_with_handles()
+    arguments = {"target": "KEY"}
+    if case == "a key on a surface":
+        arguments["output"] = "SURFACE"
+    elif case == "modifiers":
+        bar.modifiers.new("S", "SUBSURF")
+    else:
+        bpy.ops.arapfields.live()
+        scenes.activate(bar)
+    with pytest.raises(RuntimeError, match=REFUSED[case]):
+        bpy.ops.arapfields.deform(**arguments, **scenes.QUICK)
+
+
+@in_blender
+def test_linked_objects_give_results_but_are_never_written():
+    """From another file: deforming makes a local result; writing into the linked mesh is refused."""
+    import tempfile
+
+    import bpy
+    import numpy as np
+    import scenes
+
+    scenes.bar("Linked")
+    path = tempfile.mktemp(suffix=".blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(path, link=True) as (_, into):
+        into.objects = ["Linked"]
+    linked = into.objects[0]
+    bpy.context.collection.objects.link(linked)
+    bpy.context.view_layer.update()
+    scenes.activate(linked)
+    before = scenes.world_points(linked)
+    with pytest.raises(RuntimeError, match="linked from another file"):
+        bpy.ops.arapfields.add_handle()
+    with pytest.raises(RuntimeError, match="linked from another file"):
+        bpy.ops.arapfields.stylize(target="REPLACE", **scenes.QUICK)
+    assert bpy.ops.arapfields.stylize(**scenes.QUICK) == {"FINISHED"}
+    result = bpy.data.objects["Linked_stylized"]
+    assert result.library is None and result.data.library is None
+    assert np.array_equal(scenes.world_points(linked), before)
+
+
+@in_blender
+def test_without_a_window_the_course_gives_what_blocking_gives():
+    """Stepped as the window steps it, with a watched preview: the same bits as in one go."""
+    import bpy
+    import numpy as np
+    import scenes
+
+    import addon.operators.deform as deform
+    from addon.core import jobs
+
+    bar, _, moving = scenes.bar_with_handles()
+    moving.location.z += 0.4
+    bpy.ops.arapfields.deform(**scenes.QUICK)
+    blocking = scenes.world_points(bpy.data.objects["Bar_deformed"])
+    for name, value in scenes.QUICK.items():
+        setattr(bar.arapfields.deform, name, value)
+    scenes.activate(bar)
+    cls = deform.ARAPFIELDS_OT_deform
+
+    class Operator:
+        title, has_window, scope, looks = "Deform", True, "ACTIVE", 0
+        properties = type("P", (), {"is_property_set": staticmethod(lambda name: False)})
+        course, prepare, sources, plan = cls.course, cls.prepare, cls.sources, cls.plan
+        conclude, apply_one = cls.conclude, cls.apply_one
+
+        def note(self, level, text):
+            print(level, text)
+
+    operator = Operator()
+    course = operator.course(bpy.context)
+    while True:
+        try:
+            next(course)
+        except StopIteration as ended:
+            assert ended.value == {"FINISHED"}
+            break
+        operator.looks = max(operator.looks, jobs.running().sight()[1])
+    jobs.end()
+    assert np.array_equal(scenes.world_points(bpy.data.objects["Bar_deformed"]), blocking)
