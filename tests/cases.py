@@ -70,3 +70,24 @@ def bunny_handles():
     """The bend of the method's figures: the bottom held, the ears turned by 70 degrees."""
     bottom, ears = box([-1, -1, -1], [1, 1, -0.35]), box([-1, -1, 0.6], [1, 1, 1])
     return [moved(bottom), moved(ears, turn([0, 1, 0], 70, (-0.1, 0, 0.3)))]
+
+
+FINGERS = {  # of the published hand: where each tip is
+    "thumb": (0.285, -0.378, 0.122), "index": (0.227, -0.258, 0.573), "middle": (0.181, -0.064, 0.741),
+    "ring": (0.215, 0.161, 0.625), "little": (0.171, 0.369, 0.362),
+}  # fmt: skip
+
+
+def hand_handles(degrees=40.0):
+    """The published hand's palm held, and the tip of its middle finger taken where the knuckle turns it."""
+    palm, tip = box([-0.5, -0.5, -0.8], [0.06, 0.5, -0.05]), np.array(FINGERS["middle"])
+    knuckle = turn([0, 1, 0], degrees, (-0.16, -0.05, 0.12))
+    return [moved(palm), af.Point(tip, knuckle[:3, :3] @ tip + knuckle[:3, 3])]
+
+
+def fingertips(samples):
+    """Indices of the samples of each of the published hand's fingertips."""
+    return {
+        name: np.flatnonzero(np.linalg.norm(samples.points - tip, axis=1) < 0.08)
+        for name, tip in FINGERS.items()
+    }

@@ -132,14 +132,18 @@ void bind_options(py::module_& module) {
       .field("seed", &StylizeOptions::seed, "Of weights and subsets; same seed, same result.");
 }
 
-py::tuple energy_of(const DeformationField& field, const py::object& points) {
+/// What the field does at points of mesh coordinates.
+SolveReport measure_at(const DeformationField& field, const py::object& points) {
   SurfaceSamples samples;
   samples.frame = field.frame();
   samples.points = field.frame().to_cube(as_points(points, "points"));
   require_samples(samples);
-  const ArapValue value = run_long(nullptr, [&](const Progress&) {
-    return measure(field, samples, ObjectiveTerms(), samples.size()).arap;
-  });
+  return run_long(nullptr,
+                  [&](const Progress&) { return measure(field, samples, ObjectiveTerms(), samples.size()); });
+}
+
+py::tuple energy_of(const DeformationField& field, const py::object& points) {
+  const ArapValue value = measure_at(field, points).arap;
   return py::make_tuple(value.stretch, value.bend);
 }
 
@@ -214,6 +218,15 @@ void bind_solve(py::module_& module) {
   module.def("arap_energy", &energy_of, "field"_a, "points"_a,
              "(stretch, bend), means over the points (p, 3) of the rest surface, in the field's unit cube:\n"
              "stretch ‖J − R‖² with R the rotation closest to J, bend the squared speed at which R turns.");
+  module.def(
+      "distortion",
+      [](const DeformationField& field, const py::object& points) {
+        return measure_at(field, points).distortion;
+      },
+      "field"_a, "points"_a,
+      "The Distortion at points (p, 3) of the rest surface, for instance the vertices of extract_surface:\n"
+      "the smallest det J, the share of points where it is not positive (the field folds there), and the\n"
+      "largest and smallest stretch.");
 }
 
 }  // namespace arapfields::python

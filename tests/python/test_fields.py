@@ -125,3 +125,16 @@ def test_bad_points_are_named(bent):
         bent([[0.0, 1.0, np.nan]])
     assert bent(np.zeros((0, 3))).shape == (0, 3)
     assert bent.hessian(np.zeros((0, 3))).shape == (0, 3, 3, 3)
+
+
+def test_distortion_at_points(bent, samples):
+    points = samples.points[:300]
+    found = af.distortion(bent, points)
+    stretches = np.linalg.svd(bent.jacobian(points), compute_uv=False)
+    determinants = np.linalg.det(bent.jacobian(points))
+    assert found.min_determinant == pytest.approx(determinants.min(), rel=1e-6)
+    assert found.flipped_share == (determinants <= 0).mean()
+    assert found.max_stretch == pytest.approx(stretches.max(), rel=1e-6)
+    assert found.min_stretch == pytest.approx(stretches.min(), rel=1e-6)
+    with pytest.raises(af.InvalidInput, match="samples|points"):
+        af.distortion(bent, np.zeros((0, 3)))

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The example of docs/development.md: a field that the library does not know, in all that takes fields.
+#include <boost/test/unit_test.hpp>
+#include <cmath>
+
+#include "core/random.h"
+#include "energies/arap.h"
+#include "energies/distortion.h"
+#include "fields/inverse.h"
+
+using namespace arapfields;
+
+BOOST_AUTO_TEST_SUITE(foreign_field)
+
+namespace {
+
+// [roll]
+/// Rolls space about y: x becomes an angle, `curvature` times x, about the line z = −1/curvature.
+class Roll final : public DeformationField {
+ public:
+  explicit Roll(double curvature) : curvature_(curvature) {}
+
+  void evaluate(PointsIn points, JetView<double> out) const override {
+    const double k = curvature_;
+    for (Index p = 0; p < points.rows(); ++p) {
+      const double radius = points(p, 2) + 1.0 / k, s = std::sin(k * points(p, 0)),
+                   c = std::cos(k * points(p, 0));
+      const auto set = [&](int column, double x, double y, double z) {
+        double* const entry = out.at(column, p);
+        entry[0] = x, entry[1] = y, entry[2] = z;
+      };
+      set(0, radius * s, points(p, 1), radius * c - 1.0 / k);
+      if (out.order == JetOrder::value) continue;
+      set(first_column(0), k * radius * c, 0.0, -k * radius * s);
+      set(first_column(1), 0.0, 1.0, 0.0);
+      set(first_column(2), s, 0.0, c);
+      if (out.order == JetOrder::first) continue;
+      for (int column = 4; column < 10; ++column) set(column, 0.0, 0.0, 0.0);
+      set(second_column(0, 0), -k * k * radius * s, 0.0, -k * k * radius * c);
+      set(second_column(0, 2), k * c, 0.0, -k * s);
+    }
+  }
+
+ private:
+  double curvature_;
+};
+// [roll]
+
+Points some_points(Index count) {
+  Random random(7);
+  Points points(count, 3);
+  for (Index i = 0; i < count; ++i)
+    for (int k = 0; k < 3; ++k) points(i, k) = random.uniform(-0.5, 0.5);
+  return points;
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(energies_take_its_jets) {
+  const double k = 0.9;
+  const Points points = some_points(200);
+  JetBlock<double> jets(points.rows(), JetOrder::second);
+  Roll(k).evaluate(points, jets.view());
+  const ArapValue value = arap_energy<double>(std::as_const(jets).view(), 0.0, 1.0, {});
+  // J is a turn by k·x times diag(1 + k·z, 1, 1): the stretch is (k·z)², and the turn has speed k.
+  const Vector stretched = 1.0 + k * points.col(2).array();
+  BOOST_TEST(value.stretch == (stretched.array() - 1.0).square().mean(), boost::test_tools::tolerance(1e-10));
+  BOOST_TEST(value.bend == k * k * (stretched.array() + 1.0).mean(), boost::test_tools::tolerance(1e-10));
+  const Distortion found = distortion<double>(std::as_const(jets).view());
+  BOOST_TEST(found.min_determinant == stretched.minCoeff(), boost::test_tools::tolerance(1e-10));
+  BOOST_TEST(found.max_stretch == std::max(1.0, stretched.maxCoeff()), boost::test_tools::tolerance(1e-10));
+}
+
+BOOST_AUTO_TEST_CASE(newtons_method_inverts_it) {
+  const Roll roll(0.9);
+  const Points points = some_points(300);
+  Points images(points.rows(), 3);
+  roll.evaluate(points, {images.data(), images.rows(), JetOrder::value});
+  const InverseResult back = invert(roll, images);
+  BOOST_TEST(back.failures == 0);
+  BOOST_TEST((back.points - points).rowwise().norm().maxCoeff() < 1e-6);
+}
+
+BOOST_AUTO_TEST_SUITE_END()
