@@ -13,6 +13,7 @@ import hashlib
 import importlib
 import json
 import os
+import resource
 import subprocess
 import sys
 import time
@@ -59,7 +60,7 @@ def bring_up_to_date(figure, folder, force):
         print(f"{figure.name:16} up to date", flush=True)
         return True
     print(f"{figure.name:16} {figure.shows} ...", end=" ", flush=True)
-    begin = time.perf_counter()
+    begin, begin_work = time.perf_counter(), work_of_children()
     command = [sys.executable, str(HERE / "gallery.py"), "--draw", figure.name, "--output", str(folder)]
     made = subprocess.run(command, capture_output=True, text=True)
     if made.returncode:
@@ -69,8 +70,15 @@ def bring_up_to_date(figure, folder, force):
     manifest[figure.name] = {"shows": figure.shows, "hash": wanted, **json.loads(result.read_text())}
     result.unlink()
     manifest_path.write_text(json.dumps(dict(sorted(manifest.items())), indent=1) + "\n")
-    print(f"{time.perf_counter() - begin:.0f} s", flush=True)
+    seconds, work = time.perf_counter() - begin, work_of_children() - begin_work
+    print(f"{seconds:.0f} s, {work:.0f} s of processor time", flush=True)
     return True
+
+
+def work_of_children():
+    """Processor seconds of all figures so far."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def main():
@@ -101,6 +109,8 @@ def main():
         folder = ROOT / "out" / "gallery" if figure.published else options.output
         folder.mkdir(parents=True, exist_ok=True)
         done.append(bring_up_to_date(figure, folder.resolve(), options.all))
+    if work_of_children() > 1:
+        print(f"{'all':16} {work_of_children():.0f} s of processor time")
     return 0 if all(done) else 1
 
 

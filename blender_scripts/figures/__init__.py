@@ -21,4 +21,5 @@ FIGURES = [
     Figure("live", "six frames of a handle dragged live"),
     Figure("character", "materials and UVs of a deformed and a stylized mesh"),
     Figure("published", "the published bunny by three methods", published=True),
+    Figure("published_hand", "one finger of the published hand pulled", published=True),
 ]

@@ -14,8 +14,8 @@ import arapfields as af
 from .common import Box, add, add_boxes, turned
 
 BOXES = [
-    Box((0, 0, -0.66), (0.80, 0.72, 0.31)),
-    Box((-0.30, 0, 0.86), (0.50, 0.45, 0.26), 70, "Y", (-0.1, 0, 0.3)),
+    Box((0.18, -0.02, -0.445), (0.66, 0.46, 0.105)),
+    Box((-0.18, 0.22, 0.765), (0.41, 0.49, 0.175), 70, "Y", (-0.1, 0, 0.3)),
 ]
 SPACING, RESOLUTION = 2.0, 64 if stage.DRAFT else 128
 ITERATIONS = 400  # of libigl's local and global steps

@@ -9,7 +9,7 @@ import arapfields as af
 from .common import add, samples_of, shape, stack, suzanne, turned, warped
 
 STYLES = ["cube", "octahedron", "dodecahedron", "hexagonal prism", "square pyramid", "cylinder"]
-ROWS = [("dog", 48), ("suzanne", 28), ("octopus", 0)]
+ROWS = [("dog", 48, 225), ("suzanne", 28, 225), ("octopus", 0, 175)]  # turn, and height of the row
 SPACING, STRENGTH = 2.1, 0.6
 OPTIONS = {
     "samples": 3000,
@@ -19,7 +19,7 @@ OPTIONS = {
     "steps": 40,
     "tolerance": 3e-4,
 }
-LOW, HIGH = np.array((0.10, 0.13, 0.20)), np.array((0.90, 0.36, 0.06))
+LOW, HIGH = np.array((0.012, 0.03, 0.12)), np.array((0.95, 0.34, 0.02))
 
 
 def ball(colours_of, rings=64):
@@ -40,7 +40,7 @@ def ball(colours_of, rings=64):
 def preference_colours(style):
     def colours(normals):
         g = np.clip(af.gauss_preference(normals, af.preferred_normals(style)), 0, 1)[:, None]
-        return LOW + (HIGH - LOW) * g**1.5
+        return LOW + (HIGH - LOW) * g**2
 
     return colours
 
@@ -90,7 +90,7 @@ def render(output):
     shown += [stage.caption(style, (SPACING * (1 + i), -0.9, -0.42), 0.24) for i, style in enumerate(STYLES)]
     shown += [stage.caption("at rest", (0, -0.9, -0.42), 0.24), spacer(0)]
     stage.photograph(shown, paths[0], size=(1200, 225), elevation=10)
-    for name, degrees in ROWS:
+    for name, degrees, height in ROWS:
         rest = suzanne() if name == "suzanne" else shape(name)
         live = Live(samples_of(rest))
         stage.clear()
@@ -99,8 +99,8 @@ def render(output):
             moved, results[f"{name}, {style}"] = stylized(rest, live, style)
             shown.append(add(moved, style, place(rest, column, degrees)))
         paths.append(output / f"styles-{name}.png")
-        stage.photograph(shown, paths[-1], size=(1200, 225), elevation=12)
-    stack(paths, output / "styles.png", gap=0)
+        stage.photograph(shown, paths[-1], size=(1200, height), elevation=12)
+    stack(paths, output / "styles.png")
     return results
 
 
