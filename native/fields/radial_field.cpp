@@ -1,12 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fields/radial_field.h"
 
+#include <algorithm>
 #include <string>
 
 #include "core/errors.h"
+#include "core/parallel.h"
+#include "distance/morton.h"
 #include "fields/radial_sites.h"
 
 namespace arapfields {
+namespace {
+
+/// Points beyond which it pays to put near ones together.
+constexpr Index worth_sorting = 64;
+
+}  // namespace
 
 RadialField::RadialField(RadialBasis basis, RowMatrix<double> coefficients)
     : basis_(std::move(basis)), coefficients_(std::move(coefficients)) {
@@ -23,7 +32,19 @@ RadialField::RadialField(RadialBasis basis, RowMatrix<double> coefficients)
 }
 
 void RadialField::evaluate(PointsIn points, JetView<double> out) const {
-  RadialSites<double>(basis_, points).evaluate(coefficients_, out);
+  if (points.rows() <= worth_sorting) {
+    RadialSites<double>(basis_, points, out.order).evaluate(coefficients_, out);
+    return;
+  }
+  const std::vector<std::uint32_t> order = morton_order(points);
+  JetBlock<double> sorted(points.rows(), out.order);
+  const Points near = points(order, Eigen::all);
+  RadialSites<double>(basis_, near, out.order).evaluate(coefficients_, sorted.view());
+  parallel_for(0, points.rows(), 1024, [&](Index first, Index last) {
+    for (int c = 0; c < columns(out.order); ++c)
+      for (Index i = first; i < last; ++i)
+        std::copy_n(sorted.view().at(c, i), 3, out.at(c, order[static_cast<std::size_t>(i)]));
+  });
 }
 
 }  // namespace arapfields
