@@ -32,7 +32,7 @@ int sign_of(double x) { return x < 0.0 ? -1 : 1; }
 /// Walks a line through the grid's cells (Amanatides, Woo 1987).
 class CellWalk {
  public:
-  CellWalk(const SparseModel& model, const Line& line) : line_(line) {
+  CellWalk(const SparseModel& model, const Line& line) : line_(line), cells_(model.resolution()) {
     const double h = model.spacing();
     const Vec3 start = line.at(std::min(1e-9, line.length));
     for (int axis = 0; axis < 3; ++axis) {
@@ -45,11 +45,12 @@ class CellWalk {
     }
     set_leave();
   }
-  /// False behind the line's end.
+  /// False behind the line's end. Rounding may put that a little behind the grid's last wall.
   bool next() {
     enter = leave;
     if (enter >= line_.length) return false;
     place[axis_] += step_[axis_];
+    if (place[axis_] < 0 || place[axis_] >= cells_) return false;
     next_[axis_] += advance_[axis_];
     set_leave();
     return true;
@@ -64,7 +65,7 @@ class CellWalk {
     leave = std::clamp(next_[axis_], enter, line_.length);
   }
   const Line& line_;
-  int step_[3], axis_ = 0;
+  int cells_, step_[3], axis_ = 0;
   double advance_[3], next_[3];
 };
 
