@@ -13,6 +13,7 @@ help:  ## this list
 
 $(VENV)/.ready: requirements.txt
 	@test -x $(PY) || $(PYTHON) -m venv $(VENV) || { echo "Python 3.11 with the venv module is needed (Debian: python3.11-venv)"; exit 1; }
+	@echo "Fetching libtorch, Blender as a module and the tools from PyPI into $(VENV): large, once."
 	$(PY) -m pip install -q --disable-pip-version-check --upgrade "pip>=24"
 	$(PY) -m pip install -q --disable-pip-version-check -r requirements.txt
 	@# Headers of Boost.Test alone are used; the wheel's numpy>=2 (for Boost.Python) would clash with bpy 4.5's.
@@ -24,6 +25,7 @@ setup: $(VENV)/.ready  ## .venv with all that building and testing needs
 
 # The wheel's build folder is kept, so a rebuild compiles only what changed.
 $(VENV)/.installed: $(VENV)/.ready $(SOURCES)
+	@echo "Compiling the native library: some minutes the first time."
 	$(PY) -m pip install -q --disable-pip-version-check --no-build-isolation --no-deps --force-reinstall \
 	  -C build-dir=build/wheel -C cmake.define.ARAPFIELDS_NATIVE_TESTS=ON -C build.targets="arapfields;_native;stubs;native_tests" .
 	@touch $@
