@@ -6,7 +6,7 @@ PY := $(VENV)/bin/python
 SOURCES := $(shell find native cmake -type f) CMakeLists.txt pyproject.toml
 PYTEST := $(PY) -m pytest
 
-.PHONY: help setup build demo test test-slow bench sanitize format lint extension gallery docs clean
+.PHONY: help setup build demo test test-slow bench sanitize format lint extension repository gallery docs clean
 
 help:  ## this list
 	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/:.*##/ -/'
@@ -59,8 +59,14 @@ lint: setup  ## the same, checking alone
 	git ls-files '*.h' '*.cpp' | xargs $(VENV)/bin/clang-format --dry-run --Werror
 	$(VENV)/bin/ruff format --check -q . && $(VENV)/bin/ruff check .
 
+# PYTHONS="3.11 3.13" makes those a must; else 3.11 and whatever headers are at hand or to be had.
 extension: build  ## dist/arapfields-<version>-linux-x64.zip for Blender
-	$(PY) blender_scripts/build_extension.py --output dist
+	$(PY) blender_scripts/python_headers.py
+	$(PY) blender_scripts/build_extension.py --output dist $(if $(PYTHONS),--python $(PYTHONS))
+
+repository: build  ## the same, and dist/index.json: a repository of extensions to serve
+	$(PY) blender_scripts/python_headers.py
+	$(PY) blender_scripts/build_extension.py --output dist --repository $(if $(PYTHONS),--python $(PYTHONS))
 
 gallery: build  ## the documentation's pictures, rendered by the code
 	$(PY) blender_scripts/gallery.py --output docs/gallery

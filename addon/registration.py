@@ -5,8 +5,8 @@ import atexit
 
 import bpy
 
-from . import commands, panels, preferences
-from .bridge import jobs, loading, overlay, pictures, preview, translations
+from . import commands, install_check, panels, preferences
+from .bridge import host, jobs, loading, overlay, pictures, preview, translations
 from .bridge import live as live_mode
 from .operators import bake, deform, extract, fit, handles, live, presets, status, styles, stylize
 from .properties import handle, item, settings
@@ -28,6 +28,7 @@ MODULES = [
     *(fit, handles, deform, live, bake, stylize, styles, presets, extract, status),
     *panels.SECTIONS,
     commands,
+    install_check,
 ]
 
 
@@ -42,7 +43,7 @@ def register():
     except Exception:
         unregister()
         raise
-    if bpy.app.module:
+    if host.is_module():
         # Python's own bpy shuts down as its last reference goes; classes still registered would keep it
         # alive into the process's exit handlers, where it waits for a thread of its own for ever.
         atexit.register(unregister)

@@ -6,16 +6,15 @@ python blender_scripts/build_extension.py --output dist [--build build/wheel] [-
 
 import argparse
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "blender_scripts"))
 
-from extension import archive, bindings, libraries, wheel  # noqa: E402
+from extension import archive, bindings, check, libraries, wheel  # noqa: E402
+from extension.blender import extension_tool  # noqa: E402
 
-LIMIT = 200e6
 WHEEL_TAG = "py3-none-linux_x86_64"
 
 
@@ -24,7 +23,13 @@ def arguments():
     parser.add_argument("--output", type=Path, default=ROOT / "dist")
     parser.add_argument("--build", type=Path, default=ROOT / "build/wheel", help="CMake build folder to take")
     parser.add_argument(
-        "--python", nargs="+", metavar="X.Y", help="Pythons that must be served (default: at hand)"
+        "--python",
+        nargs="+",
+        metavar="X.Y",
+        help="Pythons that must be served (default: 3.11, and all at hand)",
+    )
+    parser.add_argument(
+        "--repository", action="store_true", help="also index.json, to serve the output folder"
     )
     parser.add_argument(
         "--python-include", nargs="+", default=[], metavar="DIR", help="further folders with Python.h"
@@ -40,13 +45,16 @@ def own_headers():
 
 def wanted_headers(options):
     found = bindings.find_headers([*options.python_include, *own_headers()])
-    if not options.python:
-        return found
-    wanted = [tuple(map(int, text.split("."))) for text in options.python]
-    missing = [f"{major}.{minor}" for major, minor in wanted if (major, minor) not in found]
+    given = [tuple(map(int, text.split("."))) for text in options.python or ["3.11"]]
+    missing = [f"{major}.{minor}" for major, minor in given if (major, minor) not in found]
     if missing:
         raise RuntimeError(f"no headers of Python {', '.join(missing)} at hand (pass --python-include DIR)")
-    return {version: found[version] for version in wanted}
+    if options.python:
+        return {version: found[version] for version in given}
+    for version in bindings.SERVED:
+        if version not in found:
+            print("no headers of Python {}.{} at hand: Blenders with it will not be served".format(*version))
+    return found
 
 
 def build_wheel(options, version, headers, work):
@@ -75,15 +83,6 @@ def build_wheel(options, version, headers, work):
     return wheel.write_wheel(options.output / "wheels", "arapfields", version, WHEEL_TAG, files, licence)
 
 
-def validate(path):
-    """Asks Blender's extension tool, in a process of its own."""
-    code = "import sys, bpy, addon_utils; from bl_pkg import bl_extension_cli as c; "
-    code += "sys.exit(c.cli_extension_handler(['validate', sys.argv[1]]))"
-    done = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True)
-    if done.returncode:
-        raise RuntimeError(f"Blender does not accept {path.name}:\n{done.stdout}{done.stderr}")
-
-
 def build(options):
     options.output, options.build = options.output.resolve(), options.build.resolve()
     if not (options.build / "python/arapfields/libarapfields.so").exists():
@@ -97,14 +96,15 @@ def build(options):
     print("Pythons:", ", ".join(f"{a}.{b}" for a, b in headers))
     (options.output / "wheels").mkdir(parents=True, exist_ok=True)
     wheels = [build_wheel(options, version, headers, ROOT / "build/extension")]
-    archive.check_platforms(manifest, wheels)
+    check.check_platforms(manifest, [wheel.name for wheel in wheels])
     path = options.output / f"arapfields-{version}-linux-x64.zip"
     archive.write_extension(addon, wheels, (ROOT / "LICENSE").read_text(), path)
-    validate(path)
-    size = path.stat().st_size
-    if size > LIMIT:
-        raise RuntimeError(f"{path} has {size / 1e6:.0f} MB; the limit is {LIMIT / 1e6:.0f}")
-    print(f"{path} ({size / 1e6:.0f} MB)")
+    check.check_zip(path, headers)
+    extension_tool("validate", path)
+    print(f"{path} ({path.stat().st_size / 1e6:.0f} MB)")
+    if options.repository:
+        extension_tool("server-generate", f"--repo-dir={options.output}", "--html")
+        print(f"{options.output / 'index.json'} (a repository: serve this folder)")
 
 
 if __name__ == "__main__":

@@ -33,7 +33,7 @@ def main(verb, script):
     except ImportError as error:
         sys.exit(f"{script}: run it as `blender -b -P {script} -- …`, or where bpy is installed ({error})")
     arguments = sys.argv[1:]
-    if not bpy.app.module:
+    if bpy.app.binary_path:  # Blender itself, not Python's module
         arguments = arguments[arguments.index("--") + 1 :] if "--" in arguments else []
     run = importlib.import_module(f"{addon().__name__}.commands.main").run
     code = run([verb, *arguments], script)

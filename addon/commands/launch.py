@@ -16,7 +16,9 @@ class Launch:
         """The command line that runs a verb on one file."""
         import bpy
 
-        if self.script and bpy.app.module:
+        from ..bridge import host
+
+        if self.script and host.is_module():
             return [sys.executable, str(self.script.with_name(f"{verb}.py")), *arguments]
         given = list(sys.argv[1:])
         if self.script:

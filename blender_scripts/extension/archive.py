@@ -1,25 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The extension's zip: manifest, add-on and wheel; checked by Blender's own extension tool."""
+"""The extension's zip: manifest, add-on and wheel."""
 
-import re
 import tomllib
 import zipfile
 
 from .wheel import entry
 
-PLATFORM_TAGS = {"linux-x64": r"(many)?linux.*_x86_64"}
-
 
 def read_manifest(addon):
     return tomllib.loads((addon / "blender_manifest.toml").read_text())
-
-
-def check_platforms(manifest, wheels):
-    """Each declared platform needs a wheel: Blender itself would build a zip without native code."""
-    for platform in manifest["platforms"]:
-        tag = PLATFORM_TAGS.get(platform)
-        if not tag or not any(re.search(rf"-{tag}\.whl$", wheel.name) for wheel in wheels):
-            raise RuntimeError(f"the manifest declares {platform}, for which no wheel was built")
 
 
 def addon_files(addon):

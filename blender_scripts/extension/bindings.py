@@ -10,7 +10,9 @@ from pathlib import Path
 import pybind11
 
 SERVED = [(3, 11), (3, 13), (3, 14)]  # Pythons of the Blenders that the manifest admits
+ROOT = Path(__file__).resolve().parents[2]
 SEARCHED = [
+    str(ROOT / "build/python-headers/*/usr/include"),  # python_headers.py
     "/usr/include",
     "/usr/local/include",
     "/opt/*/usr/include",  # a chroot with another release's headers

@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's own extension tool, run by the bpy of this environment in a process of its own."""
+
+import subprocess
+import sys
+
+CODE = """
+import sys, bpy, addon_utils
+from bl_pkg import bl_extension_cli
+sys.exit(bl_extension_cli.cli_extension_handler(sys.argv[1:]))
+"""
+
+
+def extension_tool(*arguments):
+    """Runs `blender --command extension …`; RuntimeError with what it says when it refuses."""
+    command = [sys.executable, "-c", CODE, *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode:
+        said = f"{done.stdout}{done.stderr}".strip()[-4000:]
+        raise RuntimeError(f"Blender's extension {arguments[0]} fails:\n{said}")
+    return done.stdout

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a finished zip must hold; read from the zip itself, not from what was meant to go into it."""
+
+import io
+import re
+import tomllib
+import zipfile
+
+LIMIT = 200e6
+PLATFORM_TAGS = {"linux-x64": r"(many)?linux.*_x86_64"}
+LIBRARY = "arapfields/libarapfields.so"
+
+
+def check_platforms(manifest, names):
+    """Each declared platform needs a wheel: Blender itself would take a zip without native code."""
+    for platform in manifest["platforms"]:
+        tag = PLATFORM_TAGS.get(platform)
+        if not tag or not any(re.search(rf"-{tag}\.whl$", name) for name in names):
+            raise RuntimeError(f"the manifest declares {platform}, for which no wheel was built")
+
+
+def check_zip(path, pythons):
+    """RuntimeError unless the zip is small, whole, and serves its platforms and these (major, minor)."""
+    size = path.stat().st_size
+    if size > LIMIT:
+        raise RuntimeError(f"{path} has {size / 1e6:.0f} MB; the limit is {LIMIT / 1e6:.0f}")
+    with zipfile.ZipFile(path) as archive:
+        names = set(archive.namelist())
+        missing = {"blender_manifest.toml", "__init__.py", "LICENSE"} - names
+        if missing:
+            raise RuntimeError(f"{path.name} lacks {', '.join(sorted(missing))}")
+        manifest = tomllib.loads(archive.read("blender_manifest.toml").decode())
+        wheels = [name.removeprefix("./") for name in manifest.get("wheels", [])]
+        if not set(wheels) <= names:
+            raise RuntimeError(f"{path.name} lacks {', '.join(sorted(set(wheels) - names))}")
+        check_platforms(manifest, wheels)
+        for wheel in wheels:
+            with zipfile.ZipFile(io.BytesIO(archive.read(wheel))) as content:
+                check_wheel(wheel, content.namelist(), pythons)
+
+
+def check_wheel(wheel, names, pythons):
+    """A wheel has the library once, and a binding for each Python."""
+    if names.count(LIBRARY) != 1:
+        raise RuntimeError(f"{wheel} has {names.count(LIBRARY)} copies of {LIBRARY}")
+    for major, minor in pythons:
+        if not any(name.startswith(f"arapfields/_native.cpython-{major}{minor}-") for name in names):
+            raise RuntimeError(f"{wheel} has no binding for Python {major}.{minor}")

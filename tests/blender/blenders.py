@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Blenders at hand besides the bpy of this environment; `make blenders` sets up what PyPI has.
+
+ARAPFIELDS_BLENDERS   folder of virtual environments with a bpy each, `4.2`, `5.2` (default build/blenders)
+ARAPFIELDS_BLENDER52  root folder of a system with a Blender 5.2 (default /opt/blender52), entered by chroot
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+HERE = Path(__file__).resolve().parent
+FOLDER = Path(os.environ.get("ARAPFIELDS_BLENDERS", ROOT / "build/blenders"))
+CHROOT = Path(os.environ.get("ARAPFIELDS_BLENDER52", "/opt/blender52"))
+NAMES = ["4.5", "4.2", "4.2 with NumPy 2", "5.2", "5.2 in its window's build"]
+
+
+@dataclass
+class Blender:
+    """How to run a Python script in one Blender, and where the user folder and files for it lie."""
+
+    command: list
+    folder: Path  # for the user folder and files, as seen from here
+    root: Path = Path("/")  # of the system that it runs in
+    libtorch: str = ""  # another libtorch_cpu.so there
+    environment: dict = field(default_factory=dict)
+
+    def inside(self, path):
+        """The path as that system sees it."""
+        return str(Path("/") / path.relative_to(self.root))
+
+    def bring(self, path):
+        """The file, where that Blender can see it."""
+        if self.root == Path("/"):
+            return path
+        copy = self.folder / path.name
+        shutil.copytree(path, copy) if path.is_dir() else shutil.copyfile(path, copy)
+        return copy
+
+    def run(self, script, *arguments, check=True):
+        here = self.bring(HERE)
+        user = self.folder / "user"
+        user.mkdir(exist_ok=True)
+        environment = {**os.environ, "OMP_NUM_THREADS": "1", "TMPDIR": self.inside(self.folder)}
+        environment |= {"BLENDER_USER_RESOURCES": self.inside(user), "PYTHONPATH": "", **self.environment}
+        command = [*self.command, self.inside(here / script)]
+        command += ["--"] if "--python" in self.command else []
+        done = subprocess.run(
+            [*command, *map(str, arguments)], env=environment, capture_output=True, text=True, timeout=900
+        )
+        if check and done.returncode:
+            pytest.fail(f"status {done.returncode}\n{done.stdout[-3000:]}{done.stderr[-4000:]}")
+        return done
+
+
+def python_of(name):
+    python = FOLDER / name / "bin/python"
+    if not python.exists():
+        pytest.skip(f"no Blender {name} at {FOLDER / name} (make blenders)")
+    return python
+
+
+def find(name, folder):
+    """The Blender of that name; skips the test where it is not at hand."""
+    if name == "4.5":
+        pytest.importorskip("bpy", reason="PyPI's bpy is not installed")
+        return Blender([sys.executable], folder)
+    if name == "4.2 with NumPy 2":
+        numpy = FOLDER / "numpy2"
+        if not numpy.is_dir():
+            pytest.skip(f"no NumPy 2 at {numpy} (make blenders)")
+        return Blender([str(python_of("4.2"))], folder, environment={"PYTHONPATH": str(numpy)})
+    if name in ("4.2", "5.2"):
+        return Blender([str(python_of(name))], folder)
+    if os.geteuid() or not (CHROOT / "usr/bin/blender").exists():
+        pytest.skip(f"no Blender in {CHROOT}, or no right to enter it")
+    there = CHROOT / "tmp" / f"arapfields-{os.getpid()}-{folder.name}"
+    shutil.rmtree(there, ignore_errors=True)
+    there.mkdir(parents=True)
+    command = ["chroot", str(CHROOT), "blender", "--background", "--factory-startup"]
+    command += ["--python-exit-code", "1", "--python"]
+    libtorch = CHROOT / "torch/lib/libtorch_cpu.so"
+    return Blender(command, there, CHROOT, "/torch/lib/libtorch_cpu.so" if libtorch.exists() else "")

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Run in a Blender of its own: installs the extension from a zip, uses it, switches it off, removes it.
+
+blender --background --python installed.py -- ZIP [--torch before|after] [--library LIBTORCH_CPU]
+python installed.py ZIP …
+"""
+
+import argparse
+import ctypes
+import os
+import sys
+from importlib.machinery import PathFinder
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+FOLDER = Path(os.environ["BLENDER_USER_RESOURCES"])
+MODULE = "bl_ext.user_default.arapfields"
+
+
+class FromTheExtension:
+    """Finds arapfields in the user folder alone, not in an environment where it may be installed as well."""
+
+    @staticmethod
+    def find_spec(name, path=None, target=None):
+        if name == "arapfields":
+            spec = PathFinder.find_spec(name, [p for p in sys.path if str(FOLDER) in p])
+            if spec is None:
+                raise ModuleNotFoundError("not in the extension", name=name)
+            return spec
+        return None
+
+
+def arguments():
+    given = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
+    parser = argparse.ArgumentParser()
+    parser.add_argument("zip")
+    parser.add_argument("--torch", choices=("before", "after"))
+    parser.add_argument("--library", help="another libtorch_cpu.so, instead of Python's torch")
+    return parser.parse_args(given)
+
+
+def other_torch(library):
+    """Another add-on's torch: trains with it; where there is only its C++ library, loads that for all."""
+    if library:
+        ctypes.CDLL(library, mode=ctypes.RTLD_GLOBAL)
+        return
+    import torch
+
+    x = torch.randn(64, 8, requires_grad=True)
+    model = torch.nn.Sequential(torch.nn.Linear(8, 32), torch.nn.Softplus(), torch.nn.Linear(32, 1))
+    optimizer = torch.optim.Adam(model.parameters())
+    for _ in range(5):
+        loss = model(x).square().mean()
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+    assert torch.isfinite(loss)
+
+
+def install(path):
+    import bpy
+
+    done = bpy.ops.extensions.package_install_files(
+        filepath=path, repo="user_default", enable_on_install=True
+    )
+    assert done == {"FINISHED"}, done
+    assert MODULE in bpy.context.preferences.addons
+
+
+def use():
+    import bpy
+    import scenes
+    from bl_ext.user_default.arapfields.core import native
+
+    assert not native.problem(), native.problem()
+    import arapfields
+
+    assert str(FOLDER) in arapfields.__file__, arapfields.__file__
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bar, _, moving = scenes.bar_with_handles()
+    scenes.decorate(bar)
+    kept = scenes.everything(bar)
+    quick = bar.arapfields.fit
+    quick.steps, quick.width, quick.layers, quick.near_points = 100, 32, 2, 20000
+    bpy.ops.arapfields.fit()
+    moving.location.z += 0.3
+    bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK)
+    assert scenes.everything(bpy.data.objects["Bar_deformed"]) == kept
+    assert scenes.world_points(bpy.data.objects["Bar_deformed"])[:, 2].max() > 0.4
+    scenes.activate(bar)
+    bpy.ops.arapfields.stylize(style="CUBE", **scenes.QUICK)
+    extract(bar, 32)
+
+
+def extract(item, resolution):
+    import bpy
+    import scenes
+
+    scenes.activate(item)
+    bpy.ops.arapfields.extract(resolution=resolution)
+    assert len(bpy.data.objects[f"{item.name}_implicit"].data.polygons) > 100
+
+
+def switch_off_and_remove():
+    import bpy
+
+    bpy.ops.preferences.addon_disable(module=MODULE)
+    assert not hasattr(bpy.types.Object, "arapfields")
+    bpy.ops.preferences.addon_enable(module=MODULE)
+    assert hasattr(bpy.types.Object, "arapfields")
+    names = [repo.module for repo in bpy.context.preferences.extensions.repos]
+    bpy.ops.extensions.package_uninstall(repo_index=names.index("user_default"), pkg_id="arapfields")
+    assert not hasattr(bpy.types.Object, "arapfields")
+    assert MODULE not in bpy.context.preferences.addons
+
+
+def main():
+    wanted = arguments()
+    sys.meta_path.insert(0, FromTheExtension)
+    if wanted.torch == "before":
+        other_torch(wanted.library)
+    sys.path.insert(0, str(HERE))
+    import bpy
+    import numpy
+
+    install(wanted.zip)
+    use()
+    if wanted.torch:
+        other_torch(wanted.library)
+        extract(bpy.data.objects["Bar"], 24)
+    switch_off_and_remove()
+    print(f"USED {bpy.app.version_string}, Python {sys.version.split()[0]}, NumPy {numpy.__version__}")
+
+
+if __name__ == "__main__":
+    main()
+    sys.stdout.flush()
+    import bpy
+
+    if not hasattr(bpy.app, "module") and not bpy.app.binary_path:
+        # The bpy of 4.2 drops a removed add-on's callbacks (update=) after Python has ended, and crashes.
+        os._exit(0)
