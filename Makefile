@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # One word a purpose. Every word sets up what it needs in .venv (dependencies from PyPI).
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
+PYTHON313 ?= $(shell command -v python3.13)
 VENV := .venv
 PY := $(VENV)/bin/python
 SOURCES := $(shell find native cmake -type f) CMakeLists.txt pyproject.toml
 PYTEST := $(PY) -m pytest
 
-.PHONY: help setup build demo test test-slow bench sanitize format lint extension repository gallery docs clean
+.PHONY: help setup build demo test test-slow bench sanitize format lint extension repository blenders gallery docs clean
 
 help:  ## this list
 	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/:.*##/ -/'
@@ -67,6 +68,21 @@ extension: build  ## dist/arapfields-<version>-linux-x64.zip for Blender
 repository: build  ## the same, and dist/index.json: a repository of extensions to serve
 	$(PY) blender_scripts/python_headers.py
 	$(PY) blender_scripts/build_extension.py --output dist --repository $(if $(PYTHONS),--python $(PYTHONS))
+
+# What PyPI has of other Blenders, for tests/blender/test_extension.py; the 5.2 needs a Python 3.13.
+blenders: build/blenders/4.2/.ready $(if $(PYTHON313),build/blenders/5.2/.ready)  ## other Blenders to test the extension in: build/blenders
+	@$(if $(PYTHON313),,echo "no python3.13 (PYTHON313=…): Blender 5.2 is left out")
+
+build/blenders/4.2/.ready:
+	$(PYTHON) -m venv build/blenders/4.2
+	build/blenders/4.2/bin/python -m pip install -q "bpy==4.2.*" "numpy<2" torch==2.13.0
+	build/blenders/4.2/bin/python -m pip install -q --no-deps --target build/blenders/numpy2 "numpy==2.*"
+	@touch $@
+
+build/blenders/5.2/.ready:
+	$(PYTHON313) -m venv build/blenders/5.2
+	build/blenders/5.2/bin/python -m pip install -q "bpy==5.2.*"
+	@touch $@
 
 gallery: build  ## the documentation's pictures, rendered by the code
 	$(PY) blender_scripts/gallery.py --output docs/gallery

@@ -15,6 +15,7 @@ SEARCHED = [
     str(ROOT / "build/python-headers/*/usr/include"),  # python_headers.py
     "/usr/include",
     "/usr/local/include",
+    "/opt/python/*/include",  # the manylinux containers
     "/opt/*/usr/include",  # a chroot with another release's headers
     str(Path.home() / ".pyenv/versions/*/include"),
 ]

@@ -5,6 +5,7 @@ ARAPFIELDS_BLENDERS   folder of virtual environments with a bpy each, `4.2`, `5.
 ARAPFIELDS_BLENDER52  root folder of a system with a Blender 5.2 (default /opt/blender52), entered by chroot
 """
 
+import importlib.util
 import os
 import shutil
 import subprocess
@@ -76,8 +77,12 @@ def find(name, folder):
         if not numpy.is_dir():
             pytest.skip(f"no NumPy 2 at {numpy} (make blenders)")
         return Blender([str(python_of("4.2"))], folder, environment={"PYTHONPATH": str(numpy)})
-    if name in ("4.2", "5.2"):
+    if name == "4.2":
         return Blender([str(python_of(name))], folder)
+    if name == "5.2":  # PyPI's torch for its Python is large: the C++ library of ours stands for it
+        torch = importlib.util.find_spec("torch")
+        library = str(Path(torch.origin).parent / "lib/libtorch_cpu.so") if torch else ""
+        return Blender([str(python_of(name))], folder, libtorch=library)
     if os.geteuid() or not (CHROOT / "usr/bin/blender").exists():
         pytest.skip(f"no Blender in {CHROOT}, or no right to enter it")
     there = CHROOT / "tmp" / f"arapfields-{os.getpid()}-{folder.name}"

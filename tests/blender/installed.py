@@ -40,9 +40,9 @@ def arguments():
 
 
 def other_torch(library):
-    """Another add-on's torch: trains with it; where there is only its C++ library, loads that for all."""
+    """Another add-on's torch: trains with it; where there is only its C++ library, loads that likewise."""
     if library:
-        ctypes.CDLL(library, mode=ctypes.RTLD_GLOBAL)
+        ctypes.CDLL(library)
         return
     import torch
 

@@ -79,3 +79,18 @@ def test_install_use_and_remove(extension, blender, torch):
     (used,) = [line for line in done.stdout.splitlines() if line.startswith("USED")]
     print(used)
     assert left_behind(blender) == []
+
+
+@pytest.mark.parametrize("blender", ["4.5", "4.2"], indirect=True)
+def test_a_repository_serves_the_zip(extension, blender, tmp_path):
+    """server-generate's index.json is all that Blender needs to list, fetch and install the extension."""
+    sys.path.insert(0, str(ROOT / "blender_scripts"))
+    from extension.blender import extension_tool
+
+    folder = tmp_path / "repository"
+    folder.mkdir()
+    shutil.copyfile(extension, folder / extension.name)
+    extension_tool("server-generate", f"--repo-dir={folder}", "--html")
+    done = blender.run("repository.py", f"file://{folder}/index.json")
+    assert "SERVED" in done.stdout, done.stdout[-2000:]
+    assert left_behind(blender) == []
