@@ -44,7 +44,7 @@ def test_links_and_pictures_exist(page):
 
 
 def test_messages_of_the_troubleshooting_page_are_in_the_code():
-    folders = ("native", "addon")
+    folders = ("native", "addon", "blender_scripts")
     sources = [
         p
         for folder in folders
