@@ -6,6 +6,7 @@
 #include <chrono>
 #include <optional>
 #include <thread>
+#include <type_traits>
 
 #include "core/errors.h"
 #include "core/task.h"
@@ -43,9 +44,19 @@ auto run_long(Task* task, Call&& call) {
   Task unwatched;
   SignalWatch signals;
   const Progress::Interruption interruption = signals.interruption();
-  try {
-    py::gil_scoped_release release;
+  const auto released = [&] {
+    const py::gil_scoped_release release;
     return call(Progress(task != nullptr ? task : &unwatched, 0.0, 1.0, &interruption));
+  };
+  try {
+    if constexpr (std::is_void_v<decltype(released())>) {
+      released();
+      signals.rethrow();
+    } else {
+      auto result = released();
+      signals.rethrow();  // it may have come too late to be seen by the call
+      return result;
+    }
   } catch (const Cancelled&) {
     signals.rethrow();
     throw;

@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import _native
 from .._native import InvalidInput
+from .running import uninterrupted
 
 MESH_SUFFIXES = (".ply", ".obj", ".stl", ".off")
 CLOUD_SUFFIXES = (".ply", ".npz", ".xyz")
@@ -19,7 +20,8 @@ MOST_PREFERRED = 256  # face normals a chosen mesh may have as preferred normals
 
 def _trimesh():
     try:
-        import trimesh
+        with uninterrupted():  # parts of it swallow Ctrl-C while they are imported
+            import trimesh
     except ImportError:
         raise ImportError("meshes need the package trimesh: pip install 'arapfields[cli]'") from None
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # what matters is in our own error

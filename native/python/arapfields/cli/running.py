@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Long calls with a progress bar, and outputs that appear whole or not at all."""
 
+import contextlib
 import os
 import shutil
+import signal
 import sys
 import tempfile
 import threading
@@ -11,6 +13,22 @@ from pathlib import Path
 from .._native import InvalidInput, Task
 
 POLL = 0.1  # seconds between looks at a task
+
+
+@contextlib.contextmanager
+def uninterrupted():
+    """Ctrl-C during the block takes effect at its end."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    waiting = []
+    before = signal.signal(signal.SIGINT, lambda *_: waiting.append(True))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if waiting:
+        signal.raise_signal(signal.SIGINT)
 
 
 def with_progress(label, call, quiet=False):
