@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Jobs in the window: they tick, preview, cancel and undo; they end when the file does."""
+
+import time
+
+import bpy
+import numpy as np
+import scenes
+import stage
+
+LONG = {**scenes.QUICK, "iterations": 200000}
+
+
+def invoke(settings):
+    with stage.override():
+        scenes.activate(bpy.data.objects["Bar"])
+        return str(bpy.ops.arapfields.deform("INVOKE_DEFAULT", **settings))
+
+
+def until_idle(limit):
+    from addon.core import jobs
+
+    begin = time.perf_counter()
+    while jobs.running() is not None and time.perf_counter() - begin < limit:
+        yield 0.01
+
+
+def checks(found, folder):
+    from addon.bridge import preview
+    from addon.bridge.jobs import JobOperator
+    from addon.core import jobs
+
+    stage.empty_file()
+    with stage.override():
+        _, _, moving = scenes.bar_with_handles()
+        bpy.ops.view3d.view_all()
+    yield 1.0
+    moving.location.z += 0.5
+    moving.rotation_euler.y = 0.6
+    bpy.context.view_layer.update()
+    before = stage.everything()
+    bpy.ops.ed.undo_push(message="before")
+    found["redraw_s"] = stage.redraw_seconds()
+    yield from stage.gaps(3.0, found, "late_without_a_job")
+    ours, shown = stage.Meter(), stage.Meter()
+    ours.watch(JobOperator, "advance").watch(preview, "draw")
+    shown.watch(preview.Preview, "show")
+    begin = time.perf_counter()
+    found["invoke"] = invoke(LONG)
+    found["click_s"] = round(time.perf_counter() - begin, 4)
+    begin = time.perf_counter()
+    yield from stage.gaps(6.0, found, "late_with_a_job")
+    seconds = time.perf_counter() - begin
+    found["running"], found["progress"] = jobs.running() is not None, jobs.progress()
+    stage.picture(folder, "running")
+    found["main_thread_at_once"], previews = ours.end(), shown.end()
+    found["previews_per_second"] = round(previews["calls"] / seconds, 2)
+    found["looks_per_second"] = round(jobs.running().sight()[1] / seconds, 2)
+    begin = time.perf_counter()
+    bpy.ops.arapfields.cancel()
+    yield from until_idle(30)
+    found["cancel_s"] = round(time.perf_counter() - begin, 4)
+    found["exact_after_cancel"] = stage.everything() == before
+    yield 1.0
+    stage.picture(folder, "cancelled")
+    yield from escape(found, before)
+    yield from result(found, folder)
+
+
+def escape(found, before):
+    """Cancelled by the key instead of the button."""
+    invoke(LONG)
+    stage.tool("mousemove", 600, 500)
+    yield 1.5
+    begin = time.perf_counter()
+    stage.tool("key", "Escape")
+    yield from until_idle(30)
+    found["escape_s"] = round(time.perf_counter() - begin, 4)
+    found["exact_after_escape"] = stage.everything() == before
+
+
+def result(found, folder):
+    from addon.bridge import preview
+
+    invoke(scenes.QUICK)
+    yield from until_idle(120)
+    modal = stage.positions("Bar_deformed")
+    found["preview_gone"] = not preview.is_shown()
+    yield 0.5
+    stage.picture(folder, "result")
+    there = "Bar_deformed" in bpy.data.objects
+    with stage.override():
+        bpy.ops.ed.undo()
+    gone = "Bar_deformed" not in bpy.data.objects
+    found["one_undo_step"] = there and gone and abs(bpy.data.objects["Moving"].location.z - 0.5) < 1e-6
+    with stage.override():
+        scenes.activate(bpy.data.objects["Bar"])
+        bpy.ops.arapfields.deform("EXEC_DEFAULT", **scenes.QUICK)
+    found["modal_against_blocking"] = float(np.abs(stage.positions("Bar_deformed") - modal).max())
+
+
+def endings(found):
+    """A job while a step is undone, a file is loaded, the add-on is switched off."""
+    from addon.core import jobs
+
+    for name, act in (
+        ("undo", lambda: bpy.ops.ed.undo()),
+        ("load", lambda: bpy.ops.wm.read_homefile(use_empty=True)),
+    ):
+        stage.empty_file()
+        with stage.override():
+            scenes.bar_with_handles()
+            bpy.ops.ed.undo_push(message="one")
+            bpy.ops.ed.undo_push(message="two")
+        invoke(LONG)
+        yield 1.0
+        running = jobs.running() is not None
+        begin = time.perf_counter()
+        with stage.override():
+            act()
+        found[f"ends_on_{name}"] = running and jobs.running() is None
+        found[f"ends_on_{name}_s"] = round(time.perf_counter() - begin, 4)
+        yield 1.0

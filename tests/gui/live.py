@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live mode in the window: how often the viewport follows, one undo step a drag, off restores."""
+
+import time
+
+import bpy
+import numpy as np
+import scenes
+import stage
+
+SECONDS = 5.0
+
+
+def checks(found, folder):
+    yield from rate(found, folder)
+    yield from drag(found, folder)
+
+
+def rate(found, folder):
+    """Moves a handle of a mesh of 50,000 vertices: how often the viewport shows a new shape."""
+    from addon.bridge import live, live_session
+
+    stage.empty_file()
+    with stage.override():
+        bar, _, moving = scenes.bar_with_handles()
+        stage.dense_bar()
+        bpy.ops.view3d.view_all()
+        scenes.activate(bar)
+        begin = time.perf_counter()
+        bpy.ops.arapfields.live("INVOKE_DEFAULT")
+        found["live_click_s"] = round(time.perf_counter() - begin, 4)
+    session = live._sessions[bar.session_uid]
+    while not session.follower.resting:
+        yield 0.01
+    found["live_first_shape_s"] = round(time.perf_counter() - begin, 4)
+    found["live_vertices"] = len(bpy.data.objects["Bar_live"].data.vertices)
+    _, area, _ = stage.view()
+    for name, overlays, samples in (("as_it_opens", True, "8"), ("plain", False, "OFF")):
+        area.spaces.active.overlay.show_overlays = overlays
+        bpy.context.preferences.system.viewport_aa = samples
+        yield 1.0
+        yield from one_rate(found, name, moving, live, live_session)
+    stage.picture(folder, "live-plain")
+    area.spaces.active.overlay.show_overlays = True
+    bpy.context.preferences.system.viewport_aa = "8"
+    while not session.follower.resting:
+        yield 0.05
+    found["live_refined"] = {"converged": session.solver.report["converged"]}
+    yield 1.0
+    stage.picture(folder, "live")
+    bar.hide_set(False)
+    with stage.override():
+        live.end(bpy.context, bar)
+
+
+def one_rate(found, name, moving, live, live_session):
+    shown, meter, ticks = stage.Meter(), stage.Meter(), stage.Meter()
+    meter.watch(live_session.Session, "moved")
+    ticks.watch(live, "update")
+    shown.watch(live_session.arrays, "set_positions")
+    times, stop = stage.draws()
+    begin = time.perf_counter()
+    while time.perf_counter() - begin < SECONDS:
+        share = (time.perf_counter() - begin) / SECONDS
+        moving.location.z, moving.rotation_euler.x = 0.6 * share, 1.2 * share
+        yield 0.004
+    stop()
+    solves, updates = meter.end(), shown.end()
+    found[f"live_{name}"] = {
+        "updates_per_second": updates["calls"] / SECONDS,
+        "draws_per_second": len(times) / SECONDS,
+        "solve_and_warp_on_worker": solves,
+        "main_thread_each_look": ticks.end(),
+        "bare_redraw_s": stage.redraw_seconds(),
+    }
+
+
+def drag(found, folder):
+    """A drag with the mouse, as a user does it: one undo step, and the shape returns with it."""
+    from addon.bridge import live
+
+    stage.empty_file()
+    with stage.override():
+        bar, _, moving = scenes.bar_with_handles()
+        bpy.ops.view3d.view_all()
+        scenes.activate(bar)
+    before = stage.everything()
+    with stage.override():
+        bpy.ops.arapfields.live("INVOKE_DEFAULT")
+        scenes.activate(moving)
+        moving["mark"] = 1
+        bpy.ops.ed.undo_push(message="mark")
+    yield 1.0
+    rest = stage.positions("Bar_live")
+    stage.tool("mousemove", 600, 500)
+    yield 0.3
+    stage.tool("key", "g")
+    yield 0.3
+    for step in range(1, 9):
+        stage.tool("mousemove", 600 + 8 * step, 500 - 12 * step)
+        yield 0.15
+    stage.tool("click", 1)
+    yield 2.0
+    moving = bpy.data.objects["Moving"]
+    moved = stage.positions("Bar_live")
+    stage.picture(folder, "dragged")
+    found["drag_moved_handle"] = round(float(np.linalg.norm(moving.location - bar.location) - 1), 4)
+    found["drag_moved_shape"] = round(float(np.abs(moved - rest).max()), 4)
+    with stage.override():
+        bpy.ops.ed.undo()
+    yield 1.5
+    moving = bpy.data.objects["Moving"]
+    back = np.allclose(moving.location, (1, 0, 0), atol=1e-6) and moving.get("mark") == 1
+    found["drag_is_one_undo_step"] = bool(back)
+    found["shape_returns_with_undo"] = round(float(np.abs(stage.positions("Bar_live") - rest).max()), 6)
+    bar = bpy.data.objects["Bar"]
+    del moving["mark"]
+    with stage.override():
+        scenes.activate(bar)
+        live.end(bpy.context, bar)
+    found["off_restores"] = stage.everything() == before and bar.display_type == "TEXTURED"

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the checks in Blender's window share: where to act, pictures, meters of time."""
+
+import contextlib
+import subprocess
+import time
+
+import bpy
+import numpy as np
+import scenes
+
+TAB = (1299, 340)  # where the sidebar's last tab lies in a window of 1600 × 1000
+
+
+def view():
+    window = bpy.context.window_manager.windows[0]
+    area = next(a for a in window.screen.areas if a.type == "VIEW_3D")
+    return window, area, next(r for r in area.regions if r.type == "WINDOW")
+
+
+def override():
+    window, area, region = view()
+    return bpy.context.temp_override(window=window, area=area, region=region)
+
+
+def show_sidebar():
+    with override():
+        bpy.context.area.spaces.active.show_region_ui = True
+        for region in bpy.context.area.regions:
+            if region.type == "UI":
+                with contextlib.suppress(AttributeError):  # read-only in some versions
+                    region.active_panel_category = "ARAP Fields"
+
+
+def tool(*words):
+    subprocess.run(["xdotool", *map(str, words)], check=False)
+
+
+def picture(folder, name):
+    subprocess.run(["import", "-window", "root", str(folder / f"{name}.png")], check=False)
+
+
+def empty_file():
+    for item in list(bpy.data.objects):
+        bpy.data.objects.remove(item)
+
+
+def positions(name):
+    return scenes.world_points(bpy.data.objects[name])
+
+
+def everything():
+    """Names of all that is in the file, and every mesh's positions, for comparison bit by bit."""
+    names = {
+        kind: sorted(getattr(bpy.data, kind).keys())
+        for kind in ("objects", "meshes", "collections", "actions", "materials", "shape_keys")
+    }
+    points = {}
+    for mesh in bpy.data.meshes:
+        flat = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+        mesh.vertices.foreach_get("co", flat)
+        points[mesh.name] = flat.tobytes()
+    where = {o.name: [tuple(row) for row in o.matrix_world] for o in bpy.data.objects}
+    return names, points, where
+
+
+def dense_bar(cuts=91):
+    """Makes the bar one of some 50,000 vertices."""
+    import bmesh
+
+    mesh, made = bpy.data.objects["Bar"].data, bmesh.new()
+    bmesh.ops.create_cube(made, size=1.0)
+    bmesh.ops.subdivide_edges(made, edges=made.edges, cuts=cuts, use_grid_fill=True)
+    bmesh.ops.scale(made, vec=(2, 0.5, 0.5), verts=made.verts)
+    made.to_mesh(mesh)
+    made.free()
+    mesh.update()
+
+
+class Meter:
+    """Wall and processor time of the main thread in some of our functions."""
+
+    def __init__(self):
+        self.wall, self.own, self._restore = [], [], []
+
+    def watch(self, owner, name):
+        original = getattr(owner, name)
+
+        def timed(*given, **named):
+            wall, own = time.perf_counter(), time.thread_time()
+            try:
+                return original(*given, **named)
+            finally:
+                self.wall.append(time.perf_counter() - wall)
+                self.own.append(time.thread_time() - own)
+
+        setattr(owner, name, timed)
+        self._restore.append((owner, name, original))
+        return self
+
+    def end(self):
+        for owner, name, original in self._restore:
+            setattr(owner, name, original)
+        if not self.wall:
+            return {"calls": 0}
+        return {
+            "calls": len(self.wall),
+            "longest_ms": round(1e3 * max(self.wall), 2),
+            "median_ms": round(1e3 * float(np.median(self.wall)), 2),
+            "longest_own_ms": round(1e3 * max(self.own), 2),
+        }
+
+
+def gaps(seconds, found, name):
+    """The longest time that a timer of 10 ms was late, while the event loop runs so long."""
+    late, begin, last = [], time.perf_counter(), time.perf_counter()
+    while time.perf_counter() - begin < seconds:
+        yield 0.01
+        late.append(time.perf_counter() - last - 0.01)
+        last = time.perf_counter()
+    found[name] = {"longest_s": round(max(late), 4), "median_s": round(float(np.median(late)), 4)}
+
+
+def redraw_seconds(count=5):
+    """Seconds of one redraw of the whole window, with nothing of ours in it."""
+    with override():
+        begin = time.perf_counter()
+        for _ in range(count):
+            bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
+        return round((time.perf_counter() - begin) / count, 4)
+
+
+def draws():
+    """A list that grows by the time of each drawing of the viewport, and what ends that."""
+    times = []
+    handler = bpy.types.SpaceView3D.draw_handler_add(
+        lambda: times.append(time.perf_counter()), (), "WINDOW", "POST_PIXEL"
+    )
+    return times, lambda: bpy.types.SpaceView3D.draw_handler_remove(handler, "WINDOW")
