@@ -16,6 +16,19 @@ def checks(found, folder):
     yield from drag(found, folder)
 
 
+def settled(name, limit=30.0):
+    """Until the live shape of that object is refined and shown, if it is live."""
+    from addon.bridge import live
+
+    begin, calm = time.perf_counter(), 0
+    while calm < 3 and time.perf_counter() - begin < limit:
+        session = live._sessions.get(bpy.data.objects[name].session_uid)
+        if session is None:
+            return
+        calm = calm + 1 if session.follower.resting else 0
+        yield 0.1
+
+
 def rate(found, folder):
     """Moves a handle of a mesh of 50,000 vertices: how often the viewport shows a new shape."""
     from addon.bridge import live, live_session
@@ -26,6 +39,7 @@ def rate(found, folder):
         stage.dense_bar()
         bpy.ops.view3d.view_all()
         scenes.activate(bar)
+        solves = stage.Meter().watch(live_session.Session, "moved")
         begin = time.perf_counter()
         bpy.ops.arapfields.live("INVOKE_DEFAULT")
         found["live_click_s"] = round(time.perf_counter() - begin, 4)
@@ -40,11 +54,12 @@ def rate(found, folder):
         bpy.context.preferences.system.viewport_aa = samples
         yield 1.0
         yield from one_rate(found, name, moving, live, live_session)
+    found["live_solve_and_warp_on_worker"] = solves.end()
+    found["live_without_drawing"] = without_drawing(moving, live)
     stage.picture(folder, "live-plain")
     area.spaces.active.overlay.show_overlays = True
     bpy.context.preferences.system.viewport_aa = "8"
-    while not session.follower.resting:
-        yield 0.05
+    yield from settled("Bar")
     found["live_refined"] = {"converged": session.solver.report["converged"]}
     yield 1.0
     stage.picture(folder, "live")
@@ -54,8 +69,7 @@ def rate(found, folder):
 
 
 def one_rate(found, name, moving, live, live_session):
-    shown, meter, ticks = stage.Meter(), stage.Meter(), stage.Meter()
-    meter.watch(live_session.Session, "moved")
+    shown, ticks = stage.Meter(), stage.Meter()
     ticks.watch(live, "update")
     shown.watch(live_session.arrays, "set_positions")
     times, stop = stage.draws()
@@ -65,14 +79,25 @@ def one_rate(found, name, moving, live, live_session):
         moving.location.z, moving.rotation_euler.x = 0.6 * share, 1.2 * share
         yield 0.004
     stop()
-    solves, updates = meter.end(), shown.end()
+    updates = shown.end()
     found[f"live_{name}"] = {
         "updates_per_second": updates["calls"] / SECONDS,
         "draws_per_second": len(times) / SECONDS,
-        "solve_and_warp_on_worker": solves,
         "main_thread_each_look": ticks.end(),
         "bare_redraw_s": stage.redraw_seconds(),
     }
+
+
+def without_drawing(moving, live):
+    """Updates a second where nothing is drawn: solve, warp, mesh and dependency graph, one after another."""
+    begin, count = time.perf_counter(), 0
+    while time.perf_counter() - begin < SECONDS / 2:
+        count += 1
+        moving.location.z = 0.6 * abs(np.sin(0.05 * count))
+        bpy.context.view_layer.update()
+        live.update(bpy.context, wait=live.WAIT)
+        bpy.context.view_layer.update()
+    return {"updates_per_second": round(count / (time.perf_counter() - begin), 1)}
 
 
 def drag(found, folder):
@@ -90,7 +115,7 @@ def drag(found, folder):
         scenes.activate(moving)
         moving["mark"] = 1
         bpy.ops.ed.undo_push(message="mark")
-    yield 1.0
+    yield from settled("Bar")
     rest = stage.positions("Bar_live")
     stage.tool("mousemove", 600, 500)
     yield 0.3
@@ -100,7 +125,8 @@ def drag(found, folder):
         stage.tool("mousemove", 600 + 8 * step, 500 - 12 * step)
         yield 0.15
     stage.tool("click", 1)
-    yield 2.0
+    yield 1.0
+    yield from settled("Bar")
     moving = bpy.data.objects["Moving"]
     moved = stage.positions("Bar_live")
     stage.picture(folder, "dragged")
@@ -108,7 +134,9 @@ def drag(found, folder):
     found["drag_moved_shape"] = round(float(np.abs(moved - rest).max()), 4)
     with stage.override():
         bpy.ops.ed.undo()
-    yield 1.5
+    yield 1.0
+    yield from settled("Bar")
+    found["live_after_undo"] = live.is_live(bpy.data.objects["Bar"])
     moving = bpy.data.objects["Moving"]
     back = np.allclose(moving.location, (1, 0, 0), atol=1e-6) and moving.get("mark") == 1
     found["drag_is_one_undo_step"] = bool(back)
