@@ -121,6 +121,8 @@ def surface_mesh(source, vertices, corners):
     mesh = arrays.new_mesh(source.name, vertices, corners)
     for material in source.data.materials:
         mesh.materials.append(material)
+    if settings_of(source).normals == "FLAT":
+        mesh.shade_flat()
     return mesh
 
 

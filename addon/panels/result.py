@@ -13,6 +13,7 @@ class ARAPFIELDS_PT_result(Section, bpy.types.Panel):
     def fill(self, context, source, ours):
         layout = self.layout
         layout.prop(ours, "resolution")
+        layout.prop(ours, "normals")
         layout.operator(Op.EXTRACT, icon="OUTLINER_OB_SURFACE")
         for entry in ours.results:
             if entry.item is not None:

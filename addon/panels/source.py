@@ -39,7 +39,7 @@ def remarks(source):
     """What the user should know about how the source is read."""
     shown = [modifier for modifier in source.modifiers if modifier.show_viewport]
     if shown:
-        yield translated("Read with {count} modifiers applied", count=len(shown))
+        yield translated("Read with its modifiers applied ({count})", count=len(shown))
     if source.data.shape_keys:
         yield translated("Read with its shape keys as they are set")
     if not len(source.data.polygons) and not shown:

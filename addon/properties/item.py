@@ -50,6 +50,12 @@ def resolution(**extra):
     )
 
 
+NORMALS = (
+    ("SMOOTH", "Smooth", "Shaded as one smooth surface"),
+    ("FLAT", "Flat", "Every triangle shaded for itself"),
+)
+
+
 class ARAPFIELDS_PG_result(bpy.types.PropertyGroup):
     item: bpy.props.PointerProperty(type=bpy.types.Object, name="Object", description="The result object")
     kind: bpy.props.StringProperty(name="Kind", description="DEFORM, STYLIZE or EXTRACT")
@@ -85,6 +91,9 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     surface: surface()
     target: target()
     resolution: resolution()
+    normals: bpy.props.EnumProperty(
+        items=NORMALS, name="Normals", description="How meshes of the implicit surface are shaded"
+    )
     live_display: bpy.props.StringProperty(
         name="Display before Live", description="How the object was displayed before it became live"
     )

@@ -51,13 +51,17 @@ def test_extraction_lies_on_the_source_in_world_space():
     bpy.ops.arapfields.extract(resolution=48)
     result = bpy.data.objects["Bar_implicit"]
     made, source = scenes.world_points(result), scenes.world_points(bar)
-    assert len(result.data.polygons) > 500
+    assert len(result.data.polygons) > 500 and all(face.use_smooth for face in result.data.polygons)
     assert np.abs(made.mean(axis=0) - source.mean(axis=0)).max() < NEAR
     assert np.abs(np.ptp(made, axis=0) - np.ptp(source, axis=0)).max() < 4 * NEAR
     assert [m.name for m in result.data.materials] == ["skin"]
     centre = np.array(result.matrix_local.inverted() @ bar.location)
     outward = [f.normal.dot(f.center) > 0 for f in result.data.polygons]
     assert np.mean(outward) > 0.95 and np.abs(centre).max() < 1e-3
+    bar.arapfields.normals = "FLAT"
+    scenes.activate(bar)
+    bpy.ops.arapfields.extract(resolution=48)
+    assert not any(face.use_smooth for face in bpy.data.objects["Bar_implicit"].data.polygons)
 
 
 @in_blender

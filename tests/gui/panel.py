@@ -5,6 +5,8 @@ import bpy
 import stage
 
 SECTIONS = ("source", "surface", "handles", "deform", "stylize", "result", "status")
+HEADER, STEP = (1120, 97), 28.4  # the sidebar's first header, and from one closed section to the next
+STYLES = (1150, 180)  # the menu of styles below the header of its section
 
 
 def checks(found, folder):
@@ -13,24 +15,30 @@ def checks(found, folder):
     moving.location.z, moving.rotation_euler.y = 0.45, -0.5
     yield 1.0
     stage.picture(folder, "handles")
-    for name in SECTIONS:
-        alone(name)
-        yield 1.5
+    for words in (("mousemove", *HEADER), ("keydown", "ctrl"), ("click", 1), ("keyup", "ctrl")):
+        stage.tool(*words)  # closes all other sections
+        yield 0.7
+    press(0)
+    yield 1.0
+    stage.picture(folder, "panel-closed")
+    for row, name in enumerate(SECTIONS):
+        press(row)
+        yield 1.0
         stage.picture(folder, f"panel-{name}")
-    alone(*SECTIONS)
+        if name == "stylize":
+            stage.tool("mousemove", STYLES[0], STYLES[1] + STEP * row, "click", 1)
+            yield 1.0
+            stage.picture(folder, "styles")
+            stage.tool("key", "Escape")
+            yield 0.5
+        press(row)
+        yield 0.7
+    for row in (3, 2, 1, 0):
+        press(row)
+        yield 0.3
     bar.modifiers.clear()
     found["sections"] = len(SECTIONS)
 
 
-def alone(*names):
-    """Only these sections are open: registered anew, since a panel's state cannot be set."""
-    import addon.panels as panels
-
-    for section in panels.SECTIONS:
-        cls = next(c for c in section.CLASSES if issubclass(c, bpy.types.Panel))
-        bpy.utils.unregister_class(cls)
-        options = set(getattr(cls, "bl_options", set())) - {"DEFAULT_CLOSED"}
-        closed = cls.__name__.rsplit("_", 1)[1] not in names
-        cls.bl_options = options | ({"DEFAULT_CLOSED"} if closed else set())
-        bpy.utils.register_class(cls)
-    stage.show_sidebar()
+def press(row):
+    stage.tool("mousemove", HEADER[0], HEADER[1] + STEP * row, "click", 1)
