@@ -14,11 +14,12 @@ class ARAPFIELDS_MT_styles(bpy.types.Menu):
     bl_label = "Style"
 
     def draw(self, context):
-        flow = self.layout.grid_flow(columns=2, row_major=True)
-        for identifier, label, _ in STYLE_ITEMS:
+        row = self.layout.row()
+        columns, half = (row.column(), row.column()), (len(STYLE_ITEMS) + 1) // 2
+        for number, (identifier, label, _) in enumerate(STYLE_ITEMS):
             plain = "EMPTY_AXIS" if identifier in CUSTOM else "NONE"
             picture = {"icon_value": icon(identifier)} if icon(identifier) else {"icon": plain}
-            flow.operator(Op.SET_STYLE, text=label, **picture).style = identifier
+            columns[number // half].operator(Op.SET_STYLE, text=label, **picture).style = identifier
 
 
 class ARAPFIELDS_PT_stylize(Section, bpy.types.Panel):

@@ -6,7 +6,7 @@ import stage
 
 SECTIONS = ("source", "surface", "handles", "deform", "stylize", "result", "status")
 HEADER, STEP = (1120, 97), 28.4  # the sidebar's first header, and from one closed section to the next
-STYLES = (1150, 180)  # the menu of styles below the header of its section
+STYLES = (1150, 217)  # the menu of styles below the header of its section
 
 
 def checks(found, folder):
