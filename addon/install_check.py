@@ -7,6 +7,7 @@ import sys
 import bpy
 
 from .bridge import host
+from .bridge.language import translated
 from .core import native
 
 
@@ -16,7 +17,7 @@ def is_whole():
 
 
 def show():
-    lines = native.problem().split(". ")
+    lines = translated(native.problem()).split(". ")
 
     def draw(menu, _):
         for line in lines:

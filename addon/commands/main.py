@@ -22,8 +22,7 @@ def run(arguments, script=None):
         return stop.code or 0
     with interruptible():
         try:
-            if native.problem():
-                raise UserError(native.problem())
+            native.library()
             return verb(options.verb)(options, Launch(script))
         except KeyboardInterrupt:
             return fail("interrupted", 130)
