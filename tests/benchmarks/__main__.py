@@ -38,7 +38,7 @@ def machine():
 
 def main(names):
     os.environ.setdefault("ARAPFIELDS_DATA", str(ROOT.parent / "shared" / "data"))
-    skip = {"__main__", "timing", "render", "live_cases"}
+    skip = {"__main__", "timing", "render", "live_cases", "live_picture"}
     known = [module.name for module in pkgutil.iter_modules([str(FOLDER)]) if module.name not in skip]
     unknown = sorted(set(names) - set(known))
     if unknown:

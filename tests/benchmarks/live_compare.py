@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The live solver beside libigl's ARAP of the mesh; its cost by size; fingers that move alone."""
+
+import numpy as np
+
+import arapfields as af
+
+from .live_cases import (
+    FINGERTIPS,
+    FULL,
+    Clock,
+    cases,
+    deformer,
+    handles,
+    inside,
+    rests,
+    samples,
+    surface,
+    targets,
+    volume,
+)
+
+HAND_LENGTH = 1.48
+
+
+def mesh_energy(vertices, triangles, moved):
+    """Sum over vertices of the cotangent-weighted squared misfit of their edges to the best rotation."""
+    corners = [triangles, np.roll(triangles, -1, 1), np.roll(triangles, -2, 1)]
+    total_i, total_j, weights = [], [], []
+    for k in range(3):
+        a, b, c = (corners[m][:, k] for m in range(3))
+        u, v = vertices[a] - vertices[c], vertices[b] - vertices[c]
+        cot = (u * v).sum(1) / np.maximum(np.linalg.norm(np.cross(u, v), axis=1), 1e-12) / 2
+        cot = np.maximum(cot, 0)  # marching cubes leave slivers
+        total_i += [a, b]
+        total_j += [b, a]
+        weights += [cot, cot]
+    i, j, w = np.concatenate(total_i), np.concatenate(total_j), np.concatenate(weights)
+    before, after = vertices[j] - vertices[i], moved[j] - moved[i]
+    spread = np.zeros((len(vertices), 3, 3))
+    np.add.at(spread, i, w[:, None, None] * after[:, :, None] * before[:, None, :])
+    left, _, right = np.linalg.svd(spread)
+    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
+    rotation = left @ right
+    return float((w * ((after - np.einsum("nij,nj->ni", rotation[i], before)) ** 2).sum(1)).sum())
+
+
+def igl_arap(vertices, triangles, boxes, poses, tolerance=1e-4, most=2000):
+    """libigl's ARAP from rest until an iteration is less than this share of the whole motion."""
+    import igl
+
+    members = [np.flatnonzero(inside(rest, vertices)) for rest in boxes]
+    goal = []
+    for rest, target, rows in zip(boxes, poses, members, strict=True):
+        motion = target @ np.linalg.inv(rest)
+        goal.append(vertices[rows] @ motion[:3, :3].T + motion[:3, 3])
+    data = igl.ARAPData()
+    with Clock() as setup:
+        igl.arap_precomputation(vertices, triangles, 3, np.concatenate(members), data)
+    data.max_iter = 1
+    moved, goal = vertices.copy(), np.concatenate(goal)
+    with Clock() as clock:
+        iteration = 0
+        while iteration < most:
+            iteration += 1
+            before, moved = moved, igl.arap_solve(goal, data, moved)
+            if np.linalg.norm(moved - before) < tolerance * np.linalg.norm(moved - vertices):
+                break
+    return moved, setup, clock, iteration
+
+
+def compare_rows(name, resolution=96):
+    vertices, triangles = surface(name, resolution)
+    poses, whole = targets(name, FULL), volume(vertices, triangles)
+    samples(name)
+    theirs, setup, clock, iterations = igl_arap(vertices, triangles, rests(name), poses)
+    with Clock() as our_setup:
+        live = deformer(name)
+        live.track(vertices)
+    with Clock() as our_clock:
+        live.solve(poses, steps=100, tolerance=1e-4)
+        ours = live.tracked().astype(float)
+    shared = {"vertices": len(vertices)}
+    return [
+        {
+            "what": f"{name}: live solver",
+            **shared,
+            "setup_cpu_s": round(our_setup.cpu, 3),
+            "steps": live.report["steps"],
+            "cpu_s": round(our_clock.cpu, 3),
+            "mesh_energy": round(mesh_energy(vertices, triangles, ours), 3),
+            "volume_ratio": round(volume(ours, triangles) / whole, 3),
+        },
+        {
+            "what": f"{name}: libigl, ARAP of the mesh",
+            **shared,
+            "setup_cpu_s": round(setup.cpu, 3),
+            "steps": iterations,
+            "cpu_s": round(clock.cpu, 3),
+            "mesh_energy": round(mesh_energy(vertices, triangles, theirs), 3),
+            "volume_ratio": round(volume(theirs, triangles) / whole, 3),
+        },
+    ]
+
+
+def cost_row(bumps, count):
+    options = {"coarse_bumps": bumps // 6, "fine_bumps": bumps - bumps // 6, "samples": count}
+    with Clock() as setup:
+        live = deformer("bunny", **options)
+    pair = handles("bunny")
+    with Clock() as added:
+        live.set_handles([*pair, af.Point([0, 0, 0.2], [0, 0, 0.2])])
+    live.set_handles(pair)
+    steps = 0
+    with Clock() as clock:
+        for degrees in range(5, FULL + 1, 5):
+            live.solve(targets("bunny", degrees))
+            steps += live.report["steps"]
+    live.solve(steps=200, tolerance=1e-6)
+    return {
+        "what": "bunny",
+        "bumps": bumps,
+        "samples": count,
+        "setup_cpu_s": round(setup.cpu, 3),
+        "handle_added_cpu_s": round(added.cpu, 3),
+        "step_cpu_ms": round(1e3 * clock.cpu / steps, 2),
+        "energy": round(live.report["energy"], 4),
+    }
+
+
+def finger_row(finger, motion, degrees, axis, interior=True, field=None):
+    palm, surface_samples = rests("hand")[0], samples("hand")
+    box, pivot = {
+        "middle": (rests("hand")[1], (-0.1, -0.05, 0.05)),
+        "index": (cases.box([0, -0.4, 0.45], [0.4, -0.14, 0.7]), (-0.05, -0.2, 0.05)),
+    }[finger]
+    pair = [cases.moved(palm), cases.moved(box, cases.turn(axis, degrees, pivot))]
+    if field is None:
+        live = af.LiveDeformer(surface_samples, pair, af.LiveOptions(interior=interior))
+        field = live.solve(steps=100, tolerance=1e-5)
+        energy, name = (
+            live.report["energy"],
+            f"radial, {'interior ways' if interior else 'straight distances'}",
+        )
+    else:
+        trained = af.deform(surface_samples, pair, af.DeformOptions(iterations=300))
+        energy, name, field = trained.report["energy"], field, trained
+    row = {
+        "what": f"hand, {finger} {motion} {abs(degrees)} degrees",
+        "field": name,
+        "energy": round(energy, 4),
+    }
+    for tip, place in FINGERTIPS.items():
+        near = np.argsort(np.linalg.norm(surface_samples.points - place, axis=1))[:20]
+        points = surface_samples.points[near]
+        share = np.linalg.norm(field(points) - points, axis=1).max() / HAND_LENGTH
+        row[tip] = "moved" if tip == finger else f"{100 * share:.1f} %"
+    return row
+
+
+def run():
+    rows = [row for name in ("bunny", "spot", "hand") for row in compare_rows(name)]
+    for bumps in (120, 360, 720, 1200, 1500):
+        rows.append(cost_row(bumps, 2000))
+    rows += [cost_row(360, count) for count in (1000, 4000, 8000)]
+    for finger, motion, degrees, axis in (
+        ("middle", "aside", -25, [1, 0, 0]),
+        ("middle", "forward", 20, [0, 1, 0]),
+        ("middle", "forward", 50, [0, 1, 0]),
+        ("index", "forward", 50, [0, 1, 0]),
+    ):
+        for interior in (True, False):
+            rows.append(finger_row(finger, motion, degrees, axis, interior))
+        rows.append(finger_row(finger, motion, degrees, axis, field="neural, 300 iterations"))
+    return rows
