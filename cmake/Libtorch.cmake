@@ -24,5 +24,7 @@ endforeach()
 # A CUDA build registers its kernels when libtorch_cuda is loaded, though no symbol of it is named by us.
 find_library(LIBTORCH_torch_cuda NAMES torch_cuda PATHS "${LIBTORCH_DIR}/lib" NO_DEFAULT_PATH)
 if(LIBTORCH_torch_cuda)
-  target_link_libraries(libtorch::libtorch INTERFACE -Wl,--no-as-needed "${LIBTORCH_torch_cuda}" -Wl,--as-needed)
+  target_link_libraries(libtorch::libtorch INTERFACE -Wl,--no-as-needed "${LIBTORCH_torch_cuda}" -Wl,--as-needed
+    # CUDA's own libraries are found when torch_cuda is loaded; the linker need not see them.
+    -Wl,--allow-shlib-undefined)
 endif()

@@ -51,3 +51,10 @@ SAME_VERTICES = 1e-6
 ON_SURFACE = 1e-4
 
 TRACKED = 5e-4  # single precision; large coefficients of neighbouring bumps of opposite sign cancel
+
+# Energies composed of libtorch's operations against the kernels, both in float64: rounding over the smallest
+# sum of two singular values, which the tests keep above 1e-3.
+COMPOSED = 1e-10
+# Sixty steps of descent in single precision along the two: rounding, amplified by optimizers that turn small
+# gradients into steps of full length. Seen: 1e-6 (orthogonal), 2e-4 (Adam), 6e-3 (exact handles).
+COMPOSED_SOLVE = 0.02

@@ -2,6 +2,7 @@
 #include "bindings/bind.h"
 #include "bindings/jet_arrays.h"
 #include "energies/arap.h"
+#include "energies/composed_probe.h"
 #include "energies/distortion.h"
 #include "energies/gauss.h"
 #include "energies/handles.h"
@@ -91,13 +92,14 @@ template <class Scalar>
 void bind_testing(py::module_& module) {
   module.def(
       "arap_energy",
-      [](JetArray<Scalar> jets, double bending, double weight) {
+      [](JetArray<Scalar> jets, double bending, double weight, bool composed) {
         JetArray<Scalar> cotangents = zeros_like(jets);
+        const auto energy = composed ? &probe_arap<Scalar> : &arap_energy<Scalar>;
         const ArapValue value =
-            arap_energy<Scalar>(jet_view<const Scalar>(jets), bending, weight, jet_view<Scalar>(cotangents));
+            energy(jet_view<const Scalar>(jets), bending, weight, jet_view<Scalar>(cotangents));
         return py::make_tuple(value.stretch, value.bend, cotangents);
       },
-      "jets"_a.noconvert(), "bending"_a, "weight"_a = 1.0);
+      "jets"_a.noconvert(), "bending"_a, "weight"_a = 1.0, "composed"_a = false);
   module.def(
       "closest_rotations",
       [](JetArray<Scalar> jacobians) {
@@ -109,32 +111,36 @@ void bind_testing(py::module_& module) {
   module.def(
       "gauss_energy",
       [](JetArray<Scalar> jets, const PointsOf<Scalar>& normals, const Points& preferred, double sharpness,
-         double weight, const Eigen::VectorX<Scalar>& sample_weights) {
+         double weight, const Eigen::VectorX<Scalar>& sample_weights, bool composed) {
         JetArray<Scalar> cotangents = zeros_like(jets);
-        const double value = gauss_energy<Scalar>(jet_view<const Scalar>(jets), normals, sample_weights,
-                                                  gauss_preference(preferred, sharpness), weight,
-                                                  jet_view<Scalar>(cotangents));
+        const auto energy = composed ? &probe_gauss<Scalar> : &gauss_energy<Scalar>;
+        const double value =
+            energy(jet_view<const Scalar>(jets), normals, sample_weights,
+                   gauss_preference(preferred, sharpness), weight, jet_view<Scalar>(cotangents));
         return py::make_tuple(value, cotangents);
       },
-      "jets"_a.noconvert(), "normals"_a, "preferred"_a, "sharpness"_a, "weight"_a, "sample_weights"_a);
+      "jets"_a.noconvert(), "normals"_a, "preferred"_a, "sharpness"_a, "weight"_a, "sample_weights"_a,
+      "composed"_a = false);
   module.def(
       "handle_energy",
-      [](JetArray<Scalar> jets, const BoundHandles& handles, double weight) {
+      [](JetArray<Scalar> jets, const BoundHandles& handles, double weight, bool composed) {
         JetArray<Scalar> cotangents = zeros_like(jets);
-        const double value = handle_energy<Scalar>(jet_view<const Scalar>(jets), handles.all<Scalar>(),
-                                                   weight, jet_view<Scalar>(cotangents));
+        const auto energy = composed ? &probe_handles<Scalar> : &handle_energy<Scalar>;
+        const double value =
+            energy(jet_view<const Scalar>(jets), handles.all<Scalar>(), weight, jet_view<Scalar>(cotangents));
         return py::make_tuple(value, cotangents);
       },
-      "jets"_a.noconvert(), "handles"_a, "weight"_a = 1.0);
+      "jets"_a.noconvert(), "handles"_a, "weight"_a = 1.0, "composed"_a = false);
   module.def(
       "fold_barrier",
-      [](JetArray<Scalar> jets, double threshold, double weight) {
+      [](JetArray<Scalar> jets, double threshold, double weight, bool composed) {
         JetArray<Scalar> cotangents = zeros_like(jets);
-        const double value = fold_barrier<Scalar>(jet_view<const Scalar>(jets), threshold, weight,
-                                                  jet_view<Scalar>(cotangents));
+        const auto energy = composed ? &probe_barrier<Scalar> : &fold_barrier<Scalar>;
+        const double value =
+            energy(jet_view<const Scalar>(jets), threshold, weight, jet_view<Scalar>(cotangents));
         return py::make_tuple(value, cotangents);
       },
-      "jets"_a.noconvert(), "threshold"_a, "weight"_a = 1.0);
+      "jets"_a.noconvert(), "threshold"_a, "weight"_a = 1.0, "composed"_a = false);
 }
 
 }  // namespace

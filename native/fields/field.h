@@ -20,6 +20,9 @@ class DeformationField {
   virtual ~DeformationField() = default;
   /// Jets at points (n,3), all in cube coordinates; `out` has count n and any order. Batched and parallel.
   virtual void evaluate(PointsIn points, JetView<double> out) const = 0;
+  /// Jets (columns, n, 3) at points (n,3), in their dtype and on their device. Fields that live there compute
+  /// them there; those of others come by evaluate().
+  virtual at::Tensor jets(const at::Tensor& points, JetOrder order) const;
 
   /// Where points (n,3) of mesh coordinates go, in mesh coordinates.
   Points at(PointsIn mesh_points) const {
@@ -45,6 +48,8 @@ class TrainableField : public DeformationField {
  public:
   /// Jets (columns, n, 3) at points (n,3); keeps what pull_back needs until the next call.
   virtual at::Tensor forward(const at::Tensor& points, JetOrder order) = 0;
+  /// The same at points in main memory; never waits for the field's device.
+  virtual at::Tensor forward_at(PointsIn points, JetOrder order) = 0;
   /// Adds Jᵀ·cotangents (columns, n, 3) of the last forward call to gradient().
   virtual void pull_back(const at::Tensor& cotangents) = 0;
   /// All parameters, and their gradient, as one contiguous vector (p).

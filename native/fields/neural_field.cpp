@@ -3,6 +3,7 @@
 
 #include <ATen/ATen.h>
 
+#include "core/device.h"
 #include "core/errors.h"
 
 namespace arapfields {
@@ -14,8 +15,9 @@ Points to_points(const at::Tensor& points) {
   return Eigen::Map<const Points>(host.const_data_ptr<double>(), host.size(0), 3);
 }
 
-at::Tensor tensor_of(const double* data, at::IntArrayRef sizes, const at::TensorOptions& options) {
-  return at::from_blob(const_cast<double*>(data), sizes, at::kDouble).to(options, false, true);
+/// Numbers in main memory in the dtype and on the device of `like`.
+at::Tensor tensor_of(const double* data, at::IntArrayRef sizes, const at::Tensor& like) {
+  return upload(at::from_blob(const_cast<double*>(data), sizes, at::kDouble).to(like.scalar_type()), like);
 }
 
 void add_identity(JetView<double> jets, PointsIn points) {
@@ -23,6 +25,12 @@ void add_identity(JetView<double> jets, PointsIn points) {
   if (jets.order == JetOrder::value) return;
   for (int k = 0; k < 3; ++k)
     Eigen::Map<Points>(jets.column(first_column(k)), jets.count, 3).col(k).array() += 1.0;
+}
+
+void add_identity(at::Tensor& jets, const at::Tensor& points) {
+  jets[0].add_(points);
+  if (jets.size(0) == 1) return;
+  for (int k = 0; k < 3; ++k) jets[first_column(k)].select(1, k).add_(1.0);
 }
 
 /// Jets of the product a·p, a (columns, n, 1) and p (columns, n, 3).
@@ -96,31 +104,44 @@ void NeuralField::evaluate(PointsIn points, JetView<double> out) const {
   if (out.count == 0) return;
   Vector a;
   fixed_part(points, out, a);
-  const at::TensorOptions options = network_.parameters().options();
-  const at::Tensor x = tensor_of(points.data(), {points.rows(), 3}, options);
+  const at::Tensor x = tensor_of(points.data(), {points.rows(), 3}, network_.parameters());
   at::Tensor jets = network_.evaluate(x, out.order).to(at::kCPU, at::kDouble);
   if (a.size() > 0)
     jets = product(at::from_blob(a.data(), {columns(out.order), out.count, 1}, at::kDouble), jets);
   at::from_blob(out.data, {columns(out.order), out.count, 3}, at::kDouble).add_(jets);
 }
 
+at::Tensor NeuralField::jets(const at::Tensor& points, JetOrder order) const {
+  const at::Tensor& own = network_.parameters();
+  if (base_ || handles_ || points.device() != own.device() || points.scalar_type() != own.scalar_type())
+    return DeformationField::jets(points, order);
+  at::Tensor jets = network_.evaluate(points.contiguous(), order);
+  add_identity(jets, points);
+  return jets;
+}
+
 at::Tensor NeuralField::forward(const at::Tensor& points, JetOrder order) {
   at::Tensor jets = network_.forward(points, order);
   factor_.reset();
-  if (!base_ && !handles_) {
-    jets[0].add_(points);
-    if (order != JetOrder::value)
-      for (int k = 0; k < 3; ++k) jets[first_column(k)].select(1, k).add_(1.0);
-    return jets;
-  }
-  const Points x = to_points(points);
-  JetBlock<double> b(x.rows(), order);
+  if (base_ || handles_) return put_together(std::move(jets), to_points(points));
+  add_identity(jets, points);
+  return jets;
+}
+
+at::Tensor NeuralField::forward_at(PointsIn points, JetOrder order) {
+  const at::Tensor x = tensor_of(points.data(), {points.rows(), 3}, network_.parameters());
+  if (!base_ && !handles_) return forward(x, order);
+  factor_.reset();
+  return put_together(network_.forward(x, order), points);
+}
+
+at::Tensor NeuralField::put_together(at::Tensor jets, PointsIn points) {
+  JetBlock<double> b(points.rows(), static_cast<JetOrder>(jets.size(0)));
   Vector a;
-  fixed_part(x, b.view(), a);
-  const at::Tensor fixed = tensor_of(b.view().data, jets.sizes(), jets.options());
+  fixed_part(points, b.view(), a);
+  const at::Tensor fixed = tensor_of(b.view().data, jets.sizes(), jets);
   if (a.size() == 0) return jets.add_(fixed);
-  factor_ =
-      std::make_shared<at::Tensor>(tensor_of(a.data(), {jets.size(0), jets.size(1), 1}, jets.options()));
+  factor_ = std::make_shared<at::Tensor>(tensor_of(a.data(), {jets.size(0), jets.size(1), 1}, jets));
   return product(*factor_, jets).add_(fixed);
 }
 
@@ -130,7 +151,7 @@ void NeuralField::pull_back(const at::Tensor& cotangents) {
 
 void NeuralField::translate(const Vec3& offset) {
   at::Tensor bias = network_.bias(shape().layers);
-  bias.add_(tensor_of(offset.data(), {3}, bias.options()));
+  bias.add_(tensor_of(offset.data(), {3}, bias));
 }
 
 VectorF NeuralField::weights() const {

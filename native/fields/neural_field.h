@@ -28,7 +28,9 @@ class NeuralField final : public TrainableField {
   const MlpShape& shape() const { return network_.shape(); }
 
   void evaluate(PointsIn points, JetView<double> out) const override;
+  at::Tensor jets(const at::Tensor& points, JetOrder order) const override;
   at::Tensor forward(const at::Tensor& points, JetOrder order) override;
+  at::Tensor forward_at(PointsIn points, JetOrder order) override;
   void pull_back(const at::Tensor& cotangents) override;
   at::Tensor& parameters() override { return network_.parameters(); }
   at::Tensor& gradient() override { return network_.gradient(); }
@@ -44,6 +46,8 @@ class NeuralField final : public TrainableField {
  private:
   /// The jets (columns, n, 3) of b as (columns·n, 3) rows, and those of a (columns, n), empty where a is 1.
   void fixed_part(PointsIn points, JetView<double> b, Vector& a) const;
+  /// b + a Ψ from the jets of Ψ.
+  at::Tensor put_together(at::Tensor jets, PointsIn points);
 
   Mlp network_;
   std::shared_ptr<const DeformationField> base_;

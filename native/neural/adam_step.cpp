@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "core/device.h"
 #include "core/parallel.h"
 #include "neural/adam_kernel.h"
 
@@ -65,7 +66,7 @@ void AdamStep::step_range(at::Tensor& parameters, const at::Tensor& gradient, do
   State& s = *state_;
   const double rate = learning_rate / (1.0 - std::pow(s.options.first_decay, s.steps));
   const double scale = 1.0 / std::sqrt(1.0 - std::pow(s.options.second_decay, s.steps));
-  if (!parameters.is_cpu()) {
+  if (composed(parameters)) {
     at::Tensor mean = s.mean.slice(0, begin, end), square = s.square.slice(0, begin, end);
     const at::Tensor g = gradient.slice(0, begin, end);
     mean.mul_(s.options.first_decay).add_(g, 1.0 - s.options.first_decay);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <ATen/ATen.h>
 
+#include "core/device.h"
 #include "neural/adjoint_kernels.h"
 #include "neural/jet_layer.h"
 
@@ -85,7 +86,7 @@ void adjoint_back_anywhere(double sharpness, const at::Tensor& planes, const at:
 
 void adjoint_layer(double sharpness, const at::Tensor& planes, const at::Tensor& slope,
                    const at::Tensor& adjoints, at::Tensor& below, at::Tensor& second) {
-  if (!planes.is_cpu()) return adjoint_anywhere(sharpness, planes, slope, adjoints, below, second);
+  if (composed(planes)) return adjoint_anywhere(sharpness, planes, slope, adjoints, below, second);
   if (planes.scalar_type() == at::kDouble)
     return adjoint_on_cpu<double>(sharpness, planes, slope, adjoints, below, second);
   adjoint_on_cpu<float>(sharpness, planes, slope, adjoints, below, second);
@@ -94,7 +95,7 @@ void adjoint_layer(double sharpness, const at::Tensor& planes, const at::Tensor&
 void adjoint_layer_back(double sharpness, const at::Tensor& planes, const at::Tensor& slope,
                         const at::Tensor& adjoints, const at::Tensor& second, at::Tensor& cotangents,
                         at::Tensor& below, at::Tensor& partial) {
-  if (!planes.is_cpu())
+  if (composed(planes))
     return adjoint_back_anywhere(sharpness, planes, slope, adjoints, second, cotangents, below, partial);
   if (planes.scalar_type() == at::kDouble)
     return adjoint_back_on_cpu<double>(sharpness, planes, slope, adjoints, second, cotangents, below,

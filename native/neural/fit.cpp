@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/device.h"
 #include "core/parallel.h"
 #include "core/random.h"
 #include "distance/training_points.h"
@@ -82,7 +83,7 @@ class Batches {
     for (Index i = 0; i < rows_.size(0); ++i)
       rows[i] = i < near_ ? random_.below(examples_.near_count)
                           : examples_.near_count + random_.below(examples_.count() - examples_.near_count);
-    const at::Tensor where = rows_.to(examples_.points.device());
+    const at::Tensor where = upload(rows_, examples_.points);
     points = at::index_select(examples_.points, 0, where);
     distances = at::index_select(examples_.distances, 0, where);
   }
@@ -127,7 +128,7 @@ class Training {
       if (options_.seconds > 0 && elapsed >= options_.seconds) return "seconds";
       const double done = std::max(static_cast<double>(steps) / options_.steps,
                                    options_.seconds > 0 ? elapsed / options_.seconds : 0.0);
-      if (steps % check_every == 0) {
+      if (steps % check_every_ == 0) {
         if (!at::isfinite(mlp_.parameters()).all().item<bool>()) return restore();
         good_.copy_(mlp_.parameters());
         good_steps_ = steps;
@@ -145,7 +146,6 @@ class Training {
   int steps = 0;
 
  private:
-  static constexpr int check_every = 10;
   static constexpr int warm_up = 20;
 
   bool use_adam() const { return options_.optimizer == "adam"; }
@@ -190,6 +190,7 @@ class Training {
   AdamStep adam_;
   at::Tensor good_, loss_;
   int good_steps_ = 0;
+  int check_every_ = composed(mlp_.parameters()) ? 25 : 10;  // a check waits for the device
   double peak_;
 };
 

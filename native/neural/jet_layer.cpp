@@ -3,6 +3,7 @@
 
 #include <ATen/ATen.h>
 
+#include "core/device.h"
 #include "neural/jet_kernels.h"
 
 namespace arapfields {
@@ -97,14 +98,14 @@ void encode_anywhere(const at::Tensor& points, double frequency, int octaves, at
 
 void activate_layer(const LayerStep& step, at::Tensor& planes, at::Tensor& slope, at::Tensor& jets,
                     const at::Tensor& bias) {
-  if (!planes.is_cpu()) return activate_anywhere(step, planes, slope, jets, bias);
+  if (composed(planes)) return activate_anywhere(step, planes, slope, jets, bias);
   if (planes.scalar_type() == at::kDouble) return activate_on_cpu<double>(step, planes, slope, jets, bias);
   activate_on_cpu<float>(step, planes, slope, jets, bias);
 }
 
 void activate_layer_back(const LayerStep& step, at::Tensor& planes, const at::Tensor& slope,
                          const at::Tensor& partial, at::Tensor& cotangents, at::Tensor& bias_gradient) {
-  if (!planes.is_cpu())
+  if (composed(planes))
     return activate_back_anywhere(step, planes, slope, partial, cotangents, bias_gradient);
   if (planes.scalar_type() == at::kDouble)
     return activate_back_on_cpu<double>(step, planes, slope, partial, cotangents, bias_gradient);
@@ -112,7 +113,7 @@ void activate_layer_back(const LayerStep& step, at::Tensor& planes, const at::Te
 }
 
 void encode_points(const at::Tensor& points, double frequency, int octaves, at::Tensor& encoding) {
-  if (!points.is_cpu()) return encode_anywhere(points, frequency, octaves, encoding);
+  if (composed(points)) return encode_anywhere(points, frequency, octaves, encoding);
   if (points.scalar_type() == at::kDouble) return encode_on_cpu<double>(points, frequency, octaves, encoding);
   encode_on_cpu<float>(points, frequency, octaves, encoding);
 }

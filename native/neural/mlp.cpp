@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/device.h"
 #include "core/errors.h"
 #include "core/memory.h"
 #include "core/parallel.h"
@@ -81,7 +82,7 @@ void Mlp::State::prepare(const at::Tensor& points, JetOrder order) {
   if (same) return;
   kept = {};  // frees before it allocates
   if (parameters.is_cpu()) require_memory("batch", kept_numbers(shape, n, order) * parameters.element_size());
-  kept.blocks = split_points(n, order, threads, parameters.is_cpu());
+  kept.blocks = split_points(n, order, threads, !composed(parameters));
   for (Block& block : kept.blocks) allocate(shape, parameters, true, block);
   for (int t = 0; t < threads; ++t)
     kept.workspaces.push_back(make_workspace(shape, parameters, largest_of(kept.blocks)));
@@ -169,7 +170,7 @@ void in_passing(const MlpShape& shape, const at::Tensor& like, Index n, JetOrder
                 const std::function<void(Block&, Workspace&)>& body) {
   Blocks passing;
   const int threads = sweep_threads(like);
-  passing.blocks = split_points(n, order, threads, like.is_cpu());
+  passing.blocks = split_points(n, order, threads, !composed(like));
   std::vector<Block> memory(static_cast<std::size_t>(threads), largest_of(passing.blocks));
   for (Block& block : memory) {
     allocate(shape, like, keep, block);

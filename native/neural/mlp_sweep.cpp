@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <atomic>
 
+#include "core/device.h"
 #include "core/parallel.h"
 #include "neural/jet_layer.h"
 
@@ -120,12 +121,12 @@ LayerViews::LayerViews(const MlpShape& shape, const at::Tensor& flat) {
 }
 
 int sweep_threads(const at::Tensor& like) {
-  return like.is_cpu() && !at::in_parallel_region() ? thread_count() : 1;
+  return !composed(like) && !at::in_parallel_region() ? thread_count() : 1;
 }
 
-std::vector<Block> split_points(Index n, JetOrder order, int threads, bool on_cpu) {
+std::vector<Block> split_points(Index n, JetOrder order, int threads, bool in_cache) {
   // Blocks whose planes fit a core's second-level cache; elsewhere one block that memory bounds.
-  const Index best = !on_cpu ? (Index(1) << 19) / columns(order) : order == JetOrder::value ? 512 : 128;
+  const Index best = !in_cache ? (Index(1) << 19) / columns(order) : order == JetOrder::value ? 512 : 128;
   Index count = (n + best - 1) / best;
   count = std::clamp<Index>((count + threads - 1) / threads * threads, 1, std::max<Index>(n, 1));
   std::vector<Block> blocks(static_cast<std::size_t>(count));

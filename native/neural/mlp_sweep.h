@@ -59,8 +59,9 @@ struct Blocks {
   Index gradient_groups() const;
 };
 
-/// Ranges of about the best number of points for the order, as many for each thread.
-std::vector<Block> split_points(Index n, JetOrder order, int threads, bool on_cpu);
+/// Ranges of about the best number of points for the order, as many for each thread; large ones where a
+/// core's cache does not matter.
+std::vector<Block> split_points(Index n, JetOrder order, int threads, bool in_cache);
 /// Threads that the sweeps of tensors like `like` are split over.
 int sweep_threads(const at::Tensor& like);
 

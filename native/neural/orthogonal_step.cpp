@@ -8,6 +8,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/device.h"
 #include "core/parallel.h"
 
 namespace arapfields {
@@ -41,6 +42,11 @@ struct OrthogonalStep::State {
 };
 
 void OrthogonalStep::State::for_each_task(const std::function<void(const Task&)>& body) const {
+  if (tasks.size() == matrices.size()) {  // a device's queue is filled by one thread
+    const at::AutoDispatchBelowADInplaceOrView quick;
+    for (const Task& task : tasks) body(task);
+    return;
+  }
   parallel_for(0, static_cast<Index>(tasks.size()), 1, [&](Index begin, Index end) {
     const at::AutoDispatchBelowADInplaceOrView quick;
     for (Index t = begin; t < end; ++t) body(tasks[static_cast<std::size_t>(t)]);
@@ -63,7 +69,7 @@ OrthogonalStep::OrthogonalStep(const Mlp& mlp, const OrthogonalOptions& options)
     m.polynomial = at::empty({small, small}, like);
     state_->matrices.push_back(m);
   }
-  const Index parts = mlp.parameters().is_cpu() ? 2 * thread_count() : 1;
+  const Index parts = composed(mlp.parameters()) ? 1 : 2 * thread_count();
   for (Matrix& m : state_->matrices) {
     const Index rows = m.x.size(0), each = std::max<Index>(32, (rows + parts - 1) / parts);
     for (Index first = 0; first < rows; first += each)

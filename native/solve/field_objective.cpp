@@ -5,32 +5,42 @@
 
 #include <algorithm>
 
+#include "core/device.h"
 #include "distance/morton.h"
 #include "energies/arap.h"
+#include "energies/composed.h"
 #include "energies/distortion.h"
 
 namespace arapfields {
 namespace {
 
 template <class Scalar>
-at::Tensor to_tensor(const PointsOf<Scalar>& points, const at::Tensor& like) {
+at::Tensor to_tensor(const PointsOf<Scalar>& points) {
   return at::from_blob(const_cast<Scalar*>(points.data()), {points.rows(), 3},
-                       c10::CppTypeToScalarType<Scalar>::value)
-      .to(like.options(), false, true);
+                       c10::CppTypeToScalarType<Scalar>::value);
 }
 
-/// The field's jets on the host and a zero block for their cotangents, which pull_back() hands over.
+/// Rows of numbers in the dtype and on the device of `like`.
+template <class Rows>
+at::Tensor uploaded(const Rows& rows, const at::Tensor& like) {
+  const at::Tensor host =
+      at::from_blob(const_cast<typename Rows::Scalar*>(rows.data()), {rows.rows(), rows.cols()},
+                    c10::CppTypeToScalarType<typename Rows::Scalar>::value);
+  return upload(host.to(like.scalar_type()), like);
+}
+
+/// The field's jets in main memory and a zero block for their cotangents, which pull_back() hands over.
 template <class Scalar>
 struct HostJets {
   HostJets(TrainableField& field, const PointsOf<Scalar>& points, JetOrder order)
       : trained(field),
-        jets(field.forward(to_tensor(points, field.parameters()), order).to(at::kCPU).contiguous()),
+        jets(field.forward(to_tensor(points), order)),
         cotangents(at::zeros_like(jets)),
         count(points.rows()),
         jet_order(order) {}
   JetView<const Scalar> view() const { return {jets.const_data_ptr<Scalar>(), count, jet_order}; }
   JetView<Scalar> cotangent_view() { return {cotangents.data_ptr<Scalar>(), count, jet_order}; }
-  void pull_back() { trained.pull_back(cotangents.to(trained.parameters().device())); }
+  void pull_back() { trained.pull_back(cotangents); }
 
   TrainableField& trained;
   at::Tensor jets, cotangents;
@@ -40,8 +50,21 @@ struct HostJets {
 
 }  // namespace
 
+struct FieldObjective::Constants {
+  Constants(const ObjectiveTerms& terms, const at::Tensor& like) : tables(like) {
+    if (!terms.preference) return;
+    RowMatrix<double> rows(terms.preference->normals.rows(), 4);
+    rows << terms.preference->normals, terms.preference->weights;
+    preferred = uploaded(rows, like);
+  }
+  EnergyTables tables;
+  at::Tensor preferred;
+};
+
 FieldObjective::FieldObjective(const SurfaceSamples& samples, ObjectiveTerms terms)
     : samples_(samples), terms_(std::move(terms)), order_(morton_order(samples.points)) {}
+
+FieldObjective::~FieldObjective() = default;
 
 Index FieldObjective::next_fresh(Random& random) {
   if (used_ == pool_.size()) {
@@ -51,61 +74,87 @@ Index FieldObjective::next_fresh(Random& random) {
   return used_++;
 }
 
-double FieldObjective::accumulate(TrainableField& field, Random& random) {
-  return field.parameters().scalar_type() == at::kDouble ? accumulate_as<double>(field, random)
-                                                         : accumulate_as<float>(field, random);
-}
-
-template <class Scalar>
-double FieldObjective::accumulate_as(TrainableField& field, Random& random) {
-  const double surface = surface_terms<Scalar>(field, random);
-  return surface + handle_terms<Scalar>(field, random);
-}
-
-template <class Scalar>
-double FieldObjective::surface_terms(TrainableField& field, Random& random) {
-  const Index available = samples_.size(), batch = std::min(terms_.batch, available);
-  const bool styled = terms_.preference && terms_.gauss > 0.0;
-  PointsOf<Scalar> points(batch, 3), normals(styled ? batch : 0, 3);
-  Eigen::VectorX<Scalar> weights(styled && terms_.preference_weights.size() > 0 ? batch : 0);
-  // Fresh samples stand evenly among the others: stretch b has one where b·fresh/batch steps up.
-  for (Index b = 0; b < batch; ++b) {
-    if (terms_.fresh > 0 && b * terms_.fresh / batch != (b + 1) * terms_.fresh / batch) {
+FieldObjective::Batch FieldObjective::draw(Random& random) {
+  const Index available = samples_.size(), count = std::min(terms_.batch, available);
+  Batch batch{Points(count, 3), Points(styled() ? count : 0, 3),
+              Vector(styled() && terms_.preference_weights.size() > 0 ? count : 0)};
+  // Fresh samples stand evenly among the others: stretch b has one where b·fresh/count steps up.
+  for (Index b = 0; b < count; ++b) {
+    if (terms_.fresh > 0 && b * terms_.fresh / count != (b + 1) * terms_.fresh / count) {
       const Index i = next_fresh(random);
-      points.row(b) = pool_.points.row(i).cast<Scalar>();
-      if (styled) normals.row(b) = pool_.normals.row(i).cast<Scalar>();
-      if (weights.size() > 0) weights[b] = Scalar(1);
+      batch.points.row(b) = pool_.points.row(i);
+      if (styled()) batch.normals.row(b) = pool_.normals.row(i);
+      if (batch.weights.size() > 0) batch.weights[b] = 1.0;
       continue;
     }
     const double place = (static_cast<double>(b) + random.uniform()) * static_cast<double>(available) /
-                         static_cast<double>(batch);
+                         static_cast<double>(count);
     const Index i = order_[static_cast<std::size_t>(std::min(available - 1, static_cast<Index>(place)))];
-    points.row(b) = samples_.points.row(i).cast<Scalar>();
-    if (styled) normals.row(b) = samples_.normals.row(i).cast<Scalar>();
-    if (weights.size() > 0) weights[b] = static_cast<Scalar>(terms_.preference_weights[i]);
+    batch.points.row(b) = samples_.points.row(i);
+    if (styled()) batch.normals.row(b) = samples_.normals.row(i);
+    if (batch.weights.size() > 0) batch.weights[b] = terms_.preference_weights[i];
   }
-  HostJets<Scalar> jets(field, points, terms_.bending > 0.0 ? JetOrder::second : JetOrder::first);
+  return batch;
+}
+
+at::Tensor FieldObjective::accumulate(TrainableField& field, Random& random) {
+  if (composed(field.parameters())) return by_compositions(field, random);
+  const bool wide = field.parameters().scalar_type() == at::kDouble;
+  return at::scalar_tensor(wide ? by_kernels<double>(field, random) : by_kernels<float>(field, random),
+                           at::kDouble);
+}
+
+template <class Scalar>
+double FieldObjective::by_kernels(TrainableField& field, Random& random) {
+  const Batch batch = draw(random);
+  HostJets<Scalar> jets(field, batch.points.cast<Scalar>(), order_of_terms());
   const ArapValue arap =
       arap_energy<Scalar>(jets.view(), terms_.bending, terms_.rigidity, jets.cotangent_view());
   double value = terms_.rigidity * (arap.stretch + terms_.bending * arap.bend);
-  if (styled)
-    value += terms_.gauss * gauss_energy<Scalar>(jets.view(), normals, weights, *terms_.preference,
+  if (styled())
+    value += terms_.gauss * gauss_energy<Scalar>(jets.view(), batch.normals.cast<Scalar>(),
+                                                 batch.weights.cast<Scalar>(), *terms_.preference,
                                                  terms_.gauss, jets.cotangent_view());
   if (terms_.barrier > 0.0)
     value += terms_.barrier * fold_barrier<Scalar>(jets.view(), terms_.barrier_threshold, terms_.barrier,
                                                    jets.cotangent_view());
   jets.pull_back();
-  return value;
+  if (!pulled()) return value;
+  const HandleBatch<Scalar> pairs = terms_.handles.batch<Scalar>(terms_.handle_batch, random);
+  HostJets<Scalar> ends(field, pairs.sources, JetOrder::value);
+  const double off = handle_energy<Scalar>(ends.view(), pairs, terms_.handle_weight, ends.cotangent_view());
+  ends.pull_back();
+  return value + terms_.handle_weight * off;
 }
 
-template <class Scalar>
-double FieldObjective::handle_terms(TrainableField& field, Random& random) const {
-  if (terms_.handles.count() == 0 || terms_.handle_weight == 0.0) return 0.0;
-  const HandleBatch<Scalar> batch = terms_.handles.batch<Scalar>(terms_.handle_batch, random);
-  HostJets<Scalar> jets(field, batch.sources, JetOrder::value);
-  const double value = handle_energy<Scalar>(jets.view(), batch, terms_.handle_weight, jets.cotangent_view());
-  jets.pull_back();
-  return terms_.handle_weight * value;
+at::Tensor FieldObjective::by_compositions(TrainableField& field, Random& random) {
+  const at::Tensor& like = field.parameters();
+  if (!constants_) constants_ = std::make_unique<Constants>(terms_, like);
+  const EnergyTables& tables = constants_->tables;
+  const Batch batch = draw(random);
+  const at::Tensor jets = field.forward_at(batch.points, order_of_terms());
+  const at::Tensor cotangents = at::zeros_like(jets);
+  const at::Tensor arap = composed_arap(jets, terms_.bending, terms_.rigidity, tables, cotangents);
+  at::Tensor value = terms_.rigidity * (arap[0] + terms_.bending * arap[1]);
+  if (styled())
+    value +=
+        terms_.gauss *
+        composed_gauss(jets, uploaded(batch.normals, like),
+                       batch.weights.size() > 0 ? uploaded(batch.weights, like).select(1, 0) : at::Tensor(),
+                       constants_->preferred, terms_.preference->sharpness, terms_.gauss, tables, cotangents);
+  if (terms_.barrier > 0.0)
+    value +=
+        terms_.barrier * composed_barrier(jets, terms_.barrier_threshold, terms_.barrier, tables, cotangents);
+  field.pull_back(cotangents);
+  if (!pulled()) return value;
+  const HandleBatch<double> pairs = terms_.handles.batch<double>(terms_.handle_batch, random);
+  const at::Tensor ends = field.forward_at(pairs.sources, JetOrder::value);
+  const at::Tensor pull = at::zeros_like(ends);
+  value += terms_.handle_weight * composed_handles(ends, uploaded(pairs.targets, like),
+                                                   uploaded(pairs.weights, like).select(1, 0),
+                                                   terms_.handle_weight, pull);
+  field.pull_back(pull);
+  return value;
 }
 
 }  // namespace arapfields

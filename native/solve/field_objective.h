@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <memory>
 #include <optional>
 
 #include "energies/gauss.h"
@@ -27,20 +28,31 @@ struct ObjectiveTerms {
 
 /// Estimates the terms on random subsets of the samples: the samples are put in spatial order and one is
 /// drawn from each of `batch` equal stretches of it, which covers the surface more evenly than independent
-/// draws. Jets are of the lowest order that the terms allow; handles need values alone.
+/// draws. Jets are of the lowest order that the terms allow; handles need values alone. Subsets are drawn in
+/// main memory, from the same random numbers wherever the field lives.
 class FieldObjective final : public Objective {
  public:
   FieldObjective(const SurfaceSamples& samples, ObjectiveTerms terms);
-  double accumulate(TrainableField& field, Random& random) override;
+  ~FieldObjective() override;
+  at::Tensor accumulate(TrainableField& field, Random& random) override;
   const ObjectiveTerms& terms() const { return terms_; }
 
  private:
+  /// Samples of one iteration; normals and weights where the terms use them.
+  struct Batch {
+    Points points, normals;
+    Vector weights;
+  };
+  /// What the terms need on a device, beside each batch.
+  struct Constants;
+
+  Batch draw(Random& random);
+  bool styled() const { return terms_.preference && terms_.gauss > 0.0; }
+  bool pulled() const { return terms_.handles.count() > 0 && terms_.handle_weight != 0.0; }
+  JetOrder order_of_terms() const { return terms_.bending > 0.0 ? JetOrder::second : JetOrder::first; }
   template <class Scalar>
-  double accumulate_as(TrainableField& field, Random& random);
-  template <class Scalar>
-  double surface_terms(TrainableField& field, Random& random);
-  template <class Scalar>
-  double handle_terms(TrainableField& field, Random& random) const;
+  double by_kernels(TrainableField& field, Random& random);
+  at::Tensor by_compositions(TrainableField& field, Random& random);
 
   /// The next fresh sample; draws another pool of as many as there are samples when one is used up.
   Index next_fresh(Random& random);
@@ -50,6 +62,7 @@ class FieldObjective final : public Objective {
   std::vector<std::uint32_t> order_;
   SurfaceSamples pool_;
   Index used_ = 0;
+  std::unique_ptr<Constants> constants_;
 };
 
 }  // namespace arapfields

@@ -3,6 +3,7 @@
 
 #include <ATen/ATen.h>
 
+#include "core/device.h"
 #include "core/parallel.h"
 #include "solve/options.h"
 #include "solve/setup.h"
@@ -11,13 +12,8 @@ namespace arapfields {
 namespace {
 
 at::Tensor to_tensor(const Points& points, const at::Tensor& like) {
-  return at::from_blob(const_cast<double*>(points.data()), {points.rows(), 3}, at::kDouble)
-      .to(like.options(), false, true);
-}
-
-Points to_points(const at::Tensor& tensor) {
-  const at::Tensor host = tensor.to(at::kCPU, at::kDouble).contiguous();
-  return Eigen::Map<const Points>(host.const_data_ptr<double>(), host.size(0), 3);
+  const at::Tensor host = at::from_blob(const_cast<double*>(points.data()), {points.rows(), 3}, at::kDouble);
+  return upload(host.to(like.scalar_type()), like);
 }
 
 Points uniform_in(const Vec3& low, const Vec3& high, Index count, Random& random) {
@@ -28,12 +24,8 @@ Points uniform_in(const Vec3& low, const Vec3& high, Index count, Random& random
 }
 
 /// Rows J_pᵀ r_p.
-Points transposed_times(JetView<const double> jets, const Points& residuals) {
-  Points result(residuals.rows(), 3);
-  for (Index p = 0; p < residuals.rows(); ++p)
-    for (int k = 0; k < 3; ++k)
-      result(p, k) = residuals.row(p).dot(Eigen::Map<const Eigen::RowVector3d>(jets.at(first_column(k), p)));
-  return result;
+at::Tensor transposed_times(const at::Tensor& jets, const at::Tensor& residuals) {
+  return (jets.slice(0, first_column(0), first_column(3)) * residuals).sum(2).t();
 }
 
 /// Trains g for a fixed f.
@@ -47,7 +39,7 @@ class CycleObjective final : public Objective {
     low_ = low - margin, high_ = high + margin;
   }
 
-  double accumulate(TrainableField& inverse, Random& random) override {
+  at::Tensor accumulate(TrainableField& inverse, Random& random) override {
     const Index surface = (batch_ + 1) / 2;
     Points y(batch_, 3), x(surface, 3);
     for (Index p = 0; p < surface; ++p) {
@@ -56,16 +48,16 @@ class CycleObjective final : public Objective {
       x.row(p) = rest_.row(i);
     }
     y.bottomRows(batch_ - surface) = uniform_in(low_, high_, batch_ - surface, random);
-    const Points back = to_points(inverse.forward(to_tensor(y, inverse.parameters()), JetOrder::value)[0]);
-    JetBlock<double> jets(batch_, JetOrder::first);
-    field_.evaluate(back, jets.view());
-    const Points cycle = Eigen::Map<const Points>(jets.view().data, batch_, 3) - y;
-    const Points direct = back.topRows(surface) - x;
+    const at::Tensor images = to_tensor(y, inverse.parameters());
+    const at::Tensor back = inverse.forward(images, JetOrder::value)[0];
+    const at::Tensor jets = field_.jets(back, JetOrder::first);
+    const at::Tensor cycle = jets[0] - images;
+    const at::Tensor direct = back.slice(0, 0, surface) - to_tensor(x, images);
     const double scale = 1.0 / static_cast<double>(batch_);
-    Points cotangents = 2.0 * scale * transposed_times(jets.view(), cycle);
-    cotangents.topRows(surface) += 2.0 * scale * direct;
-    inverse.pull_back(to_tensor(cotangents, inverse.parameters()).unsqueeze(0));
-    return scale * (cycle.squaredNorm() + direct.squaredNorm());
+    at::Tensor cotangents = 2.0 * scale * transposed_times(jets, cycle);
+    cotangents.slice(0, 0, surface).add_(direct, 2.0 * scale);
+    inverse.pull_back(cotangents.unsqueeze(0));
+    return scale * (cycle.square().sum() + direct.square().sum());
   }
 
  private:
@@ -134,24 +126,21 @@ InvertibleObjective::InvertibleObjective(Objective& inner, const SurfaceSamples&
       inverse_(shape, options.seed + 1, false, device),
       stepper_(inverse_, options) {}
 
-double InvertibleObjective::accumulate(TrainableField& field, Random& random) {
-  const double inner = inner_.accumulate(field, random);
+at::Tensor InvertibleObjective::accumulate(TrainableField& field, Random& random) {
+  const at::Tensor inner = inner_.accumulate(field, random);
   Points x = uniform_in(-Vec3::Ones(), Vec3::Ones(), batch_, random);
   for (Index p = 0; p < batch_ / 2; ++p) x.row(p) = samples_.points.row(random.below(samples_.size()));
-  const at::Tensor images = field.forward(to_tensor(x, field.parameters()), JetOrder::value)[0];
+  const at::Tensor images = field.forward_at(x, JetOrder::value)[0];
   const at::Tensor jets = inverse_.forward(images, JetOrder::first);
   const at::Tensor residual = jets[0] - to_tensor(x, jets);
   const double scale = weight_ / static_cast<double>(batch_);
   at::Tensor inverse_cotangents = at::zeros_like(jets);
   inverse_cotangents[0].copy_(residual * (2.0 / static_cast<double>(batch_)));
-  at::Tensor cotangents = at::empty_like(residual);
-  for (int k = 0; k < 3; ++k)
-    cotangents.select(1, k).copy_((jets[first_column(k)] * residual).sum(1) * (2.0 * scale));
-  field.pull_back(cotangents.unsqueeze(0));
+  field.pull_back((2.0 * scale * transposed_times(jets, residual)).unsqueeze(0));
   inverse_.gradient().zero_();
   inverse_.pull_back(inverse_cotangents);
   stepper_.step(stepper_.rate(static_cast<double>(done_++) / iterations_));
-  return inner + scale * residual.square().sum().item<double>();
+  return inner + scale * residual.square().sum();
 }
 
 }  // namespace arapfields

@@ -35,7 +35,7 @@ class InvertibleObjective final : public Objective {
  public:
   InvertibleObjective(Objective& inner, const SurfaceSamples& samples, Index batch, double weight,
                       const MlpShape& shape, const LoopOptions& options, const std::string& device);
-  double accumulate(TrainableField& field, Random& random) override;
+  at::Tensor accumulate(TrainableField& field, Random& random) override;
 
  private:
   Objective& inner_;

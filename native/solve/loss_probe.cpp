@@ -16,7 +16,7 @@ LossProbe probe_loss(NeuralField& field, FieldObjective& objective, const Vector
   field.gradient().zero_();
   Random random(seed);
   LossProbe probe;
-  probe.loss = objective.accumulate(field, random);
+  probe.loss = objective.accumulate(field, random).item<double>();
   const at::Tensor gradient = field.gradient().to(at::kDouble).contiguous();
   probe.gradient = Eigen::Map<const Vector>(gradient.const_data_ptr<double>(), gradient.numel());
   return probe;
@@ -43,7 +43,7 @@ EnergyTrial::EnergyTrial(const SurfaceSamples& samples, Index batch, double bend
 
 double EnergyTrial::run() {
   field_.gradient().zero_();
-  return objective_.accumulate(field_, random_);
+  return objective_.accumulate(field_, random_).item<double>();
 }
 
 }  // namespace arapfields

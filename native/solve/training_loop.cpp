@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/device.h"
 #include "solve/setup.h"
 #include "solve/stepper.h"
 
@@ -18,6 +19,30 @@ std::string message(const LoopOptions& options, int done, double loss, double le
                 done, options.iterations, loss, left);
   return text;
 }
+
+/// Losses stay where they were computed until a run of them is read at once: a read waits for the device.
+class Losses {
+ public:
+  explicit Losses(const at::Tensor& like)
+      : every_(composed(like) ? 25 : 1), run_(at::zeros({every_}, like.options().dtype(at::kDouble))) {}
+  /// Whether as many as are read at once are there, the `iteration`-th included.
+  bool due(int iteration) const { return (iteration + 1) % every_ == 0; }
+  void keep(int iteration, const at::Tensor& loss) {
+    run_.select(0, iteration % every_).copy_(loss);
+    kept_ = iteration + 1;
+  }
+  /// Those not read yet: consume(iteration, loss).
+  template <class Consume>
+  void read(Consume&& consume) {
+    const at::Tensor host = run_.to(at::kCPU);
+    const double* values = host.const_data_ptr<double>();
+    for (; read_ < kept_; ++read_) consume(read_, values[read_ % every_]);
+  }
+
+ private:
+  int every_, kept_ = 0, read_ = 0;
+  at::Tensor run_;
+};
 
 /// The parameters of a state whose loss was finite, refreshed now and then.
 struct GoodState {
@@ -44,7 +69,13 @@ LoopResult minimise(TrainableField& field, Objective& objective, const LoopOptio
   Random random(options.seed, 0x5eed);
   Stepper stepper(field, options);
   GoodState good{field.parameters().clone(), 0};
+  Losses losses(field.parameters());
   double smooth = 0.0, reported = -1.0;
+  const auto note = [&](int iteration, double loss) {
+    if (!std::isfinite(loss)) diverge(field, good, options, iteration);
+    smooth = iteration == 0 ? loss : 0.9 * smooth + 0.1 * loss;
+    if (iteration % history_every == 0) result.history.emplace_back(iteration, loss);
+  };
   for (int iteration = 0; iteration < options.iterations; ++iteration) {
     progress.check();
     const double elapsed = watch.seconds();
@@ -57,13 +88,13 @@ LoopResult minimise(TrainableField& field, Objective& objective, const LoopOptio
       done = std::max(done, elapsed / options.time_budget);
     }
     field.gradient().zero_();
-    const double loss = objective.accumulate(field, random);
-    if (!std::isfinite(loss)) diverge(field, good, options, iteration);
-    smooth = iteration == 0 ? loss : 0.9 * smooth + 0.1 * loss;
-    if (iteration % history_every == 0) result.history.emplace_back(iteration, loss);
-    if (iteration % snapshot_every == 0) {
-      good.parameters.copy_(field.parameters());
-      good.iteration = iteration;
+    losses.keep(iteration, objective.accumulate(field, random));
+    if (losses.due(iteration)) {
+      losses.read(note);
+      if (iteration - good.iteration >= snapshot_every) {
+        good.parameters.copy_(field.parameters());
+        good.iteration = iteration;
+      }
     }
     stepper.step(stepper.rate(done));
     result.iterations = iteration + 1;
@@ -74,6 +105,7 @@ LoopResult minimise(TrainableField& field, Objective& objective, const LoopOptio
     }
     if (observer) observer(iteration + 1);
   }
+  losses.read(note);
   if (!at::isfinite(field.parameters()).all().item<bool>()) diverge(field, good, options, result.iterations);
   result.seconds = watch.seconds();
   progress.report(1.0);

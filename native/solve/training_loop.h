@@ -16,8 +16,9 @@ namespace arapfields {
 class Objective {
  public:
   virtual ~Objective() = default;
-  /// Adds the gradient of the estimate to field.gradient(); returns the estimate.
-  virtual double accumulate(TrainableField& field, Random& random) = 0;
+  /// Adds the gradient of the estimate to field.gradient(); returns the estimate, one number wherever it was
+  /// computed.
+  virtual at::Tensor accumulate(TrainableField& field, Random& random) = 0;
 };
 
 /// How to descend. "orthogonal" is neural/orthogonal_step.h, for fields that are networks; "adam" serves any.
@@ -48,7 +49,8 @@ struct LoopResult {
 /// Called with the number of finished iterations after each of them.
 using LoopObserver = std::function<void(int)>;
 
-/// Minimises. Where the loss or the gradient leaves the finite numbers, the parameters of the last good state
+/// Minimises. Losses that a device computes are read a few dozen at a time, so that the loop does not wait
+/// for it. Where the loss or the gradient leaves the finite numbers, the parameters of the last good state
 /// are put back and Diverged is thrown, which names the iteration of both.
 LoopResult minimise(TrainableField& field, Objective& objective, const LoopOptions& options,
                     const Progress& progress, const LoopObserver& observer = {});

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+namespace at {
+class Tensor;
+}
+
+namespace arapfields {
+
+/// Whether a tensor is worked on by compositions of libtorch's operations rather than by our kernels: always
+/// where it is not in main memory, and everywhere while a ComposedScope lives.
+bool composed(const at::Tensor& tensor);
+
+/// Forces compositions on tensors in main memory too, in the whole process: what a device would compute can
+/// then be compared with the kernels where there is none.
+class ComposedScope {
+ public:
+  ComposedScope();
+  ~ComposedScope();
+  ComposedScope(const ComposedScope&) = delete;
+  ComposedScope& operator=(const ComposedScope&) = delete;
+};
+
+/// A copy of a tensor in main memory, of its dtype, on the device of `beside`. Does not wait for the device:
+/// the way there leads through page-locked memory.
+at::Tensor upload(const at::Tensor& host, const at::Tensor& beside);
+
+}  // namespace arapfields
