@@ -18,6 +18,7 @@ OPTIONS = {
     "bending": 1e-3,
     "steps": 40,
     "tolerance": 3e-4,
+    "interior": False,  # a style acts everywhere alike: nothing is to be held apart
 }
 LOW, HIGH = np.array((0.012, 0.03, 0.12)), np.array((0.95, 0.34, 0.02))
 
@@ -79,8 +80,8 @@ def place(made, column, degrees):
     return turned(made, column * SPACING, degrees, scale=min(1.8 / width, 2.2 / np.ptp(made.vertices[:, 2])))
 
 
-def render(output):
-    paths, results = [output / "styles-0.png"], {}
+def spheres(path):
+    """The first row: each style's preference."""
     stage.clear()
     balls = [ball(preference_colours(style)) for style in STYLES]
     shown = [
@@ -89,7 +90,12 @@ def render(output):
     ]
     shown += [stage.caption(style, (SPACING * (1 + i), -0.9, -0.42), 0.24) for i, style in enumerate(STYLES)]
     shown += [stage.caption("at rest", (0, -0.9, -0.42), 0.24), spacer(0)]
-    stage.photograph(shown, paths[0], size=(1200, 225), elevation=10)
+    stage.photograph(shown, path, size=(1200, 225), elevation=10)
+
+
+def render(output):
+    paths, results = [output / "styles-0.png"], {}
+    spheres(paths[0])
     for name, degrees, height in ROWS:
         rest = suzanne() if name == "suzanne" else shape(name)
         live = Live(samples_of(rest))

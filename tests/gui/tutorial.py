@@ -23,6 +23,7 @@ import addon  # noqa: E402
 import addon.panels as panels  # noqa: E402
 
 JAW = ((0.0, -0.35, -0.52), (0.50, 0.62, 0.46))
+STEPS = 60  # enough for a picture
 TAB = (1299, 340)  # where the sidebar's last tab lies
 EAR = ((1.12, 0.32, 0.17), (0.30, 0.36, 0.40))
 
@@ -108,7 +109,7 @@ def steps():
     yield 4.0
     picture("handles")
     with override():
-        bpy.ops.arapfields.deform(output="WARP")
+        bpy.ops.arapfields.deform(output="WARP", iterations=STEPS)
         suzanne.hide_set(True)
     open_alone({"source", "deform", "result", "status"})
     show_sidebar()
@@ -117,7 +118,7 @@ def steps():
     with override():
         suzanne.hide_set(False)
         activate(suzanne)
-        bpy.ops.arapfields.stylize(style="CUBE", strength=0.8)
+        bpy.ops.arapfields.stylize(style="CUBE", strength=0.8, iterations=STEPS)
         for item in bpy.data.objects:
             item.hide_set(item.name != "Suzanne_stylized")
     open_alone({"source", "stylize"})

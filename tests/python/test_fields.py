@@ -136,5 +136,5 @@ def test_distortion_at_points(bent, samples):
     assert found.flipped_share == (determinants <= 0).mean()
     assert found.max_stretch == pytest.approx(stretches.max(), rel=1e-6)
     assert found.min_stretch == pytest.approx(stretches.min(), rel=1e-6)
-    with pytest.raises(af.InvalidInput, match="samples|points"):
+    with pytest.raises(af.InvalidInput, match=r"samples|points"):
         af.distortion(bent, np.zeros((0, 3)))
