@@ -45,15 +45,22 @@ class Blender:
         return copy
 
     def run(self, script, *arguments, check=True):
-        here = self.bring(HERE)
+        """Runs a script of this folder."""
+        command = [*self.command, self.inside(self.bring(HERE) / script)]
+        command += ["--"] if "--python" in self.command else []
+        return self.call([*command, *arguments], check)
+
+    def program(self, *arguments, check=True):
+        """Runs Blender itself as a user does, with what is installed and enabled."""
+        return self.call([*self.command[: self.command.index("blender") + 1], *arguments], check)
+
+    def call(self, command, check):
         user = self.folder / "user"
         user.mkdir(exist_ok=True)
         environment = {**os.environ, "OMP_NUM_THREADS": "1", "TMPDIR": self.inside(self.folder)}
         environment |= {"BLENDER_USER_RESOURCES": self.inside(user), "PYTHONPATH": "", **self.environment}
-        command = [*self.command, self.inside(here / script)]
-        command += ["--"] if "--python" in self.command else []
         done = subprocess.run(
-            [*command, *map(str, arguments)], env=environment, capture_output=True, text=True, timeout=900
+            [*map(str, command)], env=environment, capture_output=True, text=True, timeout=900
         )
         if check and done.returncode:
             pytest.fail(f"status {done.returncode}\n{done.stdout[-3000:]}{done.stderr[-4000:]}")

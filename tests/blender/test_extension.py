@@ -81,6 +81,49 @@ def test_install_use_and_remove(extension, blender, torch):
     assert left_behind(blender) == []
 
 
+@pytest.mark.parametrize("blender", blenders.NAMES[-1:], indirect=True)
+def test_batches_in_blender_itself(extension, blender):
+    """As a command of the installed extension and as a script, which skips what the command has done."""
+    folder = blender.folder / "in"
+    folder.mkdir()
+    corners = "\n".join(f"v {x} {y} {z}" for x in (-1, 1) for y in (-1, 1) for z in (-1, 1))
+    faces = "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n"
+    for name in ("a.obj", "b.obj"):
+        (folder / name).write_text(f"{corners}\n{faces}")
+    (folder / "broken.ply").write_text("ply\nnonsense")
+    scripts = blender.bring(ROOT / "blender_scripts")
+    blender.program(
+        "--command",
+        "extension",
+        "install-file",
+        "-r",
+        "user_default",
+        "-e",
+        blender.inside(blender.bring(extension)),
+    )
+    call = [
+        "--style",
+        "octahedron",
+        "-i",
+        blender.inside(folder),
+        "-o",
+        blender.inside(blender.folder / "out"),
+    ]
+    call += ["--jobs", "2", "--iterations", "20", "--samples", "1000", "--batch", "100", "--width", "16"]
+    done = blender.program("--command", "arapfields", "batch", *call, check=False)
+    assert done.returncode == 1 and "3 files: 2 done, 0 skipped, 1 failed" in done.stdout, done.stdout
+    script = blender.inside(scripts / "batch.py")
+    done = blender.program("-b", "-P", script, "--", *call, "--pattern", "*.obj")
+    assert "2 files: 0 done, 2 skipped, 0 failed" in done.stdout, done.stdout
+    done = blender.program("-b", "-P", script, "--", *call, "--pattern", "*.obj", "--again")
+    assert "2 files: 2 done, 0 skipped, 0 failed" in done.stdout, done.stdout
+    assert sorted(p.name for p in (blender.folder / "out").iterdir()) == [
+        "a.obj",
+        "arapfields-batch.json",
+        "b.obj",
+    ]
+
+
 @pytest.mark.parametrize("blender", ["4.5", "4.2"], indirect=True)
 def test_a_repository_serves_the_zip(extension, blender, tmp_path):
     """server-generate's index.json is all that Blender needs to list, fetch and install the extension."""
