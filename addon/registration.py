@@ -6,7 +6,7 @@ import atexit
 import bpy
 
 from . import commands, install_check, panels, preferences
-from .bridge import host, jobs, loading, overlay, pictures, preview, translations
+from .bridge import host, jobs, loading, overlay, pictures, preview, staleness, translations
 from .bridge import live as live_mode
 from .operators import bake, deform, extract, fit, handles, live, presets, status, styles, stylize
 from .properties import handle, item, settings
@@ -24,6 +24,7 @@ MODULES = [
         preview,
         pictures,
         translations,
+        staleness,
     ),
     *(fit, handles, deform, live, bake, stylize, styles, presets, extract, status),
     *panels.SECTIONS,

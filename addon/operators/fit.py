@@ -3,6 +3,7 @@ import json
 
 import bpy
 
+from ..bridge import staleness
 from ..bridge.jobs import JobOperator
 from ..bridge.language import translated
 from ..bridge.lookup import settings_of
@@ -38,7 +39,9 @@ class ARAPFIELDS_OT_fit(JobOperator, bpy.types.Operator):
             return surface.fit(stages, 1.0, again)
 
         def apply(sdf):
-            ours = settings_of(surface.who.get())
+            source = surface.who.get()
+            staleness.fitted(source, surface)
+            ours = settings_of(source)
             ours.fit_key = surface.key
             ours.fit_report = json.dumps(sdf.report)
             return translated("surface fitted")

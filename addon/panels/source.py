@@ -28,7 +28,10 @@ class ARAPFIELDS_PT_source(Section, bpy.types.Panel):
         if source is None:
             layout.label(text="Select a mesh object", icon="INFO")
             return
-        layout.label(text=source.name, icon="MESH_DATA")
+        layout.label(text=source.name, icon="MESH_DATA", translate=False)
+        mesh = source.data
+        counts = {"vertices": f"{len(mesh.vertices):,}", "faces": f"{len(mesh.polygons):,}"}
+        layout.label(text=translated("{vertices} vertices, {faces} faces", **counts), icon="BLANK1")
         if lookup.refusal(source):
             wrapped(layout, translated(lookup.refusal(source)), icon="ERROR")
         for text in remarks(source):

@@ -3,6 +3,7 @@ import json
 
 import bpy
 
+from ..bridge import staleness
 from ..bridge.settings import fit_cache
 from ..core.fitting import FIT
 from ..names import Op
@@ -26,8 +27,10 @@ class ARAPFIELDS_PT_surface(Section, bpy.types.Panel):
             layout.label(text="Not fitted yet", icon="INFO")
             return
         kept = fit_cache().path(ours.fit_key).exists()
+        stale = staleness.reason(source)
         layout.label(
-            text="Fit in the cache" if kept else "Fit was cleared", icon="CHECKMARK" if kept else "ERROR"
+            text=(stale or "Fit in the cache") if kept else "Fit was cleared",
+            icon="CHECKMARK" if kept and not stale else "ERROR",
         )
         for name, value in json.loads(ours.fit_report or "{}").items():
             if isinstance(value, float) and "error" in name:

@@ -98,6 +98,9 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
         name="Display before Live", description="How the object was displayed before it became live"
     )
     fit_key: bpy.props.StringProperty(name="Fit", description="Name of the object's last fit in the cache")
+    fit_options: bpy.props.StringProperty(
+        name="Fit Settings", description="Settings of the object's last fit, as JSON"
+    )
     fit_report: bpy.props.StringProperty(
         name="Fit Report", description="Figures of the object's last fit, as JSON"
     )
