@@ -37,9 +37,11 @@ DeformedFunction::DeformedFunction(const DeformedShape& shape, const Frame& fram
       frame_(frame),
       check_(progress.part(0.0, 0.0)),
       distance_(shape.moved, shape.mesh.triangles, progress),
-      newton_(shape.field, shape.inverse != nullptr
-                               ? Points(0, 3)
-                               : shape.field.frame().to_cube(some_rows(shape.mesh.vertices, most_starts))) {}
+      newton_(shape.field,
+              shape.inverse != nullptr
+                  ? Points(0, 3)
+                  : shape.field.frame().to_cube(some_rows(shape.mesh.vertices, most_starts)),
+              check_) {}
 
 Points DeformedFunction::by_newton(PointsIn moved) const {
   const Frame& cube = shape_.field.frame();

@@ -20,8 +20,7 @@ TriangleMesh extract_deformed(const ImplicitFunction& rest, const Frame& rest_fr
                               const Progress& progress, DeformedReport* report) {
   require_resolution(resolution);
   const TriangleMesh mesh = extract_surface(rest, rest_frame, resolution, progress.part(0.0, share_at_rest));
-  Points moved(mesh.vertices.rows(), 3);
-  field.evaluate(field.frame().to_cube(mesh.vertices), {moved.data(), moved.rows(), JetOrder::value});
+  Points moved = values_at(field, field.frame().to_cube(mesh.vertices), progress);
   require(moved.allFinite(), "field", "its values are NaN or infinite on the surface",
           "a finite deformation is needed");
   moved = field.frame().to_mesh(moved);

@@ -13,13 +13,25 @@
 #include "core/parallel.h"
 
 namespace arapfields {
+
+Points values_at(const DeformationField& field, PointsIn points, const Progress& progress) {
+  constexpr Index chunk = 4096;
+  Points values(points.rows(), 3);
+  for (Index begin = 0; begin < points.rows(); begin += chunk) {
+    progress.check();
+    const Index rows = std::min(chunk, points.rows() - begin);
+    field.evaluate(points.middleRows(begin, rows), {values.data() + 3 * begin, rows, JetOrder::value});
+  }
+  return values;
+}
+
 namespace {
 
 /// Points x with their images f(x), searched by image.
 class Starts {
  public:
-  Starts(const DeformationField& field, Points rest) : rest_(std::move(rest)), images_(rest_.rows(), 3) {
-    field.evaluate(rest_, {images_.data(), rest_.rows(), JetOrder::value});
+  Starts(const DeformationField& field, Points rest, const Progress& progress)
+      : rest_(std::move(rest)), images_(values_at(field, rest_, progress)) {
     std::vector<int> ids;
     std::vector<Eigen::AlignedBox3d> boxes;
     for (Index i = 0; i < images_.rows(); ++i) {
@@ -136,8 +148,8 @@ struct NewtonInverse::Parts {
   Starts surface, space;
 };
 
-NewtonInverse::NewtonInverse(const DeformationField& field, Points rest)
-    : parts_(new Parts{field, Starts(field, std::move(rest)), Starts(field, grid(17))}) {}
+NewtonInverse::NewtonInverse(const DeformationField& field, Points rest, const Progress& progress)
+    : parts_(new Parts{field, Starts(field, std::move(rest), progress), Starts(field, grid(17), progress)}) {}
 NewtonInverse::~NewtonInverse() = default;
 NewtonInverse::NewtonInverse(NewtonInverse&&) noexcept = default;
 
@@ -187,7 +199,7 @@ InverseResult NewtonInverse::operator()(PointsIn targets, const InverseOptions& 
 
 InverseResult invert(const DeformationField& field, PointsIn targets, const InverseOptions& options,
                      const Progress& progress) {
-  return NewtonInverse(field, field.rest_points())(targets, options, progress);
+  return NewtonInverse(field, field.rest_points(), progress)(targets, options, progress);
 }
 
 }  // namespace arapfields

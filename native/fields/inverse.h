@@ -25,13 +25,16 @@ struct InverseResult {
   double worst_residual = 0.0;  ///< over the points found
 };
 
+/// f at points (n,3) in cube coordinates, in pieces between which `progress` may cancel.
+Points values_at(const DeformationField& field, PointsIn points, const Progress& progress);
+
 /// Solves f(x) = y by Newton's method with the field's own Jacobian, its steps halved until the residual
 /// falls. It starts from that of `rest` whose image is nearest to y, and where that fails from the nearest
 /// image of a grid over [-1,1]³, then from y itself. Where f folds space there are several x: the start then
 /// decides. Built once for many calls; the field must outlive it.
 class NewtonInverse {
  public:
-  NewtonInverse(const DeformationField& field, Points rest);
+  NewtonInverse(const DeformationField& field, Points rest, const Progress& progress = {});
   ~NewtonInverse();
   NewtonInverse(NewtonInverse&&) noexcept;
 
