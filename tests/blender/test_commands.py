@@ -162,3 +162,21 @@ def test_what_cannot_be_read_is_one_line(script, tmp_path, name, content, text):
     done = script("stylize", "-i", tmp_path / name, "-o", tmp_path / "x.ply", check=False)
     said = [line for line in done.stderr.splitlines() if line.startswith("arapfields")]
     assert done.returncode == 2 and len(said) == 1 and text in said[0] and name in said[0]
+
+
+def test_an_obj_keeps_its_polygons_materials_and_textures(script, tmp_path):
+    (tmp_path / "in/maps").mkdir(parents=True)
+    (tmp_path / "in/box.mtl").write_text("newmtl skin\nKd 0.5 0.4 0.3\nmap_Kd maps/skin.ppm\n")
+    (tmp_path / "in/maps/skin.ppm").write_bytes(b"P6 1 1 255 abc")
+    corners = [f"v {x} {y} {z}" for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    faces = ["f 1 2 4 3", "f 5 7 8 6", "f 1 5 6 2", "f 3 4 8 7", "f 1 3 7 5", "f 2 6 8 4"]
+    lines = ["mtllib box.mtl", "o Box", *corners, "usemtl skin", *faces]
+    (tmp_path / "in/box.obj").write_text("\n".join(lines) + "\n")
+    target = tmp_path / "out/deep/box.obj"
+    script("stylize", "--style", "octahedron", "-i", tmp_path / "in/box.obj", "-o", target, *QUICK)
+    text = target.read_text()
+    assert [len(line.split()) for line in text.splitlines() if line.startswith("f ")] == [5] * 6
+    assert "mtllib box.mtl" in text and "usemtl skin" in text
+    materials = target.with_suffix(".mtl").read_text()
+    (texture,) = [line.split()[1] for line in materials.splitlines() if line.startswith("map_Kd")]
+    assert (target.parent / texture).resolve() == tmp_path / "in/maps/skin.ppm"
