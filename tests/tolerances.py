@@ -58,3 +58,5 @@ COMPOSED = 1e-10
 # Sixty steps of descent in single precision along the two: rounding, amplified by optimizers that turn small
 # gradients into steps of full length. Seen: 1e-6 (orthogonal), 2e-4 (Adam), 6e-3 (exact handles).
 COMPOSED_SOLVE = 0.02
+# A solve with products rounded to bfloat16 against one without: what noise of 2e-3 in a product costs.
+ROUNDED_SOLVE = 0.1

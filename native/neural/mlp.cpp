@@ -42,7 +42,8 @@ Index parameter_count(const MlpShape& shape) {
 struct Mlp::State {
   MlpShape shape;
   at::Tensor parameters, gradient;
-  LayerViews layers;  // into parameters
+  LayerViews layers;   // into parameters
+  LayerViews trained;  // what forward() and pull_back() use: the same, perhaps with rounded copies
   // Of the last forward call:
   Blocks kept;
   std::vector<GradientPart> parts;  // the first is the gradient itself
@@ -112,6 +113,7 @@ Mlp::Mlp(const MlpShape& shape, std::uint64_t seed, bool zero_last_layer, bool d
       values.to(at::TensorOptions(double_precision ? at::kDouble : at::kFloat).device(at::Device(device)));
   state_->gradient = at::zeros_like(state_->parameters);
   state_->layers = LayerViews(shape, state_->parameters);
+  state_->trained = state_->layers;
 }
 
 Mlp::~Mlp() = default;
@@ -125,6 +127,16 @@ at::Tensor& Mlp::gradient() { return state_->gradient; }
 at::Tensor Mlp::weight(int layer) const { return state_->layers.weights.at(static_cast<std::size_t>(layer)); }
 at::Tensor Mlp::bias(int layer) const { return state_->layers.biases.at(static_cast<std::size_t>(layer)); }
 
+void Mlp::round_products(bool rounded) {
+  std::vector<at::Tensor>& copies = state_->trained.rounded;
+  copies.clear();
+  if (!rounded || state_->parameters.scalar_type() != at::kFloat) return;
+  for (const at::Tensor& weight : state_->layers.weights) {
+    const bool large = weight.size(0) >= 64 && weight.size(1) >= 64;
+    copies.push_back(large ? weight.to(at::kBFloat16) : at::Tensor());
+  }
+}
+
 void Mlp::release_buffers() {
   state_->kept = {};
   state_->parts.clear();
@@ -136,8 +148,10 @@ at::Tensor Mlp::forward(const at::Tensor& points, JetOrder order) {
   State& s = *state_;
   check_points(points, s.parameters);
   s.prepare(points, order);
+  for (std::size_t l = 0; l < s.trained.rounded.size(); ++l)
+    if (s.trained.rounded[l].defined()) s.trained.rounded[l].copy_(s.layers.weights[l]);
   s.kept.for_each(s.kept.count(), [&](Block& block, Workspace& space, Index, bool) {
-    sweep_forward(s.shape, s.layers, points, block, space, s.result);
+    sweep_forward(s.shape, s.trained, points, block, space, s.result);
   });
   s.fresh = true;
   return s.result;
@@ -153,7 +167,7 @@ void Mlp::pull_back(const at::Tensor& cotangents) {
   s.kept.for_each(groups, [&](Block& block, Workspace& space, Index group, bool first) {
     GradientPart& part = s.parts[static_cast<std::size_t>(group)];
     if (first && group > 0) part.flat.zero_();
-    sweep_back(s.shape, s.layers, cotangents, block, space, part.layers);
+    sweep_back(s.shape, s.trained, cotangents, block, space, part.layers);
   });
   if (groups < 2) return;
   parallel_for(0, s.gradient.numel(), 16384, [&](Index begin, Index end) {

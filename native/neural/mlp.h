@@ -56,6 +56,12 @@ class Mlp {
   /// call: it consumes the kept activations.
   void pull_back(const at::Tensor& cotangents);
 
+  /// Whether forward() and pull_back() round the factors and the results of the hidden layers' products to
+  /// bfloat16, which processors with such instructions (AVX512-BF16, AMX) multiply twice as fast. Everything
+  /// else stays in single precision: sums within a product, parameters, gradient, whatever evaluate()
+  /// computes. Of no effect in double precision.
+  void round_products(bool rounded);
+
   /// Frees what forward() keeps; the next call allocates anew.
   void release_buffers();
 

@@ -26,6 +26,31 @@ at::Tensor matrix(const at::Tensor& flat, Index rows, Index cols) {
 void product(at::Tensor c, const at::Tensor& a, const at::Tensor& b) { at::mm_out(c, a, b); }
 void add_product(at::Tensor c, const at::Tensor& a, const at::Tensor& b) { at::addmm_out(c, c, a, b); }
 
+/// The rounded copy of layer l's weight; undefined where its products are exact.
+at::Tensor rounded_weight(const LayerViews& layers, int l) {
+  return at_(l) < layers.rounded.size() ? layers.rounded[at_(l)] : at::Tensor();
+}
+
+/// c = a Wᵀ or a W for layer l's weight W.
+void times_weight(at::Tensor c, const at::Tensor& a, const LayerViews& layers, int l, bool transposed) {
+  const at::Tensor rounded = rounded_weight(layers, l);
+  const at::Tensor& weight = rounded.defined() ? rounded : layers.weights[at_(l)];
+  const at::Tensor b = transposed ? weight.t() : weight;
+  if (rounded.defined())
+    c.copy_(at::mm(a.to(at::kBFloat16), b));
+  else
+    product(c, a, b);
+}
+
+/// gradient += aᵀ b, the part of layer l's weight.
+void add_outer(at::Tensor gradient, const at::Tensor& a, const at::Tensor& b, const LayerViews& layers,
+               int l) {
+  if (rounded_weight(layers, l).defined())
+    gradient.add_(at::mm(a.to(at::kBFloat16).t(), b.to(at::kBFloat16)));
+  else
+    add_product(gradient, a.t(), b);
+}
+
 int derivatives_of(const Block& block) { return block.columns == 4 ? 2 : 1; }
 
 /// Pre-activations of the first layer: each coordinate's derivatives meet their own part of the weight alone.
@@ -72,7 +97,7 @@ void sweep_adjoints(const MlpShape& shape, const LayerViews& layers, Block& bloc
   for (int l = shape.layers - 1; l >= 0; --l) {
     adjoint_layer(shape.sharpness, block.planes[at_(l)], block.slope[at_(l)], adjoints_of(layers, block, l),
                   below, second);
-    if (l > 0) product(block.adjoints[at_(l - 1)], below, layers.weights[at_(l)]);
+    if (l > 0) times_weight(block.adjoints[at_(l - 1)], below, layers, l, false);
   }
   at::Tensor encoded = matrix(space.below, rows, shape.encoded());
   product(encoded, below, layers.weights[0]);
@@ -96,12 +121,12 @@ void sweep_adjoints_back(const MlpShape& shape, const LayerViews& layers, const 
               by_coordinate(block.encoding[2], shape));
   at::Tensor lower = encoded.view({rows, shape.encoded()});
   for (int l = 0; l < shape.layers; ++l) {
-    product(here, lower, layers.weights[at_(l)].t());
+    times_weight(here, lower, layers, l, true);
     at::Tensor below = matrix(space.below, rows, shape.width);
     at::Tensor partial = matrix(space.partial[at_(l)], block.columns * m, shape.width);
     adjoint_layer_back(shape.sharpness, block.planes[at_(l)], block.slope[at_(l)],
                        adjoints_of(layers, block, l), second, here, below, partial);
-    add_product(gradient.weights[at_(l)], below.t(), lower);
+    add_outer(gradient.weights[at_(l)], below, lower, layers, l);
     lower = here;
     std::swap(here, spare);
   }
@@ -213,7 +238,7 @@ void sweep_forward(const MlpShape& shape, const LayerViews& layers, const at::Te
     if (l == 0)
       encode_layer(shape, layers.weights[0], points, block);
     else
-      product(planes, below, layers.weights[at_(l)].t());
+      times_weight(planes, below, layers, l, true);
     activate_layer({shape.sharpness, block.columns}, planes, block.slope[at_(l)], jets,
                    layers.biases[at_(l)]);
   }
@@ -239,11 +264,11 @@ void sweep_back(const MlpShape& shape, const LayerViews& layers, const at::Tenso
   at::Tensor here = matrix(space.jets, rows, shape.width), spare = matrix(space.other, rows, shape.width);
   for (int l = shape.layers - 1; l >= 0; --l) {
     at::Tensor& planes = block.planes[at_(l)];
-    product(here, upper, layers.weights[at_(l + 1)]);
+    times_weight(here, upper, layers, l + 1, false);
     const at::Tensor partial = block.second ? matrix(space.partial[at_(l)], rows, shape.width) : at::Tensor();
     activate_layer_back({shape.sharpness, block.columns}, planes, block.slope[at_(l)], partial, here,
                         gradient.biases[at_(l)]);
-    add_product(gradient.weights[at_(l + 1)], upper.t(), planes);
+    add_outer(gradient.weights[at_(l + 1)], upper, planes, layers, l + 1);
     upper = here;
     std::swap(here, spare);
   }

@@ -15,6 +15,8 @@ struct LayerViews {
   LayerViews() = default;
   LayerViews(const MlpShape& shape, const at::Tensor& flat);
   std::vector<at::Tensor> weights, biases;
+  /// Copies of weights in bfloat16 for the products that shall be rounded; undefined, or none, elsewhere.
+  std::vector<at::Tensor> rounded;
 };
 
 /// A range of points and what the forward sweep computes for it. planes[l] is (columns·count, width): the

@@ -66,6 +66,7 @@ Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handle
       3, options.width, options.layers, options.octaves, options.frequency, options.sharpness};
   const auto seed = static_cast<std::uint64_t>(options.seed);
   auto field = std::make_shared<NeuralField>(shape, seed, false, resolve_device(options.device));
+  field->network()->round_products(options.precision == "bfloat16");
   std::vector<std::string> notes;
   if (options.exact_handles) field->set_handles(exact_blend(terms.handles, options.margin, notes));
   const double share = options.start == "radial" ? 0.1 : 0.0;

@@ -44,6 +44,8 @@ void validate_common(const Options& o) {
   not_negative("learning_rate", o.learning_rate);
   require(o.optimizer == "orthogonal" || o.optimizer == "adam", "optimizer", "'" + o.optimizer + "'",
           "'orthogonal' or 'adam' is allowed");
+  require(o.precision == "float32" || o.precision == "bfloat16", "precision", "'" + o.precision + "'",
+          "'float32' or 'bfloat16' is allowed");
   not_negative("time_budget", o.time_budget);
   in_range("threads", o.threads, 0, 1024);
   resolve_device(o.device);

@@ -28,8 +28,9 @@ struct DeformOptions {
   double learning_rate = 0.0;            ///< at its peak; 0: 0.03 for orthogonal, 0.002 for adam
   int width = 256, layers = 4, octaves = 4;
   double frequency = 1.0, sharpness = 30.0;
-  double time_budget = 0.0;  ///< seconds; 0: none
-  int threads = 0;           ///< 0: all
+  std::string precision = "float32";  ///< or "bfloat16": see Mlp::round_products
+  double time_budget = 0.0;           ///< seconds; 0: none
+  int threads = 0;                    ///< 0: all
   std::string device = "auto";
   std::int64_t seed = 0;
 
@@ -55,6 +56,7 @@ struct StylizeOptions {
   double learning_rate = 0.0;            ///< at its peak; 0: 0.03 for orthogonal, 0.002 for adam
   int width = 256, layers = 4, octaves = 4;
   double frequency = 1.0, softplus_sharpness = 30.0;
+  std::string precision = "float32";  ///< or "bfloat16", as in DeformOptions
   double time_budget = 0.0;
   int threads = 0;
   std::string device = "auto";

@@ -65,6 +65,7 @@ Solution stylize(const SurfaceSamples& samples, PointsIn preferred, const Styliz
       3, options.width, options.layers, options.octaves, options.frequency, options.softplus_sharpness};
   const auto seed = static_cast<std::uint64_t>(options.seed);
   auto field = std::make_shared<NeuralField>(shape, seed, false, resolve_device(options.device));
+  field->network()->round_products(options.precision == "bfloat16");
   LoopOptions loop;
   loop.stage = "stylize";
   loop.iterations = terms.gauss == 0.0 && handles.empty() ? 0 : options.iterations;
