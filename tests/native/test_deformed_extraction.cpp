@@ -9,7 +9,7 @@
 
 using namespace arapfields;
 
-BOOST_AUTO_TEST_SUITE(extract_deformed)
+BOOST_AUTO_TEST_SUITE(deformed_extraction)
 
 namespace {
 
