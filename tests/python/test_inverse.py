@@ -136,6 +136,6 @@ def test_inverses_on_published_shapes(data_dir, name):
     sdf = af.NeuralSdf.from_layers(*Network.published(data_dir / "neural_sdf" / f"{name}.pt").layers)
     apart, report = gap_in_voxels(sdf, field, 128)
     assert apart <= 1.5 and report["failures"] <= 0.01 * report["inverted"]
-    trained = af.train_inverse(field, samples)
+    trained = af.train_inverse(field, samples, af.InverseOptions(iterations=1500))
     assert gap_in_voxels(sdf, field, 128, inverse=trained)[0] <= 1.5
     assert np.quantile(np.linalg.norm(trained(images) - points, axis=1), 0.95) < 1e-3
