@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The main job from end to end, headless: Suzanne is fitted, deformed under three handles and rendered.
 
-    python blender_scripts/demo.py [--output out] [--threads N]
+    python blender_scripts/demo.py [--output out]
 
 Writes demo.blend and demo.png, and prints each stage's time and figures.
 """
 
 import argparse
 import math
+import os
 import sys
 import threading
 import time
@@ -60,6 +61,22 @@ def timed(title, progress=job_progress):
         done.set()
         thread.join()
         print(f"\r{title:26} {time.perf_counter() - begin:6.1f} s{'':60}", flush=True)
+
+
+@contextmanager
+def quiet_renderer():
+    """Cycles writes hundreds of lines to the process's standard output: they go nowhere, ours stay."""
+    ours, kept = sys.stdout, os.dup(1)
+    ours.flush()
+    with open(os.devnull, "w") as nowhere, os.fdopen(kept, "w") as terminal:
+        os.dup2(nowhere.fileno(), 1)
+        sys.stdout = terminal
+        try:
+            yield
+        finally:
+            terminal.flush()
+            os.dup2(terminal.fileno(), 1)
+            sys.stdout = ours
 
 
 def suzanne():
@@ -146,7 +163,7 @@ def main():
         with timed(f"deform, {text}"):
             bpy.ops.arapfields.deform(output=output)
         results.append((text, bpy.context.view_layer.objects.active, colour))
-    with timed("picture", lambda: (0.0, "Cycles at work")):
+    with quiet_renderer(), timed("picture", lambda: (0.0, "Cycles at work")):
         arrange(monkey, results, rest, targets, options.output / "demo.png")
     bpy.ops.wm.save_as_mainfile(filepath=str((options.output / "demo.blend").resolve()))
     print(f"total {time.perf_counter() - begin:.1f} s")
