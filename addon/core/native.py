@@ -109,4 +109,5 @@ def report():
     native = library()
     lines.append(f"arapfields {native.__version__} in {Path(native.__file__).parent}")
     lines.append(f"{native.thread_count()} threads, kernels for {native.simd_level()}")
+    lines.append(native.device_report())
     return lines

@@ -220,6 +220,8 @@ void bind_solve(py::module_& module) {
       "its values back, at deformed samples and in their box (the paper's cycle loss), and on the samples'\n"
       "own pairs. report: error_mean and error_max over the samples, in mesh units. For exact inverses of\n"
       "single points use field.inverse.");
+  module.def("device_report", &device_report,
+             "In words: whether device='cuda' can be asked for, and if not, why.");
   module.def("arap_energy", &energy_of, "field"_a, "points"_a,
              "(stretch, bend), means over the points (p, 3) of the rest surface, in the field's unit cube:\n"
              "stretch ‖J − R‖² with R the rotation closest to J, bend the squared speed at which R turns.");

@@ -35,8 +35,9 @@ void gemm(Transpose transpose_a, Transpose transpose_b, Scalar alpha,
 template <class Scalar>
 RowMatrix<Scalar> cholesky(const Eigen::Ref<const RowMatrix<Scalar>>& a) {
   const auto [factor, info] = at::linalg_cholesky_ex(view<Scalar>(a));
-  if (info.template item<int>() != 0) throw InvalidInput("matrix", "it is not positive definite",
-                                                "a symmetric positive definite matrix is needed");
+  if (info.template item<int>() != 0)
+    throw InvalidInput("matrix", "it is not positive definite",
+                       "a symmetric positive definite matrix is needed");
   RowMatrix<Scalar> result(a.rows(), a.cols());
   view(result.data(), result.rows(), result.cols(), result.cols()).copy_(factor);
   return result;
@@ -60,13 +61,13 @@ RowMatrix<Scalar> cholesky_solve(const Eigen::Ref<const RowMatrix<Scalar>>& fact
   return result;
 }
 
-#define ARAPFIELDS_DENSE(Scalar)                                                                             \
-  template void gemm<Scalar>(Transpose, Transpose, Scalar, const Eigen::Ref<const RowMatrix<Scalar>>&,       \
-                             const Eigen::Ref<const RowMatrix<Scalar>>&, Scalar,                             \
-                             Eigen::Ref<RowMatrix<Scalar>>);                                                 \
-  template RowMatrix<Scalar> cholesky<Scalar>(const Eigen::Ref<const RowMatrix<Scalar>>&); \
-  template RowMatrix<Scalar> lower_inverse<Scalar>(const Eigen::Ref<const RowMatrix<Scalar>>&);                   \
-  template RowMatrix<Scalar> cholesky_solve<Scalar>(const Eigen::Ref<const RowMatrix<Scalar>>&,              \
+#define ARAPFIELDS_DENSE(Scalar)                                                                       \
+  template void gemm<Scalar>(Transpose, Transpose, Scalar, const Eigen::Ref<const RowMatrix<Scalar>>&, \
+                             const Eigen::Ref<const RowMatrix<Scalar>>&, Scalar,                       \
+                             Eigen::Ref<RowMatrix<Scalar>>);                                           \
+  template RowMatrix<Scalar> cholesky<Scalar>(const Eigen::Ref<const RowMatrix<Scalar>>&);             \
+  template RowMatrix<Scalar> lower_inverse<Scalar>(const Eigen::Ref<const RowMatrix<Scalar>>&);        \
+  template RowMatrix<Scalar> cholesky_solve<Scalar>(const Eigen::Ref<const RowMatrix<Scalar>>&,        \
                                                     const Eigen::Ref<const RowMatrix<Scalar>>&);
 ARAPFIELDS_DENSE(float)
 ARAPFIELDS_DENSE(double)

@@ -78,12 +78,19 @@ void StylizeOptions::validate() const {
   in_range("sharpness", sharpness, 0.1, 100);
 }
 
+std::string device_report() {
+  if (at::hasCUDA()) return "a CUDA device was found";
+  return at::detail::getCUDAHooks().hasCUDART()
+             ? "no CUDA device: libtorch has CUDA, but neither a device nor its driver answers"
+             : "no CUDA device: the libtorch here is the processor's build";
+}
+
 std::string resolve_device(const std::string& device) {
   const bool cuda = at::hasCUDA();
   if (device == "auto") return cuda ? "cuda" : "cpu";
   require(device == "cpu" || device.rfind("cuda", 0) == 0, "device", "'" + device + "'",
           "'auto', 'cpu' or 'cuda' is allowed");
-  require(device == "cpu" || cuda, "device", "'" + device + "'", "no CUDA device was found here");
+  require(device == "cpu" || cuda, "device", "'" + device + "'", device_report());
   return device;
 }
 

@@ -192,3 +192,12 @@ def test_the_loop_does_not_wait_for_a_cuda_device(capfd):
     finally:
         torch.cuda.set_sync_debug_mode("default")
     assert waits[1] > 0 and waits[2] == waits[1]
+
+
+def test_a_device_that_is_not_there_is_refused_with_the_reason():
+    if torch.cuda.is_available():
+        assert af.device_report() == "a CUDA device was found"
+        return
+    assert af.device_report().startswith("no CUDA device: ")
+    with pytest.raises(af.InvalidInput, match="device: 'cuda'; no CUDA device: "):
+        af.deform(cases.bar_samples(100), cases.bar_handles(40.0), af.DeformOptions(device="cuda"))
