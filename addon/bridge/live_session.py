@@ -58,6 +58,7 @@ class Session:
             if self.weights is not None:
                 self.weights = groups.at_points(surface.vertices, self.weights, self.samples.points)
         ready = groups.native_handles(af, self.wanted, surface, self.samples)
+        options["interior"] = bool(ready)  # a style alone acts everywhere alike
         options |= known(af.LiveOptions, machine_options())
         self.solver = af.LiveDeformer(self.samples, ready, af.LiveOptions(**options))
         self.rest = surface.vertices

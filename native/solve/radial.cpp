@@ -92,6 +92,7 @@ Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const
   live.handle_weight = std::max(options.handle_weight, 1e-3) / options.rigidity;
   live.barrier = options.barrier / options.rigidity;
   live.gauss_weight = options.gauss_weight / options.rigidity;
+  live.interior = !handles.empty();  // a style alone acts everywhere alike: nothing is to be held apart
   LiveSolver solver(samples, handles, live, progress.part(0.0, 0.3));
   solver.set_style(preferred, options.strength, options.sharpness, weights);
   const LoopResult loop = run(solver, options.iterations, options.time_budget, progress.part(0.3, 0.95));
