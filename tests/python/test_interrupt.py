@@ -13,7 +13,8 @@ import pytest
 import arapfields as af
 
 SCRIPT = """
-import sys
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.path.insert(0, sys.argv[1])
 import cases, arapfields as af
 samples, handles = cases.bar_samples(), cases.bar_handles()
@@ -25,6 +26,14 @@ except KeyboardInterrupt:
     print("interrupted", flush=True)
 print(af.deform(samples, handles, af.DeformOptions(iterations=3, **options)).report["iterations"])
 """
+
+
+@pytest.fixture(autouse=True)
+def interrupts():
+    """Python's own handler: a parent that runs the tests in the background may have the signal ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def test_ctrl_c_in_a_script():
