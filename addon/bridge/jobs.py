@@ -11,7 +11,7 @@ import bpy
 from ..core import jobs, native
 from ..core.errors import UserError
 from ..core.stages import JobCancelled
-from . import lookup, preview
+from . import handles, lookup, preview
 from .language import translated
 
 TICK = 0.1  # seconds between looks at the worker
@@ -33,6 +33,7 @@ class JobOperator:
     """
 
     title = ""
+    needs_handles = False  # whether it is refused without one
     has_window = False  # whether it runs beside the window's events
 
     scope: bpy.props.EnumProperty(
@@ -41,7 +42,10 @@ class JobOperator:
 
     @classmethod
     def poll(cls, context):
-        reason = native.problem() or lookup.refusal(lookup.source_of(context)) or busy()
+        source = lookup.source_of(context)
+        reason = native.problem() or lookup.refusal(source) or busy()
+        if not reason and cls.needs_handles and not handles.used(source):
+            reason = UserError("Add a handle first")
         if reason:
             cls.poll_message_set(translated(reason))
         return not reason

@@ -7,12 +7,12 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 from . import handles, settings
+from .drawing import ViewportDrawing
 from .lookup import settings_of, source_of
 
 CORNERS = np.array([(x, y, z, 1.0) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 EDGES = [(a, b) for a in range(8) for b in range(a) if (CORNERS[a] != CORNERS[b]).sum() == 1]
 REST_ALPHA, NOW_ALPHA = 0.35, 0.95
-_handler = None
 
 
 def box_lines(matrix):
@@ -51,14 +51,5 @@ def draw():
     gpu.state.blend_set("NONE")
 
 
-def register():
-    global _handler
-    if not bpy.app.background:
-        _handler = bpy.types.SpaceView3D.draw_handler_add(draw, (), "WINDOW", "POST_VIEW")
-
-
-def unregister():
-    global _handler
-    if _handler is not None:
-        bpy.types.SpaceView3D.draw_handler_remove(_handler, "WINDOW")
-        _handler = None
+_drawing = ViewportDrawing(draw)
+register, unregister = _drawing.register, _drawing.unregister

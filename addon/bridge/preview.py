@@ -1,17 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a running solve has so far, drawn over the viewport: nothing of it is ever in the file."""
 
-import bpy
 import numpy as np
 
 from ..core.coarse import coarsened, vertex_normals
+from .drawing import ViewportDrawing
 
 COLOUR = np.array([0.98, 0.60, 0.22], dtype=np.float32)
 LIGHT = np.array([0.3, -0.5, 0.81], dtype=np.float32)
 AMBIENT = 0.35
 _shown = None  # (points in world space, normals, triangles)
 _batch = None
-_handler = None
 
 
 class Preview:
@@ -76,15 +75,10 @@ def draw():
     gpu.state.depth_test_set("NONE")
 
 
-def register():
-    global _handler
-    if not bpy.app.background:
-        _handler = bpy.types.SpaceView3D.draw_handler_add(draw, (), "WINDOW", "POST_VIEW")
+_drawing = ViewportDrawing(draw)
+register = _drawing.register
 
 
 def unregister():
-    global _handler
     clear()
-    if _handler is not None:
-        bpy.types.SpaceView3D.draw_handler_remove(_handler, "WINDOW")
-        _handler = None
+    _drawing.unregister()

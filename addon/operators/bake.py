@@ -3,10 +3,10 @@ import contextlib
 
 import bpy
 
-from ..bridge import handles, live_session, results
+from ..bridge import live_session, results
 from ..bridge.jobs import JobOperator
 from ..bridge.language import translated
-from ..bridge.lookup import ObjectId, refusal, source_of
+from ..bridge.lookup import ObjectId, source_of
 from ..core import jobs, native
 from ..core.errors import UserError
 from ..core.stages import JobCancelled
@@ -20,6 +20,7 @@ class ARAPFIELDS_OT_bake(JobOperator, bpy.types.Operator):
     bl_label = "Bake Animation"
     bl_options = {"UNDO"}
     title = "Bake"
+    needs_handles = True
 
     start: bpy.props.IntProperty(
         name="Start", description="First frame; 0 for the scene's", default=0, min=0, options={"SKIP_SAVE"}
@@ -30,16 +31,6 @@ class ARAPFIELDS_OT_bake(JobOperator, bpy.types.Operator):
     step: bpy.props.IntProperty(
         name="Step", description="Frames from one key to the next", default=1, min=1, options={"SKIP_SAVE"}
     )
-
-    @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        source = source_of(context)
-        if not refusal(source) and not handles.used(source):
-            cls.poll_message_set(translated("Add a handle first"))
-            return False
-        return True
 
     def course(self, context):
         self.failures, self.successes = [], []

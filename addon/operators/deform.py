@@ -3,8 +3,7 @@ import bpy
 
 from ..bridge import groups, handles
 from ..bridge.jobs import JobOperator
-from ..bridge.language import translated
-from ..bridge.lookup import refusal, settings_of, source_of
+from ..bridge.lookup import settings_of
 from ..bridge.moving import plan_move
 from ..bridge.settings import annotations, in_force, machine_options
 from ..bridge.work import known
@@ -22,6 +21,7 @@ class ARAPFIELDS_OT_deform(JobOperator, bpy.types.Operator):
     bl_label = "Deform"
     bl_options = {"UNDO"}
     title = "Deform"
+    needs_handles = True
 
     __annotations__ = {
         **annotations(DEFORM, options={"SKIP_SAVE"}),
@@ -30,16 +30,6 @@ class ARAPFIELDS_OT_deform(JobOperator, bpy.types.Operator):
         "target": target(options={"SKIP_SAVE"}),
         "resolution": resolution(options={"SKIP_SAVE"}),
     }
-
-    @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        source = source_of(context)
-        if not refusal(source) and not handles.used(source):
-            cls.poll_message_set(translated("Add a handle first"))
-            return False
-        return True
 
     def plan(self, context, source):
         context.view_layer.update()
