@@ -32,6 +32,12 @@ class ARAPFIELDS_AP_preferences(bpy.types.AddonPreferences):
         default=True,
     )
 
+    show_previews: bpy.props.BoolProperty(
+        name="Show Previews",
+        description="Draw what a running job has so far in the viewport; off where drawing is slow",
+        default=True,
+    )
+
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
@@ -39,6 +45,7 @@ class ARAPFIELDS_AP_preferences(bpy.types.AddonPreferences):
         layout.prop(self, "device")
         layout.prop(self, "cache_folder")
         layout.prop(self, "show_boxes")
+        layout.prop(self, "show_previews")
         cache = settings.fit_cache()
         row = layout.row()
         row.label(

@@ -6,7 +6,7 @@ import atexit
 import bpy
 
 from . import commands, install_check, panels, preferences
-from .bridge import host, jobs, loading, overlay, pictures, preview, staleness, translations
+from .bridge import counting, host, jobs, loading, overlay, pictures, preview, staleness, translations
 from .bridge import live as live_mode
 from .operators import bake, deform, extract, fit, handles, live, presets, status, styles, stylize
 from .properties import handle, item, settings
@@ -19,6 +19,7 @@ MODULES = [
         preferences,
         jobs,
         loading,
+        counting,
         live_mode,
         overlay,
         preview,

@@ -57,9 +57,13 @@ def set_positions(mesh, points):
 def triangles(mesh):
     """(m, 3) corners of the mesh's triangles, its larger faces split as Blender draws them."""
     mesh.calc_loop_triangles()
+    corners = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.attributes[".corner_vert"].data.foreach_get("value", corners)
+    if len(mesh.loops) == 3 * len(mesh.polygons):  # nothing but triangles: what follows would take its time
+        return corners.reshape(-1, 3)
     flat = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
-    mesh.loop_triangles.foreach_get("vertices", flat)
-    return flat.reshape(-1, 3)
+    mesh.loop_triangles.foreach_get("loops", flat)
+    return corners[flat].reshape(-1, 3)
 
 
 def read(context, source):
@@ -68,8 +72,8 @@ def read(context, source):
         arrays = MeshArrays(positions(mesh), triangles(mesh))
     if not len(arrays.vertices):
         raise UserError("{name}: the mesh is empty", name=source.name)
-    broken = np.flatnonzero(~np.isfinite(arrays.vertices).all(axis=1))
-    if len(broken):
+    if not np.isfinite(arrays.vertices).all():
+        broken = np.flatnonzero(~np.isfinite(arrays.vertices).all(axis=1))
         raise UserError(
             "{name}: {count} vertices have no finite position, the first is {first}",
             name=source.name,
@@ -81,20 +85,31 @@ def read(context, source):
     return arrays
 
 
-def new_mesh(name, vertices, corners):
-    """A smooth-shaded triangle mesh from (n, 3) positions and (m, 3) corners."""
+def shown_copy(context, source):
+    """A mesh of its own of what is shown of the source: modifiers and shape keys applied."""
+    depsgraph = context.evaluated_depsgraph_get()
+    evaluated = source.evaluated_get(depsgraph)
+    return bpy.data.meshes.new_from_object(evaluated, preserve_all_data_layers=True, depsgraph=depsgraph)
+
+
+def new_mesh(name, vertices, topology):
+    """A smooth-shaded triangle mesh from (n, 3) positions and a core.topology.Topology."""
     mesh = bpy.data.meshes.new(name)
-    fill(mesh, vertices, corners)
+    fill(mesh, vertices, topology)
     return mesh
 
 
-def fill(mesh, vertices, corners):
-    """Makes these (n, 3) positions and (m, 3) corners the mesh's geometry."""
+def fill(mesh, vertices, topology):
+    """Makes these (n, 3) positions and this topology the mesh's geometry."""
     mesh.clear_geometry()
     mesh.vertices.add(len(vertices))
-    mesh.loops.add(3 * len(corners))
-    mesh.polygons.add(len(corners))
-    mesh.vertices.foreach_set("co", np.ascontiguousarray(vertices, dtype=np.float32).ravel())
-    mesh.loops.foreach_set("vertex_index", np.ascontiguousarray(corners, dtype=np.int32).ravel())
-    mesh.polygons.foreach_set("loop_start", np.arange(0, 3 * len(corners), 3, dtype=np.int32))
-    mesh.update(calc_edges=True)
+    mesh.edges.add(len(topology.edges))
+    mesh.loops.add(topology.corners.size)
+    mesh.polygons.add(len(topology.corners))
+    data = mesh.attributes
+    data["position"].data.foreach_set("vector", np.ascontiguousarray(vertices, dtype=np.float32).ravel())
+    data[".edge_verts"].data.foreach_set("value", topology.edges.ravel())
+    data[".corner_vert"].data.foreach_set("value", topology.corners.ravel())
+    data[".corner_edge"].data.foreach_set("value", topology.corner_edges.ravel())
+    mesh.polygons.foreach_set("loop_start", np.arange(0, topology.corners.size, 3, dtype=np.int32))
+    mesh.update()

@@ -18,12 +18,12 @@ TARGETS = (
 
 
 def deliver(context, source, kind, output, target, moved, before):
-    """Puts `moved` (vertices, corners, report) where `target` says; `before` are the vertices as shown."""
+    """Puts `moved` (vertices, topology, report) where `target` says; `before` are the vertices as shown."""
     if target == "NEW":
         return new_object(context, source, kind, output, moved, before)
     refuse(source, output, target, before)
-    if moved.corners is not None:
-        mesh = results.surface_mesh(source, moved.vertices, moved.corners)
+    if moved.topology is not None:
+        mesh = results.surface_mesh(source, moved.vertices, moved.topology)
         old, source.data = source.data, mesh
         if old.users == 0:
             bpy.data.meshes.remove(old)
@@ -43,8 +43,8 @@ def deliver(context, source, kind, output, target, moved, before):
 
 
 def new_object(context, source, kind, output, moved, before):
-    if moved.corners is not None:
-        mesh = results.surface_mesh(source, moved.vertices, moved.corners)
+    if moved.topology is not None:
+        mesh = results.surface_mesh(source, moved.vertices, moved.topology)
     else:
         mesh = results.warp_mesh(context, source, before, moved.vertices)
     item = results.show(context, source, kind, output, mesh, moved.report)
@@ -61,9 +61,9 @@ def refuse(source, output, target, before):
         )
     if settings_of(source).live_display:
         raise UserError("{name} is live; end live mode first", name=source.name)
-    if output == "SURFACE" and target == "KEY":
+    if output != "WARP" and target == "KEY":
         raise UserError("a shape key keeps the mesh; choose Original Mesh for the output")
-    if output != "SURFACE" and not results.keeps_vertices(source, source.data, before):
+    if output == "WARP" and not results.keeps_vertices(source, source.data, before):
         raise UserError(
             "modifiers of {name} change its vertices; apply them, or choose New Object for the result",
             name=source.name,

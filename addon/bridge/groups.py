@@ -1,27 +1,53 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Vertex groups on the surface: weights of samples from the nearest vertices of the mesh as shown."""
 
+import bpy
 import numpy as np
 from mathutils.kdtree import KDTree
 
 from ..core.errors import UserError
 from ..core.handles import require_held
 from . import arrays
+from .lookup import ObjectId
+
+BLOCK = 4000  # vertices that are read at once, some milliseconds
 
 
-def vertex_weights(context, source, name):
-    """(n,) weights of the shown vertices in the object's vertex group of that name."""
-    group = source.vertex_groups.get(name)
-    if group is None:
-        raise UserError("{name} has no vertex group {group}", name=source.name, group=name)
-    with arrays.evaluated_mesh(context, source) as mesh:
-        weights = np.zeros(len(mesh.vertices))
-        for vertex in mesh.vertices:
+def read_weights(context, source, names):
+    """Course (core/courses.py) that reads {name: (n,) weights of the shown vertices} of vertex groups."""
+    names = list(dict.fromkeys(names))
+    for name in names:
+        if name not in source.vertex_groups:
+            raise UserError("{name} has no vertex group {group}", name=source.name, group=name)
+    if not names:
+        return {}
+    who, copied = ObjectId(source), None
+    if any(modifier.show_viewport for modifier in source.modifiers):
+        copied = arrays.shown_copy(context, source)
+    try:
+        return (yield from _read(who, copied, names))
+    finally:
+        if copied is not None:
+            bpy.data.meshes.remove(copied)
+
+
+def _read(who, copied, names):
+    source = who.get()
+    count = len((copied or source.data).vertices)
+    found = {source.vertex_groups[name].index: np.zeros(count) for name in names}
+    for begin in range(0, count, BLOCK):
+        vertices = (copied or who.get().data).vertices
+        if len(vertices) != count:
+            raise UserError("{name} changed while it was worked on; run again", name=who.name)
+        for index, vertex in enumerate(vertices[begin : begin + BLOCK], begin):
             for entry in vertex.groups:
-                if entry.group == group.index:
-                    weights[vertex.index] = entry.weight
-    if not weights.any():
-        raise UserError("the vertex group {group} of {name} holds no vertex", group=name, name=source.name)
+                if entry.group in found:
+                    found[entry.group][index] = entry.weight
+        yield False
+    weights = dict(zip(names, found.values(), strict=True))
+    for name in names:
+        if not weights[name].any():
+            raise UserError("the vertex group {group} of {name} holds no vertex", group=name, name=who.name)
     return weights
 
 
@@ -31,11 +57,10 @@ def at_points(vertices, weights, points):
     for index, vertex in enumerate(vertices):
         tree.insert(vertex, index)
     tree.balance()
-    found = np.empty(len(points))
-    for row, point in enumerate(points):
-        near = tree.find_n(point, 3)
-        shares = np.array([1.0 / max(distance, 1e-12) for _, _, distance in near])
-        found[row] = shares @ weights[[index for _, index, _ in near]] / shares.sum()
+    near = [[(index, distance) for _, index, distance in tree.find_n(point, 3)] for point in points]
+    indices, distances = np.moveaxis(np.array(near, dtype=np.float64), 2, 0)
+    shares = 1.0 / np.maximum(distances, 1e-12)
+    found = (shares * weights[indices.astype(np.int64)]).sum(axis=1) / shares.sum(axis=1)
     return np.clip(found, 0.0, 1.0)
 
 

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-from ..core import native
+from ..core.courses import finished
 from ..core.errors import UserError
 from ..core.handles import box_matrix, solve_handle
 from ..core.spaces import transform
@@ -45,13 +45,21 @@ def find(source, empty):
     return next((index for index, entry in enumerate(handles) if entry.empty == empty), -1)
 
 
-def solve_handles(context, source, space):
-    """All handles of a source as the solver wants them; UserError when there is none."""
+def group_names(source):
+    """The vertex groups that the source's handles hold."""
+    return [entry.group for entry in used(source) if entry.kind == "GROUP"]
+
+
+def solve_handles(source, space, weights=None):
+    """All handles of a source as the solver wants them; UserError when there is none.
+
+    `weights` are those of the vertex groups by name; without them, groups say only where they go.
+    """
     found = []
     for entry in used(source):
-        weights = groups.vertex_weights(context, source, entry.group) if entry.kind == "GROUP" else None
         where = rest_box(source, entry), box_now(entry.empty)
-        further = {"weights": weights, "weight": entry.weight}
+        held = weights[entry.group] if weights and entry.kind == "GROUP" else None
+        further = {"weights": held, "weight": entry.weight}
         found.append(solve_handle(entry.empty.name, entry.kind, *where, space, **further))
     if not found:
         raise UserError("{name} has no handle; add one in the panel's Handles section", name=source.name)
@@ -116,7 +124,7 @@ def new_empty(context, source, kind, group, place):
         return make_empty(context, source, Matrix(selection_box(source, size).tolist()), 1.0)
     where = context.scene.cursor.location
     if kind == "GROUP":
-        weights = groups.vertex_weights(context, source, group)
+        weights = finished(groups.read_weights(context, source, [group]))[group]
         with arrays.evaluated_mesh(context, source) as mesh:
             middle = np.average(arrays.positions(mesh), axis=0, weights=weights)
         where = source.matrix_world @ Vector(middle)
@@ -178,20 +186,3 @@ def remove(source, index):
         settings_of(empty).handle_of = None
     ours.handles.remove(index)
     ours.active_handle = max(0, min(ours.active_handle, len(ours.handles) - 1))
-
-
-COUNTED = 4000  # samples of the surface of which a handle's share is told
-
-
-def count_inside(context, source):
-    """Stores how many of some thousand points of the surface each handle holds at rest."""
-    mesh = arrays.read(context, source)
-    points = native.library().sample_mesh(mesh.vertices, mesh.triangles, count=COUNTED, seed=0).points
-    for entry in used(source):
-        if entry.kind == "GROUP":
-            weights = groups.vertex_weights(context, source, entry.group)
-            entry.inside = int((groups.at_points(mesh.vertices, weights, points) >= groups.HELD).sum())
-            continue
-        box = np.array(entry.rest, dtype=np.float64).reshape(4, 4)
-        held = (np.abs((points - box[:3, 3]) @ np.linalg.inv(box[:3, :3]).T) <= 1).all(axis=1)
-        entry.inside = int(held.sum()) if entry.kind == "CUBE" else -1

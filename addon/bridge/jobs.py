@@ -3,7 +3,6 @@
 
 import contextlib
 import sys
-import time
 import types
 
 import bpy
@@ -11,12 +10,9 @@ import bpy
 from ..core import jobs, native
 from ..core.errors import UserError
 from ..core.stages import JobCancelled
-from . import handles, lookup, preview
+from . import groups, handles, lookup
 from .language import translated
-
-TICK = 0.1  # seconds between looks at the worker
-BUDGET = 0.02  # seconds that the main thread works at once
-
+from .modal import ModalRun
 
 SCOPES = (
     ("ACTIVE", "Active", "The active object alone"),
@@ -25,16 +21,16 @@ SCOPES = (
 )
 
 
-class JobOperator:
+class JobOperator(ModalRun):
     """Mixin of operators whose work runs on the worker thread.
 
-    A subclass has `title` and `plan(context, source)`, which reads what the worker needs and returns a
-    jobs.Item; its `apply` runs on the main thread and returns the line to report.
+    A subclass has `title` and `plan(context, source, weights)`, which reads what the worker needs and returns
+    a jobs.Item; its `apply` runs on the main thread and returns the line to report. `weights` are those of
+    the vertex groups that it names by `groups_of(source)`.
     """
 
     title = ""
     needs_handles = False  # whether it is refused without one
-    has_window = False  # whether it runs beside the window's events
 
     scope: bpy.props.EnumProperty(
         items=SCOPES, name="Objects", description="Which objects to work on", options={"SKIP_SAVE"}
@@ -64,22 +60,36 @@ class JobOperator:
         self.failures += [translated(lookup.refusal(item)) for item in found if lookup.refusal(item)]
         return [item for item in found if not lookup.refusal(item)]
 
-    def prepare(self, context):
-        """The job for all sources; what cannot be planned is kept as a failure of its own."""
-        self.failures, self.successes = [], []
+    def groups_of(self, source):
+        """Names of the vertex groups whose weights the plan needs."""
+        return []
+
+    def prepare(self, context, job):
+        """Course that reads all sources, and their items; what cannot be planned is kept as a failure."""
         items = []
-        for source in self.sources(context):
+        for who in [lookup.ObjectId(source) for source in self.sources(context)]:
             try:
-                items.append(self.plan(context, source))
+                source = who.get()
+                reading = groups.read_weights(context, source, self.groups_of(source))
+                weights = yield from watched(job, reading, who.name)
+                items.append(self.plan(context, who.get(), weights))
             except (UserError, ValueError) as error:
                 self.failures.append(translated(error))
-        return jobs.Job(self.title, items, native.library().Task)
+            yield False
+        return items
 
     def course(self, context):
         """All that the main thread does, as a generator: yields True to wait for the worker, False when the
         window may redraw. Returns the operator's result."""
-        job = self.prepare(context)
-        jobs.begin(job)
+        self.failures, self.successes = [], []
+        job = jobs.Job(self.title, [], native.library().Task, stands_back=self.has_window)
+        jobs.begin(job, start=False)
+        try:
+            items = yield from self.prepare(context, job)
+        except JobCancelled:
+            self.note("INFO", translated("{job} cancelled", job=translated(self.title)))
+            return {"CANCELLED"}
+        job.start(items)
         while not job.done:
             yield True
         return (yield from self.conclude(context, job))
@@ -97,64 +107,6 @@ class JobOperator:
             return {"CANCELLED"}
         finally:
             jobs.stop()
-
-    def invoke(self, context, event):
-        if bpy.app.background or context.window is None:
-            return self.execute(context)
-        self.has_window, self._looks = True, 0
-        self._course = self.course(context)
-        self._timer = context.window_manager.event_timer_add(TICK, window=context.window)
-        context.window_manager.modal_handler_add(self)
-        return self.advance(context)
-
-    def modal(self, context, event):
-        job = jobs.running()
-        if job is None:  # stopped from outside: a file is loaded, a step undone, the add-on disabled
-            self.leave(context)
-            return {"CANCELLED"}
-        if event.type == "ESC" and event.value == "PRESS":
-            job.cancel()
-            return {"RUNNING_MODAL"}
-        if event.type != "TIMER":
-            return {"PASS_THROUGH"}
-        return self.advance(context)
-
-    def advance(self, context):
-        """Works for a moment on what the main thread has to do, and shows how far the job is."""
-        until = time.monotonic() + BUDGET
-        try:
-            while not next(self._course) and time.monotonic() < until:
-                pass
-        except StopIteration as ended:
-            self.leave(context)
-            return ended.value
-        except Exception:
-            self.leave(context)
-            raise
-        self.show_progress(context, jobs.running())
-        return {"RUNNING_MODAL"}
-
-    def show_progress(self, context, job):
-        item, looks, points = job.sight()
-        if looks and looks != self._looks and item.preview is not None:
-            item.preview.show(points)
-            redraw(context, "WINDOW")
-        self._looks = looks
-        redraw(context, "UI")
-        context.workspace.status_text_set(f"{job.message}  {job.fraction:.0%}  {translated('(ESC cancels)')}")
-
-    def cancel(self, context):
-        """Blender ends the operator: its window closes or a file is loaded."""
-        self.leave(context)
-
-    def leave(self, context):
-        self._course.close()
-        jobs.stop()
-        preview.clear()
-        context.window_manager.event_timer_remove(self._timer)
-        if context.workspace:
-            context.workspace.status_text_set(None)
-        redraw(context, "UI", "WINDOW")
 
     def conclude(self, context, job):
         """Applies what the worker made, reports it, and returns the operator's result."""
@@ -194,19 +146,19 @@ class JobOperator:
         self.report({level}, text)
 
 
+def watched(job, course, label):
+    """The same course, which shows what is read and can be cancelled."""
+    while True:
+        job.outside(0.0, translated("Reading {name}", name=label))
+        try:
+            yield next(course)
+        except StopIteration as ended:
+            return ended.value
+
+
 def busy():
     """Why nothing can be started while a job runs; None when none does."""
     return UserError("Wait for the running job, or cancel it") if jobs.running() else None
-
-
-def redraw(context, *kinds):
-    """Has regions of these kinds of every 3D view drawn again."""
-    for window in context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                for region in area.regions:
-                    if region.type in kinds:
-                        region.tag_redraw()
 
 
 @bpy.app.handlers.persistent

@@ -25,8 +25,14 @@ def is_live(source, kind=None):
 def begin(context, source, kind="DEFORM"):
     """Makes the source live; UserError when that cannot be. The shape appears when the worker has it."""
     if source.session_uid in _sessions:
-        _sessions.pop(source.session_uid).follower.stop()
-    _sessions[source.session_uid] = Session(context, source, kind)
+        _sessions.pop(source.session_uid).stop()
+    session = Session(context, source, kind)
+    try:
+        session.advance()  # a small mesh is read at once
+    except UserError:
+        live_result.drop(source)
+        raise
+    _sessions[source.session_uid] = session
     if not bpy.app.timers.is_registered(tick):
         bpy.app.timers.register(tick, persistent=True)
 
@@ -35,7 +41,7 @@ def end(context, source, keep=False):
     """Ends live mode: the result goes and the source looks as before; or the result stays (`keep`)."""
     session = _sessions.pop(source.session_uid, None)
     if session is not None:
-        session.follower.stop()
+        session.stop()
         session.show_last()
     if keep:
         return live_result.keep(context, source, session.kind if session else "DEFORM")
@@ -46,7 +52,7 @@ def end(context, source, keep=False):
 def stop_all(*_):
     """Ends every worker; what is in the file stays as it is."""
     for session in _sessions.values():
-        session.follower.stop()
+        session.stop()
     _sessions.clear()
 
 
@@ -56,13 +62,13 @@ def update(context, wait=0.0, refined=False):
         try:
             session.look(context)
             if wait:
-                session.follower.wait(wait, refined)
+                session.wait(wait, refined)
             session.show()
         except Changed:
             restart(context, uid, session)
         except (UserError, ValueError, ReferenceError) as error:
             _sessions.pop(uid, None)
-            session.follower.stop()
+            session.stop()
             told = translated("{error}; live mode ended", error=translated(error))
             jobs.note("ERROR", f"{session.source.name}: {told}")
             with contextlib.suppress(UserError, ReferenceError):
@@ -112,7 +118,7 @@ def register():
 def unregister():
     for uid in list(_sessions):
         session = _sessions.pop(uid)
-        session.follower.stop()
+        session.stop()
         with contextlib.suppress(UserError, ReferenceError, AttributeError):
             live_result.drop(session.source.get())
     if bpy.app.timers.is_registered(tick):

@@ -3,15 +3,18 @@
 
 import contextlib
 
+import bpy
 import numpy as np
 
 from ..core import native
+from ..core.courses import advanced, finished
 from ..core.errors import UserError
 from ..core.follower import Follower
 from ..core.spaces import space_of
 from ..core.stages import Stages
 from . import arrays, groups, handles, live_result, results, styling
 from .lookup import ObjectId, settings_of
+from .modal import BUDGET
 from .settings import machine_options, plain
 from .work import known, read_surface
 
@@ -33,23 +36,55 @@ class Session:
         self.source, self.kind, self.layout = ObjectId(source), kind, layout_of(source, kind)
         self.surface = read_surface(context, source)
         self.output, self.choice, self.cells = ours.output, ours.surface, min(ours.resolution, PREVIEW_CELLS)
-        self.wanted = (
-            handles.solve_handles(context, source, self.surface.space) if uses_handles(ours, kind) else []
-        )
-        self.weights = styling.region_weights(context, source, ours.stylize) if kind == "STYLIZE" else None
+        self.wanted, self.weights = [], None
         self.bending = plain(ours.deform.bending)
         self.handle_weight = plain(ours.deform.handle_weight)
-        self.goal = self.solver = self.samples = self.corners = self.style_set = None
+        self.goal = self.solver = self.samples = self.topology = self.style_set = None
         self.result = None
         if shown:
             mesh = results.shown_mesh(context, source, len(self.surface.local))
             self.result = ObjectId(live_result.show(context, source, mesh))
-        self.follower = Follower(self.moved, self.prepare, self.refined) if follow else None
+        self.follower = None
+        self.reading = self.read(context, follow)
+
+    def read(self, context, follow=False):
+        """Course (core/courses.py) that reads the vertex groups; then the worker sets out."""
+        source = self.source.get()
+        style = settings_of(source).stylize if self.kind == "STYLIZE" else None
+        names = styling.group_names(source, style) if style else handles.group_names(source)
+        weights = yield from groups.read_weights(context, source, names)
+        source = self.source.get()
+        if style is None or settings_of(source).stylize.use_handles:
+            self.wanted = handles.solve_handles(source, self.surface.space, weights)
+        if style is not None:
+            style = settings_of(source).stylize
+            self.weights = styling.region_weights(context, source, style, weights)
+        if follow:
+            gentle = not bpy.app.background
+            self.follower = Follower(self.moved, self.prepare, self.refined, stands_back=gentle)
+
+    def advance(self):
+        """Reads on for a moment; whether the worker has set out."""
+        if self.follower is None:
+            advanced(self.reading, BUDGET)
+        return self.follower is not None
+
+    def wait(self, seconds, refined):
+        """Until the worker has reached the newest goal, so many seconds at most."""
+        if self.follower is None:
+            finished(self.reading)
+        self.look(bpy.context)
+        self.follower.wait(seconds, refined)
+
+    def stop(self):
+        self.reading.close()
+        if self.follower is not None:
+            self.follower.stop()
 
     def prepare(self):
         """Sets the solver up; on the worker."""
         af, surface = native.library(), self.surface
-        use_fit = self.output == "SURFACE" or self.choice == "FIT"
+        use_fit = self.output != "WARP" or self.choice == "FIT"
         use_fit = use_fit or (self.choice == "AUTO" and surface.is_cached)
         self.samples = surface.samples(Stages(af.Task), SAMPLES, 0, use_fit)
         options = {"bending": self.bending, "handle_weight": self.handle_weight}
@@ -62,10 +97,8 @@ class Session:
         options |= known(af.LiveOptions, machine_options())
         self.solver = af.LiveDeformer(self.samples, ready, af.LiveOptions(**options))
         self.rest = surface.vertices
-        if self.output == "SURFACE":
-            self.rest, self.corners = surface.extract(Stages(af.Task), self.cells, 0.1)
-            if not len(self.corners):
-                raise UserError("the fitted surface is empty; fit with more quality")
+        if self.output != "WARP":
+            self.rest, self.topology = surface.extract(Stages(af.Task), self.cells, 0.1)
         self.solver.track(self.rest)
 
     def moved(self, goal):
@@ -99,6 +132,8 @@ class Session:
 
     def look(self, context):
         """Sends what is asked for to the worker when it changed."""
+        if not self.advance():
+            return
         source = self.source.get()
         if layout_of(source, self.kind) != self.layout:
             raise Changed
@@ -112,7 +147,7 @@ class Session:
         space, ours = space_of(source.matrix_world, source.name), settings_of(source).stylize
         targets = []
         if self.wanted:
-            found = handles.solve_handles(context, source, space)
+            found = handles.solve_handles(source, space)
             targets = [h.target[:3, 3] if h.kind == "POINT" else h.target for h in found]
         if self.kind != "STYLIZE":
             return targets, None
@@ -123,7 +158,7 @@ class Session:
 
     def show(self):
         """Puts the newest shape on the result; True when there was one."""
-        moved, error = self.follower.take()
+        moved, error = self.follower.take() if self.follower is not None else (None, "")
         if error:
             raise UserError(error)
         if moved is None:
@@ -132,9 +167,9 @@ class Session:
         if item.mode == "EDIT":
             return False
         if len(item.data.vertices) != len(moved):
-            if self.corners is None or len(moved) != len(self.rest):
+            if self.topology is None or len(moved) != len(self.rest):
                 return False
-            arrays.fill(item.data, moved, self.corners)
+            arrays.fill(item.data, moved, self.topology)
         arrays.set_positions(item.data, moved)
         return True
 

@@ -4,7 +4,7 @@
 import bpy
 
 from ..core import native
-from .jobs import redraw
+from .modal import redraw
 
 LOOK = 0.1  # seconds between looks whether it is there
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..core.errors import UserError
 from ..core.jobs import Item
+from ..core.topology import Topology
 from .delivery import deliver, refuse
 from .language import translated
 from .preview import Preview
@@ -20,7 +21,7 @@ class Moved:
     """What the worker hands back, in local coordinates."""
 
     vertices: np.ndarray
-    corners: np.ndarray | None  # of the implicit surface; None for the source's own mesh
+    topology: Topology | None  # of the implicit surface; None for the source's own mesh
     report: dict
 
 
@@ -40,17 +41,20 @@ def plan_move(context, operator, source, kind, samples, seed, solve):
     def work(stages):
         if preview is not None:
             stages.watched_points = preview.points
-        use_fit = choice == "FIT" or output == "SURFACE" or (choice == "AUTO" and surface.is_cached)
+        use_fit = choice == "FIT" or output != "WARP" or (choice == "AUTO" and surface.is_cached)
         field = solve(stages, surface, surface.samples(stages, samples, seed, use_fit))
-        before, corners = surface.vertices, None
-        if output == "SURFACE":
-            before, corners = surface.extract(stages, cells, 0.1)
-            if not len(corners):
-                raise UserError("the fitted surface is empty; fit with more quality")
-        after = field(before)
+        topology, report = None, {"output": output, **dict(field.report)}
+        if output == "REMESH":
+            after, topology, figures = surface.extract_moved(stages, field, cells, 0.3)
+            report |= figures
+        else:
+            before = surface.vertices
+            if output == "SURFACE":
+                before, topology = surface.extract(stages, cells, 0.1)
+            after = field(before)
         if not np.isfinite(after).all():
             raise UserError("the result has vertices that are not finite; try other settings")
-        return Moved(surface.space.to_local(after), corners, {"output": output, **dict(field.report)})
+        return Moved(surface.space.to_local(after), topology, report)
 
     def apply(moved):
         owner = surface.who.get()

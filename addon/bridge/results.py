@@ -116,9 +116,9 @@ def select_only(context, item):
     context.view_layer.objects.active = item
 
 
-def surface_mesh(source, vertices, corners):
+def surface_mesh(source, vertices, topology):
     """A mesh of the implicit surface, in local coordinates, with the source's materials."""
-    mesh = arrays.new_mesh(source.name, vertices, corners)
+    mesh = arrays.new_mesh(source.name, vertices, topology)
     for material in source.data.materials:
         mesh.materials.append(material)
     if settings_of(source).normals == "FLAT":
@@ -144,9 +144,7 @@ def warp_mesh(context, source, before, after):
 
 def shown_mesh(context, source, count):
     """A mesh of its own of what is shown of the source: modifiers and shape keys applied."""
-    depsgraph = context.evaluated_depsgraph_get()
-    evaluated = source.evaluated_get(depsgraph)
-    applied = bpy.data.meshes.new_from_object(evaluated, preserve_all_data_layers=True, depsgraph=depsgraph)
+    applied = arrays.shown_copy(context, source)
     if len(applied.vertices) != count:
         bpy.data.meshes.remove(applied)
         raise UserError("{name} changed while it was worked on; run again", name=source.name)

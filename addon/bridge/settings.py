@@ -64,6 +64,12 @@ def show_boxes():
     return ours is None or ours.show_boxes
 
 
+def show_previews():
+    """Whether what a running job has so far is drawn in the viewport."""
+    ours = preferences()
+    return ours is None or ours.show_previews
+
+
 def cache_folder():
     """Where fits are kept: the user's choice, Blender's folder for extensions, or a temporary one."""
     ours = preferences()

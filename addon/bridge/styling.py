@@ -8,7 +8,7 @@ import numpy as np
 from ..core.errors import UserError
 from ..core.spaces import pose
 from ..core.styles import CUSTOM, style_name
-from . import arrays, groups
+from . import arrays, handles
 from .handles import matrix_of
 from .settings import chosen
 
@@ -81,11 +81,16 @@ def custom(which, item, to_solve):
     return Style(found / np.linalg.norm(found, axis=1, keepdims=True), to_solve)
 
 
-def region_weights(context, source, ours):
-    """(n,) weights of the shown vertices: vertex group times material; None for everywhere."""
-    weights = None
-    if ours.region:
-        weights = groups.vertex_weights(context, source, ours.region)
+def group_names(source, ours):
+    """The vertex groups that a stylization asks for."""
+    held = handles.group_names(source) if ours.use_handles else []
+    return [*held, ours.region] if ours.region else held
+
+
+def region_weights(context, source, ours, of_groups):
+    """(n,) weights of the shown vertices: vertex group (one of those by name) times material; None for
+    everywhere."""
+    weights = of_groups[ours.region] if ours.region else None
     if ours.region_material is not None:
         held = material_weights(context, source, ours.region_material)
         weights = held if weights is None else weights * held

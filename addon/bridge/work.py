@@ -7,10 +7,12 @@ from functools import cached_property
 import numpy as np
 
 from ..core import native
+from ..core.errors import UserError
 from ..core.fit_cache import FitCache, fit_key
 from ..core.fitting import FIT, QUALITIES
 from ..core.parameters import native_options
 from ..core.spaces import Space, space_of
+from ..core.topology import connected
 from . import arrays, settings
 from .lookup import ObjectId, settings_of
 
@@ -29,6 +31,7 @@ class Surface:
     fit_options: dict
     cache: FitCache
     machine: dict = field(default_factory=dict)
+    _sdf: object = None  # the fitted surface, once it was asked for
 
     @cached_property
     def key(self):
@@ -41,6 +44,11 @@ class Surface:
 
     def fit(self, stages, share, again=False):
         """The fitted surface, from the cache unless it shall be made `again`; runs on the worker."""
+        if self._sdf is None:
+            self._sdf = self._fitted(stages, share, again)
+        return self._sdf
+
+    def _fitted(self, stages, share, again):
         af = native.library()
         ready = None if again else self.cache.load(self.key, af.NeuralSdf.load)
         if ready is not None:
@@ -59,10 +67,23 @@ class Surface:
         return af.sample_mesh(self.vertices, self.triangles, count=count, seed=seed)
 
     def extract(self, stages, resolution, share):
-        """(k, 3) vertices and (m, 3) corners of the implicit surface, in solve space."""
+        """(k, 3) vertices and the topology of the implicit surface, in solve space."""
         af = native.library()
         sdf = self.fit(stages, share)
-        return af.extract_surface(sdf, resolution=resolution, task=stages.start("Extracting", 0.2))
+        return whole(*af.extract_surface(sdf, resolution=resolution, task=stages.start("Extracting", 0.2)))
+
+    def extract_moved(self, stages, field, resolution, share):
+        """The same of the surface where the field moves it, by marching cubes there; and a report."""
+        sdf, report = self.fit(stages, 0.0), {}
+        task = stages.start("Extracting", share)
+        made = native.library().extract_deformed(sdf, field, resolution, task=task, report=report)
+        return *whole(*made), {name: report[name] for name in ("inverted", "failures")}
+
+
+def whole(vertices, corners):
+    if not len(corners):
+        raise UserError("the fitted surface is empty; fit with more quality")
+    return vertices, connected(corners)
 
 
 def known(options, values):

@@ -110,7 +110,9 @@ def add_solve_flags(one, verbs):
         one.set_defaults(handles=None)
     if "stylize" not in verbs:
         one.set_defaults(style=None, frame=None)
-    group.add_argument("--result", choices=("warp", "surface"), help="the mesh itself moved, or a new one")
+    group.add_argument(
+        "--result", choices=("warp", "surface", "remesh"), help="the mesh itself moved, or a new one"
+    )
     group.add_argument("--surface", choices=("auto", "fit", "mesh"), help="what is taken for the rest shape")
     group.add_argument("--resolution", type=count, metavar="N", help="cells of a new mesh's grid")
     group.add_argument("--quality", choices=[name.lower() for name in QUALITIES], help="of a fit")

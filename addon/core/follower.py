@@ -3,6 +3,8 @@
 
 import threading
 
+from .manners import stand_back
+
 REST = 0.4  # seconds that a goal rests before what was found for it is refined
 
 
@@ -39,12 +41,13 @@ class Follower:
     raised. `take` hands over the newest result, or what was raised.
     """
 
-    def __init__(self, solve, prepare=None, refine=None, rest=REST, name="arapfields live"):
+    def __init__(self, solve, prepare=None, refine=None, rest=REST, stands_back=False):
         self._solve, self._prepare, self._refine, self._rest = solve, prepare, refine, rest
         self._changed = threading.Condition()
         self._goal = self._result = self._error = self._interrupt = None
         self._working, self._ended, self._refined = prepare is not None, False, True
-        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._stands_back = stands_back  # for the window, where there is one
+        self._thread = threading.Thread(target=self._run, name="arapfields live", daemon=True)
         self._thread.start()
 
     def follow(self, goal):
@@ -90,6 +93,8 @@ class Follower:
 
     def _run(self):
         goal = None
+        if self._stands_back:
+            stand_back()
         if self._prepare is not None:
             self._attempt(self._prepare)
         while True:

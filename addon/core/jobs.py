@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from .errors import UserError
+from .manners import stand_back
 from .stages import JobCancelled, Stages
 
 
@@ -38,10 +39,11 @@ class Outcome:
 class Job:
     """Runs items one after another on a thread; one that fails does not stop the rest."""
 
-    def __init__(self, title, items, make_task):
+    def __init__(self, title, items, make_task, stands_back=False):
         self.title = title
         self.items = list(items)
         self._make_task = make_task
+        self._stands_back = stands_back  # for the window, where there is one
         self._lock = threading.Lock()
         self._stages = Stages(make_task)
         self._current = 0
@@ -129,6 +131,8 @@ class Job:
             return new
 
     def _run(self):
+        if self._stands_back:
+            stand_back()
         for index, item in enumerate(self.items):
             with self._lock:
                 self._current = index

@@ -4,11 +4,11 @@ import contextlib
 import bpy
 
 from ..bridge import live_session, results
-from ..bridge.jobs import JobOperator
+from ..bridge.jobs import JobOperator, watched
 from ..bridge.language import translated
 from ..bridge.lookup import ObjectId, source_of
-from ..core import jobs, native
 from ..core.errors import UserError
+from ..core.jobs import Item
 from ..core.stages import JobCancelled
 from ..names import Op
 
@@ -32,22 +32,12 @@ class ARAPFIELDS_OT_bake(JobOperator, bpy.types.Operator):
         name="Step", description="Frames from one key to the next", default=1, min=1, options={"SKIP_SAVE"}
     )
 
-    def course(self, context):
-        self.failures, self.successes = [], []
-        job = jobs.Job(self.title, [], native.library().Task)
-        jobs.begin(job, start=False)
+    def prepare(self, context, job):
         try:
-            item = yield from self.read(context, job)
-        except JobCancelled:
-            self.note("INFO", translated("{job} cancelled", job=translated(self.title)))
-            return {"CANCELLED"}
+            return [(yield from self.read(context, job))]
         except (UserError, ValueError) as error:
-            self.note("ERROR", translated(error))
-            return {"CANCELLED"}
-        job.start([item])
-        while not job.done:
-            yield True
-        return (yield from self.conclude(context, job))
+            self.failures.append(translated(error))
+            return []
 
     def read(self, context, job):
         """Plays the frames once and notes where the handles are; the scene ends where it was."""
@@ -59,6 +49,7 @@ class ARAPFIELDS_OT_bake(JobOperator, bpy.types.Operator):
         try:
             scene.frame_set(frames[0])
             session = live_session.Session(context, source, shown=False, follow=False)
+            yield from watched(job, session.reading, source.name)
             for number, frame in enumerate(frames):
                 job.outside(0.1 * number / len(frames), translated("Reading frame {frame}", frame=frame))
                 scene.frame_set(frame)
@@ -84,13 +75,13 @@ class ARAPFIELDS_OT_bake(JobOperator, bpy.types.Operator):
         def apply(shapes):
             return (yield from add_keys(context, who.get(), session, frames, shapes, job))
 
-        return jobs.Item(source.name, work, apply)
+        return Item(source.name, work, apply)
 
 
 def add_keys(context, source, session, frames, shapes, job):
     """The baked object, key by key; taken away again where the user cancels."""
-    if session.corners is not None:
-        mesh = results.surface_mesh(source, shapes[0], session.corners)
+    if session.topology is not None:
+        mesh = results.surface_mesh(source, shapes[0], session.topology)
     else:
         mesh = results.shown_mesh(context, source, len(session.rest))
     item = results.show(context, source, "BAKE", "BAKE", mesh, {"frames": len(frames)})

@@ -31,12 +31,15 @@ class ARAPFIELDS_OT_deform(JobOperator, bpy.types.Operator):
         "resolution": resolution(options={"SKIP_SAVE"}),
     }
 
-    def plan(self, context, source):
+    def groups_of(self, source):
+        return handles.group_names(source)
+
+    def plan(self, context, source, weights):
         context.view_layer.update()
         values = in_force(DEFORM, settings_of(source).deform, self)
         af = native.library()
         options = af.DeformOptions(**native_options(values), **known(af.DeformOptions, machine_options()))
-        wanted = handles.solve_handles(context, source, space_of(source.matrix_world, source.name))
+        wanted = handles.solve_handles(source, space_of(source.matrix_world, source.name), weights)
 
         def solve(stages, rest, samples):
             ready = groups.native_handles(af, wanted, rest, samples)

@@ -7,7 +7,6 @@ from ..bridge.language import translated
 from ..bridge.lookup import settings_of
 from ..bridge.settings import chosen
 from ..bridge.work import read_surface
-from ..core.errors import UserError
 from ..core.jobs import Item
 from ..names import Op
 from ..properties.item import resolution
@@ -23,15 +22,13 @@ class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):
 
     resolution: resolution(options={"SKIP_SAVE"})
 
-    def plan(self, context, source):
+    def plan(self, context, source, _):
         surface = read_surface(context, source)
         cells = chosen("resolution", settings_of(source), self)
 
         def work(stages):
-            vertices, corners = surface.extract(stages, cells, 0.8)
-            if not len(corners):
-                raise UserError("the fitted surface is empty; fit with more quality")
-            return surface.space.to_local(vertices), corners
+            vertices, topology = surface.extract(stages, cells, 0.8)
+            return surface.space.to_local(vertices), topology
 
         def apply(made):
             owner = surface.who.get()

@@ -31,7 +31,7 @@ class ARAPFIELDS_OT_fit(JobOperator, bpy.types.Operator):
         ),
     }
 
-    def plan(self, context, source):
+    def plan(self, context, source, _):
         surface = read_surface(context, source, self)
         again = self.again
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..bridge import handles, lookup
+from ..bridge import counting, handles, lookup
 from ..bridge.language import translated
 from ..core import native
 from ..core.errors import UserError
@@ -76,7 +76,7 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
         for empty in empties:
             entry = handles.add(source, empty, self.kind)
             entry.group = group if self.kind == "GROUP" else ""
-        handles.count_inside(context, source)
+        counting.count_inside(context, source)
         return translated("{count} handles added to {name}", count=len(empties), name=source.name)
 
 
@@ -97,7 +97,7 @@ class ARAPFIELDS_OT_mirror_handle(HandleOperator, bpy.types.Operator):
         for empty in entries:
             entry = lookup.settings_of(source).handles[handles.find(source, empty)]
             handles.mirror(context, source, entry, "XYZ".index(self.axis))
-        handles.count_inside(context, source)
+        counting.count_inside(context, source)
         return translated("{count} handles mirrored", count=len(entries))
 
 
@@ -114,7 +114,7 @@ class ARAPFIELDS_OT_set_rest(HandleOperator, bpy.types.Operator):
         for entry in entries:
             if entry.empty is not None:
                 handles.store_rest(source, entry)
-        handles.count_inside(context, source)
+        counting.count_inside(context, source)
         return translated("{count} rest poses stored", count=len(entries))
 
 

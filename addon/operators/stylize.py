@@ -34,7 +34,10 @@ class ARAPFIELDS_OT_stylize(JobOperator, bpy.types.Operator):
         "resolution": resolution(options={"SKIP_SAVE"}),
     }
 
-    def plan(self, context, source):
+    def groups_of(self, source):
+        return styling.group_names(source, settings_of(source).stylize)
+
+    def plan(self, context, source, of_groups):
         context.view_layer.update()
         ours = settings_of(source).stylize
         values = in_force(STYLIZE, ours, self)
@@ -42,8 +45,8 @@ class ARAPFIELDS_OT_stylize(JobOperator, bpy.types.Operator):
         options = af.StylizeOptions(**native_options(values), **known(af.StylizeOptions, machine_options()))
         space = space_of(source.matrix_world, source.name)
         style = styling.wanted_style(ours, space, self)
-        wanted = handles.solve_handles(context, source, space) if ours.use_handles else []
-        weights = styling.region_weights(context, source, ours)
+        wanted = handles.solve_handles(source, space, of_groups) if ours.use_handles else []
+        weights = styling.region_weights(context, source, ours, of_groups)
 
         def solve(stages, rest, samples):
             blend = None if weights is None else groups.at_points(rest.vertices, weights, samples.points)

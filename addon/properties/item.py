@@ -15,6 +15,11 @@ OUTPUTS = (
         "Implicit Surface",
         "A new mesh of the fitted surface, moved along: even triangles, no seams",
     ),
+    (
+        "REMESH",
+        "Remeshed Surface",
+        "A new mesh of the moved surface: even triangles also where the shape is stretched; takes longer",
+    ),
 )
 SURFACES = (
     ("AUTO", "Best at Hand", "The fitted surface where it is up to date, else the mesh's own triangles"),
@@ -59,7 +64,7 @@ NORMALS = (
 class ARAPFIELDS_PG_result(bpy.types.PropertyGroup):
     item: bpy.props.PointerProperty(type=bpy.types.Object, name="Object", description="The result object")
     kind: bpy.props.StringProperty(name="Kind", description="DEFORM, STYLIZE or EXTRACT")
-    output: bpy.props.StringProperty(name="Output", description="WARP or SURFACE")
+    output: bpy.props.StringProperty(name="Output", description="WARP, SURFACE or REMESH")
 
 
 class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):

@@ -56,7 +56,8 @@ def test_a_cancelled_bake_leaves_nothing():
 
     class Operator:
         title, start, end, step = "Bake", 1, 5, 1
-        course = bake.ARAPFIELDS_OT_bake.course
+        has_window = False
+        course, prepare = bake.ARAPFIELDS_OT_bake.course, bake.ARAPFIELDS_OT_bake.prepare
         read = bake.ARAPFIELDS_OT_bake.read
         conclude, apply_one = bake.JobOperator.conclude, bake.JobOperator.apply_one
 

@@ -146,6 +146,7 @@ def test_without_a_window_the_course_gives_what_blocking_gives():
         title, has_window, scope, looks = "Deform", True, "ACTIVE", 0
         properties = type("P", (), {"is_property_set": staticmethod(lambda name: False)})
         course, prepare, sources, plan = cls.course, cls.prepare, cls.sources, cls.plan
+        groups_of = cls.groups_of
         conclude, apply_one = cls.conclude, cls.apply_one
 
         def note(self, level, text):

@@ -96,3 +96,40 @@ def test_the_surface_is_deformed_like_the_mesh():
     tree = BVHTree.FromObject(surface, bpy.context.evaluated_depsgraph_get())
     off = [tree.find_nearest(v.co)[3] for v in warped.data.vertices]
     assert np.mean(off) < NEAR
+
+
+@in_blender
+def test_a_remeshed_surface_is_even_where_the_shape_is_stretched():
+    import json
+
+    import bpy
+    import numpy as np
+    import scenes
+    from mathutils.bvhtree import BVHTree
+    from test_surface import FIT, NEAR
+
+    def lengths(item):
+        mesh = item.data
+        assert not mesh.validate()
+        points = scenes.world_points(item)
+        ends = np.array([edge.vertices[:] for edge in mesh.edges])
+        return np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
+
+    bar, _, moving = scenes.bar_with_handles()
+    for name, value in FIT.items():
+        setattr(bar.arapfields.fit, name, value)
+    moving.location.x += 0.8
+    settings = scenes.QUICK | {"iterations": 120, "resolution": 48}
+    made = {}
+    for output in ("SURFACE", "REMESH"):
+        scenes.activate(bar)
+        bpy.ops.arapfields.deform(output=output, **settings)
+        made[output] = bpy.context.view_layer.objects.active
+    assert made["SURFACE"] != made["REMESH"] and len(bar.arapfields.results) == 2
+    assert json.loads(made["REMESH"]["arapfields_report"])["failures"] == 0
+    moved, even = lengths(made["SURFACE"]), lengths(made["REMESH"])
+    step = np.ptp(scenes.world_points(made["REMESH"]), axis=0).max() / 48
+    assert even.max() < 2.5 * step and moved.max() / np.median(moved) > even.max() / np.median(even)
+    tree = BVHTree.FromObject(made["SURFACE"], bpy.context.evaluated_depsgraph_get())
+    off = [tree.find_nearest(v.co)[3] for v in made["REMESH"].data.vertices]
+    assert np.mean(off) < NEAR

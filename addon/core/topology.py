@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The edges of a triangle mesh, made on the worker: Blender's own search for them would hold the window."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Topology:
+    corners: np.ndarray  # (m, 3) int32 vertices of the triangles
+    edges: np.ndarray  # (e, 2) int32 vertices of the edges, each edge once, the smaller first
+    corner_edges: np.ndarray  # (m, 3) int32 the edge from each corner to the next
+
+    def __len__(self):
+        return len(self.corners)
+
+
+def connected(corners):
+    """The topology of (m, 3) triangle corners."""
+    corners = np.ascontiguousarray(corners, dtype=np.int32)
+    following = corners[:, [1, 2, 0]]
+    ends = np.minimum(corners, following).astype(np.int64), np.maximum(corners, following)
+    keys, which = np.unique(ends[0] << 32 | ends[1], return_inverse=True)
+    edges = np.stack([keys >> 32, keys & 0xFFFFFFFF], axis=1).astype(np.int32)
+    return Topology(corners, edges, which.reshape(corners.shape).astype(np.int32))
