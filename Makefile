@@ -2,10 +2,14 @@
 # One word a purpose. Every word sets up what it needs in .venv (dependencies from PyPI).
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 PYTHON313 ?= $(shell command -v python3.13)
+SHELL := /bin/bash
+.SHELLFLAGS := -o pipefail -c
 VENV := .venv
 PY := $(VENV)/bin/python
 SOURCES := $(shell find native cmake -type f) CMakeLists.txt pyproject.toml
+PIP := $(PY) -m pip install --disable-pip-version-check
 PYTEST := $(PY) -m pytest
+NATIVE_TESTS := build/wheel/tests/native_tests
 
 .PHONY: help setup build demo test test-slow bench sanitize format lint extension repository blenders gallery docs clean
 
@@ -14,36 +18,50 @@ help:  ## this list
 
 $(VENV)/.ready: requirements.txt
 	@test -x $(PY) || $(PYTHON) -m venv $(VENV) || { echo "Python 3.11 with the venv module is needed (Debian: python3.11-venv)"; exit 1; }
-	@echo "Fetching libtorch, Blender as a module and the tools from PyPI into $(VENV): large, once."
-	$(PY) -m pip install -q --disable-pip-version-check --upgrade "pip>=24"
-	$(PY) -m pip install -q --disable-pip-version-check -r requirements.txt
-	@# Headers of Boost.Test alone are used; the wheel's numpy>=2 (for Boost.Python) would clash with bpy 4.5's.
-	$(PY) -m pip install -q --disable-pip-version-check --no-deps cmeel-boost==1.90.0
-	$(PY) blender_scripts/system_libraries.py
+	@echo "Step 1 of 2: fetching libtorch, Blender as a module and the tools from PyPI into $(VENV). Large, once."
+	@$(PIP) -q --upgrade "pip>=24"
+	@$(PIP) -r requirements.txt
+	@$(PY) blender_scripts/system_libraries.py
 	@touch $@
 
-setup: $(VENV)/.ready  ## .venv with all that building and testing needs
+# What only testing and checking need.
+$(VENV)/.tools: tests/requirements.txt $(VENV)/.ready
+	@$(PIP) -q -r tests/requirements.txt
+	@# Headers of Boost.Test alone are used; the wheel's numpy>=2 (for Boost.Python) would clash with bpy 4.5's.
+	@$(PIP) -q --no-deps cmeel-boost==1.90.0
+	@touch $@
+
+setup: $(VENV)/.tools  ## .venv with all that building and testing needs
 
 # The wheel's build folder is kept, so a rebuild compiles only what changed.
 $(VENV)/.installed: $(VENV)/.ready $(SOURCES)
-	@echo "Compiling the native library: some minutes the first time."
-	$(PY) -m pip install -q --disable-pip-version-check --no-build-isolation --no-deps --force-reinstall \
-	  -C build-dir=build/wheel -C cmake.define.ARAPFIELDS_NATIVE_TESTS=ON -C build.targets="arapfields;_native;stubs;native_tests" .
+	@command -v c++ > /dev/null || { echo "A C++20 compiler is needed (Debian: g++)"; exit 1; }
+	@echo "Step 2 of 2: compiling the native library. Some minutes the first time; all output: build/build.log"
+	@mkdir -p build
+	@$(PIP) -v --no-build-isolation --no-deps --force-reinstall -C build-dir=build/wheel . 2>&1 | tee build/build.log | \
+	  while read -r line; do case "$$line" in "["*/*"]"*) printf '\r  %s]' "$${line%%]*}";; esac; done \
+	  || { tail -n 60 build/build.log; exit 1; }
+	@echo
 	@touch $@
 
 build: $(VENV)/.installed  ## the Python package, installed in .venv
 
+$(NATIVE_TESTS): $(VENV)/.installed $(VENV)/.tools $(shell find tests/native -type f)
+	$(VENV)/bin/cmake -S . -B build/wheel -DARAPFIELDS_NATIVE_TESTS=ON > build/native_tests.log || { cat build/native_tests.log; exit 1; }
+	$(VENV)/bin/cmake --build build/wheel --target native_tests
+	@touch $@
+
 demo: build  ## the main job on Suzanne: out/demo.blend and out/demo.png
 	$(PY) blender_scripts/demo.py --output out
 
-test: build  ## all tests but the slow ones
+test: build $(NATIVE_TESTS)  ## all tests but the slow ones
 	$(PYTEST) -m "not slow" tests
 
-test-slow: build  ## every test
+test-slow: build $(NATIVE_TESTS)  ## every test
 	$(PYTEST) tests
 
-bench: build  ## paired benchmarks against the real competitors
-	$(PY) -m pip install -q --disable-pip-version-check -r tests/benchmarks/requirements.txt
+bench: build $(VENV)/.tools  ## paired benchmarks against the real competitors
+	$(PIP) -q -r tests/benchmarks/requirements.txt
 	$(PY) -m tests.benchmarks
 
 sanitize: setup  ## the native tests under the address and undefined-behaviour sanitizers
@@ -84,11 +102,12 @@ build/blenders/5.2/.ready:
 	build/blenders/5.2/bin/python -m pip install -q "bpy==5.2.*"
 	@touch $@
 
-gallery: build  ## the documentation's pictures, rendered by the code
+gallery: build $(VENV)/.tools  ## the documentation's pictures, rendered by the code
+	$(PIP) -q -r docs/requirements.txt
 	$(PY) blender_scripts/gallery.py --output docs/gallery
 
 docs: build  ## the documentation site in site/
-	$(PY) -m pip install -q --disable-pip-version-check -r docs/requirements.txt
+	$(PIP) -q -r docs/requirements.txt
 	$(PY) -m mkdocs build --strict
 
 clean:  ## removes build products (.venv stays)

@@ -16,7 +16,7 @@ def program():
     for candidate in filter(None, CANDIDATES):
         if (path := ROOT / candidate).is_file():
             return path
-    raise AssertionError("native_tests was not built (make build)")
+    raise AssertionError("native_tests was not built (make test builds it)")
 
 
 @pytest.mark.parametrize("suite", [path.stem.removeprefix("test_") for path in SOURCES])
