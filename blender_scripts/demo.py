@@ -136,7 +136,7 @@ def arrange(monkey, results, rest, targets, path):
             colour_of_box = stage.BOX_COLOURS[number % len(stage.BOX_COLOURS)]
             shown.append(stage.box(f"{text} {HANDLES[number][0]}", shift @ matrix, colour_of_box))
         shown.append(stage.caption(text, ((column - 1) * SPACING, -1.0, -1.5)))
-    stage.photograph(shown, path)
+    stage.photograph(shown, path, width=1440)
 
 
 def main():

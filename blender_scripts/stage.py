@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import bpy
+import numpy as np
 from mathutils import Matrix, Vector
 
 DRAFT = "STAGE_DRAFT" in os.environ  # smaller pictures of fewer rays, for trying a composition
@@ -72,6 +73,7 @@ def caption(text, location, size=0.22):
     made = bpy.data.objects.new(f"caption {text}", curve)
     made.location = location
     made.rotation_euler = (math.radians(90), 0, 0)
+    made.visible_shadow = False
     bpy.context.collection.objects.link(made)
     return made
 
@@ -116,18 +118,40 @@ def look_at(eye, target):
     return Matrix.Translation(eye) @ (target - eye).to_track_quat("-Z", "Y").to_matrix().to_4x4()
 
 
-def photograph(
-    objects, path, size=(1440, 600), samples=24, elevation=12.0, azimuth=0.0, threads=0, closer=1.0
-):
-    """Frames the objects from the front (looking along +y), lights them and renders a PNG with Cycles.
+def outline(objects):
+    """World-space points (n,3) that a picture of the objects must hold: vertices, or a box's corners."""
+    points = []
+    for item in objects:
+        local = [v.co for v in item.data.vertices] if item.type == "MESH" else map(Vector, item.bound_box)
+        points += [tuple(item.matrix_world @ point) for point in local]
+    return np.array(points)
 
-    `closer` above 1 crops: for groups whose corners are empty.
+
+def frame(camera, points, margin):
+    """Moves the camera, without turning it, until the points fill its width; height over width of the picture."""
+    axes = np.array(camera.matrix_world.to_3x3())
+    eye, half_width = np.array(camera.matrix_world.translation), math.tan(camera.data.angle / 2)
+    for _ in range(30):
+        seen = (points - eye) @ axes
+        depth = -seen[:, 2]
+        across, up = seen[:, 0] / depth, seen[:, 1] / depth
+        middle, reach = depth.mean(), np.ptp(across) / 2 * (1 + 2 * margin)
+        shift = (across.max() + across.min(), up.max() + up.min(), 2 * (reach / half_width - 1))
+        eye = eye + axes @ np.array(shift) * middle / 2
+    camera.matrix_world.translation = Vector(eye)
+    return (np.ptp(up) + 2 * margin * np.ptp(across)) / (2 * reach)
+
+
+def set_up(objects, width=1200, samples=24, elevation=12.0, azimuth=0.0, threads=0, margin=0.025, around=()):
+    """Backdrop, lights and a camera that looks at the objects along +y and frames them.
+
+    `around`: further points to be in the picture; rows of a sheet that share them are drawn to one scale.
     """
     bpy.context.view_layer.update()
     low, high = bounds(objects)
     middle, extent = (low + high) / 2, high - low
-    backdrop(low.z - 0.002 * extent.z, high.y + 0.6 * extent.x, 20 * extent.x)
-    span = max(extent.x, extent.z * size[0] / size[1])
+    span = extent.x
+    backdrop(low.z - 0.002 * extent.z, high.y + 0.6 * span, 20 * span)
     light(
         "key", middle + Vector((-0.55, -0.9, 0.9)) * span, middle, 7.5 * span**2, 0.35 * span, (1, 0.96, 0.9)
     )
@@ -142,8 +166,10 @@ def photograph(
     bpy.context.collection.objects.link(camera)
     a, e = math.radians(azimuth), math.radians(elevation)
     towards = Vector((math.sin(a) * math.cos(e), -math.cos(a) * math.cos(e), math.sin(e)))
-    distance = (1.02 * span / 2 / math.tan(data.angle / 2) + extent.y / 2) / closer
-    camera.matrix_world = look_at(middle + towards * distance, middle)
+    camera.matrix_world = look_at(middle + towards * 2 * span, middle)
+    bpy.context.view_layer.update()
+    points = np.concatenate([outline(objects), np.reshape(around, (-1, 3))])
+    size = (width, 2 * round(width * frame(camera, points, margin) / 2))
 
     scene = bpy.context.scene
     scene.camera = camera
@@ -154,7 +180,6 @@ def photograph(
     render = scene.render
     render.engine = "CYCLES"
     render.resolution_x, render.resolution_y, render.resolution_percentage = *size, 40 if DRAFT else 100
-    render.filepath, render.image_settings.file_format = str(Path(path).resolve()), "PNG"
     if threads:
         render.threads_mode, render.threads = "FIXED", threads
     scene.cycles.device, scene.cycles.samples = "CPU", 6 if DRAFT else samples
@@ -163,4 +188,16 @@ def photograph(
     scene.cycles.adaptive_threshold, scene.cycles.adaptive_min_samples = 0.1, 6
     scene.cycles.max_bounces, scene.cycles.diffuse_bounces, scene.cycles.glossy_bounces = 3, 2, 2
     scene.view_settings.view_transform, scene.view_settings.look = "Standard", "Medium High Contrast"
+
+
+def take(path):
+    """Renders what was set up as a PNG with Cycles."""
+    render = bpy.context.scene.render
+    render.filepath, render.image_settings.file_format = str(Path(path).resolve()), "PNG"
     bpy.ops.render.render(write_still=True)
+
+
+def photograph(objects, path, **options):
+    """A picture of the objects; the options are those of `set_up`."""
+    set_up(objects, **options)
+    take(path)

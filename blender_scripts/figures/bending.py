@@ -34,7 +34,7 @@ def render(output):
         shown += add_boxes(BOXES, place, weight is not None)
         text = "rest" if weight is None else f"λ = {weight:g}"
         shown.append(stage.caption(text, (at - 0.1, -1.0, 0.0), 0.14))
-    stage.photograph(shown, output / "bending-row.png", size=(1200, 333), elevation=14)
+    stage.photograph(shown, output / "bending-row.png", elevation=14)
     plot(results, output / "bending-plot.png")
     stack([output / "bending-row.png"], output / "bending.png")
     return results

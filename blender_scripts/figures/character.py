@@ -118,7 +118,7 @@ def render(output):
     shown = [item, copy_with(item, field(vertices), 1), copy_with(item, cubic(vertices), 2)]
     for column, targets in ((0, False), (1, True)):
         shown += add_boxes(BOXES, Matrix.Translation((SPACING * column, 0, 0)), targets)
-    stage.photograph(shown, output / "character.png", size=(1200, 467), elevation=8)
+    stage.photograph(shown, output / "character.png", elevation=8)
     return {
         "deformed": measured(field),
         "stylized": {"preference": round(live.report["preference"], 3)},

@@ -5,8 +5,6 @@ import stage
 
 from .common import Box, add, add_boxes, deformed, measured, shape, stack, turned
 
-SPACING = 2.55
-
 # shape: (turn on the table, handles); a box without a motion holds its part.
 CASES = {
     "lizard": (
@@ -28,17 +26,19 @@ CASES = {
     "octopus": (
         0,
         [
-            Box((0, 0, 0.92), (0.44, 0.44, 0.42)),
-            Box((-1.0, -0.28, 0.14), (0.24, 0.30, 0.17), 100, "Y", (-0.42, -0.2, 0.25)),
-            Box((1.0, -0.28, 0.14), (0.24, 0.30, 0.17), -75, "Y", (0.42, -0.2, 0.25)),
+            Box((0, 0, 0.30), (0.38, 0.38, 0.16)),
+            Box((-1.0, -0.28, 0.14), (0.24, 0.30, 0.17), 65, "Y", (-0.42, -0.2, 0.25)),
+            Box((1.0, -0.28, 0.14), (0.24, 0.30, 0.17), -65, "Y", (0.42, -0.2, 0.25)),
+            Box((0, 0, 1.08), (0.44, 0.44, 0.28), 22, "Y", (0, 0, 0.75), (0.06, 0, 0.12)),
         ],
     ),
     "hand": (
-        -14,
+        -8,
         [
             Box((0.0, 0.0, 0.08), (0.42, 0.24, 0.52)),
-            Box((0.375, -0.04, 1.36), (0.15, 0.15, 0.16), 75, "X", (0.30, 0.0, 0.95)),
-            Box((0.63, -0.16, 0.74), (0.16, 0.15, 0.2), 40, "Y", (0.35, -0.05, 0.35)),
+            Box((0.375, -0.04, 1.36), (0.14, 0.15, 0.16), 36, "Y", (0.28, 0.0, 0.80)),
+            Box((0.63, -0.16, 0.74), (0.16, 0.15, 0.2), 30, "Y", (0.35, -0.05, 0.35)),
+            Box((-0.39, -0.04, 1.22), (0.13, 0.15, 0.16), -36, "Y", (-0.28, 0.0, 0.78)),
         ],
     ),
     "mug": (
@@ -58,30 +58,43 @@ CASES = {
         ],
     ),
 }
-SHEETS = {"deformations": ["lizard", "dinosaur", "octopus"], "deformations_more": ["hand", "mug", "dog"]}
+# Fingers lie close together: a finer encoding and softer bends keep one from taking the others along.
+OPTIONS = {
+    "hand": {"frequency": 4.0, "octaves": 6, "bending": 1e-3, "learning_rate": 0.02, "iterations": 600}
+}
+SHEETS = {  # and where each stands
+    "deformations": {"lizard": -2.5, "dinosaur": 0.0, "octopus": 2.4},
+    "deformations_more": {"hand": -1.8, "mug": 0.0, "dog": 2.45},
+}
 
 
-def row(names, shapes, targets, path):
-    stage.clear()
+def objects_of(names, shapes, targets):
+    """A row of shapes with their boxes."""
     shown = []
-    for column, name in enumerate(names):
+    for name, x in names.items():
         degrees, boxes = CASES[name]
-        place = turned(shape(name), (column - (len(names) - 1) / 2) * SPACING, degrees)
+        place = turned(shape(name), x, degrees)
         shown.append(add(shapes[name], name, place))
         shown += add_boxes(boxes, place, targets)
-    stage.photograph(shown, path, size=(1200, 417), elevation=17)
+    return shown
 
 
 def render(output):
     results = {}
     for sheet, names in SHEETS.items():
-        rest = {name: shape(name) for name in names}
-        moved = {}
+        rest, moved = {name: shape(name) for name in names}, {}
         for name in names:
-            field, moved[name] = deformed(rest[name], CASES[name][1])
+            field, moved[name] = deformed(rest[name], CASES[name][1], **OPTIONS.get(name, {}))
             results[name] = measured(field)
-        paths = [output / f"{sheet}-{row_name}.png" for row_name in ("rest", "deformed")]
-        row(names, rest, False, paths[0])
-        row(names, moved, True, paths[1])
+        stage.clear()
+        rows = {"rest": objects_of(names, rest, False), "deformed": objects_of(names, moved, True)}
+        stage.set_up([*rows["rest"], *rows["deformed"]], elevation=15)
+        paths = []
+        for drawn in rows:
+            for row, objects in rows.items():
+                for item in objects:
+                    item.hide_render = row != drawn
+            paths.append(output / f"{sheet}-{drawn}.png")
+            stage.take(paths[-1])
         stack(paths, output / f"{sheet}.png")
     return results

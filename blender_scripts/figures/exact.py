@@ -48,5 +48,5 @@ def render(output):
         shown += [add(moved, name, place), *add_boxes(BOXES, place, True)]
         text = f"{name}: off by at most {off.max():.2g}, E = {field.report['energy']:.3f}"
         shown.append(stage.caption(text, (2.1 * column, -1, 0.0), 0.13))
-    stage.photograph(shown, output / "exact.png", size=(1200, 317), elevation=16)
+    stage.photograph(shown, output / "exact.png", elevation=16)
     return results

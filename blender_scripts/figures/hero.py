@@ -10,6 +10,7 @@ from .deformations import CASES
 from .styles import OPTIONS
 
 SPACING = 2.15
+TEXTS = ("at rest", "deformed", "cube style", "octahedron style")
 
 
 def render(output):
@@ -25,10 +26,11 @@ def render(output):
         results[style] = {"preference": round(live.report["preference"], 3)}
     stage.clear()
     shown = []
-    for column, made in enumerate(shapes):
-        place = turned(dinosaur, SPACING * column, 58)
+    for column, (made, text) in enumerate(zip(shapes, TEXTS, strict=True)):
+        place = turned(dinosaur if column < 2 else made, SPACING * column, 58)
         shown.append(add(made, f"dinosaur {column}", place))
         if column < 2:
             shown += add_boxes(boxes, place, column == 1)
-    stage.photograph(shown, output / "hero.png", size=(1440, 440), elevation=10, closer=1.05)
+        shown.append(stage.caption(text, (SPACING * column, -1.6, -0.02), 0.17))
+    stage.photograph(shown, output / "hero.png", width=1440, elevation=10)
     return results

@@ -73,7 +73,7 @@ def render(output):
         place = turned(rest, SPACING * column, degrees)
         shown += [add(made, text, place), *add_boxes(boxes, place, column > 0)]
         shown.append(stage.caption(text, (SPACING * column, -1.3, 0.0), 0.2))
-    stage.photograph(shown, output / "inverse.png", size=(1200, 370), elevation=12)
+    stage.photograph(shown, output / "inverse.png", elevation=12)
     return {
         "deformed": measured(field),
         "fit_near_error": round(float(sdf.report["near_mean"]), 5),

@@ -44,7 +44,7 @@ def render(output):
         place = turned(dinosaur, SPACING * frame, 66, scale=0.8)
         shown.append(add(moved, f"frame {frame}", place))
         shown += add_boxes(boxes, place, True, edge=0.013)
-    stage.photograph(shown, output / "live.png", size=(1200, 275), elevation=10)
+    stage.photograph(shown, output / "live.png", elevation=10)
     report = live.report
     return {
         "solves": len(seconds),

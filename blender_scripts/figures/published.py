@@ -97,5 +97,5 @@ def render(output):
         place = turned(Shape(vertices, triangles, made.colours), SPACING * column, 0)
         shown += [add(made, text, place), *add_boxes(BOXES, place, column > 0, edge=0.008)]
         shown.append(stage.caption(text, (SPACING * column, -1.9, 0.0), 0.15))
-    stage.photograph(shown, output / "published.png", size=(1200, 440), elevation=10)
+    stage.photograph(shown, output / "published.png", elevation=10)
     return results

@@ -62,5 +62,5 @@ def render(output):
         ball = Box(GOAL if column else TIP, (0.03, 0.03, 0.03))
         shown.append(stage.box("point", place @ ball.rest, stage.BOX_COLOURS[1], 0.006))
         shown.append(stage.caption(text, (SPACING * column, -0.8, 0.0), 0.09))
-    stage.photograph(shown, output / "published_hand.png", size=(1200, 460), elevation=8)
+    stage.photograph(shown, output / "published_hand.png", elevation=8)
     return results

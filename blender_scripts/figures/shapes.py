@@ -20,5 +20,5 @@ def render(output):
             place = turned(made, 2.4 * column + 1.2 * depth, degrees, y=2.6 * depth)
             shown.append(add(made, name, place))
             figures[name] = {"vertices": len(made.vertices), "triangles": len(made.triangles)}
-    stage.photograph(shown, output / "shapes.png", size=(1200, 467), elevation=20, closer=1.17)
+    stage.photograph(shown, output / "shapes.png", elevation=20)
     return figures

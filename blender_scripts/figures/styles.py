@@ -9,8 +9,9 @@ import arapfields as af
 from .common import add, samples_of, shape, stack, suzanne, turned, warped
 
 STYLES = ["cube", "octahedron", "dodecahedron", "hexagonal prism", "square pyramid", "cylinder"]
-ROWS = [("dog", 48, 225), ("suzanne", 28, 225), ("octopus", 0, 175)]  # turn, and height of the row
+ROWS = [("dog", 48), ("suzanne", 28), ("octopus", 0)]  # and its turn
 SPACING, STRENGTH = 2.1, 0.6
+ENDS = [(-0.5 * SPACING, 0.0, 0.5), ((len(STYLES) + 0.5) * SPACING, 0.0, 0.5)]  # of every row: columns align
 OPTIONS = {
     "samples": 3000,
     "coarse_bumps": 150,
@@ -73,11 +74,12 @@ class Live:
         )
 
 
-def place(made, column, degrees):
-    """In its column, as large as the column's width allows from the front."""
+def place(made, rest, column, degrees):
+    """In its column on the floor, all of a row at the scale at which the rest shape fills its column."""
     turn = np.radians(degrees)
-    width = np.ptp(made.vertices[:, :2] @ (np.cos(turn), -np.sin(turn)))
-    return turned(made, column * SPACING, degrees, scale=min(1.8 / width, 2.2 / np.ptp(made.vertices[:, 2])))
+    width = np.ptp(rest.vertices[:, :2] @ (np.cos(turn), -np.sin(turn)))
+    scale = min(1.8 / width, 1.9 / np.ptp(rest.vertices[:, 2]))
+    return turned(made, column * SPACING, degrees, scale)
 
 
 def spheres(path):
@@ -85,36 +87,26 @@ def spheres(path):
     stage.clear()
     balls = [ball(preference_colours(style)) for style in STYLES]
     shown = [
-        add(made, style, place(made, 1 + i, 25))
+        add(made, style, place(made, made, 1 + i, 25))
         for i, (style, made) in enumerate(zip(STYLES, balls, strict=True))
     ]
     shown += [stage.caption(style, (SPACING * (1 + i), -0.9, -0.42), 0.24) for i, style in enumerate(STYLES)]
-    shown += [stage.caption("at rest", (0, -0.9, -0.42), 0.24), spacer(0)]
-    stage.photograph(shown, path, size=(1200, 225), elevation=10)
+    shown.append(stage.caption("at rest", (0, -0.9, -0.42), 0.24))
+    stage.photograph(shown, path, elevation=10, around=ENDS, margin=0.01)
 
 
 def render(output):
     paths, results = [output / "styles-0.png"], {}
     spheres(paths[0])
-    for name, degrees, height in ROWS:
+    for name, degrees in ROWS:
         rest = suzanne() if name == "suzanne" else shape(name)
         live = Live(samples_of(rest))
         stage.clear()
-        shown = [add(rest, name, place(rest, 0, degrees))]
+        shown = [add(rest, name, place(rest, rest, 0, degrees))]
         for column, style in enumerate(STYLES, 1):
             moved, results[f"{name}, {style}"] = stylized(rest, live, style)
-            shown.append(add(moved, style, place(rest, column, degrees)))
+            shown.append(add(moved, style, place(moved, rest, column, degrees)))
         paths.append(output / f"styles-{name}.png")
-        stage.photograph(shown, paths[-1], size=(1200, height), elevation=12)
+        stage.photograph(shown, paths[-1], elevation=12, around=ENDS, margin=0.01)
     stack(paths, output / "styles.png")
     return results
-
-
-def spacer(column):
-    """Something invisible where the row of spheres has nothing, so that all rows are framed alike."""
-    import bpy
-
-    made = bpy.data.objects.new("spacer", None)
-    made.empty_display_size, made.location = 0.01, (column * SPACING - 0.85, 0, 0.5)
-    bpy.context.collection.objects.link(made)
-    return made

@@ -4,14 +4,13 @@
 import itertools
 import os
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
 
 import arapfields as af
 
-from .timing import once, paired
+from .timing import first_good, once, paired
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
@@ -20,17 +19,6 @@ ENERGY, HANDLE_ERROR, BENDING, HANDLE_WEIGHT = 0.0285, 0.005, 0.01, 100.0
 
 def good(field):
     return field.report["energy"] <= ENERGY and field.report["handle_error_mean"] <= HANDLE_ERROR
-
-
-def first_good(samples, handles, settings, counts):
-    """The fewest of `counts` iterations that reach the quality, with the seconds of that run."""
-    for count in counts:
-        begin = time.perf_counter()
-        field = af.deform(samples, handles, af.DeformOptions(iterations=count, **settings))
-        seconds = time.perf_counter() - begin
-        if good(field):
-            return count, seconds, field.report
-    return None, seconds, field.report
 
 
 def their_network(width=256):
@@ -151,7 +139,11 @@ def run():
         "neural 4x256, Adam": (dict(optimizer="adam"), (80, 120, 160, 240)),
     }
     for name, (options, counts) in settings.items():
-        count, seconds, report = first_good(samples, handles, options, counts)
+
+        def solve(count, options=options):
+            return af.deform(samples, handles, af.DeformOptions(iterations=count, **options))
+
+        count, seconds, report = first_good(solve, good, counts)
         rows.append(
             {
                 "what": f"bunny to E <= {ENERGY}: {name}",

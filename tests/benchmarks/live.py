@@ -42,7 +42,7 @@ def drag_row(name, neural, rounds=3, **options):
     bumps = live.field.bumps
     best = converged(live, name)
     return {
-        "what": f"{name}, {bumps} bumps",
+        "what": f"{name}, {bumps} bumps" + ("" if options.get("interior", True) else ", straight distances"),
         "setup_s": round(setup, 3),
         "setup_cpu_s": round(setup_cpu, 3),
         "solves_per_s": round(1 / step),

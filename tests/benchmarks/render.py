@@ -13,12 +13,73 @@ RESULTS = ROOT / "build" / "bench.json"
 PAGE = ROOT / "docs" / "performance.md"
 PLOT = ROOT / "docs" / "images" / "performance.svg"
 BEGIN, END = "<!-- bench: begin -->", "<!-- bench: end -->"
-HEADINGS = {"ours_s": "ours, s", "theirs_s": "theirs, s", "times_faster": "times faster"}
+SECTIONS = {  # titles; a module's first sentence stands below
+    "deform": "Deformation",
+    "jets": "The network's sweeps",
+    "stylize": "Stylization",
+    "live": "Live",
+    "live_compare": "Live: against ARAP of a mesh, by size, and fingers",
+    "sizes": "Cost against size",
+    "sampling": "Uniform samples",
+    "distance": "Signed distances",
+    "extraction": "Extraction",
+    "fit": "Fits",
+}
+HEADINGS = {
+    "ours": "ours, thousand points a second",
+    "competitor": "libigl, thousand points a second",
+    "same_side": "share with the same sign",
+    "ours_s": "ours, s",
+    "theirs_s": "theirs, s",
+    "of_products": "time over the bare products'",
+    "peak_MiB": "peak, MiB",
+    "products_GFLOPs": "bare products, GFLOP/s",
+    "at_175_s": "seconds at 175 GFLOP/s",
+    "flipped": "folded",
+    "flipped_share": "folded",
+    "setup_s": "set-up, s",
+    "setup_cpu_s": "set-up, processor s",
+    "cpu_s": "processor s",
+    "solves_per_s": "solves a second",
+    "rest_to_70_s": "rest to 70°, s",
+    "energy_12_steps": "energy after 12 steps",
+    "of_neural": "energy over the network's",
+    "of_its_time": "time over the network's",
+    "strength": "strength, updates a second",
+    "sharpness": "sharpness, updates a second",
+    "orientation": "orientation, updates a second",
+    "tracked_ms": "tracked points, ms",
+    "anew_ms": "points anew, ms",
+    "mesh_energy": "energy of the mesh",
+    "volume_ratio": "volume",
+    "handle_added_cpu_s": "handle added, processor s",
+    "step_cpu_ms": "step, processor ms",
+    "uniformity": "non-uniformity (1 is ideal)",
+}
+HIDDEN = {"ratio", "unit"}  # said by another column
+
+
+def groups(rows):
+    """Runs of rows whose columns are alike: the keys of one hold those of the other."""
+    found = []
+    for row in rows:
+        if found and (row.keys() <= found[-1][0].keys() or row.keys() >= found[-1][0].keys()):
+            found[-1].append(row)
+        else:
+            found.append([row])
+    return found
+
+
+def shown(name, columns):
+    """Whether a column is drawn: processor seconds are not beside the same figure by the clock."""
+    twin = {"per_cpu_s": "solves_per_s"}.get(name, name.replace("_per_cpu_s", "").replace("_cpu", ""))
+    return name not in HIDDEN and (twin == name or twin not in columns)
 
 
 def table(rows):
-    """A Markdown table with every column that some row has, in the order of their first use."""
+    """A Markdown table with the columns that its rows have, in the order of their first use."""
     columns = list(dict.fromkeys(key for row in rows for key in row))
+    columns = [name for name in columns if shown(name, columns)]
     lines = ["| " + " | ".join(HEADINGS.get(name, name.replace("_", " ")) for name in columns) + " |"]
     lines.append("|" + "|".join("---:" if is_number(rows, name) else "---" for name in columns) + "|")
     lines += ["| " + " | ".join(text(row.get(name, "")) for name in columns) + " |" for row in rows]
@@ -93,7 +154,9 @@ def page(results, machine):
     if bars(results):
         blocks += [f"![How many times faster than the competitor, row by row](images/{PLOT.name})", ""]
     for module, rows in results.items():
-        blocks += [f"## {title(module)}", "", table(rows), ""]
+        blocks += [f"## {SECTIONS.get(module, module)}", "", f"{title(module)}.", ""]
+        for alike in groups(rows):
+            blocks += [table(alike), ""]
     return "\n".join(blocks)
 
 

@@ -6,27 +6,19 @@
 
 import os
 import sys
-import time
 from pathlib import Path
 
 import arapfields as af
 
-from .timing import product_rate
+from .timing import first_good, product_rate
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 PREFERENCE = 0.95
 
 
-def first_good(samples, settings, counts):
-    """The fewest of `counts` iterations that reach the preference, with the seconds of that run."""
-    for count in counts:
-        begin = time.perf_counter()
-        field = af.stylize(samples, "cube", af.StylizeOptions(iterations=count, **settings))
-        seconds = time.perf_counter() - begin
-        if field.report["preference"] >= PREFERENCE:
-            return count, seconds, field.report
-    return None, seconds, field.report
+def good(field):
+    return field.report["preference"] >= PREFERENCE
 
 
 def run():
@@ -42,7 +34,11 @@ def run():
     rows = []
     for name, (options, counts) in settings.items():
         rate = product_rate()
-        count, seconds, report = first_good(samples, options, counts)
+
+        def solve(count, options=options):
+            return af.stylize(samples, "cube", af.StylizeOptions(iterations=count, **options))
+
+        count, seconds, report = first_good(solve, good, counts)
         rate = (rate + product_rate()) / 2
         rows.append(
             {

@@ -23,6 +23,18 @@ def paired(ours, theirs, rounds=5, warm_up=True):
     }
 
 
+def first_good(solve, good, counts):
+    """The fewest of `counts` iterations with which solve(count) is good (None where none is), the seconds of
+    that run, and its report."""
+    for count in counts:
+        begin = time.perf_counter()
+        field = solve(count)
+        seconds = time.perf_counter() - begin
+        if good(field):
+            return count, seconds, field.report
+    return None, seconds, field.report
+
+
 def product_rate(size=256, rows=10_000, rounds=9):
     """GFLOP/s of bare single-precision matrix products of a network's size, now."""
     import torch
