@@ -108,7 +108,7 @@ gallery: build $(VENV)/.tools  ## the documentation's pictures, rendered by the 
 
 docs: build  ## the documentation site in site/
 	$(PIP) -q -r docs/requirements.txt
-	$(PY) -m mkdocs build --strict
+	NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --strict
 
 clean:  ## removes build products (.venv stays)
 	rm -rf build dist out site $(VENV)/.installed

@@ -7,6 +7,7 @@ Writes demo.blend and demo.png, and prints each stage's time and figures.
 """
 
 import argparse
+import ctypes
 import math
 import os
 import sys
@@ -64,8 +65,8 @@ def timed(title, progress=job_progress):
 
 
 @contextmanager
-def quiet_renderer():
-    """Cycles writes hundreds of lines to the process's standard output: they go nowhere, ours stay."""
+def alone():
+    """Blender and Cycles write hundreds of lines to the standard output: they go nowhere, ours stay."""
     ours, kept = sys.stdout, os.dup(1)
     ours.flush()
     with open(os.devnull, "w") as nowhere, os.fdopen(kept, "w") as terminal:
@@ -74,6 +75,7 @@ def quiet_renderer():
         try:
             yield
         finally:
+            ctypes.CDLL(None).fflush(None)  # what C still holds goes nowhere, too
             terminal.flush()
             os.dup2(terminal.fileno(), 1)
             sys.stdout = ours
@@ -151,23 +153,27 @@ def main():
     activate(monkey)
     fit = monkey.arapfields.fit
     fit.steps, fit.octaves = 800, 5  # the eyes need more than the default
-    with timed("neural surface (fit)"):
+    with alone(), timed("neural surface (fit)"):
         bpy.ops.arapfields.fit(again=True)
-    rest, targets = add_handles(monkey)
+    with alone():
+        rest, targets = add_handles(monkey)
     results = []
     for output, text, colour in (
         ("WARP", "original mesh warped", stage.RESULT),
         ("SURFACE", "implicit surface", stage.SURFACE),
     ):
         activate(monkey)
-        with timed(f"deform, {text}"):
+        with alone(), timed(f"deform, {text}"):
             bpy.ops.arapfields.deform(output=output)
         results.append((text, bpy.context.view_layer.objects.active, colour))
-    with quiet_renderer(), timed("picture", lambda: (0.0, "Cycles at work")):
+    with alone(), timed("picture", lambda: (0.0, "Cycles at work")):
         arrange(monkey, results, rest, targets, options.output / "demo.png")
-    bpy.ops.wm.save_as_mainfile(filepath=str((options.output / "demo.blend").resolve()))
-    print(f"total {time.perf_counter() - begin:.1f} s")
-    print(f"{options.output / 'demo.blend'}, {options.output / 'demo.png'}")
+    with alone():
+        bpy.ops.wm.save_as_mainfile(filepath=str((options.output / "demo.blend").resolve()))
+    print(f"{'total':26} {time.perf_counter() - begin:6.1f} s")
+    print(
+        f"The picture: {options.output / 'demo.png'}. The scene, for Blender: {options.output / 'demo.blend'}"
+    )
 
 
 if __name__ == "__main__":

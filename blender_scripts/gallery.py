@@ -3,8 +3,8 @@
 
     python blender_scripts/gallery.py [--output docs/gallery] [--only NAME ...] [--all] [--list]
 
-A picture is up to date when its module, the modules that all share and the library's version are those it was
-made with (manifest.json in the output folder, which also holds the figures measured on the way). Figures of
+A picture is up to date when its modules, those that all share and the library's sources are what it was made
+with (manifest.json in the output folder, which also holds the figures measured on the way). Figures of
 published shapes need ../shared/data (or ARAPFIELDS_DATA) and go to out/gallery, outside the repository.
 """
 
@@ -13,6 +13,7 @@ import hashlib
 import importlib
 import json
 import os
+import re
 import resource
 import subprocess
 import sys
@@ -26,14 +27,29 @@ sys.path[:0] = [str(HERE)]
 from figures import FIGURES  # noqa: E402
 
 SHARED = ["stage.py", "shapes.py", "creatures.py", "menagerie.py", "figures/common.py"]
+LIBRARY = [
+    path
+    for path in sorted((ROOT / "native").rglob("*"))
+    if path.suffix in (".cpp", ".h") and path.parent.name != "bindings"
+]
+
+
+def with_imports(name, found=()):
+    """A figure's module and those that it takes from: figures share cases and options."""
+    path = HERE / "figures" / f"{name}.py"
+    if path in found:
+        return list(found)
+    found = [*found, path]
+    for other in re.findall(r"^from \.(\w+) import", path.read_text(), re.M):
+        found = with_imports(other, found)
+    return found
 
 
 def content_hash(figure):
-    from arapfields import __version__
-
-    digest = hashlib.sha256(__version__.encode())
-    for name in [*SHARED, f"figures/{figure.name}.py"]:
-        digest.update((HERE / name).read_bytes())
+    """Of what a picture is made from: the library's sources, stage and shapes, and its own modules."""
+    digest = hashlib.sha256(b"draft" if "STAGE_DRAFT" in os.environ else b"")
+    for path in [*LIBRARY, *(HERE / name for name in SHARED), *with_imports(figure.name)]:
+        digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
 

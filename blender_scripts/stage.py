@@ -128,7 +128,7 @@ def outline(objects):
 
 
 def frame(camera, points, margin):
-    """Moves the camera, without turning it, until the points fill its width; height over width of the picture."""
+    """Moves the camera without turning it until the points fill its width; returns height over width."""
     axes = np.array(camera.matrix_world.to_3x3())
     eye, half_width = np.array(camera.matrix_world.translation), math.tan(camera.data.angle / 2)
     for _ in range(30):

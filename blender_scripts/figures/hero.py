@@ -2,6 +2,7 @@
 """The picture at the top of the README: a shape at rest with its handles, deformed, and in two styles."""
 
 import stage
+from mathutils import Vector
 
 import arapfields as af
 
@@ -29,8 +30,9 @@ def render(output):
     for column, (made, text) in enumerate(zip(shapes, TEXTS, strict=True)):
         place = turned(dinosaur if column < 2 else made, SPACING * column, 58)
         shown.append(add(made, f"dinosaur {column}", place))
+        under = place @ Vector((made.vertices.min(0) + made.vertices.max(0)) / 2)
         if column < 2:
             shown += add_boxes(boxes, place, column == 1)
-        shown.append(stage.caption(text, (SPACING * column, -1.6, -0.02), 0.17))
+        shown.append(stage.caption(text, (under.x, -1.6, -0.02), 0.17))
     stage.photograph(shown, output / "hero.png", width=1440, elevation=10)
     return results
