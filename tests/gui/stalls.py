@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How late the window's event loop is, taken apart: at rest, drawing, a job beside it, progress, previews.
+
+A timer of 10 ms tells the time that the event loop was held. Drawing of Blender's own counts as well, so each
+part is measured after the window has come to rest, without and with what a job has drawn.
+"""
+
+import contextlib
+import time
+
+import bpy
+import numpy as np
+import scenes
+import stage
+
+LONG = {**scenes.QUICK, "iterations": 100000, "width": 256, "layers": 4, "batch": 300}
+SECONDS = 5.0
+
+
+def checks(found, folder):
+    window = bpy.context.window_manager.windows[0]
+    found["window"] = f"{window.width} x {window.height}"
+    samples = bpy.context.preferences.system.viewport_aa
+    for name, anti_aliasing, overlays in (("plain", "OFF", False), ("as_it_opens", samples, True)):
+        bpy.context.preferences.system.viewport_aa = anti_aliasing
+        stage.view()[1].spaces.active.overlay.show_overlays = overlays
+        yield from parts(found.setdefault(name, {}))
+
+
+def parts(found):
+    from addon.bridge import modal
+    from addon.core import jobs
+
+    yield from scene()
+    yield from lateness(found, "at_rest")
+    for kind in ("nothing", "STATUSBAR", "UI", "WINDOW"):
+        yield from one_redraw(found, kind)
+    equal = (jobs, "stand_back", lambda: None)
+    silent = (modal.ModalRun, "show_progress", lambda *_: None)
+    unseen = (modal.settings, "show_previews", lambda: False)
+    for name, changes in (
+        ("job_not_shown_same_priority", (equal, silent)),
+        ("job_not_shown", (silent,)),
+        ("job_with_progress", (unseen,)),
+        ("job_with_progress_and_previews", ()),
+    ):
+        with contextlib.ExitStack() as stack:
+            for change in changes:
+                stack.enter_context(replaced(*change))
+            yield from with_a_job(found, name)
+
+
+def scene():
+    stage.empty_file()
+    with stage.override():
+        _, _, moving = scenes.bar_with_handles()
+        bpy.ops.view3d.view_all()
+    moving.location.z += 0.5
+    moving.rotation_euler.y = 0.6
+    yield from at_rest()
+
+
+def with_a_job(found, name):
+    from addon.core import jobs
+
+    with stage.override():
+        scenes.activate(bpy.data.objects["Bar"])
+        bpy.ops.arapfields.deform("INVOKE_DEFAULT", **LONG)
+    yield from at_rest(limit=8.0)
+    job = jobs.running()
+    begun, begin = job.fraction, time.perf_counter()
+    yield from lateness(found, name)
+    found[name]["job_percent_per_second"] = round(
+        100 * (job.fraction - begun) / (time.perf_counter() - begin), 4
+    )
+    if name.startswith("job_not_shown"):
+        for kind in ("UI", "WINDOW"):
+            yield from one_redraw(found[name], kind)
+    bpy.ops.arapfields.cancel()
+    while jobs.running() is not None:
+        yield 0.05
+    yield from at_rest()
+
+
+def at_rest(calm=0.6, limit=60.0):
+    """Until nothing has been drawn for a while: Blender refines a picture over several drawings."""
+    times, stop = stage.draws()
+    begin = time.perf_counter()
+    while time.perf_counter() - max([begin, *times[-1:]]) < calm and time.perf_counter() - begin < limit:
+        yield 0.05
+    stop()
+
+
+def lateness(found, name):
+    """How late a timer of 10 ms is, and how much of the time the event loop was held for over 50 ms."""
+    late = []
+    drawn, stop = stage.draws()
+    begin = last = time.perf_counter()
+    while last - begin < SECONDS:
+        yield 0.01
+        now = time.perf_counter()
+        late.append(now - last - 0.01)
+        last = now
+    stop()
+    late = np.array(late)
+    found[name] = {
+        "longest_ms": round(1e3 * float(late.max()), 1),
+        "median_ms": round(1e3 * float(np.median(late)), 1),
+        "over_50_ms": int((late > 0.05).sum()),
+        "held_share": round(float(late[late > 0.05].sum() / (last - begin)), 3),
+        "viewport_drawings": len(drawn),
+    }
+
+
+def one_redraw(found, kind):
+    """One redraw of a kind of region alone, by what it takes until the event loop comes round again."""
+    times = []
+    for number in range(5):
+        yield from at_rest()
+        if kind == "STATUSBAR":
+            bpy.context.workspace.status_text_set(f"{number}")
+        for region in stage.view()[1].regions:
+            if region.type == kind:
+                region.tag_redraw()
+        begin = time.perf_counter()
+        yield 0.0
+        times.append(time.perf_counter() - begin)
+    bpy.context.workspace.status_text_set(None)
+    yield from at_rest()
+    found[f"redraw_{kind}_ms"] = round(1e3 * float(np.median(times)), 1)
+
+
+@contextlib.contextmanager
+def replaced(owner, name, value):
+    before = getattr(owner, name)
+    setattr(owner, name, value)
+    try:
+        yield
+    finally:
+        setattr(owner, name, before)
