@@ -19,14 +19,14 @@ def hand():
     wrist = [Cone((0.0, 0.02, -0.25), (0.0, 0.0, 0.25), 0.2, 0.24)]
     fingers = []
     for x, lean, length, radius in (
-        (0.27, 0.16, 0.68, 0.092),
-        (0.09, 0.03, 0.80, 0.096),
-        (-0.10, -0.08, 0.72, 0.092),
-        (-0.28, -0.22, 0.55, 0.080),
+        (0.285, 0.20, 0.68, 0.080),
+        (0.095, 0.05, 0.80, 0.083),
+        (-0.10, -0.10, 0.72, 0.080),
+        (-0.285, -0.25, 0.55, 0.070),
     ):
         root, tip = np.array([x, 0.0, 0.74]), np.array([x + lean * length, -0.05, 0.74 + length])
         middle = (root + tip) / 2 + (0, 0.02, 0)
-        fingers += tube([root, middle, tip], [1.08 * radius, radius, 0.86 * radius], blend=0.06)
+        fingers += tube([root, middle, tip], [1.06 * radius, radius, 0.88 * radius], blend=0.035)
         fingers += [Ellipsoid(tuple(np.add(tip, (0, 0.055, -0.005))), (0.052, 0.035, 0.072), nail, 0.02)]
     thumb = tube(
         [(0.26, -0.04, 0.28), (0.52, -0.12, 0.50), (0.68, -0.16, 0.78)], [0.15, 0.115, 0.092], blend=0.09

@@ -36,9 +36,9 @@ CASES = {
         -8,
         [
             Box((0.0, 0.0, 0.08), (0.42, 0.24, 0.52)),
-            Box((0.375, -0.04, 1.36), (0.14, 0.15, 0.16), 36, "Y", (0.28, 0.0, 0.80)),
+            Box((0.415, -0.04, 1.36), (0.14, 0.14, 0.15), 30, "Y", (0.29, 0.0, 0.78)),
             Box((0.63, -0.16, 0.74), (0.16, 0.15, 0.2), 30, "Y", (0.35, -0.05, 0.35)),
-            Box((-0.39, -0.04, 1.22), (0.13, 0.15, 0.16), -36, "Y", (-0.28, 0.0, 0.78)),
+            Box((-0.415, -0.04, 1.24), (0.13, 0.14, 0.15), -30, "Y", (-0.29, 0.0, 0.76)),
         ],
     ),
     "mug": (
@@ -59,9 +59,15 @@ CASES = {
     ),
 }
 # Fingers lie close together: a finer encoding and softer bends keep one from taking the others along.
-OPTIONS = {
-    "hand": {"frequency": 4.0, "octaves": 6, "bending": 1e-3, "learning_rate": 0.02, "iterations": 600}
+FINER = {
+    "frequency": 4.0,
+    "octaves": 6,
+    "bending": 1e-3,
+    "learning_rate": 0.02,
+    "width": 128,
+    "iterations": 200,
 }
+OPTIONS = {"hand": FINER}
 SHEETS = {  # and where each stands
     "deformations": {"lizard": -2.5, "dinosaur": 0.0, "octopus": 2.4},
     "deformations_more": {"hand": -1.8, "mug": 0.0, "dog": 2.45},

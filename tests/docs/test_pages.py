@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The documentation is true: its code runs, links and pictures exist, the site builds without a warning."""
 
+import ast
 import re
 import subprocess
 import sys
@@ -60,6 +61,32 @@ def test_messages_of_the_troubleshooting_page_are_in_the_code():
             part for part in re.split(r"…| i | j ", message) if part.strip() and part.strip() not in code
         ]
     assert not missing
+
+
+def literal(node):
+    """The text of a message, its gaps as '…'."""
+    if isinstance(node, ast.Constant):
+        return re.sub(r"\{\w+\}", "…", str(node.value))
+    if isinstance(node, ast.JoinedStr):
+        return "".join(literal(part) if isinstance(part, ast.Constant) else "…" for part in node.values)
+    return literal(node.args[0]) if isinstance(node, ast.Call) and node.args else ""
+
+
+def messages_of_the_extension():
+    """What its code raises as a UserError."""
+    for path in sorted((pages.ROOT / "addon").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "UserError" and node.args:
+                yield literal(node.args[0])
+
+
+def test_the_troubleshooting_page_has_every_message_of_the_extension():
+    page = (pages.ROOT / "docs" / "troubleshooting.md").read_text()
+    found = {message: re.findall(r"[^…:,(;]{6,}", message) for message in messages_of_the_extension()}
+    missing = [
+        message for message, parts in found.items() if parts and max(parts, key=len).strip(" .") not in page
+    ]
+    assert len(found) > 50 and not missing
 
 
 def test_the_field_of_ones_own_is_the_tested_one():
