@@ -11,7 +11,7 @@ import arapfields as af
 
 from .common import Box, add, add_boxes, samples_of, shape, turned, warped
 
-FRAMES, STEPS, SPACING = 6, 12, 1.75
+FRAMES, STEPS, SPACING = 6, 12, 1.95
 ANCHOR = Box((0, -0.02, 0.17), (0.45, 0.26, 0.2))
 
 

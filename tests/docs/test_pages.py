@@ -89,12 +89,6 @@ def test_the_troubleshooting_page_has_every_message_of_the_extension():
     assert len(found) > 50 and not missing
 
 
-def test_the_field_of_ones_own_is_the_tested_one():
-    source = (pages.ROOT / "tests" / "native" / "test_foreign_field.cpp").read_text()
-    code = source.split("// [roll]\n")[1]
-    assert code.strip() in (pages.ROOT / "docs" / "development.md").read_text()
-
-
 def test_the_diagram_is_that_of_the_code():
     sys.path.insert(0, str(pages.ROOT / "docs" / "hooks"))
     import diagram

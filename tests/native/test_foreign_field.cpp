@@ -6,7 +6,9 @@
 #include "core/random.h"
 #include "energies/arap.h"
 #include "energies/distortion.h"
+#include "extraction/extract_deformed.h"
 #include "fields/inverse.h"
+#include "neural/neural_sdf.h"
 
 using namespace arapfields;
 
@@ -52,6 +54,22 @@ Points some_points(Index count) {
   for (Index i = 0; i < count; ++i)
     for (int k = 0; k < 3; ++k) points(i, k) = random.uniform(-0.5, 0.5);
   return points;
+}
+
+// Compiled, so that the documentation's calls are right; the tests below run the same ones on their own
+// points.
+[[maybe_unused]] void calls(const Points& points, const Points& images, const NeuralSdf& sdf,
+                            const Frame& frame) {
+  // [calls]
+  JetBlock<double> jets(points.rows(), JetOrder::second);
+  Roll(0.9).evaluate(points, jets.view());
+  const ArapValue value =
+      arap_energy<double>(std::as_const(jets).view(), 0.0, 1.0, {});  // value.stretch, value.bend
+  const Distortion worst = distortion<double>(std::as_const(jets).view());
+  const InverseResult rest = invert(Roll(0.9), images);
+  const TriangleMesh mesh = extract_deformed(sdf, frame, Roll(0.9), nullptr, 128);
+  // [calls]
+  static_cast<void>(value), static_cast<void>(worst), static_cast<void>(rest), static_cast<void>(mesh);
 }
 
 }  // namespace

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blocks that are not Python: commands are understood, those of the package are run, C++ is compiled."""
+
+import json
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pages
+import pytest
+
+SHORT = {  # flags that keep a run brief: that it runs is tested, not how well it solves
+    "fit": "--steps 40 --width 32 --near-points 4000 --uniform-points 1000",
+    "deform": "--iterations 8 --width 32 --resolution 48",
+    "stylize": "--iterations 8 --width 32",
+    "extract": "--resolution 48",
+}
+
+
+def blocks(page, language):
+    return [code for kind, code in pages.FENCE.findall(page.read_text()) if kind == language]
+
+
+def commands(page):
+    """Lines of the page's shell blocks, without comments, continued lines joined."""
+    text = "\n".join(blocks(page, "sh")).replace("\\\n", " ")
+    return [shlex.split(line, comments=True) for line in text.splitlines() if line.strip()]
+
+
+ALL = [(page, command) for page in pages.PAGES for command in commands(page)]
+
+
+def test_every_block_is_of_a_kind_that_is_tested():
+    kinds = {kind for page in pages.PAGES for kind, _ in pages.FENCE.findall(page.read_text())}
+    assert kinds == {"python", "sh", "json", "cpp"}
+    assert {words[0] for _, words in ALL} == {"make", "arapfields", "blender", "python", ".venv/bin/python"}
+
+
+def test_words_of_make_are_in_the_makefile():
+    makefile = (pages.ROOT / "Makefile").read_text()
+    words = [command[1] for _, command in ALL if command[0] == "make"]
+    for page in pages.PAGES:
+        words += re.findall(r"`make ([a-z-]+)", page.read_text())
+    assert len(words) > 10
+    assert not [word for word in words if not re.search(rf"^{word}:", makefile, re.M)]
+
+
+def blender_arguments(words):
+    """The arguments that the extension's parser gets of a command; None where it gets none."""
+    if words[:3] == ["blender", "--command", "arapfields"]:
+        return words[3:]
+    for number, word in enumerate(words):
+        script = re.fullmatch(r"blender_scripts/(deform|stylize|batch)\.py", word)
+        if script:
+            rest = words[number + 1 :]
+            return [script[1], *(rest[1:] if rest[:1] == ["--"] else rest)]
+    return None
+
+
+def test_commands_of_blender_are_understood():
+    from addon.commands.parser import parse
+
+    understood = 0
+    for _, words in ALL:
+        named = [word for word in words if re.match(r"(blender_scripts|tests)/.*\.py$", word)]
+        assert all((pages.ROOT / name).is_file() for name in named), words
+        arguments = blender_arguments(words)
+        if arguments is not None:
+            parse(arguments)
+            understood += 1
+        elif words[0] == "blender":
+            assert named, words
+    assert understood >= 5
+
+
+def test_commands_of_the_package_run(tmp_path):
+    import trimesh
+    from meshes import sphere
+
+    page = pages.ROOT / "docs" / "command-line.md"
+    (pose,) = blocks(page, "json")
+    (tmp_path / "pose.json").write_text(json.dumps(json.loads(pose)))
+    vertices, triangles = sphere(1.0, 3)
+    mesh = trimesh.Trimesh(np.asarray(vertices) * (0.5, 0.9, 0.9), triangles, process=False)
+    mesh.export(tmp_path / "spot.obj")
+    done = [words for path, words in ALL if path == page and words[0] == "arapfields"]
+    assert len(done) >= 7
+    for words in done:
+        command = [sys.executable, "-m", *words, *SHORT.get(words[1], "").split()]
+        run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+        assert run.returncode == 0, f"{shlex.join(words)}\n{run.stderr[-2000:]}"
+        for name in [word for word in words if Path(word).suffix in (".obj", ".ply", ".npz")]:
+            assert (tmp_path / name).stat().st_size > 0
+
+
+def test_cpp_blocks_are_compiled():
+    """Between marks in tests/native/test_foreign_field.cpp, which is compiled and, but for the calls, run."""
+    compiled = (pages.ROOT / "tests" / "native" / "test_foreign_field.cpp").read_text()
+    parts = [part.strip() for mark in ("// [roll]\n", "  // [calls]\n") for part in compiled.split(mark)[1:2]]
+    written = [block for page in pages.PAGES for block in blocks(page, "cpp")]
+    assert [block.split() for block in written] == [part.split() for part in parts]
+
+
+@pytest.mark.parametrize("name", ["arapfields", "tests.benchmarks.render"])
+def test_modules_named_in_the_text_exist(name):
+    import importlib.util
+
+    assert any(f"python -m {name}" in page.read_text() for page in pages.PAGES)
+    assert importlib.util.find_spec(name)
