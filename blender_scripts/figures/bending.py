@@ -6,7 +6,7 @@ import stage
 
 import arapfields as af
 
-from .common import Box, add, add_boxes, deformed, measured, samples_of, shape, stack, turned
+from .common import Box, add, add_boxes, deformed, measured, samples_of, shape, turned
 
 SPACING = 1.5
 WEIGHTS = [0.0, 1e-3, 1e-2, 1e-1]
@@ -33,10 +33,9 @@ def render(output):
         shown.append(add(moved, f"bar {weight}", place))
         shown += add_boxes(BOXES, place, weight is not None)
         text = "rest" if weight is None else f"λ = {weight:g}"
-        shown.append(stage.caption(text, (at - 0.1, -1.0, 0.0), 0.14))
-    stage.photograph(shown, output / "bending-row.png", elevation=14)
+        shown.append(stage.caption(text, (at - (0.3 if column else 0.05), -1.0, 0.0), 0.14))
+    stage.photograph(shown, output / "bending.png", elevation=14)
     plot(results, output / "bending-plot.png")
-    stack([output / "bending-row.png"], output / "bending.png")
     return results
 
 
