@@ -5,6 +5,7 @@
 
 #include "core/errors.h"
 #include "core/random.h"
+#include "neural/orthogonal_step.h"
 
 namespace arapfields {
 namespace {
@@ -88,6 +89,14 @@ JetSweeps sweep_jets(Mlp& mlp, PointsIn points, JetOrder order, const Vector& co
   mlp.pull_back(as_tensor(cotangents.data(), jets.sizes(), jets));
   result.gradient = plain(mlp.gradient());
   return result;
+}
+
+Layers step_orthogonal(Mlp& mlp, const Vector& gradient, double learning_rate) {
+  require(gradient.size() == mlp.gradient().numel(), "gradient", std::to_string(gradient.size()) + " numbers",
+          "expected " + std::to_string(mlp.gradient().numel()));
+  mlp.gradient().copy_(as_tensor(gradient.data(), {gradient.size()}, mlp.gradient()));
+  OrthogonalStep(mlp).step(mlp, learning_rate);
+  return layers_of(mlp);
 }
 
 struct JetTrial::State {

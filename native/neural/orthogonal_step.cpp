@@ -17,6 +17,7 @@ namespace {
 // p(s) = a s + b s³ + c s⁵ drives singular values in (0,1] to about 1 (0.7 to 1.2): the coefficients of
 // Jordan et al., chosen for the slope at 0 rather than for the limit.
 constexpr double slope = 3.4445, cubic = -4.7750, quintic = 2.0315;
+constexpr Index rows_a_task = 64;
 
 /// One weight matrix. `x` is the momentum with its shorter side as rows.
 struct Matrix {
@@ -28,6 +29,16 @@ struct Matrix {
 struct Task {
   Matrix* matrix = nullptr;
   Index first = 0, count = 0;  // rows of x
+
+  at::Tensor rows_of(const at::Tensor& matrix_like) const { return matrix_like.narrow(0, first, count); }
+  /// A symmetric product's rows are computed up to the diagonal; this fills in the columns above.
+  at::Tensor up_to_diagonal(const at::Tensor& symmetric) const {
+    return rows_of(symmetric).narrow(1, 0, first + count);
+  }
+  void mirror(const at::Tensor& symmetric) const {
+    if (first > 0)
+      symmetric.narrow(0, 0, first).narrow(1, first, count).copy_(rows_of(symmetric).narrow(1, 0, first).t());
+  }
 };
 
 }  // namespace
@@ -47,9 +58,9 @@ void OrthogonalStep::State::for_each_task(const std::function<void(const Task&)>
     for (const Task& task : tasks) body(task);
     return;
   }
-  parallel_for(0, static_cast<Index>(tasks.size()), 1, [&](Index begin, Index end) {
+  parallel_jobs(static_cast<Index>(tasks.size()), [&](Index t) {
     const at::AutoDispatchBelowADInplaceOrView quick;
-    for (Index t = begin; t < end; ++t) body(tasks[static_cast<std::size_t>(t)]);
+    body(tasks[static_cast<std::size_t>(t)]);
   });
 }
 
@@ -69,10 +80,10 @@ OrthogonalStep::OrthogonalStep(const Mlp& mlp, const OrthogonalOptions& options)
     m.polynomial = at::empty({small, small}, like);
     state_->matrices.push_back(m);
   }
-  const Index parts = composed(mlp.parameters()) ? 1 : 2 * thread_count();
+  // The last rows first: their symmetric products are the longest.
   for (Matrix& m : state_->matrices) {
-    const Index rows = m.x.size(0), each = std::max<Index>(32, (rows + parts - 1) / parts);
-    for (Index first = 0; first < rows; first += each)
+    const Index rows = m.x.size(0), each = composed(mlp.parameters()) ? rows : rows_a_task;
+    for (Index first = (rows - 1) / each * each; first >= 0; first -= each)
       state_->tasks.push_back({&m, first, std::min(each, rows - first)});
   }
 }
@@ -101,18 +112,21 @@ void OrthogonalStep::step(Mlp& mlp, double learning_rate) {
   adam_up_to(parameters.numel());
   for (int i = 0; i < s.options.iterations; ++i) {
     s.for_each_task([](const Task& t) {
-      at::Tensor out = t.matrix->gram.narrow(0, t.first, t.count);
-      at::mm_out(out, t.matrix->x.narrow(0, t.first, t.count), t.matrix->x.t());
+      const at::Tensor& x = t.matrix->x;
+      at::Tensor out = t.up_to_diagonal(t.matrix->gram);
+      at::mm_out(out, t.rows_of(x), x.narrow(0, 0, t.first + t.count).t());
+      t.mirror(t.matrix->gram);
     });
     s.for_each_task([](const Task& t) {
-      at::Tensor out = t.matrix->polynomial.narrow(0, t.first, t.count);
-      const at::Tensor rows = t.matrix->gram.narrow(0, t.first, t.count);
-      at::addmm_out(out, rows, rows, t.matrix->gram, cubic, quintic);
+      const at::Tensor& gram = t.matrix->gram;
+      at::Tensor out = t.up_to_diagonal(t.matrix->polynomial);
+      at::addmm_out(out, t.up_to_diagonal(gram), t.rows_of(gram), gram.narrow(1, 0, t.first + t.count), cubic,
+                    quintic);
+      t.mirror(t.matrix->polynomial);
     });
     s.for_each_task([](const Task& t) {
-      at::Tensor out = t.matrix->next.narrow(0, t.first, t.count);
-      at::addmm_out(out, t.matrix->x.narrow(0, t.first, t.count),
-                    t.matrix->polynomial.narrow(0, t.first, t.count), t.matrix->x, slope, 1.0);
+      at::Tensor out = t.rows_of(t.matrix->next);
+      at::addmm_out(out, t.rows_of(t.matrix->x), t.rows_of(t.matrix->polynomial), t.matrix->x, slope, 1.0);
     });
     for (Matrix& m : s.matrices) std::swap(m.x, m.next);
   }
