@@ -27,7 +27,7 @@ def blocks(page, language):
 def commands(page):
     """Lines of the page's shell blocks, without comments, continued lines joined."""
     text = "\n".join(blocks(page, "sh")).replace("\\\n", " ")
-    return [shlex.split(line, comments=True) for line in text.splitlines() if line.strip()]
+    return list(filter(None, (shlex.split(line, comments=True) for line in text.splitlines())))
 
 
 ALL = [(page, command) for page in pages.PAGES for command in commands(page)]
