@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reading and editing 64-bit little-endian ELF shared libraries: dependencies, and unique symbols."""
+"""Reading and editing 64-bit little-endian ELF shared libraries: dependencies, and symbols."""
 
 import struct
 import subprocess
@@ -8,6 +8,8 @@ from pathlib import Path
 
 SHT_DYNSYM = 11
 STB_WEAK, STB_GNU_UNIQUE = 2, 10
+STT_FUNC, STT_GNU_IFUNC = 2, 10
+STV_PROTECTED = 3
 SYMBOL_SIZE = 24
 
 
@@ -16,7 +18,7 @@ class NotElf(ValueError):
 
 
 def sections(image):
-    """(type, offset, size) of every section of the library."""
+    """(type, offset, size, link) of every section of the library."""
     if image[:6] != b"\x7fELF\x02\x01":
         raise NotElf("not a 64-bit little-endian ELF file")
     (table,) = struct.unpack_from("<Q", image, 0x28)
@@ -24,18 +26,49 @@ def sections(image):
     for index in range(count):
         header = table + index * entry_size
         (kind,) = struct.unpack_from("<I", image, header + 4)
-        offset, size = struct.unpack_from("<QQ", image, header + 24)
-        yield kind, offset, size
+        offset, size, link = struct.unpack_from("<QQI", image, header + 24)
+        yield kind, offset, size, link
 
 
 def unique_symbols(image):
     """Offsets of the `st_info` bytes of the dynamic symbols bound as STB_GNU_UNIQUE."""
     found = []
-    for kind, offset, size in sections(image):
+    for kind, offset, size, _ in sections(image):
         if kind == SHT_DYNSYM:
             infos = range(offset + 4, offset + size, SYMBOL_SIZE)
             found += [place for place in infos if image[place] >> 4 == STB_GNU_UNIQUE]
     return found
+
+
+def plain_functions(image):
+    """{name: offset of its symbol} of the functions that the library defines under names of C or Fortran."""
+    found, table = {}, list(sections(image))
+    for kind, offset, size, link in table:
+        if kind != SHT_DYNSYM:
+            continue
+        names = table[link][1]
+        for symbol in range(offset, offset + size, SYMBOL_SIZE):
+            name, info, _, section = struct.unpack_from("<IBBH", image, symbol)
+            if section and info & 0xF in (STT_FUNC, STT_GNU_IFUNC):
+                text = bytes(image[names + name : image.index(0, names + name)])
+                if not text.startswith(b"_Z"):
+                    found[text.decode()] = symbol
+    return found
+
+
+def keep_own_functions(path):
+    """Makes the library call the C and Fortran functions that it defines itself; returns how many there are.
+
+    Else the dynamic linker takes those of the same name that the process loaded first. A Blender linked
+    against its distribution's BLAS would lend libtorch that one's products instead of its own: twenty times
+    slower. What is merely protected is still found by others that ask for it.
+    """
+    image = bytearray(Path(path).read_bytes())
+    symbols = plain_functions(image).values()
+    for symbol in symbols:
+        image[symbol + 5] = image[symbol + 5] & ~3 | STV_PROTECTED
+    Path(path).write_bytes(image)
+    return len(symbols)
 
 
 def weaken_unique_symbols(path):

@@ -39,6 +39,7 @@ def make_private(path, renamed, soname=None):
             arguments += ["--replace-needed", old, renamed[old]]
     elf.patchelf(*arguments, path)
     elf.weaken_unique_symbols(path)
+    elf.keep_own_functions(path)
 
 
 def prepare_libraries(library, torch_libraries, output):

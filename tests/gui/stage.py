@@ -4,12 +4,40 @@
 import contextlib
 import subprocess
 import time
+import traceback
 
 import bpy
 import numpy as np
 import scenes
 
 TAB = (1299, 340)  # where the sidebar's last tab lies in a window of 1600 × 1000
+
+
+def start(steps, ended, folder):
+    """Runs the generator `steps()` of pauses in seconds beside Blender's events, with the add-on switched on.
+
+    Then calls `ended(error)`, the error being a traceback or None, and leaves Blender.
+    """
+    import addon
+
+    bpy.context.preferences.view.show_splash = False
+    folder.mkdir(parents=True, exist_ok=True)
+    addon.register()
+    sequence = steps()
+
+    def drive():
+        error = None
+        try:
+            return next(sequence)
+        except StopIteration:
+            pass
+        except Exception:
+            error = traceback.format_exc()
+        ended(error)
+        bpy.ops.wm.quit_blender()
+        return None
+
+    bpy.app.timers.register(drive, first_interval=1.0, persistent=True)
 
 
 def view():
@@ -32,12 +60,22 @@ def show_sidebar():
                     region.active_panel_category = "ARAP Fields"
 
 
+def open_sidebar():
+    """Shows the sidebar and presses the panel's tab."""
+    show_sidebar()
+    yield 1.5
+    tool("mousemove", *TAB, "click", 1)
+    yield 1.0
+
+
 def tool(*words):
     subprocess.run(["xdotool", *map(str, words)], check=False)
 
 
-def picture(folder, name):
-    subprocess.run(["import", "-window", "root", str(folder / f"{name}.png")], check=False)
+def picture(folder, name, part=None):
+    """A picture of the screen, or of a part of it: left, top, width, height."""
+    crop = ["-crop", "{2}x{3}+{0}+{1}".format(*part), "+repage"] if part else []
+    subprocess.run(["import", "-window", "root", *crop, str(folder / f"{name}.png")], check=False)
 
 
 def empty_file():

@@ -9,7 +9,6 @@ hold it.
 
 import json
 import sys
-import traceback
 from pathlib import Path
 
 import bpy
@@ -44,10 +43,7 @@ def steps():
     with stage.override():
         scenes.bar_with_handles()
         bpy.ops.view3d.view_all()
-    stage.show_sidebar()
-    yield 1.5
-    stage.tool("mousemove", *stage.TAB, "click", 1)
-    yield 1.0
+    yield from stage.open_sidebar()
     for name in PARTS or parts:
         yield from parts[name]()
     addon.unregister()
@@ -61,24 +57,9 @@ def steps():
     yield 0.5
 
 
-def drive(sequence):
-    try:
-        return next(sequence)
-    except StopIteration:
-        FOUND["finished"] = True
-    except Exception:
-        FOUND["error"] = traceback.format_exc()
+def ended(error):
+    FOUND.update({"error": error} if error else {"finished": True})
     (OUTPUT / "checks.json").write_text(json.dumps(FOUND, indent=1))
-    bpy.ops.wm.quit_blender()
-    return None
 
 
-def main():
-    bpy.context.preferences.view.show_splash = False
-    OUTPUT.mkdir(parents=True, exist_ok=True)
-    addon.register()
-    sequence = steps()
-    bpy.app.timers.register(lambda: drive(sequence), first_interval=1.0, persistent=True)
-
-
-main()
+stage.start(steps, ended, OUTPUT)
