@@ -158,6 +158,10 @@ def page(results, machine):
     blocks = [f"Measured on: {named}.", ""]
     if bars(results):
         blocks += [f"![How many times faster than the competitor, row by row](images/{PLOT.name})", ""]
+        blocks += [
+            "*Times faster than what each section compares with, on a logarithmic scale; grey is slower.*",
+            "",
+        ]
     for module, rows in results.items():
         blocks += [f"## {SECTIONS.get(module, module)}", "", f"{title(module)}.", ""]
         for alike in groups(rows):

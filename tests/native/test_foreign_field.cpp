@@ -17,7 +17,7 @@ BOOST_AUTO_TEST_SUITE(foreign_field)
 namespace {
 
 // [roll]
-/// Rolls space about y: x becomes an angle, `curvature` times x, about the line z = −1/curvature.
+/// Rolls space about y: x becomes an angle, `curvature` times x, about z = −1/curvature.
 class Roll final : public DeformationField {
  public:
   explicit Roll(double curvature) : curvature_(curvature) {}
