@@ -101,7 +101,7 @@ def backdrop(floor_z, depth, width):
     mesh = bpy.data.meshes.new("backdrop")
     mesh.from_pydata(vertices, [], faces)
     mesh.polygons.foreach_set("use_smooth", [True] * len(faces))
-    mesh.materials.append(material("backdrop", (0.86, 0.87, 0.88), roughness=0.9))
+    mesh.materials.append(material("backdrop", (0.93, 0.85, 0.71), roughness=0.9))
     made = bpy.data.objects.new("backdrop", mesh)
     bpy.context.collection.objects.link(made)
 
@@ -153,10 +153,10 @@ def set_up(objects, width=1200, samples=24, elevation=12.0, azimuth=0.0, threads
     span = extent.x
     backdrop(low.z - 0.002 * extent.z, high.y + 0.6 * span, 20 * span)
     light(
-        "key", middle + Vector((-0.55, -0.9, 0.9)) * span, middle, 7.5 * span**2, 0.35 * span, (1, 0.96, 0.9)
+        "key", middle + Vector((-0.55, -0.9, 0.9)) * span, middle, 8.5 * span**2, 0.35 * span, (1, 0.96, 0.9)
     )
     light(
-        "fill", middle + Vector((0.9, -0.7, 0.35)) * span, middle, 2.2 * span**2, 0.6 * span, (0.88, 0.94, 1)
+        "fill", middle + Vector((0.9, -0.7, 0.35)) * span, middle, 1.8 * span**2, 0.6 * span, (0.88, 0.94, 1)
     )
     light("rim", middle + Vector((0.3, 0.5, 0.9)) * span, middle, 4 * span**2, 0.4 * span)
 
