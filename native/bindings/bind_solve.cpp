@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bindings/bind.h"
+#include "core/device.h"
 #include "energies/styles.h"
 #include "solve/deform.h"
 #include "solve/inverse_training.h"

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <string>
+
 namespace at {
 class Tensor;
 }
@@ -20,6 +22,11 @@ class ComposedScope {
   ComposedScope(const ComposedScope&) = delete;
   ComposedScope& operator=(const ComposedScope&) = delete;
 };
+
+/// "auto" → the best device there is; throws InvalidInput for a name that is unknown or not there.
+std::string resolve_device(const std::string& device);
+/// Whether a CUDA device was found, and why not.
+std::string device_report();
 
 /// A copy of a tensor in main memory, of its dtype, on the device of `beside`. Does not wait for the device:
 /// the way there leads through page-locked memory.

@@ -33,4 +33,13 @@ inline void require(bool holds, const std::string& argument, const std::string& 
   if (!holds) throw InvalidInput(argument, found, allowed);
 }
 
+/// A number as these texts show it: six digits.
+std::string number_text(double value);
+/// Throws InvalidInput unless the value is finite and within [low, high].
+void require_range(const std::string& argument, double value, double low, double high);
+/// Throws InvalidInput unless the value is finite and above 0.
+void require_positive(const std::string& argument, double value);
+/// Throws InvalidInput unless the value is finite and 0 or more.
+void require_not_negative(const std::string& argument, double value);
+
 }  // namespace arapfields

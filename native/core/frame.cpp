@@ -16,13 +16,9 @@ Frame Frame::around(PointsIn points, double half_extent) {
   return Frame{0.5 * low + 0.5 * high, half / half_extent};
 }
 
-Points Frame::to_cube(PointsIn points) const {
-  return (points.rowwise() - center.transpose()) / scale;
-}
+Points Frame::to_cube(PointsIn points) const { return (points.rowwise() - center.transpose()) / scale; }
 
-Points Frame::to_mesh(PointsIn points) const {
-  return (points * scale).rowwise() + center.transpose();
-}
+Points Frame::to_mesh(PointsIn points) const { return (points * scale).rowwise() + center.transpose(); }
 
 Mat4 Frame::motion_to_cube(const Mat4& motion) const {
   Mat4 result = motion;

@@ -22,7 +22,7 @@ void parallel_jobs(Index count, const std::function<void(Index)>& body) {
 }
 
 ThreadScope::ThreadScope(int threads) : before_(at::get_num_threads()) {
-  require(threads >= 0 && threads <= 1024, "threads", std::to_string(threads), "0 (all) to 1024 are allowed");
+  require_range("threads", threads, 0, 1024);
   if (threads > 0) at::set_num_threads(threads);
 }
 

@@ -15,8 +15,8 @@ const char* simd_level_name();
 
 /// Calls function(...) in the namespace of the level at hand.
 #if defined(__x86_64__) || defined(_M_X64)
-#define ARAPFIELDS_DISPATCH(call)                              \
-  (::arapfields::simd_level() == SimdLevel::avx512  ? avx512::call \
+#define ARAPFIELDS_DISPATCH(call)                                 \
+  (::arapfields::simd_level() == SimdLevel::avx512 ? avx512::call \
    : ::arapfields::simd_level() == SimdLevel::avx2 ? avx2::call   \
                                                    : baseline::call)
 /// Declares `declaration;` in every level's namespace (use inside namespace arapfields).

@@ -24,34 +24,19 @@ double seconds_since(Clock::time_point begin) {
 }
 
 void check(const FitOptions& o) {
-  const auto within = [](const char* name, double value, double low, double high) {
-    char text[3][32];
-    const double numbers[3] = {value, low, high};
-    for (int i = 0; i < 3; ++i) std::snprintf(text[i], sizeof text[i], "%g", numbers[i]);
-    require(value >= low && value <= high, std::string("FitOptions.") + name, std::string("got ") + text[0],
-            std::string("allowed are ") + text[1] + " to " + text[2]);
-  };
-  within("steps", o.steps, 1, 1e7);
-  within("batch", o.batch, 1, 1 << 22);
-  within("seconds", o.seconds, 0, 1e7);
-  within("target_error", o.target_error, 0, 1);
-  within("learning_rate", o.learning_rate, 0, 1e30);
-  within("near_points", o.near_points, 1, 1e9);
-  within("uniform_points", o.uniform_points, 1, 1e9);
-  within("near_spread", o.near_spread, 1e-9, 1);
-  within("far_spread", o.far_spread, 1e-9, 1);
-  within("near_share", o.near_share, 0, 1);
-  require(o.optimizer == "orthogonal" || o.optimizer == "adam", "FitOptions.optimizer",
-          "got '" + o.optimizer + "'", "known are 'orthogonal' and 'adam'");
-  require(o.device == "auto" || o.device.rfind("cpu", 0) == 0 || o.device.rfind("cuda", 0) == 0,
-          "FitOptions.device", "got '" + o.device + "'", "known are 'auto', 'cpu' and 'cuda'");
-}
-
-std::string device_for(const std::string& wanted) {
-  if (wanted == "auto") return at::hasCUDA() ? "cuda" : "cpu";
-  require(wanted == "cpu" || at::hasCUDA(), "FitOptions.device", "got '" + wanted + "'",
-          "no CUDA device is usable here");
-  return wanted;
+  require_range("steps", o.steps, 1, 1e7);
+  require_range("batch", o.batch, 1, 1 << 22);
+  require_range("seconds", o.seconds, 0, 1e7);
+  require_range("target_error", o.target_error, 0, 1);
+  require_range("learning_rate", o.learning_rate, 0, 1e30);
+  require_range("near_points", o.near_points, 1, 1e9);
+  require_range("uniform_points", o.uniform_points, 1, 1e9);
+  require_range("near_spread", o.near_spread, 1e-9, 1);
+  require_range("far_spread", o.far_spread, 1e-9, 1);
+  require_range("near_share", o.near_share, 0, 1);
+  require(o.optimizer == "orthogonal" || o.optimizer == "adam", "optimizer", "got '" + o.optimizer + "'",
+          "known are 'orthogonal' and 'adam'");
+  resolve_device(o.device);
 }
 
 /// Points and distances on the network's device, the near-surface ones first.
@@ -205,7 +190,7 @@ FitResult fit_sdf(PointsIn vertices, TrianglesIn triangles, const FitOptions& op
   validate(mesh);
   const Frame frame = mesh_frame(vertices, triangles);
   FitReport report;
-  report.device = device_for(options.device);
+  report.device = resolve_device(options.device);
   report.scale = frame.scale;
   MlpShape shape{1, options.width, options.layers, options.octaves, options.frequency, options.sharpness};
   Mlp mlp(shape, options.seed, false, false, report.device);

@@ -18,16 +18,12 @@ namespace arapfields {
 namespace {
 
 void check(const MlpShape& shape) {
-  const auto within = [](const char* what, double value, double low, double high) {
-    require(value >= low && value <= high, what, "got " + std::to_string(value),
-            "allowed are " + std::to_string(low) + " to " + std::to_string(high));
-  };
-  within("outputs", shape.outputs, 1, 1024);
-  within("width", shape.width, 1, 8192);
-  within("layers", shape.layers, 1, 64);
-  within("octaves", shape.octaves, 1, 32);
-  within("frequency", shape.frequency, 1e-6, 1e6);
-  within("sharpness", shape.sharpness, 1e-6, 1e6);
+  require_range("outputs", shape.outputs, 1, 1024);
+  require_range("width", shape.width, 1, 8192);
+  require_range("layers", shape.layers, 1, 64);
+  require_range("octaves", shape.octaves, 1, 32);
+  require_range("frequency", shape.frequency, 1e-6, 1e6);
+  require_range("sharpness", shape.sharpness, 1e-6, 1e6);
 }
 
 Index parameter_count(const MlpShape& shape) {

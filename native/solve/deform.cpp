@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/device.h"
 #include "core/parallel.h"
 #include "fields/neural_field.h"
 #include "solve/inverse_training.h"

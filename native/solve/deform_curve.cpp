@@ -19,19 +19,11 @@ constexpr int local_global_steps = 8;
 constexpr double gain_tolerance = 1e-5;
 
 void check(const CurveOptions& options) {
-  const auto positive = [](const char* name, double value) {
-    require(std::isfinite(value) && value > 0, name, std::to_string(value), "must be positive");
-  };
-  const auto not_negative = [](const char* name, double value) {
-    require(std::isfinite(value) && value >= 0, name, std::to_string(value), "must be 0 or more");
-  };
-  not_negative("bending", options.bending);
-  not_negative("smoothness", options.smoothness);
-  positive("handle_weight", options.handle_weight);
-  require(options.iterations >= 0, "iterations", std::to_string(options.iterations), "must be 0 or more");
-  positive("spacing", options.spacing);
-  require(options.spacing >= 0.01 && options.spacing <= 1, "spacing", std::to_string(options.spacing),
-          "must be in [0.01, 1]");
+  require_not_negative("bending", options.bending);
+  require_not_negative("smoothness", options.smoothness);
+  require_positive("handle_weight", options.handle_weight);
+  require_not_negative("iterations", options.iterations);
+  require_range("spacing", options.spacing, 0.01, 1);
 }
 
 void check(const CurveHandle& handle, std::size_t position, Index samples) {

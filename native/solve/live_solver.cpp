@@ -33,13 +33,6 @@ constexpr int most_uses = 16;
 /// Share of the handles' part of the energy below which a rigid motion of everything must bring it.
 constexpr double worthwhile_gain = 0.1;
 
-template <class Number>
-void require_range(const char* name, Number value, double low, double high) {
-  require(std::isfinite(static_cast<double>(value)) && value >= low && value <= high, name,
-          std::to_string(value),
-          "from " + std::to_string(low) + " to " + std::to_string(high) + " is allowed");
-}
-
 }  // namespace
 
 void LiveOptions::validate() const {

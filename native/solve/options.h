@@ -65,9 +65,4 @@ struct StylizeOptions {
   void validate() const;
 };
 
-/// "auto" → the best device there is; throws InvalidInput for a name that is unknown or not there.
-std::string resolve_device(const std::string& device);
-/// Whether a CUDA device was found, and why not.
-std::string device_report();
-
 }  // namespace arapfields

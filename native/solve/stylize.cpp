@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "solve/stylize.h"
 
+#include "core/device.h"
 #include "core/parallel.h"
 #include "fields/neural_field.h"
 #include "solve/radial.h"

@@ -5,9 +5,9 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "core/random.h"
+#include "implicit_shapes.h"
 #include "sampling/crossings.h"
 #include "sampling/sample_surface.h"
-#include "implicit_shapes.h"
 
 using namespace arapfields;
 
