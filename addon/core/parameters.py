@@ -42,6 +42,16 @@ WIDTH = Parameter(
     advanced=True,
 )
 LAYERS = Parameter("layers", 4, "Network Layers", "Hidden layers of the network", 1, 16, 8, advanced=True)
+LEARNING_RATE = Parameter(
+    "learning_rate",
+    0.0,
+    "Learning Rate",
+    "Size of the steps of the solve; 0 for what suits most shapes",
+    0.0,
+    0.1,
+    0.05,
+    advanced=True,
+)
 OCTAVES = Parameter(
     "octaves",
     4,
@@ -149,16 +159,7 @@ DEFORM = [
         10.0,
         advanced=True,
     ),
-    Parameter(
-        "learning_rate",
-        0.0,
-        "Learning Rate",
-        "Size of the steps of the solve; 0 for what suits most shapes",
-        0.0,
-        0.1,
-        0.05,
-        advanced=True,
-    ),
+    LEARNING_RATE,
     WIDTH,
     LAYERS,
     OCTAVES,

@@ -3,7 +3,7 @@
 
 from dataclasses import replace
 
-from .parameters import BARRIER, LAYERS, OCTAVES, SAMPLES, SEED, TIME, WIDTH, Parameter
+from .parameters import BARRIER, LAYERS, LEARNING_RATE, OCTAVES, SAMPLES, SEED, TIME, WIDTH, Parameter
 
 STYLIZE = [
     Parameter(
@@ -45,16 +45,7 @@ STYLIZE = [
         "batch", 500, "Samples per Step", "Samples that each step looks at", 16, 100000, 4000, advanced=True
     ),
     replace(BARRIER, default=10.0),  # a style without it folds at its edges
-    Parameter(
-        "learning_rate",
-        0.0,
-        "Learning Rate",
-        "Size of the steps of the solve; 0 for what suits most shapes",
-        0.0,
-        0.1,
-        0.05,
-        advanced=True,
-    ),
+    LEARNING_RATE,
     WIDTH,
     LAYERS,
     OCTAVES,
