@@ -7,13 +7,13 @@ Writes demo.blend and demo.png, and prints each stage's time and figures.
 """
 
 import argparse
+import contextlib
 import ctypes
 import math
 import os
 import sys
 import threading
 import time
-from contextlib import contextmanager
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -32,6 +32,7 @@ HANDLES = [
     ("right ear", (-1.14, 0.30, 0.14), (0.27, 0.32, 0.44), 60.0, (-0.80, 0.0, 0.20)),
 ]
 SPACING = 3.3
+SCREEN = os.fdopen(os.dup(1), "w")  # stays when Blender's own lines are sent away
 
 
 def job_progress():
@@ -42,17 +43,22 @@ def job_progress():
     return (job.fraction, job.message) if job else (0.0, "")
 
 
-@contextmanager
+@contextlib.contextmanager
 def timed(title, progress=job_progress):
     """Prints a stage's title, a progress bar while it runs, and its time."""
     done = threading.Event()
     begin = time.perf_counter()
 
     def draw():
-        while not done.wait(0.5 if sys.stdout.isatty() else 5):
+        while not done.wait(0.5 if SCREEN.isatty() else 5):
             share, text = progress()
             bar = "#" * round(24 * share)
-            print(f"\r{title:26} [{bar:24}] {100 * share:3.0f} %  {text[:44]:44}", end="", flush=True)
+            print(
+                f"\r{title:26} [{bar:24}] {100 * share:3.0f} %  {text[:44]:44}",
+                end="",
+                flush=True,
+                file=SCREEN,
+            )
 
     thread = threading.Thread(target=draw, daemon=True)
     thread.start()
@@ -61,24 +67,23 @@ def timed(title, progress=job_progress):
     finally:
         done.set()
         thread.join()
-        print(f"\r{title:26} {time.perf_counter() - begin:6.1f} s{'':60}", flush=True)
+        print(f"\r{title:26} {time.perf_counter() - begin:6.1f} s{'':60}", flush=True, file=SCREEN)
 
 
-@contextmanager
+@contextlib.contextmanager
 def alone():
-    """Blender and Cycles write hundreds of lines to the standard output: they go nowhere, ours stay."""
-    ours, kept = sys.stdout, os.dup(1)
-    ours.flush()
-    with open(os.devnull, "w") as nowhere, os.fdopen(kept, "w") as terminal:
-        os.dup2(nowhere.fileno(), 1)
-        sys.stdout = terminal
+    """Blender and Cycles write hundreds of lines to the standard streams: they go nowhere."""
+    kept = [os.dup(number) for number in (1, 2)]
+    with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):
+        for number in (1, 2):
+            os.dup2(nowhere.fileno(), number)
         try:
             yield
         finally:
             ctypes.CDLL(None).fflush(None)  # what C still holds goes nowhere, too
-            terminal.flush()
-            os.dup2(terminal.fileno(), 1)
-            sys.stdout = ours
+            for number, stream in zip((1, 2), kept, strict=True):
+                os.dup2(stream, number)
+                os.close(stream)
 
 
 def suzanne():
