@@ -3,7 +3,7 @@ import bpy
 
 from ..core.parameters import DEFORM
 from ..names import Op
-from .section import Section, live_buttons, presets, settings_column
+from .section import Section, job_button, live_buttons, presets, settings_column
 
 
 class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
@@ -20,7 +20,7 @@ class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
         layout.prop(ours, "surface")
         layout.prop(ours, "target")
         settings_column(layout, ours.deform, DEFORM)
-        layout.operator(Op.DEFORM, icon="MOD_SIMPLEDEFORM")
+        job_button(layout, Op.DEFORM, "MOD_SIMPLEDEFORM")
         live_buttons(layout, source, "DEFORM")
         layout.operator(Op.BAKE, icon="REC")
 

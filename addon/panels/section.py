@@ -42,6 +42,13 @@ def settings_column(layout, group, parameters, skip=()):
                 body.prop(group, parameter.name)
 
 
+def job_button(layout, operator, icon):
+    """A job's button, and beside it the choice of objects."""
+    row = layout.row(align=True)
+    row.operator(operator, icon=icon)
+    row.operator_menu_enum(operator, "scope", text="", icon="DOWNARROW_HLT")
+
+
 def presets(layout, name):
     """The user's own presets of a section, in its header."""
     row = layout.row(align=True)

@@ -5,7 +5,7 @@ from ..bridge.pictures import icon
 from ..core.styles import CUSTOM, STYLIZE
 from ..names import Op
 from ..properties.settings import STYLE_ITEMS
-from .section import Section, live_buttons, presets, settings_column
+from .section import Section, job_button, live_buttons, presets, settings_column
 
 
 class ARAPFIELDS_MT_styles(bpy.types.Menu):
@@ -51,7 +51,7 @@ class ARAPFIELDS_PT_stylize(Section, bpy.types.Panel):
         settings_column(layout, style, STYLIZE)
         layout.prop(ours, "output")
         layout.prop(ours, "target")
-        layout.operator(Op.STYLIZE, icon="MOD_EDGESPLIT")
+        job_button(layout, Op.STYLIZE, "MOD_EDGESPLIT")
         live_buttons(layout, source, "STYLIZE")
 
 

@@ -7,7 +7,7 @@ from ..bridge import staleness
 from ..bridge.settings import fit_cache
 from ..core.fitting import FIT
 from ..names import Op
-from .section import Section, presets, settings_column
+from .section import Section, job_button, presets, settings_column
 
 
 class ARAPFIELDS_PT_surface(Section, bpy.types.Panel):
@@ -22,7 +22,7 @@ class ARAPFIELDS_PT_surface(Section, bpy.types.Panel):
         layout = self.layout
         layout.prop(ours.fit, "quality")
         settings_column(layout, ours.fit, FIT)
-        layout.operator(Op.FIT, icon="MOD_REMESH")
+        job_button(layout, Op.FIT, "MOD_REMESH")
         if not ours.fit_key:
             layout.label(text="Not fitted yet", icon="INFO")
             return
