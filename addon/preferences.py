@@ -47,15 +47,14 @@ class ARAPFIELDS_AP_preferences(bpy.types.AddonPreferences):
         layout.prop(self, "show_boxes")
         layout.prop(self, "show_previews")
         cache = settings.fit_cache()
-        row = layout.row()
-        row.label(
+        layout.label(
             text=translated(
                 "{size} MB of fitted surfaces in {folder}",
                 size=f"{cache.size() / 1e6:.1f}",
                 folder=cache.folder,
             )
         )
-        row.operator(Op.CLEAR_CACHE)
+        layout.operator(Op.CLEAR_CACHE, icon="TRASH")
         box = layout.box()
         for line in native.report():
             box.label(text=line, icon="ERROR" if line == str(native.problem()) else "NONE")

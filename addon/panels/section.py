@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What every section of the side panel shares."""
 
+import bpy
+
 from ..bridge import live, lookup
 from ..core import native
 from ..names import CATEGORY, Op
@@ -67,10 +69,22 @@ def live_buttons(layout, source, kind):
         row.operator(Op.LIVE_KEEP, icon="CHECKMARK")
 
 
-def wrapped(layout, text, icon="NONE", width=46):
-    """A long text as several labels."""
+MARGIN, CHARACTER = 85, 6.2  # pixels beside a label, and of a letter, at a scale of 1
+
+
+def characters():
+    """Letters of a label for which the region drawn has room; Blender would cut a longer one off."""
+    region = bpy.context.region
+    if region is None or region.width < 2:
+        return 32
+    scale = bpy.context.preferences.system.ui_scale
+    return max(16, int((region.width / scale - MARGIN) / CHARACTER))
+
+
+def wrapped(layout, text, icon="NONE"):
+    """A long text as several labels, as long as the sidebar is wide."""
     import textwrap
 
     column = layout.column(align=True)
-    for number, line in enumerate(textwrap.wrap(text, width)):
+    for number, line in enumerate(textwrap.wrap(text, characters())):
         column.label(text=line, icon=icon if number == 0 else "BLANK1")
