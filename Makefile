@@ -105,6 +105,7 @@ build/blenders/5.2/.ready:
 gallery: build $(VENV)/.tools  ## the documentation's pictures, rendered by the code
 	$(PIP) -q -r docs/requirements.txt
 	$(PY) blender_scripts/gallery.py --output docs/gallery
+	$(PY) docs/hooks/measured.py
 
 docs: build  ## the documentation site in site/
 	$(PIP) -q -r docs/requirements.txt

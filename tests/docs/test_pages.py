@@ -96,6 +96,16 @@ def test_the_diagram_is_that_of_the_code():
     assert diagram.PICTURE.read_text() == diagram.svg(), "run python docs/hooks/diagram.py"
 
 
+def test_figures_in_the_pages_are_those_measured():
+    sys.path.insert(0, str(pages.ROOT / "docs" / "hooks"))
+    import measured
+
+    for page in measured.PAGES:
+        text = page.read_text()
+        assert len(measured.MARKED.findall(text)) >= 7
+        assert text == measured.refreshed(text), "run python docs/hooks/measured.py"
+
+
 @pytest.mark.slow
 def test_the_site_builds_without_warnings(tmp_path):
     pytest.importorskip("material", reason="mkdocs-material is installed by make docs")

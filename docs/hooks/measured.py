@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Puts the figures that `make gallery` measured into the pages: python docs/hooks/measured.py
+
+In a page, <!-- NAME -->…<!-- end --> holds what NAME below says of docs/gallery/manifest.json (tested).
+"""
+
+import json
+import re
+from pathlib import Path
+
+DOCS = Path(__file__).resolve().parents[1]
+PAGES = [DOCS / "paper-figures.md", DOCS / "gallery.md"]
+MARKED = re.compile(r"(<!-- (\w+) -->).*?(<!-- end -->)", re.S)
+
+
+def span(rows, key, digits):
+    """'least to largest' of a figure over the rows."""
+    values = [row[key] for row in rows.values()]
+    return f"{min(values):.{digits}f} to {max(values):.{digits}f}"
+
+
+def listed(rows, key, form):
+    return ", ".join(format(row[key], form) for row in rows.values())
+
+
+def hero(m):
+    moved = m["deformed"]
+    return (
+        f"mean handle error {moved['handle_error_mean']:.3f}, stretch {moved['stretch']:.3f}, smallest det J "
+        f"{moved['min_determinant']:.2f}; mean preference {m['cube']['preference']:.2f} (cube) and "
+        f"{m['octahedron']['preference']:.2f} (octahedron)"
+    )
+
+
+def bending(m):
+    return f"mean bend {listed(m, 'bend', '.2g')}; mean stretch {listed(m, 'stretch', '.3f')}"
+
+
+def deformations(m):
+    worst = max(row["flipped_share"] for row in m.values())
+    folded = "nothing folded" if worst == 0 else f"at most {100 * worst:.2f} % of the samples folded"
+    return (
+        f"mean handle error {span(m, 'handle_error_mean', 3)}, smallest det J "
+        f"{min(row['min_determinant'] for row in m.values()):.2f}, {folded}"
+    )
+
+
+def exact(m):
+    soft, hard = m["soft"], m["exact"]
+    return (
+        f"largest distance from the target {soft['largest_distance']:.2g} with soft and "
+        f"{hard['largest_distance']:.0e} with exact handles, "
+        f"energy {soft['energy']:.3f} and {hard['energy']:.3f}"
+    )
+
+
+def inverse(m):
+    def of(name):
+        row = m[name]
+        return (
+            f"{row['cells_apart_mean']:.3f}, {row['cells_apart_95_percent']:.3f} and "
+            f"{row['cells_apart_largest']:.2f}"
+        )
+
+    return f"by Newton's method {of('newton')}; by a trained inverse {of('trained')}"
+
+
+def inverted(m):
+    points, failed = (m["newton"][key] + m["trained"][key] for key in ("points_inverted", "failures"))
+    return f"{failed} of {points:,}"
+
+
+def styles(m):
+    worst = max(row["flipped_share"] for row in m.values())
+    return (
+        f"mean preference {span(m, 'preference_rest', 2)} at rest, {span(m, 'preference', 2)} stylized; "
+        f"at most {100 * worst:.1f} % of the samples folded"
+    )
+
+
+def cubes(m):
+    rows = [(name, m[f"{name}, cube"]) for name in ("dog", "suzanne", "octopus")]
+    told = [f"{row['preference_rest']:.2f} to {row['preference']:.2f} ({name.title()})" for name, row in rows]
+    return "from " + ", ".join(told).replace("(Dog)", "(dog)").replace("(Octopus)", "(octopus)")
+
+
+def live(m):
+    return (
+        f"{m['solves']} solves, median {m['median_solve_ms']:.0f} ms, after {m['set_up_s']:.2f} s of set-up"
+    )
+
+
+FIGURE = {"inverted": "inverse", "cubes": "styles"}  # whose figures they tell, where not their own name's
+TEXTS = [hero, bending, deformations, exact, inverse, inverted, styles, cubes, live]
+
+
+def refreshed(text):
+    """The page's text with today's figures."""
+    manifest = json.loads((DOCS / "gallery" / "manifest.json").read_text())
+    told = {f.__name__: f(manifest[FIGURE.get(f.__name__, f.__name__)]["measured"]) for f in TEXTS}
+    return MARKED.sub(lambda found: found[1] + told[found[2]] + found[3], text)
+
+
+if __name__ == "__main__":
+    for page in PAGES:
+        page.write_text(refreshed(page.read_text()))
