@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-SHT_DYNSYM = 11
+SHT_DYNSYM, SHT_VERDEF, SHT_VERNEED = 11, 0x6FFFFFFD, 0x6FFFFFFE
 STB_WEAK, STB_GNU_UNIQUE = 2, 10
 STT_FUNC, STT_GNU_IFUNC = 2, 10
 STV_PROTECTED = 3
@@ -98,3 +98,63 @@ def patchelf(*arguments):
 def needed(path):
     """Names of the libraries that the one at `path` asks the dynamic linker for."""
     return patchelf("--print-needed", path).split()
+
+
+def rename_versions(path, old, new):
+    """Renames the symbol versions, provided or asked for, whose names contain `old`; how many there were.
+
+    A library's own copy of another is of use only where its symbols are found before those that the process
+    has loaded already: with versions of their own they are the only ones that match. `new` is as
+    long as `old`.
+    """
+    image = bytearray(Path(path).read_bytes())
+    table, entries = list(sections(image)), []
+    for kind, offset, _, link in table:
+        if kind in (SHT_VERDEF, SHT_VERNEED):
+            walk = provided if kind == SHT_VERDEF else asked
+            entries += [(hash_at, table[link][1] + name) for hash_at, name in walk(image, offset)]
+
+    def text(place):
+        return bytes(image[place : image.index(0, place)])
+
+    renamed = [entry for entry in entries if old in text(entry[1])]
+    for _, place in renamed:  # strings may share their ends: what one has changed, another finds changed
+        image[place : place + len(text(place))] = text(place).replace(old, new)
+    for hash_at, place in renamed:
+        struct.pack_into("<I", image, hash_at, version_hash(text(place)))
+    Path(path).write_bytes(image)
+    return len(renamed)
+
+
+def provided(image, entry):
+    """(offset of the hash, name in the string table) of each version that the library provides."""
+    while True:
+        aux, following = struct.unpack_from("<II", image, entry + 12)
+        (name,) = struct.unpack_from("<I", image, entry + aux)
+        yield entry + 8, name
+        if not following:
+            return
+        entry += following
+
+
+def asked(image, entry):
+    """The same of each version that the library asks others for."""
+    while True:
+        count, aux, following = struct.unpack_from("<HxxxxII", image, entry + 2)
+        place = entry + aux
+        for _ in range(count):
+            name, step = struct.unpack_from("<II", image, place + 8)
+            yield place, name
+            place += step
+        if not following:
+            return
+        entry += following
+
+
+def version_hash(name):
+    """The hash of the System V ABI."""
+    value = 0
+    for byte in name:
+        value = (value << 4) + byte
+        value = (value ^ (value & 0xF0000000) >> 24) & 0x0FFFFFFF
+    return value

@@ -40,6 +40,7 @@ def make_private(path, renamed, soname=None):
     elf.patchelf(*arguments, path)
     elf.weaken_unique_symbols(path)
     elf.keep_own_functions(path)
+    elf.rename_versions(path, b"OMP_", b"AMP_")  # our OpenMP, not the one that Blender may have loaded
 
 
 def prepare_libraries(library, torch_libraries, output):
