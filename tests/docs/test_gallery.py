@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What `make gallery` renders and what it skips, without rendering."""
+
+import json
+import sys
+
+import pages
+import pytest
+
+sys.path.insert(0, str(pages.ROOT / "blender_scripts"))
+
+import gallery
+from figures import FIGURES
+
+COMMITTED = [figure for figure in FIGURES if not figure.published]
+
+
+def names(paths):
+    return {path.stem for path in paths}
+
+
+def test_a_picture_depends_on_the_figures_that_its_module_takes_from():
+    assert {"hero", "common", "deformations", "styles"} == names(gallery.with_imports("hero"))
+    assert {"exact", "common"} == names(gallery.with_imports("exact"))
+
+
+def test_every_committed_figure_has_its_pictures_and_figures():
+    manifest = json.loads((pages.ROOT / "docs" / "gallery" / "manifest.json").read_text())
+    assert set(manifest) == {figure.name for figure in COMMITTED}
+    for figure in COMMITTED:
+        entry = manifest[figure.name]
+        assert entry["files"] and entry["measured"]
+        assert all((pages.ROOT / "docs" / "gallery" / file).is_file() for file in entry["files"])
+
+
+@pytest.fixture
+def rendered(monkeypatch):
+    """Names of the figures that would have been rendered; rendering itself is refused."""
+    calls = []
+
+    def refuse(command, **_):
+        calls.append(command[command.index("--draw") + 1])
+        return type("Result", (), {"returncode": 1, "stdout": "", "stderr": ""})()
+
+    monkeypatch.setattr(gallery.subprocess, "run", refuse)
+    return calls
+
+
+def test_what_is_up_to_date_is_skipped(tmp_path, rendered, capsys):
+    figure = COMMITTED[0]
+    (tmp_path / "a.png").write_bytes(b"picture")
+    entry = {"hash": gallery.content_hash(figure), "files": ["a.png"]}
+    (tmp_path / "manifest.json").write_text(json.dumps({figure.name: entry}))
+    assert gallery.bring_up_to_date(figure, tmp_path, force=False)
+    assert rendered == [] and "up to date" in capsys.readouterr().out
+    gallery.bring_up_to_date(figure, tmp_path, force=True)
+    assert rendered == [figure.name]
+
+
+@pytest.mark.parametrize("change", ["picture gone", "other sources", "never made"])
+def test_what_is_not_up_to_date_is_rendered(tmp_path, rendered, change):
+    figure = COMMITTED[0]
+    if change != "picture gone":
+        (tmp_path / "a.png").write_bytes(b"picture")
+    entry = {"hash": gallery.content_hash(figure), "files": ["a.png"]}
+    if change == "other sources":
+        entry["hash"] = "0" * 16
+    manifest = {} if change == "never made" else {figure.name: entry}
+    (tmp_path / "manifest.json").write_text(json.dumps(manifest))
+    assert not gallery.bring_up_to_date(figure, tmp_path, force=False)  # what it tried was refused
+    assert rendered == [figure.name]
