@@ -5,6 +5,7 @@ import contextlib
 import ctypes
 import importlib
 import importlib.util
+import os
 import platform
 import sys
 import threading
@@ -43,11 +44,24 @@ def is_loading():
 
 
 def _load():
-    with contextlib.suppress(Exception):
+    with contextlib.suppress(Exception), _sleeping_threads():
         for path in sorted(_folder().glob("libarapfields*.so")):
             ctypes.CDLL(str(path))  # waits for the disk while other threads run
     global _problem
     _problem = _try_import()
+
+
+@contextlib.contextmanager
+def _sleeping_threads():
+    """OpenMP, which reads this when it is loaded, shall let idle threads sleep (as arapfields/_openmp.py does)."""
+    if {"OMP_WAIT_POLICY", "GOMP_SPINCOUNT"} & set(os.environ):
+        yield
+        return
+    os.environ["GOMP_SPINCOUNT"] = "0"
+    try:
+        yield
+    finally:
+        del os.environ["GOMP_SPINCOUNT"]
 
 
 def problem():
