@@ -53,7 +53,7 @@ def _load():
 
 @contextlib.contextmanager
 def _sleeping_threads():
-    """OpenMP, which reads this when it is loaded, shall let idle threads sleep (as arapfields/_openmp.py does)."""
+    """OpenMP reads this when it is loaded: idle threads sleep instead of spinning."""
     if {"OMP_WAIT_POLICY", "GOMP_SPINCOUNT"} & set(os.environ):
         yield
         return
