@@ -69,7 +69,7 @@ def live_buttons(layout, source, kind):
         row.operator(Op.LIVE_KEEP, icon="CHECKMARK")
 
 
-MARGIN, CHARACTER = 85, 6.2  # pixels beside a label, and of a letter, at a scale of 1
+MARGIN, CHARACTER = 80, 5.6  # pixels beside a label, and of a letter, at a scale of 1
 
 
 def characters():
