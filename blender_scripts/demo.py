@@ -39,8 +39,7 @@ def job_progress():
     """Share done and message of the operator's job, if one runs."""
     from addon.core import jobs
 
-    job = jobs.running()
-    return (job.fraction, job.message) if job else (0.0, "")
+    return jobs.progress()
 
 
 @contextlib.contextmanager
