@@ -46,7 +46,7 @@ def make_private(path, renamed, soname=None):
 def prepare_libraries(library, torch_libraries, output):
     """Copies our `library` and what it needs of libtorch into `output`, stripped and made private.
 
-    A copy is kept while it is newer than its original. Returns the paths, ours first.
+    A copy is kept while it is newer than its original and than what is done to it here. Returns the paths, ours first.
     """
     output.mkdir(parents=True, exist_ok=True)
     names = bundled_closure(library, torch_libraries)
@@ -57,8 +57,9 @@ def prepare_libraries(library, torch_libraries, output):
     renamed = {name: private_name(name) for name in names}
     copies = [(library, output / library.name, None)]
     copies += [(torch_libraries / name, output / renamed[name], renamed[name]) for name in names]
+    rules = max(Path(module).stat().st_mtime for module in (__file__, elf.__file__))
     for original, copy, soname in copies:
-        if copy.exists() and copy.stat().st_mtime >= original.stat().st_mtime:
+        if copy.exists() and copy.stat().st_mtime >= max(rules, original.stat().st_mtime):
             continue
         partial = copy.with_name(copy.name + ".partial")
         shutil.copyfile(original, partial)
