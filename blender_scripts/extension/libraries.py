@@ -46,7 +46,7 @@ def make_private(path, renamed, soname=None):
 def prepare_libraries(library, torch_libraries, output):
     """Copies our `library` and what it needs of libtorch into `output`, stripped and made private.
 
-    A copy is kept while it is newer than its original and than what is done to it here. Returns the paths, ours first.
+    A copy is kept while it is newer than its original and than the rules here. Returns the paths, ours first.
     """
     output.mkdir(parents=True, exist_ok=True)
     names = bundled_closure(library, torch_libraries)
