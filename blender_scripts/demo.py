@@ -53,7 +53,7 @@ def timed(title, progress=job_progress):
             share, text = progress()
             bar = "#" * round(24 * share)
             print(
-                f"\r{title:26} [{bar:24}] {100 * share:3.0f} %  {text[:44]:44}",
+                f"\r{title:26} [{bar:24}] {100 * share:3.0f} %  {text.split(',')[0][:44]:44}",
                 end="",
                 flush=True,
                 file=SCREEN,

@@ -55,4 +55,7 @@ class Stages:
     def message(self):
         with self._lock:
             detail = self._task.message if self._task is not None else ""
-            return f"{self._name}: {detail}" if detail else self._name
+        verb, colon, rest = detail.partition(": ")  # "deform: iteration 3 of 300": the name has said the verb
+        if colon and " " not in verb:
+            detail = rest
+        return f"{self._name}: {detail}" if detail else self._name

@@ -8,6 +8,7 @@ import pytest
 
 from addon.core import jobs
 from addon.core.errors import UserError
+from addon.core.stages import Stages
 
 PATIENCE = 10.0  # seconds after which a job that should have ended counts as hung
 
@@ -119,3 +120,18 @@ def test_a_job_that_never_started_can_be_stopped():
     job = jobs.Job("Test", [], FakeTask)
     job.cancel()
     assert not job.join(0.0)
+
+
+@pytest.mark.parametrize(
+    "native, shown",
+    [
+        ("", "Deforming"),
+        ("deform: iteration 3 of 300", "Deforming: iteration 3 of 300"),
+        ("measuring the result", "Deforming: measuring the result"),
+        ("two words: kept", "Deforming: two words: kept"),
+    ],
+)
+def test_a_message_names_its_verb_once(native, shown):
+    made = Stages(FakeTask)
+    made.start("Deforming", 1.0).message = native
+    assert made.message == shown
