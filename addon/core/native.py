@@ -44,7 +44,7 @@ def is_loading():
 
 
 def _load():
-    with contextlib.suppress(Exception), _sleeping_threads():
+    with contextlib.suppress(Exception), _short_spin():
         for path in sorted(_folder().glob("libarapfields*.so")):
             ctypes.CDLL(str(path))  # waits for the disk while other threads run
     global _problem
@@ -52,12 +52,12 @@ def _load():
 
 
 @contextlib.contextmanager
-def _sleeping_threads():
-    """OpenMP reads this when it is loaded: idle threads sleep instead of spinning."""
+def _short_spin():
+    """OpenMP reads this when it is loaded: idle threads soon sleep, as in arapfields/_openmp.py."""
     if {"OMP_WAIT_POLICY", "GOMP_SPINCOUNT"} & set(os.environ):
         yield
         return
-    os.environ["GOMP_SPINCOUNT"] = "0"
+    os.environ["GOMP_SPINCOUNT"] = "1000"
     try:
         yield
     finally:
