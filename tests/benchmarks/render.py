@@ -108,6 +108,7 @@ LABELS = {  # of the plot; elsewhere a row's own words
     "jets": "sweep of {points:,} points, {columns} columns, to bare products",
     "sampling": "20,000 samples of the {case}",
     "distance": "{name}",
+    "extraction": "marching cubes, {case} points a side",
     "fit": "fit of a cow to a mean error of {target}",
 }
 
