@@ -6,6 +6,7 @@ import time
 import bpy
 
 from ..core import jobs
+from ..core.courses import work
 from ..core.manners import Pace
 from ..names import CATEGORY
 from . import preview, settings
@@ -49,8 +50,7 @@ class ModalRun:
         for pace in (self._progress_pace, self._preview_pace):
             pace.spent(begin - self._left - TICK)
         try:
-            while not next(self._course) and time.monotonic() < begin + BUDGET:
-                pass
+            work(self._course, BUDGET)
         except StopIteration as ended:
             self.leave(context)
             return ended.value

@@ -14,12 +14,17 @@ def finished(course, wait=0.002):
             return ended.value
 
 
+def work(course, seconds):
+    """Runs a course for a moment. At its end StopIteration carries what it returns."""
+    until = time.monotonic() + seconds
+    while not next(course) and time.monotonic() < until:
+        pass
+
+
 def advanced(course, seconds):
     """Runs a course for a moment; whether it has ended."""
-    until = time.monotonic() + seconds
     try:
-        while not next(course) and time.monotonic() < until:
-            pass
+        work(course, seconds)
     except StopIteration:
         return True
     return False

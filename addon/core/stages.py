@@ -54,8 +54,8 @@ class Stages:
     @property
     def message(self):
         with self._lock:
-            detail = self._task.message if self._task is not None else ""
+            name, detail = self._name, self._task.message if self._task is not None else ""
         verb, colon, rest = detail.partition(": ")  # "deform: iteration 3 of 300": the name has said the verb
         if colon and " " not in verb:
             detail = rest
-        return f"{self._name}: {detail}" if detail else self._name
+        return f"{name}: {detail}" if detail else name
