@@ -6,9 +6,9 @@ import sys
 
 import bpy
 
-from .bridge import host
-from .bridge.language import translated
-from .core import native
+from .blender import host
+from .blender.language import translated
+from .core.runtime import native
 
 
 def is_whole():

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from .bridge import settings
-from .bridge.language import translated
-from .core import native
+from .blender import settings
+from .blender.language import translated
+from .core.runtime import native
 from .names import PACKAGE, Op
 
 DEVICES = (
@@ -61,4 +61,16 @@ class ARAPFIELDS_AP_preferences(bpy.types.AddonPreferences):
         box.operator(Op.COPY_REPORT, icon="COPYDOWN")
 
 
-CLASSES = [ARAPFIELDS_AP_preferences]
+class ARAPFIELDS_OT_copy_report(bpy.types.Operator):
+    """Copy what is known about the native library and this machine, for a bug report"""
+
+    bl_idname = Op.COPY_REPORT
+    bl_label = "Copy Report"
+
+    def execute(self, context):
+        lines = [f"Blender {bpy.app.version_string}", *native.report()]
+        context.window_manager.clipboard = "\n".join(lines)
+        return {"FINISHED"}
+
+
+CLASSES = [ARAPFIELDS_AP_preferences, ARAPFIELDS_OT_copy_report]

@@ -2,36 +2,31 @@
 """What the extension registers, in order: a table of contents."""
 
 import atexit
+import importlib
 
 import bpy
 
-from . import commands, install_check, panels, preferences
-from .bridge import counting, host, jobs, loading, overlay, pictures, preview, staleness, translations
-from .bridge import live as live_mode
-from .operators import bake, deform, extract, fit, handles, live, presets, status, styles, stylize
-from .properties import handle, item, settings
+from .blender import host
 
-MODULES = [
-    *(
-        handle,
-        settings,
-        item,
-        preferences,
-        jobs,
-        loading,
-        counting,
-        live_mode,
-        overlay,
-        preview,
-        pictures,
-        translations,
-        staleness,
-    ),
-    *(fit, handles, deform, live, bake, stylize, styles, presets, extract, status),
-    *panels.SECTIONS,
-    commands,
-    install_check,
+CONTENTS = [  # modules with CLASSES, or with register() and unregister()
+    # what is stored in the .blend: object.arapfields
+    *("handles.properties", "properties.settings", "properties.item"),
+    "preferences",
+    # what goes on beside the operators
+    *("jobs.job_operator", "jobs.loading", "handles.counts", "live.sessions", "surface.staleness"),
+    *("viewport.handle_boxes", "viewport.previews"),
+    *("blender.icons", "blender.translations"),
+    # features
+    *("surface.operators", "surface.panel"),
+    *("handles.operators", "handles.panel"),
+    *("deform.operators", "deform.panel"),
+    *("stylize.operators", "stylize.panel"),
+    *("live.operators", "animation.operators"),
+    *("results.panel", "jobs.operators", "jobs.panel"),
+    # without a window, and without a library
+    *("commands", "install_check"),
 ]
+MODULES = [importlib.import_module(f".{name}", __package__) for name in CONTENTS]
 
 
 _done = []  # what is registered, in order

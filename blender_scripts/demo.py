@@ -37,7 +37,7 @@ SCREEN = os.fdopen(os.dup(1), "w")  # stays when Blender's own lines are sent aw
 
 def job_progress():
     """Share done and message of the operator's job, if one runs."""
-    from addon.core import jobs
+    from addon.core.runtime import jobs
 
     return jobs.progress()
 

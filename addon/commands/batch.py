@@ -11,8 +11,8 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..core import native
 from ..core.errors import UserError
+from ..core.runtime import native
 from .parser import FORMATS, solve_settings
 from .record import NAME, Record, options_hash, stamp
 

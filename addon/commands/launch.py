@@ -16,7 +16,7 @@ class Launch:
         """The command line that runs a verb on one file."""
         import bpy
 
-        from ..bridge import host
+        from ..blender import host
 
         if self.script and host.is_module():
             return [sys.executable, str(self.script.with_name(f"{verb}.py")), *arguments]

@@ -5,8 +5,8 @@ import contextlib
 import signal
 import sys
 
-from ..core import native
 from ..core.errors import UserError
+from ..core.runtime import native
 from .launch import Launch
 from .parser import parse
 

@@ -5,9 +5,9 @@ import argparse
 import sys
 from pathlib import Path
 
-from ..core.fitting import QUALITIES
-from ..core.parameters import DEFORM
-from ..core.styles import STYLES, STYLIZE
+from ..core.settings.fitting import QUALITIES
+from ..core.settings.parameters import DEFORM
+from ..core.settings.styles import STYLES, STYLIZE
 
 FORMATS = ("ply", "obj", "stl", "blend")
 PARAMETERS = {"deform": DEFORM, "stylize": STYLIZE}

@@ -12,11 +12,11 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..bridge import handles
-from ..bridge.lookup import settings_of
-from ..core import jobs, native
+from ..blender.object_references import settings_of
 from ..core.errors import UserError
-from ..core.styles import style_identifier
+from ..core.runtime import jobs, native
+from ..core.settings.styles import style_identifier
+from ..handles import empties
 from ..names import REPORT
 from . import files
 from .parser import solve_settings
@@ -62,7 +62,7 @@ def wanted(options):
             raise UserError(f"{options.input}: no mesh object named {unknown[0]}; there are: {there}")
         meshes = [by_name[name] for name in options.objects]
     elif options.solve_verb == "deform" and not options.handles:
-        meshes = [item for item in meshes if handles.used(item)]
+        meshes = [item for item in meshes if empties.used(item)]
         if not meshes:
             raise UserError(f"{options.input}: no object has handles; give --handles FILE")
     if not meshes:
@@ -88,10 +88,10 @@ def add_handles(source, path):
             rest[:3, :3] *= max(np.ptp(corners, axis=0).max(), 1e-6) / 100
             target[:3, :3] = rest[:3, :3]
             rest[:3, 3], target[:3, 3] = made.rest, made.target
-        empty = handles.make_empty(bpy.context, source, Matrix(rest.tolist()), 1.0)
+        empty = empties.make_empty(bpy.context, source, Matrix(rest.tolist()), 1.0)
         if not np.allclose(empty.matrix_world, rest, rtol=1e-4, atol=1e-6 * np.abs(rest).max()):
             raise UserError(f"{name}: its box is sheared; an Empty cannot be")
-        entry = handles.add(source, empty, "POINT" if point else "CUBE")
+        entry = empties.add(source, empty, "POINT" if point else "CUBE")
         entry.weight = item.get("weight", 1.0)
         empty.matrix_world = Matrix(target.tolist())
     bpy.context.view_layer.update()

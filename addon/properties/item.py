@@ -3,9 +3,9 @@
 
 import bpy
 
-from ..bridge.delivery import TARGETS
+from ..handles.properties import ARAPFIELDS_PG_handle
 from ..names import PROPERTY
-from .handle import ARAPFIELDS_PG_handle
+from ..results.placement import TARGETS
 from .settings import ARAPFIELDS_PG_deform, ARAPFIELDS_PG_fit, ARAPFIELDS_PG_stylize
 
 OUTPUTS = (

@@ -3,10 +3,10 @@
 
 import bpy
 
-from ..bridge.settings import annotations
-from ..core.fitting import FIT, QUALITIES
-from ..core.parameters import DEFORM
-from ..core.styles import CUSTOM, STYLES, STYLIZE, style_identifier
+from ..blender.settings import annotations
+from ..core.settings.fitting import FIT, QUALITIES
+from ..core.settings.parameters import DEFORM
+from ..core.settings.styles import CUSTOM, STYLES, STYLIZE, style_identifier
 
 QUALITY_ITEMS = tuple((key, label, tip) for key, (label, tip, _) in QUALITIES.items())
 STYLE_ITEMS = tuple(

@@ -85,7 +85,7 @@ def svg():
         f'<rect width="{WIDTH}" height="425" fill="#ffffff"/>',
     ]
     full = WIDTH - 40
-    parts += box(20, 14, 300, 52, "addon", "Blender: bridge (bpy) and core (no bpy)", "#fff7ed")
+    parts += box(20, 14, 300, 52, "addon", "Blender: core (no bpy), a folder a feature", "#fff7ed")
     parts += box(350, 14, 300, 52, "python/arapfields", "public names, files, command line", "#fff7ed")
     parts += box(680, 14, 300, 52, "bindings", "one file a folder; no torch headers", "#fff7ed")
     for x in (320, 650):

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.core.fit_cache import FitCache, fit_key
+from addon.core.runtime.fit_cache import FitCache, fit_key
 
 V = np.random.default_rng(0).normal(size=(10, 3))
 F = np.arange(9).reshape(3, 3)

@@ -3,7 +3,7 @@
 
 import threading
 
-from addon.core.follower import Follower
+from addon.core.runtime.latest_request import Follower
 
 LIMIT = 20  # seconds after which something hangs
 

@@ -6,9 +6,9 @@ import time
 
 import pytest
 
-from addon.core import jobs
 from addon.core.errors import UserError
-from addon.core.stages import Stages
+from addon.core.runtime import jobs
+from addon.core.runtime.progress import Stages
 
 PATIENCE = 10.0  # seconds after which a job that should have ended counts as hung
 

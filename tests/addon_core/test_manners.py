@@ -7,8 +7,8 @@ import threading
 
 import pytest
 
-from addon.core.courses import advanced, finished
-from addon.core.manners import STEP, Pace, stand_back
+from addon.core.runtime.coroutines import advanced, finished
+from addon.core.runtime.threads import STEP, Pace, stand_back
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a priority is the whole process's")

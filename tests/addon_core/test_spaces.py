@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from addon.core.errors import UserError
-from addon.core.handles import box_matrix, require_held, solve_handle
-from addon.core.spaces import pose, rigid_motion, space_of, transform
+from addon.core.geometry.handles import box_matrix, require_held, solve_handle
+from addon.core.geometry.spaces import pose, rigid_motion, space_of, transform
 
 EXACT = 1e-9  # float64 arithmetic on numbers near one
 

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from addon.core.topology import connected
+from addon.core.geometry.edges import connected
 
 TETRAHEDRON = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
 

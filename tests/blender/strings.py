@@ -63,11 +63,7 @@ def of_source():
                 yield from literal(node.value)
             if isinstance(node, ast.Return) and path.name == "staleness.py" and node.value is not None:
                 yield from (text for text in literal(node.value) if " the fit" in text)
-            if (
-                isinstance(node, ast.For)
-                and path.parent.name == "panels"
-                and isinstance(node.iter, ast.Tuple)
-            ):
+            if isinstance(node, ast.For) and path.name == "panel.py" and isinstance(node.iter, ast.Tuple):
                 for row in node.iter.elts:
                     yield from literal(row.elts[MENU_ROWS])
 
@@ -82,7 +78,7 @@ def literal(node):
         for value in node.values:
             yield from literal(value)
     elif isinstance(node, ast.JoinedStr):  # only texts that the module completes with its own constants
-        from addon.core.native import ADVICE
+        from addon.core.runtime.native import ADVICE
 
         parts = [v.value if isinstance(v, ast.Constant) else "\0" for v in node.values]
         if "\0" in parts and ADVICE and "ADVICE" in ast.unparse(node):

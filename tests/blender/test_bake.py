@@ -43,8 +43,8 @@ def test_a_cancelled_bake_leaves_nothing():
     import bpy
     from test_bake import animated
 
-    import addon.operators.bake as bake
-    from addon.core import jobs
+    import addon.animation.operators as bake
+    from addon.core.runtime import jobs
 
     bar = animated()
 

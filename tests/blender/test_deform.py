@@ -185,7 +185,7 @@ def test_several_objects_in_one_call_and_one_that_fails():
     assert bpy.ops.arapfields.deform(scope="SELECTED", **scenes.QUICK) == {"FINISHED"}
     assert {"One_deformed", "Two_deformed"} <= set(bpy.data.objects.keys())
     assert "Bare_deformed" not in bpy.data.objects
-    from addon.core import jobs
+    from addon.core.runtime import jobs
 
     assert [level for level, _ in jobs.notes()] == ["INFO", "INFO", "WARNING"]
     assert "Bare has no handle" in jobs.notes()[-1][1]

@@ -10,22 +10,22 @@ def test_weights_of_groups_are_read_in_slices():
     import numpy as np
     import scenes
 
-    from addon.bridge import groups
-    from addon.core.courses import finished
+    from addon.blender import vertex_groups
     from addon.core.errors import UserError
+    from addon.core.runtime.coroutines import finished
 
     bar = scenes.decorate(scenes.bar())
     other = bar.vertex_groups.new(name="Other")
     other.add([1, 5], 0.25, "REPLACE")
     expected = np.array([sum(g.weight for g in v.groups if g.group == 0) for v in bar.data.vertices])
-    groups.BLOCK, block = 50, groups.BLOCK
+    vertex_groups.BLOCK, block = 50, vertex_groups.BLOCK
     try:
-        course = groups.read_weights(bpy.context, bar, ["Other", "Group"])
+        course = vertex_groups.read_weights(bpy.context, bar, ["Other", "Group"])
         slices = sum(1 for _ in course)
         assert slices == -(-len(bar.data.vertices) // 50)
-        found = finished(groups.read_weights(bpy.context, bar, ["Other", "Group"]))
+        found = finished(vertex_groups.read_weights(bpy.context, bar, ["Other", "Group"]))
         assert np.array_equal(found["Group"], expected) and found["Other"].sum() == 0.5
-        course = groups.read_weights(bpy.context, bar, ["Group"])
+        course = vertex_groups.read_weights(bpy.context, bar, ["Group"])
         next(course)
         bar.data.clear_geometry()
         try:
@@ -35,12 +35,12 @@ def test_weights_of_groups_are_read_in_slices():
         else:
             raise AssertionError("a changed mesh was read on")
     finally:
-        groups.BLOCK = block
+        vertex_groups.BLOCK = block
     bar = scenes.decorate(scenes.bar("Second"))
     bar.modifiers.new("Subdivision", "SUBSURF")
     bpy.context.view_layer.update()
     meshes = set(bpy.data.meshes.keys())
-    found = finished(groups.read_weights(bpy.context, bar, ["Group"]))["Group"]
+    found = finished(vertex_groups.read_weights(bpy.context, bar, ["Group"]))["Group"]
     assert len(found) == len(scenes.world_points(bar)) and 0 < found.max() <= 1
     assert set(bpy.data.meshes.keys()) == meshes
 
@@ -52,7 +52,7 @@ def test_a_window_counts_large_meshes_aside():
     import bpy
     import scenes
 
-    from addon.bridge import counting
+    from addon.handles import counts
 
     bar, fixed, _ = scenes.bar_with_handles()
     scenes.decorate(bar)
@@ -62,13 +62,13 @@ def test_a_window_counts_large_meshes_aside():
     assert min(at_once) > 0
     for entry in entries:
         entry.inside = -1
-    counting._courses[bar.session_uid] = counting.counting(bpy.context, bar)
-    while counting.tick() is not None:
+    counts._courses[bar.session_uid] = counts.counting(bpy.context, bar)
+    while counts.tick() is not None:
         time.sleep(0.005)
     assert [entry.inside for entry in entries] == at_once
-    course = counting.counting(bpy.context, bar)
+    course = counts.counting(bpy.context, bar)
     next(course)
     bpy.data.objects.remove(fixed)  # between a count and its end
-    counting._courses[bar.session_uid] = course
-    while counting.tick() is not None:
+    counts._courses[bar.session_uid] = course
+    while counts.tick() is not None:
         time.sleep(0.005)

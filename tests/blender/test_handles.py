@@ -9,15 +9,15 @@ def test_selected_empties_become_handles_and_anchors_at_first():
     import bpy
     import scenes
 
-    from addon.bridge import handles
-    from addon.core.spaces import space_of
+    from addon.core.geometry.spaces import space_of
+    from addon.handles import empties
 
     bar, fixed, moving = scenes.bar_with_handles()
-    found = handles.solve_handles(bar, space_of(bar.matrix_world))
+    found = empties.solve_handles(bar, space_of(bar.matrix_world))
     assert [h.name for h in found] == ["Fixed", "Moving"] and all(h.is_anchor for h in found)
     moving.location.z += 1
     bpy.context.view_layer.update()
-    found = handles.solve_handles(bar, space_of(bar.matrix_world))
+    found = empties.solve_handles(bar, space_of(bar.matrix_world))
     assert [h.is_anchor for h in found] == [True, False]
     assert all(entry.inside > 0 for entry in bar.arapfields.handles)
     assert fixed.arapfields.handle_of == bar and fixed.empty_display_type == "CUBE"
@@ -58,13 +58,13 @@ def test_set_rest_makes_the_present_pose_the_rest():
     import bpy
     import scenes
 
-    from addon.bridge import handles
-    from addon.core.spaces import space_of
+    from addon.core.geometry.spaces import space_of
+    from addon.handles import empties
 
     bar, _, moving = scenes.bar_with_handles()
     moving.location.y += 0.1
     bpy.ops.arapfields.set_rest(all=True)
-    found = handles.solve_handles(bar, space_of(bar.matrix_world))
+    found = empties.solve_handles(bar, space_of(bar.matrix_world))
     assert all(h.is_anchor for h in found)
 
 
@@ -88,11 +88,11 @@ def test_a_deleted_empty_is_no_handle_any_more():
     import bpy
     import scenes
 
-    from addon.bridge import handles
+    from addon.handles import empties
 
     bar, _, moving = scenes.bar_with_handles()
     bpy.data.objects.remove(moving)
-    assert [e.empty.name for e in handles.used(bar)] == ["Fixed"]
+    assert [e.empty.name for e in empties.used(bar)] == ["Fixed"]
 
 
 @in_blender
@@ -100,7 +100,7 @@ def test_with_a_handle_or_a_result_active_the_source_is_still_found():
     import bpy
     import scenes
 
-    from addon.bridge.lookup import source_of
+    from addon.blender.object_references import source_of
 
     bar, fixed, _ = scenes.bar_with_handles()
     scenes.activate(fixed)
@@ -139,7 +139,7 @@ def test_a_box_around_the_selected_vertices():
     import pytest
     import scenes
 
-    from addon.bridge import handles
+    from addon.handles import empties
 
     bar = scenes.bar()
     bar.rotation_euler.z, bar.scale = 0.5, (1, 2, 1)
@@ -150,7 +150,7 @@ def test_a_box_around_the_selected_vertices():
     assert bpy.ops.arapfields.add_handle(place="SELECTION") == {"FINISHED"}
     bpy.ops.object.mode_set(mode="OBJECT")
     (entry,) = bar.arapfields.handles
-    box = np.linalg.inv(handles.rest_box(bar, entry))
+    box = np.linalg.inv(empties.rest_box(bar, entry))
     points = scenes.world_points(bar)
     inside = (np.abs(points @ box[:3, :3].T + box[:3, 3]) <= 1 + 1e-5).all(axis=1)
     assert np.array_equal(inside, local[:, 0] > 0.8) and entry.inside > 0
@@ -167,7 +167,7 @@ def test_a_mirrored_handle_moves_as_the_mirror_image():
     import numpy as np
     import scenes
 
-    from addon.bridge import handles
+    from addon.handles import empties
 
     bar = scenes.bar()
     bar.location, bar.rotation_euler.z = (1, 2, 3), 0.7
@@ -185,7 +185,7 @@ def test_a_mirrored_handle_moves_as_the_mirror_image():
     assert two.empty.name == "Arm.R" and tuple(two.colour) != tuple(one.colour)
     flip = np.diag([-1.0, 1, 1, 1])
     to_local = np.linalg.inv(np.array(bar.matrix_world))
-    for box in (handles.rest_box, lambda source, entry: handles.box_now(entry.empty)):
+    for box in (empties.rest_box, lambda source, entry: empties.box_now(entry.empty)):
         expected = flip @ to_local @ box(bar, one) @ flip
         assert np.allclose(to_local @ box(bar, two), expected, atol=1e-5)
     bpy.ops.arapfields.mirror_handle(axis="X")

@@ -10,7 +10,7 @@ def test_every_text_is_translated():
 
     import strings
 
-    from addon.bridge.translations import catalogues
+    from addon.blender.translations import catalogues
 
     texts = strings.every()
     assert len(texts) > 250
@@ -31,7 +31,7 @@ def test_every_text_is_translated():
 
 @in_blender
 def test_messages_are_filled_in_after_translation():
-    from addon.bridge.language import translated
+    from addon.blender.language import translated
     from addon.core.errors import UserError
 
     assert translated("{count} frames baked", count=3) == "3 frames baked"

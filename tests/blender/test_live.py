@@ -10,10 +10,10 @@ def step(refined=False):
     import bpy
     from test_live import WAIT
 
-    from addon.bridge import live
+    from addon.live import sessions
 
     bpy.context.view_layer.update()
-    live.update(bpy.context, wait=WAIT, refined=refined)
+    sessions.update(bpy.context, wait=WAIT, refined=refined)
 
 
 @in_blender
@@ -23,11 +23,11 @@ def test_the_result_follows_moves_and_returns():
     import scenes
     from test_live import step
 
-    from addon.bridge import live
+    from addon.live import sessions
 
     bar, _, moving = scenes.bar_with_handles()
     before = scenes.world_points(bar)
-    assert bpy.ops.arapfields.live() == {"FINISHED"} and live.is_live(bar)
+    assert bpy.ops.arapfields.live() == {"FINISHED"} and sessions.is_live(bar)
     result = bpy.data.objects["Bar_live"]
     assert np.abs(scenes.world_points(result) - before).max() < 1e-3
     moving.location.z += 0.4
@@ -117,19 +117,19 @@ def test_a_new_handle_sets_the_solver_up_again():
     import scenes
     from test_live import step
 
-    from addon.bridge import live
+    from addon.live import sessions
 
     bar, _, _ = scenes.bar_with_handles()
     bpy.ops.arapfields.live()
     scenes.activate(bar)
     bpy.ops.arapfields.add_handle()
     step()
-    assert live.is_live(bar) and len(live._sessions[bar.session_uid].layout[0]) == 3
+    assert sessions.is_live(bar) and len(sessions._sessions[bar.session_uid].layout[0]) == 3
     for _ in range(3):
         scenes.activate(bar)
         bpy.ops.arapfields.remove_handle()
     step()
-    assert not live.is_live(bar) and "Bar_live" not in bpy.data.objects
+    assert not sessions.is_live(bar) and "Bar_live" not in bpy.data.objects
 
 
 @in_blender
@@ -160,7 +160,7 @@ def test_loading_a_file_ends_live_mode_and_cleans_what_was_saved_of_it():
     import bpy
     import scenes
 
-    from addon.bridge import live
+    from addon.live import sessions
 
     bar, *_ = scenes.bar_with_handles()
     bar.display_type = "WIRE"
@@ -168,7 +168,7 @@ def test_loading_a_file_ends_live_mode_and_cleans_what_was_saved_of_it():
     path = tempfile.mktemp(suffix=".blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert not live._sessions
+    assert not sessions._sessions
     bpy.ops.wm.open_mainfile(filepath=path)
     assert "Bar_live" not in bpy.data.objects
     bar = bpy.data.objects["Bar"]

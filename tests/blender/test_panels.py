@@ -115,8 +115,8 @@ def prepared(state):
     import bpy
     import scenes
 
-    from addon.core import jobs, native
     from addon.core.errors import UserError
+    from addon.core.runtime import jobs, native
 
     if state == "a camera":
         bpy.ops.object.camera_add()
@@ -184,7 +184,7 @@ EXPECTED = {
 def test_the_panel_draws(state):
     from test_panels import EXPECTED, drawn, prepared
 
-    from addon.core import jobs
+    from addon.core.runtime import jobs
 
     jobs._notes.clear()
     undo = prepared(state)

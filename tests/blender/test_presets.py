@@ -43,7 +43,7 @@ def test_each_style_has_its_picture():
     from pathlib import Path
 
     import addon
-    from addon.core.styles import STYLES
+    from addon.core.settings.styles import STYLES
 
     folder = Path(addon.__file__).parent / "icons"
     assert {path.stem for path in folder.glob("*.png")} == {name.replace(" ", "_") for name, _ in STYLES}

@@ -130,8 +130,8 @@ def test_without_a_window_the_course_gives_what_blocking_gives():
     import numpy as np
     import scenes
 
-    import addon.operators.deform as deform
-    from addon.core import jobs
+    import addon.deform.operators as deform
+    from addon.core.runtime import jobs
 
     bar, _, moving = scenes.bar_with_handles()
     moving.location.z += 0.4

@@ -7,9 +7,9 @@ from inside import in_blender
 @in_blender
 def test_names_and_defaults_are_the_librarys():
     import arapfields as af
-    from addon.core.fitting import FIT
-    from addon.core.parameters import DEFORM, OURS
-    from addon.core.styles import STYLIZE
+    from addon.core.settings.fitting import FIT
+    from addon.core.settings.parameters import DEFORM, OURS
+    from addon.core.settings.styles import STYLIZE
 
     tables = {"DeformOptions": DEFORM, "StylizeOptions": STYLIZE, "FitOptions": FIT}
     for name, table in tables.items():
@@ -26,8 +26,8 @@ def test_values_survive_single_precision():
     import bpy
     import scenes
 
-    from addon.bridge.settings import in_force
-    from addon.core.parameters import DEFORM
+    from addon.blender.settings import in_force
+    from addon.core.settings.parameters import DEFORM
 
     item = scenes.bar()
 

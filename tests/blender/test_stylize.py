@@ -81,7 +81,7 @@ def test_a_vertex_group_bounds_the_region():
 @in_blender
 def test_the_menu_lists_the_librarys_styles():
     import arapfields
-    from addon.core.styles import STYLES, style_identifier, style_name
+    from addon.core.settings.styles import STYLES, style_identifier, style_name
 
     assert [name for name, _ in STYLES] == list(arapfields.style_names())
     assert all(style_name(style_identifier(name)) == name for name, _ in STYLES)

@@ -15,9 +15,9 @@ def test_a_fit_is_cached_and_goes_stale_with_the_mesh():
     import scenes
     from test_surface import FIT
 
-    from addon.bridge import staleness
-    from addon.bridge.settings import fit_cache
-    from addon.bridge.work import read_surface
+    from addon.blender.settings import fit_cache
+    from addon.surface import staleness
+    from addon.surface.source_surface import read_surface
 
     fit_cache().clear()
     bar = scenes.bar()

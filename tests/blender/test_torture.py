@@ -174,7 +174,7 @@ def test_half_a_million_triangles():
     import numpy as np
     import scenes
 
-    from addon.bridge import live
+    from addon.live import sessions
 
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=500, y_subdivisions=500, size=2)
     item = bpy.context.object
@@ -194,7 +194,7 @@ def test_half_a_million_triangles():
     assert np.isfinite(after).all() and abs((after - points)[points[:, 0] > 0.9][:, 2].mean() - 0.3) < 0.1
     scenes.activate(item)
     bpy.ops.arapfields.live()
-    assert live.is_live(item)
-    live.update(bpy.context, wait=60)
+    assert sessions.is_live(item)
+    sessions.update(bpy.context, wait=60)
     moved = scenes.world_points(bpy.data.objects[f"{item.name}_live"]) - points
     assert abs(moved[points[:, 0] > 0.9][:, 2].mean() - 0.3) < 0.1

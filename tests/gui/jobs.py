@@ -18,7 +18,7 @@ def invoke(settings):
 
 
 def until_idle(limit):
-    from addon.core import jobs
+    from addon.core.runtime import jobs
 
     begin = time.perf_counter()
     while jobs.running() is not None and time.perf_counter() - begin < limit:
@@ -26,9 +26,9 @@ def until_idle(limit):
 
 
 def checks(found, folder):
-    from addon.bridge import preview
-    from addon.bridge.jobs import JobOperator
-    from addon.core import jobs
+    from addon.core.runtime import jobs
+    from addon.jobs.job_operator import JobOperator
+    from addon.viewport import previews
 
     stage.empty_file()
     with stage.override():
@@ -43,8 +43,8 @@ def checks(found, folder):
     found["redraw_s"] = stage.redraw_seconds()
     yield from stage.gaps(3.0, found, "late_without_a_job")
     ours, shown = stage.Meter(), stage.Meter()
-    ours.watch(JobOperator, "advance").watch(preview, "draw")
-    shown.watch(preview.Preview, "show")
+    ours.watch(JobOperator, "advance").watch(previews, "draw")
+    shown.watch(previews.Preview, "show")
     begin = time.perf_counter()
     found["invoke"] = invoke(LONG)
     found["click_s"] = round(time.perf_counter() - begin, 4)
@@ -80,12 +80,12 @@ def escape(found, before):
 
 
 def result(found, folder):
-    from addon.bridge import preview
+    from addon.viewport import previews
 
     invoke(scenes.QUICK)
     yield from until_idle(120)
     modal = stage.positions("Bar_deformed")
-    found["preview_gone"] = not preview.is_shown()
+    found["preview_gone"] = not previews.is_shown()
     yield 0.5
     stage.picture(folder, "result")
     there = "Bar_deformed" in bpy.data.objects
@@ -101,7 +101,7 @@ def result(found, folder):
 
 def endings(found):
     """A job while a step is undone, a file is loaded, the add-on is switched off."""
-    from addon.core import jobs
+    from addon.core.runtime import jobs
 
     for name, act in (
         ("undo", lambda: bpy.ops.ed.undo()),

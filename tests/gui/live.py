@@ -18,11 +18,11 @@ def checks(found, folder):
 
 def settled(name, limit=30.0):
     """Until the live shape of that object is refined and shown, if it is live."""
-    from addon.bridge import live
+    from addon.live import sessions
 
     begin, calm = time.perf_counter(), 0
     while calm < 3 and time.perf_counter() - begin < limit:
-        session = live._sessions.get(bpy.data.objects[name].session_uid)
+        session = sessions._sessions.get(bpy.data.objects[name].session_uid)
         if session is None:
             return
         calm = calm + 1 if session.follower.resting else 0
@@ -31,7 +31,8 @@ def settled(name, limit=30.0):
 
 def rate(found, folder):
     """Moves a handle of a mesh of 50,000 vertices: how often the viewport shows a new shape."""
-    from addon.bridge import live, live_session
+    from addon.live import session as live_session
+    from addon.live import sessions
 
     stage.empty_file()
     with stage.override():
@@ -43,7 +44,7 @@ def rate(found, folder):
         begin = time.perf_counter()
         bpy.ops.arapfields.live("INVOKE_DEFAULT")
         found["live_click_s"] = round(time.perf_counter() - begin, 4)
-    session = live._sessions[bar.session_uid]
+    session = sessions._sessions[bar.session_uid]
     while not session.follower.resting:
         yield 0.01
     found["live_first_shape_s"] = round(time.perf_counter() - begin, 4)
@@ -53,9 +54,9 @@ def rate(found, folder):
         area.spaces.active.overlay.show_overlays = overlays
         bpy.context.preferences.system.viewport_aa = samples
         yield 1.0
-        yield from one_rate(found, name, moving, live, live_session)
+        yield from one_rate(found, name, moving, sessions, live_session)
     found["live_solve_and_warp_on_worker"] = solves.end()
-    found["live_without_drawing"] = without_drawing(moving, live)
+    found["live_without_drawing"] = without_drawing(moving, sessions)
     stage.picture(folder, "live-plain")
     area.spaces.active.overlay.show_overlays = True
     bpy.context.preferences.system.viewport_aa = "8"
@@ -65,13 +66,13 @@ def rate(found, folder):
     stage.picture(folder, "live")
     bar.hide_set(False)
     with stage.override():
-        live.end(bpy.context, bar)
+        sessions.end(bpy.context, bar)
 
 
-def one_rate(found, name, moving, live, live_session):
+def one_rate(found, name, moving, sessions, live_session):
     shown, ticks = stage.Meter(), stage.Meter()
-    ticks.watch(live, "update")
-    shown.watch(live_session.arrays, "set_positions")
+    ticks.watch(sessions, "update")
+    shown.watch(live_session.mesh_arrays, "set_positions")
     times, stop = stage.draws()
     begin = time.perf_counter()
     while time.perf_counter() - begin < SECONDS:
@@ -88,21 +89,21 @@ def one_rate(found, name, moving, live, live_session):
     }
 
 
-def without_drawing(moving, live):
+def without_drawing(moving, sessions):
     """Updates a second where nothing is drawn: solve, warp, mesh and dependency graph, one after another."""
     begin, count = time.perf_counter(), 0
     while time.perf_counter() - begin < SECONDS / 2:
         count += 1
         moving.location.z = 0.6 * abs(np.sin(0.05 * count))
         bpy.context.view_layer.update()
-        live.update(bpy.context, wait=live.WAIT)
+        sessions.update(bpy.context, wait=sessions.WAIT)
         bpy.context.view_layer.update()
     return {"updates_per_second": round(count / (time.perf_counter() - begin), 1)}
 
 
 def drag(found, folder):
     """A drag with the mouse, as a user does it: one undo step, and the shape returns with it."""
-    from addon.bridge import live
+    from addon.live import sessions
 
     stage.empty_file()
     with stage.override():
@@ -136,7 +137,7 @@ def drag(found, folder):
         bpy.ops.ed.undo()
     yield 1.0
     yield from settled("Bar")
-    found["live_after_undo"] = live.is_live(bpy.data.objects["Bar"])
+    found["live_after_undo"] = sessions.is_live(bpy.data.objects["Bar"])
     moving = bpy.data.objects["Moving"]
     back = np.allclose(moving.location, (1, 0, 0), atol=1e-6) and moving.get("mark") == 1
     found["drag_is_one_undo_step"] = bool(back)
@@ -145,5 +146,5 @@ def drag(found, folder):
     del moving["mark"]
     with stage.override():
         scenes.activate(bar)
-        live.end(bpy.context, bar)
+        sessions.end(bpy.context, bar)
     found["off_restores"] = stage.everything() == before and bar.display_type == "TEXTURED"

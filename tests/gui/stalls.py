@@ -28,8 +28,8 @@ def checks(found, folder):
 
 
 def parts(found):
-    from addon.bridge import modal
-    from addon.core import jobs
+    from addon.core.runtime import jobs
+    from addon.jobs import modal
 
     yield from scene()
     yield from lateness(found, "at_rest")
@@ -61,7 +61,7 @@ def scene():
 
 
 def with_a_job(found, name):
-    from addon.core import jobs
+    from addon.core.runtime import jobs
 
     with stage.override():
         scenes.activate(bpy.data.objects["Bar"])

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What every section of the side panel shares."""
+
+import bpy
+
+from ..core.runtime import native
+from ..names import CATEGORY
+from . import object_references
+
+
+class Section:
+    """Mixin of the sections: where they are, and that a broken library or a missing source hides them."""
+
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = CATEGORY
+    needs_source = True
+
+    @classmethod
+    def poll(cls, context):
+        if native.problem():
+            return False
+        return not cls.needs_source or object_references.source_of(context) is not None
+
+    def draw(self, context):
+        source = object_references.source_of(context)
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
+        self.fill(context, source, object_references.settings_of(source) if source else None)
+
+
+def settings_column(layout, group, parameters, skip=()):
+    """The everyday parameters, and under them the advanced ones in a closed drawer."""
+    column = layout.column()
+    for parameter in parameters:
+        if not parameter.advanced and parameter.name not in skip:
+            column.prop(group, parameter.name)
+    further = [p for p in parameters if p.advanced and p.name not in skip]
+    if further:
+        header, body = layout.panel(f"arapfields_{type(group).__name__}", default_closed=True)
+        header.label(text="Advanced")
+        if body:
+            for parameter in further:
+                body.prop(group, parameter.name)
+
+
+def job_button(layout, operator, icon):
+    """A job's button, and beside it the choice of objects."""
+    row = layout.row(align=True)
+    row.operator(operator, icon=icon)
+    row.operator_menu_enum(operator, "scope", text="", icon="DOWNARROW_HLT")
+
+
+def presets(layout, name):
+    """The user's own presets of a section, in its header."""
+    row = layout.row(align=True)
+    row.emboss = "NONE"
+    row.menu(f"ARAPFIELDS_MT_{name}_presets", text="", icon="PRESET")
+    row.operator(f"arapfields.{name}_preset", text="", icon="ADD")
+    row.operator(f"arapfields.{name}_preset", text="", icon="REMOVE").remove_active = True
+
+
+MARGIN, CHARACTER = 80, 5.6  # pixels beside a label, and of a letter, at a scale of 1
+
+
+def characters():
+    """Letters of a label for which the region drawn has room; Blender would cut a longer one off."""
+    region = bpy.context.region
+    if region is None or region.width < 2:
+        return 32
+    scale = bpy.context.preferences.system.ui_scale
+    return max(16, int((region.width / scale - MARGIN) / CHARACTER))
+
+
+def wrapped(layout, text, icon="NONE"):
+    """A long text as several labels, as long as the sidebar is wide."""
+    import textwrap
+
+    column = layout.column(align=True)
+    for number, line in enumerate(textwrap.wrap(text, characters())):
+        column.label(text=line, icon=icon if number == 0 else "BLANK1")

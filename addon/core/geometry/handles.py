@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Handles as the solver wants them: boxes and motions in solve space."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import UserError
+from .spaces import rigid_motion
+
+STILL = 1e-5  # motion, relative to the box, below which a handle is an anchor
+MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Handle:
+    """One handle in solve space. `rest` and `target` map the cube [-1, 1]³ onto the box."""
+
+    name: str
+    kind: str  # CUBE, POINT or GROUP
+    rest: np.ndarray
+    target: np.ndarray
+    weights: np.ndarray | None = None  # GROUP: (n,) of the source's vertices
+    weight: float = 1.0  # how strictly it is followed, relative to others
+
+    @property
+    def is_anchor(self):
+        return np.array_equal(self.rest, self.target)
+
+    def inside(self, points):
+        """(n,) whether the points lie in the rest box."""
+        local = (points - self.rest[:3, 3]) @ np.linalg.inv(self.rest[:3, :3]).T
+        return (np.abs(local) <= 1).all(axis=1)
+
+
+def box_matrix(matrix_world, size):
+    """The cube [-1, 1]³ → world, of an Empty drawn with this size."""
+    return np.asarray(matrix_world, dtype=np.float64) @ np.diag([size, size, size, 1.0])
+
+
+def solve_handle(name, kind, rest_world, now_world, space, **further):
+    """A handle from its box at rest and its box now, both in world space."""
+    to_solve = space.world_to_solve
+    rest = to_solve @ rest_world
+    if abs(np.linalg.det(rest[:3, :3])) <= 1e-18 * np.abs(rest[:3, :3]).max() ** 3:
+        raise UserError(
+            "{name}: its box is flat; give the Empty a size and a scale other than zero", name=name
+        )
+    if np.linalg.det(rest[:3, :3]) < 0:
+        rest = rest @ MIRROR  # the same box, right-handed
+    motion = to_solve @ rigid_motion(rest_world, now_world) @ space.solve_to_world
+    motion = rigid_motion(np.eye(4), motion)
+    extent = np.linalg.norm(rest[:3, :3], axis=0).max()
+    moved = np.abs(motion[:3, :3] - np.eye(3)).max() > STILL
+    shift = motion[:3, :3] @ rest[:3, 3] + motion[:3, 3] - rest[:3, 3]
+    moved = moved or np.abs(shift).max() > STILL * extent
+    return Handle(name, kind, rest, motion @ rest if moved else rest.copy(), **further)
+
+
+def require_held(counts):
+    """`counts`: samples by handle name. UserError that names the handles that hold none."""
+    empty = [name for name, count in counts.items() if count == 0]
+    if empty:
+        raise UserError("no part of the surface lies in the rest region of {names}", names=", ".join(empty))

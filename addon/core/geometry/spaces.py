@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Solve space: the world up to a similarity, so that a moved or evenly scaled object keeps its fit.
+
+Rigidity is judged in world space. An object's linear part L = U S Vᵀ splits into s·Q·P with the scale s,
+Q = U Vᵀ orthogonal (a mirror included) and P = V S Vᵀ / s the stretch that remains: local → solve is P,
+solve → world is s·Q and the location. Without uneven scale P is the identity.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import UserError
+
+EVEN = 1e-5  # relative spread of the scales below which they count as equal
+FLAT = 1e-6  # smallest scale, relative to the largest
+
+
+@dataclass(frozen=True)
+class Space:
+    local_to_solve: np.ndarray  # (4, 4)
+    solve_to_world: np.ndarray  # (4, 4), a similarity
+
+    def to_solve(self, points):
+        """(n, 3) local → solve."""
+        return transform(self.local_to_solve, points)
+
+    def to_local(self, points):
+        """(n, 3) solve → local."""
+        return transform(np.linalg.inv(self.local_to_solve), points)
+
+    @property
+    def world_to_solve(self):
+        return np.linalg.inv(self.solve_to_world)
+
+
+def transform(matrix, points):
+    """Applies a 4×4 affine matrix to (n, 3) points, in float64."""
+    points = np.asarray(points, dtype=np.float64)
+    if np.array_equal(matrix, np.eye(4)):
+        return points.copy()
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def space_of(matrix_world, name="object"):
+    """The solve space of an object with this world matrix; UserError when its scale flattens it."""
+    world = np.asarray(matrix_world, dtype=np.float64)
+    if not np.isfinite(world).all():
+        raise UserError("{name}: its world matrix is not finite", name=name)
+    left, scales, right = np.linalg.svd(world[:3, :3])
+    if scales[-1] <= FLAT * scales[0]:
+        raise UserError("{name}: its scale flattens it; give every axis a scale other than zero", name=name)
+    if scales[0] - scales[-1] <= EVEN * scales[0]:
+        return Space(np.eye(4), world)
+    scale = float(np.prod(scales) ** (1 / 3))
+    local_to_solve, solve_to_world = np.eye(4), np.eye(4)
+    local_to_solve[:3, :3] = right.T @ np.diag(scales / scale) @ right
+    solve_to_world[:3, :3] = scale * (left @ right)
+    solve_to_world[:3, 3] = world[:3, 3]
+    return Space(local_to_solve, solve_to_world)
+
+
+def pose(matrix):
+    """The rigid part of a 4×4 matrix: its closest orthogonal linear part and its translation."""
+    matrix = np.asarray(matrix, dtype=np.float64)
+    left, _, right = np.linalg.svd(matrix[:3, :3])
+    result = np.eye(4)
+    result[:3, :3] = left @ right
+    result[:3, 3] = matrix[:3, 3]
+    return result
+
+
+def rigid_motion(rest, target):
+    """The proper rigid motion that takes the pose of one matrix to that of the other; scale is ignored."""
+    motion = pose(target) @ np.linalg.inv(pose(rest))
+    left, _, right = np.linalg.svd(motion[:3, :3])
+    mirror = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+    motion[:3, :3] = left @ mirror @ right
+    motion[:3, 3] = np.asarray(target, float)[:3, 3] - motion[:3, :3] @ np.asarray(rest, float)[:3, 3]
+    return motion

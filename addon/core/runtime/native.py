@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The native library, or the reason why it cannot be used. Nothing here raises on import."""
+
+import contextlib
+import ctypes
+import importlib
+import importlib.util
+import os
+import platform
+import sys
+import threading
+from pathlib import Path
+
+from ..errors import UserError
+
+ADVICE = "Install arapfields-<version>-<platform>.zip of a release, not the source code"
+
+
+def library():
+    """The package `arapfields`; UserError when it cannot be used."""
+    if is_loading():
+        _loading.join()
+    reason = problem()
+    if reason:
+        raise reason
+    return sys.modules["arapfields"]
+
+
+UNKNOWN = object()
+_problem = UNKNOWN
+_loading = None  # the thread that loads the library
+
+
+def preload():
+    """Loads the library on a thread: its file first, without Python's lock, then the module."""
+    global _loading
+    if _problem is UNKNOWN and _loading is None:
+        _loading = threading.Thread(target=_load, name="arapfields loading", daemon=True)
+        _loading.start()
+
+
+def is_loading():
+    return _loading is not None and _loading.is_alive()
+
+
+def _load():
+    with contextlib.suppress(Exception), _short_spin():
+        for path in sorted(_folder().glob("libarapfields*.so")):
+            ctypes.CDLL(str(path))  # waits for the disk while other threads run
+    global _problem
+    _problem = _try_import()
+
+
+@contextlib.contextmanager
+def _short_spin():
+    """OpenMP reads this when it is loaded: idle threads soon sleep, as in arapfields/_openmp.py."""
+    if {"OMP_WAIT_POLICY", "GOMP_SPINCOUNT"} & set(os.environ):
+        yield
+        return
+    os.environ["GOMP_SPINCOUNT"] = "1000"
+    try:
+        yield
+    finally:
+        del os.environ["GOMP_SPINCOUNT"]
+
+
+def problem():
+    """Why the native library cannot be used, as a UserError; None when it can."""
+    global _problem
+    if is_loading():
+        return UserError("The native library is being loaded; wait a moment")
+    if _problem is UNKNOWN:
+        _problem = _try_import()
+    return _problem
+
+
+def forget():
+    """Lets the next call of `problem` try again."""
+    global _problem, _loading
+    _problem, _loading = UNKNOWN, None
+
+
+def _try_import():
+    try:
+        module = importlib.import_module("arapfields")
+        if hasattr(module, "deform"):
+            return None
+        return UserError(f"Another package named arapfields is installed. {ADVICE}")
+    except ModuleNotFoundError as error:
+        return _missing(error)
+    except Exception as error:  # a broken library must not keep the add-on from loading
+        return UserError("The native library cannot be loaded: {error}", error=error)
+
+
+def _missing(error):
+    if error.name == "arapfields":
+        return UserError(f"The native library is not part of this installation. {ADVICE}")
+    if error.name == "arapfields._native":
+        package = (
+            Path(sys.modules["arapfields"].__file__).parent if "arapfields" in sys.modules else _folder()
+        )
+        served = sorted(path.name.split("-")[1] for path in package.glob("_native.cpython-*"))
+        here = f"{sys.version_info.major}.{sys.version_info.minor}"
+        which = ", ".join(f"{tag[0]}.{tag[1:]}" for tag in served) or "none"
+        return UserError(
+            "This build has no module for Python {here} (it has: {which}). Take a build for this Blender",
+            here=here,
+            which=which,
+        )
+    return UserError(f"The native library lacks {{module}}. {ADVICE}", module=error.name)
+
+
+def _folder():
+    spec = importlib.util.find_spec("arapfields")
+    return Path(spec.origin).parent if spec and spec.origin else Path()
+
+
+def report():
+    """Lines about the library and the machine, for the preferences and for bug reports."""
+    lines = [f"Python {platform.python_version()}, {platform.system()} {platform.machine()}"]
+    if problem():
+        return [*lines, str(problem())]
+    native = library()
+    lines.append(f"arapfields {native.__version__} in {Path(native.__file__).parent}")
+    lines.append(f"{native.thread_count()} threads, kernels for {native.simd_level()}")
+    lines.append(native.device_report())
+    return lines

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Empties as handles: rest boxes kept in the source's coordinates, motions read from where they are now."""
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+
+from ..blender import mesh_arrays, vertex_groups
+from ..blender.object_references import settings_of
+from ..core.errors import UserError
+from ..core.geometry.handles import box_matrix, solve_handle
+from ..core.geometry.spaces import transform
+from ..core.runtime.coroutines import finished
+from ..names import HANDLE_SUFFIX
+
+
+def matrix_of(item):
+    return np.array(item.matrix_world, dtype=np.float64)
+
+
+def box_now(empty):
+    """The cube [-1, 1]³ → world, of an Empty where it is now."""
+    return box_matrix(matrix_of(empty), empty.empty_display_size)
+
+
+def rest_box(source, entry):
+    """The cube [-1, 1]³ → world, of a handle's rest box; it goes where the source goes."""
+    return matrix_of(source) @ np.array(entry.rest, dtype=np.float64).reshape(4, 4)
+
+
+def store_rest(source, entry):
+    """Makes where the handle's Empty is now its rest pose."""
+    relative = np.linalg.inv(matrix_of(source)) @ box_now(entry.empty)
+    entry.rest = relative.ravel()
+
+
+def used(source):
+    """The handles whose Empties still exist."""
+    return [entry for entry in settings_of(source).handles if entry.empty is not None]
+
+
+def find(source, empty):
+    """Index of the Empty's handle in the source's list, or -1."""
+    handles = settings_of(source).handles
+    return next((index for index, entry in enumerate(handles) if entry.empty == empty), -1)
+
+
+def group_names(source):
+    """The vertex groups that the source's handles hold."""
+    return [entry.group for entry in used(source) if entry.kind == "GROUP"]
+
+
+def solve_handles(source, space, weights=None):
+    """All handles of a source as the solver wants them; UserError when there is none.
+
+    `weights` are those of the vertex groups by name; without them, groups say only where they go.
+    """
+    found = []
+    for entry in used(source):
+        where = rest_box(source, entry), box_now(entry.empty)
+        held = weights[entry.group] if weights and entry.kind == "GROUP" else None
+        further = {"weights": held, "weight": entry.weight}
+        found.append(solve_handle(entry.empty.name, entry.kind, *where, space, **further))
+    if not found:
+        raise UserError("{name} has no handle; add one in the panel's Handles section", name=source.name)
+    return found
+
+
+PALETTE = [(0.27, 0.55, 1.0), (1.0, 0.42, 0.30), (0.35, 0.80, 0.40), (0.85, 0.45, 0.90), (1.0, 0.80, 0.25)]
+SHAPES = {"CUBE": "CUBE", "POINT": "SPHERE", "GROUP": "ARROWS"}
+
+
+def add(source, empty, kind="CUBE"):
+    """Turns an Empty into a handle of the source, at rest where it is; one it was already is only reset."""
+    if empty.empty_display_type == "IMAGE":
+        raise UserError("{name} shows an image; take another kind of Empty", name=empty.name)
+    if abs(np.linalg.det(box_now(empty)[:3, :3])) == 0:
+        raise UserError("{name} is flat; give it a size and a scale other than zero", name=empty.name)
+    ours = settings_of(source)
+    owner = settings_of(empty).handle_of
+    if owner is not None and owner != source:
+        remove(owner, find(owner, empty))
+    index = find(source, empty)
+    if index < 0:
+        index = len(ours.handles)
+        ours.handles.add()
+    entry = ours.handles[index]
+    entry.empty, entry.kind = empty, kind
+    entry.colour = PALETTE[index % len(PALETTE)]
+    settings_of(empty).handle_of = source
+    empty.empty_display_type = SHAPES[kind]
+    store_rest(source, entry)
+    ours.active_handle = index
+    return entry
+
+
+def make_empty(context, source, matrix, size):
+    """A new cube Empty beside the source in its collection."""
+    empty = bpy.data.objects.new(f"{source.name}{HANDLE_SUFFIX}", None)
+    empty.empty_display_type, empty.empty_display_size = "CUBE", size
+    home = next((c for c in source.users_collection if c in editable(context)), context.collection)
+    home.objects.link(empty)
+    empty.matrix_world = matrix
+    context.view_layer.update()
+    return empty
+
+
+def editable(context):
+    return [context.scene.collection, *context.scene.collection.children_recursive]
+
+
+PLACES = (
+    ("AUTO", "Selected Empties", "The selected Empties; where none is selected, a new one at the 3D cursor"),
+    ("CURSOR", "3D Cursor", "A new box at the 3D cursor"),
+    ("SELECTION", "Selected Vertices", "A new box around the mesh's selected vertices"),
+)
+
+
+def new_empty(context, source, kind, group, place):
+    """A new Empty: about the selected vertices, amid the vertex group, or at the 3D cursor."""
+    corners = transform(matrix_of(source), np.array(source.bound_box))
+    size = float(np.ptp(corners, axis=0).max()) / 6 or 1.0
+    if place == "SELECTION":
+        return make_empty(context, source, Matrix(selection_box(source, size).tolist()), 1.0)
+    where = context.scene.cursor.location
+    if kind == "GROUP":
+        weights = finished(vertex_groups.read_weights(context, source, [group]))[group]
+        with mesh_arrays.evaluated_mesh(context, source) as mesh:
+            middle = np.average(mesh_arrays.positions(mesh), axis=0, weights=weights)
+        where = source.matrix_world @ Vector(middle)
+    return make_empty(context, source, Matrix.Translation(where), size)
+
+
+def selection_box(source, size):
+    """(4, 4) the cube [-1, 1]³ → world, of the box along the source's axes around its selected vertices."""
+    if source.mode == "EDIT":
+        source.update_from_editmode()
+    mesh = source.data
+    chosen = np.empty(len(mesh.vertices), dtype=bool)
+    mesh.vertices.foreach_get("select", chosen)
+    if not chosen.any():
+        raise UserError("{name} has no selected vertices", name=source.name)
+    points = mesh_arrays.positions(mesh)[chosen]
+    low, high = points.min(axis=0), points.max(axis=0)
+    world = matrix_of(source)
+    scales = np.linalg.norm(world[:3, :3], axis=0)
+    least = 0.1 * size / np.where(scales > 0, scales, 1.0)  # a single vertex still makes a box
+    box = np.eye(4)
+    box[:3, :3] = np.diag(np.maximum(1.05 * (high - low) / 2, least))
+    box[:3, 3] = (low + high) / 2
+    return world @ box
+
+
+def mirror(context, source, entry, axis):
+    """A new handle like this one on the other side of the source's axis (0, 1 or 2)."""
+    flip = np.eye(4)
+    flip[axis, axis] = -1.0
+    world = matrix_of(source)
+    group = bpy.utils.flip_name(entry.group) if entry.kind == "GROUP" else ""
+    if group and group not in source.vertex_groups:
+        raise UserError("{name} has no vertex group {group}", name=source.name, group=group)
+    rest = flip @ np.array(entry.rest, dtype=np.float64).reshape(4, 4) @ flip
+    now = flip @ np.linalg.inv(world) @ matrix_of(entry.empty) @ flip
+    name, size = entry.empty.name, entry.empty.empty_display_size
+    flipped = bpy.utils.flip_name(name)
+    weight, kind = entry.weight, entry.kind
+    empty = make_empty(context, source, Matrix((world @ now).tolist()), size)
+    empty.name = flipped if flipped != name else f"{name}_mirrored"
+    made = add(source, empty, kind)
+    made.rest, made.group, made.weight = rest.ravel(), group, weight
+    return made
+
+
+def reset(source, entry):
+    """Moves a handle's Empty back to its rest pose."""
+    size = entry.empty.empty_display_size or 1.0
+    matrix = rest_box(source, entry) @ np.diag([1 / size, 1 / size, 1 / size, 1.0])
+    entry.empty.matrix_world = Matrix(matrix.tolist())
+
+
+def remove(source, index):
+    """Takes a handle off the source's list; its Empty stays as an ordinary one."""
+    ours = settings_of(source)
+    empty = ours.handles[index].empty
+    if empty is not None:
+        settings_of(empty).handle_of = None
+    ours.handles.remove(index)
+    ours.active_handle = max(0, min(ours.active_handle, len(ours.handles) - 1))

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+
+from ..blender import object_references
+from ..blender.language import translated
+from ..core.errors import UserError
+from ..core.runtime import native
+from ..names import Op
+from . import counts, empties
+from .properties import KINDS
+
+
+class HandleOperator:
+    """Mixin: works on the handles of the panel's source."""
+
+    bl_options = {"REGISTER", "UNDO"}
+    needs_handle = True
+    in_edit_mode = False
+
+    @classmethod
+    def poll(cls, context):
+        source = object_references.source_of(context)
+        reason = native.problem() or object_references.refusal(source, cls.in_edit_mode)
+        if not reason and cls.needs_handle and not object_references.settings_of(source).handles:
+            reason = "The object has no handle"
+        if reason:
+            cls.poll_message_set(translated(reason))
+        return not reason
+
+    def execute(self, context):
+        context.view_layer.update()
+        try:
+            self.report({"INFO"}, self.change(context, object_references.source_of(context)))
+        except UserError as error:
+            self.report({"ERROR"}, translated(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+def chosen_entries(context, source):
+    """The handles whose Empties are selected, or the one chosen in the list."""
+    ours = object_references.settings_of(source)
+    selected = [entry for entry in empties.used(source) if entry.empty in context.selected_objects]
+    if selected:
+        return selected
+    index = ours.active_handle
+    return [ours.handles[index]] if 0 <= index < len(ours.handles) else []
+
+
+class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
+    """Make the selected Empties handles of the object, or make a new box at the cursor or around vertices"""
+
+    bl_idname = Op.ADD_HANDLE
+    bl_label = "Add Handle"
+    needs_handle = False
+    in_edit_mode = True
+
+    kind: bpy.props.EnumProperty(items=KINDS, name="Kind", description="What of the surface the handle holds")
+    place: bpy.props.EnumProperty(
+        items=empties.PLACES, name="Place", description="Where the handle is", options={"SKIP_SAVE"}
+    )
+    group: bpy.props.StringProperty(
+        name="Vertex Group", description="The group to hold, for that kind; empty for the object's active one"
+    )
+
+    def change(self, context, source):
+        if source.library is not None:
+            raise UserError(
+                "{name} is linked from another file; make it local to give it handles", name=source.name
+            )
+        group = self.group or (source.vertex_groups.active.name if source.vertex_groups else "")
+        if self.kind == "GROUP" and not group:
+            raise UserError("{name} has no vertex group", name=source.name)
+        selected = [item for item in context.selected_objects if item.type == "EMPTY"]
+        if not selected or self.place != "AUTO" or source.mode == "EDIT":
+            selected = [empties.new_empty(context, source, self.kind, group, self.place)]
+        for empty in selected:
+            entry = empties.add(source, empty, self.kind)
+            entry.group = group if self.kind == "GROUP" else ""
+        counts.count_inside(context, source)
+        return translated("{count} handles added to {name}", count=len(selected), name=source.name)
+
+
+class ARAPFIELDS_OT_mirror_handle(HandleOperator, bpy.types.Operator):
+    """Make handles like the selected ones on the other side of the object"""
+
+    bl_idname = Op.MIRROR_HANDLE
+    bl_label = "Mirror Handle"
+
+    axis: bpy.props.EnumProperty(
+        items=[(axis, axis, f"Across the object's {axis} axis") for axis in "XYZ"],
+        name="Axis",
+        description="Axis of the object across which to mirror",
+    )
+
+    def change(self, context, source):
+        entries = [entry.empty for entry in chosen_entries(context, source) if entry.empty is not None]
+        for empty in entries:
+            entry = object_references.settings_of(source).handles[empties.find(source, empty)]
+            empties.mirror(context, source, entry, "XYZ".index(self.axis))
+        counts.count_inside(context, source)
+        return translated("{count} handles mirrored", count=len(entries))
+
+
+class ARAPFIELDS_OT_set_rest(HandleOperator, bpy.types.Operator):
+    """Make where the selected handles are now their rest pose (all handles with `all`)"""
+
+    bl_idname = Op.SET_REST
+    bl_label = "Set Rest Pose"
+
+    all: bpy.props.BoolProperty(name="All", description="Every handle of the object, selected or not")
+
+    def change(self, context, source):
+        entries = empties.used(source) if self.all else chosen_entries(context, source)
+        for entry in entries:
+            if entry.empty is not None:
+                empties.store_rest(source, entry)
+        counts.count_inside(context, source)
+        return translated("{count} rest poses stored", count=len(entries))
+
+
+class ARAPFIELDS_OT_reset_handle(HandleOperator, bpy.types.Operator):
+    """Move the selected handles back to their rest pose (all handles with `all`)"""
+
+    bl_idname = Op.RESET_HANDLE
+    bl_label = "Reset to Rest"
+
+    all: bpy.props.BoolProperty(name="All", description="Every handle of the object, selected or not")
+
+    def change(self, context, source):
+        entries = empties.used(source) if self.all else chosen_entries(context, source)
+        for entry in entries:
+            if entry.empty is not None:
+                empties.reset(source, entry)
+        return translated("{count} handles moved back", count=len(entries))
+
+
+class ARAPFIELDS_OT_remove_handle(HandleOperator, bpy.types.Operator):
+    """Take the selected handles off the list (or the one chosen in it); with `delete`, their Empties too"""
+
+    bl_idname = Op.REMOVE_HANDLE
+    bl_label = "Remove Handle"
+
+    delete: bpy.props.BoolProperty(name="Delete Empties", description="Delete the Empties as well")
+
+    def change(self, context, source):
+        ours = object_references.settings_of(source)
+        rows = [index for index, entry in enumerate(ours.handles) if entry in chosen_entries(context, source)]
+        for index in reversed(rows):
+            empty = ours.handles[index].empty
+            empties.remove(source, index)
+            if self.delete and empty is not None:
+                bpy.data.objects.remove(empty)
+        return translated("{count} handles removed", count=len(rows))
+
+
+CLASSES = [
+    ARAPFIELDS_OT_add_handle,
+    ARAPFIELDS_OT_mirror_handle,
+    ARAPFIELDS_OT_set_rest,
+    ARAPFIELDS_OT_reset_handle,
+    ARAPFIELDS_OT_remove_handle,
+]

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+
+from ..blender.language import translated
+from ..blender.section import Section
+from ..names import Op
+
+ICONS = {"CUBE": "CUBE", "POINT": "DOT", "GROUP": "GROUP_VERTEX"}
+
+
+class ARAPFIELDS_UL_handles(bpy.types.UIList):
+    def draw_item(self, context, layout, data, item, icon, active_data, active_propname, index):
+        row = layout.row(align=True)
+        if item.empty is None:
+            row.label(text="(deleted)", icon="ERROR")
+            return
+        swatch = row.row()
+        swatch.ui_units_x = 0.8
+        swatch.prop(item, "colour", text="")
+        row.prop(item.empty, "name", text="", emboss=False, icon=ICONS[item.kind])
+        if item.inside >= 0:
+            row.label(
+                text=f"{item.inside:,}" if item.inside else translated("empty"),
+                icon="NONE" if item.inside else "ERROR",
+                translate=False,
+            )
+
+
+class ARAPFIELDS_MT_add_handle(bpy.types.Menu):
+    """Ways to make a handle"""
+
+    bl_label = "Add Handle"
+
+    def draw(self, context):
+        layout = self.layout
+        for kind, place, text, icon in (
+            ("CUBE", "AUTO", "From Selected Empties", "EMPTY_DATA"),
+            ("CUBE", "CURSOR", "At 3D Cursor", "PIVOT_CURSOR"),
+            ("CUBE", "SELECTION", "Around Selected Vertices", "VERTEXSEL"),
+            ("POINT", "CURSOR", "Point at 3D Cursor", "DOT"),
+            ("GROUP", "AUTO", "From Active Vertex Group", "GROUP_VERTEX"),
+        ):
+            operator = layout.operator(Op.ADD_HANDLE, text=text, icon=icon)
+            operator.kind, operator.place = kind, place
+
+
+class ARAPFIELDS_MT_more_handle(bpy.types.Menu):
+    """What else can be done with handles"""
+
+    bl_label = "More"
+
+    def draw(self, context):
+        layout = self.layout
+        layout.operator_menu_enum(Op.MIRROR_HANDLE, "axis", icon="MOD_MIRROR")
+        layout.operator(Op.SET_REST, text="Set Rest Pose of All", icon="PINNED").all = True
+        layout.operator(Op.RESET_HANDLE, text="Reset All to Rest", icon="LOOP_BACK").all = True
+        layout.separator()
+        layout.operator(Op.REMOVE_HANDLE, text="Delete with Empties", icon="TRASH").delete = True
+
+
+class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
+    bl_label = "Handles"
+    bl_idname = "ARAPFIELDS_PT_handles"
+    bl_order = 2
+
+    def fill(self, context, source, ours):
+        layout = self.layout
+        row = layout.row()
+        row.template_list("ARAPFIELDS_UL_handles", "", ours, "handles", ours, "active_handle", rows=4)
+        column = row.column(align=True)
+        column.menu("ARAPFIELDS_MT_add_handle", icon="ADD", text="")
+        column.operator(Op.REMOVE_HANDLE, icon="REMOVE", text="")
+        column.separator()
+        column.menu("ARAPFIELDS_MT_more_handle", icon="DOWNARROW_HLT", text="")
+        row = layout.row(align=True)
+        row.operator(Op.SET_REST, icon="PINNED")
+        row.operator(Op.RESET_HANDLE, icon="LOOP_BACK")
+        if 0 <= ours.active_handle < len(ours.handles):
+            entry = ours.handles[ours.active_handle]
+            layout.prop(entry, "weight")
+            if entry.kind == "GROUP":
+                layout.prop_search(entry, "group", source, "vertex_groups")
+
+
+CLASSES = [
+    ARAPFIELDS_UL_handles,
+    ARAPFIELDS_MT_add_handle,
+    ARAPFIELDS_MT_more_handle,
+    ARAPFIELDS_PT_handles,
+]

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+
+from ..blender.language import translated
+from ..blender.section import Section, wrapped
+from ..core.runtime import jobs
+from ..names import Op
+
+ICONS = {"INFO": "CHECKMARK", "WARNING": "ERROR", "ERROR": "CANCEL"}
+
+
+def draw_progress(layout, job):
+    """The running job, at the top of the panel where it is seen: how far, what, how long, and the way out."""
+    box = layout.box()
+    box.progress(factor=job.fraction, text=f"{translated(job.title)} {job.fraction:.0%}")
+    wrapped(box, job.message)
+    left = job.remaining
+    text = f"{job.elapsed:.0f} s"
+    if left is not None:
+        text += translated(", about {seconds} s left", seconds=f"{left:.0f}")
+    box.label(text=text, translate=False)
+    box.operator(Op.CANCEL, icon="X")
+
+
+class ARAPFIELDS_PT_status(Section, bpy.types.Panel):
+    bl_label = "Status"
+    bl_idname = "ARAPFIELDS_PT_status"
+    bl_order = 6
+    needs_source = False
+
+    def fill(self, context, source, ours):
+        layout = self.layout
+        job = jobs.running()
+        if job is not None:
+            layout.label(
+                text=translated("{job} is running (see the top)", job=translated(job.title)), icon="TIME"
+            )
+        for level, text in jobs.notes():
+            wrapped(layout, text, icon=ICONS[level])
+        if job is None and not jobs.notes():
+            layout.label(text="Ready")
+
+
+CLASSES = [ARAPFIELDS_PT_status]

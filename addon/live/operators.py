@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+
+from ..blender.language import translated
+from ..blender.object_references import refusal, source_of
+from ..core.errors import UserError
+from ..core.runtime import jobs, native
+from ..handles import empties
+from ..jobs.job_operator import busy
+from ..names import Op
+from . import sessions
+
+KINDS = (
+    ("DEFORM", "Deform", "The shape follows its handles"),
+    ("STYLIZE", "Stylize", "The shape follows the style's settings, and its handles where the style does"),
+)
+
+
+class ARAPFIELDS_OT_live(bpy.types.Operator):
+    """Let a result follow the handles or the style while they change; again to stop, which takes it away"""
+
+    bl_idname = Op.LIVE
+    bl_label = "Live"
+    bl_options = {"UNDO"}
+
+    kind: bpy.props.EnumProperty(
+        items=KINDS, name="Kind", description="What the shape follows", options={"SKIP_SAVE"}
+    )
+
+    @classmethod
+    def poll(cls, context):
+        source = source_of(context)
+        reason = native.problem() or refusal(source) or busy()
+        if reason:
+            cls.poll_message_set(translated(reason))
+        return not reason
+
+    def execute(self, context):
+        return self.toggle(context, sessions.WAIT)
+
+    def invoke(self, context, event):
+        return self.toggle(context, sessions.WAIT if bpy.app.background else 0.0)
+
+    def toggle(self, context, wait):
+        """`wait`: seconds at most for the first shape; a window does not wait."""
+        source = source_of(context)
+        if sessions.is_live(source, self.kind):
+            sessions.end(context, source)
+            return {"FINISHED"}
+        try:
+            if self.kind == "DEFORM" and not empties.used(source):
+                raise UserError(
+                    "{name} has no handle; add one in the panel's Handles section", name=source.name
+                )
+            context.view_layer.update()
+            sessions.begin(context, source, self.kind)
+        except (UserError, ValueError) as error:
+            self.report({"ERROR"}, translated(error))
+            return {"CANCELLED"}
+        if wait:
+            sessions.update(context, wait)
+            if not sessions.is_live(source):
+                self.report({"ERROR"}, jobs.notes()[-1][1])
+                return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class ARAPFIELDS_OT_live_keep(bpy.types.Operator):
+    """End live mode and keep the shape as an ordinary result"""
+
+    bl_idname = Op.LIVE_KEEP
+    bl_label = "Keep Shape"
+    bl_options = {"UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if not sessions.is_live(source_of(context)):
+            cls.poll_message_set(translated("The object is not live"))
+            return False
+        return True
+
+    def execute(self, context):
+        source = source_of(context)
+        try:
+            item = sessions.end(context, source, keep=True)
+        except UserError as error:
+            self.report({"ERROR"}, translated(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, translated("{name} kept", name=item.name))
+        return {"FINISHED"}
+
+
+CLASSES = [ARAPFIELDS_OT_live, ARAPFIELDS_OT_live_keep]

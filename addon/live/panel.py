@@ -1,0 +1,14 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The buttons of live mode, which the sections of deforming and stylizing show."""
+
+from ..names import Op
+from . import sessions
+
+
+def live_buttons(layout, source, kind):
+    """Live on and off, and while it is on a way to keep the shape."""
+    on = sessions.is_live(source, kind)
+    row = layout.row(align=True)
+    row.operator(Op.LIVE, icon="PAUSE" if on else "PLAY", depress=on).kind = kind
+    if on:
+        row.operator(Op.LIVE_KEEP, icon="CHECKMARK")

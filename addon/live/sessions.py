@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live mode: while handles move or a style's sliders change, results follow; off, all is as it was."""
+
+import contextlib
+
+import bpy
+
+from ..blender.language import translated
+from ..blender.object_references import settings_of
+from ..core.errors import UserError
+from ..core.runtime import jobs
+from . import live_object
+from .session import Changed, Session
+
+TICK = 1 / 60  # seconds between looks at the handles
+WAIT = 30.0  # seconds at most that a script waits for the first shape
+_sessions = {}  # session_uid of the source → Session
+
+
+def is_live(source, kind=None):
+    session = _sessions.get(source.session_uid) if source is not None else None
+    return session is not None and kind in (None, session.kind)
+
+
+def begin(context, source, kind="DEFORM"):
+    """Makes the source live; UserError when that cannot be. The shape appears when the worker has it."""
+    if source.session_uid in _sessions:
+        _sessions.pop(source.session_uid).stop()
+    session = Session(context, source, kind)
+    try:
+        session.advance()  # a small mesh is read at once
+    except UserError:
+        live_object.drop(source)
+        raise
+    _sessions[source.session_uid] = session
+    if not bpy.app.timers.is_registered(tick):
+        bpy.app.timers.register(tick, persistent=True)
+
+
+def end(context, source, keep=False):
+    """Ends live mode: the result goes and the source looks as before; or the result stays (`keep`)."""
+    session = _sessions.pop(source.session_uid, None)
+    if session is not None:
+        session.stop()
+        session.show_last()
+    if keep:
+        return live_object.keep(context, source, session.kind if session else "DEFORM")
+    live_object.drop(source)
+    return None
+
+
+def stop_all(*_):
+    """Ends every worker; what is in the file stays as it is."""
+    for session in _sessions.values():
+        session.stop()
+    _sessions.clear()
+
+
+def update(context, wait=0.0, refined=False):
+    """Looks at every live source once, waiting at most so many seconds for the shapes to follow."""
+    for uid, session in list(_sessions.items()):
+        try:
+            session.look(context)
+            if wait:
+                session.wait(wait, refined)
+            session.show()
+        except Changed:
+            restart(context, uid, session)
+        except (UserError, ValueError, ReferenceError) as error:
+            _sessions.pop(uid, None)
+            session.stop()
+            told = translated("{error}; live mode ended", error=translated(error))
+            jobs.note("ERROR", f"{session.source.name}: {told}")
+            with contextlib.suppress(UserError, ReferenceError):
+                live_object.drop(session.source.get())
+
+
+def restart(context, uid, session):
+    """Handles were added or removed: the solver is set up anew, the result stays the same object."""
+    source = session.source.get()
+    try:
+        begin(context, source, session.kind)
+    except UserError:  # the last handle was removed
+        _sessions.pop(uid, None)
+        live_object.drop(source)
+
+
+def tick():
+    """Blender calls it between redraws; ends when nothing is live."""
+    if not _sessions:
+        return None
+    update(bpy.context)
+    return TICK
+
+
+@bpy.app.handlers.persistent
+def before_load(*_):
+    stop_all()
+
+
+@bpy.app.handlers.persistent
+def recover(*_):
+    """After a file is loaded or a step undone: live results that no session moves any more are taken away."""
+    for source in bpy.data.objects:
+        if settings_of(source).live_display and not is_live(source):
+            with contextlib.suppress(UserError, RuntimeError, AttributeError):
+                live_object.drop(source)
+
+
+HANDLERS = (("load_pre", before_load), ("load_post", recover), ("undo_post", recover), ("redo_post", recover))
+
+
+def register():
+    for name, function in HANDLERS:
+        getattr(bpy.app.handlers, name).append(function)
+
+
+def unregister():
+    for uid in list(_sessions):
+        session = _sessions.pop(uid)
+        session.stop()
+        with contextlib.suppress(UserError, ReferenceError, AttributeError):
+            live_object.drop(session.source.get())
+    if bpy.app.timers.is_registered(tick):
+        bpy.app.timers.unregister(tick)
+    for name, function in HANDLERS:
+        with contextlib.suppress(ValueError):
+            getattr(bpy.app.handlers, name).remove(function)

@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+
+from ..blender.section import Section
+from ..names import Op
+
+
+class ARAPFIELDS_PT_result(Section, bpy.types.Panel):
+    bl_label = "Result"
+    bl_idname = "ARAPFIELDS_PT_result"
+    bl_order = 5
+
+    def fill(self, context, source, ours):
+        layout = self.layout
+        layout.prop(ours, "resolution")
+        layout.prop(ours, "normals")
+        layout.operator(Op.EXTRACT, icon="OUTLINER_OB_SURFACE")
+        for entry in ours.results:
+            if entry.item is not None:
+                row = layout.row()
+                row.prop(entry.item, "name", text="", icon="OBJECT_DATA")
+                row.prop(entry.item, "hide_viewport", text="", emboss=False)
+
+
+CLASSES = [ARAPFIELDS_PT_result]

@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Result objects: made once for a source and kind, updated in place by later runs."""
+
+import json
+
+import bpy
+import numpy as np
+
+from ..blender import mesh_arrays
+from ..blender.object_references import settings_of
+from ..core.errors import UserError
+from ..names import REPORT, RESULT_SUFFIX, RESULTS, WARP_KEY
+
+
+def collection(context):
+    """The scene's collection for results; each scene has its own."""
+    for child in context.scene.collection.children:
+        if child.name.split(".")[0] == RESULTS and child.library is None:
+            return child
+    made = bpy.data.collections.new(RESULTS)
+    context.scene.collection.children.link(made)
+    return made
+
+
+def discard(item):
+    """Takes a result away with all that was made for it: mesh, keys' animation, an empty collection."""
+    mesh, homes = item.data, list(item.users_collection)
+    keys = mesh.shape_keys
+    action = keys.animation_data.action if keys is not None and keys.animation_data else None
+    bpy.data.objects.remove(item)
+    if mesh.users == 0:
+        bpy.data.meshes.remove(mesh)
+        if action is not None and action.users == 0:
+            bpy.data.actions.remove(action)
+    for home in homes:
+        if home.name.split(".")[0] == RESULTS and not home.all_objects and not home.children:
+            bpy.data.collections.remove(home)
+
+
+def existing(context, source, kind, output):
+    """The result that an earlier run made, where it can be written to."""
+    for entry in settings_of(source).results:
+        item = entry.item
+        if entry.kind == kind and entry.output == output and item is not None:
+            if item.mode == "EDIT" or item.library or context.scene.objects.get(item.name) != item:
+                continue
+            return item
+    return None
+
+
+def register(source, kind, output, item):
+    entries = settings_of(source).results
+    for index in reversed(range(len(entries))):
+        if entries[index].item is None or (entries[index].kind == kind and entries[index].output == output):
+            entries.remove(index)
+    entry = entries.add()
+    entry.kind, entry.output, entry.item = kind, output, item
+    settings_of(item).result_of = source
+
+
+def show(context, source, kind, output, mesh, report, select=True):
+    """Puts the mesh on the source's result object of that kind, exactly where the source is."""
+    item = existing(context, source, kind, output)
+    mesh.name = f"{source.name}{RESULT_SUFFIX[kind]}"
+    if item is None:
+        item = bpy.data.objects.new(f"{source.name}{RESULT_SUFFIX[kind]}", mesh)
+        collection(context).objects.link(item)
+    else:
+        old, item.data = item.data, mesh
+        if old.users == 0:
+            bpy.data.meshes.remove(old)
+    register(source, kind, output, item)
+    place(context, source, item)
+    item[REPORT] = json.dumps(report)
+    if select and context.view_layer.objects.active == source:
+        select_only(context, item)
+    return item
+
+
+CHANNELS = (
+    "rotation_mode",
+    "location",
+    "rotation_euler",
+    "rotation_quaternion",
+    "rotation_axis_angle",
+    "scale",
+)
+DELTAS = ("delta_location", "delta_rotation_euler", "delta_rotation_quaternion", "delta_scale")
+
+
+def place(context, source, item):
+    """Puts a result exactly where its source is: under the same parent, with the same channels.
+
+    A matrix alone would lose the shear of unevenly scaled parents. Only where constraints or the like
+    move the source beyond its channels, the matrix is taken.
+    """
+    item.parent, item.parent_type, item.parent_bone = source.parent, source.parent_type, source.parent_bone
+    if source.parent_type in ("VERTEX", "VERTEX_3"):
+        item.parent_vertices = source.parent_vertices
+    item.matrix_parent_inverse = source.matrix_parent_inverse
+    for channel in (*CHANNELS, *DELTAS):
+        setattr(item, channel, getattr(source, channel))
+    context.view_layer.update()
+    if not np.allclose(item.matrix_world, source.matrix_world, rtol=1e-6, atol=1e-6):
+        item.parent = None
+        item.matrix_world = source.matrix_world.copy()
+        context.view_layer.update()
+
+
+def select_only(context, item):
+    if context.mode != "OBJECT":
+        return
+    for other in context.selected_objects:
+        other.select_set(False)
+    item.select_set(True)
+    context.view_layer.objects.active = item
+
+
+def surface_mesh(source, vertices, topology):
+    """A mesh of the implicit surface, in local coordinates, with the source's materials."""
+    mesh = mesh_arrays.new_mesh(source.name, vertices, topology)
+    for material in source.data.materials:
+        mesh.materials.append(material)
+    if settings_of(source).normals == "FLAT":
+        mesh.shade_flat()
+    return mesh
+
+
+def warp_mesh(context, source, before, after):
+    """A copy of the source's mesh whose vertices, (n, 3) `before` as shown, lie at `after`.
+
+    All else on the mesh is kept. Where modifiers changed the vertices, the copy is of the mesh as shown.
+    """
+    copied = source.data.copy()
+    if keeps_vertices(source, copied, before):
+        if copied.shape_keys is None:
+            mesh_arrays.set_positions(copied, after)
+        return copied
+    bpy.data.meshes.remove(copied)
+    applied = shown_mesh(context, source, len(after))
+    mesh_arrays.set_positions(applied, after)
+    return applied
+
+
+def shown_mesh(context, source, count):
+    """A mesh of its own of what is shown of the source: modifiers and shape keys applied."""
+    applied = mesh_arrays.shown_copy(context, source)
+    if len(applied.vertices) != count:
+        bpy.data.meshes.remove(applied)
+        raise UserError("{name} changed while it was worked on; run again", name=source.name)
+    return applied
+
+
+def add_frame(item, frames, number, shape):
+    """A shape key for one of the frames, at full value there and at none on its neighbours."""
+    if number == 0:
+        item.shape_key_add(name="Basis", from_mix=False)
+    key = item.shape_key_add(name=f"frame {frames[number]}", from_mix=False)
+    key.data.foreach_set("co", np.ascontiguousarray(shape, dtype=np.float32).ravel())
+    for frame in frames[max(0, number - 1) : number + 2]:
+        key.value = float(frame == frames[number])
+        key.keyframe_insert("value", frame=frame)
+
+
+def keeps_vertices(source, mesh, before):
+    """Whether the object is shown with just the vertices of its own mesh: no modifier is at work."""
+    shown = [modifier for modifier in source.modifiers if modifier.show_viewport]
+    keys = mesh.shape_keys
+    usable = keys is None or (keys.use_relative and not source.show_only_shape_key)
+    return not shown and usable and len(mesh.vertices) == len(before)
+
+
+def add_warp_key(item, before, after):
+    """On a mesh with shape keys the motion is a key of its own: every other key and slider stays as it is."""
+    keys = item.data.shape_keys
+    old = keys.key_blocks.get(WARP_KEY)
+    if old is not None:
+        item.shape_key_remove(old)
+    key = item.shape_key_add(name=WARP_KEY, from_mix=False)
+    basis = np.empty(3 * len(before), dtype=np.float32)
+    key.relative_key.data.foreach_get("co", basis)
+    moved = basis.reshape(-1, 3) + (after - before)
+    key.data.foreach_set("co", np.ascontiguousarray(moved, dtype=np.float32).ravel())
+    key.value = 1.0
+    item.data.update()

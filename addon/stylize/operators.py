@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+
+from ..blender import vertex_groups
+from ..blender.language import translated
+from ..blender.object_references import refusal, settings_of, source_of
+from ..blender.presets import preset_classes
+from ..blender.settings import annotations, in_force, machine_options
+from ..core.geometry.spaces import space_of
+from ..core.runtime import native
+from ..core.settings.parameters import native_options
+from ..core.settings.styles import STYLIZE
+from ..deform.solve_job import plan_move
+from ..handles import empties
+from ..jobs.job_operator import JobOperator
+from ..names import Op
+from ..properties.item import output, resolution, surface, target
+from ..properties.settings import frame, style
+from ..surface.source_surface import known
+from . import preference
+
+
+class ARAPFIELDS_OT_stylize(JobOperator, bpy.types.Operator):
+    """Turn the surface towards the faces of a solid, as rigidly as possible; the result is a new object"""
+
+    bl_idname = Op.STYLIZE
+    bl_label = "Stylize"
+    bl_options = {"UNDO"}
+    title = "Stylize"
+
+    __annotations__ = {
+        **annotations(STYLIZE, options={"SKIP_SAVE"}),
+        "style": style(options={"SKIP_SAVE"}),
+        "frame": frame(options={"SKIP_SAVE"}),
+        "output": output(options={"SKIP_SAVE"}),
+        "surface": surface(options={"SKIP_SAVE"}),
+        "target": target(options={"SKIP_SAVE"}),
+        "resolution": resolution(options={"SKIP_SAVE"}),
+    }
+
+    def groups_of(self, source):
+        return preference.group_names(source, settings_of(source).stylize)
+
+    def plan(self, context, source, of_groups):
+        context.view_layer.update()
+        ours = settings_of(source).stylize
+        values = in_force(STYLIZE, ours, self)
+        af = native.library()
+        options = af.StylizeOptions(**native_options(values), **known(af.StylizeOptions, machine_options()))
+        space = space_of(source.matrix_world, source.name)
+        style = preference.wanted_style(ours, space, self)
+        wanted = empties.solve_handles(source, space, of_groups) if ours.use_handles else []
+        weights = preference.region_weights(context, source, ours, of_groups)
+
+        def solve(stages, rest, samples):
+            blend = (
+                None if weights is None else vertex_groups.at_points(rest.vertices, weights, samples.points)
+            )
+            return af.stylize(
+                samples,
+                style.directions(af),
+                options,
+                stages.start("Stylizing", 0.5),
+                weights=blend,
+                handles=vertex_groups.native_handles(af, wanted, rest, samples),
+            )
+
+        return plan_move(context, self, source, "STYLIZE", values["samples"], values["seed"], solve)
+
+
+class ARAPFIELDS_OT_set_style(bpy.types.Operator):
+    """Choose this style for the object"""
+
+    bl_idname = Op.SET_STYLE
+    bl_label = "Choose Style"
+    bl_options = {"INTERNAL", "UNDO"}
+
+    style: style()
+
+    @classmethod
+    def poll(cls, context):
+        reason = refusal(source_of(context))
+        if reason:
+            cls.poll_message_set(translated(reason))
+        return not reason
+
+    def execute(self, context):
+        settings_of(source_of(context)).stylize.style = self.style
+        return {"FINISHED"}
+
+
+CLASSES = [
+    ARAPFIELDS_OT_stylize,
+    ARAPFIELDS_OT_set_style,
+    *preset_classes("stylize", "Stylize", STYLIZE, ("style", "frame")),
+]

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a stylization is asked for: preferred normals, their axes, and where on the object it acts."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..blender import mesh_arrays
+from ..blender.settings import chosen
+from ..core.errors import UserError
+from ..core.geometry.spaces import pose
+from ..core.settings.styles import CUSTOM, style_name
+from ..handles import empties
+from ..handles.empties import matrix_of
+
+MOST_NORMALS = 64  # of a custom style; more are no preference
+
+
+@dataclass(frozen=True)
+class Style:
+    """A native style's name or (k, 3) normals, and the (3, 3) turn of them into solve space."""
+
+    normals: str | np.ndarray
+    turn: np.ndarray
+
+    def directions(self, af):
+        """(k, 3) preferred normals in solve space."""
+        plain = af.preferred_normals(self.normals) if isinstance(self.normals, str) else self.normals
+        return plain @ self.turn.T
+
+    def key(self):
+        """Equal for equal styles."""
+        normals = self.normals if isinstance(self.normals, str) else self.normals.tobytes()
+        return normals, self.turn.tobytes()
+
+
+def wanted_style(ours, space, operator=None):
+    """The style of an object's settings (and the operator's arguments, where given)."""
+
+    def setting(name):
+        return chosen(name, ours, operator) if operator is not None else getattr(ours, name)
+
+    which = setting("style")
+    to_solve = pose(space.world_to_solve)[:3, :3]
+    if which in CUSTOM:
+        item = ours.style_object
+        if item is None:
+            raise UserError("choose the object that gives the style its normals")
+        return custom(which, item, to_solve)
+    if setting("frame") == "OBJECT":
+        return Style(style_name(which), np.eye(3))
+    return Style(style_name(which), to_solve @ axes(setting("frame"), ours.frame_object))
+
+
+def axes(which, item):
+    """(3, 3) axes of the style in the world, as columns."""
+    if which == "WORLD":
+        return np.eye(3)
+    if item is None:
+        raise UserError("choose the object along whose axes the style stands")
+    return pose(matrix_of(item))[:3, :3]
+
+
+def custom(which, item, to_solve):
+    if which == "AXES":
+        return Style(np.concatenate([np.eye(3), -np.eye(3)]), to_solve @ pose(matrix_of(item))[:3, :3])
+    if item.type != "MESH" or not len(item.data.polygons):
+        raise UserError("{name} has no faces that could give the style its normals", name=item.name)
+    normals = np.empty(3 * len(item.data.polygons), dtype=np.float32)
+    item.data.polygons.foreach_get("normal", normals)
+    across = np.linalg.inv(matrix_of(item)[:3, :3]).T  # normals transform by the inverse transpose
+    found = normals.reshape(-1, 3).astype(np.float64) @ across.T
+    found = found[np.linalg.norm(found, axis=1) > 0]
+    found = np.unique(np.round(found / np.linalg.norm(found, axis=1, keepdims=True), 3), axis=0)
+    if not 0 < len(found) <= MOST_NORMALS:
+        raise UserError(
+            "{name} has {count} different face normals; from 1 to {most} make a style",
+            name=item.name,
+            count=len(found),
+            most=MOST_NORMALS,
+        )
+    return Style(found / np.linalg.norm(found, axis=1, keepdims=True), to_solve)
+
+
+def group_names(source, ours):
+    """The vertex groups that a stylization asks for."""
+    held = empties.group_names(source) if ours.use_handles else []
+    return [*held, ours.region] if ours.region else held
+
+
+def region_weights(context, source, ours, of_groups):
+    """(n,) weights of the shown vertices: vertex group (one of those by name) times material; None for
+    everywhere."""
+    weights = of_groups[ours.region] if ours.region else None
+    if ours.region_material is not None:
+        held = material_weights(context, source, ours.region_material)
+        weights = held if weights is None else weights * held
+    if weights is not None and not weights.any():
+        raise UserError("the region of {name} holds no vertex", name=source.name)
+    return weights
+
+
+def material_weights(context, source, material):
+    """(n,) 1 at the shown vertices of faces with that material."""
+    slots = [index for index, slot in enumerate(source.material_slots) if slot.material == material]
+    if not slots:
+        raise UserError(
+            "{name} does not use the material {material}", name=source.name, material=material.name
+        )
+    with mesh_arrays.evaluated_mesh(context, source) as mesh:
+        numbers = np.empty(len(mesh.polygons), dtype=np.int32)
+        counts, corners = np.empty_like(numbers), np.empty(len(mesh.loops), dtype=np.int32)
+        mesh.polygons.foreach_get("material_index", numbers)
+        mesh.polygons.foreach_get("loop_total", counts)
+        mesh.loops.foreach_get("vertex_index", corners)
+        weights = np.zeros(len(mesh.vertices))
+    weights[corners[np.repeat(np.isin(numbers, slots), counts)]] = 1.0
+    return weights

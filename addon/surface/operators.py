@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import json
+
+import bpy
+
+from ..blender.language import translated
+from ..blender.object_references import settings_of
+from ..blender.presets import preset_classes
+from ..blender.settings import annotations, chosen, fit_cache
+from ..core.runtime.jobs import Item
+from ..core.settings.fitting import FIT
+from ..jobs.job_operator import JobOperator, busy
+from ..names import Op
+from ..properties.item import resolution
+from ..properties.settings import quality
+from ..results import result_objects
+from . import staleness
+from .source_surface import read_surface
+
+
+class ARAPFIELDS_OT_fit(JobOperator, bpy.types.Operator):
+    """Fit a smooth implicit surface to the active mesh; kept until the mesh or the settings change"""
+
+    bl_idname = Op.FIT
+    bl_label = "Fit Surface"
+    bl_options = {"UNDO"}
+    title = "Fit"
+
+    __annotations__ = {
+        **annotations(FIT, options={"SKIP_SAVE"}),
+        "quality": quality(options={"SKIP_SAVE"}),
+        "again": bpy.props.BoolProperty(
+            name="Again", description="Fit anew even where a fit is in the cache", options={"SKIP_SAVE"}
+        ),
+    }
+
+    def plan(self, context, source, _):
+        surface = read_surface(context, source, self)
+        again = self.again
+
+        def work(stages):
+            return surface.fit(stages, 1.0, again)
+
+        def apply(sdf):
+            source = surface.who.get()
+            staleness.fitted(source, surface)
+            ours = settings_of(source)
+            ours.fit_key = surface.key
+            ours.fit_report = json.dumps(sdf.report)
+            return translated("surface fitted")
+
+        return Item(source.name, work, apply)
+
+
+class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):
+    """Make a mesh of the fitted surface itself, undeformed (fits first where needed)"""
+
+    bl_idname = Op.EXTRACT
+    bl_label = "Extract Surface"
+    bl_options = {"UNDO"}
+    title = "Extract"
+
+    resolution: resolution(options={"SKIP_SAVE"})
+
+    def plan(self, context, source, _):
+        surface = read_surface(context, source)
+        cells = chosen("resolution", settings_of(source), self)
+
+        def work(stages):
+            vertices, topology = surface.extract(stages, cells, 0.8)
+            return surface.space.to_local(vertices), topology
+
+        def apply(made):
+            owner = surface.who.get()
+            report = {"resolution": cells, "vertices": len(made[0]), "triangles": len(made[1])}
+            item = result_objects.show(
+                bpy.context, owner, "EXTRACT", "SURFACE", result_objects.surface_mesh(owner, *made), report
+            )
+            return translated("{name} with {count} triangles", name=item.name, count=f"{len(made[1]):,}")
+
+        return Item(source.name, work, apply)
+
+
+class ARAPFIELDS_OT_clear_cache(bpy.types.Operator):
+    """Delete every fitted surface from disk; they are fitted again when needed"""
+
+    bl_idname = Op.CLEAR_CACHE
+    bl_label = "Clear Fits"
+
+    @classmethod
+    def poll(cls, context):
+        if busy():
+            cls.poll_message_set(translated(busy()))
+        return not busy()
+
+    def execute(self, context):
+        self.report({"INFO"}, translated("{count} fitted surfaces deleted", count=fit_cache().clear()))
+        return {"FINISHED"}
+
+
+CLASSES = [
+    ARAPFIELDS_OT_fit,
+    ARAPFIELDS_OT_extract,
+    ARAPFIELDS_OT_clear_cache,
+    *preset_classes("fit", "Fit", FIT),
+]

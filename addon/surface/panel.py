@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import json
+
+import bpy
+
+from ..blender import object_references
+from ..blender.language import translated
+from ..blender.section import Section, job_button, presets, settings_column, wrapped
+from ..blender.settings import fit_cache
+from ..core.runtime import jobs, native
+from ..core.settings.fitting import FIT
+from ..jobs.panel import draw_progress
+from ..names import Op
+from . import staleness
+
+
+class ARAPFIELDS_PT_source(Section, bpy.types.Panel):
+    bl_label = "Source"
+    bl_idname = "ARAPFIELDS_PT_source"
+    bl_order = 0
+    needs_source = False
+
+    @classmethod
+    def poll(cls, context):
+        return True
+
+    def fill(self, context, source, ours):
+        layout = self.layout
+        if native.problem():
+            wrapped(layout, translated(native.problem()), icon="ERROR")
+            return
+        if jobs.running() is not None:
+            draw_progress(layout, jobs.running())
+        if source is None:
+            layout.label(text="Select a mesh object", icon="INFO")
+            return
+        layout.label(text=source.name, icon="MESH_DATA", translate=False)
+        mesh = source.data
+        counts = {"vertices": f"{len(mesh.vertices):,}", "faces": f"{len(mesh.polygons):,}"}
+        layout.label(text=translated("{vertices} vertices, {faces} faces", **counts), icon="BLANK1")
+        if object_references.refusal(source):
+            wrapped(layout, translated(object_references.refusal(source)), icon="ERROR")
+        for text in remarks(source):
+            wrapped(layout, text, icon="INFO")
+
+
+def remarks(source):
+    """What the user should know about how the source is read."""
+    shown = [modifier for modifier in source.modifiers if modifier.show_viewport]
+    if shown:
+        yield translated("Read with its modifiers applied ({count})", count=len(shown))
+    if source.data.shape_keys:
+        yield translated("Read with its shape keys as they are set")
+    if not len(source.data.polygons) and not shown:
+        yield translated("The mesh has no faces")
+
+
+class ARAPFIELDS_PT_surface(Section, bpy.types.Panel):
+    bl_label = "Implicit Surface"
+    bl_idname = "ARAPFIELDS_PT_surface"
+    bl_order = 1
+
+    def draw_header_preset(self, context):
+        presets(self.layout, "fit")
+
+    def fill(self, context, source, ours):
+        layout = self.layout
+        layout.prop(ours.fit, "quality")
+        settings_column(layout, ours.fit, FIT)
+        job_button(layout, Op.FIT, "MOD_REMESH")
+        if not ours.fit_key:
+            layout.label(text="Not fitted yet", icon="INFO")
+            return
+        kept = fit_cache().path(ours.fit_key).exists()
+        stale = staleness.reason(source)
+        layout.label(
+            text=(stale or "Fit in the cache") if kept else "Fit was cleared",
+            icon="CHECKMARK" if kept and not stale else "ERROR",
+        )
+        for name, value in json.loads(ours.fit_report or "{}").items():
+            if isinstance(value, float) and "error" in name:
+                layout.label(text=f"{name.replace('_', ' ')}: {value:.3g}")
+
+
+CLASSES = [ARAPFIELDS_PT_source, ARAPFIELDS_PT_surface]
