@@ -29,7 +29,7 @@ PUBLISHED_VALUE = 1e-5
 PUBLISHED_GRADIENT = 1e-4
 # A fit's reported mean errors against means over other random points: sampling noise of some thousand points.
 FIT_REPORT = 0.15
-# A live solver at rest against the identity, in the unit cube: rounding times a hundred bumps.
+# A live solver at rest against the identity, in the unit cube: rounding times a hundred centers.
 LIVE_IDENTITY = 1e-8
 # A pose solved again after others, as a share of the shape's length: what the last steps still gain.
 LIVE_DRIFT = 1e-4
@@ -50,7 +50,7 @@ SAME_VERTICES = 1e-6
 # |Φ| at samples of the surface, in cube units.
 ON_SURFACE = 1e-4
 
-TRACKED = 5e-4  # single precision; large coefficients of neighbouring bumps of opposite sign cancel
+TRACKED = 5e-4  # single precision; large coefficients of neighbouring centers of opposite sign cancel
 
 # Energies composed of libtorch's operations against the kernels, both in float64: rounding over the smallest
 # sum of two singular values, which the tests keep above 1e-3.

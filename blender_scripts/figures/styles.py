@@ -14,8 +14,8 @@ SPACING, STRENGTH = 2.1, 0.6
 ENDS = [(-0.5 * SPACING, 0.0, 0.5), ((len(STYLES) + 0.5) * SPACING, 0.0, 0.5)]  # of every row: columns align
 OPTIONS = {
     "samples": 3000,
-    "coarse_bumps": 150,
-    "fine_bumps": 800,
+    "coarse_centers": 150,
+    "fine_centers": 800,
     "bending": 1e-3,
     "steps": 40,
     "tolerance": 3e-4,

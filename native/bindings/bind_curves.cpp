@@ -87,12 +87,13 @@ void bind_curves(py::module_& module) {
 
   OptionsBinding<CurveOptions>(module, "CurveOptions", "Options of deform_curve.")
       .field("bending", &CurveOptions::bending, "Weight λ_bend of the bend, in the curve's square.")
-      .field("smoothness", &CurveOptions::smoothness,
-             "Weight of the second derivatives' mean square at the bumps: keeps the plane tame away from the "
-             "curve.")
+      .field(
+          "smoothness", &CurveOptions::smoothness,
+          "Weight of the second derivatives' mean square at the centers: keeps the plane tame away from the "
+          "curve.")
       .field("handle_weight", &CurveOptions::handle_weight, "Factor of the handles' mean squared distance.")
       .field("iterations", &CurveOptions::iterations, "Quasi-Newton steps at most.")
-      .field("spacing", &CurveOptions::spacing, "Distance of neighbouring bumps, in the curve's square.")
+      .field("spacing", &CurveOptions::spacing, "Distance of neighbouring centers, in the curve's square.")
       .field("threads", &CurveOptions::threads, "Threads; 0 uses all.");
 
   py::class_<CurveReport>(module, "CurveReport", "What deform_curve reached.")
@@ -129,7 +130,7 @@ void bind_curves(py::module_& module) {
       "Deforms a plane curve, given by its samples (n, 2), as rigidly as possible so that the handles' "
       "samples\n"
       "follow their motions. The energy is that of surfaces with d = 2; the field is a sum of Gaussian "
-      "bumps.\n"
+      "centers.\n"
       "Lengths and weights refer to the square in which the curve's bounding box has half-extent 0.75.\n"
       "InvalidInput for no handles, indices out of range, motions that are not rigid.");
 

@@ -2,7 +2,7 @@
 #include "bindings/bind.h"
 #include "bindings/jet_arrays.h"
 #include "energies/arap.h"
-#include "energies/composed_probe.h"
+#include "energies/aten_probe.h"
 #include "energies/distortion.h"
 #include "energies/gauss.h"
 #include "energies/handles.h"
@@ -92,14 +92,14 @@ template <class Scalar>
 void bind_testing(py::module_& module) {
   module.def(
       "arap_energy",
-      [](JetArray<Scalar> jets, double bending, double weight, bool composed) {
+      [](JetArray<Scalar> jets, double bending, double weight, bool aten) {
         JetArray<Scalar> cotangents = zeros_like(jets);
-        const auto energy = composed ? &probe_arap<Scalar> : &arap_energy<Scalar>;
+        const auto energy = aten ? &probe_arap<Scalar> : &arap_energy<Scalar>;
         const ArapValue value =
             energy(jet_view<const Scalar>(jets), bending, weight, jet_view<Scalar>(cotangents));
         return py::make_tuple(value.stretch, value.bend, cotangents);
       },
-      "jets"_a.noconvert(), "bending"_a, "weight"_a = 1.0, "composed"_a = false);
+      "jets"_a.noconvert(), "bending"_a, "weight"_a = 1.0, "aten"_a = false);
   module.def(
       "closest_rotations",
       [](JetArray<Scalar> jacobians) {
@@ -111,36 +111,36 @@ void bind_testing(py::module_& module) {
   module.def(
       "gauss_energy",
       [](JetArray<Scalar> jets, const PointsOf<Scalar>& normals, const Points& preferred, double sharpness,
-         double weight, const Eigen::VectorX<Scalar>& sample_weights, bool composed) {
+         double weight, const Eigen::VectorX<Scalar>& sample_weights, bool aten) {
         JetArray<Scalar> cotangents = zeros_like(jets);
-        const auto energy = composed ? &probe_gauss<Scalar> : &gauss_energy<Scalar>;
+        const auto energy = aten ? &probe_gauss<Scalar> : &gauss_energy<Scalar>;
         const double value =
             energy(jet_view<const Scalar>(jets), normals, sample_weights,
                    gauss_preference(preferred, sharpness), weight, jet_view<Scalar>(cotangents));
         return py::make_tuple(value, cotangents);
       },
       "jets"_a.noconvert(), "normals"_a, "preferred"_a, "sharpness"_a, "weight"_a, "sample_weights"_a,
-      "composed"_a = false);
+      "aten"_a = false);
   module.def(
       "handle_energy",
-      [](JetArray<Scalar> jets, const BoundHandles& handles, double weight, bool composed) {
+      [](JetArray<Scalar> jets, const BoundHandles& handles, double weight, bool aten) {
         JetArray<Scalar> cotangents = zeros_like(jets);
-        const auto energy = composed ? &probe_handles<Scalar> : &handle_energy<Scalar>;
+        const auto energy = aten ? &probe_handles<Scalar> : &handle_energy<Scalar>;
         const double value =
             energy(jet_view<const Scalar>(jets), handles.all<Scalar>(), weight, jet_view<Scalar>(cotangents));
         return py::make_tuple(value, cotangents);
       },
-      "jets"_a.noconvert(), "handles"_a, "weight"_a = 1.0, "composed"_a = false);
+      "jets"_a.noconvert(), "handles"_a, "weight"_a = 1.0, "aten"_a = false);
   module.def(
       "fold_barrier",
-      [](JetArray<Scalar> jets, double threshold, double weight, bool composed) {
+      [](JetArray<Scalar> jets, double threshold, double weight, bool aten) {
         JetArray<Scalar> cotangents = zeros_like(jets);
-        const auto energy = composed ? &probe_barrier<Scalar> : &fold_barrier<Scalar>;
+        const auto energy = aten ? &probe_barrier<Scalar> : &fold_barrier<Scalar>;
         const double value =
             energy(jet_view<const Scalar>(jets), threshold, weight, jet_view<Scalar>(cotangents));
         return py::make_tuple(value, cotangents);
       },
-      "jets"_a.noconvert(), "threshold"_a, "weight"_a = 1.0, "composed"_a = false);
+      "jets"_a.noconvert(), "threshold"_a, "weight"_a = 1.0, "aten"_a = false);
 }
 
 }  // namespace

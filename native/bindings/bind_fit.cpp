@@ -21,9 +21,8 @@ void bind_options(py::module_& module) {
              "Time budget for the steps, which the schedule then follows; 0: none.")
       .field("target_error", &FitOptions::target_error,
              "Stop once the mean error near the surface is this small, in cube units; 0: never.")
-      .field("optimizer", &FitOptions::optimizer, "'orthogonal' (orthogonalised momentum) or 'adam'.")
-      .field("learning_rate", &FitOptions::learning_rate,
-             "At its peak; 0: 0.05 for orthogonal, 0.003 for adam.")
+      .field("optimizer", &FitOptions::optimizer, "'muon' (orthogonalised momentum) or 'adam'.")
+      .field("learning_rate", &FitOptions::learning_rate, "At its peak; 0: 0.05 for muon, 0.003 for adam.")
       .field("near_points", &FitOptions::near_points, "Training points near the surface.")
       .field("uniform_points", &FitOptions::uniform_points, "Training points uniform in the cube.")
       .field("near_spread", &FitOptions::near_spread,

@@ -64,13 +64,16 @@ void bind_options(py::module_& module) {
   OptionsBinding<LiveOptions>(module, "LiveOptions",
                               "Options of LiveDeformer. Lengths and weights refer to the samples' unit cube.")
       .field("samples", &LiveOptions::samples, "Surface samples that the energy sees.")
-      .field("coarse_bumps", &LiveOptions::coarse_bumps, "Bumps of the coarse scale; 0: none.")
-      .field("fine_bumps", &LiveOptions::fine_bumps, "Bumps of the fine scale.")
-      .field("coarse_reach", &LiveOptions::coarse_reach, "Radius of the coarse bumps over their spacing.")
-      .field("fine_reach", &LiveOptions::fine_reach, "Radius of the fine bumps over their spacing.")
-      .field("interior", &LiveOptions::interior,
-             "Bumps reach as far as ways through the shape's interior: parts near in space but apart in the\n"
-             "shape, such as fingers, do not pull at each other.")
+      .field("coarse_centers", &LiveOptions::coarse_centers, "Centers of the coarse scale; 0: none.")
+      .field("fine_centers", &LiveOptions::fine_centers, "Centers of the fine scale.")
+      .field("coarse_radius_factor", &LiveOptions::coarse_radius_factor,
+             "Radius of the coarse centers over their spacing.")
+      .field("fine_radius_factor", &LiveOptions::fine_radius_factor,
+             "Radius of the fine centers over their spacing.")
+      .field(
+          "interior", &LiveOptions::interior,
+          "Centers reach as far as ways through the shape's interior: parts near in space but apart in the\n"
+          "shape, such as fingers, do not pull at each other.")
       .field("bending", &LiveOptions::bending, "λ_bend, the weight of the bend against the stretch.")
       .field("handle_weight", &LiveOptions::handle_weight, "Weight of the handles' mean squared distance.")
       .field("handle_samples", &LiveOptions::handle_samples, "Samples at which a handle pulls, at most.")
@@ -89,9 +92,9 @@ void bind_options(py::module_& module) {
 void bind_live(py::module_& module) {
   bind_options(module);
   py::class_<RadialField, DeformationField, std::shared_ptr<RadialField>>(
-      module, "RadialField", "A deformation as a sum of compact bumps and an affine map.")
+      module, "RadialField", "A deformation as a sum of compact centers and an affine map.")
       .def_property_readonly(
-          "bumps", [](const RadialField& f) { return f.basis().bumps(); }, "Number of bumps.");
+          "centers", [](const RadialField& f) { return f.basis().center_count(); }, "Number of centers.");
   py::class_<LiveSolver>(
       module, "LiveDeformer",
       "Deforms a surface at interactive rates: handles move, solve() follows from the last shape.\n\n"

@@ -164,12 +164,12 @@ void bind_testing(py::module_& module) {
       "Jets (columns, n, outputs) of order 0, 1 or 2 and, for flat cotangents of them, the flat parameter "
       "gradient.");
   testing.def(
-      "step_orthogonal",
+      "step_muon",
       [](const py::sequence& weights, const py::sequence& biases, int octaves, const py::object& gradient,
          double learning_rate) {
         const Layers layers = as_layers(weights, biases);
         Mlp mlp = make_mlp(layers, shape_of(layers, octaves, 1.0, 30.0), true);
-        return step_orthogonal(mlp, as_vector(gradient, "gradient"), learning_rate).weights;
+        return step_muon(mlp, as_vector(gradient, "gradient"), learning_rate).weights;
       },
       "weights"_a, "biases"_a, "octaves"_a, "gradient"_a, "learning_rate"_a,
       "The weights after one step of orthogonalised momentum from rest.");

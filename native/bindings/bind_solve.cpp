@@ -71,9 +71,10 @@ void bind_options(py::module_& module) {
   OptionsBinding<DeformOptions>(module, "DeformOptions",
                                 "Options of deform. Lengths and weights refer to the samples' unit cube.")
       .field("field", &DeformOptions::field,
-             "'neural': a network trained by Adam. 'radial': bumps, solved directly at interactive rates.")
+             "'neural': a network trained by Adam. 'radial': centers, solved directly at interactive rates.")
       .field("start", &DeformOptions::start, "What the network refines: 'identity' or the 'radial' result.")
-      .field("bumps", &DeformOptions::bumps, "Fine bumps of a radial field; a fifth of coarse ones is added.")
+      .field("centers", &DeformOptions::centers,
+             "Fine centers of a radial field; a fifth of coarse ones is added.")
       .field("iterations", &DeformOptions::iterations, "Steps of the optimization.")
       .field("batch", &DeformOptions::batch, "Surface samples a step.")
       .field(
@@ -91,9 +92,8 @@ void bind_options(py::module_& module) {
       .field("invertibility", &DeformOptions::invertibility,
              "Weight of the cycle loss with an inverse trained along, which penalises folds; 0: none.")
       .field("optimizer", &DeformOptions::optimizer,
-             "'orthogonal': orthogonalised momentum, which needs about a third of the steps; or 'adam'.")
-      .field("learning_rate", &DeformOptions::learning_rate,
-             "At its peak; 0: 0.03 for orthogonal, 0.002 for adam.")
+             "'muon': orthogonalised momentum, which needs about a third of the steps; or 'adam'.")
+      .field("learning_rate", &DeformOptions::learning_rate, "At its peak; 0: 0.03 for muon, 0.002 for adam.")
       .field("width", &DeformOptions::width, "Units of a hidden layer.")
       .field("layers", &DeformOptions::layers, "Hidden layers.")
       .field("octaves", &DeformOptions::octaves, "Octaves of the positional encoding.")
@@ -123,9 +123,9 @@ void bind_options(py::module_& module) {
       .field("barrier", &StylizeOptions::barrier, "Weight of the barrier that keeps det J up; 0: none.")
       .field("barrier_threshold", &StylizeOptions::barrier_threshold, "det J below which the barrier acts.")
       .field("optimizer", &StylizeOptions::optimizer,
-             "'orthogonal': orthogonalised momentum, which needs about a third of the steps; or 'adam'.")
+             "'muon': orthogonalised momentum, which needs about a third of the steps; or 'adam'.")
       .field("learning_rate", &StylizeOptions::learning_rate,
-             "At its peak; 0: 0.03 for orthogonal, 0.002 for adam.")
+             "At its peak; 0: 0.03 for muon, 0.002 for adam.")
       .field("width", &StylizeOptions::width, "Units of a hidden layer.")
       .field("layers", &StylizeOptions::layers, "Hidden layers.")
       .field("octaves", &StylizeOptions::octaves, "Octaves of the positional encoding.")
@@ -192,7 +192,7 @@ void bind_solve(py::module_& module) {
   OptionsBinding<InverseTrainingOptions>(module, "InverseOptions", "Options of train_inverse.")
       .field("iterations", &InverseTrainingOptions::iterations, "Steps of the optimization.")
       .field("batch", &InverseTrainingOptions::batch, "Points a step, half on the deformed surface.")
-      .field("optimizer", &InverseTrainingOptions::optimizer, "'orthogonal' or 'adam'.")
+      .field("optimizer", &InverseTrainingOptions::optimizer, "'muon' or 'adam'.")
       .field("learning_rate", &InverseTrainingOptions::learning_rate, "0: the optimizer's default.")
       .field("width", &InverseTrainingOptions::width, "Units of a hidden layer.")
       .field("layers", &InverseTrainingOptions::layers, "Hidden layers.")

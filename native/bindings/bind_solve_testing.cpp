@@ -60,8 +60,8 @@ void bind_solve_testing(py::module_& module) {
            "gauss"_a = 0.0, "barrier"_a = 0.0, "margin"_a = 0.0)
       .def("__call__", &Probe::operator(), "parameters"_a, "seed"_a = 0)
       .def_property_readonly("size", &Probe::size);
-  py::class_<ComposedScope, std::unique_ptr<ComposedScope>>(
-      testing, "Composed", "While it lives, tensors are worked on as on a device instead of by kernels.")
+  py::class_<AtenPathScope, std::unique_ptr<AtenPathScope>>(
+      testing, "AtenPath", "While it lives, tensors are worked on as on a device instead of by kernels.")
       .def(py::init<>());
   py::class_<EnergyTrial>(testing, "EnergyTrial", "The energy and its parameter gradient, for timing.")
       .def(py::init<const SurfaceSamples&, Index, double>(), "samples"_a, "batch"_a, "bending"_a)

@@ -84,9 +84,9 @@ std::shared_ptr<DeformationField> neural_from(const py::dict& state) {
 py::dict radial_state(const RadialField& field) {
   py::dict state("kind"_a = "radial", "centers"_a = field.basis().centers, "radii"_a = field.basis().radii,
                  "coefficients"_a = field.coefficients());
-  if (const RadialLift* lift = field.basis().lift.get())
-    state["lift"] = py::dict("nodes"_a = lift->nodes, "values"_a = lift->values, "slopes"_a = lift->slopes,
-                             "width"_a = lift->width);
+  if (const InteriorEmbedding* embedding = field.basis().embedding.get())
+    state["embedding"] = py::dict("nodes"_a = embedding->nodes, "values"_a = embedding->values,
+                                  "slopes"_a = embedding->slopes, "width"_a = embedding->width);
   return state;
 }
 
@@ -94,11 +94,11 @@ std::shared_ptr<DeformationField> radial_from(const py::dict& state) {
   RadialBasis basis;
   basis.centers = as_points(get(state, "centers"), "centers");
   basis.radii = as_vector(get(state, "radii"), "radii");
-  if (has(state, "lift")) {
-    const py::dict lift = get_as<py::dict>(state, "lift");
-    basis.set_lift(std::make_shared<const RadialLift>(
-        RadialLift{as_points(get(lift, "nodes"), "nodes"), as_points(get(lift, "values"), "values"),
-                   as_matrix(get(lift, "slopes"), "slopes"), get_as<double>(lift, "width")}));
+  if (has(state, "embedding")) {
+    const py::dict embedding = get_as<py::dict>(state, "embedding");
+    basis.set_embedding(std::make_shared<const InteriorEmbedding>(InteriorEmbedding{
+        as_points(get(embedding, "nodes"), "nodes"), as_points(get(embedding, "values"), "values"),
+        as_matrix(get(embedding, "slopes"), "slopes"), get_as<double>(embedding, "width")}));
   }
   return std::make_shared<RadialField>(std::move(basis),
                                        as_points(get(state, "coefficients"), "coefficients"));

@@ -15,10 +15,10 @@ std::atomic<int> scopes{0};
 
 }  // namespace
 
-bool composed(const at::Tensor& tensor) { return !tensor.is_cpu() || scopes.load() > 0; }
+bool on_aten_path(const at::Tensor& tensor) { return !tensor.is_cpu() || scopes.load() > 0; }
 
-ComposedScope::ComposedScope() { ++scopes; }
-ComposedScope::~ComposedScope() { --scopes; }
+AtenPathScope::AtenPathScope() { ++scopes; }
+AtenPathScope::~AtenPathScope() { --scopes; }
 
 std::string device_report() {
   if (at::hasCUDA()) return "a CUDA device was found";

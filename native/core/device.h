@@ -10,17 +10,17 @@ class Tensor;
 namespace arapfields {
 
 /// Whether a tensor is worked on by compositions of libtorch's operations rather than by our kernels: always
-/// where it is not in main memory, and everywhere while a ComposedScope lives.
-bool composed(const at::Tensor& tensor);
+/// where it is not in main memory, and everywhere while a AtenPathScope lives.
+bool on_aten_path(const at::Tensor& tensor);
 
 /// Forces compositions on tensors in main memory too, in the whole process: what a device would compute can
 /// then be compared with the kernels where there is none.
-class ComposedScope {
+class AtenPathScope {
  public:
-  ComposedScope();
-  ~ComposedScope();
-  ComposedScope(const ComposedScope&) = delete;
-  ComposedScope& operator=(const ComposedScope&) = delete;
+  AtenPathScope();
+  ~AtenPathScope();
+  AtenPathScope(const AtenPathScope&) = delete;
+  AtenPathScope& operator=(const AtenPathScope&) = delete;
 };
 
 /// "auto" → the best device there is; throws InvalidInput for a name that is unknown or not there.

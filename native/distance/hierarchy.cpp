@@ -7,10 +7,10 @@
 
 #include "core/errors.h"
 #include "core/parallel.h"
+#include "distance/bvh_topology.h"
 #include "distance/disk.h"
 #include "distance/multipole.h"
-#include "distance/packet.h"
-#include "distance/topology.h"
+#include "distance/triangle_packet.h"
 #include "mesh/triangle_mesh.h"
 
 namespace arapfields {

@@ -11,11 +11,11 @@
 
 #include "core/errors.h"
 #include "core/parallel.h"
-#include "distance/closed.h"
 #include "distance/hierarchy.h"
+#include "distance/is_closed.h"
 #include "distance/kernels.h"
 #include "distance/morton.h"
-#include "distance/packet.h"
+#include "distance/triangle_packet.h"
 #include "mesh/triangle_mesh.h"
 
 namespace arapfields {

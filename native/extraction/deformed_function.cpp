@@ -47,7 +47,7 @@ Points DeformedFunction::by_newton(PointsIn moved) const {
   const Frame& cube = shape_.field.frame();
   InverseOptions options;
   options.tolerance = newton_tolerance;
-  options.reach = reach_in_bands * shape_.band / cube.scale;
+  options.max_distance = reach_in_bands * shape_.band / cube.scale;
   return cube.to_mesh(newton_(cube.to_cube(moved), options, check_).points);
 }
 

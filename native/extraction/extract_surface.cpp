@@ -26,11 +26,11 @@ TriangleMesh extract_surface(const ImplicitFunction& implicit, const Frame& fram
   require_resolution(resolution);
   const auto start = std::chrono::steady_clock::now();
   progress.report(0.0, "finding the surface");
-  CountedFunction function(implicit, progress);
-  std::optional<SparseModel> model;
+  EvaluationCounter function(implicit, progress);
+  std::optional<TricubicSurrogate> model;
   if (resolution >= smallest_with_model)
-    model.emplace(function, SparseModelOptions{.wanted_cells = std::numeric_limits<Index>::max(),
-                                               .max_resolution = resolution / grid_steps_a_cell});
+    model.emplace(function, TricubicSurrogateOptions{.wanted_cells = std::numeric_limits<Index>::max(),
+                                                     .max_resolution = resolution / grid_steps_a_cell});
   progress.report(0.4, "evaluating the grid");
   SparseGrid grid(resolution, model ? &*model : nullptr);
   grid.refine(function);

@@ -20,7 +20,7 @@ bool differs(float a, float b) { return (a < 0.0f) != (b < 0.0f) && !std::isnan(
 
 }  // namespace
 
-SparseGrid::SparseGrid(int resolution, const SparseModel* model)
+SparseGrid::SparseGrid(int resolution, const TricubicSurrogate* model)
     : resolution_(resolution),
       width_((resolution + side - 1) / side),
       spacing_(2.0 / (resolution - 1)),
@@ -206,7 +206,7 @@ void SparseGrid::wish(std::int32_t index, bool first_round, Wish& out) const {
       }
 }
 
-void SparseGrid::refine(CountedFunction& function) {
+void SparseGrid::refine(EvaluationCounter& function) {
   for (bool first_round = true;; first_round = false) {
     const auto count = static_cast<Index>(blocks_.size());
     const Index chunks = (count + blocks_per_chunk - 1) / blocks_per_chunk;

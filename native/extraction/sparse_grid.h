@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "sampling/sparse_model.h"
+#include "sampling/tricubic_surrogate.h"
 
 namespace arapfields {
 
@@ -33,8 +33,8 @@ class SparseGrid {
   };
 
   /// Without a model (nullptr) all blocks are kept and every point is evaluated.
-  SparseGrid(int resolution, const SparseModel* model);
-  void refine(CountedFunction& function);
+  SparseGrid(int resolution, const TricubicSurrogate* model);
+  void refine(EvaluationCounter& function);
 
   int resolution() const { return resolution_; }
   /// Coordinate of the i-th grid point along an axis.
@@ -64,7 +64,7 @@ class SparseGrid {
   int resolution_;
   int width_;  // blocks a side
   double spacing_;
-  const SparseModel* model_;
+  const TricubicSurrogate* model_;
   std::vector<std::int32_t>
       table_;  // width³: index into blocks_, −1 for the positive and −2 for the negative
   std::vector<Block> blocks_;

@@ -5,7 +5,7 @@
 
 namespace arapfields {
 
-/// Gaussian bumps exp(−|x − p_m|²/r_m²) in the plane, and the affine maps: bumps first, then 1, x, y.
+/// Gaussian centers exp(−|x − p_m|²/r_m²) in the plane, and the affine maps: centers first, then 1, x, y.
 struct CurveBasis {
   Points2 centers;  ///< (m,2)
   Vector radii;     ///< (m)
@@ -15,7 +15,7 @@ struct CurveBasis {
   RowMatrix<double> rows(Points2In points) const;
 };
 
-/// Bumps at the nodes of a grid that have a point within a cell and a half, and at all nodes of one three
+/// Centers at the nodes of a grid that have a point within a cell and a half, and at all nodes of one three
 /// times as coarse over the points' surroundings; each twice its grid's spacing wide. A curve's own points
 /// would be poor centres: straight on a line, no bump centred on it has a slope across.
 CurveBasis curve_basis(Points2In points, double spacing);

@@ -166,7 +166,7 @@ InverseResult NewtonInverse::operator()(PointsIn targets, const InverseOptions& 
     std::vector<Index> left;
     for (Index i = begin; i < begin + rows; ++i)
       if (targets.row(i).allFinite()) left.push_back(i);
-    const int attempts = std::isfinite(options.reach) ? 1 : 3;
+    const int attempts = std::isfinite(options.max_distance) ? 1 : 3;
     for (int attempt = 0; attempt < attempts && !left.empty(); ++attempt) {
       const Starts* starts = attempt == 0 ? &surface : attempt == 1 ? &space : nullptr;
       if (starts != nullptr && starts->empty()) continue;
@@ -182,7 +182,7 @@ InverseResult NewtonInverse::operator()(PointsIn targets, const InverseOptions& 
       walk(field, walkers, options, progress);
       left.clear();
       for (const Walker& w : walkers) {
-        if (w.residual <= options.tolerance && (w.best - w.start).norm() <= options.reach) {
+        if (w.residual <= options.tolerance && (w.best - w.start).norm() <= options.max_distance) {
           result.points.row(w.row) = w.best;
           result.worst_residual = std::max(result.worst_residual, w.residual);
         } else {

@@ -16,7 +16,7 @@ struct InverseOptions {
   double longest_step = 0.25;
   /// Farthest that x may lie from its start. If finite, the nearest rest point is the only start: what is
   /// found is the preimage beside the surface.
-  double reach = std::numeric_limits<double>::infinity();
+  double max_distance = std::numeric_limits<double>::infinity();
 };
 
 struct InverseResult {

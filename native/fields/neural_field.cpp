@@ -123,7 +123,7 @@ at::Tensor NeuralField::jets(const at::Tensor& points, JetOrder order) const {
 at::Tensor NeuralField::forward(const at::Tensor& points, JetOrder order) {
   at::Tensor jets = network_.forward(points, order);
   factor_.reset();
-  if (base_ || handles_) return put_together(std::move(jets), to_points(points));
+  if (base_ || handles_) return compose(std::move(jets), to_points(points));
   add_identity(jets, points);
   return jets;
 }
@@ -132,10 +132,10 @@ at::Tensor NeuralField::forward_at(PointsIn points, JetOrder order) {
   const at::Tensor x = tensor_of(points.data(), {points.rows(), 3}, network_.parameters());
   if (!base_ && !handles_) return forward(x, order);
   factor_.reset();
-  return put_together(network_.forward(x, order), points);
+  return compose(network_.forward(x, order), points);
 }
 
-at::Tensor NeuralField::put_together(at::Tensor jets, PointsIn points) {
+at::Tensor NeuralField::compose(at::Tensor jets, PointsIn points) {
   JetBlock<double> b(points.rows(), static_cast<JetOrder>(jets.size(0)));
   Vector a;
   fixed_part(points, b.view(), a);

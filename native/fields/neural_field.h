@@ -47,7 +47,7 @@ class NeuralField final : public TrainableField {
   /// The jets (columns, n, 3) of b as (columns·n, 3) rows, and those of a (columns, n), empty where a is 1.
   void fixed_part(PointsIn points, JetView<double> b, Vector& a) const;
   /// b + a Ψ from the jets of Ψ.
-  at::Tensor put_together(at::Tensor jets, PointsIn points);
+  at::Tensor compose(at::Tensor jets, PointsIn points);
 
   Mlp network_;
   std::shared_ptr<const DeformationField> base_;

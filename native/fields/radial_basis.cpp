@@ -15,10 +15,10 @@ RowMatrix<double> RadialBasis::identity() const {
   return result;
 }
 
-void RadialBasis::set_lift(std::shared_ptr<const RadialLift> other) {
-  lift = std::move(other);
-  lifted.resize(lift ? bumps() : 0, 3);
-  if (lift) lift->evaluate(centers, {lifted.data(), bumps(), JetOrder::value});
+void RadialBasis::set_embedding(std::shared_ptr<const InteriorEmbedding> other) {
+  embedding = std::move(other);
+  embedded.resize(embedding ? center_count() : 0, 3);
+  if (embedding) embedding->evaluate(centers, {embedded.data(), center_count(), JetOrder::value});
 }
 
 FarthestPoints farthest_points(PointsIn points, Index count) {
@@ -52,14 +52,14 @@ RadialBasis radial_basis(PointsIn points, const std::vector<RadialScale>& scales
   std::vector<double> radii;
   for (const RadialScale& scale : scales) {
     require(scale.count > 0, "scales.count", std::to_string(scale.count), "must be positive");
-    require(scale.reach > 0.0 && std::isfinite(scale.reach), "scales.reach", std::to_string(scale.reach),
-            "must be positive");
+    require(scale.radius_factor > 0.0 && std::isfinite(scale.radius_factor), "scales.radius_factor",
+            std::to_string(scale.radius_factor), "must be positive");
     const FarthestPoints chosen = farthest_points(points, scale.count);
     const double extent = (points.colwise().maxCoeff() - points.colwise().minCoeff()).maxCoeff();
     // All points covered exactly (few points, or one): the radius falls back on the extent.
     const double fill = chosen.fill_distance > 0.0 ? chosen.fill_distance : std::max(extent, 1e-3);
     centers.insert(centers.end(), chosen.indices.begin(), chosen.indices.end());
-    radii.insert(radii.end(), chosen.indices.size(), scale.reach * fill);
+    radii.insert(radii.end(), chosen.indices.size(), scale.radius_factor * fill);
   }
   RadialBasis basis{Points(static_cast<Index>(centers.size()), 3),
                     Eigen::Map<const Vector>(radii.data(), static_cast<Index>(radii.size())),

@@ -5,36 +5,37 @@
 #include <vector>
 
 #include "core/types.h"
-#include "fields/radial_lift.h"
+#include "fields/interior_embedding.h"
 
 namespace arapfields {
 
-/// Bumps of one size, spread evenly over the surface.
+/// Centers of one size, spread evenly over the surface.
 struct RadialScale {
-  Index count = 300;   ///< bumps
-  double reach = 4.0;  ///< radius as a multiple of the distance within which every sample has a bump
+  Index count = 300;           ///< centers
+  double radius_factor = 4.0;  ///< radius as a multiple of the distance within which every sample has a bump
 };
 
 /// The space of maps f(x) = Σ_m c_m φ(|x − p_m|² / r_m²) + (1, x)·c_affine, φ(s) = (1 − s/κ)₊^κ: the Gaussian
 /// e^{−s} for large κ, κ = 6 (fields/radial_kernel.h), but with a bounded support, so that a
-/// point feels nearby bumps alone, and κ − 1 times continuously differentiable. Coefficients are (size, 3):
-/// bumps, then the constant, then x, y, z. With a lift ψ, s = (|x − p_m|² + |ψ(x) − ψ(p_m)|²) / r_m².
+/// point feels nearby centers alone, and κ − 1 times continuously differentiable. Coefficients are (size, 3):
+/// centers, then the constant, then x, y, z. With an embedding ψ, s = (|x − p_m|² + |ψ(x) − ψ(p_m)|²) / r_m².
 struct RadialBasis {
   Points centers;  ///< (m,3)
   Vector radii;    ///< (m)
-  std::shared_ptr<const RadialLift> lift = nullptr;
-  Points lifted = {};  ///< (m,3) ψ(p_m); empty without a lift
+  std::shared_ptr<const InteriorEmbedding> embedding = nullptr;
+  Points embedded = {};  ///< (m,3) ψ(p_m); empty without an embedding
 
-  Index bumps() const { return centers.rows(); }
+  Index center_count() const { return centers.rows(); }
   Index size() const { return centers.rows() + 4; }
   /// Coefficients of f(x) = x.
   RowMatrix<double> identity() const;
-  /// Takes a lift, or none.
-  void set_lift(std::shared_ptr<const RadialLift> other);
+  /// Takes an embedding, or none.
+  void set_embedding(std::shared_ptr<const InteriorEmbedding> other);
 };
 
-/// Bumps at farthest-point samples of the points, scale by scale (a scale with as many bumps as there are
-/// distinct points or more is cut there). Throws InvalidInput for no points or scales without bumps or reach.
+/// Centers at farthest-point samples of the points, scale by scale (a scale with as many centers as there are
+/// distinct points or more is cut there). Throws InvalidInput for no points or scales without centers or
+/// radius_factor.
 RadialBasis radial_basis(PointsIn points, const std::vector<RadialScale>& scales);
 
 /// Indices of `count` farthest-point samples, and the largest distance of a point to them.

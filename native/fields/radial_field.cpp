@@ -7,7 +7,7 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "distance/morton.h"
-#include "fields/radial_sites.h"
+#include "fields/radial_evaluator.h"
 
 namespace arapfields {
 namespace {
@@ -19,8 +19,9 @@ constexpr Index worth_sorting = 64;
 
 RadialField::RadialField(RadialBasis basis, RowMatrix<double> coefficients)
     : basis_(std::move(basis)), coefficients_(std::move(coefficients)) {
-  require(basis_.radii.size() == basis_.bumps(), "radii", std::to_string(basis_.radii.size()) + " numbers",
-          "one for each of the " + std::to_string(basis_.bumps()) + " centers is needed");
+  require(basis_.radii.size() == basis_.center_count(), "radii",
+          std::to_string(basis_.radii.size()) + " numbers",
+          "one for each of the " + std::to_string(basis_.center_count()) + " centers is needed");
   require(
       coefficients_.rows() == basis_.size() && coefficients_.cols() == 3, "coefficients",
       "shape (" + std::to_string(coefficients_.rows()) + ", " + std::to_string(coefficients_.cols()) + ")",
@@ -33,13 +34,13 @@ RadialField::RadialField(RadialBasis basis, RowMatrix<double> coefficients)
 
 void RadialField::evaluate(PointsIn points, JetView<double> out) const {
   if (points.rows() <= worth_sorting) {
-    RadialSites<double>(basis_, points, out.order).evaluate(coefficients_, out);
+    RadialEvaluator<double>(basis_, points, out.order).evaluate(coefficients_, out);
     return;
   }
   const std::vector<std::uint32_t> order = morton_order(points);
   JetBlock<double> sorted(points.rows(), out.order);
   const Points near = points(order, Eigen::all);
-  RadialSites<double>(basis_, near, out.order).evaluate(coefficients_, sorted.view());
+  RadialEvaluator<double>(basis_, near, out.order).evaluate(coefficients_, sorted.view());
   parallel_for(0, points.rows(), 1024, [&](Index first, Index last) {
     for (int c = 0; c < columns(out.order); ++c)
       for (Index i = first; i < last; ++i)

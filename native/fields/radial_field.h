@@ -6,7 +6,7 @@
 
 namespace arapfields {
 
-/// A deformation as a weighted sum of compact bumps and an affine map, with analytic jets.
+/// A deformation as a weighted sum of compact centers and an affine map, with analytic jets.
 class RadialField : public DeformationField {
  public:
   /// Coefficients (basis.size(), 3); throws InvalidInput for other shapes, non-finite numbers or radii ≤ 0.

@@ -31,24 +31,25 @@ inline Bump<Scalar> bump(Pack<Scalar> square, Scalar g) {
 }
 
 /// The ten (four, one) jet columns of bump m at some lanes of the block.
-template <int order, bool lifted, class Scalar>
+template <int order, bool embedded, class Scalar>
 inline void jet_of(const RadialBlock<Scalar>& block, int offset, std::int64_t m, Pack<Scalar>* out) {
   constexpr int pairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
-  const Scalar* center = block.bumps + radial_bump * m;
-  // Halves of the squared distance's derivatives: arm d, and what the lift adds to it and to the identity.
+  const Scalar* center = block.centers + center_stride * m;
+  // Halves of the squared distance's derivatives: arm d, and what the embedding adds to it and to the
+  // identity.
   Pack<Scalar> d[3], q[3];
   for (int k = 0; k < 3; ++k) d[k] = load(block.points + k * block_size + offset) - center[k];
   Pack<Scalar> square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-  const auto lift = [&](int row) { return load(block.lift + row * block_size + offset); };
-  if constexpr (lifted) {
-    for (int k = 0; k < 3; ++k) q[k] = lift(k) - center[4 + k];
+  const auto embedding = [&](int row) { return load(block.embedding + row * block_size + offset); };
+  if constexpr (embedded) {
+    for (int k = 0; k < 3; ++k) q[k] = embedding(k) - center[4 + k];
     square += q[0] * q[0] + q[1] * q[1] + q[2] * q[2];
   }
   const Bump<Scalar> b = bump<order, Scalar>(square, center[3]);
   out[0] = b.value;
-  if constexpr (lifted && order >= 1)
+  if constexpr (embedded && order >= 1)
     for (int i = 0; i < 3; ++i)
-      for (int k = 0; k < 3; ++k) d[i] += q[k] * lift(3 + 3 * i + k);
+      for (int k = 0; k < 3; ++k) d[i] += q[k] * embedding(3 + 3 * i + k);
   if constexpr (order >= 1)
     for (int k = 0; k < 3; ++k) out[1 + k] = b.slope * d[k];
   if constexpr (order >= 2) {
@@ -56,9 +57,9 @@ inline void jet_of(const RadialBlock<Scalar>& block, int offset, std::int64_t m,
     for (int k = 0; k < 3; ++k) curved[k] = b.curvature * d[k];
     for (int c = 0; c < 6; ++c) {
       out[4 + c] = curved[pairs[c][0]] * d[pairs[c][1]];
-      if constexpr (lifted) {
-        Pack<Scalar> more = lift(30 + c);
-        for (int k = 0; k < 3; ++k) more += q[k] * lift(12 + 3 * c + k);
+      if constexpr (embedded) {
+        Pack<Scalar> more = embedding(30 + c);
+        for (int k = 0; k < 3; ++k) more += q[k] * embedding(12 + 3 * c + k);
         out[4 + c] += b.slope * (c < 3 ? more + Scalar(1) : more);
       } else if (c < 3) {
         out[4 + c] += b.slope;
@@ -72,7 +73,7 @@ constexpr int columns_of = order == 0   ? 1
                            : order == 1 ? 4
                                         : 10;
 
-template <int order, bool lifted, class Scalar>
+template <int order, bool embedded, class Scalar>
 void forward(const RadialBlock<Scalar>& block, const Scalar* coefficients, Scalar* jets) {
   constexpr int columns = columns_of<order>;
   for (int offset = 0; offset < block_size; offset += lanes<Scalar>) {
@@ -80,7 +81,7 @@ void forward(const RadialBlock<Scalar>& block, const Scalar* coefficients, Scala
     for (std::int64_t a = 0; a < block.active_count; ++a) {
       const std::int64_t m = block.active[a];
       Pack<Scalar> basis[columns];
-      jet_of<order, lifted>(block, offset, m, basis);
+      jet_of<order, embedded>(block, offset, m, basis);
       const Scalar* c = coefficients + 3 * m;
       for (int column = 0; column < columns; ++column)
         for (int i = 0; i < 3; ++i) sums[column][i] += basis[column] * c[i];
@@ -90,7 +91,7 @@ void forward(const RadialBlock<Scalar>& block, const Scalar* coefficients, Scala
   }
 }
 
-template <int order, bool lifted, class Scalar>
+template <int order, bool embedded, class Scalar>
 void backward(const RadialBlock<Scalar>& block, const Scalar* cotangents, Scalar* gradient) {
   constexpr int columns = columns_of<order>;
   for (int offset = 0; offset < block_size; offset += lanes<Scalar>) {
@@ -101,7 +102,7 @@ void backward(const RadialBlock<Scalar>& block, const Scalar* cotangents, Scalar
     for (std::int64_t a = 0; a < block.active_count; ++a) {
       const std::int64_t m = block.active[a];
       Pack<Scalar> basis[columns];
-      jet_of<order, lifted>(block, offset, m, basis);
+      jet_of<order, embedded>(block, offset, m, basis);
       Scalar* sums = gradient + m * 3 * radial_lanes;
       for (int i = 0; i < 3; ++i) {
         Pack<Scalar> sum = load(sums + i * radial_lanes);
@@ -112,39 +113,39 @@ void backward(const RadialBlock<Scalar>& block, const Scalar* cotangents, Scalar
   }
 }
 
-template <int order, bool lifted>
+template <int order, bool embedded>
 void rows_of(const RadialBlock<double>& block, double* rows) {
   constexpr int columns = columns_of<order>;
   for (int offset = 0; offset < block_size; offset += lanes<double>)
     for (std::int64_t a = 0; a < block.active_count; ++a) {
       Pack<double> basis[columns];
-      jet_of<order, lifted>(block, offset, block.active[a], basis);
+      jet_of<order, embedded>(block, offset, block.active[a], basis);
       for (int column = 0; column < columns; ++column)
         store(rows + (a * columns + column) * block_size + offset, basis[column]);
     }
 }
 
-/// Calls body.template operator()<order, lifted>() for the block and the number of columns at hand.
+/// Calls body.template operator()<order, embedded>() for the block and the number of columns at hand.
 template <class Scalar, class Body>
 void specialise(const RadialBlock<Scalar>& block, int columns, Body&& body) {
-  const bool lifted = block.lift != nullptr;
+  const bool embedded = block.embedding != nullptr;
   if (columns == 1)
-    return lifted ? body.template operator()<0, true>() : body.template operator()<0, false>();
+    return embedded ? body.template operator()<0, true>() : body.template operator()<0, false>();
   if (columns == 4)
-    return lifted ? body.template operator()<1, true>() : body.template operator()<1, false>();
-  lifted ? body.template operator()<2, true>() : body.template operator()<2, false>();
+    return embedded ? body.template operator()<1, true>() : body.template operator()<1, false>();
+  embedded ? body.template operator()<2, true>() : body.template operator()<2, false>();
 }
 
 template <class Scalar>
 void forward_any(const RadialBlock<Scalar>& block, const Scalar* coefficients, int columns, Scalar* jets) {
   specialise(block, columns,
-             [&]<int order, bool lifted>() { forward<order, lifted>(block, coefficients, jets); });
+             [&]<int order, bool embedded>() { forward<order, embedded>(block, coefficients, jets); });
 }
 
 template <class Scalar>
 void backward_any(const RadialBlock<Scalar>& block, const Scalar* cotangents, int columns, Scalar* sums) {
   specialise(block, columns,
-             [&]<int order, bool lifted>() { backward<order, lifted>(block, cotangents, sums); });
+             [&]<int order, bool embedded>() { backward<order, embedded>(block, cotangents, sums); });
 }
 
 }  // namespace
@@ -163,19 +164,19 @@ void radial_backward(const RadialBlock<double>& block, const double* cotangents,
 }
 
 void radial_rows(const RadialBlock<double>& block, int columns, double* rows) {
-  specialise(block, columns, [&]<int order, bool lifted>() { rows_of<order, lifted>(block, rows); });
+  specialise(block, columns, [&]<int order, bool embedded>() { rows_of<order, embedded>(block, rows); });
 }
 
-std::int64_t radial_active(const double* center, const double* reach, const double* bumps, std::int64_t count,
-                           std::int32_t* active) {
+std::int64_t radial_active(const double* center, const double* ball_radius, const double* centers,
+                           std::int64_t count, std::int32_t* active) {
   std::int64_t found = 0;
   for (std::int64_t m = 0; m < count; ++m) {
-    const double* b = bumps + radial_bump * m;
+    const double* b = centers + center_stride * m;
     double square = 0;
     for (int part = 0; part < 2; ++part) {
       const double x = b[4 * part] - center[3 * part], y = b[4 * part + 1] - center[3 * part + 1],
                    z = b[4 * part + 2] - center[3 * part + 2];
-      const double gap = std::sqrt(x * x + y * y + z * z) - reach[part];
+      const double gap = std::sqrt(x * x + y * y + z * z) - ball_radius[part];
       square += gap > 0 ? gap * gap : 0;
     }
     active[found] = static_cast<std::int32_t>(m);

@@ -8,21 +8,21 @@
 
 namespace arapfields {
 
-/// Power κ of the bumps φ(s) = (1 − s/κ)₊^κ, s = |x − p|²/r²; they vanish at √κ radii.
+/// Power κ of the centers φ(s) = (1 − s/κ)₊^κ, s = |x − p|²/r²; they vanish at √κ radii.
 constexpr int radial_power = 6;
 
-/// Numbers of a bump: center, 1/r², lifted center, 0.
-constexpr int radial_bump = 8;
-/// Rows of 16 numbers that a block's lift has: ψ, its first derivatives, its second ones, and the products
-/// ∂_i ψ · ∂_j ψ, in the order of jets; fewer where the order of jets asks for less.
-constexpr int radial_lift_rows(int columns) { return columns == 10 ? 36 : 3 * columns; }
+/// Numbers of a bump: center, 1/r², embedded center, 0.
+constexpr int center_stride = 8;
+/// Rows of 16 numbers that a block's embedding has: ψ, its first derivatives, its second ones, and the
+/// products ∂_i ψ · ∂_j ψ, in the order of jets; fewer where the order of jets asks for less.
+constexpr int embedding_rows(int columns) { return columns == 10 ? 36 : 3 * columns; }
 
-/// One block of 16 points and the bumps it feels. Coefficients are rows of 3.
+/// One block of 16 points and the centers it feels. Coefficients are rows of 3.
 template <class Scalar>
 struct RadialBlock {
-  const Scalar* points;  // (3, 16)
-  const Scalar* lift;    // (radial_lift_rows, 16), or null
-  const Scalar* bumps;
+  const Scalar* points;     // (3, 16)
+  const Scalar* embedding;  // (embedding_rows, 16), or null
+  const Scalar* centers;
   const std::int32_t* active;
   std::int64_t active_count;
 };
@@ -30,7 +30,7 @@ struct RadialBlock {
 /// Lanes of the gradient's partial sums, (m, 3, radial_lanes).
 constexpr int radial_lanes = 16;
 
-// Jets (columns, 3, 16) of the bumps' part.
+// Jets (columns, 3, 16) of the centers' part.
 ARAPFIELDS_DECLARE(void radial_forward(const RadialBlock<float>&, const float* coefficients, int columns,
                                        float* jets))
 ARAPFIELDS_DECLARE(void radial_forward(const RadialBlock<double>&, const double* coefficients, int columns,
@@ -42,10 +42,11 @@ ARAPFIELDS_DECLARE(void radial_backward(const RadialBlock<double>&, const double
                                         double* sums))
 // Jets of each active bump: (active, columns, 16).
 ARAPFIELDS_DECLARE(void radial_rows(const RadialBlock<double>&, int columns, double* rows))
-// Lists the bumps whose support meets the ball of radius reach[0] around center[0..2], lifted into the ball
-// of radius reach[1] around center[3..5]; returns how many.
-ARAPFIELDS_DECLARE(std::int64_t radial_active(const double* center, const double* reach, const double* bumps,
-                                              std::int64_t count, std::int32_t* active))
+// Lists the centers whose support meets the ball of radius ball_radius[0] around center[0..2], embedded into
+// the ball of radius ball_radius[1] around center[3..5]; returns how many.
+ARAPFIELDS_DECLARE(std::int64_t radial_active(const double* center, const double* ball_radius,
+                                              const double* centers, std::int64_t count,
+                                              std::int32_t* active))
 // distance ← min(distance, |point − from|²) for points (3, stride); `count` is a multiple of 16. The largest.
 ARAPFIELDS_DECLARE(double farthest_update(const double* points, std::int64_t stride, std::int64_t count,
                                           const double* from, double* distance))

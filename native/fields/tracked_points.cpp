@@ -14,14 +14,14 @@ TrackedPoints::TrackedPoints(const RadialBasis& basis, const Frame& frame, Point
   Points sorted(mesh_points.rows(), 3);
   for (Index i = 0; i < sorted.rows(); ++i)
     sorted.row(i) = mesh_points.row(order_[static_cast<std::size_t>(i)]);
-  sites_ = RadialSites<float>(basis, frame.to_cube(sorted), JetOrder::value);
+  evaluator_ = RadialEvaluator<float>(basis, frame.to_cube(sorted), JetOrder::value);
 }
 
 PointsF TrackedPoints::moved(const RowMatrix<double>& coefficients) const {
   PointsF result(size(), 3);
   if (size() == 0) return result;
   PointsF sorted(size(), 3);
-  sites_.evaluate(coefficients, {sorted.data(), size(), JetOrder::value});
+  evaluator_.evaluate(coefficients, {sorted.data(), size(), JetOrder::value});
   const Eigen::RowVector3d center = frame_.center.transpose();
   for (Index i = 0; i < size(); ++i)
     result.row(order_[static_cast<std::size_t>(i)]) =

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/frame.h"
-#include "fields/radial_sites.h"
+#include "fields/radial_evaluator.h"
 
 namespace arapfields {
 
@@ -14,12 +14,12 @@ class TrackedPoints {
   TrackedPoints(const RadialBasis& basis, const Frame& frame, PointsIn mesh_points);
   /// Where the field with these coefficients takes them, (n,3) in mesh coordinates.
   PointsF moved(const RowMatrix<double>& coefficients) const;
-  Index size() const { return sites_.size(); }
+  Index size() const { return evaluator_.size(); }
 
  private:
   Frame frame_;
   std::vector<std::uint32_t> order_;
-  RadialSites<float> sites_;
+  RadialEvaluator<float> evaluator_;
 };
 
 }  // namespace arapfields

@@ -8,7 +8,7 @@ namespace {
 
 template <class Scalar>
 void adam_any(const AdamBlock<Scalar>& b) {
-  const Scalar d1 = b.first_decay, d2 = b.second_decay, rate = b.rate, scale = b.scale, epsilon = b.epsilon;
+  const Scalar d1 = b.beta1, d2 = b.beta2, rate = b.rate, scale = b.scale, epsilon = b.epsilon;
   Scalar *x = b.parameters, *m = b.mean, *v = b.square;
   const Scalar* g = b.gradient;
 #pragma GCC ivdep

@@ -16,7 +16,7 @@ struct AdamBlock {
   Scalar* mean = nullptr;
   Scalar* square = nullptr;
   std::int64_t count = 0;
-  Scalar first_decay = 0, second_decay = 0, rate = 0, scale = 0, epsilon = 0;
+  Scalar beta1 = 0, beta2 = 0, rate = 0, scale = 0, epsilon = 0;
 };
 
 ARAPFIELDS_DECLARE(void adam(const AdamBlock<float>& block))

@@ -31,8 +31,8 @@ void step_on_cpu(AdamBlock<Scalar> block, const at::Tensor& parameters, const at
 template <class Scalar>
 AdamBlock<Scalar> block_with(const AdamOptions& options, double rate, double scale) {
   AdamBlock<Scalar> block;
-  block.first_decay = static_cast<Scalar>(options.first_decay);
-  block.second_decay = static_cast<Scalar>(options.second_decay);
+  block.beta1 = static_cast<Scalar>(options.beta1);
+  block.beta2 = static_cast<Scalar>(options.beta2);
   block.rate = static_cast<Scalar>(rate);
   block.scale = static_cast<Scalar>(scale);
   block.epsilon = static_cast<Scalar>(options.epsilon);
@@ -64,13 +64,13 @@ void AdamStep::step(at::Tensor& parameters, const at::Tensor& gradient, double l
 void AdamStep::step_range(at::Tensor& parameters, const at::Tensor& gradient, double learning_rate,
                           Index begin, Index end) {
   State& s = *state_;
-  const double rate = learning_rate / (1.0 - std::pow(s.options.first_decay, s.steps));
-  const double scale = 1.0 / std::sqrt(1.0 - std::pow(s.options.second_decay, s.steps));
-  if (composed(parameters)) {
+  const double rate = learning_rate / (1.0 - std::pow(s.options.beta1, s.steps));
+  const double scale = 1.0 / std::sqrt(1.0 - std::pow(s.options.beta2, s.steps));
+  if (on_aten_path(parameters)) {
     at::Tensor mean = s.mean.slice(0, begin, end), square = s.square.slice(0, begin, end);
     const at::Tensor g = gradient.slice(0, begin, end);
-    mean.mul_(s.options.first_decay).add_(g, 1.0 - s.options.first_decay);
-    square.mul_(s.options.second_decay).addcmul_(g, g, 1.0 - s.options.second_decay);
+    mean.mul_(s.options.beta1).add_(g, 1.0 - s.options.beta1);
+    square.mul_(s.options.beta2).addcmul_(g, g, 1.0 - s.options.beta2);
     parameters.slice(0, begin, end)
         .addcdiv_(mean, at::sqrt(square).mul_(scale).add_(s.options.epsilon), -rate);
   } else if (parameters.scalar_type() == at::kDouble) {

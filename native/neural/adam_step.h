@@ -13,8 +13,8 @@ class Tensor;
 namespace arapfields {
 
 struct AdamOptions {
-  double first_decay = 0.9;    ///< β1, of the gradient's running mean
-  double second_decay = 0.99;  ///< β2, of the running mean of its squares
+  double beta1 = 0.9;   ///< β1, of the gradient's running mean
+  double beta2 = 0.99;  ///< β2, of the running mean of its squares
   double epsilon = 1e-8;
 };
 

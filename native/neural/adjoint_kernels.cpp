@@ -25,8 +25,8 @@ inline void adjoint_units(const AdjointBlock<Scalar>& b, std::int64_t p, std::in
                           V (&sum)[count][6]) {
   const std::int64_t plane = b.points * b.width, at = p * b.width + w;
   const V s = read<V>(b.slope + at), curve = b.sharpness * s * (1 - s);
-  const V z1 = read<V>(b.planes + plane + at), z2 = read<V>(b.planes + 2 * plane + at),
-          z3 = read<V>(b.planes + 3 * plane + at);
+  const V z1 = read<V>(b.activations + plane + at), z2 = read<V>(b.activations + 2 * plane + at),
+          z3 = read<V>(b.activations + 3 * plane + at);
   const V c1 = curve * z1, c2 = curve * z2, c3 = curve * z3;
   const V bent[6] = {c1 * z1, c2 * z2, c3 * z3, c1 * z2, c1 * z3, c2 * z3};
   for (int o = 0; o < count; ++o) {
@@ -63,8 +63,8 @@ inline void back_units(const AdjointBlock<Scalar>& b, std::int64_t p, std::int64
   const std::int64_t plane = b.points * b.width, at = p * b.width + w;
   const V s = read<V>(b.slope + at), curve = b.sharpness * s * (1 - s);
   const V steeper = b.sharpness * (1 - 2 * s);  // φ''' = steeper φ''
-  const V z1 = read<V>(b.planes + plane + at), z2 = read<V>(b.planes + 2 * plane + at),
-          z3 = read<V>(b.planes + 3 * plane + at);
+  const V z1 = read<V>(b.activations + plane + at), z2 = read<V>(b.activations + 2 * plane + at),
+          z3 = read<V>(b.activations + 3 * plane + at);
   V to_value = {}, to_1 = {}, to_2 = {}, to_3 = {};
   for (int o = 0; o < b.outputs; ++o) {
     const Scalar d11 = d[o], d22 = d[b.outputs + o], d33 = d[2 * b.outputs + o];

@@ -12,8 +12,9 @@ namespace arapfields {
 /// encoding's own curvature): no second derivative need travel through the layers.
 template <class Scalar>
 struct AdjointBlock {
-  const Scalar* planes = nullptr;  ///< (4, points, width), as activate() leaves them: ∂_i z in planes 1 to 3
-  const Scalar* slope = nullptr;   ///< (points, width): φ'
+  const Scalar* activations =
+      nullptr;  ///< (4, points, width), as activate() leaves them: ∂_i z in activations 1 to 3
+  const Scalar* slope = nullptr;     ///< (points, width): φ'
   const Scalar* adjoints = nullptr;  ///< (outputs, points, width): q
   bool shared = false;               ///< q is (outputs, width), the same for all points
   Scalar* below = nullptr;           ///< (outputs, points, width): φ' q = ∂(output)/∂z
@@ -27,7 +28,8 @@ struct AdjointBlock {
   /* fills `below`; adds to `second` (points, 6, outputs), pairs in the order of the jets' columns */       \
   ARAPFIELDS_DECLARE(void adjoint(const AdjointBlock<Scalar>& block, Scalar* second))                       \
   /* cotangents (outputs, points, width) of `below` become those of q; `second` holds the cotangents of the \
-     second derivatives; `partial` (4, points, width) receives what reaches the planes; fills `below` */    \
+     second derivatives; `partial` (4, points, width) receives what reaches the activations; fills `below`  \
+   */                                                                                                       \
   ARAPFIELDS_DECLARE(void adjoint_back(const AdjointBlock<Scalar>& block, const Scalar* second,             \
                                        Scalar* cotangents, Scalar* partial))
 ARAPFIELDS_ADJOINT_KERNELS(float)

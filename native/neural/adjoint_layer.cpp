@@ -12,10 +12,10 @@ constexpr int first_of_pair[6] = {0, 1, 2, 0, 0, 1};
 constexpr int second_of_pair[6] = {0, 1, 2, 1, 2, 2};
 
 template <class Scalar>
-AdjointBlock<Scalar> block_of(double sharpness, const at::Tensor& planes, const at::Tensor& slope,
+AdjointBlock<Scalar> block_of(double sharpness, const at::Tensor& activations, const at::Tensor& slope,
                               const at::Tensor& adjoints, at::Tensor& below) {
   AdjointBlock<Scalar> block;
-  block.planes = planes.data_ptr<Scalar>();
+  block.activations = activations.data_ptr<Scalar>();
   block.slope = slope.data_ptr<Scalar>();
   block.adjoints = adjoints.data_ptr<Scalar>();
   block.shared = adjoints.size(0) != below.size(0);
@@ -28,17 +28,17 @@ AdjointBlock<Scalar> block_of(double sharpness, const at::Tensor& planes, const 
 }
 
 template <class Scalar>
-void adjoint_on_cpu(double sharpness, const at::Tensor& planes, const at::Tensor& slope,
+void adjoint_on_cpu(double sharpness, const at::Tensor& activations, const at::Tensor& slope,
                     const at::Tensor& adjoints, at::Tensor& below, at::Tensor& second) {
-  const AdjointBlock<Scalar> block = block_of<Scalar>(sharpness, planes, slope, adjoints, below);
+  const AdjointBlock<Scalar> block = block_of<Scalar>(sharpness, activations, slope, adjoints, below);
   ARAPFIELDS_DISPATCH(adjoint(block, second.data_ptr<Scalar>()));
 }
 
 template <class Scalar>
-void adjoint_back_on_cpu(double sharpness, const at::Tensor& planes, const at::Tensor& slope,
+void adjoint_back_on_cpu(double sharpness, const at::Tensor& activations, const at::Tensor& slope,
                          const at::Tensor& adjoints, const at::Tensor& second, at::Tensor& cotangents,
                          at::Tensor& below, at::Tensor& partial) {
-  const AdjointBlock<Scalar> block = block_of<Scalar>(sharpness, planes, slope, adjoints, below);
+  const AdjointBlock<Scalar> block = block_of<Scalar>(sharpness, activations, slope, adjoints, below);
   ARAPFIELDS_DISPATCH(adjoint_back(block, second.data_ptr<Scalar>(), cotangents.data_ptr<Scalar>(),
                                    partial.data_ptr<Scalar>()));
 }
@@ -48,10 +48,10 @@ at::Tensor by_output(const at::Tensor& rows, Index outputs) {
   return rows.view({outputs, rows.size(0) / outputs, rows.size(1)});
 }
 
-void adjoint_anywhere(double sharpness, const at::Tensor& planes, const at::Tensor& s,
-                      const at::Tensor& adjoints, at::Tensor& below, at::Tensor& second) {
+void adjoint_aten(double sharpness, const at::Tensor& activations, const at::Tensor& s,
+                  const at::Tensor& adjoints, at::Tensor& below, at::Tensor& second) {
   const Index outputs = second.size(2);
-  const at::Tensor z = planes.view({4, s.size(0), s.size(1)}).slice(0, 1);
+  const at::Tensor z = activations.view({4, s.size(0), s.size(1)}).slice(0, 1);
   const at::Tensor q = by_output(adjoints, outputs), curve = sharpness * s * (1 - s);
   by_output(below, outputs).copy_(s * q);
   for (int c = 0; c < 6; ++c) {
@@ -60,11 +60,11 @@ void adjoint_anywhere(double sharpness, const at::Tensor& planes, const at::Tens
   }
 }
 
-void adjoint_back_anywhere(double sharpness, const at::Tensor& planes, const at::Tensor& s,
-                           const at::Tensor& adjoints, const at::Tensor& second, at::Tensor& cotangents,
-                           at::Tensor& below, at::Tensor& partial) {
+void adjoint_back_aten(double sharpness, const at::Tensor& activations, const at::Tensor& s,
+                       const at::Tensor& adjoints, const at::Tensor& second, at::Tensor& cotangents,
+                       at::Tensor& below, at::Tensor& partial) {
   const Index outputs = second.size(2);
-  const at::Tensor z = planes.view({4, s.size(0), s.size(1)}).slice(0, 1);
+  const at::Tensor z = activations.view({4, s.size(0), s.size(1)}).slice(0, 1);
   const at::Tensor q = by_output(adjoints, outputs), curve = sharpness * s * (1 - s);
   at::Tensor g = by_output(cotangents, outputs), part = partial.view({4, s.size(0), s.size(1)});
   at::Tensor bent = at::zeros_like(g);
@@ -84,23 +84,23 @@ void adjoint_back_anywhere(double sharpness, const at::Tensor& planes, const at:
 
 }  // namespace
 
-void adjoint_layer(double sharpness, const at::Tensor& planes, const at::Tensor& slope,
+void adjoint_layer(double sharpness, const at::Tensor& activations, const at::Tensor& slope,
                    const at::Tensor& adjoints, at::Tensor& below, at::Tensor& second) {
-  if (composed(planes)) return adjoint_anywhere(sharpness, planes, slope, adjoints, below, second);
-  if (planes.scalar_type() == at::kDouble)
-    return adjoint_on_cpu<double>(sharpness, planes, slope, adjoints, below, second);
-  adjoint_on_cpu<float>(sharpness, planes, slope, adjoints, below, second);
+  if (on_aten_path(activations)) return adjoint_aten(sharpness, activations, slope, adjoints, below, second);
+  if (activations.scalar_type() == at::kDouble)
+    return adjoint_on_cpu<double>(sharpness, activations, slope, adjoints, below, second);
+  adjoint_on_cpu<float>(sharpness, activations, slope, adjoints, below, second);
 }
 
-void adjoint_layer_back(double sharpness, const at::Tensor& planes, const at::Tensor& slope,
+void adjoint_layer_back(double sharpness, const at::Tensor& activations, const at::Tensor& slope,
                         const at::Tensor& adjoints, const at::Tensor& second, at::Tensor& cotangents,
                         at::Tensor& below, at::Tensor& partial) {
-  if (composed(planes))
-    return adjoint_back_anywhere(sharpness, planes, slope, adjoints, second, cotangents, below, partial);
-  if (planes.scalar_type() == at::kDouble)
-    return adjoint_back_on_cpu<double>(sharpness, planes, slope, adjoints, second, cotangents, below,
+  if (on_aten_path(activations))
+    return adjoint_back_aten(sharpness, activations, slope, adjoints, second, cotangents, below, partial);
+  if (activations.scalar_type() == at::kDouble)
+    return adjoint_back_on_cpu<double>(sharpness, activations, slope, adjoints, second, cotangents, below,
                                        partial);
-  adjoint_back_on_cpu<float>(sharpness, planes, slope, adjoints, second, cotangents, below, partial);
+  adjoint_back_on_cpu<float>(sharpness, activations, slope, adjoints, second, cotangents, below, partial);
 }
 
 }  // namespace arapfields

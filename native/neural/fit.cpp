@@ -12,7 +12,7 @@
 #include "core/random.h"
 #include "distance/training_points.h"
 #include "mesh/sample_mesh.h"
-#include "neural/orthogonal_step.h"
+#include "neural/muon.h"
 
 namespace arapfields {
 namespace {
@@ -34,8 +34,8 @@ void check(const FitOptions& o) {
   require_range("near_spread", o.near_spread, 1e-9, 1);
   require_range("far_spread", o.far_spread, 1e-9, 1);
   require_range("near_share", o.near_share, 0, 1);
-  require(o.optimizer == "orthogonal" || o.optimizer == "adam", "optimizer", "got '" + o.optimizer + "'",
-          "known are 'orthogonal' and 'adam'");
+  require(o.optimizer == "muon" || o.optimizer == "adam", "optimizer", "got '" + o.optimizer + "'",
+          "known are 'muon' and 'adam'");
   resolve_device(o.device);
 }
 
@@ -98,7 +98,7 @@ class Training {
         mlp_(mlp),
         held_out_(held_out),
         batches_(examples, options),
-        orthogonal_(mlp, {}),
+        muon_(mlp, {}),
         adam_(mlp.parameters()),
         good_(mlp.parameters().clone()),
         peak_(options.learning_rate > 0 ? options.learning_rate
@@ -150,7 +150,7 @@ class Training {
     if (use_adam())
       adam_.step(mlp_.parameters(), mlp_.gradient(), learning_rate);
     else
-      orthogonal_.step(mlp_, learning_rate);
+      muon_.step(mlp_, learning_rate);
   }
 
   void report(const Progress& progress, double done) {
@@ -171,11 +171,11 @@ class Training {
   Mlp& mlp_;
   const Examples& held_out_;
   Batches batches_;
-  OrthogonalStep orthogonal_;
+  Muon muon_;
   AdamStep adam_;
   at::Tensor good_, loss_;
   int good_steps_ = 0;
-  int check_every_ = composed(mlp_.parameters()) ? 25 : 10;  // a check waits for the device
+  int check_every_ = on_aten_path(mlp_.parameters()) ? 25 : 10;  // a check waits for the device
   double peak_;
 };
 

@@ -21,11 +21,11 @@ struct FitOptions {
   double sharpness = 30.0;
 
   int steps = 400;
-  int batch = 1024;                      ///< points a step
-  double seconds = 0.0;                  ///< time budget, which the schedule then follows; 0: none
-  double target_error = 0.0;             ///< stop at this mean error near the surface; 0: never
-  std::string optimizer = "orthogonal";  ///< or "adam"
-  double learning_rate = 0.0;            ///< at its peak; 0: 0.05 for orthogonal, 0.003 for adam
+  int batch = 1024;                ///< points a step
+  double seconds = 0.0;            ///< time budget, which the schedule then follows; 0: none
+  double target_error = 0.0;       ///< stop at this mean error near the surface; 0: never
+  std::string optimizer = "muon";  ///< or "adam"
+  double learning_rate = 0.0;      ///< at its peak; 0: 0.05 for muon, 0.003 for adam
 
   int near_points = 150000;  ///< near the surface, half of them with each of the two spreads
   int uniform_points = 40000;

@@ -11,7 +11,7 @@ template <class Scalar, bool keep>
 void activate_values(const ActivationBlock<Scalar>& b) {
   const Scalar scale = 1 / b.sharpness;
   for (std::int64_t p = 0; p < b.points; ++p) {
-    Scalar* z = b.planes + p * b.width;
+    Scalar* z = b.activations + p * b.width;
     Scalar* slope = keep ? b.slope + p * b.width : nullptr;
 #pragma GCC ivdep
     for (std::int64_t w = 0; w < b.width; ++w) {
@@ -28,7 +28,7 @@ void activate_jets(const ActivationBlock<Scalar>& b) {
   const std::int64_t plane = b.points * b.width;
   const Scalar scale = 1 / b.sharpness;
   for (std::int64_t p = 0; p < b.points; ++p) {
-    Scalar* z = b.planes + p * b.width;
+    Scalar* z = b.activations + p * b.width;
     Scalar* h = b.jets + p * b.width;
     Scalar* slope = keep ? b.slope + p * b.width : nullptr;
 #pragma GCC ivdep
@@ -65,7 +65,7 @@ void back_first(const ActivationBlock<Scalar>& b, const Scalar* partial, Scalar*
   const std::int64_t plane = b.points * b.width;
   for (std::int64_t p = 0; p < b.points; ++p) {
     const Scalar* slope = b.slope + p * b.width;
-    Scalar* z = b.planes + p * b.width;
+    Scalar* z = b.activations + p * b.width;
     Scalar* g = cotangents + p * b.width;
     const Scalar* more = with_partial ? partial + p * b.width : nullptr;
 #pragma GCC ivdep

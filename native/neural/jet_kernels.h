@@ -7,14 +7,15 @@
 
 namespace arapfields {
 
-/// One layer's softplus on the jets of a block of points. `planes` = (columns, points, width), contiguous.
-/// Before: plane 0 holds z without its bias; after activate(): φ(z + bias). The planes of ∂ keep z
-/// until activate_back() turns them into those of h. `slope` (points, width) receives φ'.
+/// One layer's softplus on the jets of a block of points. `activations` = (columns, points, width),
+/// contiguous. Before: plane 0 holds z without its bias; after activate(): φ(z + bias). The activations of ∂
+/// keep z until activate_back() turns them into those of h. `slope` (points, width) receives φ'.
 template <class Scalar>
 struct ActivationBlock {
-  Scalar* planes = nullptr;
+  Scalar* activations = nullptr;
   Scalar* slope = nullptr;  ///< may be null in activate(): nothing is kept then
-  Scalar* jets = nullptr;   ///< (columns, points, width): h; not used with one column, where planes holds h
+  Scalar* jets =
+      nullptr;  ///< (columns, points, width): h; not used with one column, where activations holds h
   const Scalar* bias = nullptr;
   Scalar sharpness = 1;
   std::int64_t points = 0;

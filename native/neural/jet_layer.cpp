@@ -10,30 +10,30 @@ namespace arapfields {
 namespace {
 
 template <class Scalar>
-ActivationBlock<Scalar> block_of(const LayerStep& step, at::Tensor& planes, const at::Tensor& slope) {
+ActivationBlock<Scalar> block_of(const LayerStep& step, at::Tensor& activations, const at::Tensor& slope) {
   ActivationBlock<Scalar> block;
-  block.planes = planes.data_ptr<Scalar>();
+  block.activations = activations.data_ptr<Scalar>();
   block.slope = slope.defined() ? slope.data_ptr<Scalar>() : nullptr;
   block.sharpness = static_cast<Scalar>(step.sharpness);
-  block.points = planes.size(0) / step.columns;
-  block.width = planes.size(1);
+  block.points = activations.size(0) / step.columns;
+  block.width = activations.size(1);
   block.columns = step.columns;
   return block;
 }
 
 template <class Scalar>
-void activate_on_cpu(const LayerStep& step, at::Tensor& planes, at::Tensor& slope, at::Tensor& jets,
+void activate_on_cpu(const LayerStep& step, at::Tensor& activations, at::Tensor& slope, at::Tensor& jets,
                      const at::Tensor& bias) {
-  ActivationBlock<Scalar> block = block_of<Scalar>(step, planes, slope);
+  ActivationBlock<Scalar> block = block_of<Scalar>(step, activations, slope);
   block.bias = bias.data_ptr<Scalar>();
   if (step.columns > 1) block.jets = jets.data_ptr<Scalar>();
   ARAPFIELDS_DISPATCH(activate(block));
 }
 
 template <class Scalar>
-void activate_back_on_cpu(const LayerStep& step, at::Tensor& planes, const at::Tensor& slope,
+void activate_back_on_cpu(const LayerStep& step, at::Tensor& activations, const at::Tensor& slope,
                           const at::Tensor& partial, at::Tensor& cotangents, at::Tensor& bias_gradient) {
-  const ActivationBlock<Scalar> block = block_of<Scalar>(step, planes, slope);
+  const ActivationBlock<Scalar> block = block_of<Scalar>(step, activations, slope);
   const Scalar* more = partial.defined() ? partial.data_ptr<Scalar>() : nullptr;
   ARAPFIELDS_DISPATCH(
       activate_back(block, more, cotangents.data_ptr<Scalar>(), bias_gradient.data_ptr<Scalar>()));
@@ -53,13 +53,13 @@ void encode_on_cpu(const at::Tensor& points, double frequency, int octaves, at::
   ARAPFIELDS_DISPATCH(encode(block));
 }
 
-at::Tensor by_column(const at::Tensor& planes, int columns) {
-  return planes.view({columns, planes.size(0) / columns, planes.size(1)});
+at::Tensor by_column(const at::Tensor& activations, int columns) {
+  return activations.view({columns, activations.size(0) / columns, activations.size(1)});
 }
 
-void activate_anywhere(const LayerStep& step, at::Tensor& planes, at::Tensor& slope, at::Tensor& jets,
-                       const at::Tensor& bias) {
-  at::Tensor z = by_column(planes, step.columns), z0 = z[0];
+void activate_aten(const LayerStep& step, at::Tensor& activations, at::Tensor& slope, at::Tensor& jets,
+                   const at::Tensor& bias) {
+  at::Tensor z = by_column(activations, step.columns), z0 = z[0];
   const at::Tensor t = step.sharpness * (z0 + bias);
   const at::Tensor s = at::sigmoid(t);
   const at::Tensor value = (at::relu(t) + at::log1p(at::exp(-t.abs()))) / step.sharpness;
@@ -72,9 +72,9 @@ void activate_anywhere(const LayerStep& step, at::Tensor& planes, at::Tensor& sl
   if (slope.defined()) slope.copy_(s);
 }
 
-void activate_back_anywhere(const LayerStep& step, at::Tensor& planes, const at::Tensor& s,
-                            const at::Tensor& partial, at::Tensor& cotangents, at::Tensor& bias_gradient) {
-  at::Tensor z = by_column(planes, step.columns), g = by_column(cotangents, step.columns);
+void activate_back_aten(const LayerStep& step, at::Tensor& activations, const at::Tensor& s,
+                        const at::Tensor& partial, at::Tensor& cotangents, at::Tensor& bias_gradient) {
+  at::Tensor z = by_column(activations, step.columns), g = by_column(cotangents, step.columns);
   at::Tensor g0 = s * g[0];
   if (step.columns > 1) g0 += step.sharpness * s * (1 - s) * (z.slice(0, 1) * g.slice(0, 1)).sum(0);
   g.mul_(s);
@@ -84,7 +84,7 @@ void activate_back_anywhere(const LayerStep& step, at::Tensor& planes, const at:
   bias_gradient.add_(g[0].sum(0));
 }
 
-void encode_anywhere(const at::Tensor& points, double frequency, int octaves, at::Tensor& encoding) {
+void encode_aten(const at::Tensor& points, double frequency, int octaves, at::Tensor& encoding) {
   const Index n = points.size(0);
   const at::Tensor f = at::pow(2.0, at::arange(octaves, points.options().dtype(at::kDouble))) * frequency;
   const at::Tensor angle = points.to(at::kDouble).unsqueeze(-1) * f;  // (n, 3, octaves)
@@ -96,24 +96,25 @@ void encode_anywhere(const at::Tensor& points, double frequency, int octaves, at
 
 }  // namespace
 
-void activate_layer(const LayerStep& step, at::Tensor& planes, at::Tensor& slope, at::Tensor& jets,
+void activate_layer(const LayerStep& step, at::Tensor& activations, at::Tensor& slope, at::Tensor& jets,
                     const at::Tensor& bias) {
-  if (composed(planes)) return activate_anywhere(step, planes, slope, jets, bias);
-  if (planes.scalar_type() == at::kDouble) return activate_on_cpu<double>(step, planes, slope, jets, bias);
-  activate_on_cpu<float>(step, planes, slope, jets, bias);
+  if (on_aten_path(activations)) return activate_aten(step, activations, slope, jets, bias);
+  if (activations.scalar_type() == at::kDouble)
+    return activate_on_cpu<double>(step, activations, slope, jets, bias);
+  activate_on_cpu<float>(step, activations, slope, jets, bias);
 }
 
-void activate_layer_back(const LayerStep& step, at::Tensor& planes, const at::Tensor& slope,
+void activate_layer_back(const LayerStep& step, at::Tensor& activations, const at::Tensor& slope,
                          const at::Tensor& partial, at::Tensor& cotangents, at::Tensor& bias_gradient) {
-  if (composed(planes))
-    return activate_back_anywhere(step, planes, slope, partial, cotangents, bias_gradient);
-  if (planes.scalar_type() == at::kDouble)
-    return activate_back_on_cpu<double>(step, planes, slope, partial, cotangents, bias_gradient);
-  activate_back_on_cpu<float>(step, planes, slope, partial, cotangents, bias_gradient);
+  if (on_aten_path(activations))
+    return activate_back_aten(step, activations, slope, partial, cotangents, bias_gradient);
+  if (activations.scalar_type() == at::kDouble)
+    return activate_back_on_cpu<double>(step, activations, slope, partial, cotangents, bias_gradient);
+  activate_back_on_cpu<float>(step, activations, slope, partial, cotangents, bias_gradient);
 }
 
 void encode_points(const at::Tensor& points, double frequency, int octaves, at::Tensor& encoding) {
-  if (composed(points)) return encode_anywhere(points, frequency, octaves, encoding);
+  if (on_aten_path(points)) return encode_aten(points, frequency, octaves, encoding);
   if (points.scalar_type() == at::kDouble) return encode_on_cpu<double>(points, frequency, octaves, encoding);
   encode_on_cpu<float>(points, frequency, octaves, encoding);
 }

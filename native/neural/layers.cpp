@@ -5,7 +5,7 @@
 
 #include "core/errors.h"
 #include "core/random.h"
-#include "neural/orthogonal_step.h"
+#include "neural/muon.h"
 
 namespace arapfields {
 namespace {
@@ -91,11 +91,11 @@ JetSweeps sweep_jets(Mlp& mlp, PointsIn points, JetOrder order, const Vector& co
   return result;
 }
 
-Layers step_orthogonal(Mlp& mlp, const Vector& gradient, double learning_rate) {
+Layers step_muon(Mlp& mlp, const Vector& gradient, double learning_rate) {
   require(gradient.size() == mlp.gradient().numel(), "gradient", std::to_string(gradient.size()) + " numbers",
           "expected " + std::to_string(mlp.gradient().numel()));
   mlp.gradient().copy_(as_tensor(gradient.data(), {gradient.size()}, mlp.gradient()));
-  OrthogonalStep(mlp).step(mlp, learning_rate);
+  Muon(mlp).step(mlp, learning_rate);
   return layers_of(mlp);
 }
 

@@ -31,7 +31,7 @@ struct JetSweeps {
 JetSweeps sweep_jets(Mlp& mlp, PointsIn points, JetOrder order, const Vector& cotangents);
 
 /// The network after one step of orthogonalised momentum along a flat gradient, momentum at rest before.
-Layers step_orthogonal(Mlp& mlp, const Vector& gradient, double learning_rate);
+Layers step_muon(Mlp& mlp, const Vector& gradient, double learning_rate);
 
 /// A network with random numbers, points and cotangents, whose two sweeps can be run and timed.
 class JetTrial {

@@ -60,8 +60,8 @@ void check_points(const at::Tensor& points, const at::Tensor& like) {
 
 /// Numbers that forward() keeps for pull_back().
 double kept_numbers(const MlpShape& shape, Index n, JetOrder order) {
-  const int planes = std::min(columns(order), 4) + 1 + (order == JetOrder::second ? shape.outputs : 0);
-  return static_cast<double>(n) * shape.layers * planes * shape.width;
+  const int activations = std::min(columns(order), 4) + 1 + (order == JetOrder::second ? shape.outputs : 0);
+  return static_cast<double>(n) * shape.layers * activations * shape.width;
 }
 
 const Block& largest_of(const std::vector<Block>& blocks) {
@@ -79,7 +79,7 @@ void Mlp::State::prepare(const at::Tensor& points, JetOrder order) {
   if (same) return;
   kept = {};  // frees before it allocates
   if (parameters.is_cpu()) require_memory("batch", kept_numbers(shape, n, order) * parameters.element_size());
-  kept.blocks = split_points(n, order, threads, !composed(parameters));
+  kept.blocks = split_points(n, order, threads, !on_aten_path(parameters));
   for (Block& block : kept.blocks) allocate(shape, parameters, true, block);
   for (int t = 0; t < threads; ++t)
     kept.workspaces.push_back(make_workspace(shape, parameters, largest_of(kept.blocks)));
@@ -176,11 +176,11 @@ void Mlp::pull_back(const at::Tensor& cotangents) {
 namespace {
 
 /// Runs body(block, workspace) over all points with one block's memory a thread.
-void in_passing(const MlpShape& shape, const at::Tensor& like, Index n, JetOrder order, bool keep,
-                const std::function<void(Block&, Workspace&)>& body) {
+void stream_blocks(const MlpShape& shape, const at::Tensor& like, Index n, JetOrder order, bool keep,
+                   const std::function<void(Block&, Workspace&)>& body) {
   Blocks passing;
   const int threads = sweep_threads(like);
-  passing.blocks = split_points(n, order, threads, !composed(like));
+  passing.blocks = split_points(n, order, threads, !on_aten_path(like));
   std::vector<Block> memory(static_cast<std::size_t>(threads), largest_of(passing.blocks));
   for (Block& block : memory) {
     allocate(shape, like, keep, block);
@@ -200,10 +200,10 @@ at::Tensor Mlp::evaluate(const at::Tensor& points, JetOrder order) const {
   const State& s = *state_;
   check_points(points, s.parameters);
   at::Tensor result = at::empty({columns(order), points.size(0), s.shape.outputs}, s.parameters.options());
-  in_passing(s.shape, s.parameters, points.size(0), order, order == JetOrder::second,
-             [&](Block& block, Workspace& space) {
-               sweep_forward(s.shape, s.layers, points, block, space, result);
-             });
+  stream_blocks(s.shape, s.parameters, points.size(0), order, order == JetOrder::second,
+                [&](Block& block, Workspace& space) {
+                  sweep_forward(s.shape, s.layers, points, block, space, result);
+                });
   return result;
 }
 
@@ -213,11 +213,11 @@ void Mlp::evaluate_with_gradient(const at::Tensor& points, at::Tensor& values, a
   require(s.shape.outputs == 1, "network", std::to_string(s.shape.outputs) + " outputs", "expected one");
   values = at::empty({1, points.size(0), 1}, s.parameters.options());
   gradients = at::empty({points.size(0), 3}, s.parameters.options());
-  in_passing(s.shape, s.parameters, points.size(0), JetOrder::value, true,
-             [&](Block& block, Workspace& space) {
-               sweep_forward(s.shape, s.layers, points, block, space, values);
-               sweep_to_points(s.shape, s.layers, block, space, gradients);
-             });
+  stream_blocks(s.shape, s.parameters, points.size(0), JetOrder::value, true,
+                [&](Block& block, Workspace& space) {
+                  sweep_forward(s.shape, s.layers, points, block, space, values);
+                  sweep_to_points(s.shape, s.layers, block, space, gradients);
+                });
   values = values.view({-1});
 }
 

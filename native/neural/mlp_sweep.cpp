@@ -57,7 +57,7 @@ int derivatives_of(const Block& block) { return block.columns == 4 ? 2 : 1; }
 void encode_layer(const MlpShape& shape, const at::Tensor& weight, const at::Tensor& points, Block& block) {
   encode_points(points.narrow(0, block.begin, block.count), shape.frequency, shape.octaves, block.encoding);
   const Index m = block.count, part = 2 * shape.octaves;
-  at::Tensor& z = block.planes[0];
+  at::Tensor& z = block.activations[0];
   product(z.narrow(0, 0, m), block.encoding[0], weight.t());
   for (int derivative = 1; derivative < derivatives_of(block); ++derivative)
     for (int i = 0; i < 3; ++i)
@@ -95,8 +95,8 @@ void sweep_adjoints(const MlpShape& shape, const LayerViews& layers, Block& bloc
   at::Tensor below = matrix(space.jets, rows, shape.width);
   at::Tensor second = space.second.narrow(0, 0, m * 6 * shape.outputs).view({m, 6, shape.outputs}).zero_();
   for (int l = shape.layers - 1; l >= 0; --l) {
-    adjoint_layer(shape.sharpness, block.planes[at_(l)], block.slope[at_(l)], adjoints_of(layers, block, l),
-                  below, second);
+    adjoint_layer(shape.sharpness, block.activations[at_(l)], block.slope[at_(l)],
+                  adjoints_of(layers, block, l), below, second);
     if (l > 0) times_weight(block.adjoints[at_(l - 1)], below, layers, l, false);
   }
   at::Tensor encoded = matrix(space.below, rows, shape.encoded());
@@ -108,8 +108,8 @@ void sweep_adjoints(const MlpShape& shape, const LayerViews& layers, Block& bloc
   result.narrow(0, 4, 6).narrow(1, block.begin, m).copy_(second.transpose(0, 1));
 }
 
-/// The way back of sweep_adjoints(), upwards: adds to `gradient`, and leaves in space.partial what the planes
-/// of each layer receive.
+/// The way back of sweep_adjoints(), upwards: adds to `gradient`, and leaves in space.partial what the
+/// activations of each layer receive.
 void sweep_adjoints_back(const MlpShape& shape, const LayerViews& layers, const at::Tensor& cotangents,
                          Block& block, Workspace& space, LayerViews& gradient) {
   const Index m = block.count, rows = shape.outputs * m;
@@ -124,7 +124,7 @@ void sweep_adjoints_back(const MlpShape& shape, const LayerViews& layers, const 
     times_weight(here, lower, layers, l, true);
     at::Tensor below = matrix(space.below, rows, shape.width);
     at::Tensor partial = matrix(space.partial[at_(l)], block.columns * m, shape.width);
-    adjoint_layer_back(shape.sharpness, block.planes[at_(l)], block.slope[at_(l)],
+    adjoint_layer_back(shape.sharpness, block.activations[at_(l)], block.slope[at_(l)],
                        adjoints_of(layers, block, l), second, here, below, partial);
     add_outer(gradient.weights[at_(l)], below, lower, layers, l);
     lower = here;
@@ -146,11 +146,11 @@ LayerViews::LayerViews(const MlpShape& shape, const at::Tensor& flat) {
 }
 
 int sweep_threads(const at::Tensor& like) {
-  return !composed(like) && !at::in_parallel_region() ? thread_count() : 1;
+  return !on_aten_path(like) && !at::in_parallel_region() ? thread_count() : 1;
 }
 
 std::vector<Block> split_points(Index n, JetOrder order, int threads, bool in_cache) {
-  // Blocks whose planes fit a core's second-level cache; elsewhere one block that memory bounds.
+  // Blocks whose activations fit a core's second-level cache; elsewhere one block that memory bounds.
   const Index best = !in_cache ? (Index(1) << 19) / columns(order) : order == JetOrder::value ? 512 : 128;
   Index count = (n + best - 1) / best;
   count = std::clamp<Index>((count + threads - 1) / threads * threads, 1, std::max<Index>(n, 1));
@@ -168,12 +168,12 @@ std::vector<Block> split_points(Index n, JetOrder order, int threads, bool in_ca
 void allocate(const MlpShape& shape, const at::Tensor& like, bool keep, Block& block) {
   const Index m = block.count, stored = block.second ? 3 : 2;
   block.encoding = at::empty({stored, m, shape.encoded()}, like.options());
-  block.planes.clear(), block.slope.clear(), block.adjoints.clear();
+  block.activations.clear(), block.slope.clear(), block.adjoints.clear();
   // Where nothing is kept, two buffers take turns.
   for (int l = 0; l < shape.layers; ++l) {
     const bool own = keep || l < 2;
-    block.planes.push_back(own ? at::empty({block.columns * m, shape.width}, like.options())
-                               : block.planes[at_(l - 2)]);
+    block.activations.push_back(own ? at::empty({block.columns * m, shape.width}, like.options())
+                                    : block.activations[at_(l - 2)]);
     block.slope.push_back(keep ? at::empty({m, shape.width}, like.options()) : at::Tensor());
   }
   for (int l = 0; l + 1 < shape.layers && block.second; ++l)
@@ -185,9 +185,9 @@ void borrow(const Block& memory, Block& block) {
   block.encoding = memory.encoding.view({-1})
                        .narrow(0, 0, memory.encoding.size(0) * m * memory.encoding.size(2))
                        .view({memory.encoding.size(0), m, memory.encoding.size(2)});
-  block.planes.clear(), block.slope.clear(), block.adjoints.clear();
-  for (const at::Tensor& planes : memory.planes)
-    block.planes.push_back(planes.narrow(0, 0, block.columns * m));
+  block.activations.clear(), block.slope.clear(), block.adjoints.clear();
+  for (const at::Tensor& activations : memory.activations)
+    block.activations.push_back(activations.narrow(0, 0, block.columns * m));
   for (const at::Tensor& slope : memory.slope)
     block.slope.push_back(slope.defined() ? slope.narrow(0, 0, m) : slope);
   for (const at::Tensor& adjoints : memory.adjoints)
@@ -233,16 +233,16 @@ void sweep_forward(const MlpShape& shape, const LayerViews& layers, const at::Te
   const Index rows = block.columns * block.count;
   at::Tensor jets = matrix(space.jets, rows, shape.width);
   for (int l = 0; l < shape.layers; ++l) {
-    at::Tensor& planes = block.planes[at_(l)];
-    const at::Tensor& below = block.columns == 1 && l > 0 ? block.planes[at_(l - 1)] : jets;
+    at::Tensor& activations = block.activations[at_(l)];
+    const at::Tensor& below = block.columns == 1 && l > 0 ? block.activations[at_(l - 1)] : jets;
     if (l == 0)
       encode_layer(shape, layers.weights[0], points, block);
     else
-      times_weight(planes, below, layers, l, true);
-    activate_layer({shape.sharpness, block.columns}, planes, block.slope[at_(l)], jets,
+      times_weight(activations, below, layers, l, true);
+    activate_layer({shape.sharpness, block.columns}, activations, block.slope[at_(l)], jets,
                    layers.biases[at_(l)]);
   }
-  const at::Tensor& top = block.columns == 1 ? block.planes.back() : jets;
+  const at::Tensor& top = block.columns == 1 ? block.activations.back() : jets;
   at::Tensor output = matrix(space.output, rows, shape.outputs);
   product(output, top, layers.weights.back().t());
   output.narrow(0, 0, block.count).add_(layers.biases.back());
@@ -263,12 +263,12 @@ void sweep_back(const MlpShape& shape, const LayerViews& layers, const at::Tenso
   gradient.biases.back().add_(upper.narrow(0, 0, block.count).sum(0));
   at::Tensor here = matrix(space.jets, rows, shape.width), spare = matrix(space.other, rows, shape.width);
   for (int l = shape.layers - 1; l >= 0; --l) {
-    at::Tensor& planes = block.planes[at_(l)];
+    at::Tensor& activations = block.activations[at_(l)];
     times_weight(here, upper, layers, l + 1, false);
     const at::Tensor partial = block.second ? matrix(space.partial[at_(l)], rows, shape.width) : at::Tensor();
-    activate_layer_back({shape.sharpness, block.columns}, planes, block.slope[at_(l)], partial, here,
+    activate_layer_back({shape.sharpness, block.columns}, activations, block.slope[at_(l)], partial, here,
                         gradient.biases[at_(l)]);
-    add_outer(gradient.weights[at_(l + 1)], upper, planes, layers, l + 1);
+    add_outer(gradient.weights[at_(l + 1)], upper, activations, layers, l + 1);
     upper = here;
     std::swap(here, spare);
   }

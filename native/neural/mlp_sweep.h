@@ -19,18 +19,18 @@ struct LayerViews {
   std::vector<at::Tensor> rounded;
 };
 
-/// A range of points and what the forward sweep computes for it. planes[l] is (columns·count, width): the
-/// pre-activations of layer l, then as in ActivationBlock; slope[l] (count, width) is φ', or undefined where
-/// nothing is kept; encoding (1 to 3, count, 6·octaves). Second derivatives come from a sweep downwards:
-/// adjoints[l] (outputs·count, width) are the outputs' derivatives by the activations of layer l, but the
-/// last, whose row of the output layer's weight serves all points.
+/// A range of points and what the forward sweep computes for it. activations[l] is (columns·count, width):
+/// the pre-activations of layer l, then as in ActivationBlock; slope[l] (count, width) is φ', or undefined
+/// where nothing is kept; encoding (1 to 3, count, 6·octaves). Second derivatives come from a sweep
+/// downwards: adjoints[l] (outputs·count, width) are the outputs' derivatives by the activations of layer l,
+/// but the last, whose row of the output layer's weight serves all points.
 struct Block {
   Index begin = 0;
   Index count = 0;
   int columns = 1;
   bool second = false;
   at::Tensor encoding;
-  std::vector<at::Tensor> planes, slope, adjoints;
+  std::vector<at::Tensor> activations, slope, adjoints;
 };
 
 /// What one thread needs besides: flat buffers for the largest block, the last three for second derivatives.

@@ -60,7 +60,7 @@ struct Search {
 
 }  // namespace
 
-Crossings find_crossings(CountedFunction& function, const std::vector<Line>& lines,
+Crossings find_crossings(EvaluationCounter& function, const std::vector<Line>& lines,
                          const std::vector<Bracket>& brackets, double tolerance) {
   const auto total = static_cast<Index>(brackets.size());
   PointsF points(total, 3), gradients(total, 3);

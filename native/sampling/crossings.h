@@ -3,16 +3,16 @@
 
 #include <vector>
 
-#include "sampling/line_scan.h"
+#include "sampling/root_isolation.h"
 
 namespace arapfields {
 
 /// Asks Φ in the doubtful parts of lines until every crossing there has its bracket. A part is bisected, all
 /// parts at once, until Φ − p, known at its ends and bounded in slope, excludes a second zero or any, or
 /// until it is shorter than `finest`. Excursions of Φ over zero and back within that length may be missed.
-std::vector<Bracket> settle_doubts(CountedFunction& function, const SparseModel& model,
-                                   const std::vector<Line>& lines, const std::vector<Doubt>& doubts,
-                                   double finest = 2e-4);
+std::vector<Bracket> resolve_ambiguous(EvaluationCounter& function, const TricubicSurrogate& model,
+                                       const std::vector<Line>& lines,
+                                       const std::vector<AmbiguousInterval>& ambiguous, double finest = 2e-4);
 
 struct Crossings {
   std::vector<Index> bracket;  ///< which bracket each belongs to, ascending
@@ -24,7 +24,7 @@ struct Crossings {
 
 /// The zero in every bracket by safeguarded secant steps, all brackets at once, until |Φ| ≤ tolerance (or as
 /// near as float32 coordinates come, below 1e-4). Two values and one gradient are typical.
-Crossings find_crossings(CountedFunction& function, const std::vector<Line>& lines,
+Crossings find_crossings(EvaluationCounter& function, const std::vector<Line>& lines,
                          const std::vector<Bracket>& brackets, double tolerance);
 
 }  // namespace arapfields

@@ -27,7 +27,7 @@ Line random_line(const Box& box, Random& random) {
   line.origin[axis] = upper ? box.high[axis] : box.low[axis];
   line.origin[u] = random.uniform(box.low[u], box.high[u]);
   line.origin[v] = random.uniform(box.low[v], box.high[v]);
-  // Malley's method: a uniform point of the disk, lifted to the hemisphere, is cosine-distributed.
+  // Malley's method: a uniform point of the disk, embedded to the hemisphere, is cosine-distributed.
   const double square = random.uniform(), angle = random.uniform(0.0, 2.0 * std::numbers::pi);
   line.direction[u] = std::sqrt(square) * std::cos(angle);
   line.direction[v] = std::sqrt(square) * std::sin(angle);

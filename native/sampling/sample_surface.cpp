@@ -20,14 +20,14 @@ constexpr Index hopeless_lines = 1 << 18;  // without a crossing: there is no su
 constexpr std::uint64_t shuffle_stream = ~std::uint64_t{0};
 
 /// The model pays off while it has fewer cells than a quarter of the points wanted.
-SparseModelOptions model_options(Index count) {
+TricubicSurrogateOptions model_options(Index count) {
   return {.wanted_cells = std::clamp<Index>(count / 4, 200, 50'000), .max_resolution = 128};
 }
 
 /// Casts lines and keeps those that cross, with a bracket for every crossing.
 class Caster {
  public:
-  Caster(CountedFunction& function, const SparseModel& model, std::uint64_t seed)
+  Caster(EvaluationCounter& function, const TricubicSurrogate& model, std::uint64_t seed)
       : function_(function), model_(model), box_(model.bounds()), seed_(seed) {}
 
   /// Brackets of `count` further lines, appended to `brackets`.
@@ -38,7 +38,7 @@ class Caster {
       line = random_line(box_, random);
     }
     ScanResult found = scan_lines(model_, fresh);
-    const std::vector<Bracket> more = settle_doubts(function_, model_, fresh, found.doubts);
+    const std::vector<Bracket> more = resolve_ambiguous(function_, model_, fresh, found.ambiguous);
     found.brackets.insert(found.brackets.end(), more.begin(), more.end());
     std::sort(found.brackets.begin(), found.brackets.end(), [](const Bracket& a, const Bracket& b) {
       return a.line != b.line ? a.line < b.line : a.low < b.low;
@@ -66,8 +66,8 @@ class Caster {
   std::vector<Bracket> brackets;
 
  private:
-  CountedFunction& function_;
-  const SparseModel& model_;
+  EvaluationCounter& function_;
+  const TricubicSurrogate& model_;
   Box box_;
   std::uint64_t seed_;
   Index cast_ = 0;
@@ -94,8 +94,8 @@ SurfaceSamples sample_surface(const ImplicitFunction& implicit, const Frame& fra
   require_memory("count", 12.0 * sizeof(double) * static_cast<double>(options.count));
   const auto start = std::chrono::steady_clock::now();
   progress.report(0.0, "measuring the implicit function");
-  CountedFunction function(implicit, progress);
-  const SparseModel model(function, model_options(options.count));
+  EvaluationCounter function(implicit, progress);
+  const TricubicSurrogate model(function, model_options(options.count));
   const Index model_evaluations = function.value_count() + function.gradient_count();
   if (model.active().empty()) throw_empty("its values keep one sign in the whole cube");
 

@@ -41,17 +41,17 @@ void check(const CurveHandle& handle, std::size_t position, Index samples) {
 }
 
 /// The deformation of one curve. What it measures of the coefficients: the jets at the samples, then the
-/// second derivatives at the bumps, scaled so that their squares add up to the smoothness term.
+/// second derivatives at the centers, scaled so that their squares add up to the smoothness term.
 class CurveProblem final : public MeasuredObjective {
  public:
   CurveProblem(Points2In points, const std::vector<CurveHandle>& handles, const CurveOptions& options)
       : options_(options), count_(points.rows()), field_(CurveField::around(points, options.spacing)) {
     const Rows jets = field_.basis.rows(field_.to_square(points));
-    const Index bumps = field_.basis.centers.rows();
-    Rows second = field_.basis.rows(field_.basis.centers).bottomRows(3 * bumps);
-    second.bottomRows(bumps) *= std::sqrt(2.0);  // the mixed derivative counts twice in ‖D‖²
+    const Index centers = field_.basis.centers.rows();
+    Rows second = field_.basis.rows(field_.basis.centers).bottomRows(3 * centers);
+    second.bottomRows(centers) *= std::sqrt(2.0);  // the mixed derivative counts twice in ‖D‖²
     rows_.resize(jets.rows() + second.rows(), field_.basis.size());
-    rows_ << jets, std::sqrt(options.smoothness / static_cast<double>(bumps)) * second;
+    rows_ << jets, std::sqrt(options.smoothness / static_cast<double>(centers)) * second;
     for (const CurveHandle& handle : handles) {
       const double share =
           options.handle_weight * handle.weight / static_cast<double>(handles.size() * handle.samples.size());

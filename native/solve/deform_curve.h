@@ -17,10 +17,10 @@ struct CurveHandle {
 
 struct CurveOptions {
   double bending = 0.01;       ///< λ_bend, in the square
-  double smoothness = 1e-4;    ///< of mean ‖D‖² at the bumps, off the curve too
+  double smoothness = 1e-4;    ///< of mean ‖D‖² at the centers, off the curve too
   double handle_weight = 100;  ///< factor of the handles' mean squared distance
   int iterations = 200;        ///< quasi-Newton steps at most
-  double spacing = 0.1;        ///< of the fine bumps, in the square
+  double spacing = 0.1;        ///< of the fine centers, in the square
   int threads = 0;             ///< 0: all
 };
 

@@ -8,7 +8,7 @@
 #include "core/device.h"
 #include "distance/morton.h"
 #include "energies/arap.h"
-#include "energies/composed.h"
+#include "energies/aten_energies.h"
 #include "energies/distortion.h"
 
 namespace arapfields {
@@ -98,7 +98,7 @@ FieldObjective::Batch FieldObjective::draw(Random& random) {
 }
 
 at::Tensor FieldObjective::accumulate(TrainableField& field, Random& random) {
-  if (composed(field.parameters())) return by_compositions(field, random);
+  if (on_aten_path(field.parameters())) return by_compositions(field, random);
   const bool wide = field.parameters().scalar_type() == at::kDouble;
   return at::scalar_tensor(wide ? by_kernels<double>(field, random) : by_kernels<float>(field, random),
                            at::kDouble);
@@ -134,25 +134,25 @@ at::Tensor FieldObjective::by_compositions(TrainableField& field, Random& random
   const Batch batch = draw(random);
   const at::Tensor jets = field.forward_at(batch.points, order_of_terms());
   const at::Tensor cotangents = at::zeros_like(jets);
-  const at::Tensor arap = composed_arap(jets, terms_.bending, terms_.rigidity, tables, cotangents);
+  const at::Tensor arap = aten_arap(jets, terms_.bending, terms_.rigidity, tables, cotangents);
   at::Tensor value = terms_.rigidity * (arap[0] + terms_.bending * arap[1]);
   if (styled())
     value +=
         terms_.gauss *
-        composed_gauss(jets, uploaded(batch.normals, like),
-                       batch.weights.size() > 0 ? uploaded(batch.weights, like).select(1, 0) : at::Tensor(),
-                       constants_->preferred, terms_.preference->sharpness, terms_.gauss, tables, cotangents);
+        aten_gauss(jets, uploaded(batch.normals, like),
+                   batch.weights.size() > 0 ? uploaded(batch.weights, like).select(1, 0) : at::Tensor(),
+                   constants_->preferred, terms_.preference->sharpness, terms_.gauss, tables, cotangents);
   if (terms_.barrier > 0.0)
     value +=
-        terms_.barrier * composed_barrier(jets, terms_.barrier_threshold, terms_.barrier, tables, cotangents);
+        terms_.barrier * aten_barrier(jets, terms_.barrier_threshold, terms_.barrier, tables, cotangents);
   field.pull_back(cotangents);
   if (!pulled()) return value;
   const HandleBatch<double> pairs = terms_.handles.batch<double>(terms_.handle_batch, random);
   const at::Tensor ends = field.forward_at(pairs.sources, JetOrder::value);
   const at::Tensor pull = at::zeros_like(ends);
-  value += terms_.handle_weight * composed_handles(ends, uploaded(pairs.targets, like),
-                                                   uploaded(pairs.weights, like).select(1, 0),
-                                                   terms_.handle_weight, pull);
+  value += terms_.handle_weight * aten_handles(ends, uploaded(pairs.targets, like),
+                                               uploaded(pairs.weights, like).select(1, 0),
+                                               terms_.handle_weight, pull);
   field.pull_back(pull);
   return value;
 }

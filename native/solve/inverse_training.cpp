@@ -100,7 +100,7 @@ Solution train_inverse(const DeformationField& field, const SurfaceSamples& samp
   loop.iterations = options.iterations;
   loop.learning_rate = options.learning_rate;
   loop.final_share = 0.01;
-  loop.hold = 0.3;
+  loop.lr_hold_fraction = 0.3;
   loop.time_budget = options.time_budget;
   loop.seed = seed;
   Solution solution{inverse, {}};
@@ -124,7 +124,7 @@ InvertibleObjective::InvertibleObjective(Objective& inner, const SurfaceSamples&
       weight_(weight),
       iterations_(std::max(1, options.iterations)),
       inverse_(shape, options.seed + 1, false, device),
-      stepper_(inverse_, options) {}
+      optimizer_(inverse_, options) {}
 
 at::Tensor InvertibleObjective::accumulate(TrainableField& field, Random& random) {
   const at::Tensor inner = inner_.accumulate(field, random);
@@ -139,7 +139,7 @@ at::Tensor InvertibleObjective::accumulate(TrainableField& field, Random& random
   field.pull_back((2.0 * scale * transposed_times(jets, residual)).unsqueeze(0));
   inverse_.gradient().zero_();
   inverse_.pull_back(inverse_cotangents);
-  stepper_.step(stepper_.rate(static_cast<double>(done_++) / iterations_));
+  optimizer_.step(optimizer_.rate(static_cast<double>(done_++) / iterations_));
   return inner + scale * residual.square().sum();
 }
 

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "fields/neural_field.h"
+#include "solve/optimizer.h"
 #include "solve/report.h"
-#include "solve/stepper.h"
 
 namespace arapfields {
 
@@ -11,7 +11,7 @@ struct InverseTrainingOptions {
   int iterations = 1000;
   int batch = 1000;  ///< half of them deformed samples, half uniform in the deformed surface's box
   double learning_rate = 0.0;
-  std::string optimizer = "orthogonal";
+  std::string optimizer = "muon";
   int width = 256, layers = 4, octaves = 4;
   double frequency = 1.0, sharpness = 30.0;
   double time_budget = 0.0;
@@ -44,7 +44,7 @@ class InvertibleObjective final : public Objective {
   double weight_;
   int iterations_, done_ = 0;
   NeuralField inverse_;
-  Stepper stepper_;
+  Optimizer optimizer_;
 };
 
 }  // namespace arapfields

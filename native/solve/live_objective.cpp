@@ -8,14 +8,17 @@ namespace arapfields {
 namespace {
 
 /// Pull of each bump's coefficient towards zero: removes what no sample can see, and no more.
-constexpr double bump_weight = 1e-10;
+constexpr double coefficient_weight = 1e-10;
 
 }  // namespace
 
 template <class Scalar>
 LiveObjective<Scalar>::LiveObjective(const RadialBasis& basis, PointsIn samples, double bending,
                                      double handle_weight)
-    : bumps_(basis.bumps()), bending_(bending), handle_weight_(handle_weight), samples_(basis, samples) {}
+    : center_count_(basis.center_count()),
+      bending_(bending),
+      handle_weight_(handle_weight),
+      samples_(basis, samples) {}
 
 template <class Scalar>
 void LiveObjective<Scalar>::set_barrier(double weight, double threshold) {
@@ -28,8 +31,8 @@ void LiveObjective<Scalar>::set_handles(const HandleBatch<double>& pairs,
                                         const RowMatrix<double>& values_of_basis,
                                         const RowMatrix<double>& inverse_factor) {
   pairs_ = {pairs.sources.cast<Scalar>(), pairs.targets.cast<Scalar>(), pairs.weights.cast<Scalar>()};
-  handle_basis_ = SkinnyMatrix<Scalar>(values_of_basis);
-  inverse_factor_ = SkinnyMatrix<float>(inverse_factor, true);
+  handle_basis_ = TallMatrix<Scalar>(values_of_basis);
+  inverse_factor_ = TallMatrix<float>(inverse_factor, true);
 }
 
 template <class Scalar>
@@ -49,12 +52,12 @@ void LiveObjective<Scalar>::set_style(const std::optional<LiveStyle>& style) {
 
 template <class Scalar>
 void LiveObjective<Scalar>::measure(const RowMatrix<double>& c, Measurements& u) const {
-  u.resize(bump_offset() + 3 * bumps_);
+  u.resize(center_offset() + 3 * center_count_);
   samples_.evaluate(c, {u.data(), samples_.size(), JetOrder::second});
   const PointsOf<Scalar> rounded = c.cast<Scalar>();
   Eigen::Map<PointsOf<Scalar>>(u.data() + handle_offset(), pairs_.sources.rows(), 3) =
       handle_basis_.times(rounded);
-  u.tail(3 * bumps_) = Eigen::Map<const Measurements>(rounded.data(), 3 * bumps_);
+  u.tail(3 * center_count_) = Eigen::Map<const Measurements>(rounded.data(), 3 * center_count_);
 }
 
 template <class Scalar>
@@ -79,19 +82,20 @@ LiveTerms LiveObjective<Scalar>::evaluate(const Measurements& u, Measurements* c
 template <class Scalar>
 double LiveObjective<Scalar>::value(const Measurements& u, Measurements* cotangents) const {
   const LiveTerms terms = evaluate(u, cotangents);
-  const auto bumps = u.tail(3 * bumps_);
-  if (cotangents != nullptr) cotangents->tail(3 * bumps_) = Scalar(2.0 * bump_weight) * bumps;
+  const auto centers = u.tail(3 * center_count_);
+  if (cotangents != nullptr) cotangents->tail(3 * center_count_) = Scalar(2.0 * coefficient_weight) * centers;
   return terms.arap.stretch + bending_ * terms.arap.bend + handle_weight_ * terms.handles +
          (style_ ? style_->weight * terms.gauss : 0.0) + barrier_ * terms.barrier +
-         bump_weight * static_cast<double>(bumps.squaredNorm());
+         coefficient_weight * static_cast<double>(centers.squaredNorm());
 }
 
 template <class Scalar>
 RowMatrix<double> LiveObjective<Scalar>::pull_back(const Measurements& cotangents) const {
-  RowMatrix<double> gradient = RowMatrix<double>::Zero(bumps_ + 4, 3);
+  RowMatrix<double> gradient = RowMatrix<double>::Zero(center_count_ + 4, 3);
   samples_.pull_back({cotangents.data(), samples_.size(), JetOrder::second}, gradient);
   gradient += handle_basis_.transpose_times(handle_values(cotangents)).template cast<double>();
-  Eigen::Map<Vector>(gradient.data(), 3 * bumps_) += cotangents.tail(3 * bumps_).template cast<double>();
+  Eigen::Map<Vector>(gradient.data(), 3 * center_count_) +=
+      cotangents.tail(3 * center_count_).template cast<double>();
   return gradient;
 }
 

@@ -3,11 +3,11 @@
 
 #include <optional>
 
-#include "core/skinny.h"
+#include "core/tall_product.h"
 #include "energies/arap.h"
 #include "energies/gauss.h"
 #include "energies/handles.h"
-#include "fields/radial_sites.h"
+#include "fields/radial_evaluator.h"
 #include "solve/quasi_newton.h"
 
 namespace arapfields {
@@ -28,9 +28,9 @@ struct LiveTerms {
   double barrier = 0.0;  ///< energies/distortion.h
 };
 
-/// stretch + λ_bend·bend + weight·handles + λ_Gauss·gauss + barrier + a vanishing pull of all bumps towards
+/// stretch + λ_bend·bend + weight·handles + λ_Gauss·gauss + barrier + a vanishing pull of all centers towards
 /// zero, of the fields of one radial basis. Measurements: jets at the samples, values at the handles'
-/// sources, bumps. In single precision a step costs half, and the value is good to some 1e-6 of itself.
+/// sources, centers. In single precision a step costs half, and the value is good to some 1e-6 of itself.
 template <class Scalar>
 class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
  public:
@@ -63,14 +63,14 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
  private:
   LiveTerms evaluate(const Measurements& u, Measurements* cotangents) const;
   Index handle_offset() const { return 30 * samples_.size(); }
-  Index bump_offset() const { return handle_offset() + 3 * pairs_.sources.rows(); }
+  Index center_offset() const { return handle_offset() + 3 * pairs_.sources.rows(); }
 
-  Index bumps_;
+  Index center_count_;
   double bending_, handle_weight_, barrier_ = 0.0, barrier_threshold_ = 0.1;
-  RadialSites<Scalar> samples_;
+  RadialEvaluator<Scalar> samples_;
   HandleBatch<Scalar> pairs_;
-  SkinnyMatrix<Scalar> handle_basis_;   // (pairs, size)
-  SkinnyMatrix<float> inverse_factor_;  // L⁻¹ of the preconditioner's matrix L Lᵀ
+  TallMatrix<Scalar> handle_basis_;   // (pairs, size)
+  TallMatrix<float> inverse_factor_;  // L⁻¹ of the preconditioner's matrix L Lᵀ
   std::optional<LiveStyle> style_;
   PointsOf<Scalar> style_normals_;
   Eigen::VectorX<Scalar> style_weights_;

@@ -12,12 +12,12 @@ namespace arapfields {
 
 /// Options of a live solve. Lengths and weights refer to the unit cube of the samples' frame.
 struct LiveOptions {
-  int samples = 2000;          ///< surface samples that the energy sees
-  int coarse_bumps = 60;       ///< bumps of the coarse scale (0: none)
-  int fine_bumps = 300;        ///< bumps of the fine scale
-  double coarse_reach = 3.0;   ///< radius of the coarse bumps as a multiple of their spacing
-  double fine_reach = 4.0;     ///< the same of the fine bumps
-  bool interior = true;        ///< bumps reach along the shape's interior (fields/radial_lift.h)
+  int samples = 2000;                 ///< surface samples that the energy sees
+  int coarse_centers = 60;            ///< centers of the coarse scale (0: none)
+  int fine_centers = 300;             ///< centers of the fine scale
+  double coarse_radius_factor = 3.0;  ///< radius of the coarse centers as a multiple of their spacing
+  double fine_radius_factor = 4.0;    ///< the same of the fine centers
+  bool interior = true;        ///< centers reach along the shape's interior (fields/interior_embedding.h)
   double bending = 0.01;       ///< λ_bend
   double handle_weight = 100;  ///< factor of the handles' mean squared distance
   int handle_samples = 300;    ///< samples that a handle pulls at, at most

@@ -15,13 +15,13 @@
 namespace arapfields {
 namespace {
 
-/// Samples that the bumps' centers are chosen from.
+/// Samples that the centers' centers are chosen from.
 constexpr Index center_candidates = 6000;
 /// Weight, against the surface's energy, with which a style without handles holds the lowest sample in place.
 constexpr double anchor_weight = 1.0;
 
-/// Samples × bumps below which a step takes about a millisecond: waking other threads, which may be busy with
-/// drawing, would cost more than they do.
+/// Samples × centers below which a step takes about a millisecond: waking other threads, which may be busy
+/// with drawing, would cost more than they do.
 constexpr Index worth_threads = 1000000;
 
 /// Single precision serves down to this tolerance; what it cannot see is an energy of about the second
@@ -37,10 +37,10 @@ constexpr double worthwhile_gain = 0.1;
 
 void LiveOptions::validate() const {
   require_range("samples", samples, 10, 1e6);
-  require_range("coarse_bumps", coarse_bumps, 0, 3000);
-  require_range("fine_bumps", fine_bumps, 1, 3000);
-  require_range("coarse_reach", coarse_reach, 0.5, 20);
-  require_range("fine_reach", fine_reach, 0.5, 20);
+  require_range("coarse_centers", coarse_centers, 0, 3000);
+  require_range("fine_centers", fine_centers, 1, 3000);
+  require_range("coarse_radius_factor", coarse_radius_factor, 0.5, 20);
+  require_range("fine_radius_factor", fine_radius_factor, 0.5, 20);
   require_range("bending", bending, 0, 1e3);
   require_range("handle_weight", handle_weight, 1e-6, 1e9);
   require_range("handle_samples", handle_samples, 1, 1e6);
@@ -64,14 +64,14 @@ LiveSolver::LiveSolver(const SurfaceSamples& samples, const std::vector<Handle>&
   chosen_ = stratified(order, options.samples, random);
   const std::vector<Index> candidates = stratified(order, center_candidates, random);
   std::vector<RadialScale> scales;
-  if (options.coarse_bumps > 0) scales.push_back({options.coarse_bumps, options.coarse_reach});
-  scales.push_back({options.fine_bumps, options.fine_reach});
+  if (options.coarse_centers > 0) scales.push_back({options.coarse_centers, options.coarse_radius_factor});
+  scales.push_back({options.fine_centers, options.fine_radius_factor});
   const Points spread = rows_of(surface_, candidates);
   basis_ = radial_basis(spread, scales);
   if (options.interior && surface_normals_.rows() == surface_.rows())
-    basis_.set_lift(interior_lift(spread, rows_of(surface_normals_, candidates)));
+    basis_.set_embedding(interior_embedding(spread, rows_of(surface_normals_, candidates)));
   coefficients_ = basis_.identity();
-  progress.report(0.2, "bumps placed");
+  progress.report(0.2, "centers placed");
   stiffness_ = surface_stiffness(basis_, rows_of(surface_, chosen_), options.bending);
   progress.report(0.8, "stiffness");
   prepare(fast_);
@@ -174,7 +174,7 @@ void LiveSolver::clear_style() {
 }
 
 int LiveSolver::solve_threads() const {
-  const Index work = static_cast<Index>(chosen_.size()) * basis_.bumps();
+  const Index work = static_cast<Index>(chosen_.size()) * basis_.center_count();
   return options_.threads == 0 && work < worth_threads ? 1 : options_.threads;
 }
 
@@ -223,7 +223,7 @@ void LiveSolver::follow_rigidly() {
   const Alignment alignment = best_alignment(values, pairs_.targets, pairs_.weights);
   if (alignment.gain > worthwhile_gain) return;
   coefficients_ *= alignment.rotation.transpose();
-  coefficients_.row(basis_.bumps()) += alignment.translation.transpose();
+  coefficients_.row(basis_.center_count()) += alignment.translation.transpose();
   fast_.u.resize(0);
   u_before_.resize(0);
   optimizer_.forget();
@@ -250,8 +250,8 @@ void LiveSolver::extrapolate() {
 /// No energy feels a translation: what is left of one is taken out exactly.
 void LiveSolver::hold_lowest() {
   Points value(1, 3);
-  RadialSites<double>(basis_, pairs_.sources).evaluate(coefficients_, {value.data(), 1, JetOrder::value});
-  coefficients_.row(basis_.bumps()) += pairs_.sources.row(0) - value.row(0);
+  RadialEvaluator<double>(basis_, pairs_.sources).evaluate(coefficients_, {value.data(), 1, JetOrder::value});
+  coefficients_.row(basis_.center_count()) += pairs_.sources.row(0) - value.row(0);
   fast_.u.resize(0);
   exact_.u.resize(0);
 }

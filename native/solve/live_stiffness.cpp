@@ -4,12 +4,12 @@
 #include <cmath>
 
 #include "core/dense.h"
-#include "fields/radial_sites.h"
+#include "fields/radial_evaluator.h"
 
 namespace arapfields {
 namespace {
 
-/// Bumps overlap so much that the matrix is singular to rounding.
+/// Centers overlap so much that the matrix is singular to rounding.
 constexpr double ridge = 1e-9;
 constexpr Index most_samples = 1000;
 

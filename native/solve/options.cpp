@@ -19,8 +19,8 @@ void validate_common(const Options& o) {
   require_not_negative("barrier", o.barrier);
   require_positive("barrier_threshold", o.barrier_threshold);
   require_not_negative("learning_rate", o.learning_rate);
-  require(o.optimizer == "orthogonal" || o.optimizer == "adam", "optimizer", "'" + o.optimizer + "'",
-          "'orthogonal' or 'adam' is allowed");
+  require(o.optimizer == "muon" || o.optimizer == "adam", "optimizer", "'" + o.optimizer + "'",
+          "'muon' or 'adam' is allowed");
   require(o.precision == "float32" || o.precision == "bfloat16", "precision", "'" + o.precision + "'",
           "'float32' or 'bfloat16' is allowed");
   require_not_negative("time_budget", o.time_budget);
@@ -35,7 +35,7 @@ void DeformOptions::validate() const {
   require(start == "identity" || start == "radial", "start", "'" + start + "'",
           "'identity' or 'radial' is allowed");
   validate_common(*this);
-  require_range("bumps", bumps, 5, 3000);
+  require_range("centers", centers, 5, 3000);
   require_positive("margin", margin);
   const bool radial = field == "radial";
   require(!(radial && exact_handles), "exact_handles", "True with field='radial'",

@@ -12,7 +12,7 @@ namespace arapfields {
 struct DeformOptions {
   std::string field = "neural";    ///< "neural" or "radial"
   std::string start = "identity";  ///< neural: what the network refines, "identity" or "radial"
-  int bumps = 300;                 ///< fine bumps of a radial field, to which a fifth of coarse ones is added
+  int centers = 300;  ///< fine centers of a radial field, to which a fifth of coarse ones is added
   int iterations = 300;
   int batch = 300;             ///< surface samples an iteration
   int fresh_samples = 0;       ///< of these, newly drawn from the surface at each iteration
@@ -23,9 +23,9 @@ struct DeformOptions {
   double margin = 0.1;         ///< width of the exact handles' fall-off
   double barrier = 0.0;        ///< weight of the barrier against folds
   double barrier_threshold = 0.1;
-  double invertibility = 0.0;            ///< weight of the cycle loss with an inverse that is trained along
-  std::string optimizer = "orthogonal";  ///< or "adam"
-  double learning_rate = 0.0;            ///< at its peak; 0: 0.03 for orthogonal, 0.002 for adam
+  double invertibility = 0.0;      ///< weight of the cycle loss with an inverse that is trained along
+  std::string optimizer = "muon";  ///< or "adam"
+  double learning_rate = 0.0;      ///< at its peak; 0: 0.03 for muon, 0.002 for adam
   int width = 256, layers = 4, octaves = 4;
   double frequency = 1.0, sharpness = 30.0;
   std::string precision = "float32";  ///< or "bfloat16": see Mlp::round_products
@@ -52,8 +52,8 @@ struct StylizeOptions {
   int handle_batch = 256;
   double barrier = 10.0;
   double barrier_threshold = 0.2;
-  std::string optimizer = "orthogonal";  ///< or "adam"
-  double learning_rate = 0.0;            ///< at its peak; 0: 0.03 for orthogonal, 0.002 for adam
+  std::string optimizer = "muon";  ///< or "adam"
+  double learning_rate = 0.0;      ///< at its peak; 0: 0.03 for muon, 0.002 for adam
   int width = 256, layers = 4, octaves = 4;
   double frequency = 1.0, softplus_sharpness = 30.0;
   std::string precision = "float32";  ///< or "bfloat16", as in DeformOptions

@@ -59,9 +59,9 @@ Solution deform_radial(const SurfaceSamples& samples, const std::vector<Handle>&
                        const DeformOptions& options, const Progress& progress) {
   require(options.handle_weight > 0.0, "handle_weight", "0", "must be positive for 'radial'");
   LiveOptions live = live_options(options);
-  live.samples = std::max(live.samples, 8 * options.bumps);
-  live.coarse_bumps = options.bumps / 5;
-  live.fine_bumps = options.bumps;
+  live.samples = std::max(live.samples, 8 * options.centers);
+  live.coarse_centers = options.centers / 5;
+  live.fine_centers = options.centers;
   live.handle_weight = options.handle_weight;
   LiveSolver solver(samples, handles, live, progress.part(0.0, 0.3));
   const LoopResult loop = run(solver, options.iterations, options.time_budget, progress.part(0.3, 0.95));
@@ -86,8 +86,8 @@ Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const
   // The live solver's energy has weight 1: all other weights are divided by this one's.
   LiveOptions live = live_options(options);
   live.samples = 6000;
-  live.coarse_bumps = 200;
-  live.fine_bumps = 1000;
+  live.coarse_centers = 200;
+  live.fine_centers = 1000;
   live.tolerance = 1e-4;
   live.handle_weight = std::max(options.handle_weight, 1e-3) / options.rigidity;
   live.barrier = options.barrier / options.rigidity;

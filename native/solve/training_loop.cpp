@@ -7,8 +7,8 @@
 #include <cstdio>
 
 #include "core/device.h"
+#include "solve/optimizer.h"
 #include "solve/setup.h"
-#include "solve/stepper.h"
 
 namespace arapfields {
 namespace {
@@ -24,7 +24,7 @@ std::string message(const LoopOptions& options, int done, double loss, double le
 class Losses {
  public:
   explicit Losses(const at::Tensor& like)
-      : every_(composed(like) ? 25 : 1), run_(at::zeros({every_}, like.options().dtype(at::kDouble))) {}
+      : every_(on_aten_path(like) ? 25 : 1), run_(at::zeros({every_}, like.options().dtype(at::kDouble))) {}
   /// Whether as many as are read at once are there, the `iteration`-th included.
   bool due(int iteration) const { return (iteration + 1) % every_ == 0; }
   void keep(int iteration, const at::Tensor& loss) {
@@ -67,7 +67,7 @@ LoopResult minimise(TrainableField& field, Objective& objective, const LoopOptio
   const int history_every = std::max(1, options.iterations / 200);
   LoopResult result;
   Random random(options.seed, 0x5eed);
-  Stepper stepper(field, options);
+  Optimizer optimizer(field, options);
   GoodState good{field.parameters().clone(), 0};
   Losses losses(field.parameters());
   double smooth = 0.0, reported = -1.0;
@@ -96,7 +96,7 @@ LoopResult minimise(TrainableField& field, Objective& objective, const LoopOptio
         good.iteration = iteration;
       }
     }
-    stepper.step(stepper.rate(done));
+    optimizer.step(optimizer.rate(done));
     result.iterations = iteration + 1;
     if (elapsed - reported > 0.1) {
       reported = elapsed;

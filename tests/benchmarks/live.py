@@ -39,10 +39,10 @@ def drag_row(name, neural, rounds=3, **options):
     (setup, setup_cpu), (rest, rest_cpu), (step, step_cpu) = (
         np.min(times, axis=0) for times in (setups, whole, steps)
     )
-    bumps = live.field.bumps
+    centers = live.field.centers
     best = converged(live, name)
     return {
-        "what": f"{name}, {bumps} bumps" + ("" if options.get("interior", True) else ", straight distances"),
+        "what": f"{name}, {centers} centers" + ("" if options.get("interior", True) else ", straight distances"),
         "setup_s": round(setup, 3),
         "setup_cpu_s": round(setup_cpu, 3),
         "solves_per_s": round(1 / step),
@@ -76,9 +76,9 @@ def polish_row(name, neural, iterations=NEURAL_ITERATIONS // 3):
 
 
 STYLES = {  # aim for the mean of g: what suffices for it
-    0.90: {"fine_bumps": 400, "coarse_bumps": 80, "gauss_weight": 4.0},
-    0.95: {"fine_bumps": 700, "coarse_bumps": 140, "gauss_weight": 6.0, "samples": 3000},
-    0.97: {"fine_bumps": 1000, "coarse_bumps": 200, "gauss_weight": 8.0, "samples": 4000},
+    0.90: {"fine_centers": 400, "coarse_centers": 80, "gauss_weight": 4.0},
+    0.95: {"fine_centers": 700, "coarse_centers": 140, "gauss_weight": 6.0, "samples": 3000},
+    0.97: {"fine_centers": 1000, "coarse_centers": 200, "gauss_weight": 8.0, "samples": 4000},
 }
 
 
@@ -96,7 +96,7 @@ def style_row(aim, options, most=60):
                 break
     return {
         "what": f"spot to cube, mean g >= {aim}",
-        "bumps": live.field.bumps,
+        "centers": live.field.centers,
         "steps": steps,
         "seconds": round(clock.wall, 2),
         "cpu_s": round(clock.cpu, 2),
@@ -106,15 +106,15 @@ def style_row(aim, options, most=60):
 
 
 def slider_row(updates=30):
-    """A style's strength, sharpness or orientation moved in small steps, 600 bumps."""
+    """A style's strength, sharpness or orientation moved in small steps, 600 centers."""
     live = af.LiveDeformer(
         samples("spot"),
-        options=af.LiveOptions(coarse_bumps=100, fine_bumps=500, bending=1e-3, barrier=1.0, gauss_weight=4.0),
+        options=af.LiveOptions(coarse_centers=100, fine_centers=500, bending=1e-3, barrier=1.0, gauss_weight=4.0),
     )
     live.set_style("cube", strength=0.3)
     live.solve(steps=40)
     cube = af.preferred_normals("cube")
-    row = {"what": "style slider, 600 bumps: updates a second"}
+    row = {"what": "style slider, 600 centers: updates a second"}
     for name in ("strength", "sharpness", "orientation"):
         with Clock() as clock:
             for i in range(updates):
@@ -152,7 +152,7 @@ def warp_row(count=50000, rounds=10):
 def run():
     neural = {name: neural_field(name) for name in ("bunny", "spot", "hand")}
     rows = [drag_row(name, field) for name, field in neural.items()]
-    larger = {"coarse_bumps": 100, "fine_bumps": 600, "samples": 3000}
+    larger = {"coarse_centers": 100, "fine_centers": 600, "samples": 3000}
     rows += [drag_row(name, field, 1, **larger) for name, field in neural.items()]
     rows += [drag_row("bunny", None, interior=False)]
     rows += [polish_row(name, neural[name]) for name in ("bunny", "hand")]

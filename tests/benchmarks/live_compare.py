@@ -103,8 +103,8 @@ def compare_rows(name, resolution=96):
     ]
 
 
-def cost_row(bumps, count):
-    options = {"coarse_bumps": bumps // 6, "fine_bumps": bumps - bumps // 6, "samples": count}
+def cost_row(centers, count):
+    options = {"coarse_centers": centers // 6, "fine_centers": centers - centers // 6, "samples": count}
     with Clock() as setup:
         live = deformer("bunny", **options)
     pair = handles("bunny")
@@ -119,7 +119,7 @@ def cost_row(bumps, count):
     live.solve(steps=200, tolerance=1e-6)
     return {
         "what": "bunny",
-        "bumps": bumps,
+        "centers": centers,
         "samples": count,
         "setup_cpu_s": round(setup.cpu, 3),
         "handle_added_cpu_s": round(added.cpu, 3),
@@ -160,8 +160,8 @@ def finger_row(finger, motion, degrees, axis, interior=True, field=None):
 
 def run():
     rows = [row for name in ("bunny", "spot", "hand") for row in compare_rows(name)]
-    for bumps in (120, 360, 720, 1200, 1500):
-        rows.append(cost_row(bumps, 2000))
+    for centers in (120, 360, 720, 1200, 1500):
+        rows.append(cost_row(centers, 2000))
     rows += [cost_row(360, count) for count in (1000, 4000, 8000)]
     for finger, motion, degrees, axis in (
         ("middle", "aside", -25, [1, 0, 0]),

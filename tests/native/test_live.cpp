@@ -5,8 +5,8 @@
 #include "core/dense.h"
 #include "core/errors.h"
 #include "core/random.h"
-#include "core/skinny.h"
-#include "fields/radial_sites.h"
+#include "core/tall_product.h"
+#include "fields/radial_evaluator.h"
 #include "solve/quasi_newton.h"
 
 using namespace arapfields;
@@ -67,10 +67,10 @@ BOOST_AUTO_TEST_CASE(farthest_points_spread_and_stop_at_duplicates) {
 }
 
 template <class Scalar>
-void check_sites(double tolerance) {
+void check_evaluator(double tolerance) {
   const Points points = random_points(77, 5);
   const RadialBasis basis = radial_basis(random_points(400, 6), {{10, 1.5}, {60, 2.0}});
-  const RadialSites<Scalar> sites(basis, points);
+  const RadialEvaluator<Scalar> sites(basis, points);
   const RowMatrix<double> c = random_matrix(basis.size(), 3, 7);
   for (const JetOrder order : {JetOrder::value, JetOrder::first, JetOrder::second}) {
     JetBlock<Scalar> jets(points.rows(), order);
@@ -88,16 +88,16 @@ void check_sites(double tolerance) {
   }
 }
 
-BOOST_AUTO_TEST_CASE(sites_agree_with_their_rows_and_pull_back_is_the_transpose) {
-  check_sites<double>(1e-11);
-  check_sites<float>(1e-5);
+BOOST_AUTO_TEST_CASE(evaluators_agree_with_their_rows_and_pull_back_is_the_transpose) {
+  check_evaluator<double>(1e-11);
+  check_evaluator<float>(1e-5);
 }
 
-BOOST_AUTO_TEST_CASE(skinny_products_agree_with_eigen) {
+BOOST_AUTO_TEST_CASE(tall_products_agree_with_eigen) {
   for (const Index n : {1, 5, 64, 131}) {
     const RowMatrix<double> a = random_matrix(n + 3, n, 9), square = random_matrix(n, n, 10);
     const Points b = random_matrix(n, 3, 11), c = random_matrix(n + 3, 3, 12);
-    const SkinnyMatrix<double> whole(a), lower(square, true);
+    const TallMatrix<double> whole(a), lower(square, true);
     BOOST_TEST((whole.times(b) - a * b).norm() < 1e-11);
     BOOST_TEST((whole.transpose_times(c) - a.transpose() * c).norm() < 1e-11);
     const RowMatrix<double> triangle = square.triangularView<Eigen::Lower>();

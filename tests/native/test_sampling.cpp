@@ -138,15 +138,15 @@ BOOST_AUTO_TEST_CASE(every_crossing_is_found) {
                                     return std::abs(x.norm() - 0.6) - 0.01;
                                   })};
   for (const auto& shape : all) {
-    CountedFunction function(shape, Progress());
-    const SparseModel model(function, {});
+    EvaluationCounter function(shape, Progress());
+    const TricubicSurrogate model(function, {});
     std::vector<Line> lines(1500);
     for (std::size_t i = 0; i < lines.size(); ++i) {
       Random random(5, i);
       lines[i] = random_line(model.bounds(), random);
     }
     ScanResult found = scan_lines(model, lines);
-    const auto settled = settle_doubts(function, model, lines, found.doubts);
+    const auto settled = resolve_ambiguous(function, model, lines, found.ambiguous);
     found.brackets.insert(found.brackets.end(), settled.begin(), settled.end());
     std::vector<Index> counts(lines.size(), 0);
     for (const Bracket& each : found.brackets) ++counts[static_cast<std::size_t>(each.line)];

@@ -19,7 +19,7 @@ def check_trade(samples, handles, **options):
 
 
 def test_on_a_bar_by_bumps():
-    check_trade(cases.bar_samples(3000), cases.bar_handles(), field="radial", bumps=150)
+    check_trade(cases.bar_samples(3000), cases.bar_handles(), field="radial", centers=150)
 
 
 @pytest.mark.slow

@@ -147,7 +147,7 @@ def test_same_seed_same_result(samples):
 @pytest.mark.parametrize("changes", [dict(field="radial"), dict(start="radial", iterations=20)], ids=str)
 def test_radial_fields_and_starts(samples, changes):
     """Bumps alone, and a network on top of them, bend the bar as the network alone does."""
-    field = af.deform(samples, cases.bar_handles(), quick(bumps=80, **changes))
+    field = af.deform(samples, cases.bar_handles(), quick(centers=80, **changes))
     alone = af.deform(samples, cases.bar_handles(), quick(iterations=250))
     assert field.report["handle_error_mean"] < 0.02
     assert field.report["energy"] < 1.5 * alone.report["energy"]
@@ -156,7 +156,7 @@ def test_radial_fields_and_starts(samples, changes):
 
 
 def test_both_optimizers_descend(samples):
-    for optimizer in ("orthogonal", "adam"):
+    for optimizer in ("muon", "adam"):
         loss = af.deform(samples, cases.bar_handles(), quick(optimizer=optimizer)).report["loss"]
         assert np.mean([l for _, l in loss[-10:]]) < 0.1 * loss[0][1]
 
@@ -199,7 +199,7 @@ def test_divergence_keeps_the_last_good_state(samples):
         dict(learning_rate=-1.0),
         dict(optimizer="newton"),
         dict(field="radial", exact_handles=True),
-        dict(field="radial", bumps=1),
+        dict(field="radial", centers=1),
         dict(barrier=1.0, field="radial"),
         dict(field="splines"),
         dict(start="nowhere"),

@@ -30,7 +30,7 @@ def exact(samples):
 @pytest.fixture(scope="module")
 def refined(samples):
     """A network on a radial field, between exact handles."""
-    options = af.DeformOptions(start="radial", bumps=60, exact_handles=True, **QUICK)
+    options = af.DeformOptions(start="radial", centers=60, exact_handles=True, **QUICK)
     return af.deform(samples, cases.bar_handles(), options)
 
 

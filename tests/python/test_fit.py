@@ -113,7 +113,7 @@ def test_a_fit_survives_its_file(fitted, tmp_path):
         ({"batch": 0}, "batch"),
         ({"near_share": 1.5}, "near_share"),
         ({"near_spread": float("nan")}, "near_spread"),
-        ({"optimizer": "sgd"}, "orthogonal"),
+        ({"optimizer": "sgd"}, "muon"),
         ({"device": "tpu"}, "device"),
         ({"width": 0}, "width"),
         ({"threads": -1}, "threads"),

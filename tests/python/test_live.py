@@ -9,7 +9,7 @@ from tolerances import LIVE_DRIFT, LIVE_IDENTITY, TRACKED
 
 import arapfields as af
 
-QUICK = {"samples": 800, "coarse_bumps": 30, "fine_bumps": 120}
+QUICK = {"samples": 800, "coarse_centers": 30, "fine_centers": 120}
 
 
 @pytest.fixture(scope="module")
@@ -161,7 +161,7 @@ def test_flat_and_tiny_sample_sets():
 
 
 def test_many_bumps_stay_well_conditioned(samples):
-    live = deformer(samples, coarse_bumps=300, fine_bumps=1200, samples=2000)
+    live = deformer(samples, coarse_centers=300, fine_centers=1200, samples=2000)
     field = live.solve([LEFT, turned(60) @ RIGHT], steps=30)
     assert (
         live.report["energy"] < deformer(samples).solve([LEFT, turned(60) @ RIGHT], steps=30).report["energy"]
@@ -199,8 +199,8 @@ def test_style_without_handles_holds_the_lowest_sample(samples):
 def test_bad_options_are_named(samples):
     for name, value in [
         ("samples", 0),
-        ("fine_bumps", 0),
-        ("fine_reach", 0.0),
+        ("fine_centers", 0),
+        ("fine_radius_factor", 0.0),
         ("tolerance", -1.0),
         ("steps", 0),
     ]:

@@ -21,7 +21,7 @@ def resident_mebibytes():
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="no /proc to read memory from")
 def test_ten_thousand_motions_leave_no_trace():
     samples = bar_samples()
-    options = af.LiveOptions(samples=800, coarse_bumps=30, fine_bumps=120, threads=1)
+    options = af.LiveOptions(samples=800, coarse_centers=30, fine_centers=120, threads=1)
     live, fresh = (
         af.LiveDeformer(samples, [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)], options) for _ in range(2)
     )
@@ -65,7 +65,7 @@ def test_refined_by_a_style_and_handles_at_once():
     live = af.LiveDeformer(
         samples,
         [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)],
-        af.LiveOptions(samples=800, coarse_bumps=30, fine_bumps=120, bending=1e-3, gauss_weight=2.0),
+        af.LiveOptions(samples=800, coarse_centers=30, fine_centers=120, bending=1e-3, gauss_weight=2.0),
     )
     cube = af.preferred_normals("cube")
     for i in range(1, 6):

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The compositions of aten_energies.h on jets in main memory, with the kernels' signatures: for comparison.
+#pragma once
+
+#include "energies/arap.h"
+#include "energies/gauss.h"
+#include "energies/handles.h"
+
+namespace arapfields {
+
+template <class Scalar>
+ArapValue probe_arap(JetView<const Scalar> jets, double bending, double weight, JetView<Scalar> cotangents);
+template <class Scalar>
+double probe_gauss(JetView<const Scalar> jets, ConstPointsRef<Scalar> normals,
+                   const Eigen::Ref<const Eigen::VectorX<Scalar>>& sample_weights,
+                   const GaussPreference& preference, double weight, JetView<Scalar> cotangents);
+template <class Scalar>
+double probe_barrier(JetView<const Scalar> jets, double threshold, double weight, JetView<Scalar> cotangents);
+template <class Scalar>
+double probe_handles(JetView<const Scalar> jets, const HandleBatch<Scalar>& batch, double weight,
+                     JetView<Scalar> cotangents);
+
+}  // namespace arapfields

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <ATen/ATen.h>
+
+#include "energies/aten_energies.h"
+
+namespace arapfields {
+namespace {
+
+constexpr double shortest = 1e-3;  // as in gauss_kernel.cpp
+
+at::Tensor dots(const at::Tensor& a, const at::Tensor& b) { return (a * b).sum(-1, true); }
+
+/// Columns of the cofactor matrix, (3, n, 3): minors_k = j_{k+1} × j_{k+2}.
+at::Tensor minors_of(const at::Tensor& jets, const EnergyTables& tables) {
+  return at::linalg_cross(at::index_select(jets, 0, tables.next_column),
+                          at::index_select(jets, 0, tables.last));
+}
+
+}  // namespace
+
+at::Tensor aten_gauss(const at::Tensor& jets, const at::Tensor& normals, const at::Tensor& sample_weights,
+                      const at::Tensor& preferred, double sharpness, double weight,
+                      const EnergyTables& tables, at::Tensor cotangents) {
+  const double share = 1.0 / static_cast<double>(std::max<int64_t>(jets.size(1), 1));
+  const at::Tensor minors = minors_of(jets, tables);
+  const at::Tensor orientation = dots(jets[1], minors[0]);
+  const at::Tensor sign = at::where(orientation < 0, -at::ones_like(orientation), at::ones_like(orientation));
+  const at::Tensor columns = normals.t().unsqueeze(2);  // (3, n, 1)
+  const at::Tensor image = sign * (columns * minors).sum(0);
+  const at::Tensor length = at::sqrt(dots(image, image));
+  const at::Tensor inverse = at::clamp_min(length, shortest).reciprocal();
+  const at::Tensor unit = image * inverse;
+  const at::Tensor directions = preferred.slice(1, 0, 3);
+  const at::Tensor terms =
+      at::exp(sharpness * at::mm(unit, directions.t())) * preferred.select(1, 3).unsqueeze(0);  // (n, k)
+  at::Tensor loss = 1.0 - terms.sum(1, true);
+  if (sample_weights.defined()) loss = loss * sample_weights.unsqueeze(1);
+  if (cotangents.defined()) {
+    const at::Tensor by_normal = at::mm(terms, directions);
+    const at::Tensor along = at::where(length > shortest, dots(unit, by_normal), at::zeros_like(length));
+    at::Tensor h = (by_normal - along * unit) * sign * inverse * (-weight * share * sharpness);
+    if (sample_weights.defined()) h = h * sample_weights.unsqueeze(1);
+    // Of j_k: h × (n_{k+1} j_{k+2} − n_{k+2} j_{k+1}).
+    const at::Tensor arms =
+        at::index_select(columns, 0, tables.next_column - 1) * at::index_select(jets, 0, tables.last) -
+        at::index_select(columns, 0, tables.last - 1) * at::index_select(jets, 0, tables.next_column);
+    cotangents.slice(0, 1, 4).add_(at::linalg_cross(h.unsqueeze(0).expand_as(arms), arms));
+  }
+  return loss.sum() * share;
+}
+
+at::Tensor aten_barrier(const at::Tensor& jets, double threshold, double weight, const EnergyTables& tables,
+                        at::Tensor cotangents) {
+  const double share = 1.0 / static_cast<double>(std::max<int64_t>(jets.size(1), 1));
+  const at::Tensor minors = minors_of(jets, tables);
+  const at::Tensor gap = at::relu(1.0 - dots(jets[1], minors[0]) / threshold);  // (n, 1)
+  if (cotangents.defined()) cotangents.slice(0, 1, 4).add_(gap * minors, -2.0 * weight * share / threshold);
+  return (gap * gap).sum() * share;
+}
+
+at::Tensor aten_handles(const at::Tensor& jets, const at::Tensor& targets, const at::Tensor& weights,
+                        double weight, at::Tensor cotangents) {
+  const at::Tensor difference = jets[0] - targets, scaled = weights.unsqueeze(1) * difference;
+  if (cotangents.defined()) cotangents[0].add_(scaled, 2.0 * weight);
+  return (scaled * difference).sum();
+}
+
+}  // namespace arapfields

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fields/interior_embedding.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "core/parallel.h"
+#include "fields/interior_distance.h"
+#include "fields/interior_embedding_kernel.h"
+#include "fields/radial_basis.h"
+
+namespace arapfields {
+namespace {
+
+constexpr Index most_nodes = 1500, least_nodes = 100, landmarks = 64;
+/// What the graph's paths, which turn at nodes, make of straight lines.
+constexpr double detour = 0.94;
+/// Exceeding lengths count so many times.
+constexpr double emphasis = 2.0;
+/// Weight of smoothing against the embedding's values, and the reach of a node's neighbours in spacings.
+constexpr double smoothing = 10.0, neighbour_spacings = 3.0;
+/// Spread of ψ, as a share of the shape's size, below which straight lines serve as well.
+constexpr double worthwhile_spread = 0.04;
+/// Nodes whose weight is below e to this power, next to the nearest one's, are left out.
+constexpr double negligible = -36.0;
+
+using Neighbours = std::vector<std::vector<Index>>;
+
+/// Coordinates (n,3) whose squared distances come closest to the exceeding squares (n, landmarks); the first
+/// rows are the landmarks'.
+Points leading_coordinates(const RowMatrix<double>& excess) {
+  const Index count = excess.cols();
+  const RowMatrix<double> own = 0.5 * (excess.topRows(count) + excess.topRows(count).transpose());
+  const Vector mean = own.rowwise().mean();
+  RowMatrix<double> products = -0.5 * own;
+  products.colwise() += 0.5 * mean;
+  products.rowwise() += 0.5 * mean.transpose();
+  products.array() -= 0.5 * mean.mean();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(products);
+  Points result = Points::Zero(excess.rows(), 3);
+  for (int k = 0; k < 3; ++k) {
+    const double value = solver.eigenvalues()[count - 1 - k];
+    if (!(value > 1e-12)) continue;
+    Vector direction = solver.eigenvectors().col(count - 1 - k) / std::sqrt(value);
+    result.col(k) = -0.5 * (excess * direction).array() + 0.5 * mean.dot(direction);
+  }
+  return result;
+}
+
+/// (1 + smoothing · graph Laplacian)⁻¹ values, by conjugate gradients.
+Points smoothed(const Points& values, const Neighbours& neighbours) {
+  const auto apply = [&](const Points& x) {
+    Points y = x;
+    for (std::size_t i = 0; i < neighbours.size(); ++i)
+      for (const Index j : neighbours[i])
+        y.row(static_cast<Index>(i)) += smoothing * (x.row(static_cast<Index>(i)) - x.row(j));
+    return y;
+  };
+  Points x = values, residual = values - apply(x), direction = residual;
+  double square = residual.squaredNorm();
+  const double enough = 1e-16 * values.squaredNorm();
+  for (int i = 0; i < 60 && square > enough; ++i) {
+    const Points image = apply(direction);
+    const double step = square / direction.cwiseProduct(image).sum();
+    x += step * direction;
+    residual -= step * image;
+    const double next = residual.squaredNorm();
+    direction = residual + next / square * direction;
+    square = next;
+  }
+  return x;
+}
+
+RowMatrix<double> fitted_slopes(const Points& nodes, const Points& values, const Neighbours& neighbours) {
+  RowMatrix<double> slopes = RowMatrix<double>::Zero(nodes.rows(), 9);
+  for (Index i = 0; i < nodes.rows(); ++i) {
+    Mat3 moments = Mat3::Zero(), products = Mat3::Zero();
+    for (const Index j : neighbours[static_cast<std::size_t>(i)]) {
+      const Vec3 arm = (nodes.row(j) - nodes.row(i)).transpose();
+      moments += arm * arm.transpose();
+      products += (values.row(j) - values.row(i)).transpose() * arm.transpose();
+    }
+    if (!(moments.trace() > 0.0)) continue;
+    moments.diagonal().array() += 1e-2 * moments.trace();
+    const Mat3 slope = products * moments.inverse();
+    slopes.row(i) = slope.reshaped<Eigen::RowMajor>().transpose();
+  }
+  return slopes;
+}
+
+}  // namespace
+
+void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out) const {
+  constexpr Index block = embedding_block;
+  const Index count = points.rows(), n = nodes.rows();
+  RowMatrix<double> rows(n, embedding_row);
+  rows << nodes, values, slopes;
+  const double scale = 1.0 / (width * width);
+  const int columns_count = columns(out.order);
+  parallel_for(0, (count + block - 1) / block, 4, [&](Index first, Index last) {
+    std::array<double, 3 * block> packed;
+    std::array<double, 30 * block> jets;
+    std::vector<std::int32_t> near(static_cast<std::size_t>(n));
+    std::vector<double> distance(static_cast<std::size_t>(n));
+    for (Index b = first; b < last; ++b) {
+      const Index valid = std::min(block, count - b * block);
+      const auto part = points.middleRows(b * block, valid);
+      const Eigen::RowVector3d center = 0.5 * (part.colwise().minCoeff() + part.colwise().maxCoeff());
+      const double radius = std::sqrt((part.rowwise() - center).rowwise().squaredNorm().maxCoeff());
+      for (Index i = 0; i < block; ++i)
+        for (int k = 0; k < 3; ++k)
+          packed[static_cast<std::size_t>(k * block + i)] = part(std::min(i, valid - 1), k);
+      double nearest = 1e300;
+      for (Index j = 0; j < n; ++j) {
+        const double a = nodes(j, 0) - center[0], c = nodes(j, 1) - center[1], d = nodes(j, 2) - center[2];
+        distance[static_cast<std::size_t>(j)] = std::sqrt(a * a + c * c + d * d);
+        nearest = std::min(nearest, distance[static_cast<std::size_t>(j)]);
+      }
+      const double farthest_nearest = nearest + radius;
+      const double reach =
+          std::sqrt(farthest_nearest * farthest_nearest - negligible * width * width) + radius;
+      Index found = 0;
+      for (Index j = 0; j < n; ++j)
+        if (distance[static_cast<std::size_t>(j)] <= reach)
+          near[static_cast<std::size_t>(found++)] = static_cast<std::int32_t>(j);
+      const EmbeddingBlock here{packed.data(), rows.data(), near.data(), found, scale};
+      ARAPFIELDS_DISPATCH(embedding_jets(here, columns_count, jets.data()));
+      for (int c = 0; c < columns_count; ++c)
+        for (Index p = 0; p < valid; ++p)
+          for (int k = 0; k < 3; ++k)
+            out.at(c, b * block + p)[k] = jets[static_cast<std::size_t>((c * 3 + k) * block + p)];
+    }
+  });
+}
+
+std::shared_ptr<const InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn normals) {
+  if (samples.rows() < least_nodes || normals.rows() != samples.rows()) return nullptr;
+  const FarthestPoints chosen = farthest_points(samples, std::min(most_nodes, samples.rows()));
+  const Index n = static_cast<Index>(chosen.indices.size());
+  if (n < least_nodes || !(chosen.fill_distance > 0.0)) return nullptr;
+  InteriorEmbedding embedding;
+  embedding.width = chosen.fill_distance;
+  embedding.nodes = samples(chosen.indices, Eigen::all);
+  const Points node_normals = normals(chosen.indices, Eigen::all);
+  const InteriorGraph graph(embedding.nodes, node_normals, embedding.width);
+  RowMatrix<double> excess = (detour * graph.distances(landmarks)).array().square();
+  for (Index i = 0; i < n; ++i)
+    for (Index l = 0; l < landmarks; ++l)
+      excess(i, l) =
+          std::max(0.0, excess(i, l) - (embedding.nodes.row(i) - embedding.nodes.row(l)).squaredNorm());
+  embedding.values = std::sqrt(emphasis) * leading_coordinates(excess);
+  Neighbours neighbours(static_cast<std::size_t>(n));
+  const float reach = static_cast<float>(neighbour_spacings * embedding.width);
+  for (Index i = 0; i < n; ++i)
+    for (const InteriorGraph::Edge& edge : graph.edges(i))
+      if (edge.length < reach) neighbours[static_cast<std::size_t>(i)].push_back(edge.to);
+  embedding.values = smoothed(embedding.values, neighbours);
+  const double size =
+      (embedding.nodes.colwise().maxCoeff() - embedding.nodes.colwise().minCoeff()).maxCoeff();
+  const Eigen::RowVector3d middle = embedding.values.colwise().mean();
+  const double spread =
+      (embedding.values.rowwise() - middle).colwise().squaredNorm().maxCoeff() / static_cast<double>(n);
+  if (spread < worthwhile_spread * worthwhile_spread * size * size) return nullptr;
+  embedding.slopes = fitted_slopes(embedding.nodes, embedding.values, neighbours);
+  return std::make_shared<const InteriorEmbedding>(std::move(embedding));
+}
+
+}  // namespace arapfields

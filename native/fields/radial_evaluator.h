@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "core/jets.h"
+#include "fields/radial_basis.h"
+#include "fields/radial_kernel.h"
+
+namespace arapfields {
+
+/// Points at which fields of one basis are evaluated again and again. Cheap where consecutive points are
+/// close (morton_order): blocks of 16 keep lists of the centers they feel. Float has half double's cost and
+/// errors of some 1e-6 of the jets.
+template <class Scalar>
+class RadialEvaluator {
+ public:
+  RadialEvaluator() = default;
+  /// `most`: the highest order that will be asked for.
+  RadialEvaluator(const RadialBasis& basis, PointsIn points, JetOrder most = JetOrder::second);
+  Index size() const { return count_; }
+
+  /// Jets of the field with these coefficients (size, 3): overwrites `out` (count = size(), any order).
+  void evaluate(const RowMatrix<double>& coefficients, JetView<Scalar> out) const;
+  /// Adds to `gradient` (size, 3) what cotangents of such jets are worth.
+  void pull_back(JetView<const Scalar> cotangents, RowMatrix<double>& gradient) const;
+
+  /// Calls body(b, block) for the blocks of 16 points, in parallel.
+  template <class Body>
+  void for_blocks(Body&& body) const;
+  Index center_count() const { return center_count_; }
+
+ private:
+  Index blocks() const { return (count_ + 15) / 16; }
+  RadialBlock<Scalar> block(Index b) const;
+  void pack_embedding(const JetBlock<double>& jets);
+  void require_order(JetOrder order) const;
+
+  Index center_count_ = 0;
+  Index count_ = 0;
+  std::vector<Scalar> points_;     // (blocks, 3, 16), the last point repeated
+  std::vector<Scalar> centers_;    // (m, center_stride)
+  std::vector<Scalar> embedding_;  // (blocks, embedding_rows_, 16); empty without an embedding
+  JetOrder most_ = JetOrder::second;
+  std::vector<std::int32_t> active_;  // centers felt by block b: active_[start_[b]] … active_[start_[b+1]−1]
+  std::vector<Index> start_;
+};
+
+/// Basis functions' own jets at the points: (columns·n, size), column by column.
+RowMatrix<double> radial_rows(const RadialBasis& basis, PointsIn points, JetOrder order);
+
+}  // namespace arapfields

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "neural/muon.h"
+
+#include <ATen/ATen.h>
+#include <ATen/core/LegacyTypeDispatch.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/device.h"
+#include "core/parallel.h"
+
+namespace arapfields {
+namespace {
+
+// p(s) = a s + b s³ + c s⁵ drives singular values in (0,1] to about 1 (0.7 to 1.2): the coefficients of
+// Jordan et al., chosen for the slope at 0 rather than for the limit.
+constexpr double slope = 3.4445, cubic = -4.7750, quintic = 2.0315;
+constexpr Index rows_a_task = 64;
+
+/// One weight matrix. `x` is the momentum with its shorter side as rows.
+struct Matrix {
+  Index begin = 0;  // in the flat vector
+  Index rows = 0, columns = 0;
+  at::Tensor momentum, x, next, gram, polynomial;
+};
+
+struct Task {
+  Matrix* matrix = nullptr;
+  Index first = 0, count = 0;  // rows of x
+
+  at::Tensor rows_of(const at::Tensor& matrix_like) const { return matrix_like.narrow(0, first, count); }
+  /// A symmetric product's rows are computed up to the diagonal; this fills in the columns above.
+  at::Tensor up_to_diagonal(const at::Tensor& symmetric) const {
+    return rows_of(symmetric).narrow(1, 0, first + count);
+  }
+  void mirror(const at::Tensor& symmetric) const {
+    if (first > 0)
+      symmetric.narrow(0, 0, first).narrow(1, first, count).copy_(rows_of(symmetric).narrow(1, 0, first).t());
+  }
+};
+
+}  // namespace
+
+struct Muon::State {
+  MuonOptions options;
+  AdamStep adam;
+  std::vector<Matrix> matrices;
+  std::vector<Task> tasks;
+
+  void for_each_task(const std::function<void(const Task&)>& body) const;
+};
+
+void Muon::State::for_each_task(const std::function<void(const Task&)>& body) const {
+  if (tasks.size() == matrices.size()) {  // a device's queue is filled by one thread
+    const at::AutoDispatchBelowADInplaceOrView quick;
+    for (const Task& task : tasks) body(task);
+    return;
+  }
+  parallel_jobs(static_cast<Index>(tasks.size()), [&](Index t) {
+    const at::AutoDispatchBelowADInplaceOrView quick;
+    body(tasks[static_cast<std::size_t>(t)]);
+  });
+}
+
+Muon::Muon(const Mlp& mlp, const MuonOptions& options)
+    : state_(std::make_unique<State>(State{options, AdamStep(mlp.parameters(), options.adam), {}, {}})) {
+  const at::TensorOptions like = mlp.parameters().options();
+  for (int l = 0; l < mlp.shape().layers; ++l) {
+    const at::Tensor weight = mlp.weight(l);
+    Matrix m;
+    m.begin = weight.storage_offset();
+    m.rows = weight.size(0), m.columns = weight.size(1);
+    const Index small = std::min(m.rows, m.columns), large = std::max(m.rows, m.columns);
+    m.momentum = at::zeros({m.rows, m.columns}, like);
+    m.x = at::empty({small, large}, like);
+    m.next = at::empty({small, large}, like);
+    m.gram = at::empty({small, small}, like);
+    m.polynomial = at::empty({small, small}, like);
+    state_->matrices.push_back(m);
+  }
+  // The last rows first: their symmetric products are the longest.
+  for (Matrix& m : state_->matrices) {
+    const Index rows = m.x.size(0), each = on_aten_path(mlp.parameters()) ? rows : rows_a_task;
+    for (Index first = (rows - 1) / each * each; first >= 0; first -= each)
+      state_->tasks.push_back({&m, first, std::min(each, rows - first)});
+  }
+}
+
+Muon::~Muon() = default;
+Muon::Muon(Muon&&) noexcept = default;
+Muon& Muon::operator=(Muon&&) noexcept = default;
+
+void Muon::step(Mlp& mlp, double learning_rate) {
+  State& s = *state_;
+  at::Tensor &parameters = mlp.parameters(), &gradient = mlp.gradient();
+  s.adam.next_step();
+  Index done = 0;
+  const auto adam_up_to = [&](Index end) {
+    s.adam.step_range(parameters, gradient, s.options.adam_share * learning_rate, done, end);
+  };
+  for (Matrix& m : s.matrices) {
+    adam_up_to(m.begin);
+    done = m.begin + m.rows * m.columns;
+    const at::Tensor g = gradient.slice(0, m.begin, done).view({m.rows, m.columns});
+    m.momentum.mul_(s.options.momentum).add_(g);
+    const at::Tensor ahead = at::add(g, m.momentum, s.options.momentum);
+    m.x.copy_(m.rows > m.columns ? ahead.t() : ahead);
+    m.x.div_(at::norm(ahead).add_(1e-30));
+  }
+  adam_up_to(parameters.numel());
+  for (int i = 0; i < s.options.iterations; ++i) {
+    s.for_each_task([](const Task& t) {
+      const at::Tensor& x = t.matrix->x;
+      at::Tensor out = t.up_to_diagonal(t.matrix->gram);
+      at::mm_out(out, t.rows_of(x), x.narrow(0, 0, t.first + t.count).t());
+      t.mirror(t.matrix->gram);
+    });
+    s.for_each_task([](const Task& t) {
+      const at::Tensor& gram = t.matrix->gram;
+      at::Tensor out = t.up_to_diagonal(t.matrix->polynomial);
+      at::addmm_out(out, t.up_to_diagonal(gram), t.rows_of(gram), gram.narrow(1, 0, t.first + t.count), cubic,
+                    quintic);
+      t.mirror(t.matrix->polynomial);
+    });
+    s.for_each_task([](const Task& t) {
+      at::Tensor out = t.rows_of(t.matrix->next);
+      at::addmm_out(out, t.rows_of(t.matrix->x), t.rows_of(t.matrix->polynomial), t.matrix->x, slope, 1.0);
+    });
+    for (Matrix& m : s.matrices) std::swap(m.x, m.next);
+  }
+  for (Matrix& m : s.matrices) {
+    const double stretch =
+        std::sqrt(std::max(1.0, static_cast<double>(m.rows) / static_cast<double>(m.columns)));
+    at::Tensor weight = parameters.slice(0, m.begin, m.begin + m.rows * m.columns).view({m.rows, m.columns});
+    weight.sub_(m.rows > m.columns ? m.x.t() : m.x, learning_rate * stretch);
+  }
+}
+
+}  // namespace arapfields

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/implicit.h"
+#include "core/task.h"
+
+namespace arapfields {
+
+/// An ImplicitFunction asked in batches small enough for a prompt cancel, with the number of points counted.
+/// A value or gradient that is not finite throws InvalidInput("sdf", …).
+class EvaluationCounter {
+ public:
+  EvaluationCounter(const ImplicitFunction& function, const Progress& progress)
+      : function_(function), progress_(progress) {}
+
+  VectorF values(ConstPointsRef<float> points);
+  VectorF values(ConstPointsRef<float> points, PointsF& gradients);
+
+  const Progress& progress() const { return progress_; }
+  Index value_count() const { return value_count_; }
+  Index gradient_count() const { return gradient_count_; }
+
+ private:
+  const ImplicitFunction& function_;
+  Progress progress_;
+  Index value_count_ = 0;
+  Index gradient_count_ = 0;
+};
+
+/// A bound on |∇Φ| over the cube: the largest of a stratified sample of gradients (strata³ of them,
+/// jittered), times a safety factor of 1.25. The largest of 40,000 gradients of the published networks
+/// is 1.04 to 1.23 times what such a sample sees. TricubicSurrogate raises the bound where grid values
+/// contradict it.
+double measure_lipschitz(EvaluationCounter& function, int strata = 12);
+
+}  // namespace arapfields

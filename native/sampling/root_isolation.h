@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "sampling/tricubic_surrogate.h"
+
+namespace arapfields {
+
+/// A part of a line in which Φ passes zero exactly once.
+struct Bracket {
+  Index line = 0;
+  double low = 0.0, high = 0.0;  ///< parameters on the line
+  double guess = 0.0;            ///< where the zero is expected
+  double slope = 0.0;            ///< expected dΦ/dt there; its sign is that of Φ at `high`
+};
+
+/// A part of a line in which the model alone cannot count the zeros: Φ itself must be asked.
+struct AmbiguousInterval {
+  Index line = 0;
+  double low = 0.0, high = 0.0;
+};
+
+struct ScanResult {
+  std::vector<Bracket> brackets;
+  std::vector<AmbiguousInterval> ambiguous;
+};
+
+/// All crossings of the lines as far as the model tells, ordered by line and parameter; no evaluation of Φ.
+/// A step along a line is clear where |p| exceeds the model's error, and holds at most one zero where
+/// |dp/dt| exceeds the model's slope error; runs of neither kind are ambiguous.
+ScanResult scan_lines(const TricubicSurrogate& model, const std::vector<Line>& lines);
+
+}  // namespace arapfields

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "sampling/evaluation_counter.h"
+#include "sampling/lines.h"
+#include "sampling/tricubic_weights.h"
+
+namespace arapfields {
+
+struct TricubicSurrogateOptions {
+  Index wanted_cells = 5000;  ///< halve the cells until so many may hold the surface …
+  int max_resolution = 128;   ///< … or the cube has so many of them a side
+};
+
+/// A cheap stand-in for Φ near {Φ = 0}. The cube is cut into resolution³ cells, from coarse to fine; a cell
+/// is dropped where |Φ(centre)| exceeds a measured bound on |∇Φ| times its half diagonal, for then Φ keeps
+/// its sign there. In the cells that remain, cubic interpolation p of Φ on their corners and the corners
+/// around them replaces Φ, with an error bound measured by Φ − p at cell centres. Sampling and extraction use
+/// p to find where Φ itself must be evaluated.
+class TricubicSurrogate {
+ public:
+  TricubicSurrogate(EvaluationCounter& function, const TricubicSurrogateOptions& options);
+
+  int resolution() const { return resolution_; }
+  double spacing() const { return 2.0 / resolution_; }
+  /// Bound on |∇Φ| in use: measured, and raised until no difference of grid values contradicts it.
+  double lipschitz() const { return lipschitz_; }
+  /// Cells that may hold the surface, ascending; their bounding box (meaningless for none).
+  const std::vector<Index>& active() const { return active_; }
+  Box bounds() const;
+
+  Index cell(int i, int j, int k) const {
+    return (static_cast<Index>(i) * resolution_ + j) * resolution_ + k;
+  }
+  std::array<int, 3> coordinates(Index cell) const;
+  /// The cell's position along an axis of a coordinate in [-1,1].
+  int position(double x) const;
+  /// +1 or −1 where Φ keeps that sign in all of the cell, 0 in the cells of active().
+  int side(Index cell) const { return side_[static_cast<std::size_t>(cell)]; }
+  /// Bounds in an active cell on |Φ − p| and on |∇(Φ − p)|.
+  float error(Index cell) const { return error_[static_cast<std::size_t>(cell)]; }
+  float slope_error(Index cell) const { return slope_error_of(error(cell)); }
+  /// The latter from the former.
+  float slope_error_of(float error) const;
+
+  /// p's coefficients in an active cell; at(block, …) evaluates them at a point of the cube.
+  CubicBlock block(Index cell) const;
+  /// First grid point of a cell's 4×4×4 block along an axis; p takes (x + 1) / spacing − that.
+  int block_start(int position) const;
+  /// p at a point in an active cell.
+  float operator()(const Vec3& point) const;
+
+ private:
+  void cull(EvaluationCounter& function, const TricubicSurrogateOptions& options);
+  bool fill(EvaluationCounter& function);
+  void measure_errors();
+
+  int resolution_ = 0;
+  double lipschitz_ = 0.0;
+  std::vector<std::int8_t> side_;
+  std::vector<Index> active_;
+  VectorF centre_values_;      // of active_
+  std::vector<float> error_;   // resolution³
+  std::vector<float> values_;  // (resolution+1)³ grid points, NaN where not needed
+};
+
+}  // namespace arapfields
