@@ -56,11 +56,11 @@ def test_derivatives_and_files_of_such_a_field(samples, tmp_path):
 
 
 def test_a_convex_shape_needs_no_lift(samples, tmp_path):
-    for surface, lifted in ((bar_samples(), False), (samples, True)):
+    for surface, embedded in ((bar_samples(), False), (samples, True)):
         live = af.LiveDeformer(surface, [af.Point(surface.points[0], surface.points[0])])
         live.field.save(tmp_path / "field.npz")
         names = np.load(tmp_path / "field.npz").files
-        assert any("lift" in name for name in names) == lifted
+        assert any("embedding" in name for name in names) == embedded
 
 
 def test_loose_parts_stay_together():
