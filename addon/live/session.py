@@ -25,7 +25,13 @@ from . import live_object
 SAMPLES = 6000
 PREVIEW_CELLS = 96  # at most, of the implicit surface that is shown while it moves
 REFINEMENTS, STEPS_AT_ONCE, FINE = 40, 10, 1e-6
-STYLE_BUMPS = {"samples": 3000, "coarse_centers": 100, "fine_centers": 500, "bending": 1e-3, "tolerance": 3e-4}
+STYLE_BUMPS = {
+    "samples": 3000,
+    "coarse_centers": 100,
+    "fine_centers": 500,
+    "bending": 1e-3,
+    "tolerance": 3e-4,
+}
 
 
 class Changed(Exception):

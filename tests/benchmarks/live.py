@@ -42,7 +42,8 @@ def drag_row(name, neural, rounds=3, **options):
     centers = live.field.centers
     best = converged(live, name)
     return {
-        "what": f"{name}, {centers} centers" + ("" if options.get("interior", True) else ", straight distances"),
+        "what": f"{name}, {centers} centers"
+        + ("" if options.get("interior", True) else ", straight distances"),
         "setup_s": round(setup, 3),
         "setup_cpu_s": round(setup_cpu, 3),
         "solves_per_s": round(1 / step),
@@ -109,7 +110,9 @@ def slider_row(updates=30):
     """A style's strength, sharpness or orientation moved in small steps, 600 centers."""
     live = af.LiveDeformer(
         samples("spot"),
-        options=af.LiveOptions(coarse_centers=100, fine_centers=500, bending=1e-3, barrier=1.0, gauss_weight=4.0),
+        options=af.LiveOptions(
+            coarse_centers=100, fine_centers=500, bending=1e-3, barrier=1.0, gauss_weight=4.0
+        ),
     )
     live.set_style("cube", strength=0.3)
     live.solve(steps=40)
