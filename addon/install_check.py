@@ -6,12 +6,12 @@ import sys
 
 import bpy
 
-from .blender import host
+from .blender import host, timers
 from .blender.language import translated
 from .core.runtime import native
 
 
-def is_whole():
+def is_complete():
     """Whether the library is there; looking for it does not load it."""
     return importlib.util.find_spec("arapfields") is not None
 
@@ -26,14 +26,9 @@ def show():
     bpy.context.window_manager.popup_menu(draw, title="ARAP Fields cannot work", icon="ERROR")
 
 
-def register():
-    if is_whole():
+def start():
+    if is_complete():
         return
     print(f"ARAP Fields: {native.problem()}", file=sys.stderr, flush=True)
-    if not bpy.app.background and not host.is_module():
-        bpy.app.timers.register(show, first_interval=0.1)
-
-
-def unregister():
-    if bpy.app.timers.is_registered(show):
-        bpy.app.timers.unregister(show)
+    if host.has_window() and not host.is_module():
+        timers.start(show, first=0.1)

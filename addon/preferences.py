@@ -1,16 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from .blender import settings
+from .blender import user_preferences
 from .blender.language import translated
 from .core.runtime import native
+from .core.settings.choices import DEVICES
 from .names import PACKAGE, Op
-
-DEVICES = (
-    ("auto", "Automatic", "The fastest device that is found"),
-    ("cpu", "Processor", "The processor's cores"),
-    ("cuda", "CUDA", "A graphics card, where the native library was built for it"),
-)
 
 
 class ARAPFIELDS_AP_preferences(bpy.types.AddonPreferences):
@@ -46,7 +41,7 @@ class ARAPFIELDS_AP_preferences(bpy.types.AddonPreferences):
         layout.prop(self, "cache_folder")
         layout.prop(self, "show_boxes")
         layout.prop(self, "show_previews")
-        cache = settings.fit_cache()
+        cache = user_preferences.fit_cache()
         layout.label(
             text=translated(
                 "{size} MB of fitted surfaces in {folder}",

@@ -1,21 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the extension registers, in order: a table of contents."""
+"""What the extension registers, in order: a table of contents. lifecycle.py has what runs beside it."""
 
 import atexit
 import importlib
 
 import bpy
 
+from . import lifecycle
 from .blender import host
+from .properties import item
 
-CONTENTS = [  # modules with CLASSES, or with register() and unregister()
+CONTENTS = [  # modules with CLASSES
     # what is stored in the .blend: object.arapfields
     *("handles.properties", "properties.settings", "properties.item"),
-    "preferences",
-    # what goes on beside the operators
-    *("jobs.job_operator", "jobs.loading", "handles.counts", "live.sessions", "surface.staleness"),
-    *("viewport.handle_boxes", "viewport.previews"),
-    *("blender.icons", "blender.translations"),
     # features
     *("surface.operators", "surface.panel"),
     *("handles.operators", "handles.panel"),
@@ -23,20 +20,18 @@ CONTENTS = [  # modules with CLASSES, or with register() and unregister()
     *("stylize.operators", "stylize.panel"),
     *("live.operators", "animation.operators"),
     *("results.panel", "jobs.operators", "jobs.panel"),
-    # without a window, and without a library
-    *("commands", "install_check"),
+    "preferences",
 ]
 MODULES = [importlib.import_module(f".{name}", __package__) for name in CONTENTS]
-
-
-_done = []  # what is registered, in order
+CLASSES = [cls for module in MODULES for cls in module.CLASSES]
 
 
 def register():
     try:
-        for module in MODULES:
-            _done.append(module)
-            _register(module)
+        for cls in CLASSES:
+            bpy.utils.register_class(cls)
+        item.attach()
+        lifecycle.register()
     except Exception:
         unregister()
         raise
@@ -47,22 +42,10 @@ def register():
 
 
 def unregister():
-    """Undoes register(), once: Blender calls it too when it ends and switches its add-ons off."""
+    """Undoes register(), or what it did before it failed; once: Blender calls it too when it ends."""
     atexit.unregister(unregister)
-    while _done:
-        _unregister(_done.pop())
-
-
-def _register(module):
-    for cls in getattr(module, "CLASSES", []):
-        bpy.utils.register_class(cls)
-    if hasattr(module, "register"):
-        module.register()
-
-
-def _unregister(module):
-    if hasattr(module, "unregister"):
-        module.unregister()
-    for cls in reversed(getattr(module, "CLASSES", [])):
+    lifecycle.unregister()
+    item.detach()
+    for cls in reversed(CLASSES):
         if cls.is_registered:
             bpy.utils.unregister_class(cls)

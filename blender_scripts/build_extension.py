@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds the Blender extension: one zip with the add-on, our library, libtorch and a binding per Python.
+"""Builds the Blender extension: one zip with the add-on, our library, libtorch, a binding per Python and what
+the add-on takes from PyPI.
 
 python blender_scripts/build_extension.py --output dist [--build build/wheel] [--python 3.11 3.13]
 """
@@ -12,7 +13,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "blender_scripts"))
 
-from extension import archive, bindings, check, libraries, wheel  # noqa: E402
+from extension import archive, bindings, check, dependencies, libraries, wheel  # noqa: E402
 from extension.blender import extension_tool  # noqa: E402
 
 WHEEL_TAG = "py3-none-linux_x86_64"
@@ -94,9 +95,12 @@ def build(options):
         raise RuntimeError(f"the manifest says version {manifest['version']}, the library is {version}")
     headers = wanted_headers(options)
     print("Pythons:", ", ".join(f"{a}.{b}" for a, b in headers))
-    (options.output / "wheels").mkdir(parents=True, exist_ok=True)
+    folder = options.output / "wheels"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
     wheels = [build_wheel(options, version, headers, ROOT / "build/extension")]
     check.check_platforms(manifest, [wheel.name for wheel in wheels])
+    wheels += dependencies.dependency_wheels((ROOT / "requirements.txt").read_text(), folder)
     path = options.output / f"arapfields-{version}-linux-x64.zip"
     archive.write_extension(addon, wheels, (ROOT / "LICENSE").read_text(), path)
     check.check_zip(path, headers)

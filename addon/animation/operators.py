@@ -4,11 +4,13 @@ import contextlib
 import bpy
 
 from ..blender.language import translated
-from ..blender.object_references import ObjectId, source_of
+from ..blender.object_references import ObjectReference, source_of
 from ..core.errors import UserError
+from ..core.runtime.coroutines import Pause
 from ..core.runtime.jobs import Item
 from ..core.runtime.progress import JobCancelled
-from ..jobs.job_operator import JobOperator, watched
+from ..handles.empties import require_handles
+from ..jobs.job_operator import JobOperator, with_progress
 from ..live.session import Session
 from ..names import Op
 from ..results import result_objects
@@ -21,7 +23,7 @@ class ARAPFIELDS_OT_bake(JobOperator, bpy.types.Operator):
     bl_label = "Bake Animation"
     bl_options = {"UNDO"}
     title = "Bake"
-    needs_handles = True
+    refuses = staticmethod(require_handles)
 
     start: bpy.props.IntProperty(
         name="Start", description="First frame; 0 for the scene's", default=0, min=0, options={"SKIP_SAVE"}
@@ -46,35 +48,37 @@ class ARAPFIELDS_OT_bake(JobOperator, bpy.types.Operator):
         frames = list(range(self.start or scene.frame_start, (self.end or scene.frame_end) + 1, self.step))
         if not frames:
             raise UserError("the last frame comes before the first")
-        goals = []
+        requests = []
         try:
             scene.frame_set(frames[0])
             session = Session(context, source, shown=False, follow=False)
-            yield from watched(job, session.reading, source.name)
+            yield from with_progress(job, session.reading, source.name)
             for number, frame in enumerate(frames):
-                job.outside(0.1 * number / len(frames), translated("Reading frame {frame}", frame=frame))
+                job.report_main_thread(
+                    0.1 * number / len(frames), translated("Reading frame {frame}", frame=frame)
+                )
                 scene.frame_set(frame)
-                goals.append(session.goal_now(context, source))
-                yield False
+                requests.append(session.current_request(context, source))
+                yield Pause.REDRAW
         finally:
             with contextlib.suppress(ReferenceError):
                 scene.frame_set(present)
-        who = ObjectId(source)
+        reference = ObjectReference(source)
 
-        def work(stages):
-            task = stages.start("Solving", 1.0)
+        def work(tracker):
+            task = tracker.start("Solving", 1.0)
             session.prepare()
             shapes = []
-            for number, goal in enumerate(goals):
+            for number, request in enumerate(requests):
                 if task.cancelled:
                     raise JobCancelled
-                task.report(number / len(goals), translated("frame {frame}", frame=frames[number]))
-                session.solve(goal, steps=30)
+                task.report(number / len(requests), translated("frame {frame}", frame=frames[number]))
+                session.solve(request, steps=30)
                 shapes.append(session.local(session.solver.field(session.rest)))
             return shapes
 
         def apply(shapes):
-            return (yield from add_keys(context, who.get(), session, frames, shapes, job))
+            return (yield from add_keys(context, reference.get(), session, frames, shapes, job))
 
         return Item(source.name, work, apply)
 
@@ -89,9 +93,11 @@ def add_keys(context, source, session, frames, shapes, job):
     kept = False
     try:
         for number in range(len(frames)):
-            job.outside(number / len(frames), translated("Storing frame {frame}", frame=frames[number]))
+            job.report_main_thread(
+                number / len(frames), translated("Storing frame {frame}", frame=frames[number])
+            )
             result_objects.add_frame(item, frames, number, shapes[number])
-            yield False
+            yield Pause.REDRAW
         kept = True
     finally:
         if not kept:

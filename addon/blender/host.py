@@ -7,3 +7,8 @@ import bpy
 def is_module():
     """Whether Blender runs as Python's module bpy; Blender 4.2 tells by having no program of its own."""
     return getattr(bpy.app, "module", not bpy.app.binary_path)
+
+
+def has_window():
+    """Whether there is a window: events, timers and drawing."""
+    return not bpy.app.background

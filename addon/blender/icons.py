@@ -6,25 +6,23 @@ from pathlib import Path
 import bpy.utils.previews
 
 FOLDER = Path(__file__).resolve().parents[1] / "icons"
-_loaded = None
+_collections = []  # one, while the extension is on
 
 
 def icon(identifier):
     """The number of a style's picture; 0 where there is none."""
-    if _loaded is None or identifier not in _loaded:
+    if not _collections or identifier not in _collections[0]:
         return 0
-    return _loaded[identifier].icon_id
+    return _collections[0][identifier].icon_id
 
 
-def register():
-    global _loaded
-    _loaded = bpy.utils.previews.new()
+def load():
+    pictures = bpy.utils.previews.new()
+    _collections.append(pictures)
     for path in sorted(FOLDER.glob("*.png")):
-        _loaded.load(path.stem.upper(), str(path), "IMAGE")
+        pictures.load(path.stem.upper(), str(path), "IMAGE")
 
 
-def unregister():
-    global _loaded
-    if _loaded is not None:
-        bpy.utils.previews.remove(_loaded)
-        _loaded = None
+def clear():
+    while _collections:
+        bpy.utils.previews.remove(_collections.pop())

@@ -7,7 +7,7 @@ from ..core.errors import UserError
 from ..names import PROPERTY
 
 
-class ObjectId:
+class ObjectReference:
     """Stands for an object while a job runs; the object may be renamed, undone or deleted meanwhile."""
 
     def __init__(self, item):
@@ -32,15 +32,15 @@ def source_of(context):
     active = context.view_layer.objects.active if context.view_layer else None
     if active is None:
         return None
-    ours = settings_of(active)
+    settings = settings_of(active)
     if active.type == "EMPTY":
-        if ours.handle_of is not None:
-            return ours.handle_of
+        if settings.handle_of is not None:
+            return settings.handle_of
         meshes = [item for item in context.selected_objects if item.type == "MESH"]
         return meshes[0] if len(meshes) == 1 else None
     if active.type != "MESH":
         return None
-    return ours.result_of if ours.result_of is not None else active
+    return settings.result_of if settings.result_of is not None else active
 
 
 def refusal(item, in_edit_mode=False):
@@ -48,7 +48,7 @@ def refusal(item, in_edit_mode=False):
     if item is None:
         return UserError("Select a mesh object")
     if item.type != "MESH":
-        return UserError("{name} is no mesh object", name=item.name)
+        return UserError("{name} is not a mesh object", name=item.name)
     if item.mode == "EDIT" and not in_edit_mode:
         return UserError("{name} is in Edit Mode; leave it first", name=item.name)
     return None

@@ -1,29 +1,41 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Gives Blender the add-on's translations: each file in addon/translations is a language."""
+"""Gives Blender the add-on's translations: each .po file in addon/translations is a language."""
 
+import sys
 from pathlib import Path
 
 import bpy
 
-from ..core.catalogue import read_catalogue
 from ..names import PACKAGE
 
 FOLDER = Path(__file__).resolve().parents[1] / "translations"
 CONTEXTS = ("*", "Operator")  # Blender looks texts of buttons up in the second
 
 
-def catalogues():
+def read_po(path):
+    """{English: translated} of a .po file, wrapped lines included; OSError names a line that is no .po."""
+    import polib
+
+    return {entry.msgid: entry.msgstr for entry in polib.pofile(str(path)).translated_entries()}
+
+
+def translations():
     """{language: {(context, English): translated}}."""
-    found = {}
+    languages = {}
     for path in sorted(FOLDER.glob("*.po")):
-        texts = read_catalogue(path.read_text(encoding="utf-8"))
-        found[path.stem] = {(context, text): told for text, told in texts.items() for context in CONTEXTS}
-    return found
+        texts = read_po(path).items()
+        languages[path.stem] = {(context, text): told for text, told in texts for context in CONTEXTS}
+    return languages
 
 
-def register():
-    bpy.app.translations.register(PACKAGE, catalogues())
+def load():
+    try:
+        texts = translations()
+    except ModuleNotFoundError:  # the source code was installed, which install_check says
+        print("ARAP Fields: polib is missing, so all texts are in English", file=sys.stderr, flush=True)
+        texts = {}
+    bpy.app.translations.register(PACKAGE, texts)
 
 
-def unregister():
+def clear():
     bpy.app.translations.unregister(PACKAGE)

@@ -15,6 +15,7 @@ from mathutils import Matrix
 from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..core.runtime import jobs, native
+from ..core.runtime.threads import start_thread
 from ..core.settings.styles import style_identifier
 from ..handles import empties
 from ..names import REPORT
@@ -122,7 +123,7 @@ def solve(source, options):
     item = settings_of(source).results[-1].item
     seconds = time.perf_counter() - begin
     figures = json.loads(item[REPORT])
-    message = "; ".join(text for _, text in jobs.notes()) or source.name
+    message = "; ".join(text for _, text in jobs.messages()) or source.name
     outcome |= {"status": "done", "message": message, "seconds": seconds, "figures": figures}
     return outcome, (source, item)
 
@@ -163,8 +164,7 @@ def progress(quiet):
     if quiet:
         yield
         return
-    thread = threading.Thread(target=draw, daemon=True)
-    thread.start()
+    thread = start_thread("progress", draw)
     try:
         yield
     finally:

@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..blender import vertex_groups
 from ..blender.object_references import settings_of
 from ..blender.presets import preset_classes
-from ..blender.settings import annotations, in_force, machine_options
+from ..blender.property_definitions import annotations, effective_values
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
-from ..core.settings.parameters import DEFORM, native_options
+from ..core.settings.parameters import DEFORM
 from ..handles import empties
+from ..handles.native_handles import native_handles
 from ..jobs.job_operator import JobOperator
 from ..names import Op
 from ..properties.item import output, resolution, surface, target
-from ..surface.source_surface import known
-from .solve_job import plan_move
+from ..surface.source_surface import build_options
+from .solve_job import plan_solve_job
 
 
 class ARAPFIELDS_OT_deform(JobOperator, bpy.types.Operator):
@@ -23,7 +23,7 @@ class ARAPFIELDS_OT_deform(JobOperator, bpy.types.Operator):
     bl_label = "Deform"
     bl_options = {"UNDO"}
     title = "Deform"
-    needs_handles = True
+    refuses = staticmethod(empties.require_handles)
 
     __annotations__ = {
         **annotations(DEFORM, options={"SKIP_SAVE"}),
@@ -38,16 +38,16 @@ class ARAPFIELDS_OT_deform(JobOperator, bpy.types.Operator):
 
     def plan(self, context, source, weights):
         context.view_layer.update()
-        values = in_force(DEFORM, settings_of(source).deform, self)
+        values = effective_values(DEFORM, settings_of(source).deform, self)
         af = native.library()
-        options = af.DeformOptions(**native_options(values), **known(af.DeformOptions, machine_options()))
-        wanted = empties.solve_handles(source, space_of(source.matrix_world, source.name), weights)
+        options = build_options(af.DeformOptions, values)
+        handles = empties.solve_handles(source, space_of(source.matrix_world, source.name), weights)
 
-        def solve(stages, rest, samples):
-            ready = vertex_groups.native_handles(af, wanted, rest, samples)
-            return af.deform(samples, ready, options, stages.start("Deforming", 0.5))
+        def solve(tracker, rest, samples):
+            natives = native_handles(af, handles, rest, samples)
+            return af.deform(samples, natives, options, tracker.start("Deforming", 0.5))
 
-        return plan_move(context, self, source, "DEFORM", values["samples"], values["seed"], solve)
+        return plan_solve_job(context, self, source, "DEFORM", values["samples"], values["seed"], solve)
 
 
 CLASSES = [ARAPFIELDS_OT_deform, *preset_classes("deform", "Deform", DEFORM)]

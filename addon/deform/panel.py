@@ -15,12 +15,12 @@ class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
     def draw_header_preset(self, context):
         presets(self.layout, "deform")
 
-    def fill(self, context, source, ours):
+    def fill(self, context, source, settings):
         layout = self.layout
-        layout.prop(ours, "output")
-        layout.prop(ours, "surface")
-        layout.prop(ours, "target")
-        settings_column(layout, ours.deform, DEFORM)
+        layout.prop(settings, "output")
+        layout.prop(settings, "surface")
+        layout.prop(settings, "target")
+        settings_column(layout, settings.deform, DEFORM)
         job_button(layout, Op.DEFORM, "MOD_SIMPLEDEFORM")
         live_buttons(layout, source, "DEFORM")
         layout.operator(Op.BAKE, icon="REC")

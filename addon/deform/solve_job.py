@@ -7,17 +7,17 @@ import bpy
 import numpy as np
 
 from ..blender.language import translated
-from ..blender.settings import chosen
+from ..blender.property_definitions import effective_value
 from ..core.errors import UserError
 from ..core.geometry.edges import Topology
 from ..core.runtime.jobs import Item
-from ..results.placement import deliver, refuse
+from ..results.placement import place_result, require_placeable
 from ..surface.source_surface import read_surface, settings_of
 from ..viewport.previews import Preview
 
 
 @dataclass
-class Moved:
+class SolvedMesh:
     """What the worker hands back, in local coordinates."""
 
     vertices: np.ndarray
@@ -25,41 +25,41 @@ class Moved:
     report: dict
 
 
-def plan_move(context, operator, source, kind, samples, seed, solve):
-    """The job's item. `solve(stages, surface, samples)` returns the field, on the worker."""
+def plan_solve_job(context, operator, source, kind, samples, seed, solve):
+    """The job's item. `solve(tracker, surface, samples)` returns the field, on the worker."""
     surface = read_surface(context, source)
-    ours = settings_of(source)
-    output = chosen("output", ours, operator)
-    cells = chosen("resolution", ours, operator)
-    choice = chosen("surface", ours, operator)
-    target = chosen("target", ours, operator)
+    settings = settings_of(source)
+    output = effective_value("output", settings, operator)
+    cells = effective_value("resolution", settings, operator)
+    choice = effective_value("surface", settings, operator)
+    target = effective_value("target", settings, operator)
     if target != "NEW":
-        refuse(source, output, target, surface.local)
+        require_placeable(source, output, target, surface.local)
 
-    preview = Preview(surface) if operator.has_window else None
+    preview = Preview(surface) if operator.in_window else None
 
-    def work(stages):
+    def work(tracker):
         if preview is not None:
-            stages.watched_points = preview.points
+            tracker.rest_preview_points = preview.points
         use_fit = choice == "FIT" or output != "WARP" or (choice == "AUTO" and surface.is_cached)
-        field = solve(stages, surface, surface.samples(stages, samples, seed, use_fit))
+        field = solve(tracker, surface, surface.samples(tracker, samples, seed, use_fit))
         topology, report = None, {"output": output, **dict(field.report)}
         if output == "REMESH":
-            after, topology, figures = surface.extract_moved(stages, field, cells, 0.3)
+            after, topology, figures = surface.extract_moved(tracker, field, cells, 0.3)
             report |= figures
         else:
             before = surface.vertices
             if output == "SURFACE":
-                before, topology = surface.extract(stages, cells, 0.1)
+                before, topology = surface.extract(tracker, cells, 0.1)
             after = field(before)
         if not np.isfinite(after).all():
             raise UserError("the result has vertices that are not finite; try other settings")
-        return Moved(surface.space.to_local(after), topology, report)
+        return SolvedMesh(surface.space.to_local(after), topology, report)
 
-    def apply(moved):
-        owner = surface.who.get()
-        item = deliver(bpy.context, owner, kind, output, target, moved, surface.local)
-        return describe(item, moved.report)
+    def apply(solved):
+        owner = surface.reference.get()
+        item = place_result(bpy.context, owner, kind, output, target, solved, surface.local)
+        return describe(item, solved.report)
 
     return Item(source.name, work, apply, preview)
 

@@ -10,7 +10,7 @@ from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..core.geometry.handles import box_matrix, solve_handle
 from ..core.geometry.spaces import transform
-from ..core.runtime.coroutines import finished
+from ..core.runtime.coroutines import run_to_completion
 from ..names import HANDLE_SUFFIX
 
 
@@ -18,7 +18,7 @@ def matrix_of(item):
     return np.array(item.matrix_world, dtype=np.float64)
 
 
-def box_now(empty):
+def current_box(empty):
     """The cube [-1, 1]³ → world, of an Empty where it is now."""
     return box_matrix(matrix_of(empty), empty.empty_display_size)
 
@@ -30,13 +30,18 @@ def rest_box(source, entry):
 
 def store_rest(source, entry):
     """Makes where the handle's Empty is now its rest pose."""
-    relative = np.linalg.inv(matrix_of(source)) @ box_now(entry.empty)
+    relative = np.linalg.inv(matrix_of(source)) @ current_box(entry.empty)
     entry.rest = relative.ravel()
 
 
 def used(source):
     """The handles whose Empties still exist."""
     return [entry for entry in settings_of(source).handles if entry.empty is not None]
+
+
+def require_handles(source):
+    """Why a source without a handle is refused, as a UserError; None where it has one."""
+    return None if used(source) else UserError("Add a handle first")
 
 
 def find(source, empty):
@@ -55,15 +60,15 @@ def solve_handles(source, space, weights=None):
 
     `weights` are those of the vertex groups by name; without them, groups say only where they go.
     """
-    found = []
+    handles = []
     for entry in used(source):
-        where = rest_box(source, entry), box_now(entry.empty)
+        boxes = rest_box(source, entry), current_box(entry.empty)
         held = weights[entry.group] if weights and entry.kind == "GROUP" else None
-        further = {"weights": held, "weight": entry.weight}
-        found.append(solve_handle(entry.empty.name, entry.kind, *where, space, **further))
-    if not found:
+        options = {"weights": held, "weight": entry.weight}
+        handles.append(solve_handle(entry.empty.name, entry.kind, *boxes, space, **options))
+    if not handles:
         raise UserError("{name} has no handle; add one in the panel's Handles section", name=source.name)
-    return found
+    return handles
 
 
 PALETTE = [(0.27, 0.55, 1.0), (1.0, 0.42, 0.30), (0.35, 0.80, 0.40), (0.85, 0.45, 0.90), (1.0, 0.80, 0.25)]
@@ -74,23 +79,23 @@ def add(source, empty, kind="CUBE"):
     """Turns an Empty into a handle of the source, at rest where it is; one it was already is only reset."""
     if empty.empty_display_type == "IMAGE":
         raise UserError("{name} shows an image; take another kind of Empty", name=empty.name)
-    if abs(np.linalg.det(box_now(empty)[:3, :3])) == 0:
+    if abs(np.linalg.det(current_box(empty)[:3, :3])) == 0:
         raise UserError("{name} is flat; give it a size and a scale other than zero", name=empty.name)
-    ours = settings_of(source)
+    settings = settings_of(source)
     owner = settings_of(empty).handle_of
     if owner is not None and owner != source:
         remove(owner, find(owner, empty))
     index = find(source, empty)
     if index < 0:
-        index = len(ours.handles)
-        ours.handles.add()
-    entry = ours.handles[index]
+        index = len(settings.handles)
+        settings.handles.add()
+    entry = settings.handles[index]
     entry.empty, entry.kind = empty, kind
     entry.colour = PALETTE[index % len(PALETTE)]
     settings_of(empty).handle_of = source
     empty.empty_display_type = SHAPES[kind]
     store_rest(source, entry)
-    ours.active_handle = index
+    settings.active_handle = index
     return entry
 
 
@@ -109,13 +114,6 @@ def editable(context):
     return [context.scene.collection, *context.scene.collection.children_recursive]
 
 
-PLACES = (
-    ("AUTO", "Selected Empties", "The selected Empties; where none is selected, a new one at the 3D cursor"),
-    ("CURSOR", "3D Cursor", "A new box at the 3D cursor"),
-    ("SELECTION", "Selected Vertices", "A new box around the mesh's selected vertices"),
-)
-
-
 def new_empty(context, source, kind, group, place):
     """A new Empty: about the selected vertices, amid the vertex group, or at the 3D cursor."""
     corners = transform(matrix_of(source), np.array(source.bound_box))
@@ -124,7 +122,7 @@ def new_empty(context, source, kind, group, place):
         return make_empty(context, source, Matrix(selection_box(source, size).tolist()), 1.0)
     where = context.scene.cursor.location
     if kind == "GROUP":
-        weights = finished(vertex_groups.read_weights(context, source, [group]))[group]
+        weights = run_to_completion(vertex_groups.read_weights(context, source, [group]))[group]
         with mesh_arrays.evaluated_mesh(context, source) as mesh:
             middle = np.average(mesh_arrays.positions(mesh), axis=0, weights=weights)
         where = source.matrix_world @ Vector(middle)
@@ -160,15 +158,15 @@ def mirror(context, source, entry, axis):
     if group and group not in source.vertex_groups:
         raise UserError("{name} has no vertex group {group}", name=source.name, group=group)
     rest = flip @ np.array(entry.rest, dtype=np.float64).reshape(4, 4) @ flip
-    now = flip @ np.linalg.inv(world) @ matrix_of(entry.empty) @ flip
+    current = flip @ np.linalg.inv(world) @ matrix_of(entry.empty) @ flip
     name, size = entry.empty.name, entry.empty.empty_display_size
     flipped = bpy.utils.flip_name(name)
     weight, kind = entry.weight, entry.kind
-    empty = make_empty(context, source, Matrix((world @ now).tolist()), size)
+    empty = make_empty(context, source, Matrix((world @ current).tolist()), size)
     empty.name = flipped if flipped != name else f"{name}_mirrored"
-    made = add(source, empty, kind)
-    made.rest, made.group, made.weight = rest.ravel(), group, weight
-    return made
+    mirrored = add(source, empty, kind)
+    mirrored.rest, mirrored.group, mirrored.weight = rest.ravel(), group, weight
+    return mirrored
 
 
 def reset(source, entry):
@@ -180,9 +178,9 @@ def reset(source, entry):
 
 def remove(source, index):
     """Takes a handle off the source's list; its Empty stays as an ordinary one."""
-    ours = settings_of(source)
-    empty = ours.handles[index].empty
+    settings = settings_of(source)
+    empty = settings.handles[index].empty
     if empty is not None:
         settings_of(empty).handle_of = None
-    ours.handles.remove(index)
-    ours.active_handle = max(0, min(ours.active_handle, len(ours.handles) - 1))
+    settings.handles.remove(index)
+    settings.active_handle = max(0, min(settings.active_handle, len(settings.handles) - 1))

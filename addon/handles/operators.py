@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..blender import object_references
 from ..blender.language import translated
+from ..blender.object_references import refusal, settings_of, source_of
 from ..core.errors import UserError
 from ..core.runtime import native
+from ..core.settings.choices import HANDLE_KINDS, HANDLE_PLACES
 from ..names import Op
 from . import counts, empties
-from .properties import KINDS
 
 
 class HandleOperator:
@@ -19,9 +19,9 @@ class HandleOperator:
 
     @classmethod
     def poll(cls, context):
-        source = object_references.source_of(context)
-        reason = native.problem() or object_references.refusal(source, cls.in_edit_mode)
-        if not reason and cls.needs_handle and not object_references.settings_of(source).handles:
+        source = source_of(context)
+        reason = native.problem() or refusal(source, cls.in_edit_mode)
+        if not reason and cls.needs_handle and not settings_of(source).handles:
             reason = "The object has no handle"
         if reason:
             cls.poll_message_set(translated(reason))
@@ -30,7 +30,7 @@ class HandleOperator:
     def execute(self, context):
         context.view_layer.update()
         try:
-            self.report({"INFO"}, self.change(context, object_references.source_of(context)))
+            self.report({"INFO"}, self.change(context, source_of(context)))
         except UserError as error:
             self.report({"ERROR"}, translated(error))
             return {"CANCELLED"}
@@ -39,12 +39,12 @@ class HandleOperator:
 
 def chosen_entries(context, source):
     """The handles whose Empties are selected, or the one chosen in the list."""
-    ours = object_references.settings_of(source)
+    settings = settings_of(source)
     selected = [entry for entry in empties.used(source) if entry.empty in context.selected_objects]
     if selected:
         return selected
-    index = ours.active_handle
-    return [ours.handles[index]] if 0 <= index < len(ours.handles) else []
+    index = settings.active_handle
+    return [settings.handles[index]] if 0 <= index < len(settings.handles) else []
 
 
 class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
@@ -55,9 +55,11 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
     needs_handle = False
     in_edit_mode = True
 
-    kind: bpy.props.EnumProperty(items=KINDS, name="Kind", description="What of the surface the handle holds")
+    kind: bpy.props.EnumProperty(
+        items=HANDLE_KINDS, name="Kind", description="What of the surface the handle holds"
+    )
     place: bpy.props.EnumProperty(
-        items=empties.PLACES, name="Place", description="Where the handle is", options={"SKIP_SAVE"}
+        items=HANDLE_PLACES, name="Place", description="Where the handle is", options={"SKIP_SAVE"}
     )
     group: bpy.props.StringProperty(
         name="Vertex Group", description="The group to hold, for that kind; empty for the object's active one"
@@ -96,7 +98,7 @@ class ARAPFIELDS_OT_mirror_handle(HandleOperator, bpy.types.Operator):
     def change(self, context, source):
         entries = [entry.empty for entry in chosen_entries(context, source) if entry.empty is not None]
         for empty in entries:
-            entry = object_references.settings_of(source).handles[empties.find(source, empty)]
+            entry = settings_of(source).handles[empties.find(source, empty)]
             empties.mirror(context, source, entry, "XYZ".index(self.axis))
         counts.count_inside(context, source)
         return translated("{count} handles mirrored", count=len(entries))
@@ -144,10 +146,11 @@ class ARAPFIELDS_OT_remove_handle(HandleOperator, bpy.types.Operator):
     delete: bpy.props.BoolProperty(name="Delete Empties", description="Delete the Empties as well")
 
     def change(self, context, source):
-        ours = object_references.settings_of(source)
-        rows = [index for index, entry in enumerate(ours.handles) if entry in chosen_entries(context, source)]
+        settings = settings_of(source)
+        chosen = chosen_entries(context, source)
+        rows = [index for index, entry in enumerate(settings.handles) if entry in chosen]
         for index in reversed(rows):
-            empty = ours.handles[index].empty
+            empty = settings.handles[index].empty
             empties.remove(source, index)
             if self.delete and empty is not None:
                 bpy.data.objects.remove(empty)

@@ -63,10 +63,10 @@ class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
     bl_idname = "ARAPFIELDS_PT_handles"
     bl_order = 2
 
-    def fill(self, context, source, ours):
+    def fill(self, context, source, settings):
         layout = self.layout
         row = layout.row()
-        row.template_list("ARAPFIELDS_UL_handles", "", ours, "handles", ours, "active_handle", rows=4)
+        row.template_list("ARAPFIELDS_UL_handles", "", settings, "handles", settings, "active_handle", rows=4)
         column = row.column(align=True)
         column.menu("ARAPFIELDS_MT_add_handle", icon="ADD", text="")
         column.operator(Op.REMOVE_HANDLE, icon="REMOVE", text="")
@@ -75,8 +75,8 @@ class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator(Op.SET_REST, icon="PINNED")
         row.operator(Op.RESET_HANDLE, icon="LOOP_BACK")
-        if 0 <= ours.active_handle < len(ours.handles):
-            entry = ours.handles[ours.active_handle]
+        if 0 <= settings.active_handle < len(settings.handles):
+            entry = settings.handles[settings.active_handle]
             layout.prop(entry, "weight")
             if entry.kind == "GROUP":
                 layout.prop_search(entry, "group", source, "vertex_groups")

@@ -3,16 +3,14 @@
 
 import bpy
 
-KINDS = (
-    ("CUBE", "Region", "What lies in the box at rest follows the Empty"),
-    ("POINT", "Point", "The point of the surface nearest to the Empty at rest follows it"),
-    ("GROUP", "Vertex Group", "What a vertex group of the object holds follows the Empty"),
-)
+from ..core.settings.choices import HANDLE_KINDS
 
 
 class ARAPFIELDS_PG_handle(bpy.types.PropertyGroup):
     empty: bpy.props.PointerProperty(type=bpy.types.Object, name="Empty", description="Moves the handle")
-    kind: bpy.props.EnumProperty(items=KINDS, name="Kind", description="What of the surface the handle holds")
+    kind: bpy.props.EnumProperty(
+        items=HANDLE_KINDS, name="Kind", description="What of the surface the handle holds"
+    )
     group: bpy.props.StringProperty(
         name="Vertex Group", description="The group that the handle holds, for handles of that kind"
     )

@@ -1,25 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Operators that run a job: at once and blocking from scripts, modal with progress in a window."""
 
-import contextlib
-import sys
 import types
 
 import bpy
 
-from ..blender import object_references, vertex_groups
+from ..blender import vertex_groups
 from ..blender.language import translated
+from ..blender.object_references import ObjectReference, refusal, settings_of, source_of
 from ..core.errors import UserError
 from ..core.runtime import jobs, native
+from ..core.runtime.coroutines import Pause, run_to_completion
 from ..core.runtime.progress import JobCancelled
-from ..handles import empties
+from ..core.settings.choices import SCOPES
 from .modal import ModalRun
-
-SCOPES = (
-    ("ACTIVE", "Active", "The active object alone"),
-    ("SELECTED", "Selected", "Every selected mesh object, one after another"),
-    ("COLLECTION", "Collection", "Every mesh object of the active object's collections"),
-)
 
 
 class JobOperator(ModalRun):
@@ -31,7 +25,6 @@ class JobOperator(ModalRun):
     """
 
     title = ""
-    needs_handles = False  # whether it is refused without one
 
     scope: bpy.props.EnumProperty(
         items=SCOPES, name="Objects", description="Which objects to work on", options={"SKIP_SAVE"}
@@ -39,74 +32,70 @@ class JobOperator(ModalRun):
 
     @classmethod
     def poll(cls, context):
-        source = object_references.source_of(context)
-        reason = native.problem() or object_references.refusal(source) or busy()
-        if not reason and cls.needs_handles and not empties.used(source):
-            reason = UserError("Add a handle first")
+        source = source_of(context)
+        reason = native.problem() or refusal(source) or busy() or cls.refuses(source)
         if reason:
             cls.poll_message_set(translated(reason))
         return not reason
 
+    @classmethod
+    def refuses(cls, source):
+        """Why this operator cannot work on a source that others can, as a UserError; else None."""
+        return None
+
     def sources(self, context):
         """The objects to work on; none is ignored silently, what cannot be worked on becomes a failure."""
+        active = source_of(context)
         if self.scope == "ACTIVE":
-            return [object_references.source_of(context)]
-        active = object_references.source_of(context)
+            return [active]
         within = context.selected_objects
         if self.scope == "COLLECTION":
             within = [item for home in active.users_collection for item in home.all_objects]
         meshes = [item for item in within if item.type == "MESH"]
-        owners = [object_references.settings_of(item).result_of or item for item in meshes]
-        found = list(dict.fromkeys(owners))
-        self.failures += [
-            translated(object_references.refusal(item)) for item in found if object_references.refusal(item)
-        ]
-        return [item for item in found if not object_references.refusal(item)]
+        owners = dict.fromkeys(settings_of(item).result_of or item for item in meshes)
+        refusals = {item: refusal(item) for item in owners}
+        self.failures += [translated(reason) for reason in refusals.values() if reason]
+        return [item for item, reason in refusals.items() if not reason]
 
     def groups_of(self, source):
         """Names of the vertex groups whose weights the plan needs."""
         return []
 
     def prepare(self, context, job):
-        """Course that reads all sources, and their items; what cannot be planned is kept as a failure."""
+        """Coroutine that reads all sources, and their items; what cannot be planned is kept as a failure."""
         items = []
-        for who in [object_references.ObjectId(source) for source in self.sources(context)]:
+        for reference in [ObjectReference(source) for source in self.sources(context)]:
             try:
-                source = who.get()
+                source = reference.get()
                 reading = vertex_groups.read_weights(context, source, self.groups_of(source))
-                weights = yield from watched(job, reading, who.name)
-                items.append(self.plan(context, who.get(), weights))
+                weights = yield from with_progress(job, reading, reference.name)
+                items.append(self.plan(context, reference.get(), weights))
             except (UserError, ValueError) as error:
                 self.failures.append(translated(error))
-            yield False
+            yield Pause.REDRAW
         return items
 
-    def course(self, context):
-        """All that the main thread does, as a generator: yields True to wait for the worker, False when the
-        window may redraw. Returns the operator's result."""
+    def coroutine(self, context):
+        """All that the main thread does; returns the operator's result."""
         self.failures, self.successes = [], []
-        job = jobs.Job(self.title, [], native.library().Task, stands_back=self.has_window)
+        job = jobs.Job(self.title, [], native.library().Task, low_priority=self.in_window)
         jobs.begin(job, start=False)
         try:
             items = yield from self.prepare(context, job)
         except JobCancelled:
-            self.note("INFO", translated("{job} cancelled", job=translated(self.title)))
+            self.add_message("INFO", translated("{job} cancelled", job=translated(self.title)))
             return {"CANCELLED"}
         job.start(items)
         while not job.done:
-            yield True
+            yield Pause.WORKER
         return (yield from self.conclude(context, job))
 
     def execute(self, context):
-        course = self.course(context)
+        coroutine = self.coroutine(context)
         try:
-            while True:
-                if next(course):
-                    jobs.running().join(0.05)
-        except StopIteration as ended:
-            return ended.value
+            return run_to_completion(coroutine, wait=lambda: jobs.running().join(0.05))
         except KeyboardInterrupt:
-            course.close()
+            coroutine.close()
             return {"CANCELLED"}
         finally:
             jobs.stop()
@@ -122,12 +111,12 @@ class JobOperator(ModalRun):
             else:
                 cancelled |= yield from self.apply_one(outcome)
         if cancelled and not self.successes and not self.failures:
-            self.note("INFO", translated("{job} cancelled", job=translated(self.title)))
+            self.add_message("INFO", translated("{job} cancelled", job=translated(self.title)))
             return {"CANCELLED"}
         for text in self.successes:
-            self.note("INFO", text)
+            self.add_message("INFO", text)
         for text in self.failures:
-            self.note("ERROR" if not self.successes else "WARNING", text)
+            self.add_message("ERROR" if not self.successes else "WARNING", text)
         return {"FINISHED"} if self.successes else {"CANCELLED"}
 
     def apply_one(self, outcome):
@@ -144,17 +133,17 @@ class JobOperator(ModalRun):
             return True
         return False
 
-    def note(self, level, text):
-        jobs.note(level, text)
+    def add_message(self, level, text):
+        jobs.add_message(level, text)
         self.report({level}, text)
 
 
-def watched(job, course, label):
-    """The same course, which shows what is read and can be cancelled."""
+def with_progress(job, coroutine, label):
+    """The same coroutine, which shows what is read and can be cancelled."""
     while True:
-        job.outside(0.0, translated("Reading {name}", name=label))
+        job.report_main_thread(0.0, translated("Reading {name}", name=label))
         try:
-            yield next(course)
+            yield next(coroutine)
         except StopIteration as ended:
             return ended.value
 
@@ -162,25 +151,3 @@ def watched(job, course, label):
 def busy():
     """Why nothing can be started while a job runs; None when none does."""
     return UserError("Wait for the running job, or cancel it") if jobs.running() else None
-
-
-@bpy.app.handlers.persistent
-def stop(*_):
-    """The file is about to change under the job: another is loaded, or a step undone."""
-    jobs.stop()
-
-
-HANDLERS = ("load_pre", "undo_pre", "redo_pre")
-
-
-def register():
-    for name in HANDLERS:
-        getattr(bpy.app.handlers, name).append(stop)
-
-
-def unregister():
-    jobs.stop()
-    for name in HANDLERS:
-        with contextlib.suppress(ValueError):
-            getattr(bpy.app.handlers, name).remove(stop)
-    sys.stdout.flush()

@@ -28,16 +28,16 @@ class ARAPFIELDS_PT_status(Section, bpy.types.Panel):
     bl_order = 6
     needs_source = False
 
-    def fill(self, context, source, ours):
+    def fill(self, context, source, settings):
         layout = self.layout
         job = jobs.running()
         if job is not None:
             layout.label(
                 text=translated("{job} is running (see the top)", job=translated(job.title)), icon="TIME"
             )
-        for level, text in jobs.notes():
+        for level, text in jobs.messages():
             wrapped(layout, text, icon=ICONS[level])
-        if job is None and not jobs.notes():
+        if job is None and not jobs.messages():
             layout.label(text="Ready")
 
 

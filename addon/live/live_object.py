@@ -14,9 +14,9 @@ def show(context, source, mesh):
     """The live result with this mesh; the source is shown as a mere box meanwhile."""
     active, selected = context.view_layer.objects.active, list(context.selected_objects)
     item = result_objects.show(context, source, LIVE, LIVE, mesh, {"output": LIVE}, select=False)
-    ours = settings_of(source)
-    if not ours.live_display:
-        ours.live_display = source.display_type
+    settings = settings_of(source)
+    if not settings.live_display:
+        settings.live_display = source.display_type
         source.display_type = "BOUNDS"
     context.view_layer.objects.active = active
     for other in selected:
@@ -39,13 +39,13 @@ def drop(source):
 
 
 def restore(source):
-    ours = settings_of(source)
-    if ours.live_display:
-        source.display_type = ours.live_display
-        ours.live_display = ""
-    for index in reversed(range(len(ours.results))):
-        if ours.results[index].kind == LIVE:
-            ours.results.remove(index)
+    settings = settings_of(source)
+    if settings.live_display:
+        source.display_type = settings.live_display
+        settings.live_display = ""
+    for index in reversed(range(len(settings.results))):
+        if settings.results[index].kind == LIVE:
+            settings.results.remove(index)
 
 
 def keep(context, source, kind):

@@ -5,15 +5,11 @@ from ..blender.language import translated
 from ..blender.object_references import refusal, source_of
 from ..core.errors import UserError
 from ..core.runtime import jobs, native
+from ..core.settings.choices import LIVE_KINDS
 from ..handles import empties
 from ..jobs.job_operator import busy
 from ..names import Op
 from . import sessions
-
-KINDS = (
-    ("DEFORM", "Deform", "The shape follows its handles"),
-    ("STYLIZE", "Stylize", "The shape follows the style's settings, and its handles where the style does"),
-)
 
 
 class ARAPFIELDS_OT_live(bpy.types.Operator):
@@ -24,7 +20,7 @@ class ARAPFIELDS_OT_live(bpy.types.Operator):
     bl_options = {"UNDO"}
 
     kind: bpy.props.EnumProperty(
-        items=KINDS, name="Kind", description="What the shape follows", options={"SKIP_SAVE"}
+        items=LIVE_KINDS, name="Kind", description="What the shape follows", options={"SKIP_SAVE"}
     )
 
     @classmethod
@@ -60,7 +56,7 @@ class ARAPFIELDS_OT_live(bpy.types.Operator):
         if wait:
             sessions.update(context, wait)
             if not sessions.is_live(source):
-                self.report({"ERROR"}, jobs.notes()[-1][1])
+                self.report({"ERROR"}, jobs.messages()[-1][1])
                 return {"CANCELLED"}
         return {"FINISHED"}
 

@@ -7,25 +7,27 @@ import bpy
 import numpy as np
 
 from ..blender import mesh_arrays, vertex_groups
-from ..blender.object_references import ObjectId, settings_of
-from ..blender.settings import machine_options, plain
+from ..blender.host import has_window
+from ..blender.object_references import ObjectReference, settings_of
+from ..blender.property_definitions import from_single_precision
+from ..blender.user_preferences import machine_options
 from ..core.errors import UserError
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
-from ..core.runtime.coroutines import advanced, finished
-from ..core.runtime.latest_request import Follower
-from ..core.runtime.progress import Stages
+from ..core.runtime.coroutines import run_to_completion, step_for
+from ..core.runtime.latest_request_worker import LatestRequestWorker
+from ..core.runtime.progress import ProgressTracker
 from ..handles import empties
-from ..jobs.modal import BUDGET
+from ..handles.native_handles import native_handles
 from ..results import result_objects
 from ..stylize import preference
-from ..surface.source_surface import known, read_surface
+from ..surface.source_surface import read_surface, supported_options
 from . import live_object
 
 SAMPLES = 6000
 PREVIEW_CELLS = 96  # at most, of the implicit surface that is shown while it moves
-REFINEMENTS, STEPS_AT_ONCE, FINE = 40, 10, 1e-6
-STYLE_BUMPS = {
+REFINEMENTS, STEPS_AT_ONCE, FINE_TOLERANCE = 40, 10, 1e-6
+STYLE_OPTIONS = {
     "samples": 3000,
     "coarse_centers": 100,
     "fine_centers": 500,
@@ -42,93 +44,95 @@ class Session:
     """Reads its source when made, on the main thread; everything that takes time is done by the worker."""
 
     def __init__(self, context, source, kind="DEFORM", shown=True, follow=True):
-        ours = settings_of(source)
-        self.source, self.kind, self.layout = ObjectId(source), kind, layout_of(source, kind)
+        settings = settings_of(source)
+        self.source, self.kind, self.layout = ObjectReference(source), kind, layout_of(source, kind)
         self.surface = read_surface(context, source)
-        self.output, self.choice, self.cells = ours.output, ours.surface, min(ours.resolution, PREVIEW_CELLS)
-        self.wanted, self.weights = [], None
-        self.bending = plain(ours.deform.bending)
-        self.handle_weight = plain(ours.deform.handle_weight)
-        self.goal = self.solver = self.samples = self.topology = self.style_set = None
+        self.output, self.choice = settings.output, settings.surface
+        self.cells = min(settings.resolution, PREVIEW_CELLS)
+        self.handles, self.weights = [], None
+        self.bending = from_single_precision(settings.deform.bending)
+        self.handle_weight = from_single_precision(settings.deform.handle_weight)
+        self.requested = self.solver = self.samples = self.topology = self.style_set = None
         self.result = None
         if shown:
             mesh = result_objects.shown_mesh(context, source, len(self.surface.local))
-            self.result = ObjectId(live_object.show(context, source, mesh))
-        self.follower = None
+            self.result = ObjectReference(live_object.show(context, source, mesh))
+        self.worker = None
         self.reading = self.read(context, follow)
 
     def read(self, context, follow=False):
-        """Course (core/courses.py) that reads the vertex groups; then the worker sets out."""
+        """Coroutine (core/coroutines.py) that reads the vertex groups; then the worker sets out."""
         source = self.source.get()
         style = settings_of(source).stylize if self.kind == "STYLIZE" else None
         names = preference.group_names(source, style) if style else empties.group_names(source)
         weights = yield from vertex_groups.read_weights(context, source, names)
         source = self.source.get()
         if style is None or settings_of(source).stylize.use_handles:
-            self.wanted = empties.solve_handles(source, self.surface.space, weights)
+            self.handles = empties.solve_handles(source, self.surface.space, weights)
         if style is not None:
             style = settings_of(source).stylize
             self.weights = preference.region_weights(context, source, style, weights)
         if follow:
-            gentle = not bpy.app.background
-            self.follower = Follower(self.moved, self.prepare, self.refined, stands_back=gentle)
+            self.worker = LatestRequestWorker(
+                self.moved, self.prepare, self.refined, low_priority=has_window()
+            )
 
     def advance(self):
         """Reads on for a moment; whether the worker has set out."""
-        if self.follower is None:
-            advanced(self.reading, BUDGET)
-        return self.follower is not None
+        if self.worker is None:
+            step_for(self.reading)
+        return self.worker is not None
 
     def wait(self, seconds, refined):
-        """Until the worker has reached the newest goal, so many seconds at most."""
-        if self.follower is None:
-            finished(self.reading)
+        """Until the worker has reached the newest request, so many seconds at most."""
+        if self.worker is None:
+            run_to_completion(self.reading)
         self.look(bpy.context)
-        self.follower.wait(seconds, refined)
+        self.worker.wait(seconds, refined)
 
     def stop(self):
         self.reading.close()
-        if self.follower is not None:
-            self.follower.stop()
+        if self.worker is not None:
+            self.worker.stop()
 
     def prepare(self):
         """Sets the solver up; on the worker."""
         af, surface = native.library(), self.surface
         use_fit = self.output != "WARP" or self.choice == "FIT"
         use_fit = use_fit or (self.choice == "AUTO" and surface.is_cached)
-        self.samples = surface.samples(Stages(af.Task), SAMPLES, 0, use_fit)
+        self.samples = surface.samples(ProgressTracker(af.Task), SAMPLES, 0, use_fit)
         options = {"bending": self.bending, "handle_weight": self.handle_weight}
         if self.kind == "STYLIZE":
-            options |= STYLE_BUMPS
+            options |= STYLE_OPTIONS
             if self.weights is not None:
                 self.weights = vertex_groups.at_points(surface.vertices, self.weights, self.samples.points)
-        ready = vertex_groups.native_handles(af, self.wanted, surface, self.samples)
-        options["interior"] = bool(ready)  # a style alone acts everywhere alike
-        options |= known(af.LiveOptions, machine_options())
-        self.solver = af.LiveDeformer(self.samples, ready, af.LiveOptions(**options))
+        handles = native_handles(af, self.handles, surface, self.samples)
+        options["interior"] = bool(handles)  # a style alone acts everywhere alike
+        options |= supported_options(af.LiveOptions, machine_options())
+        self.solver = af.LiveDeformer(self.samples, handles, af.LiveOptions(**options))
         self.rest = surface.vertices
         if self.output != "WARP":
-            self.rest, self.topology = surface.extract(Stages(af.Task), self.cells, 0.1)
+            self.rest, self.topology = surface.extract(ProgressTracker(af.Task), self.cells, 0.1)
         self.solver.track(self.rest)
 
-    def moved(self, goal):
-        """(n, 3) vertices in local coordinates for this goal, quickly; on the worker."""
-        self.solve(goal)
+    def moved(self, request):
+        """(n, 3) vertices in local coordinates for this request, quickly; on the worker."""
+        self.solve(request)
         return self.local(self.solver.tracked())
 
-    def solve(self, goal, **further):
-        targets, style = goal
+    def solve(self, request, **further):
+        targets, style = request
         if style is not None and style[0] != self.style_set:
             directions, strength, sharpness = style[1:]
             self.solver.set_style(directions, strength, sharpness, self.weights)
             self.style_set = style[0]
-        self.solver.solve(targets if self.wanted else None, **further)
+        self.solver.solve(targets if self.handles else None, **further)
 
-    def refined(self, goal, interrupt):
+    def refined(self, request, token):
         """Better and better vertices, until the energy falls no more; on the worker."""
         for _ in range(REFINEMENTS):
-            self.solve(goal, steps=STEPS_AT_ONCE, tolerance=FINE)
-            if interrupt.raised:
+            self.solve(request, steps=STEPS_AT_ONCE, tolerance=FINE_TOLERANCE)
+            if token.cancelled:
                 return
             if self.solver.report["steps"] < STEPS_AT_ONCE:
                 break
@@ -137,7 +141,7 @@ class Session:
 
     def local(self, solved):
         if not np.isfinite(solved).all():
-            raise UserError("the shape has left the finite numbers")
+            raise UserError("the shape has vertices that are NaN or infinite; move the handles less far")
         return np.ascontiguousarray(self.surface.space.to_local(solved), dtype=np.float32)
 
     def look(self, context):
@@ -147,28 +151,31 @@ class Session:
         source = self.source.get()
         if layout_of(source, self.kind) != self.layout:
             raise Changed
-        goal = self.goal_now(context, source)
-        if self.goal is None or not same(goal, self.goal):
-            self.goal = goal
-            self.follower.follow(goal)
+        request = self.current_request(context, source)
+        if self.requested is None or not same(request, self.requested):
+            self.requested = request
+            self.worker.request(request)
 
-    def goal_now(self, context, source):
+    def current_request(self, context, source):
         """(targets of the handles, (key, directions, strength, sharpness) of the style or None)."""
-        space, ours = space_of(source.matrix_world, source.name), settings_of(source).stylize
+        space, settings = space_of(source.matrix_world, source.name), settings_of(source).stylize
         targets = []
-        if self.wanted:
-            found = empties.solve_handles(source, space)
-            targets = [h.target[:3, 3] if h.kind == "POINT" else h.target for h in found]
+        if self.handles:
+            current = empties.solve_handles(source, space)
+            targets = [h.target[:3, 3] if h.kind == "POINT" else h.target for h in current]
         if self.kind != "STYLIZE":
             return targets, None
-        style = preference.wanted_style(ours, space)
-        strength, sharpness = plain(ours.strength), plain(ours.sharpness)
+        style = preference.requested_style(settings, space)
+        strength, sharpness = (
+            from_single_precision(settings.strength),
+            from_single_precision(settings.sharpness),
+        )
         directions = style.directions(native.library())
         return targets, ((*style.key(), strength, sharpness), directions, strength, sharpness)
 
     def show(self):
         """Puts the newest shape on the result; True when there was one."""
-        moved, error = self.follower.take() if self.follower is not None else (None, "")
+        moved, error = self.worker.poll() if self.worker is not None else (None, "")
         if error:
             raise UserError(error)
         if moved is None:
@@ -189,23 +196,24 @@ class Session:
             self.show()
 
 
-def uses_handles(ours, kind):
-    return kind == "DEFORM" or ours.stylize.use_handles
+def uses_handles(settings, kind):
+    return kind == "DEFORM" or settings.stylize.use_handles
 
 
 def layout_of(source, kind):
     """What the solver was set up for: the handles and their rest regions, and what is shown."""
-    ours = settings_of(source)
+    settings = settings_of(source)
     held = [(e.empty.session_uid, e.kind, e.group, e.weight, tuple(e.rest)) for e in empties.used(source)]
-    style = ours.stylize.region, ours.stylize.region_material
-    further = (plain(ours.deform.bending), plain(ours.deform.handle_weight), ours.output, ours.surface)
+    style = settings.stylize.region, settings.stylize.region_material
+    weights = settings.deform.bending, settings.deform.handle_weight
+    further = (*map(from_single_precision, weights), settings.output, settings.surface)
     if kind == "STYLIZE":
-        further += (*style, ours.stylize.use_handles)
-    return (held if uses_handles(ours, kind) else [], further)
+        further += (*style, settings.stylize.use_handles)
+    return (held if uses_handles(settings, kind) else [], further)
 
 
 def same(a, b):
-    """Whether two goals ask for the same."""
+    """Whether two requests ask for the same."""
     if (a[1] and a[1][0]) != (b[1] and b[1][0]):
         return False
     return all(np.array_equal(x, y) for x, y in zip(a[0], b[0], strict=True))

@@ -5,6 +5,7 @@ import contextlib
 
 import bpy
 
+from ..blender import timers
 from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..core.errors import UserError
@@ -12,34 +13,47 @@ from ..core.runtime import jobs
 from . import live_object
 from .session import Changed, Session
 
-TICK = 1 / 60  # seconds between looks at the handles
+INTERVAL = 1 / 60  # seconds between looks at the handles
 WAIT = 30.0  # seconds at most that a script waits for the first shape
-_sessions = {}  # session_uid of the source → Session
+
+
+class Sessions(dict):
+    """{session_uid of the source: Session} of all that is live."""
+
+    def clear(self):
+        """Ends every one and takes its result away."""
+        for uid in list(self):
+            session = self.pop(uid)
+            session.stop()
+            with contextlib.suppress(UserError, ReferenceError, AttributeError):
+                live_object.drop(session.source.get())
+
+
+live = Sessions()
 
 
 def is_live(source, kind=None):
-    session = _sessions.get(source.session_uid) if source is not None else None
+    session = live.get(source.session_uid) if source is not None else None
     return session is not None and kind in (None, session.kind)
 
 
 def begin(context, source, kind="DEFORM"):
     """Makes the source live; UserError when that cannot be. The shape appears when the worker has it."""
-    if source.session_uid in _sessions:
-        _sessions.pop(source.session_uid).stop()
+    if source.session_uid in live:
+        live.pop(source.session_uid).stop()
     session = Session(context, source, kind)
     try:
         session.advance()  # a small mesh is read at once
     except UserError:
         live_object.drop(source)
         raise
-    _sessions[source.session_uid] = session
-    if not bpy.app.timers.is_registered(tick):
-        bpy.app.timers.register(tick, persistent=True)
+    live[source.session_uid] = session
+    timers.start(poll_live, persistent=True)
 
 
 def end(context, source, keep=False):
     """Ends live mode: the result goes and the source looks as before; or the result stays (`keep`)."""
-    session = _sessions.pop(source.session_uid, None)
+    session = live.pop(source.session_uid, None)
     if session is not None:
         session.stop()
         session.show_last()
@@ -49,16 +63,15 @@ def end(context, source, keep=False):
     return None
 
 
-def stop_all(*_):
+def stop_all():
     """Ends every worker; what is in the file stays as it is."""
-    for session in _sessions.values():
-        session.stop()
-    _sessions.clear()
+    while live:
+        live.popitem()[1].stop()
 
 
 def update(context, wait=0.0, refined=False):
     """Looks at every live source once, waiting at most so many seconds for the shapes to follow."""
-    for uid, session in list(_sessions.items()):
+    for uid, session in list(live.items()):
         try:
             session.look(context)
             if wait:
@@ -67,10 +80,10 @@ def update(context, wait=0.0, refined=False):
         except Changed:
             restart(context, uid, session)
         except (UserError, ValueError, ReferenceError) as error:
-            _sessions.pop(uid, None)
+            live.pop(uid, None)
             session.stop()
             told = translated("{error}; live mode ended", error=translated(error))
-            jobs.note("ERROR", f"{session.source.name}: {told}")
+            jobs.add_message("ERROR", f"{session.source.name}: {told}")
             with contextlib.suppress(UserError, ReferenceError):
                 live_object.drop(session.source.get())
 
@@ -81,48 +94,21 @@ def restart(context, uid, session):
     try:
         begin(context, source, session.kind)
     except UserError:  # the last handle was removed
-        _sessions.pop(uid, None)
+        live.pop(uid, None)
         live_object.drop(source)
 
 
-def tick():
-    """Blender calls it between redraws; ends when nothing is live."""
-    if not _sessions:
+def poll_live():
+    """Called between redraws; ends when nothing is live."""
+    if not live:
         return None
     update(bpy.context)
-    return TICK
+    return INTERVAL
 
 
-@bpy.app.handlers.persistent
-def before_load(*_):
-    stop_all()
-
-
-@bpy.app.handlers.persistent
-def recover(*_):
-    """After a file is loaded or a step undone: live results that no session moves any more are taken away."""
+def recover():
+    """After a file is loaded or a step undone: takes away live results that no session moves any more."""
     for source in bpy.data.objects:
         if settings_of(source).live_display and not is_live(source):
             with contextlib.suppress(UserError, RuntimeError, AttributeError):
                 live_object.drop(source)
-
-
-HANDLERS = (("load_pre", before_load), ("load_post", recover), ("undo_post", recover), ("redo_post", recover))
-
-
-def register():
-    for name, function in HANDLERS:
-        getattr(bpy.app.handlers, name).append(function)
-
-
-def unregister():
-    for uid in list(_sessions):
-        session = _sessions.pop(uid)
-        session.stop()
-        with contextlib.suppress(UserError, ReferenceError, AttributeError):
-            live_object.drop(session.source.get())
-    if bpy.app.timers.is_registered(tick):
-        bpy.app.timers.unregister(tick)
-    for name, function in HANDLERS:
-        with contextlib.suppress(ValueError):
-            getattr(bpy.app.handlers, name).remove(function)

@@ -3,29 +3,10 @@
 
 import bpy
 
+from ..core.settings.choices import NORMALS, OUTPUTS, PLACEMENTS, SURFACES
 from ..handles.properties import ARAPFIELDS_PG_handle
 from ..names import PROPERTY
-from ..results.placement import TARGETS
 from .settings import ARAPFIELDS_PG_deform, ARAPFIELDS_PG_fit, ARAPFIELDS_PG_stylize
-
-OUTPUTS = (
-    ("WARP", "Original Mesh", "The object's own vertices moved: UVs, materials, groups and topology stay"),
-    (
-        "SURFACE",
-        "Implicit Surface",
-        "A new mesh of the fitted surface, moved along: even triangles, no seams",
-    ),
-    (
-        "REMESH",
-        "Remeshed Surface",
-        "A new mesh of the moved surface: even triangles also where the shape is stretched; takes longer",
-    ),
-)
-SURFACES = (
-    ("AUTO", "Best at Hand", "The fitted surface where it is up to date, else the mesh's own triangles"),
-    ("FIT", "Fitted", "The fitted surface; it is fitted first where it is out of date"),
-    ("MESH", "Mesh", "The mesh's own triangles; no fit is needed"),
-)
 
 
 def output(**extra):
@@ -41,7 +22,9 @@ def surface(**extra):
 
 
 def target(**extra):
-    return bpy.props.EnumProperty(items=TARGETS, name="Result", description="Where the result goes", **extra)
+    return bpy.props.EnumProperty(
+        items=PLACEMENTS, name="Result", description="Where the result goes", **extra
+    )
 
 
 def resolution(**extra):
@@ -53,12 +36,6 @@ def resolution(**extra):
         max=512,
         **extra,
     )
-
-
-NORMALS = (
-    ("SMOOTH", "Smooth", "Shaded as one smooth surface"),
-    ("FLAT", "Flat", "Every triangle shaded for itself"),
-)
 
 
 class ARAPFIELDS_PG_result(bpy.types.PropertyGroup):
@@ -120,11 +97,12 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
 CLASSES = [ARAPFIELDS_PG_result, ARAPFIELDS_PG_object]
 
 
-def register():
+def attach():
     setattr(
         bpy.types.Object, PROPERTY, bpy.props.PointerProperty(type=ARAPFIELDS_PG_object, name="ARAP Fields")
     )
 
 
-def unregister():
-    delattr(bpy.types.Object, PROPERTY)
+def detach():
+    if hasattr(bpy.types.Object, PROPERTY):
+        delattr(bpy.types.Object, PROPERTY)

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..blender.settings import annotations
+from ..blender.property_definitions import annotations
 from ..core.settings.fitting import FIT, QUALITIES
 from ..core.settings.parameters import DEFORM
 from ..core.settings.styles import CUSTOM, STYLES, STYLIZE, style_identifier

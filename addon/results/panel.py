@@ -10,12 +10,12 @@ class ARAPFIELDS_PT_result(Section, bpy.types.Panel):
     bl_idname = "ARAPFIELDS_PT_result"
     bl_order = 5
 
-    def fill(self, context, source, ours):
+    def fill(self, context, source, settings):
         layout = self.layout
-        layout.prop(ours, "resolution")
-        layout.prop(ours, "normals")
+        layout.prop(settings, "resolution")
+        layout.prop(settings, "normals")
         layout.operator(Op.EXTRACT, icon="OUTLINER_OB_SURFACE")
-        for entry in ours.results:
+        for entry in settings.results:
             if entry.item is not None:
                 row = layout.row()
                 row.prop(entry.item, "name", text="", icon="OBJECT_DATA")

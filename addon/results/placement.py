@@ -12,18 +12,12 @@ from ..handles import empties
 from ..names import REPORT
 from . import result_objects
 
-TARGETS = (
-    ("NEW", "New Object", "An object of its own beside the source; a later run updates it"),
-    ("REPLACE", "Replace Mesh", "The source itself moves; its handles' poses become their rest poses"),
-    ("KEY", "Shape Key", "One more shape key of the source, which can be blended and animated"),
-)
 
-
-def deliver(context, source, kind, output, target, moved, before):
+def place_result(context, source, kind, output, target, moved, before):
     """Puts `moved` (vertices, topology, report) where `target` says; `before` are the vertices as shown."""
     if target == "NEW":
         return new_object(context, source, kind, output, moved, before)
-    refuse(source, output, target, before)
+    require_placeable(source, output, target, before)
     if moved.topology is not None:
         mesh = result_objects.surface_mesh(source, moved.vertices, moved.topology)
         old, source.data = source.data, mesh
@@ -55,7 +49,7 @@ def new_object(context, source, kind, output, moved, before):
     return item
 
 
-def refuse(source, output, target, before):
+def require_placeable(source, output, target, before):
     """UserError where the source itself cannot take the result."""
     if source.library is not None or source.data.library is not None:
         raise UserError(

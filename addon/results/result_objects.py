@@ -17,9 +17,9 @@ def collection(context):
     for child in context.scene.collection.children:
         if child.name.split(".")[0] == RESULTS and child.library is None:
             return child
-    made = bpy.data.collections.new(RESULTS)
-    context.scene.collection.children.link(made)
-    return made
+    home = bpy.data.collections.new(RESULTS)
+    context.scene.collection.children.link(home)
+    return home
 
 
 def discard(item):

@@ -5,18 +5,18 @@ from ..blender import vertex_groups
 from ..blender.language import translated
 from ..blender.object_references import refusal, settings_of, source_of
 from ..blender.presets import preset_classes
-from ..blender.settings import annotations, in_force, machine_options
+from ..blender.property_definitions import annotations, effective_values
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
-from ..core.settings.parameters import native_options
 from ..core.settings.styles import STYLIZE
-from ..deform.solve_job import plan_move
+from ..deform.solve_job import plan_solve_job
 from ..handles import empties
+from ..handles.native_handles import native_handles
 from ..jobs.job_operator import JobOperator
 from ..names import Op
 from ..properties.item import output, resolution, surface, target
 from ..properties.settings import frame, style
-from ..surface.source_surface import known
+from ..surface.source_surface import build_options
 from . import preference
 
 
@@ -43,16 +43,16 @@ class ARAPFIELDS_OT_stylize(JobOperator, bpy.types.Operator):
 
     def plan(self, context, source, of_groups):
         context.view_layer.update()
-        ours = settings_of(source).stylize
-        values = in_force(STYLIZE, ours, self)
+        settings = settings_of(source).stylize
+        values = effective_values(STYLIZE, settings, self)
         af = native.library()
-        options = af.StylizeOptions(**native_options(values), **known(af.StylizeOptions, machine_options()))
+        options = build_options(af.StylizeOptions, values)
         space = space_of(source.matrix_world, source.name)
-        style = preference.wanted_style(ours, space, self)
-        wanted = empties.solve_handles(source, space, of_groups) if ours.use_handles else []
-        weights = preference.region_weights(context, source, ours, of_groups)
+        style = preference.requested_style(settings, space, self)
+        handles = empties.solve_handles(source, space, of_groups) if settings.use_handles else []
+        weights = preference.region_weights(context, source, settings, of_groups)
 
-        def solve(stages, rest, samples):
+        def solve(tracker, rest, samples):
             blend = (
                 None if weights is None else vertex_groups.at_points(rest.vertices, weights, samples.points)
             )
@@ -60,12 +60,12 @@ class ARAPFIELDS_OT_stylize(JobOperator, bpy.types.Operator):
                 samples,
                 style.directions(af),
                 options,
-                stages.start("Stylizing", 0.5),
+                tracker.start("Stylizing", 0.5),
                 weights=blend,
-                handles=vertex_groups.native_handles(af, wanted, rest, samples),
+                handles=native_handles(af, handles, rest, samples),
             )
 
-        return plan_move(context, self, source, "STYLIZE", values["samples"], values["seed"], solve)
+        return plan_solve_job(context, self, source, "STYLIZE", values["samples"], values["seed"], solve)
 
 
 class ARAPFIELDS_OT_set_style(bpy.types.Operator):

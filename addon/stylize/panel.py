@@ -32,8 +32,8 @@ class ARAPFIELDS_PT_stylize(Section, bpy.types.Panel):
     def draw_header_preset(self, context):
         presets(self.layout, "stylize")
 
-    def fill(self, context, source, ours):
-        layout, style = self.layout, ours.stylize
+    def fill(self, context, source, settings):
+        layout, style = self.layout, settings.stylize
         label = next(label for identifier, label, _ in STYLE_ITEMS if identifier == style.style)
         if icon(style.style):
             row = layout.row()
@@ -50,8 +50,8 @@ class ARAPFIELDS_PT_stylize(Section, bpy.types.Panel):
         layout.prop(style, "region_material")
         layout.prop(style, "use_handles")
         settings_column(layout, style, STYLIZE)
-        layout.prop(ours, "output")
-        layout.prop(ours, "target")
+        layout.prop(settings, "output")
+        layout.prop(settings, "target")
         job_button(layout, Op.STYLIZE, "MOD_EDGESPLIT")
         live_buttons(layout, source, "STYLIZE")
 

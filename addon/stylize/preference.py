@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..blender import mesh_arrays
-from ..blender.settings import chosen
+from ..blender.property_definitions import effective_value
 from ..core.errors import UserError
 from ..core.geometry.spaces import pose
 from ..core.settings.styles import CUSTOM, style_name
@@ -34,22 +34,22 @@ class Style:
         return normals, self.turn.tobytes()
 
 
-def wanted_style(ours, space, operator=None):
+def requested_style(settings, space, operator=None):
     """The style of an object's settings (and the operator's arguments, where given)."""
 
     def setting(name):
-        return chosen(name, ours, operator) if operator is not None else getattr(ours, name)
+        return effective_value(name, settings, operator) if operator is not None else getattr(settings, name)
 
     which = setting("style")
     to_solve = pose(space.world_to_solve)[:3, :3]
     if which in CUSTOM:
-        item = ours.style_object
+        item = settings.style_object
         if item is None:
             raise UserError("choose the object that gives the style its normals")
         return custom(which, item, to_solve)
     if setting("frame") == "OBJECT":
         return Style(style_name(which), np.eye(3))
-    return Style(style_name(which), to_solve @ axes(setting("frame"), ours.frame_object))
+    return Style(style_name(which), to_solve @ axes(setting("frame"), settings.frame_object))
 
 
 def axes(which, item):
@@ -69,31 +69,31 @@ def custom(which, item, to_solve):
     normals = np.empty(3 * len(item.data.polygons), dtype=np.float32)
     item.data.polygons.foreach_get("normal", normals)
     across = np.linalg.inv(matrix_of(item)[:3, :3]).T  # normals transform by the inverse transpose
-    found = normals.reshape(-1, 3).astype(np.float64) @ across.T
-    found = found[np.linalg.norm(found, axis=1) > 0]
-    found = np.unique(np.round(found / np.linalg.norm(found, axis=1, keepdims=True), 3), axis=0)
-    if not 0 < len(found) <= MOST_NORMALS:
+    turned = normals.reshape(-1, 3).astype(np.float64) @ across.T
+    turned = turned[np.linalg.norm(turned, axis=1) > 0]
+    turned = np.unique(np.round(turned / np.linalg.norm(turned, axis=1, keepdims=True), 3), axis=0)
+    if not 0 < len(turned) <= MOST_NORMALS:
         raise UserError(
             "{name} has {count} different face normals; from 1 to {most} make a style",
             name=item.name,
-            count=len(found),
+            count=len(turned),
             most=MOST_NORMALS,
         )
-    return Style(found / np.linalg.norm(found, axis=1, keepdims=True), to_solve)
+    return Style(turned / np.linalg.norm(turned, axis=1, keepdims=True), to_solve)
 
 
-def group_names(source, ours):
+def group_names(source, settings):
     """The vertex groups that a stylization asks for."""
-    held = empties.group_names(source) if ours.use_handles else []
-    return [*held, ours.region] if ours.region else held
+    held = empties.group_names(source) if settings.use_handles else []
+    return [*held, settings.region] if settings.region else held
 
 
-def region_weights(context, source, ours, of_groups):
+def region_weights(context, source, settings, of_groups):
     """(n,) weights of the shown vertices: vertex group (one of those by name) times material; None for
     everywhere."""
-    weights = of_groups[ours.region] if ours.region else None
-    if ours.region_material is not None:
-        held = material_weights(context, source, ours.region_material)
+    weights = of_groups[settings.region] if settings.region else None
+    if settings.region_material is not None:
+        held = material_weights(context, source, settings.region_material)
         weights = held if weights is None else weights * held
     if weights is not None and not weights.any():
         raise UserError("the region of {name} holds no vertex", name=source.name)

@@ -6,7 +6,8 @@ import bpy
 from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..blender.presets import preset_classes
-from ..blender.settings import annotations, chosen, fit_cache
+from ..blender.property_definitions import annotations, effective_value
+from ..blender.user_preferences import fit_cache
 from ..core.runtime.jobs import Item
 from ..core.settings.fitting import FIT
 from ..jobs.job_operator import JobOperator, busy
@@ -38,15 +39,15 @@ class ARAPFIELDS_OT_fit(JobOperator, bpy.types.Operator):
         surface = read_surface(context, source, self)
         again = self.again
 
-        def work(stages):
-            return surface.fit(stages, 1.0, again)
+        def work(tracker):
+            return surface.fit(tracker, 1.0, again)
 
         def apply(sdf):
-            source = surface.who.get()
-            staleness.fitted(source, surface)
-            ours = settings_of(source)
-            ours.fit_key = surface.key
-            ours.fit_report = json.dumps(sdf.report)
+            source = surface.reference.get()
+            staleness.mark_fitted(source, surface)
+            settings = settings_of(source)
+            settings.fit_key = surface.key
+            settings.fit_report = json.dumps(sdf.report)
             return translated("surface fitted")
 
         return Item(source.name, work, apply)
@@ -64,19 +65,19 @@ class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):
 
     def plan(self, context, source, _):
         surface = read_surface(context, source)
-        cells = chosen("resolution", settings_of(source), self)
+        cells = effective_value("resolution", settings_of(source), self)
 
-        def work(stages):
-            vertices, topology = surface.extract(stages, cells, 0.8)
+        def work(tracker):
+            vertices, topology = surface.extract(tracker, cells, 0.8)
             return surface.space.to_local(vertices), topology
 
-        def apply(made):
-            owner = surface.who.get()
-            report = {"resolution": cells, "vertices": len(made[0]), "triangles": len(made[1])}
+        def apply(mesh):
+            owner = surface.reference.get()
+            report = {"resolution": cells, "vertices": len(mesh[0]), "triangles": len(mesh[1])}
             item = result_objects.show(
-                bpy.context, owner, "EXTRACT", "SURFACE", result_objects.surface_mesh(owner, *made), report
+                bpy.context, owner, "EXTRACT", "SURFACE", result_objects.surface_mesh(owner, *mesh), report
             )
-            return translated("{name} with {count} triangles", name=item.name, count=f"{len(made[1]):,}")
+            return translated("{name} with {count} triangles", name=item.name, count=f"{len(mesh[1]):,}")
 
         return Item(source.name, work, apply)
 

@@ -6,7 +6,7 @@ import bpy
 from ..blender import object_references
 from ..blender.language import translated
 from ..blender.section import Section, job_button, presets, settings_column, wrapped
-from ..blender.settings import fit_cache
+from ..blender.user_preferences import fit_cache
 from ..core.runtime import jobs, native
 from ..core.settings.fitting import FIT
 from ..jobs.panel import draw_progress
@@ -24,7 +24,7 @@ class ARAPFIELDS_PT_source(Section, bpy.types.Panel):
     def poll(cls, context):
         return True
 
-    def fill(self, context, source, ours):
+    def fill(self, context, source, settings):
         layout = self.layout
         if native.problem():
             wrapped(layout, translated(native.problem()), icon="ERROR")
@@ -63,21 +63,21 @@ class ARAPFIELDS_PT_surface(Section, bpy.types.Panel):
     def draw_header_preset(self, context):
         presets(self.layout, "fit")
 
-    def fill(self, context, source, ours):
+    def fill(self, context, source, settings):
         layout = self.layout
-        layout.prop(ours.fit, "quality")
-        settings_column(layout, ours.fit, FIT)
+        layout.prop(settings.fit, "quality")
+        settings_column(layout, settings.fit, FIT)
         job_button(layout, Op.FIT, "MOD_REMESH")
-        if not ours.fit_key:
+        if not settings.fit_key:
             layout.label(text="Not fitted yet", icon="INFO")
             return
-        kept = fit_cache().path(ours.fit_key).exists()
+        kept = fit_cache().path(settings.fit_key).exists()
         stale = staleness.reason(source)
         layout.label(
             text=(stale or "Fit in the cache") if kept else "Fit was cleared",
             icon="CHECKMARK" if kept and not stale else "ERROR",
         )
-        for name, value in json.loads(ours.fit_report or "{}").items():
+        for name, value in json.loads(settings.fit_report or "{}").items():
             if isinstance(value, float) and "error" in name:
                 layout.label(text=f"{name.replace('_', ' ')}: {value:.3g}")
 

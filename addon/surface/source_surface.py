@@ -6,10 +6,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ..blender import mesh_arrays, settings
-from ..blender.object_references import ObjectId, settings_of
+from ..blender import mesh_arrays, property_definitions, user_preferences
+from ..blender.object_references import ObjectReference, settings_of
 from ..core.errors import UserError
-from ..core.geometry.edges import connected
+from ..core.geometry.edges import build_edges
 from ..core.geometry.spaces import Space, space_of
 from ..core.runtime import native
 from ..core.runtime.fit_cache import FitCache, fit_key
@@ -20,10 +20,10 @@ VERSION = 1  # raised whenever fits of older versions must not be used
 
 
 @dataclass
-class Surface:
+class SourceSurface:
     """A source in solve space, with what its fit needs."""
 
-    who: ObjectId
+    reference: ObjectReference
     space: Space
     local: np.ndarray  # (n, 3) vertices as shown
     vertices: np.ndarray  # (n, 3) the same in solve space
@@ -42,60 +42,67 @@ class Surface:
     def is_cached(self):
         return self.cache.path(self.key).exists()
 
-    def fit(self, stages, share, again=False):
+    def fit(self, tracker, weight, again=False):
         """The fitted surface, from the cache unless it shall be made `again`; runs on the worker."""
         if self._sdf is None:
-            self._sdf = self._fitted(stages, share, again)
+            self._sdf = self._fitted(tracker, weight, again)
         return self._sdf
 
-    def _fitted(self, stages, share, again):
+    def _fitted(self, tracker, weight, again):
         af = native.library()
-        ready = None if again else self.cache.load(self.key, af.NeuralSdf.load)
-        if ready is not None:
-            return ready
-        options = af.FitOptions(**self.fit_options, **known(af.FitOptions, self.machine))
-        sdf = af.fit_sdf(self.vertices, self.triangles, options, stages.start("Fitting", share))
+        cached = None if again else self.cache.load(self.key, af.NeuralSdf.load)
+        if cached is not None:
+            return cached
+        options = af.FitOptions(**self.fit_options, **supported_options(af.FitOptions, self.machine))
+        sdf = af.fit_sdf(self.vertices, self.triangles, options, tracker.start("Fitting", weight))
         self.cache.save(self.key, sdf.save)
         return sdf
 
-    def samples(self, stages, count, seed, use_fit):
+    def samples(self, tracker, count, seed, use_fit):
         """Points spread evenly over the surface: the fit's when there is one, else the triangles'."""
         af = native.library()
         if use_fit:
-            sdf = self.fit(stages, 0.3)
-            return af.sample_surface(sdf, count=count, seed=seed, task=stages.start("Sampling", 0.1))
+            sdf = self.fit(tracker, 0.3)
+            return af.sample_surface(sdf, count=count, seed=seed, task=tracker.start("Sampling", 0.1))
         return af.sample_mesh(self.vertices, self.triangles, count=count, seed=seed)
 
-    def extract(self, stages, resolution, share):
+    def extract(self, tracker, resolution, weight):
         """(k, 3) vertices and the topology of the implicit surface, in solve space."""
         af = native.library()
-        sdf = self.fit(stages, share)
-        return whole(*af.extract_surface(sdf, resolution=resolution, task=stages.start("Extracting", 0.2)))
+        sdf = self.fit(tracker, weight)
+        task = tracker.start("Extracting", 0.2)
+        return checked_mesh(*af.extract_surface(sdf, resolution=resolution, task=task))
 
-    def extract_moved(self, stages, field, resolution, share):
+    def extract_moved(self, tracker, field, resolution, weight):
         """The same of the surface where the field moves it, by marching cubes there; and a report."""
-        sdf, report = self.fit(stages, 0.0), {}
-        task = stages.start("Extracting", share)
-        made = native.library().extract_deformed(sdf, field, resolution, task=task, report=report)
-        return *whole(*made), {name: report[name] for name in ("inverted", "failures")}
+        sdf, report = self.fit(tracker, 0.0), {}
+        task = tracker.start("Extracting", weight)
+        mesh = native.library().extract_deformed(sdf, field, resolution, task=task, report=report)
+        return *checked_mesh(*mesh), {name: report[name] for name in ("inverted", "failures")}
 
 
-def whole(vertices, corners):
+def checked_mesh(vertices, corners):
     if not len(corners):
         raise UserError("the fitted surface is empty; fit with more quality")
-    return vertices, connected(corners)
+    return vertices, build_edges(corners)
 
 
-def known(options, values):
+def supported_options(options, values):
     """The values that this class of native options has a field for."""
     return {name: value for name, value in values.items() if name in options.fields}
 
 
+def build_options(options, values):
+    """Native options of this class: the settings' values, and those that depend on the machine."""
+    machine = supported_options(options, user_preferences.machine_options())
+    return options(**native_options(values), **machine)
+
+
 def fit_values(group, operator):
-    """The fit's settings in force; an operator's `quality` counts before single settings of the object."""
+    """The fit's settings that count; an operator's `quality` counts before single settings of the object."""
     if operator is None:
-        return {p.name: settings.plain(getattr(group, p.name)) for p in FIT}
-    values = settings.in_force(FIT, group, operator)
+        return {p.name: property_definitions.from_single_precision(getattr(group, p.name)) for p in FIT}
+    values = property_definitions.effective_values(FIT, group, operator)
     if operator.properties.is_property_set("quality"):
         preset = QUALITIES[operator.quality][2]
         values |= {n: v for n, v in preset.items() if not operator.properties.is_property_set(n)}
@@ -109,13 +116,13 @@ def read_surface(context, source, operator=None):
     space = space_of(source.matrix_world, source.name)
     vertices = space.to_solve(mesh.vertices)
     options = native_options(fit_values(settings_of(source).fit, operator))
-    return Surface(
-        who=ObjectId(source),
+    return SourceSurface(
+        reference=ObjectReference(source),
         space=space,
         local=mesh.vertices,
         vertices=vertices,
         triangles=mesh.triangles,
         fit_options=options,
-        cache=settings.fit_cache(),
-        machine=settings.machine_options(),
+        cache=user_preferences.fit_cache(),
+        machine=user_preferences.machine_options(),
     )

@@ -6,10 +6,9 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
-from ..blender import settings
+from ..blender import user_preferences
 from ..blender.object_references import settings_of, source_of
 from ..handles import empties
-from .drawing import ViewportDrawing
 
 CORNERS = np.array([(x, y, z, 1.0) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 EDGES = [(a, b) for a in range(8) for b in range(a) if (CORNERS[a] != CORNERS[b]).sum() == 1]
@@ -24,22 +23,22 @@ def box_lines(matrix):
 
 def segments(source):
     """((r, g, b, alpha), line ends in world space) of all handles of a source."""
-    found = []
+    lines = []
     for entry in settings_of(source).handles:
         if entry.empty is None or not entry.empty.visible_get():
             continue
-        rest, now = empties.rest_box(source, entry), empties.box_now(entry.empty)
-        found.append(((*entry.colour, REST_ALPHA), box_lines(rest)))
+        rest, now = empties.rest_box(source, entry), empties.current_box(entry.empty)
+        lines.append(((*entry.colour, REST_ALPHA), box_lines(rest)))
         if not np.allclose(rest, now, atol=1e-6):
-            found.append(((*entry.colour, NOW_ALPHA), box_lines(now)))
-            found.append(((*entry.colour, NOW_ALPHA), [rest[:3, 3].tolist(), now[:3, 3].tolist()]))
-    return found
+            lines.append(((*entry.colour, NOW_ALPHA), box_lines(now)))
+            lines.append(((*entry.colour, NOW_ALPHA), [rest[:3, 3].tolist(), now[:3, 3].tolist()]))
+    return lines
 
 
 def draw():
     context = bpy.context
     source = source_of(context)
-    if source is None or not context.space_data.overlay.show_overlays or not settings.show_boxes():
+    if source is None or not context.space_data.overlay.show_overlays or not user_preferences.show_boxes():
         return
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     gpu.state.blend_set("ALPHA")
@@ -50,7 +49,3 @@ def draw():
         shader.uniform_float("color", shade)
         batch_for_shader(shader, "LINES", {"pos": ends}).draw(shader)
     gpu.state.blend_set("NONE")
-
-
-_drawing = ViewportDrawing(draw)
-register, unregister = _drawing.register, _drawing.unregister

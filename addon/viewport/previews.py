@@ -3,51 +3,56 @@
 
 import numpy as np
 
-from ..core.geometry.clustering import coarsened, vertex_normals
-from .drawing import ViewportDrawing
+from ..core.geometry.clustering import cluster_vertices, vertex_normals
 
 COLOUR = np.array([0.98, 0.60, 0.22], dtype=np.float32)
 LIGHT = np.array([0.3, -0.5, 0.81], dtype=np.float32)
 AMBIENT = 0.35
-_shown = None  # (points in world space, normals, triangles)
-_batch = None
+
+
+class Shown:
+    """The one mesh that is drawn: `mesh` is (points in world space, normals, triangles), or None."""
+
+    def __init__(self):
+        self.mesh = self.batch = None
+
+    def set(self, mesh):
+        self.mesh, self.batch = mesh, None
+
+    def clear(self):
+        self.set(None)
+
+
+shown = Shown()
 
 
 class Preview:
-    """A coarse mesh of the source in solve space; where it goes is what is drawn."""
+    """A coarse mesh of the source in solve space; what is drawn is where its points go."""
 
     def __init__(self, surface):
-        self._surface, self._coarse = surface, None
+        self._surface, self._clustered = surface, None
 
     @property
     def points(self):
-        """(k, 3) points to watch; the worker asks, so that a large mesh does not hold the window."""
-        if self._coarse is None:
-            self._coarse = coarsened(self._surface.vertices, self._surface.triangles)
-        return self._coarse.vertices
+        """(k, 3) points at rest; the worker asks for them, as a large mesh takes a while."""
+        if self._clustered is None:
+            self._clustered = cluster_vertices(self._surface.vertices, self._surface.triangles)
+        return self._clustered.vertices
 
     def show(self, points):
-        global _shown, _batch
         world = self._surface.space.solve_to_world
         placed = (points.astype(np.float64) @ world[:3, :3].T + world[:3, 3]).astype(np.float32)
-        _shown = placed, vertex_normals(placed, self._coarse.triangles), self._coarse.triangles
-        _batch = None
+        triangles = self._clustered.triangles
+        shown.set((placed, vertex_normals(placed, triangles), triangles))
+
+    def clear(self):
+        shown.clear()
 
 
-def is_shown():
-    return _shown is not None
-
-
-def clear():
-    global _shown, _batch
-    _shown = _batch = None
-
-
-def made_batch():
+def batch_of(points, normals, triangles):
     """The vertices with their shades, for the graphics card."""
     import gpu
 
-    points, normals, triangles = _shown
     shade = AMBIENT + (1 - AMBIENT) * np.abs(normals @ LIGHT)
     colours = np.concatenate([COLOUR * shade[:, None], np.ones((len(shade), 1), np.float32)], axis=1)
     layout = gpu.types.GPUVertFormat()
@@ -61,24 +66,14 @@ def made_batch():
 
 
 def draw():
-    global _batch
     import gpu
 
-    if _shown is None:
+    if shown.mesh is None:
         return
-    if _batch is None:
-        _batch = made_batch()
+    if shown.batch is None:
+        shown.batch = batch_of(*shown.mesh)
     gpu.state.depth_test_set("LESS_EQUAL")
     gpu.state.depth_mask_set(True)
-    _batch.draw(gpu.shader.from_builtin("SMOOTH_COLOR"))
+    shown.batch.draw(gpu.shader.from_builtin("SMOOTH_COLOR"))
     gpu.state.depth_mask_set(False)
     gpu.state.depth_test_set("NONE")
-
-
-_drawing = ViewportDrawing(draw)
-register = _drawing.register
-
-
-def unregister():
-    clear()
-    _drawing.unregister()

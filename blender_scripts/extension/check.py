@@ -5,6 +5,9 @@ import io
 import re
 import tomllib
 import zipfile
+from pathlib import Path
+
+from . import dependencies
 
 LIMIT = 200e6
 PLATFORM_TAGS = {"linux-x64": r"(many)?linux.*_x86_64"}
@@ -34,7 +37,11 @@ def check_zip(path, pythons):
         if not set(wheels) <= names:
             raise RuntimeError(f"{path.name} lacks {', '.join(sorted(set(wheels) - names))}")
         check_platforms(manifest, wheels)
-        for wheel in wheels:
+        for name in dependencies.SHIPPED:
+            if not any(Path(wheel).name.startswith(f"{name}-") for wheel in wheels):
+                raise RuntimeError(f"{path.name} lacks the wheel of {name}")
+        ours = [wheel for wheel in wheels if Path(wheel).name.startswith("arapfields-")]
+        for wheel in ours:
             with zipfile.ZipFile(io.BytesIO(archive.read(wheel))) as content:
                 check_wheel(wheel, content.namelist(), pythons)
 

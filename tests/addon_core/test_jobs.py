@@ -8,7 +8,7 @@ import pytest
 
 from addon.core.errors import UserError
 from addon.core.runtime import jobs
-from addon.core.runtime.progress import Stages
+from addon.core.runtime.progress import ProgressTracker
 
 PATIENCE = 10.0  # seconds after which a job that should have ended counts as hung
 
@@ -27,8 +27,8 @@ class Cancelled(RuntimeError):
     """As the native library raises it."""
 
 
-def wait_for_cancel(stages):
-    task = stages.start("Waiting", 1.0)
+def wait_for_cancel(tracker):
+    task = tracker.start("Waiting", 1.0)
     while not task.cancelled:
         time.sleep(0.001)
     raise Cancelled
@@ -43,7 +43,7 @@ def run(*works):
 
 
 def test_every_item_has_its_outcome_though_one_fails():
-    def fail(stages):
+    def fail(tracker):
         raise UserError("no faces")
 
     outcomes = run(lambda s: 1, fail, lambda s: 3).take_outcomes()
@@ -61,7 +61,7 @@ def test_every_item_has_its_outcome_though_one_fails():
     ],
 )
 def test_errors_become_texts(error, text):
-    def work(stages):
+    def work(tracker):
         raise error
 
     (outcome,) = run(work).take_outcomes()
@@ -76,9 +76,9 @@ def test_outcomes_are_handed_over_once():
 def test_cancel_reaches_the_running_item_and_those_that_wait():
     started = threading.Event()
 
-    def first(stages):
+    def first(tracker):
         started.set()
-        wait_for_cancel(stages)
+        wait_for_cancel(tracker)
 
     items = [jobs.Item("first", first), jobs.Item("second", lambda s: s.start("Work", 1.0))]
     job = jobs.Job("Test", items, FakeTask)
@@ -93,9 +93,9 @@ def test_progress_never_falls_and_ends_at_one():
     seen = []
     job = None
 
-    def work(stages):
+    def work(tracker):
         for share in (0.25, 0.75):
-            task = stages.start("Part", share)
+            task = tracker.start("Part", share)
             for step in range(5):
                 task.progress = step / 4
                 seen.append(job.fraction)
@@ -132,6 +132,6 @@ def test_a_job_that_never_started_can_be_stopped():
     ],
 )
 def test_a_message_names_its_verb_once(native, shown):
-    made = Stages(FakeTask)
-    made.start("Deforming", 1.0).message = native
-    assert made.message == shown
+    tracker = ProgressTracker(FakeTask)
+    tracker.start("Deforming", 1.0).message = native
+    assert tracker.message == shown

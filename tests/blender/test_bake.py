@@ -45,6 +45,7 @@ def test_a_cancelled_bake_leaves_nothing():
 
     import addon.animation.operators as bake
     from addon.core.runtime import jobs
+    from addon.core.runtime.coroutines import Pause
 
     bar = animated()
 
@@ -56,20 +57,20 @@ def test_a_cancelled_bake_leaves_nothing():
 
     class Operator:
         title, start, end, step = "Bake", 1, 5, 1
-        has_window = False
-        course, prepare = bake.ARAPFIELDS_OT_bake.course, bake.ARAPFIELDS_OT_bake.prepare
+        in_window = False
+        coroutine, prepare = bake.ARAPFIELDS_OT_bake.coroutine, bake.ARAPFIELDS_OT_bake.prepare
         read = bake.ARAPFIELDS_OT_bake.read
         conclude, apply_one = bake.JobOperator.conclude, bake.JobOperator.apply_one
 
-        def note(self, level, text):
+        def add_message(self, level, text):
             self.said = text
 
     for stage in ("Reading frame 3", "frame 2", "Storing frame 3"):
         operator = Operator()
-        course, result = operator.course(bpy.context), None
+        coroutine, result = operator.coroutine(bpy.context), None
         while result is None:
             try:
-                if next(course):
+                if next(coroutine) is Pause.WORKER:
                     jobs.running().join(0.001)
             except StopIteration as ended:
                 result = ended.value

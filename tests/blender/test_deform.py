@@ -187,5 +187,5 @@ def test_several_objects_in_one_call_and_one_that_fails():
     assert "Bare_deformed" not in bpy.data.objects
     from addon.core.runtime import jobs
 
-    assert [level for level, _ in jobs.notes()] == ["INFO", "INFO", "WARNING"]
-    assert "Bare has no handle" in jobs.notes()[-1][1]
+    assert [level for level, _ in jobs.messages()] == ["INFO", "INFO", "WARNING"]
+    assert "Bare has no handle" in jobs.messages()[-1][1]

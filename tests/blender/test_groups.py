@@ -12,7 +12,7 @@ def test_weights_of_groups_are_read_in_slices():
 
     from addon.blender import vertex_groups
     from addon.core.errors import UserError
-    from addon.core.runtime.coroutines import finished
+    from addon.core.runtime.coroutines import run_to_completion
 
     bar = scenes.decorate(scenes.bar())
     other = bar.vertex_groups.new(name="Other")
@@ -20,16 +20,16 @@ def test_weights_of_groups_are_read_in_slices():
     expected = np.array([sum(g.weight for g in v.groups if g.group == 0) for v in bar.data.vertices])
     vertex_groups.BLOCK, block = 50, vertex_groups.BLOCK
     try:
-        course = vertex_groups.read_weights(bpy.context, bar, ["Other", "Group"])
-        slices = sum(1 for _ in course)
+        coroutine = vertex_groups.read_weights(bpy.context, bar, ["Other", "Group"])
+        slices = sum(1 for _ in coroutine)
         assert slices == -(-len(bar.data.vertices) // 50)
-        found = finished(vertex_groups.read_weights(bpy.context, bar, ["Other", "Group"]))
+        found = run_to_completion(vertex_groups.read_weights(bpy.context, bar, ["Other", "Group"]))
         assert np.array_equal(found["Group"], expected) and found["Other"].sum() == 0.5
-        course = vertex_groups.read_weights(bpy.context, bar, ["Group"])
-        next(course)
+        coroutine = vertex_groups.read_weights(bpy.context, bar, ["Group"])
+        next(coroutine)
         bar.data.clear_geometry()
         try:
-            finished(course)
+            run_to_completion(coroutine)
         except UserError as error:
             assert "changed while" in str(error)
         else:
@@ -40,7 +40,7 @@ def test_weights_of_groups_are_read_in_slices():
     bar.modifiers.new("Subdivision", "SUBSURF")
     bpy.context.view_layer.update()
     meshes = set(bpy.data.meshes.keys())
-    found = finished(vertex_groups.read_weights(bpy.context, bar, ["Group"]))["Group"]
+    found = run_to_completion(vertex_groups.read_weights(bpy.context, bar, ["Group"]))["Group"]
     assert len(found) == len(scenes.world_points(bar)) and 0 < found.max() <= 1
     assert set(bpy.data.meshes.keys()) == meshes
 
@@ -62,13 +62,13 @@ def test_a_window_counts_large_meshes_aside():
     assert min(at_once) > 0
     for entry in entries:
         entry.inside = -1
-    counts._courses[bar.session_uid] = counts.counting(bpy.context, bar)
-    while counts.tick() is not None:
+    counts.pending[bar.session_uid] = counts.counting(bpy.context, bar)
+    while counts.poll_counts() is not None:
         time.sleep(0.005)
     assert [entry.inside for entry in entries] == at_once
-    course = counts.counting(bpy.context, bar)
-    next(course)
+    coroutine = counts.counting(bpy.context, bar)
+    next(coroutine)
     bpy.data.objects.remove(fixed)  # between a count and its end
-    counts._courses[bar.session_uid] = course
-    while counts.tick() is not None:
+    counts.pending[bar.session_uid] = coroutine
+    while counts.poll_counts() is not None:
         time.sleep(0.005)

@@ -185,7 +185,7 @@ def test_a_mirrored_handle_moves_as_the_mirror_image():
     assert two.empty.name == "Arm.R" and tuple(two.colour) != tuple(one.colour)
     flip = np.diag([-1.0, 1, 1, 1])
     to_local = np.linalg.inv(np.array(bar.matrix_world))
-    for box in (empties.rest_box, lambda source, entry: empties.box_now(entry.empty)):
+    for box in (empties.rest_box, lambda source, entry: empties.current_box(entry.empty)):
         expected = flip @ to_local @ box(bar, one) @ flip
         assert np.allclose(to_local @ box(bar, two), expected, atol=1e-5)
     bpy.ops.arapfields.mirror_handle(axis="X")

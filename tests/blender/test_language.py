@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every text that a user may read is in the catalogues, and templates keep their fields."""
+"""Every text that a user may read is in the translations, and templates keep their fields."""
 
 from inside import in_blender
 
@@ -10,7 +10,7 @@ def test_every_text_is_translated():
 
     import strings
 
-    from addon.blender.translations import catalogues
+    from addon.blender.translations import translations
 
     texts = strings.every()
     assert len(texts) > 250
@@ -18,7 +18,7 @@ def test_every_text_is_translated():
     def fields(text):
         return sorted(field for _, field, _, _ in string.Formatter().parse(text) if field)
 
-    found = catalogues()
+    found = translations()
     assert "de_DE" in found
     for language, told in found.items():
         missing = [text for text in texts if ("*", text) not in told]
@@ -35,5 +35,32 @@ def test_messages_are_filled_in_after_translation():
     from addon.core.errors import UserError
 
     assert translated("{count} frames baked", count=3) == "3 frames baked"
-    assert translated(UserError("{name} is no mesh object", name="{x}")) == "{x} is no mesh object"
+    assert translated(UserError("{name} is not a mesh object", name="{x}")) == "{x} is not a mesh object"
     assert translated(ValueError("as it is")) == "as it is"
+
+
+@in_blender
+def test_wrapped_lines_and_every_form_of_a_po_file_are_read():
+    import tempfile
+    from pathlib import Path
+
+    import pytest
+
+    from addon.blender.translations import read_po
+
+    path = Path(tempfile.mkdtemp()) / "de_DE.po"
+    path.write_text(
+        'msgid ""\nmsgstr "Content-Type: text/plain; charset=UTF-8\\n"\n\n'
+        '# a remark\nmsgid ""\n"{name} was deleted "\n"while it was worked on"\n'
+        'msgstr ""\n"{name} wurde gelöscht, "\n"während daran gearbeitet wurde"\n\n'
+        'msgctxt "Operator"\nmsgid "Fit \\"it\\""\nmsgstr "„Anpassen“"\n\n'
+        'msgid "not yet"\nmsgstr ""\n'
+    )
+    texts = read_po(path)
+    assert texts == {
+        "{name} was deleted while it was worked on": "{name} wurde gelöscht, während daran gearbeitet wurde",
+        'Fit "it"': "„Anpassen“",
+    }
+    path.write_text('msgid "a"\nnonsense\nmsgstr "b"\n')
+    with pytest.raises(OSError):
+        read_po(path)

@@ -124,7 +124,7 @@ def test_a_new_handle_sets_the_solver_up_again():
     scenes.activate(bar)
     bpy.ops.arapfields.add_handle()
     step()
-    assert sessions.is_live(bar) and len(sessions._sessions[bar.session_uid].layout[0]) == 3
+    assert sessions.is_live(bar) and len(sessions.live[bar.session_uid].layout[0]) == 3
     for _ in range(3):
         scenes.activate(bar)
         bpy.ops.arapfields.remove_handle()
@@ -168,7 +168,7 @@ def test_loading_a_file_ends_live_mode_and_cleans_what_was_saved_of_it():
     path = tempfile.mktemp(suffix=".blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert not sessions._sessions
+    assert not sessions.live
     bpy.ops.wm.open_mainfile(filepath=path)
     assert "Bar_live" not in bpy.data.objects
     bar = bpy.data.objects["Bar"]

@@ -150,13 +150,13 @@ def prepared(state):
     elif state == "running":
         gate = __import__("threading").Event()
         jobs.begin(
-            jobs.Job("Deform", [jobs.Item("Bar", lambda stages: gate.wait(60))], native.library().Task)
+            jobs.Job("Deform", [jobs.Item("Bar", lambda tracker: gate.wait(60))], native.library().Task)
         )
         return lambda: (gate.set(), jobs.stop())
     elif state == "a failure":
-        jobs.note("ERROR", "Bar: the mesh has no faces")
+        jobs.add_message("ERROR", "Bar: the mesh has no faces")
     elif state == "library missing":
-        native._problem = UserError("The native library is not part of this installation.")
+        native._state.problem = UserError("The native library is not part of this installation.")
         return native.forget
     return undo
 
@@ -186,7 +186,7 @@ def test_the_panel_draws(state):
 
     from addon.core.runtime import jobs
 
-    jobs._notes.clear()
+    jobs.board.messages.clear()
     undo = prepared(state)
     try:
         found = drawn()

@@ -143,23 +143,23 @@ def test_without_a_window_the_course_gives_what_blocking_gives():
     cls = deform.ARAPFIELDS_OT_deform
 
     class Operator:
-        title, has_window, scope, looks = "Deform", True, "ACTIVE", 0
+        title, in_window, scope, looks = "Deform", True, "ACTIVE", 0
         properties = type("P", (), {"is_property_set": staticmethod(lambda name: False)})
-        course, prepare, sources, plan = cls.course, cls.prepare, cls.sources, cls.plan
+        coroutine, prepare, sources, plan = cls.coroutine, cls.prepare, cls.sources, cls.plan
         groups_of = cls.groups_of
         conclude, apply_one = cls.conclude, cls.apply_one
 
-        def note(self, level, text):
+        def add_message(self, level, text):
             print(level, text)
 
     operator = Operator()
-    course = operator.course(bpy.context)
+    coroutine = operator.coroutine(bpy.context)
     while True:
         try:
-            next(course)
+            next(coroutine)
         except StopIteration as ended:
             assert ended.value == {"FINISHED"}
             break
-        operator.looks = max(operator.looks, jobs.running().sight()[1])
-    jobs.end()
+        operator.looks = max(operator.looks, jobs.running().preview_points()[1])
+    jobs.stop()
     assert np.array_equal(scenes.world_points(bpy.data.objects["Bar_deformed"]), blocking)

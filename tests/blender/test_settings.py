@@ -26,7 +26,7 @@ def test_values_survive_single_precision():
     import bpy
     import scenes
 
-    from addon.blender.settings import in_force
+    from addon.blender.property_definitions import effective_values
     from addon.core.settings.parameters import DEFORM
 
     item = scenes.bar()
@@ -34,7 +34,7 @@ def test_values_survive_single_precision():
     class Operator:
         properties = type("P", (), {"is_property_set": staticmethod(lambda name: False)})
 
-    values = in_force(DEFORM, item.arapfields.deform, Operator)
+    values = effective_values(DEFORM, item.arapfields.deform, Operator)
     assert values == {p.name: p.default for p in DEFORM}
     assert bpy.context.object == item
 

@@ -15,7 +15,7 @@ def test_a_fit_is_cached_and_goes_stale_with_the_mesh():
     import scenes
     from test_surface import FIT
 
-    from addon.blender.settings import fit_cache
+    from addon.blender.user_preferences import fit_cache
     from addon.surface import staleness
     from addon.surface.source_surface import read_surface
 

@@ -55,7 +55,7 @@ def checks(found, folder):
     stage.picture(folder, "running")
     found["main_thread_at_once"], previews = ours.end(), shown.end()
     found["previews_per_second"] = round(previews["calls"] / seconds, 2)
-    found["looks_per_second"] = round(jobs.running().sight()[1] / seconds, 2)
+    found["looks_per_second"] = round(jobs.running().preview_points()[1] / seconds, 2)
     begin = time.perf_counter()
     bpy.ops.arapfields.cancel()
     yield from until_idle(30)
@@ -85,7 +85,7 @@ def result(found, folder):
     invoke(scenes.QUICK)
     yield from until_idle(120)
     modal = stage.positions("Bar_deformed")
-    found["preview_gone"] = not previews.is_shown()
+    found["preview_gone"] = not previews.shown.mesh is not None
     yield 0.5
     stage.picture(folder, "result")
     there = "Bar_deformed" in bpy.data.objects

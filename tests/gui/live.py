@@ -22,10 +22,10 @@ def settled(name, limit=30.0):
 
     begin, calm = time.perf_counter(), 0
     while calm < 3 and time.perf_counter() - begin < limit:
-        session = sessions._sessions.get(bpy.data.objects[name].session_uid)
+        session = sessions.live.get(bpy.data.objects[name].session_uid)
         if session is None:
             return
-        calm = calm + 1 if session.follower.resting else 0
+        calm = calm + 1 if session.worker.resting else 0
         yield 0.1
 
 
@@ -44,8 +44,8 @@ def rate(found, folder):
         begin = time.perf_counter()
         bpy.ops.arapfields.live("INVOKE_DEFAULT")
         found["live_click_s"] = round(time.perf_counter() - begin, 4)
-    session = sessions._sessions[bar.session_uid]
-    while not session.follower.resting:
+    session = sessions.live[bar.session_uid]
+    while not session.worker.resting:
         yield 0.01
     found["live_first_shape_s"] = round(time.perf_counter() - begin, 4)
     found["live_vertices"] = len(bpy.data.objects["Bar_live"].data.vertices)

@@ -28,16 +28,16 @@ def checks(found, folder):
 
 
 def parts(found):
-    from addon.core.runtime import jobs
-    from addon.jobs import modal
+    from addon.core.runtime import threads
+    from addon.jobs import display, modal
 
     yield from scene()
     yield from lateness(found, "at_rest")
     for kind in ("nothing", "STATUSBAR", "UI", "WINDOW"):
         yield from one_redraw(found, kind)
-    equal = (jobs, "stand_back", lambda: None)
+    equal = (threads, "lower_thread_priority", lambda: None)
     silent = (modal.ModalRun, "show_progress", lambda *_: None)
-    unseen = (modal.settings, "show_previews", lambda: False)
+    unseen = (display.user_preferences, "show_previews", lambda: False)
     for name, changes in (
         ("job_not_shown_same_priority", (equal, silent)),
         ("job_not_shown", (silent,)),

@@ -12,10 +12,11 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "blender_scripts"))
 pytest.importorskip("pybind11", reason="pybind11 is not installed")
 
-from extension import bindings, check  # noqa: E402
+from extension import bindings, check, dependencies  # noqa: E402
 
 WHEEL = "wheels/arapfields-0.1.0-py3-none-linux_x86_64.whl"
-MANIFEST = f'platforms = ["linux-x64"]\nwheels = ["./{WHEEL}"]\n'
+POLIB = "wheels/polib-1.2.0-py2.py3-none-any.whl"
+MANIFEST = f'platforms = ["linux-x64"]\nwheels = ["./{WHEEL}", "./{POLIB}"]\n'
 PARTS = ["arapfields/libarapfields.so", "arapfields/_native.cpython-311-x86_64-linux-gnu.so"]
 
 
@@ -29,6 +30,7 @@ def make_zip(path, manifest=MANIFEST, wheel=WHEEL, parts=PARTS):
             archive.writestr(name, "")
         archive.writestr("blender_manifest.toml", manifest)
         archive.writestr(wheel, content.getvalue())
+        archive.writestr(POLIB, "")
     return path
 
 
@@ -43,6 +45,7 @@ def test_a_whole_zip_passes(tmp_path):
         ({"parts": PARTS[1:]}, [(3, 11)], "0 copies"),
         ({"manifest": MANIFEST.replace("linux-x64", "windows-x64")}, [], "declares windows-x64"),
         ({"manifest": 'platforms = ["linux-x64"]\n'}, [], "declares linux-x64, for which no wheel"),
+        ({"manifest": MANIFEST.replace(f', "./{POLIB}"', "")}, [], "lacks the wheel of polib"),
         ({"wheel": "wheels/other.whl"}, [], "lacks wheels/arapfields"),
     ],
 )
@@ -67,3 +70,11 @@ def test_headers_are_known_by_what_they_say(tmp_path):
     assert bindings.header_version(folder) == (3, 13, 5)
     assert bindings.header_version(tmp_path) is None
     assert bindings.find_headers([folder])[3, 13] == folder
+
+
+def test_shipped_packages_are_pinned():
+    requirements = (ROOT / "requirements.txt").read_text()
+    for name in dependencies.SHIPPED:
+        assert dependencies.pinned(requirements, name).startswith(f"{name}==")
+    with pytest.raises(RuntimeError, match="does not pin a version of polib"):
+        dependencies.pinned("polib>=1\n", "polib")

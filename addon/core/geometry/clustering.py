@@ -1,23 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A coarse stand-in for a mesh, quick to make and to draw: vertices of one cell of a grid become one."""
+"""Vertex clustering: a coarse mesh, quick to make and to draw; the vertices in a grid cell become one."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-MOST = 12000  # vertices of a stand-in
+MAX_VERTICES = 12000  # of a clustered mesh
 
 
 @dataclass(frozen=True)
-class Coarse:
+class ClusteredMesh:
     vertices: np.ndarray  # (k, 3) some of the mesh's own
     triangles: np.ndarray  # (m, 3) int32
 
 
-def coarsened(vertices, triangles, most=MOST):
-    """The mesh itself where it is small; else one vertex a cell, cells as small as `most` vertices allow."""
+def cluster_vertices(vertices, triangles, most=MAX_VERTICES):
+    """The mesh itself where it is small; else one vertex a cell, at most `most` of them."""
     if len(vertices) <= most:
-        return Coarse(vertices, np.ascontiguousarray(triangles, dtype=np.int32))
+        return ClusteredMesh(vertices, np.ascontiguousarray(triangles, dtype=np.int32))
     low, size = vertices.min(axis=0), np.ptp(vertices, axis=0).max() or 1.0
     cells = int(np.sqrt(most))
     while True:
@@ -30,7 +30,7 @@ def coarsened(vertices, triangles, most=MOST):
     corners = which.reshape(-1)[triangles]
     a, b, c = corners.T
     kept = corners[(a != b) & (b != c) & (c != a)]
-    return Coarse(vertices[first], np.ascontiguousarray(kept, dtype=np.int32))
+    return ClusteredMesh(vertices[first], np.ascontiguousarray(kept, dtype=np.int32))
 
 
 def vertex_normals(vertices, triangles):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The edges of a triangle mesh, made on the worker: Blender's own search for them would hold the window."""
+"""The edges of a triangle mesh, built on the worker: Blender's own search would block the window."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ class Topology:
         return len(self.corners)
 
 
-def connected(corners):
+def build_edges(corners):
     """The topology of (m, 3) triangle corners."""
     corners = np.ascontiguousarray(corners, dtype=np.int32)
     following = corners[:, [1, 2, 0]]

@@ -8,7 +8,7 @@ import numpy as np
 from ..errors import UserError
 from .spaces import rigid_motion
 
-STILL = 1e-5  # motion, relative to the box, below which a handle is an anchor
+ANCHOR_TOLERANCE = 1e-5  # motion, relative to the box, below which a handle is an anchor
 MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 
 
@@ -51,9 +51,9 @@ def solve_handle(name, kind, rest_world, now_world, space, **further):
     motion = to_solve @ rigid_motion(rest_world, now_world) @ space.solve_to_world
     motion = rigid_motion(np.eye(4), motion)
     extent = np.linalg.norm(rest[:3, :3], axis=0).max()
-    moved = np.abs(motion[:3, :3] - np.eye(3)).max() > STILL
+    moved = np.abs(motion[:3, :3] - np.eye(3)).max() > ANCHOR_TOLERANCE
     shift = motion[:3, :3] @ rest[:3, 3] + motion[:3, 3] - rest[:3, 3]
-    moved = moved or np.abs(shift).max() > STILL * extent
+    moved = moved or np.abs(shift).max() > ANCHOR_TOLERANCE * extent
     return Handle(name, kind, rest, motion @ rest if moved else rest.copy(), **further)
 
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Solve space: the world up to a similarity, so that a moved or evenly scaled object keeps its fit.
+"""Solve space: the world up to a similarity, so that a moved or uniformly scaled object keeps its fit.
 
 Rigidity is judged in world space. An object's linear part L = U S Vᵀ splits into s·Q·P with the scale s,
 Q = U Vᵀ orthogonal (a mirror included) and P = V S Vᵀ / s the stretch that remains: local → solve is P,
-solve → world is s·Q and the location. Without uneven scale P is the identity.
+solve → world is s·Q and the location. Without non-uniform scale P is the identity.
 """
 
 from dataclasses import dataclass
@@ -12,8 +12,8 @@ import numpy as np
 
 from ..errors import UserError
 
-EVEN = 1e-5  # relative spread of the scales below which they count as equal
-FLAT = 1e-6  # smallest scale, relative to the largest
+UNIFORM_SCALE_TOLERANCE = 1e-5  # relative spread of the scales below which they count as equal
+FLAT_SCALE_TOLERANCE = 1e-6  # smallest scale, relative to the largest
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,9 @@ def space_of(matrix_world, name="object"):
     if not np.isfinite(world).all():
         raise UserError("{name}: its world matrix is not finite", name=name)
     left, scales, right = np.linalg.svd(world[:3, :3])
-    if scales[-1] <= FLAT * scales[0]:
+    if scales[-1] <= FLAT_SCALE_TOLERANCE * scales[0]:
         raise UserError("{name}: its scale flattens it; give every axis a scale other than zero", name=name)
-    if scales[0] - scales[-1] <= EVEN * scales[0]:
+    if scales[0] - scales[-1] <= UNIFORM_SCALE_TOLERANCE * scales[0]:
         return Space(np.eye(4), world)
     scale = float(np.prod(scales) ** (1 / 3))
     local_to_solve, solve_to_world = np.eye(4), np.eye(4)

@@ -1,30 +1,44 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Work of the main thread in slices: generators that yield False to go on, True to wait for a worker."""
+"""The main thread's work as coroutines: generators that yield a `Pause` every few milliseconds."""
 
 import time
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+SLICE = 0.02  # seconds that the main thread works at once
 
 
-def finished(course, wait=0.002):
-    """Runs a course to its end at once; what it returns."""
+class Pause(Enum):
+    """Why a coroutine yields."""
+
+    REDRAW = "the window may redraw; there is more to do"
+    WORKER = "nothing to do until a worker thread is done"
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A coroutine has ended, with this result."""
+
+    value: Any
+
+
+def step_for(coroutine, seconds=SLICE):
+    """Runs a coroutine until it waits for a worker or the time is over; `Finished` at its end, else None."""
+    until = time.monotonic() + seconds
+    try:
+        while next(coroutine) is Pause.REDRAW and time.monotonic() < until:
+            pass
+    except StopIteration as ended:
+        return Finished(ended.value)
+    return None
+
+
+def run_to_completion(coroutine, wait=lambda: time.sleep(0.002)):
+    """Runs a coroutine to its end and returns its result; `wait()` is called where it waits for a worker."""
     while True:
         try:
-            if next(course):
-                time.sleep(wait)
+            if next(coroutine) is Pause.WORKER:
+                wait()
         except StopIteration as ended:
             return ended.value
-
-
-def work(course, seconds):
-    """Runs a course for a moment. At its end StopIteration carries what it returns."""
-    until = time.monotonic() + seconds
-    while not next(course) and time.monotonic() < until:
-        pass
-
-
-def advanced(course, seconds):
-    """Runs a course for a moment; whether it has ended."""
-    try:
-        work(course, seconds)
-    except StopIteration:
-        return True
-    return False

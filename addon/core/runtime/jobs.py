@@ -9,20 +9,20 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import UserError
-from .progress import JobCancelled, Stages
-from .threads import stand_back
+from .progress import JobCancelled, ProgressTracker
+from .threads import start_thread
 
 
 @dataclass
 class Item:
-    """One object's work. `work(stages)` runs on the worker and returns what `apply` needs on the main thread.
+    """One object's work: `work(tracker)` runs on the worker, `apply` takes its value on the main thread.
 
-    `apply` returns the line to report, or is a generator that yields whenever the window may redraw.
-    `preview` shows the points that the worker's stages watch.
+    `apply` returns the line to report, or is a coroutine (runtime/coroutines.py) that does.
+    `preview`, if any, has `show(points)`, `clear()`, and shows the tracker's preview points.
     """
 
     label: str
-    work: Callable[[Stages], Any]
+    work: Callable[[ProgressTracker], Any]
     apply: Callable[[Any], Any] | None = None
     preview: Any = None
 
@@ -39,56 +39,56 @@ class Outcome:
 class Job:
     """Runs items one after another on a thread; one that fails does not stop the rest."""
 
-    def __init__(self, title, items, make_task, stands_back=False):
+    def __init__(self, title, items, make_task, low_priority=False):
         self.title = title
         self.items = list(items)
         self._make_task = make_task
-        self._stands_back = stands_back  # for the window, where there is one
+        self._low_priority = low_priority
         self._lock = threading.Lock()
-        self._stages = Stages(make_task)
+        self._tracker = ProgressTracker(make_task)
         self._current = 0
         self._cancelled = False
         self._outcomes = []
         self._taken = 0
-        self._outside = None  # (share, message) while the main thread works
+        self._main_thread = None  # (fraction, message) while the main thread works
         self._begin = time.monotonic()
-        self._thread = threading.Thread(target=self._run, name=f"arapfields {title}", daemon=True)
+        self._thread = None
 
     def start(self, items=None):
         """Starts the worker, on these items where they are known only now."""
         if items is not None:
             self.items = list(items)
-        self._outside, self._begin = None, time.monotonic()
-        self._thread.start()
+        self._main_thread, self._begin = None, time.monotonic()
+        self._thread = start_thread(self.title, self._run, self._low_priority)
 
-    def outside(self, fraction, message):
+    def report_main_thread(self, fraction, message):
         """Progress of what the main thread does before the worker starts or after it has ended."""
         if self._cancelled:
             raise JobCancelled
-        self._outside = fraction, message
+        self._main_thread = fraction, message
 
-    def sight(self):
-        """(the item at work, how often its points were looked at, where they were)."""
+    def preview_points(self):
+        """(the item at work, how often its preview points were published, where they are)."""
         with self._lock:
             item = self.items[self._current] if self._current < len(self.items) else None
-            stages = self._stages
-        return item, *stages.sight()
+            tracker = self._tracker
+        return item, *tracker.preview_points()
 
     def cancel(self):
         """Asks the worker to stop; `join` waits for it."""
         with self._lock:
             self._cancelled = True
-            self._stages.cancel()
+            self._tracker.cancel()
 
     def join(self, timeout=None):
         """Waits for the worker; True when it has ended."""
-        if self._thread.ident is not None:
+        if self._thread is not None:
             self._thread.join(timeout)
         return self.done
 
     @property
     def done(self):
-        return self._thread.ident is not None and not self._thread.is_alive()
+        return self._thread is not None and not self._thread.is_alive()
 
     @property
     def cancelled(self):
@@ -96,22 +96,22 @@ class Job:
 
     @property
     def fraction(self):
-        if self._outside is not None:
-            return self._outside[0]
+        if self._main_thread is not None:
+            return self._main_thread[0]
         with self._lock:
-            part = self._stages.fraction if self._current < len(self.items) else 0.0
+            part = self._tracker.fraction if self._current < len(self.items) else 0.0
             return min(1.0, (self._current + part) / max(1, len(self.items)))
 
     @property
     def message(self):
-        if self._outside is not None:
-            return self._outside[1]
+        if self._main_thread is not None:
+            return self._main_thread[1]
         with self._lock:
             if self._current >= len(self.items):
                 return self.title
             label = self.items[self._current].label
             prefix = f"{self._current + 1}/{len(self.items)} {label}" if len(self.items) > 1 else label
-            return f"{prefix} · {self._stages.message}" if self._stages.message else prefix
+            return f"{prefix} · {self._tracker.message}" if self._tracker.message else prefix
 
     @property
     def elapsed(self):
@@ -131,27 +131,25 @@ class Job:
             return new
 
     def _run(self):
-        if self._stands_back:
-            stand_back()
         for index, item in enumerate(self.items):
             with self._lock:
                 self._current = index
-                self._stages = Stages(self._make_task)
+                self._tracker = ProgressTracker(self._make_task)
                 if self._cancelled:
-                    self._stages.cancel()
-            outcome = run_item(item, self._stages)
+                    self._tracker.cancel()
+            outcome = run_item(item, self._tracker)
             with self._lock:
                 self._outcomes.append(outcome)
         with self._lock:
             self._current = len(self.items)
 
 
-def run_item(item, stages):
+def run_item(item, tracker):
     """Runs one item and turns whatever it raises into an outcome."""
     begin = time.monotonic()
     outcome = Outcome(item)
     try:
-        outcome.value = item.work(stages)
+        outcome.value = item.work(tracker)
     except JobCancelled:
         outcome.cancelled = True
     except UserError as error:
@@ -170,48 +168,49 @@ def run_item(item, stages):
     return outcome
 
 
-# The one job that runs, and what the last ones had to say; the panel shows both.
-_running = None
-_notes = []
+class Board:
+    """The one job that runs, and the messages of the last one; the panel shows both."""
+
+    def __init__(self):
+        self.job, self.messages = None, []
+
+    def clear(self):
+        """Cancels the running job and waits for its worker; nothing of it is applied."""
+        if self.job is not None:
+            self.job.cancel()
+            self.job.join()
+            self.job = None
+
+
+board = Board()
 
 
 def begin(job, start=True):
     """Makes a job the one that runs; without `start` the main thread prepares it first."""
-    global _running
-    _notes.clear()
-    _running = job
+    board.messages.clear()
+    board.job = job
     if start:
         job.start()
 
 
-def end():
-    global _running
-    _running = None
-
-
 def stop():
-    """Cancels the running job and waits for its worker; nothing of it is applied."""
-    job = _running
-    if job is not None:
-        job.cancel()
-        job.join()
-        end()
+    board.clear()
 
 
 def running():
-    return _running
+    return board.job
 
 
 def progress():
-    """(share done, what is being done) of the running job."""
-    job = _running
+    """(fraction done, what is being done) of the running job."""
+    job = board.job
     return (job.fraction, job.message) if job is not None else (0.0, "")
 
 
-def note(level, text):
+def add_message(level, text):
     """Keeps a line for the panel: INFO, WARNING or ERROR."""
-    _notes.append((level, text))
+    board.messages.append((level, text))
 
 
-def notes():
-    return list(_notes)
+def messages():
+    return list(board.messages)

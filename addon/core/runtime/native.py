@@ -8,10 +8,10 @@ import importlib.util
 import os
 import platform
 import sys
-import threading
 from pathlib import Path
 
 from ..errors import UserError
+from .threads import start_thread
 
 ADVICE = "Install arapfields-<version>-<platform>.zip of a release, not the source code"
 
@@ -19,7 +19,7 @@ ADVICE = "Install arapfields-<version>-<platform>.zip of a release, not the sour
 def library():
     """The package `arapfields`; UserError when it cannot be used."""
     if is_loading():
-        _loading.join()
+        _state.thread.join()
     reason = problem()
     if reason:
         raise reason
@@ -27,28 +27,32 @@ def library():
 
 
 UNKNOWN = object()
-_problem = UNKNOWN
-_loading = None  # the thread that loads the library
+
+
+class _State:
+    """What is known of the library: why it cannot be used, and the thread that loads it."""
+
+    problem, thread = UNKNOWN, None
+
+
+_state = _State()
 
 
 def preload():
     """Loads the library on a thread: its file first, without Python's lock, then the module."""
-    global _loading
-    if _problem is UNKNOWN and _loading is None:
-        _loading = threading.Thread(target=_load, name="arapfields loading", daemon=True)
-        _loading.start()
+    if _state.problem is UNKNOWN and _state.thread is None:
+        _state.thread = start_thread("loading", _load)
 
 
 def is_loading():
-    return _loading is not None and _loading.is_alive()
+    return _state.thread is not None and _state.thread.is_alive()
 
 
 def _load():
     with contextlib.suppress(Exception), _short_spin():
         for path in sorted(_folder().glob("libarapfields*.so")):
             ctypes.CDLL(str(path))  # waits for the disk while other threads run
-    global _problem
-    _problem = _try_import()
+    _state.problem = _try_import()
 
 
 @contextlib.contextmanager
@@ -66,18 +70,16 @@ def _short_spin():
 
 def problem():
     """Why the native library cannot be used, as a UserError; None when it can."""
-    global _problem
     if is_loading():
         return UserError("The native library is being loaded; wait a moment")
-    if _problem is UNKNOWN:
-        _problem = _try_import()
-    return _problem
+    if _state.problem is UNKNOWN:
+        _state.problem = _try_import()
+    return _state.problem
 
 
 def forget():
     """Lets the next call of `problem` try again."""
-    global _problem, _loading
-    _problem, _loading = UNKNOWN, None
+    _state.problem, _state.thread = UNKNOWN, None
 
 
 def _try_import():

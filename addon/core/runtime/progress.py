@@ -8,25 +8,25 @@ class JobCancelled(Exception):
     """The user cancelled the job."""
 
 
-class Stages:
-    """Progress of one item through several native calls, each with a task of its own."""
+class ProgressTracker:
+    """Progress of one item through several native calls, each with a native task of its own."""
 
     def __init__(self, make_task):
         self._make_task = make_task
         self._lock = threading.Lock()
         self._task = None
         self._name = ""
-        self._begun = self._share = 0.0
+        self._begun = self._weight = 0.0
         self._cancelled = False
-        self.watched_points = None  # (n, 3) that every native call shall tell the present places of
+        self.rest_preview_points = None  # (n, 3) whose moved positions every native call shall publish
 
-    def start(self, name, share):
-        """A task for the next native call, which is about `share` of the item's work."""
+    def start(self, name, weight):
+        """A task for the next native call, which is about this part, `weight`, of the item's work."""
         with self._lock:
-            self._begun = min(1.0, self._begun + self._share)
-            self._name, self._share, self._task = name, share, self._make_task()
-            if self.watched_points is not None:
-                self._task.watch(self.watched_points)
+            self._begun = min(1.0, self._begun + self._weight)
+            self._name, self._weight, self._task = name, weight, self._make_task()
+            if self.rest_preview_points is not None:
+                self._task.watch(self.rest_preview_points)
             if self._cancelled:
                 self._task.cancel()
                 raise JobCancelled
@@ -38,24 +38,31 @@ class Stages:
             if self._task is not None:
                 self._task.cancel()
 
-    def sight(self):
-        """(how often the watched points were looked at, where they were) in the present native call."""
+    def preview_points(self):
+        """(how often the preview points were published, where they are) in the present native call."""
         with self._lock:
             task = self._task
-        looks = task.looks if task is not None and self.watched_points is not None else 0
-        return looks, task.watched if looks else None
+        count = task.looks if task is not None and self.rest_preview_points is not None else 0
+        return count, task.watched if count else None
 
     @property
     def fraction(self):
         with self._lock:
             done = self._task.progress if self._task is not None else 0.0
-            return min(1.0, self._begun + self._share * done)
+            return min(1.0, self._begun + self._weight * done)
 
     @property
     def message(self):
         with self._lock:
             name, detail = self._name, self._task.message if self._task is not None else ""
-        verb, colon, rest = detail.partition(": ")  # "deform: iteration 3 of 300": the name has said the verb
-        if colon and " " not in verb:
-            detail = rest
+        detail = without_verb(detail)
         return f"{name}: {detail}" if detail else name
+
+
+def without_verb(text):
+    """A native message without the library's verb: "deform: iteration 3 of 300" → "iteration 3 of 300".
+
+    The extension names its own: the operator, or the object at fault.
+    """
+    verb, colon, rest = text.partition(": ")
+    return rest if colon and " " not in verb else text

@@ -1,43 +1,40 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Manners towards the window: workers that stand back for it, drawing that leaves it time for the user."""
+"""The one way to start a thread, and the priority of threads that work beside a window."""
 
 import contextlib
-import math
 import os
 import sys
 import threading
 
-STEP = 10  # of priority, below the window's
+NICENESS = 10  # steps of priority below the window's
+PREFIX = "arapfields "  # of the threads' names
 
 
-def stand_back():
-    """The calling thread, and each that it starts from now on, works with what the window leaves it.
+def start_thread(name, work, low_priority=False):
+    """Starts `work()` on a thread that does not keep the process alive; returns the thread."""
+
+    def run():
+        if low_priority:
+            lower_thread_priority()
+        work()
+
+    thread = threading.Thread(target=run, name=f"{PREFIX}{name}", daemon=True)
+    thread.start()
+    return thread
+
+
+def own_threads():
+    """The threads of the extension that are running."""
+    return [thread for thread in threading.enumerate() if thread.name.startswith(PREFIX)]
+
+
+def lower_thread_priority():
+    """Lowers the priority of the calling thread, and of each that it starts from now on, below the window's.
 
     On Linux alone: elsewhere such a priority belongs to the whole process.
     """
     if sys.platform == "linux":
         with contextlib.suppress(OSError):
             thread = threading.get_native_id()
-            os.setpriority(os.PRIO_PROCESS, thread, min(19, os.getpriority(os.PRIO_PROCESS, thread) + STEP))
-
-
-class Pace:
-    """Says when to draw again, so that drawing keeps the window busy for no more than a share of the time."""
-
-    SHARE = 0.4
-    MOST = 5.0  # seconds between two drawings, however slow they are
-
-    def __init__(self, least):
-        self.least = least  # seconds between two drawings, however quick they are
-        self._begun, self._busy = -math.inf, 0.0
-
-    def spent(self, seconds):
-        """The window was late by so much: that is what drawing costs."""
-        self._busy += max(0.0, seconds)
-
-    def due(self, now):
-        return now - self._begun >= min(self.MOST, max(self.least, self._busy / self.SHARE))
-
-    def begin(self, now):
-        """Something is drawn now."""
-        self._begun, self._busy = now, 0.0
+            niceness = min(19, os.getpriority(os.PRIO_PROCESS, thread) + NICENESS)
+            os.setpriority(os.PRIO_PROCESS, thread, niceness)

@@ -1,62 +1,60 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A worker thread that follows a moving goal: it always works on the newest one and skips those between."""
+"""A worker thread for requests that change faster than they are answered: only the newest one counts."""
 
 import threading
 
-from .threads import stand_back
+from .threads import start_thread
 
-REST = 0.4  # seconds that a goal rests before what was found for it is refined
+REST = 0.4  # seconds without a new request after which the result is refined
 
 
-class Interrupt:
-    """Tells a refinement that a newer goal is there; cancels the native calls that it runs."""
+class CancellationToken:
+    """Tells a refinement that a newer request is there; cancels the native tasks that it runs."""
 
     def __init__(self):
         self._lock = threading.Lock()
-        self._raised, self._tasks = False, []
+        self._cancelled, self._tasks = False, []
 
     @property
-    def raised(self):
-        return self._raised
+    def cancelled(self):
+        return self._cancelled
 
     def watch(self, task):
-        """A native task that is cancelled when the interrupt is raised; returns it."""
+        """Links a native task to the token: both are cancelled together. Returns the task."""
         with self._lock:
             self._tasks.append(task)
-            if self._raised:
+            if self._cancelled:
                 task.cancel()
         return task
 
-    def throw(self):
+    def cancel(self):
         with self._lock:
-            self._raised = True
+            self._cancelled = True
             for task in self._tasks:
                 task.cancel()
 
 
-class Follower:
-    """`prepare()` runs on the thread first, then `solve(goal)` for the newest goal whenever there is one.
+class LatestRequestWorker:
+    """Runs `prepare()` once, then `solve(request)` for the newest request, skipping those between.
 
-    Where a goal has rested, `refine(goal, interrupt)` yields better and better results until the interrupt is
-    raised. `take` hands over the newest result, or what was raised.
+    After `rest` seconds without a new request, `refine(request, token)` yields better and better results
+    until the token is cancelled. `poll` returns the newest result, or the error.
     """
 
-    def __init__(self, solve, prepare=None, refine=None, rest=REST, stands_back=False):
+    def __init__(self, solve, prepare=None, refine=None, rest=REST, low_priority=False):
         self._solve, self._prepare, self._refine, self._rest = solve, prepare, refine, rest
         self._changed = threading.Condition()
-        self._goal = self._result = self._error = self._interrupt = None
+        self._request = self._result = self._error = self._token = None
         self._working, self._ended, self._refined = prepare is not None, False, True
-        self._stands_back = stands_back  # for the window, where there is one
-        self._thread = threading.Thread(target=self._run, name="arapfields live", daemon=True)
-        self._thread.start()
+        self._thread = start_thread("live", self._run, low_priority)
 
-    def follow(self, goal):
-        """Makes this the goal; one that waits is forgotten."""
+    def request(self, request):
+        """Makes this the newest request; one that is still waiting is dropped."""
         with self._changed:
-            self._goal = goal
+            self._request = request
             self._wake()
 
-    def take(self):
+    def poll(self):
         """(result or None, error text) since the last call."""
         with self._changed:
             found = self._result, self._error or ""
@@ -64,10 +62,10 @@ class Follower:
             return found
 
     def wait(self, timeout, refined=False):
-        """Until the newest goal is reached (and `refined`); False when that takes longer."""
+        """Waits until the newest request is solved (and `refined`); False when that takes longer."""
 
         def reached():
-            idle = self._goal is None and not self._working
+            idle = self._request is None and not self._working
             return idle and (self._refined or not refined or self._refine is None)
 
         with self._changed:
@@ -75,9 +73,9 @@ class Follower:
 
     @property
     def resting(self):
-        """Whether nothing is left to do for the newest goal."""
+        """Whether nothing is left to do for the newest request."""
         with self._changed:
-            return self._goal is None and not self._working and (self._refined or self._refine is None)
+            return self._request is None and not self._working and (self._refined or self._refine is None)
 
     def stop(self):
         """Ends the thread and waits for it."""
@@ -87,45 +85,43 @@ class Follower:
         self._thread.join()
 
     def _wake(self):
-        if self._interrupt is not None:
-            self._interrupt.throw()
+        if self._token is not None:
+            self._token.cancel()
         self._changed.notify_all()
 
     def _run(self):
-        goal = None
-        if self._stands_back:
-            stand_back()
+        request = None
         if self._prepare is not None:
             self._attempt(self._prepare)
         while True:
             with self._changed:
                 due = self._refine is not None and not self._refined
                 self._changed.wait_for(
-                    lambda: self._goal is not None or self._ended, self._rest if due else None
+                    lambda: self._request is not None or self._ended, self._rest if due else None
                 )
                 if self._ended:
                     return
-                if self._goal is not None:
-                    goal, self._goal = self._goal, None
+                if self._request is not None:
+                    request, self._request = self._request, None
                     self._working, self._refined, due = True, False, False
                 else:
-                    self._working, self._interrupt = True, Interrupt()
+                    self._working, self._token = True, CancellationToken()
             if due:
-                self._improve(goal, self._interrupt)
+                self._improve(request, self._token)
             else:
-                self._attempt(lambda goal=goal: self._solve(goal))
+                self._attempt(lambda request=request: self._solve(request))
 
-    def _improve(self, goal, interrupt):
+    def _improve(self, request, token):
         def steps():
-            for better in self._refine(goal, interrupt):
-                if interrupt.raised:
+            for better in self._refine(request, token):
+                if token.cancelled:
                     break
                 with self._changed:
                     self._result = better
 
         self._attempt(steps)
         with self._changed:
-            self._refined, self._interrupt = not interrupt.raised, None
+            self._refined, self._token = not token.cancelled, None
             self._changed.notify_all()
 
     def _attempt(self, call):

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Parameters as Blender's properties, and the values that count for one call."""
+
+import bpy
+
+
+def annotations(parameters, **extra):
+    """Property definitions for a class that shows these parameters."""
+    return {p.name: definition(p, **extra) for p in parameters}
+
+
+def definition(parameter, **extra):
+    """One parameter as a bpy.props definition."""
+    p = parameter
+    common = {"name": p.label, "description": p.tip, **extra}
+    if p.items:
+        return bpy.props.EnumProperty(items=p.items, default=p.default, **common)
+    if isinstance(p.default, bool):
+        return bpy.props.BoolProperty(default=p.default, **common)
+    limits = {"min": p.low, "max": p.high, "soft_max": p.high if p.soft_high is None else p.soft_high}
+    if isinstance(p.default, int):
+        return bpy.props.IntProperty(default=p.default, **limits, **common)
+    precision = 4 if 0 < p.default < 0.1 else 2
+    return bpy.props.FloatProperty(default=p.default, precision=precision, **limits, **common)
+
+
+def effective_values(parameters, group, operator):
+    """Values by name: the operator's arguments where given, else the object's settings."""
+    return {p.name: from_single_precision(effective_value(p.name, group, operator)) for p in parameters}
+
+
+def from_single_precision(value):
+    """Blender keeps floats in single precision: 0.01 as 0.0099999998. The number that was meant."""
+    return float(f"{value:.7g}") if isinstance(value, float) else value
+
+
+def effective_value(name, group, operator):
+    """One setting: the operator's argument where given, else the object's."""
+    return getattr(operator if operator.properties.is_property_set(name) else group, name)

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The add-on's preferences, read with what counts where there are none."""
+
+import os
+import tempfile
+from pathlib import Path
+
+import bpy
+
+from ..core.runtime.fit_cache import FitCache
+from ..names import PACKAGE
+
+
+def preferences():
+    """The add-on's preferences; None where it runs from its source folder."""
+    entry = bpy.context.preferences.addons.get(PACKAGE)
+    return entry.preferences if entry else None
+
+
+def machine_options():
+    """Options that depend on the machine alone."""
+    stored = preferences()
+    return {"threads": stored.threads, "device": stored.device} if stored else {}
+
+
+def show_boxes():
+    """Whether the handles' boxes are drawn in the viewport."""
+    stored = preferences()
+    return stored is None or stored.show_boxes
+
+
+def show_previews():
+    """Whether what a running job has so far is drawn in the viewport."""
+    stored = preferences()
+    return stored is None or stored.show_previews
+
+
+def cache_folder():
+    """Where fits are kept: the user's choice, Blender's folder for extensions, or a temporary one."""
+    stored = preferences()
+    if stored and stored.cache_folder:
+        return Path(bpy.path.abspath(stored.cache_folder))
+    try:
+        return Path(bpy.utils.extension_path_user(PACKAGE, path="fits", create=False))
+    except ValueError:  # not run as an extension
+        return (
+            Path(tempfile.gettempdir())
+            / f"arapfields-fits-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
+        )
+
+
+def fit_cache():
+    return FitCache(cache_folder())

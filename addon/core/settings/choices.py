@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Choices that are no option of the solvers: (identifier, label, tip) each, as Blender's menus show them."""
+
+HANDLE_KINDS = (
+    ("CUBE", "Region", "What lies in the box at rest follows the Empty"),
+    ("POINT", "Point", "The point of the surface nearest to the Empty at rest follows it"),
+    ("GROUP", "Vertex Group", "What a vertex group of the object holds follows the Empty"),
+)
+HANDLE_PLACES = (
+    ("AUTO", "Selected Empties", "The selected Empties; where none is selected, a new one at the 3D cursor"),
+    ("CURSOR", "3D Cursor", "A new box at the 3D cursor"),
+    ("SELECTION", "Selected Vertices", "A new box around the mesh's selected vertices"),
+)
+SCOPES = (  # of a job
+    ("ACTIVE", "Active", "The active object alone"),
+    ("SELECTED", "Selected", "Every selected mesh object, one after another"),
+    ("COLLECTION", "Collection", "Every mesh object of the active object's collections"),
+)
+SURFACES = (
+    ("AUTO", "Automatic", "The fitted surface where it is up to date, else the mesh's own triangles"),
+    ("FIT", "Fitted", "The fitted surface; it is fitted first where it is out of date"),
+    ("MESH", "Mesh", "The mesh's own triangles; no fit is needed"),
+)
+OUTPUTS = (
+    ("WARP", "Original Mesh", "The object's own vertices moved: UVs, materials, groups and topology stay"),
+    (
+        "SURFACE",
+        "Implicit Surface",
+        "A new mesh of the fitted surface, moved along: even triangles, no seams",
+    ),
+    (
+        "REMESH",
+        "Remeshed Surface",
+        "A new mesh of the moved surface: even triangles also where the shape is stretched; takes longer",
+    ),
+)
+PLACEMENTS = (  # of a result
+    ("NEW", "New Object", "An object of its own beside the source; a later run updates it"),
+    ("REPLACE", "Replace Mesh", "The source itself moves; its handles' poses become their rest poses"),
+    ("KEY", "Shape Key", "One more shape key of the source, which can be blended and animated"),
+)
+NORMALS = (
+    ("SMOOTH", "Smooth", "Shaded as one smooth surface"),
+    ("FLAT", "Flat", "Every triangle shaded for itself"),
+)
+LIVE_KINDS = (
+    ("DEFORM", "Deform", "The shape follows its handles"),
+    ("STYLIZE", "Stylize", "The shape follows the style's settings, and its handles where the style does"),
+)
+DEVICES = (
+    ("auto", "Automatic", "The fastest device that is found"),
+    ("cpu", "Processor", "The processor's cores"),
+    ("cuda", "CUDA", "A graphics card, where the native library was built for it"),
+)

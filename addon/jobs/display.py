@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the window shows of the running job, and the timer that drives it; all of it goes with the job."""
+
+import time
+
+import bpy
+
+from ..blender import user_preferences
+from ..blender.language import translated
+from ..blender.redraw import redraw
+from ..core.runtime.redraw_throttle import RedrawThrottle
+
+TICK = 0.03  # seconds between looks at the worker
+
+
+class Display:
+    """Status bar, sidebar and preview of one job at a time, each drawn no more often than drawing allows."""
+
+    def __init__(self):
+        self._timer = self._preview = None
+        self._words, self._count, self._left = "", 0, 0.0
+
+    def begin(self, context):
+        self._timer = context.window_manager.event_timer_add(TICK, window=context.window)
+        self._words, self._count, self._left = "", 0, time.monotonic()
+        self._progress_throttle, self._preview_throttle = RedrawThrottle(0.25), RedrawThrottle(0.4)
+
+    def note_arrival(self):
+        """A timer event has come; how late it is tells what drawing costs."""
+        late = time.monotonic() - self._left - TICK
+        for throttle in (self._progress_throttle, self._preview_throttle):
+            throttle.add_cost(late)
+
+    def note_departure(self):
+        self._left = time.monotonic()
+
+    def show(self, context, job):
+        """Redraws the viewport for a new preview and the sidebar for new words, each when it is due."""
+        now = time.monotonic()
+        if self._preview_throttle.is_due(now) and user_preferences.show_previews():
+            item, count, points = job.preview_points()
+            if count and count != self._count and item.preview is not None:
+                self._preview, self._count = item.preview, count
+                self._preview.show(points)
+                redraw(context, "WINDOW")
+                self._preview_throttle.begin(now)
+        words = f"{job.message}  {job.fraction:.0%}"
+        if words != self._words and self._progress_throttle.is_due(now):
+            redraw(context, "UI")
+            context.workspace.status_text_set(f"{words}  {translated('(ESC cancels)')}")
+            self._progress_throttle.begin(now)
+            self._words = words
+
+    def clear(self):
+        """Takes everything away: the job has ended, or the extension is being disabled."""
+        if self._preview is not None:
+            self._preview.clear()
+        if self._timer is not None:
+            bpy.context.window_manager.event_timer_remove(self._timer)
+            for workspace in bpy.data.workspaces:
+                workspace.status_text_set(None)
+            redraw(bpy.context, "UI", "WINDOW")
+        self._timer = self._preview = None
+
+
+display = Display()

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The one table of what Blender calls beside operators and panels, and of the extension's state."""
+
+import contextlib
+
+import bpy
+from bpy.app.handlers import persistent
+
+from . import commands, install_check
+from .blender import icons, library_loading, timers, translations
+from .blender.host import has_window
+from .core.runtime import jobs
+from .handles import counts
+from .jobs.display import display
+from .live import sessions
+from .surface import staleness
+from .viewport import handle_boxes, previews
+
+
+@persistent
+def before_load(*_):
+    """The file is about to go: whatever works on it ends, and nothing of it is applied."""
+    for state in (jobs.board, counts.pending, staleness.changed):
+        state.clear()
+    sessions.stop_all()
+
+
+@persistent
+def before_undo(*_):
+    jobs.stop()
+
+
+@persistent
+def after_restore(*_):
+    """A file was loaded, or a step undone or redone."""
+    sessions.recover()
+
+
+@persistent
+def after_update(scene, depsgraph):
+    staleness.watch(depsgraph)
+
+
+HANDLERS = {  # of bpy.app.handlers
+    "load_pre": before_load,
+    "load_post": after_restore,
+    "undo_pre": before_undo,
+    "undo_post": after_restore,
+    "redo_pre": before_undo,
+    "redo_post": after_restore,
+    "depsgraph_update_post": after_update,
+}
+DRAWINGS = (previews.draw, handle_boxes.draw)  # over every 3D viewport
+PARTS = (  # what begins with the extension, and how it ends
+    (icons.load, icons.clear),
+    (translations.load, translations.clear),
+    (commands.register, commands.unregister),
+    (library_loading.start, None),
+    (install_check.start, None),
+)
+# What may be there when the extension is disabled, in the order in which it ends; each has clear().
+# Timers are started by blender/timers.py, threads by core/runtime/threads.py.
+STATE = (jobs.board, display, sessions.live, counts.pending, staleness.changed, previews.shown, timers)
+
+_begun, _drawn = [], []
+
+
+def register():
+    for name, function in HANDLERS.items():
+        getattr(bpy.app.handlers, name).append(function)
+    if has_window():
+        for draw in DRAWINGS:
+            _drawn.append(bpy.types.SpaceView3D.draw_handler_add(draw, (), "WINDOW", "POST_VIEW"))
+    for begin, end in PARTS:
+        begin()
+        _begun.append(end)
+
+
+def unregister():
+    for state in STATE:
+        state.clear()
+    while _begun:
+        end = _begun.pop()
+        if end is not None:
+            end()
+    while _drawn:
+        bpy.types.SpaceView3D.draw_handler_remove(_drawn.pop(), "WINDOW")
+    for name, function in HANDLERS.items():
+        with contextlib.suppress(ValueError):
+            getattr(bpy.app.handlers, name).remove(function)

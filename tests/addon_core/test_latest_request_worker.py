@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The thread behind live mode: newest request wins, refinement at rest, errors handed over, a clean end."""
+
+import threading
+
+from addon.core.runtime.latest_request_worker import LatestRequestWorker
+
+LIMIT = 20  # seconds after which something hangs
+
+
+def test_requests_between_are_skipped():
+    seen, gate = [], threading.Event()
+
+    def solve(request):
+        seen.append(request)
+        gate.wait(LIMIT)
+        return request
+
+    worker = LatestRequestWorker(solve)
+    worker.request(0)
+    while not seen:
+        pass
+    for request in range(1, 50):
+        worker.request(request)
+    gate.set()
+    assert worker.wait(LIMIT)
+    assert seen == [0, 49] and worker.poll() == (49, "") and worker.poll() == (None, "")
+    worker.stop()
+
+
+def test_a_request_at_rest_is_refined_and_a_new_one_cancels_that():
+    begun, last = threading.Event(), []
+
+    def refine(request, token):
+        step = 0
+        while not token.cancelled and (request != "b" or step < 3):
+            begun.set()
+            step += 1
+            yield f"{request}{step}"
+        last.append(request)
+
+    worker = LatestRequestWorker(lambda request: request, refine=refine, rest=0.01)
+    worker.request("a")
+    assert begun.wait(LIMIT)
+    worker.request("b")
+    assert worker.wait(LIMIT, refined=True) and worker.resting
+    assert last[-1] == "b" and worker.poll() == ("b3", "")
+    worker.stop()
+
+
+def test_a_token_cancels_the_tasks_of_a_refinement():
+    cancelled, ready = threading.Event(), threading.Event()
+
+    class Task:
+        def cancel(self):
+            cancelled.set()
+
+    def refine(request, token):
+        token.watch(Task())
+        ready.set()
+        cancelled.wait(LIMIT)
+        yield request
+
+    worker = LatestRequestWorker(lambda request: request, refine=refine, rest=0.01)
+    worker.request(1)
+    assert ready.wait(LIMIT)
+    worker.stop()
+    assert cancelled.is_set()
+
+
+def test_preparing_comes_first_and_errors_are_handed_over():
+    order = []
+
+    def fail(request):
+        order.append("solve")
+        raise ValueError("no such pose")
+
+    worker = LatestRequestWorker(fail, prepare=lambda: order.append("prepare"))
+    worker.request(1)
+    assert worker.wait(LIMIT) and order == ["prepare", "solve"]
+    assert worker.poll() == (None, "no such pose")
+    worker.stop()

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The extension's layers: which of its folders may import which, and what each thing is done by alone."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ADDON = Path(__file__).resolve().parents[2] / "addon"
+# Each folder imports itself and those before it.
+ORDER = ["core", "blender", "jobs", "handles", "surface", "results", "viewport", "deform", "stylize", "live"]
+ORDER += ["animation", "commands"]
+TOP = {"__init__", "registration", "lifecycle", "preferences", "install_check", "names", "properties"}
+# Operators and panels are what a user meets: they use any feature, and only the contents page lists them.
+LEAVES = ("operators", "panel")
+ALONE = {  # text of a call → the one module that makes it
+    "Thread(": "core/runtime/threads.py",
+    "app.timers.register": "blender/timers.py",
+    "event_timer_add": "jobs/display.py",
+    "draw_handler_add": "lifecycle.py",
+    "bpy.app.handlers,": "lifecycle.py",
+    "from bpy.app.handlers": "lifecycle.py",
+    "translations.register": "blender/translations.py",
+    "polib": "blender/translations.py",
+    "register_class": "registration.py",
+    "threading.enumerate": "core/runtime/threads.py",
+    "status_text_set": "jobs/display.py",
+}
+
+
+def modules():
+    return sorted(ADDON.rglob("*.py"))
+
+
+def name(path):
+    return path.relative_to(ADDON).as_posix()
+
+
+def imports(path):
+    """Dotted names, below the add-on, of what a module imports from it."""
+    package = path.relative_to(ADDON).parent.parts
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            base = [*package[: len(package) - node.level + 1], *(node.module or "").split(".")]
+            base = [part for part in base if part]
+            for alias in node.names:
+                inner = ADDON.joinpath(*base, alias.name)
+                is_module = inner.with_suffix(".py").exists() or inner.is_dir()
+                yield ".".join([*base, alias.name] if is_module else base)
+
+
+def is_leaf(path):
+    return path.stem in LEAVES
+
+
+def test_folders_import_towards_the_core_alone():
+    wrong = []
+    for path in modules():
+        folder = path.relative_to(ADDON).parts[0]
+        if path.parent == ADDON or is_leaf(path) or folder == "properties":
+            continue
+        allowed = {*ORDER[: ORDER.index(folder) + 1], "names"}
+        if folder == "core":
+            allowed -= {"names"}
+        wrong += [f"{name(path)} imports {one}" for one in imports(path) if one.split(".")[0] not in allowed]
+    assert not wrong, wrong
+
+
+def test_every_folder_has_its_place():
+    folders = {path.name for path in ADDON.iterdir() if path.is_dir() and any(path.glob("*.py"))}
+    assert folders - {"properties"} == set(ORDER)
+    assert {path.stem for path in ADDON.glob("*.py")} <= TOP
+
+
+def test_nothing_but_the_contents_page_needs_operators_or_panels():
+    wrong = []
+    for path in modules():
+        found = [one for one in imports(path) if one.split(".")[-1] in LEAVES]
+        if path.stem == "panel":
+            found = [one for one in found if not one.endswith(".panel")]  # sections draw parts of one another
+        wrong += [f"{name(path)} imports {one}" for one in found]
+    assert not wrong, wrong
+
+
+def test_properties_know_choices_and_tables_alone():
+    allowed = ("core.settings", "names", "blender.property_definitions")
+    found = [path for path in modules() if path.stem == "properties" or path.parent.name == "properties"]
+    wrong = [
+        f"{name(path)} imports {one}"
+        for path in found
+        for one in imports(path)
+        if not one.startswith(allowed) and "properties" not in one.split(".")
+    ]
+    assert found and not wrong, wrong
+
+
+def test_the_contents_page_lists_all_that_is_registered():
+    contents = ast.parse((ADDON / "registration.py").read_text())
+    listed = {node.value for node in ast.walk(contents) if isinstance(node, ast.Constant)}
+    defining = {
+        ".".join(path.relative_to(ADDON).with_suffix("").parts)
+        for path in modules()
+        if "\nCLASSES = [" in path.read_text() and path.name != "registration.py"
+    }
+    assert len(defining) > 10 and not defining - listed, defining - listed
+
+
+@pytest.mark.parametrize("call", ALONE)
+def test_each_thing_has_one_way(call):
+    assert [name(path) for path in modules() if call in path.read_text()] == [ALONE[call]]
+
+
+def test_state_is_in_objects_that_the_lifecycle_lists():
+    wrong = [
+        name(path)
+        for path in modules()
+        if any(isinstance(node, ast.Global) for node in ast.walk(ast.parse(path.read_text())))
+    ]
+    assert not wrong, f"module globals in {wrong}"

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Enabled and disabled again and again, in whatever state: nothing of the extension is left in Blender."""
+
+import pytest
+from inside import in_blender
+
+ROUNDS = 20
+STATES = ["idle", "live", "job", "counting"]
+
+
+def remains():
+    """All that the extension has in this Blender: {kind: names}."""
+    import inspect
+    import re
+
+    import bpy
+
+    from addon import lifecycle
+    from addon.blender import icons, timers
+    from addon.core.runtime import threads
+
+    def of_addon(function):
+        return (getattr(function, "__module__", "") or "").startswith("addon")
+
+    handlers = {
+        name: [function for function in functions if of_addon(function)]
+        for name, functions in inspect.getmembers(bpy.app.handlers, lambda value: isinstance(value, list))
+    }
+    configurations = bpy.context.window_manager.keyconfigs
+    maps = [config.keymaps for config in (configurations.addon, configurations.user) if config]
+    types = [name for name in dir(bpy.types) if re.match(r"ARAPFIELDS_", name)]
+    subclasses = [
+        cls
+        for base in (bpy.types.Operator, bpy.types.Panel, bpy.types.Menu, bpy.types.PropertyGroup)
+        for cls in base.__subclasses__()
+        if of_addon(cls) and cls.is_registered
+    ]
+    found = {f"handler {name}": functions for name, functions in handlers.items()}
+    return found | {
+        "types": types + subclasses,
+        "operators": dir(bpy.ops.arapfields),
+        "property": [name for name in ("arapfields",) if hasattr(bpy.types.Object, name)],
+        "timers": timers.running(),
+        "threads": threads.own_threads(),
+        "drawings": lifecycle._drawn,
+        "pictures": icons._collections,
+        "state": [state for state in lifecycle.STATE if is_busy(state)],
+        "key maps": [
+            item.idname
+            for keymaps in maps
+            for keymap in keymaps
+            for item in keymap.keymap_items
+            if item.idname.startswith("arapfields.")
+        ],
+        "menus": [
+            function
+            for name in dir(bpy.types)
+            for function in getattr(getattr(getattr(bpy.types, name), "draw", None), "_draw_funcs", [])
+            if of_addon(function)
+        ],
+    }
+
+
+def is_busy(state):
+    """Whether one of lifecycle.STATE holds anything."""
+    from addon.core.runtime import jobs
+    from addon.jobs.display import display
+    from addon.viewport import previews
+
+    if state is jobs.board:
+        return state.job is not None
+    if state is display:
+        return state._timer is not None or state._preview is not None
+    if state is previews.shown:
+        return state.mesh is not None
+    return bool(state) if isinstance(state, (dict, set)) else bool(state._started)
+
+
+def enter(state):
+    """Puts the scene into a state in which there is something to end."""
+    import time
+
+    import bpy
+    import scenes
+
+    from addon.core.runtime import jobs, native, threads
+    from addon.handles import counts
+
+    bar, *_ = scenes.bar_with_handles()
+    if state == "live":
+        assert bpy.ops.arapfields.live() == {"FINISHED"}
+    elif state == "job":
+
+        def work(tracker):
+            task = tracker.start("Waiting", 1.0)
+            while not task.cancelled:
+                pass
+
+        jobs.begin(jobs.Job("Deform", [jobs.Item("Bar", work)], native.library().Task))
+    elif state == "counting":
+        counts.points_inside = lambda *_: time.sleep(0.1) or {}
+        coroutine = counts.pending[bar.session_uid] = counts.counting(bpy.context, bar)
+        while not any("counting" in thread.name for thread in threads.own_threads()):
+            next(coroutine)
+
+
+@pytest.mark.parametrize("state", STATES)
+@in_blender
+def test_nothing_is_left_when_the_extension_is_disabled(state):
+    import bpy
+    from test_lifecycle import ROUNDS, enter, remains
+
+    import addon
+    from addon.handles import counts
+
+    enabled, points_inside = None, counts.points_inside
+    for _ in range(ROUNDS):
+        there = {kind: len(names) for kind, names in remains().items()}
+        enabled = enabled or there
+        assert there == enabled  # nothing is there twice
+        assert there["types"] > 25 and there["handler load_pre"] == 1
+        enter(state)
+        addon.unregister()
+        for kind, names in remains().items():
+            assert not names, (state, kind, names)
+        counts.points_inside = points_inside
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        addon.register()
+
+
+@in_blender
+def test_in_a_window_drawing_and_timers_end_too():
+    """Blender's own calls are noted, as a Blender without a window draws nothing."""
+    import bpy
+    from test_lifecycle import ROUNDS, remains
+
+    import addon
+    from addon import lifecycle
+    from addon.blender import host, library_loading
+
+    addon.unregister()
+    there, kept = [], (lifecycle.has_window, library_loading.has_window, bpy.types.SpaceView3D)
+
+    class SpaceView3D:
+        @staticmethod
+        def draw_handler_add(draw, arguments, region, when):
+            there.append(draw)
+            return draw
+
+        @staticmethod
+        def draw_handler_remove(handle, region):
+            there.remove(handle)
+
+    class Types:
+        def __getattr__(self, name):
+            return SpaceView3D if name == "SpaceView3D" else getattr(types, name)
+
+    types = bpy.types
+    lifecycle.has_window = library_loading.has_window = lambda: True
+    try:
+        lifecycle.bpy = type("Bpy", (), {"app": bpy.app, "types": Types()})
+        for _ in range(ROUNDS):
+            addon.register()
+            assert len(there) == len(lifecycle.DRAWINGS) and remains()["timers"]
+            addon.unregister()
+            assert not there and not remains()["timers"] and not lifecycle._drawn
+    finally:
+        lifecycle.bpy = bpy
+        lifecycle.has_window, library_loading.has_window, _ = kept
+        addon.register()
+    assert host.has_window() is False
+
+
+@in_blender
+def test_what_failed_half_way_is_undone():
+    import bpy
+    import pytest
+    from test_lifecycle import remains
+
+    import addon
+    from addon import lifecycle
+
+    addon.unregister()
+    parts, lifecycle.PARTS = lifecycle.PARTS, (*lifecycle.PARTS, (lambda: 1 / 0, None))
+    try:
+        with pytest.raises(ZeroDivisionError):
+            addon.register()
+        assert not any(remains().values())
+    finally:
+        lifecycle.PARTS = parts
+        addon.register()
+    assert hasattr(bpy.types.Object, "arapfields")
