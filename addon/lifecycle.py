@@ -39,6 +39,7 @@ def after_restore(*_):
 @persistent
 def after_update(scene, depsgraph):
     staleness.watch(depsgraph)
+    sessions.watch(depsgraph)
 
 
 HANDLERS = {  # of bpy.app.handlers

@@ -14,14 +14,37 @@ class ObjectReference:
         self.name, self.uid = item.name, item.session_uid
 
     def get(self):
-        for item in bpy.data.objects:
-            if item.session_uid == self.uid:
-                return item
-        raise UserError("{name} was deleted while it was worked on", name=self.name)
+        """The object; UserError when it is in no scene any more."""
+        item = self.find()
+        if not in_scene(item):
+            raise UserError("{name} was deleted while it was worked on", name=self.name)
+        return item
+
+    def find(self):
+        """The object even where it is in no scene, or None."""
+        return next((item for item in bpy.data.objects if item.session_uid == self.uid), None)
+
+
+def in_scene(item):
+    """Whether an object is there for the user: one that was deleted stays in the file while anything points
+    to it, but in no scene."""
+    return item is not None and any(holds(scene, item) for scene in bpy.data.scenes)
+
+
+def holds(scene, item):
+    same_name = scene.objects.get(item.name)
+    return same_name == item or (same_name is not None and item in scene.objects[:])
 
 
 def settings_of(item):
     return getattr(item, PROPERTY)
+
+
+def owner_of(item):
+    """The object that a handle or a result belongs to; None for others, and where that was deleted."""
+    settings = settings_of(item)
+    owner = settings.handle_of or settings.result_of
+    return owner if in_scene(owner) else None
 
 
 def source_of(context):
@@ -32,15 +55,13 @@ def source_of(context):
     active = context.view_layer.objects.active if context.view_layer else None
     if active is None:
         return None
-    settings = settings_of(active)
-    if active.type == "EMPTY":
-        if settings.handle_of is not None:
-            return settings.handle_of
+    owner = owner_of(active)
+    if active.type == "EMPTY" and owner is None:
         meshes = [item for item in context.selected_objects if item.type == "MESH"]
         return meshes[0] if len(meshes) == 1 else None
-    if active.type != "MESH":
+    if active.type not in ("EMPTY", "MESH"):
         return None
-    return settings.result_of if settings.result_of is not None else active
+    return owner or active
 
 
 def refusal(item, in_edit_mode=False):
@@ -49,6 +70,8 @@ def refusal(item, in_edit_mode=False):
         return UserError("Select a mesh object")
     if item.type != "MESH":
         return UserError("{name} is not a mesh object", name=item.name)
+    if item.override_library is not None:
+        return UserError("{name} is a library override; make it local first", name=item.name)
     if item.mode == "EDIT" and not in_edit_mode:
         return UserError("{name} is in Edit Mode; leave it first", name=item.name)
     return None

@@ -43,9 +43,9 @@ class ARAPFIELDS_OT_deform(JobOperator, bpy.types.Operator):
         options = build_options(af.DeformOptions, values)
         handles = empties.solve_handles(source, space_of(source.matrix_world, source.name), weights)
 
-        def solve(tracker, rest, samples):
+        def solve(tracker, rest, samples, weight):
             natives = native_handles(af, handles, rest, samples)
-            return af.deform(samples, natives, options, tracker.start("Deforming", 0.5))
+            return af.deform(samples, natives, options, tracker.start("Deforming", weight))
 
         return plan_solve_job(context, self, source, "DEFORM", values["samples"], values["seed"], solve)
 

@@ -26,7 +26,7 @@ class SolvedMesh:
 
 
 def plan_solve_job(context, operator, source, kind, samples, seed, solve):
-    """The job's item. `solve(tracker, surface, samples)` returns the field, on the worker."""
+    """The job's item. `solve(tracker, surface, samples, weight)` returns the field, on the worker."""
     surface = read_surface(context, source)
     settings = settings_of(source)
     output = effective_value("output", settings, operator)
@@ -42,10 +42,11 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
         if preview is not None:
             tracker.rest_preview_points = preview.points
         use_fit = choice == "FIT" or output != "WARP" or (choice == "AUTO" and surface.is_cached)
-        field = solve(tracker, surface, surface.samples(tracker, samples, seed, use_fit))
+        weight = 1.0 if output == "WARP" else 0.7  # of the solve in what is left to do
+        field = solve(tracker, surface, surface.samples(tracker, samples, seed, use_fit), weight)
         topology, report = None, {"output": output, **dict(field.report)}
         if output == "REMESH":
-            after, topology, figures = surface.extract_moved(tracker, field, cells, 0.3)
+            after, topology, figures = surface.extract_moved(tracker, field, cells)
             report |= figures
         else:
             before = surface.vertices

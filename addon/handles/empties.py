@@ -6,7 +6,7 @@ import numpy as np
 from mathutils import Matrix, Vector
 
 from ..blender import mesh_arrays, vertex_groups
-from ..blender.object_references import settings_of
+from ..blender.object_references import in_scene, settings_of
 from ..core.errors import UserError
 from ..core.geometry.handles import box_matrix, solve_handle
 from ..core.geometry.spaces import transform
@@ -35,8 +35,8 @@ def store_rest(source, entry):
 
 
 def used(source):
-    """The handles whose Empties still exist."""
-    return [entry for entry in settings_of(source).handles if entry.empty is not None]
+    """The handles whose Empties are still there."""
+    return [entry for entry in settings_of(source).handles if in_scene(entry.empty)]
 
 
 def require_handles(source):
@@ -83,7 +83,7 @@ def add(source, empty, kind="CUBE"):
         raise UserError("{name} is flat; give it a size and a scale other than zero", name=empty.name)
     settings = settings_of(source)
     owner = settings_of(empty).handle_of
-    if owner is not None and owner != source:
+    if owner is not None and owner != source and find(owner, empty) >= 0:  # a copy of a handle is none
         remove(owner, find(owner, empty))
     index = find(source, empty)
     if index < 0:

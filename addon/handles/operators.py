@@ -16,6 +16,7 @@ class HandleOperator:
     bl_options = {"REGISTER", "UNDO"}
     needs_handle = True
     in_edit_mode = False
+    counts_points = False  # whether it counts what the handles hold
 
     @classmethod
     def poll(cls, context):
@@ -30,11 +31,22 @@ class HandleOperator:
     def execute(self, context):
         context.view_layer.update()
         try:
-            self.report({"INFO"}, self.change(context, source_of(context)))
+            source = source_of(context)
+            self.report({"INFO"}, self.change(context, source))
+            self.warn_of_empty(source)
         except UserError as error:
             self.report({"ERROR"}, translated(error))
             return {"CANCELLED"}
         return {"FINISHED"}
+
+    def warn_of_empty(self, source):
+        """Says which handles hold nothing; a solve would refuse them."""
+        names = [entry.empty.name for entry in empties.used(source) if entry.inside == 0]
+        if self.counts_points and names:
+            error = UserError(
+                "no part of the surface lies in the rest region of {names}", names=", ".join(names)
+            )
+            self.report({"WARNING"}, translated(error))
 
 
 def chosen_entries(context, source):
@@ -43,6 +55,11 @@ def chosen_entries(context, source):
     selected = [entry for entry in empties.used(source) if entry.empty in context.selected_objects]
     if selected:
         return selected
+    copies = [item for item in context.selected_objects if settings_of(item).handle_of == source]
+    if copies:
+        raise UserError(
+            "{name} is a copy of a handle and is none itself; add it as a handle first", name=copies[0].name
+        )
     index = settings.active_handle
     return [settings.handles[index]] if 0 <= index < len(settings.handles) else []
 
@@ -53,7 +70,7 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
     bl_idname = Op.ADD_HANDLE
     bl_label = "Add Handle"
     needs_handle = False
-    in_edit_mode = True
+    in_edit_mode = counts_points = True
 
     kind: bpy.props.EnumProperty(
         items=HANDLE_KINDS, name="Kind", description="What of the surface the handle holds"
@@ -76,10 +93,14 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
         selected = [item for item in context.selected_objects if item.type == "EMPTY"]
         if not selected or self.place != "AUTO" or source.mode == "EDIT":
             selected = [empties.new_empty(context, source, self.kind, group, self.place)]
+        others = {settings_of(empty).handle_of for empty in selected} - {None, source}
         for empty in selected:
             entry = empties.add(source, empty, self.kind)
             entry.group = group if self.kind == "GROUP" else ""
         counts.count_inside(context, source)
+        for other in sorted(item.name for item in others):
+            text = translated("handles of {other} were taken over by {name}", other=other, name=source.name)
+            self.report({"WARNING"}, text)
         return translated("{count} handles added to {name}", count=len(selected), name=source.name)
 
 
@@ -88,6 +109,7 @@ class ARAPFIELDS_OT_mirror_handle(HandleOperator, bpy.types.Operator):
 
     bl_idname = Op.MIRROR_HANDLE
     bl_label = "Mirror Handle"
+    counts_points = True
 
     axis: bpy.props.EnumProperty(
         items=[(axis, axis, f"Across the object's {axis} axis") for axis in "XYZ"],
@@ -109,6 +131,7 @@ class ARAPFIELDS_OT_set_rest(HandleOperator, bpy.types.Operator):
 
     bl_idname = Op.SET_REST
     bl_label = "Set Rest Pose"
+    counts_points = True
 
     all: bpy.props.BoolProperty(name="All", description="Every handle of the object, selected or not")
 

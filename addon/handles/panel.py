@@ -2,6 +2,7 @@
 import bpy
 
 from ..blender.language import translated
+from ..blender.object_references import in_scene
 from ..blender.section import Section
 from ..names import Op
 
@@ -11,7 +12,7 @@ ICONS = {"CUBE": "CUBE", "POINT": "DOT", "GROUP": "GROUP_VERTEX"}
 class ARAPFIELDS_UL_handles(bpy.types.UIList):
     def draw_item(self, context, layout, data, item, icon, active_data, active_propname, index):
         row = layout.row(align=True)
-        if item.empty is None:
+        if not in_scene(item.empty):
             row.label(text="(deleted)", icon="ERROR")
             return
         swatch = row.row()

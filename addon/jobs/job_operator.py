@@ -7,7 +7,7 @@ import bpy
 
 from ..blender import vertex_groups
 from ..blender.language import translated
-from ..blender.object_references import ObjectReference, refusal, settings_of, source_of
+from ..blender.object_references import ObjectReference, owner_of, refusal, source_of
 from ..core.errors import UserError
 from ..core.runtime import jobs, native
 from ..core.runtime.coroutines import Pause, run_to_completion
@@ -52,7 +52,7 @@ class JobOperator(ModalRun):
         if self.scope == "COLLECTION":
             within = [item for home in active.users_collection for item in home.all_objects]
         meshes = [item for item in within if item.type == "MESH"]
-        owners = dict.fromkeys(settings_of(item).result_of or item for item in meshes)
+        owners = dict.fromkeys(owner_of(item) or item for item in meshes)
         refusals = {item: refusal(item) for item in owners}
         self.failures += [translated(reason) for reason in refusals.values() if reason]
         return [item for item, reason in refusals.items() if not reason]

@@ -31,13 +31,15 @@ STYLE_OPTIONS = {
     "samples": 3000,
     "coarse_centers": 100,
     "fine_centers": 500,
-    "bending": 1e-3,
     "tolerance": 3e-4,
 }
 
 
+LEAST_RIGIDITY = 1e-3  # of a live style
+
+
 class Changed(Exception):
-    """Handles were added, removed or given another rest pose: the solver must be set up again."""
+    """The source was edited, or its handles or settings: the solver must be set up again."""
 
 
 class Session:
@@ -47,11 +49,11 @@ class Session:
         settings = settings_of(source)
         self.source, self.kind, self.layout = ObjectReference(source), kind, layout_of(source, kind)
         self.surface = read_surface(context, source)
+        self.fingerprint, self.may_be_edited = mesh_arrays.fingerprint(source.data), False
         self.output, self.choice = settings.output, settings.surface
         self.cells = min(settings.resolution, PREVIEW_CELLS)
         self.handles, self.weights = [], None
-        self.bending = from_single_precision(settings.deform.bending)
-        self.handle_weight = from_single_precision(settings.deform.handle_weight)
+        self.energy = energy_weights(settings, kind)
         self.requested = self.solver = self.samples = self.topology = self.style_set = None
         self.result = None
         if shown:
@@ -101,9 +103,14 @@ class Session:
         use_fit = self.output != "WARP" or self.choice == "FIT"
         use_fit = use_fit or (self.choice == "AUTO" and surface.is_cached)
         self.samples = surface.samples(ProgressTracker(af.Task), SAMPLES, 0, use_fit)
-        options = {"bending": self.bending, "handle_weight": self.handle_weight}
+        options = {**self.energy}
         if self.kind == "STYLIZE":
             options |= STYLE_OPTIONS
+            # The live energy has stretch with weight 1: all others are relative to it.
+            rigidity = max(options.pop("rigidity"), LEAST_RIGIDITY)
+            options["gauss_weight"] = af.LiveOptions().gauss_weight
+            for name in ("bending", "barrier", "gauss_weight", "handle_weight"):
+                options[name] /= rigidity
             if self.weights is not None:
                 self.weights = vertex_groups.at_points(surface.vertices, self.weights, self.samples.points)
         handles = native_handles(af, self.handles, surface, self.samples)
@@ -148,13 +155,22 @@ class Session:
         """Sends what is asked for to the worker when it changed."""
         if not self.advance():
             return
-        source = self.source.get()
-        if layout_of(source, self.kind) != self.layout:
+        source, _ = self.source.get(), self.result.get()  # both are still there
+        if source.mode == "EDIT":  # it goes on from what the user leaves
+            return
+        if layout_of(source, self.kind) != self.layout or self.is_edited(source):
             raise Changed
         request = self.current_request(context, source)
         if self.requested is None or not same(request, self.requested):
             self.requested = request
             self.worker.request(request)
+
+    def is_edited(self, source):
+        """Whether the source's mesh is another than when it was read; looked at after an update of it."""
+        if not self.may_be_edited:
+            return False
+        self.may_be_edited = False
+        return mesh_arrays.fingerprint(source.data) != self.fingerprint
 
     def current_request(self, context, source):
         """(targets of the handles, (key, directions, strength, sharpness) of the style or None)."""
@@ -196,6 +212,16 @@ class Session:
             self.show()
 
 
+def energy_weights(settings, kind):
+    """The weights of the energy's terms by name, as the section that is live has them."""
+    group = settings.deform if kind == "DEFORM" else settings.stylize
+    weights = {"bending": group.bending, "barrier": group.barrier}
+    weights["handle_weight"] = settings.deform.handle_weight
+    if kind == "STYLIZE":
+        weights["rigidity"] = group.rigidity
+    return {name: from_single_precision(value) for name, value in weights.items()}
+
+
 def uses_handles(settings, kind):
     return kind == "DEFORM" or settings.stylize.use_handles
 
@@ -205,8 +231,7 @@ def layout_of(source, kind):
     settings = settings_of(source)
     held = [(e.empty.session_uid, e.kind, e.group, e.weight, tuple(e.rest)) for e in empties.used(source)]
     style = settings.stylize.region, settings.stylize.region_material
-    weights = settings.deform.bending, settings.deform.handle_weight
-    further = (*map(from_single_precision, weights), settings.output, settings.surface)
+    further = (*energy_weights(settings, kind).items(), settings.output, settings.surface)
     if kind == "STYLIZE":
         further += (*style, settings.stylize.use_handles)
     return (held if uses_handles(settings, kind) else [], further)

@@ -10,6 +10,7 @@ from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..core.runtime import jobs
+from ..results import result_objects
 from . import live_object
 from .session import Changed, Session
 
@@ -25,8 +26,7 @@ class Sessions(dict):
         for uid in list(self):
             session = self.pop(uid)
             session.stop()
-            with contextlib.suppress(UserError, ReferenceError, AttributeError):
-                live_object.drop(session.source.get())
+            take_away(session)
 
 
 live = Sessions()
@@ -84,12 +84,35 @@ def update(context, wait=0.0, refined=False):
             session.stop()
             told = translated("{error}; live mode ended", error=translated(error))
             jobs.add_message("ERROR", f"{session.source.name}: {told}")
-            with contextlib.suppress(UserError, ReferenceError):
-                live_object.drop(session.source.get())
+            take_away(session)
+
+
+def take_away(session):
+    """Takes the live object away, also one that an undone step left in the file but in no scene."""
+    with contextlib.suppress(UserError, ReferenceError, AttributeError):
+        live_object.drop(session.source.find())
+    leftover = session.result.find()
+    if leftover is not None:
+        result_objects.discard(leftover)
+
+
+def watch(depsgraph):
+    """Looks through what Blender has just updated for edits of live sources."""
+    if not live:
+        return
+    meshes = {
+        update.id.original.session_uid
+        for update in depsgraph.updates
+        if update.is_updated_geometry and isinstance(update.id, bpy.types.Mesh)
+    }
+    for session in live.values() if meshes else ():
+        source = session.source.find()
+        if source is not None and source.data.session_uid in meshes:
+            session.may_be_edited = True
 
 
 def restart(context, uid, session):
-    """Handles were added or removed: the solver is set up anew, the result stays the same object."""
+    """The source or its handles changed: the solver is set up anew, the result stays the same object."""
     source = session.source.get()
     try:
         begin(context, source, session.kind)

@@ -3,6 +3,7 @@
 
 import bpy
 
+from ..blender.object_references import owner_of, settings_of
 from ..core.settings.choices import NORMALS, OUTPUTS, PLACEMENTS, SURFACES
 from ..handles.properties import ARAPFIELDS_PG_handle
 from ..names import PROPERTY
@@ -90,8 +91,8 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     @property
     def owner(self):
         """The settings of the object that this one, a handle or a result, belongs to; its own for others."""
-        source = self.handle_of or self.result_of
-        return getattr(source, PROPERTY) if source is not None else self
+        source = owner_of(self.id_data)
+        return settings_of(source) if source is not None else self
 
 
 CLASSES = [ARAPFIELDS_PG_result, ARAPFIELDS_PG_object]

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
+from ..blender.object_references import in_scene
 from ..blender.section import Section
 from ..names import Op
 
@@ -16,7 +17,7 @@ class ARAPFIELDS_PT_result(Section, bpy.types.Panel):
         layout.prop(settings, "normals")
         layout.operator(Op.EXTRACT, icon="OUTLINER_OB_SURFACE")
         for entry in settings.results:
-            if entry.item is not None:
+            if in_scene(entry.item):
                 row = layout.row()
                 row.prop(entry.item, "name", text="", icon="OBJECT_DATA")
                 row.prop(entry.item, "hide_viewport", text="", emboss=False)

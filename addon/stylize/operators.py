@@ -52,7 +52,7 @@ class ARAPFIELDS_OT_stylize(JobOperator, bpy.types.Operator):
         handles = empties.solve_handles(source, space, of_groups) if settings.use_handles else []
         weights = preference.region_weights(context, source, settings, of_groups)
 
-        def solve(tracker, rest, samples):
+        def solve(tracker, rest, samples, weight):
             blend = (
                 None if weights is None else vertex_groups.at_points(rest.vertices, weights, samples.points)
             )
@@ -60,7 +60,7 @@ class ARAPFIELDS_OT_stylize(JobOperator, bpy.types.Operator):
                 samples,
                 style.directions(af),
                 options,
-                tracker.start("Stylizing", 0.5),
+                tracker.start("Stylizing", weight),
                 weights=blend,
                 handles=native_handles(af, handles, rest, samples),
             )

@@ -63,20 +63,20 @@ class SourceSurface:
         af = native.library()
         if use_fit:
             sdf = self.fit(tracker, 0.3)
-            return af.sample_surface(sdf, count=count, seed=seed, task=tracker.start("Sampling", 0.1))
+            return af.sample_surface(sdf, count=count, seed=seed, task=tracker.start("Sampling", 0.15))
         return af.sample_mesh(self.vertices, self.triangles, count=count, seed=seed)
 
     def extract(self, tracker, resolution, weight):
         """(k, 3) vertices and the topology of the implicit surface, in solve space."""
         af = native.library()
         sdf = self.fit(tracker, weight)
-        task = tracker.start("Extracting", 0.2)
+        task = tracker.start("Extracting", 1.0)
         return checked_mesh(*af.extract_surface(sdf, resolution=resolution, task=task))
 
-    def extract_moved(self, tracker, field, resolution, weight):
+    def extract_moved(self, tracker, field, resolution):
         """The same of the surface where the field moves it, by marching cubes there; and a report."""
         sdf, report = self.fit(tracker, 0.0), {}
-        task = tracker.start("Extracting", weight)
+        task = tracker.start("Extracting", 1.0)
         mesh = native.library().extract_deformed(sdf, field, resolution, task=task, report=report)
         return *checked_mesh(*mesh), {name: report[name] for name in ("inverted", "failures")}
 

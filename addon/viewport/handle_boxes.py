@@ -7,7 +7,7 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 from ..blender import user_preferences
-from ..blender.object_references import settings_of, source_of
+from ..blender.object_references import in_scene, settings_of, source_of
 from ..handles import empties
 
 CORNERS = np.array([(x, y, z, 1.0) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
@@ -25,7 +25,7 @@ def segments(source):
     """((r, g, b, alpha), line ends in world space) of all handles of a source."""
     lines = []
     for entry in settings_of(source).handles:
-        if entry.empty is None or not entry.empty.visible_get():
+        if not in_scene(entry.empty) or not entry.empty.visible_get():
             continue
         rest, now = empties.rest_box(source, entry), empties.current_box(entry.empty)
         lines.append(((*entry.colour, REST_ALPHA), box_lines(rest)))

@@ -94,8 +94,8 @@ def test_progress_never_falls_and_ends_at_one():
     job = None
 
     def work(tracker):
-        for share in (0.25, 0.75):
-            task = tracker.start("Part", share)
+        for weight in (0.25, 1.0):
+            task = tracker.start("Part", weight)
             for step in range(5):
                 task.progress = step / 4
                 seen.append(job.fraction)

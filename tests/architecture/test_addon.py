@@ -83,7 +83,7 @@ def test_nothing_but_the_contents_page_needs_operators_or_panels():
 
 
 def test_properties_know_choices_and_tables_alone():
-    allowed = ("core.settings", "names", "blender.property_definitions")
+    allowed = ("core.settings", "names", "blender.property_definitions", "blender.object_references")
     found = [path for path in modules() if path.stem == "properties" or path.parent.name == "properties"]
     wrong = [
         f"{name(path)} imports {one}"

@@ -68,3 +68,29 @@ def test_the_implicit_surface_follows_too():
     step()
     shift = scenes.world_points(result) - before
     assert abs(shift[before[:, 0] > 0.9][:, 2].mean() - 0.3) < 0.05
+
+
+@in_blender
+def test_a_live_style_follows_stiffness_rigidity_and_the_fold_barrier():
+    import bpy
+    from test_live import step
+
+    from addon.live import sessions
+
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
+    ball = bpy.context.object
+    style = ball.arapfields.stylize
+    bpy.ops.arapfields.live(kind="STYLIZE")
+
+    def report():
+        for _ in range(2):  # the first look sets the solver up anew
+            step(refined=True)
+        return sessions.live[ball.session_uid].solver.report
+
+    usual = report()
+    style.rigidity = 50.0
+    assert report()["stretch"] < 0.2 * usual["stretch"]
+    style.rigidity, style.bending = 1.0, 5.0
+    assert report()["bend"] < 0.1 * usual["bend"]
+    style.bending, style.barrier = 1e-3, 0.0
+    assert report()["min_determinant"] < usual["min_determinant"]

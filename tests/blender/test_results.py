@@ -143,7 +143,7 @@ def test_without_a_window_the_course_gives_what_blocking_gives():
     cls = deform.ARAPFIELDS_OT_deform
 
     class Operator:
-        title, in_window, scope, looks = "Deform", True, "ACTIVE", 0
+        title, in_window, scope, looks, fraction = "Deform", True, "ACTIVE", 0, 0.0
         properties = type("P", (), {"is_property_set": staticmethod(lambda name: False)})
         coroutine, prepare, sources, plan = cls.coroutine, cls.prepare, cls.sources, cls.plan
         groups_of = cls.groups_of
@@ -161,5 +161,7 @@ def test_without_a_window_the_course_gives_what_blocking_gives():
             assert ended.value == {"FINISHED"}
             break
         operator.looks = max(operator.looks, jobs.running().preview_points()[1])
+        operator.fraction = max(operator.fraction, jobs.running().fraction)
     jobs.stop()
     assert np.array_equal(scenes.world_points(bpy.data.objects["Bar_deformed"]), blocking)
+    assert operator.fraction > 0.9  # the share done and "iteration 40 of 40" say the same

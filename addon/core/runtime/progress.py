@@ -21,10 +21,13 @@ class ProgressTracker:
         self.rest_preview_points = None  # (n, 3) whose moved positions every native call shall publish
 
     def start(self, name, weight):
-        """A task for the next native call, which is about this part, `weight`, of the item's work."""
+        """A task for the next native call, which is about this part, `weight`, of the work that is left.
+
+        The last call has weight 1, so that the whole ends at 1 whatever was skipped before it.
+        """
         with self._lock:
             self._begun = min(1.0, self._begun + self._weight)
-            self._name, self._weight, self._task = name, weight, self._make_task()
+            self._name, self._weight, self._task = name, weight * (1.0 - self._begun), self._make_task()
             if self.rest_preview_points is not None:
                 self._task.watch(self.rest_preview_points)
             if self._cancelled:

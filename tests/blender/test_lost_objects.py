@@ -1,0 +1,247 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Objects that users delete, duplicate, override or edit at the wrong moment."""
+
+import pytest
+from inside import in_blender
+
+
+def delete(item):
+    """As the user does: unlinked from the scene, while pointers keep the data alive."""
+    import bpy
+
+    for home in item.users_collection:
+        home.objects.unlink(item)
+    bpy.context.view_layer.update()
+    assert item.name in bpy.data.objects
+
+
+@in_blender
+def test_a_deleted_empty_is_no_handle_though_a_pointer_keeps_it():
+    import bpy
+    import pytest
+    import scenes
+    from test_lost_objects import delete
+
+    from addon.handles import empties
+
+    bar, fixed, moving = scenes.bar_with_handles()
+    delete(moving)
+    assert [entry.empty for entry in empties.used(bar)] == [fixed]
+    delete(fixed)
+    with pytest.raises(RuntimeError, match="Add a handle first"):
+        bpy.ops.arapfields.deform(**scenes.QUICK)
+
+
+@in_blender
+def test_a_deleted_source_is_worked_on_no_more():
+    import bpy
+    import scenes
+    from test_lost_objects import delete
+
+    from addon.blender.object_references import source_of
+
+    bar, fixed, _ = scenes.bar_with_handles()
+    bpy.ops.arapfields.deform(**scenes.QUICK)
+    result = bpy.data.objects["Bar_deformed"]
+    delete(bar)
+    scenes.activate(fixed)
+    assert source_of(bpy.context) is None and not bpy.ops.arapfields.deform.poll()
+    assert fixed.arapfields.owner == fixed.arapfields
+    scenes.activate(result)
+    assert source_of(bpy.context) == result  # an object like any other
+
+
+@pytest.mark.parametrize("which", ["source", "live object"])
+@in_blender
+def test_live_ends_when_its_source_or_its_object_is_deleted(which):
+    import bpy
+    import scenes
+    from test_live import step
+    from test_lost_objects import delete
+
+    from addon.live import sessions
+
+    bar, _, moving = scenes.bar_with_handles()
+    bpy.ops.arapfields.live()
+    delete(bar if which == "source" else bpy.data.objects["Bar_live"])
+    moving.location.z += 0.4
+    step()
+    assert not sessions.live and "Bar_live" not in bpy.data.objects
+    assert bar.display_type == "TEXTURED" and not bar.arapfields.results
+
+
+@in_blender
+def test_a_copy_of_a_handle_takes_no_other_handle_away():
+    import bpy
+    import pytest
+    import scenes
+
+    bar, fixed, moving = scenes.bar_with_handles()
+    copied = moving.copy()
+    bpy.context.collection.objects.link(copied)
+    bpy.context.view_layer.update()
+    scenes.activate(copied)
+    with pytest.raises(RuntimeError, match=r"Moving\.001 is a copy of a handle and is none itself"):
+        bpy.ops.arapfields.remove_handle()
+    assert len(bar.arapfields.handles) == 2
+    other = scenes.bar("Other")
+    scenes.activate(copied, other)
+    bpy.ops.arapfields.add_handle()
+    assert [entry.empty for entry in other.arapfields.handles] == [copied]
+    assert [entry.empty for entry in bar.arapfields.handles] == [fixed, moving]
+
+
+@in_blender
+def test_taking_a_handle_from_another_mesh_is_said():
+    import scenes
+
+    from addon.handles import operators
+
+    bar, _, moving = scenes.bar_with_handles()
+    other = scenes.bar("Other")
+    scenes.activate(moving, other)
+    said = reports(operators.ARAPFIELDS_OT_add_handle, kind="CUBE", place="AUTO", group="")
+    assert said["WARNING"][0] == "handles of Bar were taken over by Other"
+    assert len(bar.arapfields.handles) == 1 and len(other.arapfields.handles) == 1
+
+
+@in_blender
+def test_a_handle_that_holds_nothing_is_said():
+    import scenes
+
+    from addon.handles import operators
+
+    bar = scenes.bar()
+    far = scenes.cube_empty((30, 0, 0), (1, 1, 1), "Far")
+    scenes.activate(far, bar)
+    said = reports(operators.ARAPFIELDS_OT_add_handle, kind="CUBE", place="AUTO", group="")
+    assert said["WARNING"] == ["no part of the surface lies in the rest region of Far"]
+
+
+def reports(operator, **properties):
+    """{level: texts} that an operator reports when it is executed with these properties."""
+    import bpy
+
+    said = {"INFO": [], "WARNING": [], "ERROR": []}
+    stand_in = type("Operator", (), {**vars(operator), **properties})
+    for base in reversed(operator.__mro__[1:2]):
+        for name, value in vars(base).items():
+            if not name.startswith("__") and name not in vars(operator):
+                setattr(stand_in, name, value)
+    stand_in.report = lambda self, levels, text: said[next(iter(levels))].append(text)
+    stand_in().execute(bpy.context)
+    return said
+
+
+@in_blender
+def test_a_library_override_is_refused_before_pressing():
+    import tempfile
+
+    import bpy
+    import pytest
+    import scenes
+
+    scenes.bar_with_handles("Linked")
+    path = tempfile.mktemp(suffix=".blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(path, link=True) as (_, into):
+        into.objects = ["Linked"]
+    bpy.context.collection.objects.link(into.objects[0])
+    override = into.objects[0].override_create(remap_local_usages=True)
+    bpy.context.view_layer.update()
+    scenes.activate(override)
+    ours = bpy.ops.arapfields
+    for operator in (
+        ours.deform,
+        ours.stylize,
+        ours.extract,
+        ours.bake,
+        ours.live,
+        ours.add_handle,
+        ours.fit,
+    ):
+        with pytest.raises(RuntimeError, match="Linked is a library override; make it local first"):
+            operator()
+
+
+@in_blender
+def test_edits_of_a_live_source_are_followed():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_live import step
+
+    from addon.live import sessions
+
+    bar, *_ = scenes.bar_with_handles()
+    bpy.ops.arapfields.live()
+    session = sessions.live[bar.session_uid]
+    bar.data.update_tag()
+    step()
+    assert sessions.live[bar.session_uid] is session  # nothing was changed
+    points = np.array([vertex.co for vertex in bar.data.vertices])
+    points[:, 1] *= 1.5
+    scenes.set_positions(bar.data, points)
+    step()
+    step()
+    assert sessions.live[bar.session_uid] is not session
+    shown = scenes.world_points(bpy.data.objects["Bar_live"])
+    assert np.abs(shown - points).max() < 0.05
+
+
+@in_blender
+def test_live_waits_while_its_source_is_in_edit_mode():
+    import bpy
+    import scenes
+    from test_live import step
+
+    from addon.live import sessions
+
+    bar, *_ = scenes.bar_with_handles()
+    bpy.ops.arapfields.live()
+    scenes.activate(bar)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.subdivide()
+    step()
+    assert sessions.is_live(bar)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    step()
+    step()
+    assert sessions.is_live(bar)
+    assert len(bpy.data.objects["Bar_live"].data.vertices) == len(bar.data.vertices)
+
+
+@in_blender
+def test_after_a_bake_the_present_frame_is_shown():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_bake import animated
+
+    bar = animated()
+    bpy.context.scene.frame_set(1)
+    bpy.ops.arapfields.bake(start=1, end=5, step=2)
+    keys = bpy.data.objects["Bar_baked"].data.shape_keys.key_blocks
+    assert [round(key.value, 3) for key in keys[1:]] == [1.0, 0.0, 0.0]
+    shift = scenes.world_points(bpy.data.objects["Bar_baked"]) - scenes.world_points(bar)
+    assert np.abs(shift).max() < 0.05
+
+
+@in_blender
+def test_a_live_object_that_undo_left_in_no_scene_goes_too():
+    import bpy
+    import scenes
+    from test_live import step
+    from test_lost_objects import delete
+
+    from addon.live import sessions
+
+    bar, *_ = scenes.bar_with_handles()
+    bpy.ops.arapfields.live()
+    delete(bpy.data.objects["Bar_live"])
+    bar.arapfields.results.clear()  # as in the step before
+    bar.display_type, bar.arapfields.live_display = "TEXTURED", ""
+    step()
+    assert not sessions.live and "Bar_live" not in bpy.data.objects and "Bar_live" not in bpy.data.meshes

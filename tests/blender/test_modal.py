@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The modal operator and what it shows, driven by stand-ins for a window's events, timer and status bar."""
+
+import contextlib
+
+from inside import in_blender
+
+
+class Window:
+    """Stands for a context with a window: notes timers, status texts and modal handlers."""
+
+    def __init__(self):
+        self.timers, self.texts, self.handlers = [], [], []
+        self.window, self.window_manager, self.workspace = object(), self, self
+        self.windows, self.data, self.context = [], self, self
+        self.workspaces = [self]
+
+    def event_timer_add(self, seconds, window):
+        self.timers.append(seconds)
+        return seconds
+
+    def event_timer_remove(self, timer):
+        self.timers.remove(timer)
+
+    def modal_handler_add(self, operator):
+        self.handlers.append(operator)
+
+    def status_text_set(self, text):
+        self.texts.append(text)
+
+
+@contextlib.contextmanager
+def window():
+    """A Window that the add-on takes for Blender's own."""
+    from addon.jobs import display, modal
+
+    stand_in, kept = Window(), (display.bpy, modal.has_window)
+    display.bpy, modal.has_window = stand_in, lambda: True
+    try:
+        yield stand_in
+    finally:
+        display.bpy, modal.has_window = kept
+
+
+def operator(work):
+    """A modal operator whose one job is `work(tracker)`."""
+    from addon.core.runtime import jobs, native
+    from addon.core.runtime.coroutines import Pause
+    from addon.jobs.modal import ModalRun
+
+    class Operator(ModalRun):
+        def coroutine(self, context):
+            job = jobs.Job("Test", [jobs.Item("Bar", work)], native.library().Task)
+            jobs.begin(job)
+            while not job.done:
+                yield Pause.WORKER
+            yield Pause.REDRAW
+            return {"CANCELLED"} if job.take_outcomes()[0].cancelled else {"FINISHED"}
+
+    return Operator()
+
+
+def event(kind, value="NOTHING"):
+    return type("Event", (), {"type": kind, "value": value})
+
+
+def until_ended(running, context):
+    import time
+
+    end = time.monotonic() + 60
+    while time.monotonic() < end:
+        time.sleep(0.005)
+        result = running.modal(context, event("TIMER"))
+        if result != {"RUNNING_MODAL"}:
+            return result
+    raise AssertionError("the job hangs")
+
+
+def wait_for_cancel(tracker):
+    task = tracker.start("Waiting", 1.0)
+    while not task.cancelled:
+        pass
+    from addon.core.runtime.progress import JobCancelled
+
+    raise JobCancelled
+
+
+@in_blender
+def test_a_job_runs_beside_events_and_leaves_nothing_in_the_window():
+    import time
+
+    with window() as context:
+        running = operator(lambda tracker: (tracker.start("Working", 1.0), time.sleep(0.5)))
+        assert running.invoke(context, None) == {"RUNNING_MODAL"}
+        assert context.handlers == [running] and len(context.timers) == 1
+        assert running.modal(context, event("MOUSEMOVE")) == {"PASS_THROUGH"}
+        assert until_ended(running, context) == {"FINISHED"}
+        assert "Bar · Working" in " ".join(filter(None, context.texts))
+        assert context.texts[-1] is None and not context.timers
+
+
+@in_blender
+def test_escape_cancels():
+    with window() as context:
+        running = operator(wait_for_cancel)
+        running.invoke(context, None)
+        assert running.modal(context, event("ESC", "PRESS")) == {"RUNNING_MODAL"}
+        assert until_ended(running, context) == {"CANCELLED"}
+        assert context.texts[-1] is None and not context.timers
+
+
+@in_blender
+def test_the_status_bar_is_cleared_when_the_extension_is_disabled():
+    import addon
+    from addon.core.runtime import jobs
+
+    with window() as context:
+        running = operator(wait_for_cancel)
+        running.invoke(context, None)
+        assert context.texts[-1] and "Bar" in context.texts[-1]
+        addon.unregister()
+        assert context.texts[-1] is None and not context.timers and jobs.running() is None
+        assert running.modal(context, event("TIMER")) == {"CANCELLED"}
+        addon.register()
