@@ -64,11 +64,17 @@ bench: build $(VENV)/.tools  ## paired benchmarks against the real competitors
 	$(PIP) -q -r tests/benchmarks/requirements.txt
 	$(PY) -m tests.benchmarks
 
-sanitize: setup  ## the native tests under the address and undefined-behaviour sanitizers
-	$(VENV)/bin/cmake -S . -B build/sanitize -G Ninja -DPython_EXECUTABLE=$(abspath $(PY)) -DCMAKE_MAKE_PROGRAM=$(abspath $(VENV)/bin/ninja) \
-	  -DCMAKE_BUILD_TYPE=RelWithDebInfo -DARAPFIELDS_SANITIZE=address,undefined -DARAPFIELDS_NATIVE_TESTS=ON
+SANITIZED = $(VENV)/bin/cmake -S . -G Ninja -DPython_EXECUTABLE=$(abspath $(PY)) -DCMAKE_MAKE_PROGRAM=$(abspath $(VENV)/bin/ninja) \
+  -DCMAKE_BUILD_TYPE=RelWithDebInfo -DARAPFIELDS_NATIVE_TESTS=ON
+
+# The thread sanitizer does not follow forks: the tests that make them are left out.
+sanitize: setup  ## the native tests under the address and undefined-behaviour sanitizers, those of threads under the thread sanitizer
+	$(SANITIZED) -B build/sanitize -DARAPFIELDS_SANITIZE=address,undefined
 	$(VENV)/bin/cmake --build build/sanitize --target native_tests
 	ASAN_OPTIONS=detect_leaks=0:detect_odr_violation=0 UBSAN_OPTIONS=print_stacktrace=1 build/sanitize/tests/native_tests
+	$(SANITIZED) -B build/sanitize-thread -DARAPFIELDS_SANITIZE=thread
+	$(VENV)/bin/cmake --build build/sanitize-thread --target native_tests
+	build/sanitize-thread/tests/native_tests --run_test=threads --run_test='!@fork'
 
 format: setup  ## clang-format and ruff over our files
 	git ls-files '*.h' '*.cpp' | xargs $(VENV)/bin/clang-format -i

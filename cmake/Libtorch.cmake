@@ -21,6 +21,13 @@ foreach(name c10 torch_cpu torch)
   find_library(LIBTORCH_${name} NAMES ${name} PATHS "${LIBTORCH_DIR}/lib" NO_DEFAULT_PATH REQUIRED)
   target_link_libraries(libtorch::libtorch INTERFACE "${LIBTORCH_${name}}")
 endforeach()
+# The OpenMP library that libtorch brings along: a call tells it to keep to one thread (core/torch_threads.h).
+file(GLOB LIBTORCH_OPENMP "${LIBTORCH_DIR}/lib/libgomp*.so*" "${LIBTORCH_DIR}/../torch.libs/libgomp*.so*")
+if(NOT LIBTORCH_OPENMP)
+  message(FATAL_ERROR "no libgomp beside ${LIBTORCH_DIR}/lib/libtorch_cpu.so")
+endif()
+list(GET LIBTORCH_OPENMP 0 LIBTORCH_OPENMP)
+target_link_libraries(libtorch::libtorch INTERFACE "${LIBTORCH_OPENMP}")
 # A CUDA build registers its kernels when libtorch_cuda is loaded, though no symbol of it is named by us.
 find_library(LIBTORCH_torch_cuda NAMES torch_cuda PATHS "${LIBTORCH_DIR}/lib" NO_DEFAULT_PATH)
 if(LIBTORCH_torch_cuda)

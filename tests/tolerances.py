@@ -64,3 +64,6 @@ EVENED = 0.35
 SAME_VECTORS = 1e-9
 # A solve with products rounded to bfloat16 against one without: what noise of 2e-3 in a product costs.
 ROUNDED_SOLVE = 0.1
+# How many times as long a call may take beside as many busy processes as there are processors: fair is 2, the
+# rest is what threads that wait for each other lose to the scheduler.
+BUSY_SLOWDOWN = 2.5

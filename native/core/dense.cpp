@@ -2,8 +2,12 @@
 #include "core/dense.h"
 
 #include <ATen/ATen.h>
+#include <ATen/core/LegacyTypeDispatch.h>
+
+#include <algorithm>
 
 #include "core/errors.h"
+#include "core/parallel.h"
 
 namespace arapfields {
 namespace {
@@ -19,42 +23,104 @@ at::Tensor view(const Eigen::Ref<const RowMatrix<Scalar>>& m) {
   return view(m.data(), m.rows(), m.cols(), m.outerStride());
 }
 
+/// A dimension in tiles of about equal length. Products of tiles run side by side, on one thread each; the
+/// tiles, and so the results, do not depend on the number of threads.
+class Tiles {
+ public:
+  explicit Tiles(Index length) : length_(length), count_(std::max<Index>(1, (length + most - 1) / most)) {}
+  Index count() const { return count_; }
+  Index begin(Index i) const { return i * length_ / count_; }
+  at::Tensor of(const at::Tensor& whole, int dimension, Index i) const {
+    return whole.narrow(dimension, begin(i), begin(i + 1) - begin(i));
+  }
+
+ private:
+  static constexpr Index most = 192;
+  Index length_, count_;
+};
+
 }  // namespace
 
 template <class Scalar>
 void gemm(Transpose transpose_a, Transpose transpose_b, Scalar alpha,
           const Eigen::Ref<const RowMatrix<Scalar>>& a, const Eigen::Ref<const RowMatrix<Scalar>>& b,
           Scalar beta, Eigen::Ref<RowMatrix<Scalar>> c) {
+  const ThreadScope scope;
   at::Tensor ta = view<Scalar>(a), tb = view<Scalar>(b);
   if (transpose_a == Transpose::yes) ta = ta.t();
   if (transpose_b == Transpose::yes) tb = tb.t();
-  at::Tensor tc = view(c.data(), c.rows(), c.cols(), c.outerStride());
-  at::addmm_out(tc, tc, ta, tb, beta, alpha);
+  const at::Tensor tc = view(c.data(), c.rows(), c.cols(), c.outerStride());
+  const Tiles rows(c.rows()), columns(c.cols());
+  parallel_jobs(rows.count() * columns.count(), [&](Index job) {
+    const at::AutoDispatchBelowADInplaceOrView quick;
+    const Index i = job / columns.count(), j = job % columns.count();
+    at::Tensor tile = columns.of(rows.of(tc, 0, i), 1, j);
+    at::addmm_out(tile, tile, rows.of(ta, 0, i), columns.of(tb, 1, j), beta, alpha);
+  });
 }
 
+/// By blocks of columns, left to right: a block's own factor, what is below it, then its products off the
+/// rest.
 template <class Scalar>
 RowMatrix<Scalar> cholesky(const Eigen::Ref<const RowMatrix<Scalar>>& a) {
-  const auto [factor, info] = at::linalg_cholesky_ex(view<Scalar>(a));
-  if (info.template item<int>() != 0)
-    throw InvalidInput("matrix", "it is not positive definite",
-                       "a symmetric positive definite matrix is needed");
-  RowMatrix<Scalar> result(a.rows(), a.cols());
-  view(result.data(), result.rows(), result.cols(), result.cols()).copy_(factor);
+  const ThreadScope scope;
+  RowMatrix<Scalar> result = a.template triangularView<Eigen::Lower>();
+  const at::Tensor l = view(result.data(), result.rows(), result.cols(), result.cols());
+  const Tiles tiles(result.rows());
+  const auto tile = [&](Index i, Index j) { return tiles.of(tiles.of(l, 0, i), 1, j); };
+  for (Index k = 0; k < tiles.count(); ++k) {
+    const auto [factor, info] = at::linalg_cholesky_ex(tile(k, k));
+    if (info.template item<int>() != 0)
+      throw InvalidInput("matrix", "it is not positive definite",
+                         "a symmetric positive definite matrix is needed");
+    tile(k, k).copy_(factor);
+    const Index below = tiles.count() - k - 1;
+    parallel_jobs(below, [&, upper = factor.t()](Index job) {
+      const at::Tensor panel = tile(k + 1 + job, k);
+      panel.copy_(at::linalg_solve_triangular(upper, panel, /*upper=*/true, /*left=*/false));
+    });
+    parallel_jobs(below * below, [&](Index job) {
+      const Index i = job / below, j = job % below;
+      if (j > i) return;
+      const at::AutoDispatchBelowADInplaceOrView quick;
+      at::Tensor rest = tile(k + 1 + i, k + 1 + j);
+      at::addmm_out(rest, rest, tile(k + 1 + i, k), tile(k + 1 + j, k).t(), 1, -1);
+    });
+  }
   return result;
 }
 
+/// Tiles on the diagonal first; then each column of tiles by forward substitution.
 template <class Scalar>
 RowMatrix<Scalar> lower_inverse(const Eigen::Ref<const RowMatrix<Scalar>>& factor) {
+  const ThreadScope scope;
   const at::Tensor l = view<Scalar>(factor);
-  RowMatrix<Scalar> result(factor.rows(), factor.cols());
-  view(result.data(), result.rows(), result.cols(), result.cols())
-      .copy_(at::linalg_solve_triangular(l, at::eye(l.size(0), l.options()), /*upper=*/false));
+  RowMatrix<Scalar> result = RowMatrix<Scalar>::Zero(factor.rows(), factor.cols());
+  const at::Tensor x = view(result.data(), result.rows(), result.cols(), result.cols());
+  const Tiles tiles(result.rows());
+  const auto tile = [&](const at::Tensor& of, Index i, Index j) {
+    return tiles.of(tiles.of(of, 0, i), 1, j);
+  };
+  parallel_jobs(tiles.count(), [&](Index k) {
+    const at::Tensor own = tile(l, k, k);
+    tile(x, k, k).copy_(at::linalg_solve_triangular(own, at::eye(own.size(0), own.options()), false));
+  });
+  parallel_jobs(tiles.count(), [&](Index j) {
+    const at::AutoDispatchBelowADInplaceOrView quick;
+    for (Index i = j + 1; i < tiles.count(); ++i) {
+      const Index first = tiles.begin(j), length = tiles.begin(i) - first;
+      at::Tensor into = tile(x, i, j);
+      const at::Tensor left = tiles.of(l, 0, i).narrow(1, first, length);
+      at::mm_out(into, tile(x, i, i), at::mm(left, tiles.of(x, 1, j).narrow(0, first, length)).neg_());
+    }
+  });
   return result;
 }
 
 template <class Scalar>
 RowMatrix<Scalar> cholesky_solve(const Eigen::Ref<const RowMatrix<Scalar>>& factor,
                                  const Eigen::Ref<const RowMatrix<Scalar>>& b) {
+  const ThreadScope scope;
   RowMatrix<Scalar> result(b.rows(), b.cols());
   view(result.data(), result.rows(), result.cols(), result.cols())
       .copy_(at::cholesky_solve(view<Scalar>(b), view<Scalar>(factor)));

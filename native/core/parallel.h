@@ -2,32 +2,43 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
+#include "core/torch_threads.h"
 #include "core/types.h"
 
 namespace arapfields {
 
-/// Splits [begin, end) into ranges of at least `grain` and runs body(range_begin, range_end) on the threads
-/// that libtorch's matrix products use too, so that the two never compete. The split depends on the thread
-/// count alone. An exception in `body` reaches the caller.
+/// Splits [begin, end) into chunks of at least `grain` and runs body(chunk_begin, chunk_end) for each on the
+/// call's threads (ThreadScope), which take the next chunk as they come free. The chunks depend on the range
+/// and the grain alone, not on the number of threads. Loops within `body` stay on their thread, as do
+/// libtorch's functions. After an exception in `body` no chunk is begun, and the caller gets it (one, where
+/// there are more).
 void parallel_for(Index begin, Index end, Index grain, const std::function<void(Index, Index)>& body);
 
-/// Runs body(job) for jobs 0 to count−1 on the same threads, each taking the next job that is left: for jobs
-/// of unequal length whose results do not depend on who runs them.
+/// The same for jobs 0 to count−1, one by one: for jobs of unequal length.
 void parallel_jobs(Index count, const std::function<void(Index)>& body);
+/// body(job, slot): jobs that run at the same time have different slots, which are below thread_count().
+void parallel_jobs_in_slots(Index count, const std::function<void(Index, Index)>& body);
 
-/// Sets the calling thread's number of worker threads for its lifetime; 0 keeps what is in force.
+/// Gives the calling thread's loops a number of threads while it lives, and keeps libtorch's own threads out;
+/// 0 keeps the number that is in force. No other thread and no later call sees any of it. More threads than
+/// the pool may have (256), or than the system grants, are done without: results do not depend on their
+/// number.
 class ThreadScope {
  public:
-  explicit ThreadScope(int threads);
+  explicit ThreadScope(int threads = 0);
   ~ThreadScope();
   ThreadScope(const ThreadScope&) = delete;
   ThreadScope& operator=(const ThreadScope&) = delete;
 
  private:
   int before_;
+  std::optional<SerialTorch> serial_;
 };
 
+/// The threads that a loop here would be split over: those of the innermost ThreadScope, else as many as
+/// libtorch would use; 1 within a loop's body.
 int thread_count();
 
 }  // namespace arapfields

@@ -4,10 +4,12 @@
 #include <ATen/ATen.h>
 
 #include "core/device.h"
+#include "core/parallel.h"
 
 namespace arapfields {
 
 at::Tensor DeformationField::jets(const at::Tensor& points, JetOrder order) const {
+  const ThreadScope scope;
   const at::Tensor host = points.to(at::kCPU, at::kDouble).contiguous();
   JetBlock<double> block(host.size(0), order);
   evaluate(Eigen::Map<const Points>(host.const_data_ptr<double>(), host.size(0), 3), block.view());

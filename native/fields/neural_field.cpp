@@ -5,6 +5,7 @@
 
 #include "core/device.h"
 #include "core/errors.h"
+#include "core/parallel.h"
 
 namespace arapfields {
 namespace {
@@ -72,6 +73,7 @@ NeuralField::NeuralField(const MlpShape& shape, std::uint64_t seed, bool double_
 }
 
 void NeuralField::fixed_part(PointsIn points, JetView<double> b, Vector& a) const {
+  const ThreadScope scope;
   const Index n = points.rows();
   const int count = columns(b.order);
   if (base_) {
@@ -100,6 +102,7 @@ void NeuralField::fixed_part(PointsIn points, JetView<double> b, Vector& a) cons
 }
 
 void NeuralField::evaluate(PointsIn points, JetView<double> out) const {
+  const ThreadScope scope;
   require(out.count == points.rows(), "out", std::to_string(out.count) + " jets", "one a point is needed");
   if (out.count == 0) return;
   Vector a;
@@ -112,6 +115,7 @@ void NeuralField::evaluate(PointsIn points, JetView<double> out) const {
 }
 
 at::Tensor NeuralField::jets(const at::Tensor& points, JetOrder order) const {
+  const ThreadScope scope;
   const at::Tensor& own = network_.parameters();
   if (base_ || handles_ || points.device() != own.device() || points.scalar_type() != own.scalar_type())
     return DeformationField::jets(points, order);
@@ -121,6 +125,7 @@ at::Tensor NeuralField::jets(const at::Tensor& points, JetOrder order) const {
 }
 
 at::Tensor NeuralField::forward(const at::Tensor& points, JetOrder order) {
+  const ThreadScope scope;
   at::Tensor jets = network_.forward(points, order);
   factor_.reset();
   if (base_ || handles_) return compose(std::move(jets), to_points(points));
@@ -129,6 +134,7 @@ at::Tensor NeuralField::forward(const at::Tensor& points, JetOrder order) {
 }
 
 at::Tensor NeuralField::forward_at(PointsIn points, JetOrder order) {
+  const ThreadScope scope;
   const at::Tensor x = tensor_of(points.data(), {points.rows(), 3}, network_.parameters());
   if (!base_ && !handles_) return forward(x, order);
   factor_.reset();
@@ -146,6 +152,7 @@ at::Tensor NeuralField::compose(at::Tensor jets, PointsIn points) {
 }
 
 void NeuralField::pull_back(const at::Tensor& cotangents) {
+  const ThreadScope scope;
   network_.pull_back(factor_ ? product_pull_back(*factor_, cotangents) : cotangents);
 }
 
@@ -155,11 +162,13 @@ void NeuralField::translate(const Vec3& offset) {
 }
 
 VectorF NeuralField::weights() const {
+  const ThreadScope scope;
   const at::Tensor host = network_.parameters().to(at::kCPU, at::kFloat).contiguous();
   return Eigen::Map<const VectorF>(host.const_data_ptr<float>(), host.numel());
 }
 
 void NeuralField::set_weights(const VectorF& weights) {
+  const ThreadScope scope;
   at::Tensor& parameters = network_.parameters();
   require(weights.size() == parameters.numel(), "weights", std::to_string(weights.size()) + " numbers",
           "this network has " + std::to_string(parameters.numel()));

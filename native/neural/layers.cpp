@@ -4,6 +4,7 @@
 #include <ATen/ATen.h>
 
 #include "core/errors.h"
+#include "core/parallel.h"
 #include "core/random.h"
 #include "neural/muon.h"
 
@@ -51,6 +52,7 @@ MlpShape shape_of(const Layers& layers, int octaves, double frequency, double sh
 }
 
 Mlp make_mlp(const Layers& layers, const MlpShape& shape, bool double_precision, const std::string& device) {
+  const ThreadScope scope;
   Mlp mlp(shape, 0, true, double_precision, device);
   for (int l = 0; l <= shape.layers; ++l) {
     const RowMatrix<double>& weight = layers.weights[static_cast<std::size_t>(l)];
@@ -62,6 +64,7 @@ Mlp make_mlp(const Layers& layers, const MlpShape& shape, bool double_precision,
 }
 
 Layers layers_of(const Mlp& mlp) {
+  const ThreadScope scope;
   Layers layers;
   for (int l = 0; l <= mlp.shape().layers; ++l) {
     const at::Tensor weight = mlp.weight(l).to(at::kCPU, at::kDouble).contiguous();
@@ -74,6 +77,7 @@ Layers layers_of(const Mlp& mlp) {
 }
 
 JetSweeps sweep_jets(Mlp& mlp, PointsIn points, JetOrder order, const Vector& cotangents) {
+  const ThreadScope scope;
   const auto plain = [](const at::Tensor& tensor) -> Vector {
     const at::Tensor flat = tensor.to(at::kCPU, at::kDouble).contiguous();
     return Eigen::Map<const Vector>(flat.data_ptr<double>(), flat.numel());
@@ -92,6 +96,7 @@ JetSweeps sweep_jets(Mlp& mlp, PointsIn points, JetOrder order, const Vector& co
 }
 
 Layers step_muon(Mlp& mlp, const Vector& gradient, double learning_rate) {
+  const ThreadScope scope;
   require(gradient.size() == mlp.gradient().numel(), "gradient", std::to_string(gradient.size()) + " numbers",
           "expected " + std::to_string(mlp.gradient().numel()));
   mlp.gradient().copy_(as_tensor(gradient.data(), {gradient.size()}, mlp.gradient()));
@@ -119,6 +124,7 @@ JetTrial::JetTrial(const MlpShape& shape, Index points, JetOrder order, std::uin
 JetTrial::~JetTrial() = default;
 
 void JetTrial::run() {
+  const ThreadScope scope;
   state_->mlp.forward(state_->points, state_->order);
   state_->mlp.gradient().zero_();
   state_->mlp.pull_back(state_->cotangents);

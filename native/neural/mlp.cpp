@@ -72,16 +72,15 @@ const Block& largest_of(const std::vector<Block>& blocks) {
 }  // namespace
 
 void Mlp::State::prepare(const at::Tensor& points, JetOrder order) {
-  const int threads = sweep_threads(parameters);
   const Index n = points.size(0);
   const bool same = result.defined() && result.size(0) == columns(order) && result.size(1) == n &&
-                    static_cast<int>(kept.workspaces.size()) == threads;
+                    static_cast<int>(kept.workspaces.size()) >= sweep_threads(parameters, kept.blocks.size());
   if (same) return;
   kept = {};  // frees before it allocates
   if (parameters.is_cpu()) require_memory("batch", kept_numbers(shape, n, order) * parameters.element_size());
-  kept.blocks = split_points(n, order, threads, !on_aten_path(parameters));
+  kept.blocks = split_points(n, order, !on_aten_path(parameters));
   for (Block& block : kept.blocks) allocate(shape, parameters, true, block);
-  for (int t = 0; t < threads; ++t)
+  for (int t = sweep_threads(parameters, kept.blocks.size()); t > 0; --t)
     kept.workspaces.push_back(make_workspace(shape, parameters, largest_of(kept.blocks)));
   parts.clear();
   for (Index g = 0; g < kept.gradient_groups(); ++g) {
@@ -94,6 +93,7 @@ void Mlp::State::prepare(const at::Tensor& points, JetOrder order) {
 Mlp::Mlp(const MlpShape& shape, std::uint64_t seed, bool zero_last_layer, bool double_precision,
          const std::string& device) {
   check(shape);
+  const ThreadScope scope;
   const Index count = parameter_count(shape);
   at::Tensor values = at::zeros({count}, at::kDouble);
   double* next = values.data_ptr<double>();
@@ -141,6 +141,7 @@ void Mlp::release_buffers() {
 }
 
 at::Tensor Mlp::forward(const at::Tensor& points, JetOrder order) {
+  const ThreadScope scope;
   State& s = *state_;
   check_points(points, s.parameters);
   s.prepare(points, order);
@@ -154,6 +155,7 @@ at::Tensor Mlp::forward(const at::Tensor& points, JetOrder order) {
 }
 
 void Mlp::pull_back(const at::Tensor& cotangents) {
+  const ThreadScope scope;
   State& s = *state_;
   if (!s.fresh) throw std::logic_error("Mlp::pull_back needs a forward call of its own");
   require(cotangents.sizes() == s.result.sizes() && cotangents.scalar_type() == s.result.scalar_type(),
@@ -179,8 +181,8 @@ namespace {
 void stream_blocks(const MlpShape& shape, const at::Tensor& like, Index n, JetOrder order, bool keep,
                    const std::function<void(Block&, Workspace&)>& body) {
   Blocks passing;
-  const int threads = sweep_threads(like);
-  passing.blocks = split_points(n, order, threads, !on_aten_path(like));
+  passing.blocks = split_points(n, order, !on_aten_path(like));
+  const int threads = sweep_threads(like, passing.blocks.size());
   std::vector<Block> memory(static_cast<std::size_t>(threads), largest_of(passing.blocks));
   for (Block& block : memory) {
     allocate(shape, like, keep, block);
@@ -197,6 +199,7 @@ void stream_blocks(const MlpShape& shape, const at::Tensor& like, Index n, JetOr
 }  // namespace
 
 at::Tensor Mlp::evaluate(const at::Tensor& points, JetOrder order) const {
+  const ThreadScope scope;
   const State& s = *state_;
   check_points(points, s.parameters);
   at::Tensor result = at::empty({columns(order), points.size(0), s.shape.outputs}, s.parameters.options());
@@ -208,6 +211,7 @@ at::Tensor Mlp::evaluate(const at::Tensor& points, JetOrder order) const {
 }
 
 void Mlp::evaluate_with_gradient(const at::Tensor& points, at::Tensor& values, at::Tensor& gradients) const {
+  const ThreadScope scope;
   const State& s = *state_;
   check_points(points, s.parameters);
   require(s.shape.outputs == 1, "network", std::to_string(s.shape.outputs) + " outputs", "expected one");

@@ -2,11 +2,9 @@
 #include "neural/mlp_sweep.h"
 
 #include <ATen/ATen.h>
-#include <ATen/Parallel.h>
 #include <ATen/core/LegacyTypeDispatch.h>
 
 #include <algorithm>
-#include <atomic>
 
 #include "core/device.h"
 #include "core/parallel.h"
@@ -145,15 +143,19 @@ LayerViews::LayerViews(const MlpShape& shape, const at::Tensor& flat) {
   }
 }
 
-int sweep_threads(const at::Tensor& like) {
-  return !on_aten_path(like) && !at::in_parallel_region() ? thread_count() : 1;
+int sweep_threads(const at::Tensor& like, std::size_t blocks) {
+  return on_aten_path(like)
+             ? 1
+             : static_cast<int>(std::min<std::size_t>(blocks, static_cast<std::size_t>(thread_count())));
 }
 
-std::vector<Block> split_points(Index n, JetOrder order, int threads, bool in_cache) {
+std::vector<Block> split_points(Index n, JetOrder order, bool in_cache) {
+  constexpr Index fewest_points = 32, multiple = 8;
   // Blocks whose activations fit a core's second-level cache; elsewhere one block that memory bounds.
   const Index best = !in_cache ? (Index(1) << 19) / columns(order) : order == JetOrder::value ? 512 : 128;
   Index count = (n + best - 1) / best;
-  count = std::clamp<Index>((count + threads - 1) / threads * threads, 1, std::max<Index>(n, 1));
+  if (in_cache) count = std::min((count + multiple - 1) / multiple * multiple, n / fewest_points);
+  count = std::max<Index>(count, 1);
   std::vector<Block> blocks(static_cast<std::size_t>(count));
   for (Index b = 0; b < count; ++b) {
     Block& block = blocks[static_cast<std::size_t>(b)];
@@ -210,20 +212,17 @@ Workspace make_workspace(const MlpShape& shape, const at::Tensor& like, const Bl
 }
 
 Index Blocks::gradient_groups() const {
-  const Index threads = static_cast<Index>(workspaces.size());
-  return std::min(count(), std::max(threads, std::min<Index>(4 * threads, count() / 4)));
+  constexpr Index fewest = 8, most = 64, blocks_a_group = 4;
+  return std::min(count(), std::clamp(count() / blocks_a_group, fewest, most));
 }
 
 void Blocks::for_each(Index groups, const std::function<void(Block&, Workspace&, Index, bool)>& body) {
-  std::atomic<Index> next{0};
-  parallel_for(0, static_cast<Index>(workspaces.size()), 1, [&](Index first, Index last) {
+  const ThreadScope scope(std::min(thread_count(), static_cast<int>(workspaces.size())));
+  parallel_jobs_in_slots(groups, [&](Index g, Index slot) {
     const at::AutoDispatchBelowADInplaceOrView quick;  // plain kernels, no bookkeeping
-    for (Index t = first; t < last; ++t)
-      for (Index g = next++; g < groups; g = next++) {
-        const Index begin = g * count() / groups, end = (g + 1) * count() / groups;
-        for (Index b = begin; b < end; ++b)
-          body(blocks[static_cast<std::size_t>(b)], workspaces[static_cast<std::size_t>(t)], g, b == begin);
-      }
+    const Index begin = g * count() / groups, end = (g + 1) * count() / groups;
+    for (Index b = begin; b < end; ++b)
+      body(blocks[static_cast<std::size_t>(b)], workspaces[static_cast<std::size_t>(slot)], g, b == begin);
   });
 }
 

@@ -48,7 +48,7 @@ struct GradientPart {
 
 /// The blocks of one size of call. Threads take groups of blocks as they come free, so that a slow or busy
 /// core costs little; each group has its own order and its own sum, so that the result does not depend on who
-/// did what.
+/// did what, nor on how many did it.
 struct Blocks {
   std::vector<Block> blocks;
   std::vector<Workspace> workspaces;  // one a thread
@@ -61,11 +61,11 @@ struct Blocks {
   Index gradient_groups() const;
 };
 
-/// Ranges of about the best number of points for the order, as many for each thread; large ones where a
-/// core's cache does not matter.
-std::vector<Block> split_points(Index n, JetOrder order, int threads, bool in_cache);
-/// Threads that the sweeps of tensors like `like` are split over.
-int sweep_threads(const at::Tensor& like);
+/// Ranges of about the best number of points for the order, some for each of a few threads where points are
+/// few; large ones where a core's cache does not matter.
+std::vector<Block> split_points(Index n, JetOrder order, bool in_cache);
+/// Threads that sweeps of so many blocks of tensors like `like` are split over.
+int sweep_threads(const at::Tensor& like, std::size_t blocks);
 
 /// Gives a block its memory; for every layer where `keep` asks for the activations. With one column the
 /// encoding always has its first derivatives, for sweep_to_points().

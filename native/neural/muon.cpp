@@ -24,6 +24,8 @@ struct Matrix {
   Index begin = 0;  // in the flat vector
   Index rows = 0, columns = 0;
   at::Tensor momentum, x, next, gram, polynomial;
+
+  Index end() const { return begin + rows * columns; }
 };
 
 struct Task {
@@ -48,24 +50,32 @@ struct Muon::State {
   AdamStep adam;
   std::vector<Matrix> matrices;
   std::vector<Task> tasks;
+  bool on_device = false;  // whose queue is filled by one thread
 
-  void for_each_task(const std::function<void(const Task&)>& body) const;
+  void for_each_task(const std::function<void(const Task&)>& body);
+  void for_each_matrix(const std::function<void(Matrix&)>& body);
+
+ private:
+  template <class Items, class Body>
+  void for_each(Items& items, const Body& body) const {
+    const auto one = [&](Index i) {
+      const at::AutoDispatchBelowADInplaceOrView quick;
+      body(items[static_cast<std::size_t>(i)]);
+    };
+    const auto count = static_cast<Index>(items.size());
+    if (!on_device) return parallel_jobs(count, one);
+    for (Index i = 0; i < count; ++i) one(i);
+  }
 };
 
-void Muon::State::for_each_task(const std::function<void(const Task&)>& body) const {
-  if (tasks.size() == matrices.size()) {  // a device's queue is filled by one thread
-    const at::AutoDispatchBelowADInplaceOrView quick;
-    for (const Task& task : tasks) body(task);
-    return;
-  }
-  parallel_jobs(static_cast<Index>(tasks.size()), [&](Index t) {
-    const at::AutoDispatchBelowADInplaceOrView quick;
-    body(tasks[static_cast<std::size_t>(t)]);
-  });
-}
+void Muon::State::for_each_task(const std::function<void(const Task&)>& body) { for_each(tasks, body); }
+
+void Muon::State::for_each_matrix(const std::function<void(Matrix&)>& body) { for_each(matrices, body); }
 
 Muon::Muon(const Mlp& mlp, const MuonOptions& options)
-    : state_(std::make_unique<State>(State{options, AdamStep(mlp.parameters(), options.adam), {}, {}})) {
+    : state_(std::make_unique<State>(
+          State{options, AdamStep(mlp.parameters(), options.adam), {}, {}, on_aten_path(mlp.parameters())})) {
+  const ThreadScope scope;
   const at::TensorOptions like = mlp.parameters().options();
   for (int l = 0; l < mlp.shape().layers; ++l) {
     const at::Tensor weight = mlp.weight(l);
@@ -82,7 +92,7 @@ Muon::Muon(const Mlp& mlp, const MuonOptions& options)
   }
   // The last rows first: their symmetric products are the longest.
   for (Matrix& m : state_->matrices) {
-    const Index rows = m.x.size(0), each = on_aten_path(mlp.parameters()) ? rows : rows_a_task;
+    const Index rows = m.x.size(0), each = state_->on_device ? rows : rows_a_task;
     for (Index first = (rows - 1) / each * each; first >= 0; first -= each)
       state_->tasks.push_back({&m, first, std::min(each, rows - first)});
   }
@@ -93,6 +103,7 @@ Muon::Muon(Muon&&) noexcept = default;
 Muon& Muon::operator=(Muon&&) noexcept = default;
 
 void Muon::step(Mlp& mlp, double learning_rate) {
+  const ThreadScope scope;
   State& s = *state_;
   at::Tensor &parameters = mlp.parameters(), &gradient = mlp.gradient();
   s.adam.next_step();
@@ -102,14 +113,16 @@ void Muon::step(Mlp& mlp, double learning_rate) {
   };
   for (Matrix& m : s.matrices) {
     adam_up_to(m.begin);
-    done = m.begin + m.rows * m.columns;
-    const at::Tensor g = gradient.slice(0, m.begin, done).view({m.rows, m.columns});
+    done = m.end();
+  }
+  adam_up_to(parameters.numel());
+  s.for_each_matrix([&](Matrix& m) {
+    const at::Tensor g = gradient.slice(0, m.begin, m.end()).view({m.rows, m.columns});
     m.momentum.mul_(s.options.momentum).add_(g);
     const at::Tensor ahead = at::add(g, m.momentum, s.options.momentum);
     m.x.copy_(m.rows > m.columns ? ahead.t() : ahead);
     m.x.div_(at::norm(ahead).add_(1e-30));
-  }
-  adam_up_to(parameters.numel());
+  });
   for (int i = 0; i < s.options.iterations; ++i) {
     s.for_each_task([](const Task& t) {
       const at::Tensor& x = t.matrix->x;
@@ -130,12 +143,12 @@ void Muon::step(Mlp& mlp, double learning_rate) {
     });
     for (Matrix& m : s.matrices) std::swap(m.x, m.next);
   }
-  for (Matrix& m : s.matrices) {
+  s.for_each_matrix([&](Matrix& m) {
     const double stretch =
         std::sqrt(std::max(1.0, static_cast<double>(m.rows) / static_cast<double>(m.columns)));
-    at::Tensor weight = parameters.slice(0, m.begin, m.begin + m.rows * m.columns).view({m.rows, m.columns});
+    at::Tensor weight = parameters.slice(0, m.begin, m.end()).view({m.rows, m.columns});
     weight.sub_(m.rows > m.columns ? m.x.t() : m.x, learning_rate * stretch);
-  }
+  });
 }
 
 }  // namespace arapfields

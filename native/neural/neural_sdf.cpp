@@ -4,6 +4,7 @@
 #include <ATen/ATen.h>
 
 #include "core/errors.h"
+#include "core/parallel.h"
 
 namespace arapfields {
 namespace {
@@ -35,12 +36,14 @@ std::shared_ptr<NeuralSdf> NeuralSdf::from_layers(const Layers& layers, int octa
 }
 
 void NeuralSdf::evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> values) const {
+  const ThreadScope scope;
   if (points.rows() == 0) return;
   copy_out(mlp_.evaluate(as_tensor(points, mlp_), JetOrder::value).view({-1}), values.data(), 1);
 }
 
 void NeuralSdf::evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> values,
                          Eigen::Ref<PointsF> gradients) const {
+  const ThreadScope scope;
   if (points.rows() == 0) return;
   at::Tensor value, gradient;
   mlp_.evaluate_with_gradient(as_tensor(points, mlp_), value, gradient);

@@ -3,10 +3,13 @@
 
 #include <ATen/ATen.h>
 
+#include "core/parallel.h"
+
 namespace arapfields {
 
 LossProbe probe_loss(NeuralField& field, FieldObjective& objective, const Vector& parameters,
                      std::uint64_t seed) {
+  const ThreadScope scope;
   const at::Tensor given =
       at::from_blob(const_cast<double*>(parameters.data()), {parameters.size()}, at::kDouble);
   require(given.numel() == field.parameters().numel(), "parameters",
@@ -42,6 +45,7 @@ EnergyTrial::EnergyTrial(const SurfaceSamples& samples, Index batch, double bend
 }
 
 double EnergyTrial::run() {
+  const ThreadScope scope;
   field_.gradient().zero_();
   return objective_.accumulate(field_, random_).item<double>();
 }

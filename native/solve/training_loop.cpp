@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "core/device.h"
+#include "core/parallel.h"
 #include "solve/optimizer.h"
 #include "solve/setup.h"
 
@@ -62,6 +63,7 @@ struct GoodState {
 
 LoopResult minimise(TrainableField& field, Objective& objective, const LoopOptions& options,
                     const Progress& progress, const LoopObserver& observer) {
+  const ThreadScope scope;
   constexpr int snapshot_every = 10;
   const Stopwatch watch;
   const int history_every = std::max(1, options.iterations / 200);

@@ -5,7 +5,6 @@ import contextlib
 import ctypes
 import importlib
 import importlib.util
-import os
 import platform
 import sys
 from pathlib import Path
@@ -49,23 +48,10 @@ def is_loading():
 
 
 def _load():
-    with contextlib.suppress(Exception), _short_spin():
+    with contextlib.suppress(Exception):
         for path in sorted(_folder().glob("libarapfields*.so")):
             ctypes.CDLL(str(path))  # waits for the disk while other threads run
     _state.problem = _try_import()
-
-
-@contextlib.contextmanager
-def _short_spin():
-    """OpenMP reads this when it is loaded: idle threads soon sleep, as in arapfields/_openmp.py."""
-    if {"OMP_WAIT_POLICY", "GOMP_SPINCOUNT"} & set(os.environ):
-        yield
-        return
-    os.environ["GOMP_SPINCOUNT"] = "1000"
-    try:
-        yield
-    finally:
-        del os.environ["GOMP_SPINCOUNT"]
 
 
 def problem():

@@ -4,7 +4,6 @@
 Arrays are NumPy, all coordinates are the mesh's own; distances are negative inside.
 """
 
-from . import _openmp  # noqa: F401  (first: it decides how the native library is loaded)
 from ._native import (
     Cancelled,
     Cuboid,

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/thread_pool.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <exception>
+#include <thread>
+
+#ifdef __linux__
+#include <sys/resource.h>
+#endif
+#ifndef _WIN32
+#include <pthread.h>
+#endif
+
+#include "core/torch_threads.h"
+
+namespace arapfields {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// How long a thread that waits looks before it sleeps: about what falling asleep and waking up take.
+constexpr std::chrono::microseconds spin_time{20};
+
+void pause_processor() {
+#if defined(__x86_64__) || defined(__i386__)
+  __builtin_ia32_pause();
+#elif defined(__aarch64__)
+  asm volatile("yield");
+#endif
+}
+
+/// Looks until ready() or the time is over; returns which.
+template <class Ready>
+bool spin_until(const Ready& ready) {
+  const Clock::time_point end = Clock::now() + spin_time;
+  do {
+    for (int i = 0; i < 16; ++i) {
+      if (ready()) return true;
+      pause_processor();
+    }
+  } while (Clock::now() < end);
+  return ready();
+}
+
+}  // namespace
+
+struct ThreadPool::Job {
+  const std::function<void(int)>* work;
+  int helpers;                 // under the pool's mutex
+  int begun = 0;               // under the pool's mutex
+  std::atomic<int> inside{0};  // helpers that have begun and not ended
+};
+
+void ThreadPool::run(int helpers, const std::function<void(int)>& work) {
+  if (helpers <= 0) return work(0);
+  const auto job = std::make_shared<Job>();
+  job->work = &work;
+  job->helpers = helpers;
+  bool wake = false;
+  {
+    const std::lock_guard lock(mutex_);
+    open_.push_back(job);
+    wanted_ += helpers;
+    count_open();
+    start_threads();
+    wake = sleeping_ > 0 && spinning_.load(std::memory_order_relaxed) < helpers;
+  }
+  if (wake) wake_.notify_one();  // who wakes up wakes the next one
+  work(0);
+  {
+    const std::lock_guard lock(mutex_);
+    wanted_ -= helpers;
+    std::erase(open_, job);
+    count_open();
+  }
+  const auto ended = [&] { return job->inside.load(std::memory_order_acquire) == 0; };
+  if (spin_until(ended)) return;
+  for (int inside = job->inside.load(std::memory_order_acquire); inside != 0;
+       inside = job->inside.load(std::memory_order_acquire))
+    job->inside.wait(inside, std::memory_order_acquire);
+}
+
+/// As many as the calls that run now ask for together.
+void ThreadPool::start_threads() {
+  while (!refused_ && threads_ < std::min(wanted_, most_workers)) {
+    try {
+      std::thread([this] { serve(); }).detach();
+      ++threads_;
+    } catch (const std::exception&) {
+      refused_ = true;  // those that are there share the work
+    }
+  }
+}
+
+bool ThreadPool::spin_for_job() const {
+  return spin_until([this] { return open_count_.load(std::memory_order_relaxed) > 0; });
+}
+
+void ThreadPool::count_open() {
+  open_count_.store(static_cast<int>(open_.size()), std::memory_order_relaxed);
+}
+
+void ThreadPool::take_job(std::shared_ptr<Job>& job, int& number) {
+  std::unique_lock lock(mutex_);
+  while (open_.empty()) {
+    ++spinning_;
+    lock.unlock();
+    const bool seen = spin_for_job();
+    lock.lock();
+    --spinning_;
+    if (seen || !open_.empty()) continue;
+    ++sleeping_;
+    wake_.wait(lock);
+    --sleeping_;
+  }
+  job = open_.front();
+  job->inside.fetch_add(1, std::memory_order_relaxed);
+  number = ++job->begun;
+  if (number == job->helpers) {
+    open_.erase(open_.begin());
+    count_open();
+  }
+  const bool wake = !open_.empty() && sleeping_ > 0 && spinning_.load(std::memory_order_relaxed) == 0;
+  lock.unlock();
+  if (wake) wake_.notify_one();
+}
+
+void ThreadPool::serve() {
+#ifdef __linux__
+  pthread_setname_np(pthread_self(), "arapfields");
+#endif
+  on_start_();
+  for (;;) {
+    std::shared_ptr<Job> job;
+    int number = 0;
+    take_job(job, number);
+    (*job->work)(number);
+    if (job->inside.fetch_sub(1, std::memory_order_acq_rel) == 1) job->inside.notify_all();
+  }
+}
+
+namespace {
+
+/// One pool for each priority from −20 to 19, made when first asked for.
+std::array<std::atomic<ThreadPool*>, 40> pools{};
+
+std::size_t priority() {
+#ifdef __linux__
+  return static_cast<std::size_t>(std::clamp(getpriority(PRIO_PROCESS, 0) + 20, 0, 39));
+#else
+  return 20;
+#endif
+}
+
+/// Of a parent's pools a child has the memory but not the threads: it leaves them alone.
+void forget_pools() {
+  for (auto& pool : pools) pool.store(nullptr, std::memory_order_relaxed);
+}
+
+#ifndef _WIN32
+[[maybe_unused]] const int watching_forks = pthread_atfork(nullptr, nullptr, forget_pools);
+#endif
+
+}  // namespace
+
+ThreadPool& thread_pool() {
+  std::atomic<ThreadPool*>& mine = pools[priority()];
+  ThreadPool* pool = mine.load(std::memory_order_acquire);
+  if (pool != nullptr) return *pool;
+  auto* const fresh = new ThreadPool(keep_torch_serial);
+  if (mine.compare_exchange_strong(pool, fresh, std::memory_order_acq_rel)) return *fresh;
+  return *pool;  // somebody was faster; the other one has no threads yet and is forgotten
+}
+
+}  // namespace arapfields

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/torch_threads.h"
+
+#include <ATen/Parallel.h>
+
+// Of the OpenMP library that libtorch itself uses: per thread, as the standard says.
+extern "C" int omp_get_max_threads();
+extern "C" void omp_set_num_threads(int count);
+// Exported by a libtorch that is built with MKL; returns the setting before, 0 for "as the process".
+extern "C" __attribute__((weak)) int MKL_Set_Num_Threads_Local(int count);
+
+namespace arapfields {
+namespace {
+
+int set_mkl_threads(int count) {
+  return MKL_Set_Num_Threads_Local != nullptr ? MKL_Set_Num_Threads_Local(count) : 0;
+}
+
+}  // namespace
+
+// The first question about its threads that a thread asks libtorch sets them: it is asked before we do.
+int torch_threads() { return at::get_num_threads(); }
+
+SerialTorch::SerialTorch() : openmp_(torch_threads()), mkl_(set_mkl_threads(1)) { omp_set_num_threads(1); }
+
+SerialTorch::~SerialTorch() {
+  omp_set_num_threads(openmp_);
+  set_mkl_threads(mkl_);
+}
+
+void keep_torch_serial() {
+  torch_threads();
+  set_mkl_threads(1);
+  omp_set_num_threads(1);
+}
+
+}  // namespace arapfields
