@@ -3,18 +3,16 @@ import bpy
 
 from .blender import user_preferences
 from .blender.language import translated
+from .blender.property_definitions import annotations
 from .core.runtime import native
-from .core.settings.choices import DEVICES
+from .core.settings.parameters import MACHINE
 from .names import PACKAGE, Op
 
 
 class ARAPFIELDS_AP_preferences(bpy.types.AddonPreferences):
     bl_idname = PACKAGE
 
-    threads: bpy.props.IntProperty(
-        name="Threads", description="Threads that a job may use; 0 for all", default=0, min=0, max=256
-    )
-    device: bpy.props.EnumProperty(items=DEVICES, name="Device", description="Where jobs are computed")
+    __annotations__ = annotations(MACHINE)
     cache_folder: bpy.props.StringProperty(
         name="Fit Folder",
         description="Where fitted surfaces are kept; empty for Blender's own folder for this extension",
@@ -36,8 +34,8 @@ class ARAPFIELDS_AP_preferences(bpy.types.AddonPreferences):
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
-        layout.prop(self, "threads")
-        layout.prop(self, "device")
+        for parameter in MACHINE:
+            layout.prop(self, parameter.name)
         layout.prop(self, "cache_folder")
         layout.prop(self, "show_boxes")
         layout.prop(self, "show_previews")

@@ -78,7 +78,7 @@ def build_wheel(options, version, headers, work):
     print("needs glibc {}.{} or newer".format(*libraries.glibc_floor([shipped[0], *modules])))
     files = {f"arapfields/{path.name}": path for path in [*shipped, *modules]}
     for path in package.rglob("*"):
-        if path.suffix in (".py", ".pyi") or path.name == "py.typed":
+        if path.suffix in (".py", ".pyi", ".json") or path.name == "py.typed":
             files[f"arapfields/{path.relative_to(package).as_posix()}"] = path
     licence = (ROOT / "LICENSE").read_text()
     return wheel.write_wheel(options.output / "wheels", "arapfields", version, WHEEL_TAG, files, licence)
@@ -102,7 +102,8 @@ def build(options):
     check.check_platforms(manifest, [wheel.name for wheel in wheels])
     wheels += dependencies.dependency_wheels((ROOT / "requirements.txt").read_text(), folder)
     path = options.output / f"arapfields-{version}-linux-x64.zip"
-    archive.write_extension(addon, wheels, (ROOT / "LICENSE").read_text(), path)
+    options_table = options.build / "python/arapfields/options.json"
+    archive.write_extension(addon, options_table, wheels, (ROOT / "LICENSE").read_text(), path)
     check.check_zip(path, headers)
     extension_tool("validate", path)
     print(f"{path} ({path.stat().st_size / 1e6:.0f} MB)")

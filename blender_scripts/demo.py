@@ -156,7 +156,7 @@ def main():
     monkey = suzanne()
     activate(monkey)
     fit = monkey.arapfields.fit
-    fit.steps, fit.octaves = 800, 5  # the eyes need more than the default
+    fit.iterations, fit.octaves = 800, 5  # the eyes need more than the default
     with alone(), timed("neural surface (fit)"):
         bpy.ops.arapfields.fit(again=True)
     with alone():

@@ -3,8 +3,9 @@
 #   ARAPFIELDS_BINDING_HEADERS  folder with its Python.h
 #   ARAPFIELDS_BINDING_NAME     file name of the module, with the Python's own suffix
 #   ARAPFIELDS_LIBRARY          the built libarapfields.so
+#   ARAPFIELDS_GENERATED        folder of what native/options/generate.py wrote for that library
 #   EIGEN_INCLUDE_DIR, PYBIND11_INCLUDE_DIR
-foreach(name ARAPFIELDS_BINDING_NAME ARAPFIELDS_LIBRARY EIGEN_INCLUDE_DIR PYBIND11_INCLUDE_DIR)
+foreach(name ARAPFIELDS_BINDING_NAME ARAPFIELDS_LIBRARY ARAPFIELDS_GENERATED EIGEN_INCLUDE_DIR PYBIND11_INCLUDE_DIR)
   if(NOT ${name})
     message(FATAL_ERROR "${name} is not given")
   endif()
@@ -13,8 +14,8 @@ add_library(arapfields_built SHARED IMPORTED)
 set_target_properties(arapfields_built PROPERTIES IMPORTED_LOCATION "${ARAPFIELDS_LIBRARY}")
 
 file(GLOB binding_sources CONFIGURE_DEPENDS native/bindings/*.cpp)
-add_library(_native MODULE ${binding_sources})
-target_include_directories(_native PRIVATE native)
+add_library(_native MODULE ${binding_sources} "${ARAPFIELDS_GENERATED}/options/bind_options.cpp")
+target_include_directories(_native PRIVATE native "${ARAPFIELDS_GENERATED}")
 target_include_directories(_native SYSTEM PRIVATE
   "${ARAPFIELDS_BINDING_HEADERS}" "${PYBIND11_INCLUDE_DIR}" "${EIGEN_INCLUDE_DIR}")
 # Debian keeps pyconfig.h beside other libraries' headers, which must not win over this system's.

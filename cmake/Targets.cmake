@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Options shared by all our targets, and arapfields_sources(), by which each folder lists its files.
 add_library(arapfields_options INTERFACE)
-target_include_directories(arapfields_options INTERFACE "${PROJECT_SOURCE_DIR}/native")
+set(ARAPFIELDS_GENERATED "${CMAKE_BINARY_DIR}/generated")  # what native/options/generate.py writes
+target_include_directories(arapfields_options INTERFACE "${PROJECT_SOURCE_DIR}/native" "${ARAPFIELDS_GENERATED}")
 target_link_libraries(arapfields_options INTERFACE arapfields_eigen)
 target_compile_options(arapfields_options INTERFACE -Wall -Wextra -Wshadow -Wno-unknown-pragmas)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")

@@ -11,7 +11,7 @@ import arapfields
 from arapfields.__main__ import main
 
 SMALL_FIT = [
-    "--steps",
+    "--iterations",
     "60",
     "--width",
     "32",

@@ -73,7 +73,7 @@ class ARAPFIELDS_OT_bake(JobOperator, bpy.types.Operator):
                 if task.cancelled:
                     raise JobCancelled
                 task.report(number / len(requests), translated("frame {frame}", frame=frames[number]))
-                session.solve(request, steps=30)
+                session.solve(request, iterations=30)
                 shapes.append(session.local(session.solver.field(session.rest)))
             return shapes
 

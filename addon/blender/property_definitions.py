@@ -17,7 +17,7 @@ def definition(parameter, **extra):
         return bpy.props.EnumProperty(items=p.items, default=p.default, **common)
     if isinstance(p.default, bool):
         return bpy.props.BoolProperty(default=p.default, **common)
-    limits = {"min": p.low, "max": p.high, "soft_max": p.high if p.soft_high is None else p.soft_high}
+    limits = {"min": p.low, "max": p.high, "soft_min": p.soft_low, "soft_max": p.soft_high}
     if isinstance(p.default, int):
         return bpy.props.IntProperty(default=p.default, **limits, **common)
     precision = 4 if 0 < p.default < 0.1 else 2

@@ -17,6 +17,7 @@ from ..core.runtime import native
 from ..core.runtime.coroutines import run_to_completion, step_for
 from ..core.runtime.latest_request_worker import LatestRequestWorker
 from ..core.runtime.progress import ProgressTracker
+from ..core.settings.parameters import presets
 from ..handles import empties
 from ..handles.native_handles import native_handles
 from ..results import result_objects
@@ -27,12 +28,7 @@ from . import live_object
 SAMPLES = 6000
 PREVIEW_CELLS = 96  # at most, of the implicit surface that is shown while it moves
 REFINEMENTS, STEPS_AT_ONCE, FINE_TOLERANCE = 40, 10, 1e-6
-STYLE_OPTIONS = {
-    "samples": 3000,
-    "coarse_centers": 100,
-    "fine_centers": 500,
-    "tolerance": 3e-4,
-}
+STYLE = presets("live").get("STYLE")  # label, tip, and options for a style, which acts everywhere
 
 
 LEAST_RIGIDITY = 1e-3  # of a live style
@@ -105,7 +101,7 @@ class Session:
         self.samples = surface.samples(ProgressTracker(af.Task), SAMPLES, 0, use_fit)
         options = {**self.energy}
         if self.kind == "STYLIZE":
-            options |= STYLE_OPTIONS
+            options |= STYLE[2]
             # The live energy has stretch with weight 1: all others are relative to it.
             rigidity = max(options.pop("rigidity"), LEAST_RIGIDITY)
             options["gauss_weight"] = af.LiveOptions().gauss_weight
@@ -138,10 +134,10 @@ class Session:
     def refined(self, request, token):
         """Better and better vertices, until the energy falls no more; on the worker."""
         for _ in range(REFINEMENTS):
-            self.solve(request, steps=STEPS_AT_ONCE, tolerance=FINE_TOLERANCE)
+            self.solve(request, iterations=STEPS_AT_ONCE, tolerance=FINE_TOLERANCE)
             if token.cancelled:
                 return
-            if self.solver.report["steps"] < STEPS_AT_ONCE:
+            if self.solver.report["iterations"] < STEPS_AT_ONCE:
                 break
             yield self.local(self.solver.tracked())
         yield self.local(self.solver.field(self.rest))

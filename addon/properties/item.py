@@ -4,7 +4,9 @@
 import bpy
 
 from ..blender.object_references import owner_of, settings_of
+from ..blender.property_definitions import annotations
 from ..core.settings.choices import NORMALS, OUTPUTS, PLACEMENTS, SURFACES
+from ..core.settings.parameters import EXTRACTION
 from ..handles.properties import ARAPFIELDS_PG_handle
 from ..names import PROPERTY
 from .settings import ARAPFIELDS_PG_deform, ARAPFIELDS_PG_fit, ARAPFIELDS_PG_stylize
@@ -29,14 +31,7 @@ def target(**extra):
 
 
 def resolution(**extra):
-    return bpy.props.IntProperty(
-        name="Resolution",
-        description="Cells along the longest side of the implicit surface's grid",
-        default=256,
-        min=16,
-        max=512,
-        **extra,
-    )
+    return annotations(EXTRACTION, **extra).get("resolution")
 
 
 class ARAPFIELDS_PG_result(bpy.types.PropertyGroup):

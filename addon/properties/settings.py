@@ -24,8 +24,8 @@ def quality(**extra):
     return bpy.props.EnumProperty(
         items=QUALITY_ITEMS,
         name="Quality",
-        description="Sets the steps and the network's size",
-        default="GOOD",
+        description="Sets the iterations and the network's size",
+        **({"default": "GOOD"} if QUALITY_ITEMS else {}),
         **extra,
     )
 

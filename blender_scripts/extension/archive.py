@@ -6,6 +6,8 @@ import zipfile
 
 from .wheel import entry
 
+OPTIONS = "core/settings/options.json"  # where addon/core/settings/parameters.py looks for it
+
 
 def read_manifest(addon):
     return tomllib.loads((addon / "blender_manifest.toml").read_text())
@@ -19,8 +21,11 @@ def addon_files(addon):
     return names
 
 
-def write_extension(addon, wheels, licence, path):
-    """Writes the extension's zip to `path`. Wheels, compressed already, are stored."""
+def write_extension(addon, options, wheels, licence, path):
+    """Writes the extension's zip to `path`; `options` is the library's options.json, which makes the panel.
+
+    Wheels, compressed already, are stored.
+    """
     lines = "".join(f'  "./wheels/{wheel.name}",\n' for wheel in wheels)
     # Keys after a table would belong to it: the wheels go before the first one.
     head, table, tail = (addon / "blender_manifest.toml").read_text().partition("\n[")
@@ -32,6 +37,7 @@ def write_extension(addon, wheels, licence, path):
         archive.writestr(entry("LICENSE"), licence)
         for name, source in addon_files(addon).items():
             archive.writestr(entry(name), source.read_bytes())
+        archive.writestr(entry(OPTIONS), options.read_bytes())
         for wheel in wheels:
             archive.writestr(entry(f"wheels/{wheel.name}", method=zipfile.ZIP_STORED), wheel.read_bytes())
     partial.replace(path)

@@ -63,6 +63,7 @@ def build_binding(root, build, headers, version, work):
         f"-DARAPFIELDS_BINDING_HEADERS={headers}",
         f"-DARAPFIELDS_BINDING_NAME={module_name(version)}",
         f"-DARAPFIELDS_LIBRARY={build / 'python/arapfields/libarapfields.so'}",
+        f"-DARAPFIELDS_GENERATED={build / 'generated'}",
         f"-DEIGEN_INCLUDE_DIR={cached(build, 'EIGEN_INCLUDE_DIR')}",
         f"-DPYBIND11_INCLUDE_DIR={pybind11.get_include()}",
     ]

@@ -8,6 +8,7 @@ import zipfile
 from pathlib import Path
 
 from . import dependencies
+from .archive import OPTIONS
 
 LIMIT = 200e6
 PLATFORM_TAGS = {"linux-x64": r"(many)?linux.*_x86_64"}
@@ -29,7 +30,7 @@ def check_zip(path, pythons):
         raise RuntimeError(f"{path} has {size / 1e6:.0f} MB; the limit is {LIMIT / 1e6:.0f}")
     with zipfile.ZipFile(path) as archive:
         names = set(archive.namelist())
-        missing = {"blender_manifest.toml", "__init__.py", "LICENSE"} - names
+        missing = {"blender_manifest.toml", "__init__.py", "LICENSE", OPTIONS} - names
         if missing:
             raise RuntimeError(f"{path.name} lacks {', '.join(sorted(missing))}")
         manifest = tomllib.loads(archive.read("blender_manifest.toml").decode())

@@ -60,7 +60,9 @@ def render(output):
     field = af.deform(
         samples, [box.handle for box in boxes], af.DeformOptions(iterations=60 if stage.DRAFT else 300)
     )
-    inverse = af.train_inverse(field, samples, af.InverseOptions(iterations=100 if stage.DRAFT else 600))
+    inverse = af.train_inverse(
+        field, samples, af.InverseTrainingOptions(iterations=100 if stage.DRAFT else 600)
+    )
     vertices, triangles = af.extract_surface(sdf, FORWARD)
     rest = surface(vertices, triangles, stage.CLAY)
     forward = surface(field(vertices), triangles, stage.RESULT)

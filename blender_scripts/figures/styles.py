@@ -17,7 +17,7 @@ OPTIONS = {
     "coarse_centers": 150,
     "fine_centers": 800,
     "bending": 1e-3,
-    "steps": 40,
+    "iterations": 40,
     "tolerance": 3e-4,
     "interior": False,  # a style acts everywhere alike: nothing is to be held apart
 }

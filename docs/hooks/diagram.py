@@ -20,21 +20,22 @@ HOLDS = {
     "solve": "Adam, live solver",
     "extraction": "marching cubes",
 }
+UNDER_ALL = ("core", "options")
 WIDTH, STEP, BOX, TOP = 1000, 121, 104, 250
 INK, LINE = "#1f2937", "#94a3b8"
 
 
 def pipeline():
-    """The native folders but core, in the order in which CMake lists them."""
+    """The native folders but those under all, in the order in which CMake lists them."""
     text = (ROOT / "native" / "CMakeLists.txt").read_text()
     listed = re.search(r"foreach\(folder ([^)]*)\)", text)[1].split()
-    return [folder for folder in listed if folder != "core"]
+    return [folder for folder in listed if folder not in UNDER_ALL]
 
 
 def includes():
     """The pairs (from, to) of folders one of whose files includes a header of the other."""
     found = set()
-    for folder in [*pipeline(), "core"]:
+    for folder in [*pipeline(), *UNDER_ALL]:
         for path in sorted((ROOT / "native" / folder).glob("*.*")):
             targets = re.findall(r'^\s*#include\s+"(\w+)/', path.read_text(), re.M)
             found |= {(folder, target) for target in targets if target != folder}
@@ -96,15 +97,15 @@ def svg():
         '<text x="20" y="110" font-size="11">libarapfields: an arrow points to what is included</text>'
     )
     for source, target in sorted(found):
-        if target != "core":
+        if target not in UNDER_ALL and source not in UNDER_ALL:
             shift = 6 if left[source] > left[target] else -6
             parts.append(arc(left[source] + BOX / 2 - shift, left[target] + BOX / 2 + shift))
     for name in folders:
         parts += box(left[name], TOP, BOX, 66, name, HOLDS.get(name, ""))
         if (name, "core") in found:
             parts.append(down(left[name] + BOX / 2, TOP + 66, 32))
-    note = "types, errors, task, random numbers, frame, jets, threads, dense products, instruction sets"
-    parts += box(20, TOP + 100, full - 12, 52, "core", note, "#ecfeff")
+    note = "types, errors, task, random numbers, frame, jets, threads, dense products; every option once"
+    parts += box(20, TOP + 100, full - 12, 52, "core, options", note, "#ecfeff")
     return "\n".join([*parts, "</svg>", ""])
 
 

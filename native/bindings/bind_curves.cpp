@@ -85,24 +85,13 @@ void bind_curves(py::module_& module) {
       .def_readonly("motion", &CurveHandle::motion)
       .def_readonly("weight", &CurveHandle::weight);
 
-  OptionsBinding<CurveOptions>(module, "CurveOptions", "Options of deform_curve.")
-      .field("bending", &CurveOptions::bending, "Weight λ_bend of the bend, in the curve's square.")
-      .field(
-          "smoothness", &CurveOptions::smoothness,
-          "Weight of the second derivatives' mean square at the centers: keeps the plane tame away from the "
-          "curve.")
-      .field("handle_weight", &CurveOptions::handle_weight, "Factor of the handles' mean squared distance.")
-      .field("iterations", &CurveOptions::iterations, "Quasi-Newton steps at most.")
-      .field("spacing", &CurveOptions::spacing, "Distance of neighbouring centers, in the curve's square.")
-      .field("threads", &CurveOptions::threads, "Threads; 0 uses all.");
-
   py::class_<CurveReport>(module, "CurveReport", "What deform_curve reached.")
       .def_readonly("stretch", &CurveReport::stretch, "Mean ‖J − R‖² over the samples.")
       .def_readonly("bend", &CurveReport::bend, "Mean bend over the samples, in the curve's square.")
       .def_readonly("handle_error_mean", &CurveReport::handle_error_mean, "In the curve's units.")
       .def_readonly("handle_error_max", &CurveReport::handle_error_max, "In the curve's units.")
       .def_readonly("min_determinant", &CurveReport::min_determinant, "Smallest det J at the samples.")
-      .def_readonly("steps", &CurveReport::steps, "Quasi-Newton steps taken.")
+      .def_readonly("iterations", &CurveReport::iterations, "Quasi-Newton steps taken.")
       .def_readonly("loss", &CurveReport::loss, "Reached: stretch + bending · bend, handles, smoothness.")
       .def_readonly("converged", &CurveReport::converged, "A further step would gain next to nothing.");
 
@@ -126,7 +115,7 @@ void bind_curves(py::module_& module) {
           return deform_curve(samples, handles, options, progress);
         });
       },
-      "points"_a, "handles"_a, "options"_a = CurveOptions(), "task"_a = py::none(),
+      "points"_a, "handles"_a, py::arg_v("options", CurveOptions(), "CurveOptions()"), "task"_a = py::none(),
       "Deforms a plane curve, given by its samples (n, 2), as rigidly as possible so that the handles' "
       "samples\n"
       "follow their motions. The energy is that of surfaces with d = 2; the field is a sum of Gaussian "

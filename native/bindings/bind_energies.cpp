@@ -82,7 +82,7 @@ void bind_styles(py::module_& module) {
         const Points directions = as_points(normals, "normals");
         return gauss_preference(as_points(preferred, "preferred"), sharpness).values(directions);
       },
-      "normals"_a, "preferred"_a, "sharpness"_a = 5.0,
+      "normals"_a, "preferred"_a, "sharpness"_a = StylizeOptions().sharpness,
       "How much each unit normal (n, 3) agrees with the preferred normals (k, 3): (n,) values\n"
       "g = sum_k w_k exp(sharpness n·n_k) with g(n_k) = 1, small far from all of them. Coinciding preferred\n"
       "normals raise InvalidInput that names the pair. After Kohlbrenner et al., Gauss Stylization (2021).");

@@ -48,8 +48,8 @@ py::tuple extract_moved(const ImplicitFunction& sdf, const DeformationField& fie
 
 void bind_extraction(py::module_& module) {
   module.def(
-      "extract_surface", &extract, "sdf"_a, "resolution"_a = 256, "task"_a = py::none(), "threads"_a = 0,
-      "report"_a = py::none(),
+      "extract_surface", &extract, "sdf"_a, "resolution"_a = ExtractionOptions().resolution,
+      "task"_a = py::none(), "threads"_a = 0, "report"_a = py::none(),
       "The zero surface of a signed distance function as a mesh: V (n,3), F (m,3), in mesh coordinates.\n\n"
       "Marching cubes on `resolution` (8 to 512) grid points a side over the frame's cube, evaluated only\n"
       "where a measured bound on the gradient lets the surface be; the vertices are those of the whole "
@@ -58,8 +58,8 @@ void bind_extraction(py::module_& module) {
       "leaves the cube. A dict given as `report` receives evaluations and dense_evaluations (points of the\n"
       "grid), open (the mesh has a boundary) and seconds. InvalidInput for a bad resolution or no surface.");
   module.def(
-      "extract_deformed", &extract_moved, "sdf"_a, "field"_a, "resolution"_a = 256, "inverse"_a = py::none(),
-      "task"_a = py::none(), "threads"_a = 0, "report"_a = py::none(),
+      "extract_deformed", &extract_moved, "sdf"_a, "field"_a, "resolution"_a = ExtractionOptions().resolution,
+      "inverse"_a = py::none(), "task"_a = py::none(), "threads"_a = 0, "report"_a = py::none(),
       "The deformed surface as the zero set of sdf ∘ field⁻¹: V (n,3), F (m,3), in mesh coordinates.\n\n"
       "Marching cubes on `resolution` (8 to 512) grid points a side over a cube around the deformed "
       "surface;\n"

@@ -51,7 +51,7 @@ FieldArray hessian(const DeformationField& field, const py::object& points) {
 
 Points inverse(const DeformationField& field, const py::object& points, double tolerance, Task* task) {
   const Points mesh = as_points(points, "points");
-  InverseOptions options;
+  NewtonInverseOptions options;
   options.tolerance = tolerance / field.frame().scale;
   return run_long(task, [&](const Progress& progress) {
     return field.frame().to_mesh(invert(field, field.frame().to_cube(mesh), options, progress).points);
@@ -83,7 +83,8 @@ void bind_fields(py::module_& module) {
       .def("jacobian", &jacobian, "points"_a, "(p, 3, 3): [:, i, j] is the derivative of f_i by x_j.")
       .def("hessian", &hessian, "points"_a, "(p, 3, 3, 3): [:, i, j, k] is ∂²f_i/∂x_j∂x_k (1/length).")
       .def(
-          "inverse", &inverse, "points"_a, "tolerance"_a = 2e-6, "task"_a = nullptr,
+          "inverse", &inverse, "points"_a, "tolerance"_a = NewtonInverseOptions().tolerance,
+          "task"_a = nullptr,
           "Points (p, 3) that the field takes to `points` within `tolerance` (a length), by Newton's method\n"
           "with the analytic Jacobian; rows of NaN where none was found. Where space is folded there are\n"
           "several, and the one nearest to the surface's rest samples is preferred.")

@@ -5,42 +5,14 @@
 namespace arapfields::python {
 namespace {
 
-void bind_options(py::module_& module) {
-  OptionsBinding<FitOptions>(
-      module, "FitOptions",
-      "How fit_sdf learns. Lengths are in units of the frame's cube, in which the mesh spans 1.5.")
-      .field("octaves", &FitOptions::octaves, "Frequencies of the positional encoding.")
-      .field("frequency", &FitOptions::frequency,
-             "The lowest of them, in radians a cube unit; each next one doubles.")
-      .field("width", &FitOptions::width, "Units of a hidden layer.")
-      .field("layers", &FitOptions::layers, "Hidden layers.")
-      .field("sharpness", &FitOptions::sharpness, "Beta of the softplus units.")
-      .field("steps", &FitOptions::steps, "Steps of the optimization at most.")
-      .field("batch", &FitOptions::batch, "Points a step.")
-      .field("seconds", &FitOptions::seconds,
-             "Time budget for the steps, which the schedule then follows; 0: none.")
-      .field("target_error", &FitOptions::target_error,
-             "Stop once the mean error near the surface is this small, in cube units; 0: never.")
-      .field("optimizer", &FitOptions::optimizer, "'muon' (orthogonalised momentum) or 'adam'.")
-      .field("learning_rate", &FitOptions::learning_rate, "At its peak; 0: 0.05 for muon, 0.003 for adam.")
-      .field("near_points", &FitOptions::near_points, "Training points near the surface.")
-      .field("uniform_points", &FitOptions::uniform_points, "Training points uniform in the cube.")
-      .field("near_spread", &FitOptions::near_spread,
-             "Standard deviation, along each axis, of one half of the near points about the surface.")
-      .field("far_spread", &FitOptions::far_spread, "That of the other half.")
-      .field("near_share", &FitOptions::near_share, "Share of the near points in each step.")
-      .field("threads", &FitOptions::threads, "0: those in force (see thread_count).")
-      .field("device", &FitOptions::device, "'cpu', 'cuda', or 'auto': a CUDA device if there is one.")
-      .field("seed", &FitOptions::seed, "Same seed and thread count: same network, bit for bit.");
-}
-
 py::object with_report(const FitResult& result) {
   const FitReport& r = result.report;
   py::object sdf = py::cast(result.sdf);
-  sdf.attr("_report") = py::dict(
-      "near_mean"_a = r.near_mean, "near_max"_a = r.near_max, "volume_mean"_a = r.volume_mean,
-      "volume_max"_a = r.volume_max, "scale"_a = r.scale, "steps"_a = r.steps, "seconds"_a = r.seconds,
-      "distance_seconds"_a = r.distance_seconds, "stopped_by"_a = r.stopped_by, "device"_a = r.device);
+  sdf.attr("_report") =
+      py::dict("near_mean"_a = r.near_mean, "near_max"_a = r.near_max, "volume_mean"_a = r.volume_mean,
+               "volume_max"_a = r.volume_max, "scale"_a = r.scale, "iterations"_a = r.iterations,
+               "seconds"_a = r.seconds, "distance_seconds"_a = r.distance_seconds,
+               "stopped_by"_a = r.stopped_by, "device"_a = r.device);
   return sdf;
 }
 
@@ -64,7 +36,6 @@ py::object fit(const py::object& vertices, const py::object& triangles,
 }  // namespace
 
 void bind_fit(py::module_& module) {
-  bind_options(module);
   module.def(
       "fit_sdf", &fit, "vertices"_a, "triangles"_a, "options"_a = py::none(), "task"_a = py::none(),
       "A NeuralSdf that has learnt the signed distance of a triangle soup.\n\n"
@@ -76,7 +47,8 @@ void bind_fit(py::module_& module) {
       "layers learn by orthogonalised momentum (Muon; Jordan et al. 2024), the rest by Adam, at a rate that\n"
       "falls linearly to zero. report: near_mean, near_max, volume_mean, volume_max (errors at held-out "
       "points,\n"
-      "mesh units), scale (mesh units a cube unit), steps, seconds, distance_seconds, stopped_by, device.\n"
+      "mesh units), scale (mesh units a cube unit), iterations, seconds, distance_seconds, stopped_by, "
+      "device.\n"
       "InvalidInput for a broken mesh or option; Cancelled; Diverged, whose last_good is the state before.");
 }
 

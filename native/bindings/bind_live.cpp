@@ -28,7 +28,7 @@ py::dict report_dict(const LiveReport& report) {
       "value"_a = report.value, "handle_error_mean"_a = report.handle_mean,
       "handle_error_max"_a = report.handle_max, "min_determinant"_a = report.distortion.min_determinant,
       "flipped_share"_a = report.distortion.flipped_share, "max_stretch"_a = report.distortion.max_stretch,
-      "min_stretch"_a = report.distortion.min_stretch, "steps"_a = report.steps,
+      "min_stretch"_a = report.distortion.min_stretch, "iterations"_a = report.iterations,
       "evaluations"_a = report.evaluations, "converged"_a = report.converged, "seconds"_a = report.seconds,
       "setup_seconds"_a = report.setup_seconds);
   if (report.preference) result["preference"] = *report.preference;
@@ -41,12 +41,13 @@ py::object with_report(const LiveSolver& live) {
   return field;
 }
 
-py::object solve(LiveSolver& live, const py::object& targets, Index steps, double tolerance, Task* task) {
-  require(steps >= 0, "steps", std::to_string(steps), "0 (the options') or more is allowed");
+py::object solve(LiveSolver& live, const py::object& targets, Index iterations, double tolerance,
+                 Task* task) {
+  require(iterations >= 0, "iterations", std::to_string(iterations), "0 (the options') or more is allowed");
   require(tolerance >= 0.0 && tolerance < 1.0, "tolerance", std::to_string(tolerance),
           "0 (the options') or a share below 1 is allowed");
   if (!targets.is_none()) live.set_targets(moved_handles(live, py::cast<py::sequence>(targets)));
-  run_long(task, [&](const Progress& progress) { return live.solve(steps, tolerance, progress); });
+  run_long(task, [&](const Progress& progress) { return live.solve(iterations, tolerance, progress); });
   return with_report(live);
 }
 
@@ -60,37 +61,9 @@ void set_style(LiveSolver& live, const py::object& normals, double strength, dou
                  weights.is_none() ? Vector() : as_vector(weights, "weights"));
 }
 
-void bind_options(py::module_& module) {
-  OptionsBinding<LiveOptions>(module, "LiveOptions",
-                              "Options of LiveDeformer. Lengths and weights refer to the samples' unit cube.")
-      .field("samples", &LiveOptions::samples, "Surface samples that the energy sees.")
-      .field("coarse_centers", &LiveOptions::coarse_centers, "Centers of the coarse scale; 0: none.")
-      .field("fine_centers", &LiveOptions::fine_centers, "Centers of the fine scale.")
-      .field("coarse_radius_factor", &LiveOptions::coarse_radius_factor,
-             "Radius of the coarse centers over their spacing.")
-      .field("fine_radius_factor", &LiveOptions::fine_radius_factor,
-             "Radius of the fine centers over their spacing.")
-      .field(
-          "interior", &LiveOptions::interior,
-          "Centers reach as far as ways through the shape's interior: parts near in space but apart in the\n"
-          "shape, such as fingers, do not pull at each other.")
-      .field("bending", &LiveOptions::bending, "λ_bend, the weight of the bend against the stretch.")
-      .field("handle_weight", &LiveOptions::handle_weight, "Weight of the handles' mean squared distance.")
-      .field("handle_samples", &LiveOptions::handle_samples, "Samples at which a handle pulls, at most.")
-      .field("gauss_weight", &LiveOptions::gauss_weight, "λ_Gauss of a style at strength 1.")
-      .field("barrier", &LiveOptions::barrier, "Weight of the barrier that keeps det J up; 0: none.")
-      .field("barrier_threshold", &LiveOptions::barrier_threshold, "det J below which the barrier acts.")
-      .field("steps", &LiveOptions::steps, "Quasi-Newton steps of one solve, at most.")
-      .field("tolerance", &LiveOptions::tolerance,
-             "A solve ends where the next step is expected to gain less than this share of the energy.")
-      .field("threads", &LiveOptions::threads, "Worker threads; 0: as many as pay off.")
-      .field("seed", &LiveOptions::seed, "Of the choice of samples; same seed, same result.");
-}
-
 }  // namespace
 
 void bind_live(py::module_& module) {
-  bind_options(module);
   py::class_<RadialField, DeformationField, std::shared_ptr<RadialField>>(
       module, "RadialField", "A deformation as a sum of compact centers and an affine map.")
       .def_property_readonly(
@@ -108,15 +81,17 @@ void bind_live(py::module_& module) {
               return std::make_unique<LiveSolver>(samples, handles, options, progress);
             });
           }),
-          "samples"_a, "handles"_a = std::vector<Handle>(), "options"_a = LiveOptions(), "task"_a = nullptr,
+          "samples"_a, "handles"_a = std::vector<Handle>(),
+          py::arg_v("options", LiveOptions(), "LiveOptions()"), "task"_a = nullptr,
           "samples: SurfaceSamples; handles: Cuboid, Point or Region in mesh coordinates (none: for a style\n"
           "alone; the lowest sample is then held). InvalidInput names the handle or option that does not "
           "fit.")
-      .def("solve", &solve, "targets"_a = py::none(), "steps"_a = 0, "tolerance"_a = 0.0, "task"_a = nullptr,
+      .def("solve", &solve, "targets"_a = py::none(), "iterations"_a = 0, "tolerance"_a = 0.0,
+           "task"_a = nullptr,
            "Follows the handles to `targets` (a 4×4 matrix a handle, three numbers for a point; None: where\n"
-           "they are) and returns a DeformationField of its own. `steps` and `tolerance` replace the "
+           "they are) and returns a DeformationField of its own. `iterations` and `tolerance` replace the "
            "options' for\n"
-           "this call, for instance to finish a drag: steps=100, tolerance=1e-6.")
+           "this call, for instance to finish a drag: iterations=100, tolerance=1e-6.")
       .def(
           "track",
           [](LiveSolver& live, const py::object& points) {
@@ -133,8 +108,8 @@ void bind_live(py::module_& module) {
           "times faster than the field itself.")
       .def("set_handles", &LiveSolver::set_handles, "handles"_a,
            "Other handles for the same surface; the shape at hand is kept as the start of the next solve.")
-      .def("set_style", &set_style, "normals"_a, "strength"_a = 1.0, "sharpness"_a = 5.0,
-           "weights"_a = py::none(),
+      .def("set_style", &set_style, "normals"_a, "strength"_a = StylizeOptions().strength,
+           "sharpness"_a = StylizeOptions().sharpness, "weights"_a = py::none(),
            "Turns the surface towards preferred normals, (k, 3) or a style's name, from the next solve on; "
            "None\n"
            "or strength 0: no style. `weights` (one for each sample given at the start) blend the effect.")

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bindings/bind.h"
 #include "mesh/sample_mesh.h"
+#include "options/sampling.h"
 
 namespace arapfields::python {
 namespace {
@@ -59,7 +60,7 @@ void bind_mesh(py::module_& module) {
         const Triangles f = as_triangles(triangles, "triangles");
         return run_long(nullptr, [&](const Progress&) { return sample_mesh(v, f, count, seed); });
       },
-      "vertices"_a, "triangles"_a, "count"_a = 20000, "seed"_a = 0,
+      "vertices"_a, "triangles"_a, "count"_a = SampleOptions().count, "seed"_a = SampleOptions().seed,
       "Independent samples of a mesh, uniform by area, with the triangles' unit normals.\n\n"
       "vertices (n,3), triangles (m,3) counter-clockwise seen from outside. The frame centres the bounding "
       "box\n"

@@ -51,7 +51,8 @@ void save(const py::object& self, const py::object& path) {
     weights.append(RowMatrix<float>(weight.cast<float>()));
   for (const Vector& bias : layers.biases) biases.append(VectorF(bias.cast<float>()));
   const py::dict network("octaves"_a = shape.octaves, "frequency"_a = shape.frequency,
-                         "sharpness"_a = shape.sharpness, "weights"_a = weights, "biases"_a = biases);
+                         "sharpness"_a = shape.softplus_sharpness, "weights"_a = weights,
+                         "biases"_a = biases);
   const py::dict frame("center"_a = sdf.frame().center, "scale"_a = sdf.frame().scale);
   py::module_::import("arapfields._files")
       .attr("save_state")(
@@ -90,7 +91,8 @@ void bind_sdf(py::module_& module) {
              double sharpness) {
             return NeuralSdf::from_layers(as_layers(weights, biases), octaves, frequency, sharpness);
           },
-          "weights"_a, "biases"_a, "octaves"_a = 4, "frequency"_a = 1.0, "sharpness"_a = 30.0,
+          "weights"_a, "biases"_a, "octaves"_a = NetworkOptions().octaves,
+          "frequency"_a = NetworkOptions().frequency, "sharpness"_a = NetworkOptions().softplus_sharpness,
           "A published network, in cube coordinates (its frame is the identity).\n\n"
           "weights[l] (out, in) and biases[l] (out,) of each layer, the last with one output; the first "
           "takes\n"
@@ -142,7 +144,7 @@ void bind_testing(py::module_& module) {
              shape.width = width, shape.layers = layers;
              return std::make_unique<JetTrial>(shape, points, order_of(order), 0);
            }),
-           "points"_a, "order"_a, "width"_a = 256, "layers"_a = 4)
+           "points"_a, "order"_a, "width"_a = NetworkOptions().width, "layers"_a = NetworkOptions().layers)
       .def("run", &JetTrial::run, py::call_guard<py::gil_scoped_release>());
   testing.def(
       "mlp_jets",

@@ -7,8 +7,8 @@
 namespace arapfields::python {
 namespace {
 
-SurfaceSamples sample(const std::shared_ptr<ImplicitFunction>& sdf, Index count, std::uint64_t seed,
-                      Task* task, int threads, const std::optional<py::dict>& report) {
+SurfaceSamples sample(const std::shared_ptr<ImplicitFunction>& sdf, int count, std::int64_t seed, Task* task,
+                      int threads, const std::optional<py::dict>& report) {
   const auto* network = dynamic_cast<const NeuralSdf*>(sdf.get());
   const Frame frame = network != nullptr ? network->frame() : Frame();
   SampleReport done;
@@ -17,7 +17,8 @@ SurfaceSamples sample(const std::shared_ptr<ImplicitFunction>& sdf, Index count,
     return sample_surface(*sdf, frame, {.count = count, .seed = seed}, progress, &done);
   });
   samples.redraw = [sdf, frame](Index again, std::uint64_t other) {
-    return sample_surface(*sdf, frame, {.count = again, .seed = other});
+    return sample_surface(*sdf, frame,
+                          {.count = static_cast<int>(again), .seed = static_cast<std::int64_t>(other >> 11)});
   };
   if (report)
     report->attr("update")(
@@ -31,8 +32,8 @@ SurfaceSamples sample(const std::shared_ptr<ImplicitFunction>& sdf, Index count,
 
 void bind_sampling(py::module_& module) {
   module.def(
-      "sample_surface", &sample, "sdf"_a, "count"_a = 20000, "seed"_a = 0, "task"_a = py::none(),
-      "threads"_a = 0, "report"_a = py::none(),
+      "sample_surface", &sample, "sdf"_a, "count"_a = SampleOptions().count, "seed"_a = SampleOptions().seed,
+      "task"_a = py::none(), "threads"_a = 0, "report"_a = py::none(),
       "Samples of the zero surface of a signed distance function, uniform by area, with unit normals.\n\n"
       "All crossings of random lines through the cube, thinned to `count` (1 to 100 million) at random, in\n"
       "random order; every point has |sdf| <= 1e-4 of the cube's half side, nearly all <= 2e-6. Follows\n"

@@ -67,77 +67,6 @@ Points preferred_from(const py::object& style, const py::object& orientation) {
   return normals * turn.transpose();
 }
 
-void bind_options(py::module_& module) {
-  OptionsBinding<DeformOptions>(module, "DeformOptions",
-                                "Options of deform. Lengths and weights refer to the samples' unit cube.")
-      .field("field", &DeformOptions::field,
-             "'neural': a network trained by Adam. 'radial': centers, solved directly at interactive rates.")
-      .field("start", &DeformOptions::start, "What the network refines: 'identity' or the 'radial' result.")
-      .field("centers", &DeformOptions::centers,
-             "Fine centers of a radial field; a fifth of coarse ones is added.")
-      .field("iterations", &DeformOptions::iterations, "Steps of the optimization.")
-      .field("batch", &DeformOptions::batch, "Surface samples a step.")
-      .field(
-          "fresh_samples", &DeformOptions::fresh_samples,
-          "Of the batch, samples newly drawn from the surface at each step: the estimate is then unbiased\n"
-          "where the fixed samples miss something. Needs samples of sample_mesh or sample_surface.")
-      .field("bending", &DeformOptions::bending, "λ_bend, the weight of the bend against the stretch.")
-      .field("handle_weight", &DeformOptions::handle_weight, "Weight of the handles' mean squared distance.")
-      .field("handle_batch", &DeformOptions::handle_batch, "Most samples of each handle a step.")
-      .field("exact_handles", &DeformOptions::exact_handles,
-             "Interpolate the handles' motions by construction instead of by weight.")
-      .field("margin", &DeformOptions::margin, "Width of the fall-off around an exact handle.")
-      .field("barrier", &DeformOptions::barrier, "Weight of the barrier that keeps det J up; 0: none.")
-      .field("barrier_threshold", &DeformOptions::barrier_threshold, "det J below which the barrier acts.")
-      .field("invertibility", &DeformOptions::invertibility,
-             "Weight of the cycle loss with an inverse trained along, which penalises folds; 0: none.")
-      .field("optimizer", &DeformOptions::optimizer,
-             "'muon': orthogonalised momentum, which needs about a third of the steps; or 'adam'.")
-      .field("learning_rate", &DeformOptions::learning_rate, "At its peak; 0: 0.03 for muon, 0.002 for adam.")
-      .field("width", &DeformOptions::width, "Units of a hidden layer.")
-      .field("layers", &DeformOptions::layers, "Hidden layers.")
-      .field("octaves", &DeformOptions::octaves, "Octaves of the positional encoding.")
-      .field("frequency", &DeformOptions::frequency, "Angular frequency of its first octave.")
-      .field("sharpness", &DeformOptions::sharpness, "β of softplus.")
-      .field("precision", &DeformOptions::precision,
-             "Of the matrix products while solving: 'float32', or 'bfloat16', whose factors are rounded to 8 "
-             "bits; about\n"
-             "a third faster where the processor multiplies them (AVX512-BF16), slower elsewhere.")
-      .field("time_budget", &DeformOptions::time_budget, "Seconds after which to stop; 0: none.")
-      .field("threads", &DeformOptions::threads, "Worker threads; 0: all.")
-      .field("device", &DeformOptions::device, "'auto', 'cpu' or 'cuda'.")
-      .field("seed", &DeformOptions::seed, "Of weights and subsets; same seed, same result.");
-  OptionsBinding<StylizeOptions>(module, "StylizeOptions",
-                                 "Options of stylize. Lengths and weights refer to the samples' unit cube.")
-      .field("field", &StylizeOptions::field, "'neural' or 'radial', as in DeformOptions.")
-      .field("strength", &StylizeOptions::strength, "From 0, the shape itself, to 1.")
-      .field("sharpness", &StylizeOptions::sharpness,
-             "How narrow the preference is about each normal (σ): low rounds edges, high keeps them crisp.")
-      .field("gauss_weight", &StylizeOptions::gauss_weight, "λ_Gauss at full strength.")
-      .field("rigidity", &StylizeOptions::rigidity, "λ_ARAP.")
-      .field("bending", &StylizeOptions::bending, "λ_bend.")
-      .field("iterations", &StylizeOptions::iterations, "Steps of the optimization.")
-      .field("batch", &StylizeOptions::batch, "Surface samples a step.")
-      .field("handle_weight", &StylizeOptions::handle_weight, "Weight of the handles, where there are any.")
-      .field("handle_batch", &StylizeOptions::handle_batch, "Most samples of each handle a step.")
-      .field("barrier", &StylizeOptions::barrier, "Weight of the barrier that keeps det J up; 0: none.")
-      .field("barrier_threshold", &StylizeOptions::barrier_threshold, "det J below which the barrier acts.")
-      .field("optimizer", &StylizeOptions::optimizer,
-             "'muon': orthogonalised momentum, which needs about a third of the steps; or 'adam'.")
-      .field("learning_rate", &StylizeOptions::learning_rate,
-             "At its peak; 0: 0.03 for muon, 0.002 for adam.")
-      .field("width", &StylizeOptions::width, "Units of a hidden layer.")
-      .field("layers", &StylizeOptions::layers, "Hidden layers.")
-      .field("octaves", &StylizeOptions::octaves, "Octaves of the positional encoding.")
-      .field("frequency", &StylizeOptions::frequency, "Angular frequency of its first octave.")
-      .field("softplus_sharpness", &StylizeOptions::softplus_sharpness, "β of softplus.")
-      .field("precision", &StylizeOptions::precision, "Of the matrix products, as in DeformOptions.")
-      .field("time_budget", &StylizeOptions::time_budget, "Seconds after which to stop; 0: none.")
-      .field("threads", &StylizeOptions::threads, "Worker threads; 0: all.")
-      .field("device", &StylizeOptions::device, "'auto', 'cpu' or 'cuda'.")
-      .field("seed", &StylizeOptions::seed, "Of weights and subsets; same seed, same result.");
-}
-
 /// What the field does at points of mesh coordinates.
 SolveReport measure_at(const DeformationField& field, const py::object& points) {
   SurfaceSamples samples;
@@ -156,7 +85,6 @@ py::tuple energy_of(const DeformationField& field, const py::object& points) {
 }  // namespace
 
 void bind_solve(py::module_& module) {
-  bind_options(module);
   module.def(
       "deform",
       [](const SurfaceSamples& samples, const std::vector<Handle>& handles, const DeformOptions& options,
@@ -189,20 +117,6 @@ void bind_solve(py::module_& module) {
       "handles\n"
       "the lowest sample stays in place; strength 0 is the identity. field.report['preference'] is the mean\n"
       "preference reached. Raises as deform does.");
-  OptionsBinding<InverseTrainingOptions>(module, "InverseOptions", "Options of train_inverse.")
-      .field("iterations", &InverseTrainingOptions::iterations, "Steps of the optimization.")
-      .field("batch", &InverseTrainingOptions::batch, "Points a step, half on the deformed surface.")
-      .field("optimizer", &InverseTrainingOptions::optimizer, "'muon' or 'adam'.")
-      .field("learning_rate", &InverseTrainingOptions::learning_rate, "0: the optimizer's default.")
-      .field("width", &InverseTrainingOptions::width, "Units of a hidden layer.")
-      .field("layers", &InverseTrainingOptions::layers, "Hidden layers.")
-      .field("octaves", &InverseTrainingOptions::octaves, "Octaves of the positional encoding.")
-      .field("frequency", &InverseTrainingOptions::frequency, "Angular frequency of its first octave.")
-      .field("sharpness", &InverseTrainingOptions::sharpness, "β of softplus.")
-      .field("time_budget", &InverseTrainingOptions::time_budget, "Seconds after which to stop; 0: none.")
-      .field("threads", &InverseTrainingOptions::threads, "Worker threads; 0: all.")
-      .field("device", &InverseTrainingOptions::device, "'auto', 'cpu' or 'cuda'.")
-      .field("seed", &InverseTrainingOptions::seed, "Of weights and subsets; same seed, same result.");
   module.def(
       "train_inverse",
       [](const DeformationField& field, const SurfaceSamples& samples, const InverseTrainingOptions& options,
@@ -215,7 +129,7 @@ void bind_solve(py::module_& module) {
                                           "iterations"_a = r.loop.iterations, "seconds"_a = r.loop.seconds);
         return result;
       },
-      "field"_a, "samples"_a, py::arg_v("options", InverseTrainingOptions(), "InverseOptions()"),
+      "field"_a, "samples"_a, py::arg_v("options", InverseTrainingOptions(), "InverseTrainingOptions()"),
       "task"_a = nullptr,
       "A network that approximates field's inverse, as a DeformationField: trained so that the field takes\n"
       "its values back, at deformed samples and in their box (the paper's cycle loss), and on the samples'\n"

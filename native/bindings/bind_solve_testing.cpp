@@ -13,7 +13,7 @@ class Probe {
   Probe(const SurfaceSamples& samples, const std::vector<Handle>& handles, int width, double bending,
         const Points& preferred, double gauss, double barrier, double margin)
       : samples_(samples),
-        field_(MlpShape{3, width, 2, 2, 1.0, 5.0}, 0, true),
+        field_(MlpShape{{width, 2, 2, 1.0, 5.0}, 3}, 0, true),
         objective_(samples_, terms(samples_, handles, bending, preferred, gauss, barrier)) {
     if (margin > 0.0) field_.set_handles(blend(objective_.terms().handles, margin));
   }
@@ -28,13 +28,13 @@ class Probe {
                               double bending, const Points& preferred, double gauss, double barrier) {
     ObjectiveTerms terms;
     terms.batch = 20;
-    terms.bending = bending;
+    terms.surface.bending = bending;
     if (preferred.rows() > 0) terms.preference = gauss_preference(preferred);
     terms.gauss = gauss;
-    terms.barrier = barrier;
-    terms.barrier_threshold = 0.9;
+    terms.surface.barrier = barrier;
+    terms.surface.barrier_threshold = 0.9;
     terms.handles = BoundHandles(handles, samples.points);
-    terms.handle_batch = 8;
+    terms.pull.handle_batch = 8;
     return terms;
   }
   static std::shared_ptr<const HandleBlend> blend(const BoundHandles& handles, double margin) {

@@ -61,19 +61,17 @@ py::dict neural_state(const NeuralField& field) {
   const MlpShape& shape = field.shape();
   py::dict state("kind"_a = "neural", "width"_a = shape.width, "layers"_a = shape.layers,
                  "octaves"_a = shape.octaves, "frequency"_a = shape.frequency,
-                 "sharpness"_a = shape.sharpness, "weights"_a = field.weights());
+                 "sharpness"_a = shape.softplus_sharpness, "weights"_a = field.weights());
   if (field.handles()) state["handles"] = handles_state(*field.handles());
   if (field.base()) state["base"] = field_state(*field.base());
   return state;
 }
 
 std::shared_ptr<DeformationField> neural_from(const py::dict& state) {
-  const MlpShape shape{3,
-                       get_as<int>(state, "width"),
-                       get_as<int>(state, "layers"),
-                       get_as<int>(state, "octaves"),
-                       get_as<double>(state, "frequency"),
-                       get_as<double>(state, "sharpness")};
+  const NetworkOptions network{get_as<int>(state, "width"), get_as<int>(state, "layers"),
+                               get_as<int>(state, "octaves"), get_as<double>(state, "frequency"),
+                               get_as<double>(state, "sharpness")};
+  const MlpShape shape{network, 3};
   auto field = std::make_shared<NeuralField>(shape, 0);
   field->set_weights(as_vector(get(state, "weights"), "weights").cast<float>());
   if (has(state, "handles")) field->set_handles(handles_from(get_as<py::dict>(state, "handles")));

@@ -6,6 +6,7 @@ PYBIND11_MODULE(_native, module) {
   module.doc() = "Native part of arapfields.";
   module.attr("__version__") = ARAPFIELDS_VERSION;
   bind_core(module);
+  bind_options(module);
   bind_mesh(module);
   bind_distance(module);
   bind_neural(module);

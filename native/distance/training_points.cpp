@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "distance/training_points.h"
 
-#include <cmath>
-#include <string>
-
-#include "core/errors.h"
 #include "core/parallel.h"
 #include "mesh/sample_mesh.h"
 
@@ -12,10 +8,6 @@ namespace arapfields {
 namespace {
 
 constexpr Index grain = 4096;
-
-void require_spread(double spread, const char* name) {
-  require(std::isfinite(spread) && spread > 0.0, name, std::to_string(spread), "must be above zero");
-}
 
 Vec3 displaced(const AreaSampler& sampler, Random& random, double spread) {
   const Vec3 on_surface = sampler.draw(random).point;
@@ -31,21 +23,18 @@ Vec3 anywhere(Random& random) {
 }  // namespace
 
 TrainingPoints training_points(const SignedDistance& distance, const TriangleMesh& mesh, const Frame& frame,
-                               const TrainingPointsOptions& options, const Progress& progress) {
-  require(options.near_surface >= 0 && options.in_volume >= 0, "near_surface, in_volume",
-          std::to_string(options.near_surface) + " and " + std::to_string(options.in_volume),
-          "counts must not be negative");
-  require_spread(options.fine_spread, "fine_spread");
-  require_spread(options.coarse_spread, "coarse_spread");
+                               const TrainingPointsOptions& options, std::uint64_t seed,
+                               const Progress& progress) {
+  options.validate();
   const AreaSampler sampler(frame.to_cube(mesh.vertices), mesh.triangles);
 
-  const Index count = options.near_surface + options.in_volume;
-  TrainingPoints result{PointsF(count, 3), VectorF(count), options.near_surface};
+  const Index near = options.near_points, count = near + options.uniform_points;
+  TrainingPoints result{PointsF(count, 3), VectorF(count), near};
   parallel_for(0, count, grain, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
-      Random random(options.seed, static_cast<std::uint64_t>(i));
-      const double spread = i % 2 == 0 ? options.fine_spread : options.coarse_spread;
-      const Vec3 point = i < options.near_surface ? displaced(sampler, random, spread) : anywhere(random);
+      Random random(seed, static_cast<std::uint64_t>(i));
+      const double spread = i % 2 == 0 ? options.near_spread : options.far_spread;
+      const Vec3 point = i < near ? displaced(sampler, random, spread) : anywhere(random);
       result.points.row(i) = point.transpose().cast<float>();
     }
   });

@@ -2,15 +2,16 @@
 #pragma once
 
 #include "core/jets.h"
+#include "options/stylize.h"
 
 namespace arapfields {
 
 /// A function g on the sphere of directions that is 1 at each preferred normal n_k and small far from all of
 /// them: g(n) = Σ_k w_k exp(sharpness · n·n_k) (Kohlbrenner et al., "Gauss Stylization", 2021).
 struct GaussPreference {
-  Points normals;          ///< (k,3), unit length
-  Vector weights;          ///< (k)
-  double sharpness = 5.0;  ///< σ
+  Points normals;                                 ///< (k,3), unit length
+  Vector weights;                                 ///< (k)
+  double sharpness = StylizeOptions().sharpness;  ///< σ
   double value(const Vec3& normal) const;
   /// (n) values at unit normals (n,3).
   Vector values(PointsIn directions) const;
@@ -20,7 +21,7 @@ struct GaussPreference {
 /// singular (many close normals) the smallest weights that still satisfy it are taken. Throws InvalidInput
 /// for none, non-finite or zero normals, for a pair that coincides (named), and for sharpness outside (0,
 /// 100].
-GaussPreference gauss_preference(PointsIn normals, double sharpness = 5.0);
+GaussPreference gauss_preference(PointsIn normals, double sharpness = StylizeOptions().sharpness);
 
 /// mean of u·(1 − g(ñ)) with ñ = J⁻ᵀn/‖J⁻ᵀn‖, for jets of at least first order at samples with unit rest
 /// normals (n,3) and weights u (n; empty: all 1). Adds weight times its cotangents (data may be null). Near

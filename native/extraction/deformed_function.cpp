@@ -45,7 +45,7 @@ DeformedFunction::DeformedFunction(const DeformedShape& shape, const Frame& fram
 
 Points DeformedFunction::by_newton(PointsIn moved) const {
   const Frame& cube = shape_.field.frame();
-  InverseOptions options;
+  NewtonInverseOptions options;
   options.tolerance = newton_tolerance;
   options.max_distance = reach_in_bands * shape_.band / cube.scale;
   return cube.to_mesh(newton_(cube.to_cube(moved), options, check_).points);

@@ -18,7 +18,7 @@ constexpr double share_at_rest = 0.15;  // of the work
 TriangleMesh extract_deformed(const ImplicitFunction& rest, const Frame& rest_frame,
                               const DeformationField& field, const DeformationField* inverse, int resolution,
                               const Progress& progress, DeformedReport* report) {
-  require_resolution(resolution);
+  ExtractionOptions{.resolution = resolution}.validate();
   const TriangleMesh mesh = extract_surface(rest, rest_frame, resolution, progress.part(0.0, share_at_rest));
   Points moved = values_at(field, field.frame().to_cube(mesh.vertices), progress);
   require(moved.allFinite(), "field", "its values are NaN or infinite on the surface",

@@ -19,7 +19,7 @@ struct DeformedReport : ExtractionReport {
 /// Throws InvalidInput as extract_surface does, and where the field is not finite.
 TriangleMesh extract_deformed(const ImplicitFunction& rest, const Frame& rest_frame,
                               const DeformationField& field, const DeformationField* inverse,
-                              int resolution = 256, const Progress& progress = {},
+                              int resolution = ExtractionOptions().resolution, const Progress& progress = {},
                               DeformedReport* report = nullptr);
 
 }  // namespace arapfields

@@ -10,20 +10,14 @@
 namespace arapfields {
 namespace {
 
-constexpr int coarsest_grid = 8, finest_grid = 512;
 constexpr int smallest_with_model = 32;  // below, the model would cost more than the grid
 constexpr int grid_steps_a_cell = 4;
 
 }  // namespace
 
-void require_resolution(int resolution) {
-  require(resolution >= coarsest_grid && resolution <= finest_grid, "resolution", std::to_string(resolution),
-          "8 to 512 grid points a side are allowed");
-}
-
 TriangleMesh extract_surface(const ImplicitFunction& implicit, const Frame& frame, int resolution,
                              const Progress& progress, ExtractionReport* report) {
-  require_resolution(resolution);
+  ExtractionOptions{.resolution = resolution}.validate();
   const auto start = std::chrono::steady_clock::now();
   progress.report(0.0, "finding the surface");
   EvaluationCounter function(implicit, progress);

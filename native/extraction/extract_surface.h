@@ -5,6 +5,7 @@
 #include "core/implicit.h"
 #include "core/task.h"
 #include "mesh/triangle_mesh.h"
+#include "options/extraction.h"
 
 namespace arapfields {
 
@@ -16,14 +17,12 @@ struct ExtractionReport {
   double seconds = 0.0;
 };
 
-/// Throws InvalidInput unless 8 to 512.
-void require_resolution(int resolution);
-
 /// {Φ = 0} in mesh coordinates by marching cubes on the grid of `resolution`³ points (8 to 512) over the cube
 /// [-1,1]³: the vertices that the whole grid's values would give, from values near the surface alone.
 /// Throws InvalidInput for a bad resolution, a function that is not finite, or one that has no zero surface
 /// which the grid resolves.
-TriangleMesh extract_surface(const ImplicitFunction& function, const Frame& frame, int resolution = 256,
-                             const Progress& progress = {}, ExtractionReport* report = nullptr);
+TriangleMesh extract_surface(const ImplicitFunction& function, const Frame& frame,
+                             int resolution = ExtractionOptions().resolution, const Progress& progress = {},
+                             ExtractionReport* report = nullptr);
 
 }  // namespace arapfields

@@ -104,7 +104,7 @@ Vec3 newton_step(const Mat3& jacobian, const Vec3& residual, double longest) {
 }
 
 /// Moves all walkers until they arrive or can go no further; every evaluation is one batch.
-void walk(const DeformationField& field, std::vector<Walker>& walkers, const InverseOptions& options,
+void walk(const DeformationField& field, std::vector<Walker>& walkers, const NewtonInverseOptions& options,
           const Progress& progress) {
   constexpr double smallest_damping = 1.0 / 64.0;
   std::vector<std::size_t> active(walkers.size());
@@ -153,10 +153,9 @@ NewtonInverse::NewtonInverse(const DeformationField& field, Points rest, const P
 NewtonInverse::~NewtonInverse() = default;
 NewtonInverse::NewtonInverse(NewtonInverse&&) noexcept = default;
 
-InverseResult NewtonInverse::operator()(PointsIn targets, const InverseOptions& options,
+InverseResult NewtonInverse::operator()(PointsIn targets, const NewtonInverseOptions& options,
                                         const Progress& progress) const {
-  require(options.iterations > 0, "iterations", std::to_string(options.iterations), "must be positive");
-  require(options.tolerance > 0.0, "tolerance", std::to_string(options.tolerance), "must be positive");
+  options.validate();
   constexpr Index chunk = 4096;
   const auto& [field, surface, space] = *parts_;
   InverseResult result{Points::Constant(targets.rows(), 3, std::numeric_limits<double>::quiet_NaN()), 0, 0.0};
@@ -197,7 +196,7 @@ InverseResult NewtonInverse::operator()(PointsIn targets, const InverseOptions& 
   return result;
 }
 
-InverseResult invert(const DeformationField& field, PointsIn targets, const InverseOptions& options,
+InverseResult invert(const DeformationField& field, PointsIn targets, const NewtonInverseOptions& options,
                      const Progress& progress) {
   return NewtonInverse(field, field.rest_points(), progress)(targets, options, progress);
 }

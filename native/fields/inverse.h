@@ -1,23 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <limits>
 #include <memory>
 
 #include "core/task.h"
 #include "fields/field.h"
+#include "options/newton.h"
 
 namespace arapfields {
-
-/// Options of invert; lengths in cube units.
-struct InverseOptions {
-  int iterations = 50;      ///< most evaluations a point and start
-  double tolerance = 2e-6;  ///< largest residual ‖f(x) − y‖ of a point that counts as found
-  double longest_step = 0.25;
-  /// Farthest that x may lie from its start. If finite, the nearest rest point is the only start: what is
-  /// found is the preimage beside the surface.
-  double max_distance = std::numeric_limits<double>::infinity();
-};
 
 struct InverseResult {
   Points points;  ///< (n,3); NaN where nothing was found
@@ -39,7 +29,7 @@ class NewtonInverse {
   NewtonInverse(NewtonInverse&&) noexcept;
 
   /// x for every row y of `targets`, all in cube coordinates.
-  InverseResult operator()(PointsIn targets, const InverseOptions& options = {},
+  InverseResult operator()(PointsIn targets, const NewtonInverseOptions& options = {},
                            const Progress& progress = {}) const;
 
  private:
@@ -48,7 +38,7 @@ class NewtonInverse {
 };
 
 /// The same for one use, from the field's rest points.
-InverseResult invert(const DeformationField& field, PointsIn targets, const InverseOptions& options = {},
-                     const Progress& progress = {});
+InverseResult invert(const DeformationField& field, PointsIn targets,
+                     const NewtonInverseOptions& options = {}, const Progress& progress = {});
 
 }  // namespace arapfields

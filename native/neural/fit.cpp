@@ -23,22 +23,6 @@ double seconds_since(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
-void check(const FitOptions& o) {
-  require_range("steps", o.steps, 1, 1e7);
-  require_range("batch", o.batch, 1, 1 << 22);
-  require_range("seconds", o.seconds, 0, 1e7);
-  require_range("target_error", o.target_error, 0, 1);
-  require_range("learning_rate", o.learning_rate, 0, 1e30);
-  require_range("near_points", o.near_points, 1, 1e9);
-  require_range("uniform_points", o.uniform_points, 1, 1e9);
-  require_range("near_spread", o.near_spread, 1e-9, 1);
-  require_range("far_spread", o.far_spread, 1e-9, 1);
-  require_range("near_share", o.near_share, 0, 1);
-  require(o.optimizer == "muon" || o.optimizer == "adam", "optimizer", "got '" + o.optimizer + "'",
-          "known are 'muon' and 'adam'");
-  resolve_device(o.device);
-}
-
 /// Points and distances on the network's device, the near-surface ones first.
 struct Examples {
   Examples(const TrainingPoints& given, const at::Tensor& like) : near_count(given.near_surface) {
@@ -59,9 +43,9 @@ class Batches {
  public:
   Batches(const Examples& examples, const FitOptions& options)
       : examples_(examples),
-        near_(std::llround(options.near_share * options.batch)),
-        random_(options.seed, 0xba7c4),
-        rows_(at::empty({options.batch}, at::kLong)) {}
+        near_(std::llround(options.near_share * options.training.batch)),
+        random_(options.training.seed, 0xba7c4),
+        rows_(at::empty({options.training.batch}, at::kLong)) {}
 
   void next() {
     Index* rows = rows_.data_ptr<Index>();
@@ -101,18 +85,19 @@ class Training {
         muon_(mlp, {}),
         adam_(mlp.parameters()),
         good_(mlp.parameters().clone()),
-        peak_(options.learning_rate > 0 ? options.learning_rate
-              : use_adam()              ? 3e-3
-                                        : 5e-2) {}
+        peak_(options.training.learning_rate > 0
+                  ? options.training.learning_rate
+                  : options.automatic_learning_rate(options.training.optimizer)) {}
 
   /// Returns what ended it.
   std::string run(const Progress& progress) {
     const Clock::time_point begin = Clock::now();
-    for (steps = 0; steps < options_.steps; ++steps) {
+    const double budget = options_.training.time_budget;
+    for (steps = 0; steps < options_.training.iterations; ++steps) {
       const double elapsed = seconds_since(begin);
-      if (options_.seconds > 0 && elapsed >= options_.seconds) return "seconds";
-      const double done = std::max(static_cast<double>(steps) / options_.steps,
-                                   options_.seconds > 0 ? elapsed / options_.seconds : 0.0);
+      if (budget > 0 && elapsed >= budget) return "time_budget";
+      const double done = std::max(static_cast<double>(steps) / options_.training.iterations,
+                                   budget > 0 ? elapsed / budget : 0.0);
       if (steps % check_every_ == 0) {
         if (!at::isfinite(mlp_.parameters()).all().item<bool>()) return restore();
         good_.copy_(mlp_.parameters());
@@ -125,7 +110,7 @@ class Training {
       step(rate(done));
     }
     if (!at::isfinite(mlp_.parameters()).all().item<bool>()) return restore();
-    return "steps";
+    return "iterations";
   }
 
   int steps = 0;
@@ -133,7 +118,7 @@ class Training {
  private:
   static constexpr int warm_up = 20;
 
-  bool use_adam() const { return options_.optimizer == "adam"; }
+  bool use_adam() const { return options_.training.optimizer == OptimizerKind::adam; }
   double near_error() const {
     const Index some = std::min<Index>(held_out_.near_count, 4096);
     return errors(mlp_, held_out_.points.narrow(0, 0, some), held_out_.distances.narrow(0, 0, some)).mean;
@@ -146,7 +131,7 @@ class Training {
     const at::Tensor off = mlp_.forward(batches_.points, JetOrder::value).view({-1}) - batches_.distances;
     loss_ = off;
     mlp_.gradient().zero_();
-    mlp_.pull_back(at::sign(off).div_(static_cast<double>(options_.batch)).view({1, -1, 1}));
+    mlp_.pull_back(at::sign(off).div_(static_cast<double>(options_.training.batch)).view({1, -1, 1}));
     if (use_adam())
       adam_.step(mlp_.parameters(), mlp_.gradient(), learning_rate);
     else
@@ -156,8 +141,8 @@ class Training {
   void report(const Progress& progress, double done) {
     char text[120] = "fitting";
     if (loss_.defined())
-      std::snprintf(text, sizeof text, "fitting: step %d of %d, mean error %.2g of the cube", steps,
-                    options_.steps, loss_.abs().mean().item<double>());
+      std::snprintf(text, sizeof text, "fitting: iteration %d of %d, mean error %.2g of the cube", steps,
+                    options_.training.iterations, loss_.abs().mean().item<double>());
     progress.report(done, text);
   }
 
@@ -184,31 +169,31 @@ class Training {
 FitResult fit_sdf(PointsIn vertices, TrianglesIn triangles, const FitOptions& options,
                   const Progress& progress) {
   const Clock::time_point begin = Clock::now();
-  check(options);
-  const ThreadScope scope(options.threads);
+  options.validate();
+  const ThreadScope scope(options.machine.threads);
   const TriangleMesh mesh{vertices, triangles};
   validate(mesh);
   const Frame frame = mesh_frame(vertices, triangles);
   FitReport report;
-  report.device = resolve_device(options.device);
+  report.device = resolve_device(options.machine.device);
   report.scale = frame.scale;
-  MlpShape shape{1, options.width, options.layers, options.octaves, options.frequency, options.sharpness};
-  Mlp mlp(shape, options.seed, false, false, report.device);
+  Mlp mlp({options.network, 1}, options.training.seed, false, false, report.device);
 
   progress.report(0.0, "exact distances");
   const SignedDistance distance(vertices, triangles);
-  TrainingPointsOptions where{options.near_points, options.uniform_points, options.near_spread,
-                              options.far_spread, options.seed};
-  const Examples examples(training_points(distance, mesh, frame, where, progress.part(0.0, 0.08)),
+  const auto seed = static_cast<std::uint64_t>(options.training.seed);
+  TrainingPointsOptions where = options.points;
+  const Examples examples(training_points(distance, mesh, frame, where, seed, progress.part(0.0, 0.08)),
                           mlp.parameters());
-  where.near_surface = 20000, where.in_volume = 10000, where.seed = options.seed ^ 0x8e1d0f7u;
-  const Examples held_out(training_points(distance, mesh, frame, where, progress.part(0.08, 0.1)),
-                          mlp.parameters());
+  where.near_points = 20000, where.uniform_points = 10000;
+  const Examples held_out(
+      training_points(distance, mesh, frame, where, seed ^ 0x8e1d0f7u, progress.part(0.08, 0.1)),
+      mlp.parameters());
   report.distance_seconds = seconds_since(begin);
 
   Training training(options, mlp, examples, held_out);
   report.stopped_by = training.run(progress.part(0.1, 1.0));
-  report.steps = training.steps;
+  report.iterations = training.steps;
   mlp.release_buffers();
 
   const Index near = held_out.near_count, rest = held_out.count() - near;
@@ -220,10 +205,10 @@ FitResult fit_sdf(PointsIn vertices, TrianglesIn triangles, const FitOptions& op
   report.seconds = seconds_since(begin);
   progress.report(1.0, "fitted");
   const std::string stopped_by = report.stopped_by;
-  const int steps = report.steps;
+  const int steps = report.iterations;
   FitResult result{std::make_shared<NeuralSdf>(std::move(mlp), frame), report};
   if (stopped_by == "diverged")
-    throw FitDiverged("fit_sdf left the finite numbers after step " + std::to_string(steps) +
+    throw FitDiverged("fit_sdf left the finite numbers after iteration " + std::to_string(steps) +
                           ", whose state is kept in the error's last_good; a smaller learning_rate may help",
                       result);
   return result;

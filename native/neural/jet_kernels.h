@@ -30,9 +30,9 @@ struct EncodingBlock {
   Scalar* value = nullptr;  ///< (points, 6·octaves); derivatives follow in the same shape, if asked for
   Scalar* first = nullptr;
   Scalar* second = nullptr;
-  double frequency = 1.0;
+  double frequency = 0.0;
   std::int64_t count = 0;
-  int octaves = 4;
+  int octaves = 0;
 };
 
 #define ARAPFIELDS_JET_KERNELS(Scalar)                                                                    \

@@ -33,7 +33,7 @@ MlpShape shape_of(const Layers& layers, int octaves, double frequency, double sh
   shape.outputs = static_cast<int>(layers.weights.back().rows());
   shape.octaves = octaves;
   shape.frequency = frequency;
-  shape.sharpness = sharpness;
+  shape.softplus_sharpness = sharpness;
   for (std::size_t l = 0; l < count; ++l) {
     const RowMatrix<double>& weight = layers.weights[l];
     const int out = shape.fan_out(static_cast<int>(l)), in = shape.fan_in(static_cast<int>(l));

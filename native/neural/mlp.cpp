@@ -19,11 +19,7 @@ namespace {
 
 void check(const MlpShape& shape) {
   require_range("outputs", shape.outputs, 1, 1024);
-  require_range("width", shape.width, 1, 8192);
-  require_range("layers", shape.layers, 1, 64);
-  require_range("octaves", shape.octaves, 1, 32);
-  require_range("frequency", shape.frequency, 1e-6, 1e6);
-  require_range("sharpness", shape.sharpness, 1e-6, 1e6);
+  shape.validate();
 }
 
 Index parameter_count(const MlpShape& shape) {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/jets.h"
+#include "options/network.h"
 
 namespace at {
 class Tensor;
@@ -16,14 +17,8 @@ namespace arapfields {
 /// A network R³ → R^outputs: positional encoding, `layers` hidden layers of `width` softplus units, linear
 /// output. Encoding: for each coordinate c in turn, for k < octaves, the pair cos(2^k·frequency·c),
 /// sin(2^k·frequency·c).
-struct MlpShape {
+struct MlpShape : NetworkOptions {
   int outputs = 3;
-  int width = 256;
-  int layers = 4;
-  int octaves = 4;
-  double frequency = 1.0;
-  /// β of softplus(z) = log(1 + exp(βz))/β.
-  double sharpness = 30.0;
 
   int encoded() const { return 6 * octaves; }
   int fan_in(int layer) const { return layer == 0 ? encoded() : width; }

@@ -93,7 +93,7 @@ void sweep_adjoints(const MlpShape& shape, const LayerViews& layers, Block& bloc
   at::Tensor below = matrix(space.jets, rows, shape.width);
   at::Tensor second = space.second.narrow(0, 0, m * 6 * shape.outputs).view({m, 6, shape.outputs}).zero_();
   for (int l = shape.layers - 1; l >= 0; --l) {
-    adjoint_layer(shape.sharpness, block.activations[at_(l)], block.slope[at_(l)],
+    adjoint_layer(shape.softplus_sharpness, block.activations[at_(l)], block.slope[at_(l)],
                   adjoints_of(layers, block, l), below, second);
     if (l > 0) times_weight(block.adjoints[at_(l - 1)], below, layers, l, false);
   }
@@ -122,7 +122,7 @@ void sweep_adjoints_back(const MlpShape& shape, const LayerViews& layers, const 
     times_weight(here, lower, layers, l, true);
     at::Tensor below = matrix(space.below, rows, shape.width);
     at::Tensor partial = matrix(space.partial[at_(l)], block.columns * m, shape.width);
-    adjoint_layer_back(shape.sharpness, block.activations[at_(l)], block.slope[at_(l)],
+    adjoint_layer_back(shape.softplus_sharpness, block.activations[at_(l)], block.slope[at_(l)],
                        adjoints_of(layers, block, l), second, here, below, partial);
     add_outer(gradient.weights[at_(l)], below, lower, layers, l);
     lower = here;
@@ -238,7 +238,7 @@ void sweep_forward(const MlpShape& shape, const LayerViews& layers, const at::Te
       encode_layer(shape, layers.weights[0], points, block);
     else
       times_weight(activations, below, layers, l, true);
-    activate_layer({shape.sharpness, block.columns}, activations, block.slope[at_(l)], jets,
+    activate_layer({shape.softplus_sharpness, block.columns}, activations, block.slope[at_(l)], jets,
                    layers.biases[at_(l)]);
   }
   const at::Tensor& top = block.columns == 1 ? block.activations.back() : jets;
@@ -265,8 +265,8 @@ void sweep_back(const MlpShape& shape, const LayerViews& layers, const at::Tenso
     at::Tensor& activations = block.activations[at_(l)];
     times_weight(here, upper, layers, l + 1, false);
     const at::Tensor partial = block.second ? matrix(space.partial[at_(l)], rows, shape.width) : at::Tensor();
-    activate_layer_back({shape.sharpness, block.columns}, activations, block.slope[at_(l)], partial, here,
-                        gradient.biases[at_(l)]);
+    activate_layer_back({shape.softplus_sharpness, block.columns}, activations, block.slope[at_(l)], partial,
+                        here, gradient.biases[at_(l)]);
     add_outer(gradient.weights[at_(l + 1)], upper, activations, layers, l + 1);
     upper = here;
     std::swap(here, spare);

@@ -13,7 +13,6 @@
 namespace arapfields {
 namespace {
 
-constexpr Index largest_count = 100'000'000;
 constexpr Index fewest_lines = 1024;
 constexpr Index most_lines_a_round = 1 << 18;
 constexpr Index hopeless_lines = 1 << 18;  // without a crossing: there is no surface
@@ -87,10 +86,7 @@ void shuffle(std::vector<Bracket>& items, std::size_t begin, Random& random) {
 
 SurfaceSamples sample_surface(const ImplicitFunction& implicit, const Frame& frame,
                               const SampleOptions& options, const Progress& progress, SampleReport* report) {
-  require(options.count >= 1 && options.count <= largest_count, "count", std::to_string(options.count),
-          "1 to 100 million points are allowed");
-  require(options.tolerance > 0.0 && options.tolerance <= 1e-4, "tolerance",
-          std::to_string(options.tolerance), "must be positive and at most 1e-4");
+  options.validate();
   require_memory("count", 12.0 * sizeof(double) * static_cast<double>(options.count));
   const auto start = std::chrono::steady_clock::now();
   progress.report(0.0, "measuring the implicit function");
@@ -103,8 +99,9 @@ SurfaceSamples sample_surface(const ImplicitFunction& implicit, const Frame& fra
   samples.frame = frame;
   samples.points.resize(options.count, 3);
   samples.normals.resize(options.count, 3);
-  Caster caster(function, model, options.seed);
-  Random order(options.seed, shuffle_stream);
+  const auto seed = static_cast<std::uint64_t>(options.seed);
+  Caster caster(function, model, seed);
+  Random order(seed, shuffle_stream);
   Index done = 0;
   double largest = 0.0;
   std::size_t used = 0;  // brackets searched so far

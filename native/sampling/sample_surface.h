@@ -4,14 +4,9 @@
 #include "core/implicit.h"
 #include "core/task.h"
 #include "mesh/surface_samples.h"
+#include "options/sampling.h"
 
 namespace arapfields {
-
-struct SampleOptions {
-  Index count = 20000;  ///< points wanted, 1 to 100 million
-  std::uint64_t seed = 0;
-  double tolerance = 2e-6;  ///< |Φ| aimed at; every point ends at |Φ| ≤ 1e-4
-};
 
 /// What a call of sample_surface did.
 struct SampleReport {

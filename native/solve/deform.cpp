@@ -38,14 +38,12 @@ std::shared_ptr<const HandleBlend> exact_blend(const BoundHandles& handles, doub
 ObjectiveTerms terms_of(const SurfaceSamples& samples, const std::vector<Handle>& handles,
                         const DeformOptions& options) {
   ObjectiveTerms terms;
-  terms.batch = options.batch;
-  terms.fresh = std::min(options.fresh_samples, options.batch);
-  terms.bending = options.bending;
-  terms.barrier = options.barrier;
-  terms.barrier_threshold = options.barrier_threshold;
+  terms.batch = options.training.batch;
+  terms.fresh = std::min(options.fresh_samples, options.training.batch);
+  terms.surface = options.surface;
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
-  terms.handle_weight = options.exact_handles ? 0.0 : options.handle_weight;
-  terms.handle_batch = options.handle_batch;
+  terms.pull = options.handles;
+  if (options.exact_handles) terms.pull.handle_weight = 0.0;
   return terms;
 }
 
@@ -59,33 +57,29 @@ Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handle
   require(options.fresh_samples == 0 || samples.redraw, "options.fresh_samples",
           "the samples are a plain list of points",
           "samples of sample_mesh or sample_surface are needed, which know their surface");
-  if (options.field == "radial") return deform_radial(samples, handles, options, progress);
-  const ThreadScope threads(options.threads);
+  if (options.field == FieldKind::radial) return deform_radial(samples, handles, options, progress);
+  const ThreadScope threads(options.machine.threads);
   ObjectiveTerms terms = terms_of(samples, handles, options);
 
-  const MlpShape shape{
-      3, options.width, options.layers, options.octaves, options.frequency, options.sharpness};
-  const auto seed = static_cast<std::uint64_t>(options.seed);
-  auto field = std::make_shared<NeuralField>(shape, seed, false, resolve_device(options.device));
-  field->network()->round_products(options.precision == "bfloat16");
+  const MlpShape shape{options.network, 3};
+  const auto seed = static_cast<std::uint64_t>(options.training.seed);
+  auto field = std::make_shared<NeuralField>(shape, seed, false, resolve_device(options.machine.device));
+  field->network()->round_products(options.precision == ProductPrecision::bfloat16);
   std::vector<std::string> notes;
   if (options.exact_handles) field->set_handles(exact_blend(terms.handles, options.margin, notes));
-  const double share = options.start == "radial" ? 0.1 : 0.0;
-  if (options.start == "radial")
+  const double share = options.start == StartKind::radial ? 0.1 : 0.0;
+  if (options.start == StartKind::radial)
     field->set_base(radial_start(samples, handles, options, progress.part(0.0, share)));
 
   LoopOptions loop;
   loop.stage = "deform";
-  loop.iterations = options.iterations;
-  loop.optimizer = options.optimizer;
-  loop.learning_rate = options.learning_rate;
-  loop.time_budget = options.time_budget;
-  loop.seed = seed;
+  loop.training = options.training;
   WrapObjective wrap;
   if (options.invertibility > 0.0)
     wrap = [&](Objective& inner) {
-      return std::make_unique<InvertibleObjective>(inner, samples, options.batch, options.invertibility,
-                                                   shape, loop, resolve_device(options.device));
+      return std::make_unique<InvertibleObjective>(inner, samples, options.training.batch,
+                                                   options.invertibility, shape, loop,
+                                                   resolve_device(options.machine.device));
     };
   Solution solution = solve_field(field, samples, std::move(terms), loop, progress.part(share, 1.0), wrap);
   solution.report.notes = notes;

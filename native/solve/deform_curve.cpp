@@ -18,14 +18,6 @@ using Rows = RowMatrix<double>;
 constexpr int local_global_steps = 8;
 constexpr double gain_tolerance = 1e-5;
 
-void check(const CurveOptions& options) {
-  require_not_negative("bending", options.bending);
-  require_not_negative("smoothness", options.smoothness);
-  require_positive("handle_weight", options.handle_weight);
-  require_not_negative("iterations", options.iterations);
-  require_range("spacing", options.spacing, 0.01, 1);
-}
-
 void check(const CurveHandle& handle, std::size_t position, Index samples) {
   const std::string name = "handles[" + std::to_string(position) + "]";
   require(!handle.samples.empty(), name, "no samples", "a handle holds one sample or more");
@@ -173,7 +165,7 @@ class CurveProblem final : public MeasuredObjective {
 
 CurveSolution deform_curve(Points2In points, const std::vector<CurveHandle>& handles,
                            const CurveOptions& options, const Progress& progress) {
-  check(options);
+  options.validate();
   require(!handles.empty(), "handles", "none", "one or more are needed");
   for (std::size_t h = 0; h < handles.size(); ++h) check(handles[h], h, points.rows());
   const ThreadScope threads(options.threads);
@@ -187,7 +179,7 @@ CurveSolution deform_curve(Points2In points, const std::vector<CurveHandle>& han
   const QuasiNewtonReport done = descent.minimise(problem, {options.iterations, gain_tolerance},
                                                   problem.field().coefficients, progress.part(0.2, 1.0));
   CurveSolution solution{problem.field(), problem.report()};
-  solution.report.steps = done.steps;
+  solution.report.iterations = done.iterations;
   solution.report.loss = done.value;
   solution.report.converged = done.converged;
   return solution;

@@ -5,6 +5,7 @@
 
 #include "core/task.h"
 #include "fields/curve_field.h"
+#include "options/curve.h"
 
 namespace arapfields {
 
@@ -15,20 +16,11 @@ struct CurveHandle {
   double weight = 1.0;
 };
 
-struct CurveOptions {
-  double bending = 0.01;       ///< λ_bend, in the square
-  double smoothness = 1e-4;    ///< of mean ‖D‖² at the centers, off the curve too
-  double handle_weight = 100;  ///< factor of the handles' mean squared distance
-  int iterations = 200;        ///< quasi-Newton steps at most
-  double spacing = 0.1;        ///< of the fine centers, in the square
-  int threads = 0;             ///< 0: all
-};
-
 struct CurveReport {
   double stretch = 0.0, bend = 0.0;                        ///< means over the samples, in the square
   double handle_error_mean = 0.0, handle_error_max = 0.0;  ///< in the curve's units
   double min_determinant = 0.0;                            ///< smallest det J at the samples
-  Index steps = 0;                                         ///< quasi-Newton steps taken
+  Index iterations = 0;                                    ///< quasi-Newton steps taken
   double loss = 0.0;       ///< reached: stretch + λ_bend·bend, handles and smoothness
   bool converged = false;  ///< a further step would gain next to nothing
 };

@@ -109,22 +109,23 @@ double FieldObjective::by_kernels(TrainableField& field, Random& random) {
   const Batch batch = draw(random);
   HostJets<Scalar> jets(field, batch.points.cast<Scalar>(), order_of_terms());
   const ArapValue arap =
-      arap_energy<Scalar>(jets.view(), terms_.bending, terms_.rigidity, jets.cotangent_view());
-  double value = terms_.rigidity * (arap.stretch + terms_.bending * arap.bend);
+      arap_energy<Scalar>(jets.view(), terms_.surface.bending, terms_.rigidity, jets.cotangent_view());
+  double value = terms_.rigidity * (arap.stretch + terms_.surface.bending * arap.bend);
   if (styled())
     value += terms_.gauss * gauss_energy<Scalar>(jets.view(), batch.normals.cast<Scalar>(),
                                                  batch.weights.cast<Scalar>(), *terms_.preference,
                                                  terms_.gauss, jets.cotangent_view());
-  if (terms_.barrier > 0.0)
-    value += terms_.barrier * fold_barrier<Scalar>(jets.view(), terms_.barrier_threshold, terms_.barrier,
-                                                   jets.cotangent_view());
+  if (terms_.surface.barrier > 0.0)
+    value += terms_.surface.barrier * fold_barrier<Scalar>(jets.view(), terms_.surface.barrier_threshold,
+                                                           terms_.surface.barrier, jets.cotangent_view());
   jets.pull_back();
   if (!pulled()) return value;
-  const HandleBatch<Scalar> pairs = terms_.handles.batch<Scalar>(terms_.handle_batch, random);
+  const HandleBatch<Scalar> pairs = terms_.handles.batch<Scalar>(terms_.pull.handle_batch, random);
   HostJets<Scalar> ends(field, pairs.sources, JetOrder::value);
-  const double off = handle_energy<Scalar>(ends.view(), pairs, terms_.handle_weight, ends.cotangent_view());
+  const double off =
+      handle_energy<Scalar>(ends.view(), pairs, terms_.pull.handle_weight, ends.cotangent_view());
   ends.pull_back();
-  return value + terms_.handle_weight * off;
+  return value + terms_.pull.handle_weight * off;
 }
 
 at::Tensor FieldObjective::by_compositions(TrainableField& field, Random& random) {
@@ -134,25 +135,25 @@ at::Tensor FieldObjective::by_compositions(TrainableField& field, Random& random
   const Batch batch = draw(random);
   const at::Tensor jets = field.forward_at(batch.points, order_of_terms());
   const at::Tensor cotangents = at::zeros_like(jets);
-  const at::Tensor arap = aten_arap(jets, terms_.bending, terms_.rigidity, tables, cotangents);
-  at::Tensor value = terms_.rigidity * (arap[0] + terms_.bending * arap[1]);
+  const at::Tensor arap = aten_arap(jets, terms_.surface.bending, terms_.rigidity, tables, cotangents);
+  at::Tensor value = terms_.rigidity * (arap[0] + terms_.surface.bending * arap[1]);
   if (styled())
     value +=
         terms_.gauss *
         aten_gauss(jets, uploaded(batch.normals, like),
                    batch.weights.size() > 0 ? uploaded(batch.weights, like).select(1, 0) : at::Tensor(),
                    constants_->preferred, terms_.preference->sharpness, terms_.gauss, tables, cotangents);
-  if (terms_.barrier > 0.0)
-    value +=
-        terms_.barrier * aten_barrier(jets, terms_.barrier_threshold, terms_.barrier, tables, cotangents);
+  if (terms_.surface.barrier > 0.0)
+    value += terms_.surface.barrier *
+             aten_barrier(jets, terms_.surface.barrier_threshold, terms_.surface.barrier, tables, cotangents);
   field.pull_back(cotangents);
   if (!pulled()) return value;
-  const HandleBatch<double> pairs = terms_.handles.batch<double>(terms_.handle_batch, random);
+  const HandleBatch<double> pairs = terms_.handles.batch<double>(terms_.pull.handle_batch, random);
   const at::Tensor ends = field.forward_at(pairs.sources, JetOrder::value);
   const at::Tensor pull = at::zeros_like(ends);
-  value += terms_.handle_weight * aten_handles(ends, uploaded(pairs.targets, like),
-                                               uploaded(pairs.weights, like).select(1, 0),
-                                               terms_.handle_weight, pull);
+  value += terms_.pull.handle_weight * aten_handles(ends, uploaded(pairs.targets, like),
+                                                    uploaded(pairs.weights, like).select(1, 0),
+                                                    terms_.pull.handle_weight, pull);
   field.pull_back(pull);
   return value;
 }

@@ -7,6 +7,8 @@
 #include "energies/gauss.h"
 #include "energies/handles.h"
 #include "mesh/surface_samples.h"
+#include "options/handles.h"
+#include "options/surface.h"
 #include "solve/training_loop.h"
 
 namespace arapfields {
@@ -14,16 +16,15 @@ namespace arapfields {
 /// What a deformation is asked for, as weights of the terms:
 ///   rigidity·(stretch + bending·bend) + gauss·mean(1 − g) + barrier·fold_barrier + handles.
 struct ObjectiveTerms {
-  Index batch = 300;
+  Index batch = 0;  ///< samples an iteration
   Index fresh = 0;  ///< of the batch, samples that the surface is asked for anew; needs samples.redraw
-  double rigidity = 1.0, bending = 0.01;
+  double rigidity = 1.0;
+  SurfaceOptions surface;
   std::optional<GaussPreference> preference;
   double gauss = 0.0;
   Vector preference_weights;  ///< a weight a sample; empty: all 1
-  double barrier = 0.0, barrier_threshold = 0.1;
   BoundHandles handles;
-  double handle_weight = 100.0;
-  Index handle_batch = 256;
+  HandleOptions pull;
 };
 
 /// Estimates the terms on random subsets of the samples: the samples are put in spatial order and one is
@@ -48,8 +49,10 @@ class FieldObjective final : public Objective {
 
   Batch draw(Random& random);
   bool styled() const { return terms_.preference && terms_.gauss > 0.0; }
-  bool pulled() const { return terms_.handles.count() > 0 && terms_.handle_weight != 0.0; }
-  JetOrder order_of_terms() const { return terms_.bending > 0.0 ? JetOrder::second : JetOrder::first; }
+  bool pulled() const { return terms_.handles.count() > 0 && terms_.pull.handle_weight != 0.0; }
+  JetOrder order_of_terms() const {
+    return terms_.surface.bending > 0.0 ? JetOrder::second : JetOrder::first;
+  }
   template <class Scalar>
   double by_kernels(TrainableField& field, Random& random);
   at::Tensor by_compositions(TrainableField& field, Random& random);

@@ -5,7 +5,6 @@
 
 #include "core/device.h"
 #include "core/parallel.h"
-#include "solve/options.h"
 #include "solve/setup.h"
 
 namespace arapfields {
@@ -70,39 +69,22 @@ class CycleObjective final : public Objective {
 
 }  // namespace
 
-void InverseTrainingOptions::validate() const {
-  DeformOptions common;
-  common.iterations = iterations;
-  common.batch = batch;
-  common.learning_rate = learning_rate;
-  common.optimizer = optimizer;
-  common.time_budget = time_budget;
-  common.threads = threads;
-  common.device = device;
-  common.validate();
-}
-
 Solution train_inverse(const DeformationField& field, const SurfaceSamples& samples,
                        const InverseTrainingOptions& options, const Progress& progress) {
   options.validate();
   require_samples(samples);
-  const ThreadScope threads(options.threads);
-  const MlpShape shape{
-      3, options.width, options.layers, options.octaves, options.frequency, options.sharpness};
-  const auto seed = static_cast<std::uint64_t>(options.seed);
-  auto inverse = std::make_shared<NeuralField>(shape, seed, false, resolve_device(options.device));
+  const ThreadScope threads(options.machine.threads);
+  auto inverse = std::make_shared<NeuralField>(MlpShape{options.network, 3},
+                                               static_cast<std::uint64_t>(options.training.seed), false,
+                                               resolve_device(options.machine.device));
   inverse->set_frame(field.frame());
   const Points rest = field.frame().to_cube(samples.frame.to_mesh(samples.points));
-  CycleObjective objective(field, rest, options.batch);
+  CycleObjective objective(field, rest, options.training.batch);
   LoopOptions loop;
   loop.stage = "inverse";
-  loop.optimizer = options.optimizer;
-  loop.iterations = options.iterations;
-  loop.learning_rate = options.learning_rate;
+  loop.training = options.training;
   loop.final_share = 0.01;
   loop.lr_hold_fraction = 0.3;
-  loop.time_budget = options.time_budget;
-  loop.seed = seed;
   Solution solution{inverse, {}};
   solution.report.loop = minimise(*inverse, objective, loop, progress);
   Points images(rest.rows(), 3), back(rest.rows(), 3);
@@ -122,8 +104,8 @@ InvertibleObjective::InvertibleObjective(Objective& inner, const SurfaceSamples&
       samples_(samples),
       batch_(batch),
       weight_(weight),
-      iterations_(std::max(1, options.iterations)),
-      inverse_(shape, options.seed + 1, false, device),
+      iterations_(std::max(1, options.training.iterations)),
+      inverse_(shape, static_cast<std::uint64_t>(options.training.seed) + 1, false, device),
       optimizer_(inverse_, options) {}
 
 at::Tensor InvertibleObjective::accumulate(TrainableField& field, Random& random) {

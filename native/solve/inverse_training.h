@@ -2,26 +2,11 @@
 #pragma once
 
 #include "fields/neural_field.h"
+#include "options/inverse.h"
 #include "solve/optimizer.h"
 #include "solve/report.h"
 
 namespace arapfields {
-
-struct InverseTrainingOptions {
-  int iterations = 1000;
-  int batch = 1000;  ///< half of them deformed samples, half uniform in the deformed surface's box
-  double learning_rate = 0.0;
-  std::string optimizer = "muon";
-  int width = 256, layers = 4, octaves = 4;
-  double frequency = 1.0, sharpness = 30.0;
-  double time_budget = 0.0;
-  int threads = 0;
-  std::string device = "auto";
-  std::int64_t seed = 0;
-
-  /// Throws InvalidInput that names the option.
-  void validate() const;
-};
 
 /// A network g ≈ f⁻¹, trained on the cycle ‖f(g(y)) − y‖² at deformed samples and at uniform points of their
 /// box (enlarged by a tenth), and at the samples x on ‖g(f(x)) − x‖² too, which decides where f has several

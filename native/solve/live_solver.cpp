@@ -35,23 +35,6 @@ constexpr double worthwhile_gain = 0.1;
 
 }  // namespace
 
-void LiveOptions::validate() const {
-  require_range("samples", samples, 10, 1e6);
-  require_range("coarse_centers", coarse_centers, 0, 3000);
-  require_range("fine_centers", fine_centers, 1, 3000);
-  require_range("coarse_radius_factor", coarse_radius_factor, 0.5, 20);
-  require_range("fine_radius_factor", fine_radius_factor, 0.5, 20);
-  require_range("bending", bending, 0, 1e3);
-  require_range("handle_weight", handle_weight, 1e-6, 1e9);
-  require_range("handle_samples", handle_samples, 1, 1e6);
-  require_range("steps", steps, 1, 1e6);
-  require_range("tolerance", tolerance, 0, 1);
-  require_range("gauss_weight", gauss_weight, 0, 1e6);
-  require_range("barrier", barrier, 0, 1e6);
-  require_range("barrier_threshold", barrier_threshold, 1e-6, 1);
-  require_range("threads", threads, 0, 1024);
-}
-
 LiveSolver::LiveSolver(const SurfaceSamples& samples, const std::vector<Handle>& handles,
                        const LiveOptions& options, const Progress& progress)
     : options_(options), frame_(samples.frame), surface_(samples.points), surface_normals_(samples.normals) {
@@ -72,7 +55,7 @@ LiveSolver::LiveSolver(const SurfaceSamples& samples, const std::vector<Handle>&
     basis_.set_embedding(interior_embedding(spread, rows_of(surface_normals_, candidates)));
   coefficients_ = basis_.identity();
   progress.report(0.2, "centers placed");
-  stiffness_ = surface_stiffness(basis_, rows_of(surface_, chosen_), options.bending);
+  stiffness_ = surface_stiffness(basis_, rows_of(surface_, chosen_), options.surface.bending);
   progress.report(0.8, "stiffness");
   prepare(fast_);
   set_handles(handles);
@@ -81,9 +64,9 @@ LiveSolver::LiveSolver(const SurfaceSamples& samples, const std::vector<Handle>&
 
 template <class Scalar>
 void LiveSolver::prepare(Precision<Scalar>& precision) {
-  precision.objective = std::make_unique<LiveObjective<Scalar>>(basis_, rows_of(surface_, chosen_),
-                                                                options_.bending, options_.handle_weight);
-  precision.objective->set_barrier(options_.barrier, options_.barrier_threshold);
+  precision.objective = std::make_unique<LiveObjective<Scalar>>(
+      basis_, rows_of(surface_, chosen_), options_.surface.bending, options_.handle_weight);
+  precision.objective->set_barrier(options_.surface.barrier, options_.surface.barrier_threshold);
   if (pairs_.sources.rows() > 0) precision.objective->set_handles(pairs_, pair_values_, inverse_factor_);
   precision.objective->set_style(style_);
 }
@@ -184,27 +167,28 @@ QuasiNewtonReport LiveSolver::descend(Precision<Scalar>& precision, const QuasiN
   const QuasiNewtonReport found =
       optimizer_.minimise(*precision.objective, options, coefficients_, precision.u, progress);
   if (++precision.uses >= most_uses) precision.u.resize(0), precision.uses = 0;
-  report_.steps += found.steps;
+  report_.iterations += found.iterations;
   report_.evaluations += found.evaluations;
   report_.converged = found.converged;
   report_.value = found.value;
   return found;
 }
 
-std::shared_ptr<RadialField> LiveSolver::solve(Index steps, double tolerance, const Progress& progress) {
+std::shared_ptr<RadialField> LiveSolver::solve(Index iterations, double tolerance, const Progress& progress) {
   const ThreadScope threads(solve_threads());
   const Stopwatch watch;
-  if (steps <= 0) steps = options_.steps;
+  if (iterations <= 0) iterations = options_.iterations;
   if (tolerance <= 0.0) tolerance = options_.tolerance;
-  report_.steps = report_.evaluations = 0;
+  report_.iterations = report_.evaluations = 0;
   if (!handles_.empty() && !style_) follow_rigidly();
   extrapolate();
   const bool fast_alone = tolerance >= single_tolerance;
-  descend(fast_, {steps, std::max(tolerance, single_tolerance), single_floor}, progress);
+  descend(fast_, {iterations, std::max(tolerance, single_tolerance), single_floor}, progress);
   if (!fast_alone) {
     if (!exact_.objective) prepare(exact_);
     exact_.u.resize(0);
-    if (report_.steps < steps) descend(exact_, {steps - report_.steps, tolerance}, progress);
+    if (report_.iterations < iterations)
+      descend(exact_, {iterations - report_.iterations, tolerance}, progress);
     fast_.u.resize(0);
   }
   if (handles_.empty()) hold_lowest();
@@ -262,7 +246,7 @@ void LiveSolver::measure(Precision<Scalar>& precision) {
   if (precision.u.size() == 0) objective.measure(coefficients_, precision.u);
   const LiveTerms terms = objective.terms(precision.u);
   report_.arap = terms.arap;
-  report_.energy = terms.arap.stretch + options_.bending * terms.arap.bend;
+  report_.energy = terms.arap.stretch + options_.surface.bending * terms.arap.bend;
   report_.preference.reset();
   if (style_) report_.preference = 1.0 - terms.gauss;
   report_.distortion = distortion<Scalar>(objective.jets(precision.u));

@@ -6,8 +6,9 @@
 #include "fields/radial_field.h"
 #include "fields/tracked_points.h"
 #include "mesh/surface_samples.h"
+#include "options/live.h"
 #include "solve/live_objective.h"
-#include "solve/live_options.h"
+#include "solve/live_report.h"
 
 namespace arapfields {
 
@@ -27,8 +28,9 @@ class LiveSolver {
   void clear_style();
   /// Moves the handles' targets.
   void set_targets(const std::vector<Handle>& moved);
-  /// Improves the field for the targets and the style at hand; 0 steps or tolerance: the options'.
-  std::shared_ptr<RadialField> solve(Index steps = 0, double tolerance = 0.0, const Progress& progress = {});
+  /// Improves the field for the targets and the style at hand; 0 iterations or tolerance: the options'.
+  std::shared_ptr<RadialField> solve(Index iterations = 0, double tolerance = 0.0,
+                                     const Progress& progress = {});
   /// Back to the identity, and the handles' targets to rest.
   void reset();
 

@@ -30,7 +30,7 @@ namespace {
 ObjectiveTerms rigidity_alone(Index batch, double bending) {
   ObjectiveTerms terms;
   terms.batch = batch;
-  terms.bending = bending;
+  terms.surface.bending = bending;
   return terms;
 }
 

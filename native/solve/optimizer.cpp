@@ -9,8 +9,10 @@ namespace arapfields {
 
 Optimizer::Optimizer(TrainableField& field, const LoopOptions& options) : field_(field), options_(options) {
   const AdamOptions adam{options.beta1, options.beta2, 1e-8};
-  const bool muon = options.optimizer == "muon" && field.network() != nullptr;
-  if (options.learning_rate == 0.0) options_.learning_rate = muon ? 0.03 : 0.002;
+  const bool muon = options.training.optimizer == OptimizerKind::muon && field.network() != nullptr;
+  double& peak = options_.training.learning_rate;
+  if (peak == 0.0)
+    peak = TrainingOptions::automatic_learning_rate(muon ? OptimizerKind::muon : OptimizerKind::adam);
   if (muon)
     muon_.emplace(*field.network(), MuonOptions{options.momentum, 5, options.adam_share, adam});
   else
@@ -21,7 +23,7 @@ double Optimizer::rate(double done) const {
   const double falling = std::clamp(
       (done - options_.lr_hold_fraction) / std::max(1e-9, 1.0 - options_.lr_hold_fraction), 0.0, 1.0);
   const double share = 0.5 * (1.0 + std::cos(std::numbers::pi * falling));
-  return options_.learning_rate * (options_.final_share + (1.0 - options_.final_share) * share);
+  return options_.training.learning_rate * (options_.final_share + (1.0 - options_.final_share) * share);
 }
 
 void Optimizer::step(double learning_rate) {

@@ -99,8 +99,8 @@ QuasiNewtonReport QuasiNewton::minimise(const MeasuredObjectiveOf<Scalar>& objec
   if (!std::isfinite(now.value)) throw Diverged("live solve: the energy is not finite at the start");
   RowMatrix<double> gradient = objective.pull_back(now.cotangents);
   Eigen::VectorX<Scalar> du;
-  while (report.steps < options.steps) {
-    progress.report(static_cast<double>(report.steps) / static_cast<double>(options.steps));
+  while (report.iterations < options.iterations) {
+    progress.report(static_cast<double>(report.iterations) / static_cast<double>(options.iterations));
     RowMatrix<double> step = direction(objective, gradient);
     double slope = dot(gradient, step);
     if (!(slope < 0.0)) {  // stale pairs
@@ -132,7 +132,7 @@ QuasiNewtonReport QuasiNewton::minimise(const MeasuredObjectiveOf<Scalar>& objec
     }
     gradient = std::move(next_gradient);
     now = std::move(next);
-    ++report.steps;
+    ++report.iterations;
   }
   report.value = now.value;
   u = std::move(now.u);

@@ -26,13 +26,13 @@ class MeasuredObjectiveOf {
 using MeasuredObjective = MeasuredObjectiveOf<double>;
 
 struct QuasiNewtonOptions {
-  Index steps = 12;         ///< at most so many
+  Index iterations;         ///< at most so many
   double tolerance = 1e-4;  ///< stops where a step is expected to gain less than this share of the value
   double floor = 1e-18;     ///< or less than this
 };
 
 struct QuasiNewtonReport {
-  Index steps = 0;
+  Index iterations = 0;
   Index evaluations = 0;
   double value = 0.0;
   bool converged = false;

@@ -16,18 +16,17 @@ constexpr int steps_at_once = 10;
 template <class Options>
 LiveOptions live_options(const Options& options) {
   LiveOptions live;
-  live.bending = options.bending;
-  live.handle_samples = options.handle_batch;
-  live.barrier = options.barrier;
-  live.barrier_threshold = options.barrier_threshold;
-  live.threads = options.threads;
-  live.seed = options.seed;
+  live.surface = options.surface;
+  live.handle_samples = options.handles.handle_batch;
+  live.threads = options.machine.threads;
+  live.seed = options.training.seed;
   live.tolerance = 1e-6;
   return live;
 }
 
 /// Solves until it converges, is out of steps, or out of time.
-LoopResult run(LiveSolver& live, int iterations, double time_budget, const Progress& progress) {
+LoopResult run(LiveSolver& live, const TrainingOptions& how, const Progress& progress) {
+  const int iterations = how.iterations;
   const Stopwatch watch;
   LoopResult result;
   while (result.iterations < iterations) {
@@ -35,11 +34,11 @@ LoopResult run(LiveSolver& live, int iterations, double time_budget, const Progr
     const double done = static_cast<double>(result.iterations) / iterations;
     live.solve(steps, 0.0, progress.part(done, done + static_cast<double>(steps) / iterations));
     progress.look([&](PointsIn points) { return live.field()->at(points); });
-    result.iterations += static_cast<int>(live.report().steps);
+    result.iterations += static_cast<int>(live.report().iterations);
     result.history.emplace_back(result.iterations, live.report().value);
     result.seconds = watch.seconds();
-    if (live.report().steps < steps) break;
-    if (time_budget > 0.0 && result.seconds > time_budget) {
+    if (live.report().iterations < steps) break;
+    if (how.time_budget > 0.0 && result.seconds > how.time_budget) {
       result.out_of_time = true;
       break;
     }
@@ -57,16 +56,16 @@ Solution finish(const LiveSolver& live, const SurfaceSamples& samples, const Obj
 
 Solution deform_radial(const SurfaceSamples& samples, const std::vector<Handle>& handles,
                        const DeformOptions& options, const Progress& progress) {
-  require(options.handle_weight > 0.0, "handle_weight", "0", "must be positive for 'radial'");
+  require(options.handles.handle_weight > 0.0, "handle_weight", "0", "must be positive for 'radial'");
   LiveOptions live = live_options(options);
   live.samples = std::max(live.samples, 8 * options.centers);
   live.coarse_centers = options.centers / 5;
   live.fine_centers = options.centers;
-  live.handle_weight = options.handle_weight;
+  live.handle_weight = options.handles.handle_weight;
   LiveSolver solver(samples, handles, live, progress.part(0.0, 0.3));
-  const LoopResult loop = run(solver, options.iterations, options.time_budget, progress.part(0.3, 0.95));
+  const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95));
   ObjectiveTerms terms;
-  terms.bending = options.bending;
+  terms.surface = options.surface;
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
   return finish(solver, samples, terms, loop, progress);
 }
@@ -77,7 +76,7 @@ std::shared_ptr<const DeformationField> radial_start(const SurfaceSamples& sampl
   constexpr int start_steps = 30;
   options.exact_handles = false;
   options.invertibility = 0.0;
-  options.iterations = start_steps;
+  options.training.iterations = start_steps;
   return deform_radial(samples, handles, options, progress).field;
 }
 
@@ -89,16 +88,16 @@ Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const
   live.coarse_centers = 200;
   live.fine_centers = 1000;
   live.tolerance = 1e-4;
-  live.handle_weight = std::max(options.handle_weight, 1e-3) / options.rigidity;
-  live.barrier = options.barrier / options.rigidity;
+  live.handle_weight = std::max(options.handles.handle_weight, 1e-3) / options.rigidity;
+  live.surface.barrier = options.surface.barrier / options.rigidity;
   live.gauss_weight = options.gauss_weight / options.rigidity;
   live.interior = !handles.empty();  // a style alone acts everywhere alike: nothing is to be held apart
   LiveSolver solver(samples, handles, live, progress.part(0.0, 0.3));
   solver.set_style(preferred, options.strength, options.sharpness, weights);
-  const LoopResult loop = run(solver, options.iterations, options.time_budget, progress.part(0.3, 0.95));
+  const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95));
   ObjectiveTerms terms;
   terms.rigidity = options.rigidity;
-  terms.bending = options.bending;
+  terms.surface = options.surface;
   terms.preference = gauss_preference(preferred, options.sharpness);
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
   return finish(solver, samples, terms, loop, progress);

@@ -2,7 +2,8 @@
 // deform and stylize over a radial field: the live solver's work, brought to its end in one call.
 #pragma once
 
-#include "solve/options.h"
+#include "options/deform.h"
+#include "options/stylize.h"
 #include "solve/report.h"
 
 namespace arapfields {

@@ -48,7 +48,7 @@ SolveReport measure(const DeformationField& field, const SurfaceSamples& samples
     JetBlock<double> block(rows, JetOrder::second);
     field.evaluate(points.middleRows(begin, rows), block.view());
     const JetView<const double> jets = block.view();
-    const ArapValue arap = arap_energy<double>(jets, terms.bending, 0.0, {});
+    const ArapValue arap = arap_energy<double>(jets, terms.surface.bending, 0.0, {});
     report.arap.stretch += share * arap.stretch;
     report.arap.bend += share * arap.bend;
     Distortion part = distortion<double>(jets);
@@ -61,7 +61,7 @@ SolveReport measure(const DeformationField& field, const SurfaceSamples& samples
       preference += share * (1.0 - gauss_energy<double>(jets, rest, Vector(), *terms.preference, 0.0, {}));
     }
   }
-  report.energy = report.arap.stretch + terms.bending * report.arap.bend;
+  report.energy = report.arap.stretch + terms.surface.bending * report.arap.bend;
   if (terms.preference) report.preference = preference;
   measure_handles(field, terms.handles, samples.frame.scale, report);
   return report;

@@ -44,36 +44,30 @@ Solution stylize(const SurfaceSamples& samples, PointsIn preferred, const Styliz
                  const Progress& progress, const Vector& weights, const std::vector<Handle>& handles) {
   options.validate();
   check_samples(samples, weights);
-  if (options.field == "radial")
+  if (options.field == FieldKind::radial)
     return stylize_radial(samples, preferred, options, progress, weights, handles);
-  const ThreadScope threads(options.threads);
+  const ThreadScope threads(options.machine.threads);
   ObjectiveTerms terms;
-  terms.batch = options.batch;
+  terms.batch = options.training.batch;
   terms.rigidity = options.rigidity;
-  terms.bending = options.bending;
+  terms.surface = options.surface;
   terms.preference = gauss_preference(preferred, options.sharpness);
   terms.gauss = options.strength * options.gauss_weight;
   terms.preference_weights = weights;
-  terms.barrier = options.barrier;
-  terms.barrier_threshold = options.barrier_threshold;
   const Handle lowest = hold_lowest(samples);
   terms.handles = handles.empty() ? BoundHandles({lowest}, samples.points)
                                   : BoundHandles(in_cube(handles, samples.frame), samples.points);
-  terms.handle_weight = handles.empty() ? 1.0 : options.handle_weight;
-  terms.handle_batch = options.handle_batch;
+  terms.pull = options.handles;
+  if (handles.empty()) terms.pull.handle_weight = 1.0;
 
-  const MlpShape shape{
-      3, options.width, options.layers, options.octaves, options.frequency, options.softplus_sharpness};
-  const auto seed = static_cast<std::uint64_t>(options.seed);
-  auto field = std::make_shared<NeuralField>(shape, seed, false, resolve_device(options.device));
-  field->network()->round_products(options.precision == "bfloat16");
+  auto field = std::make_shared<NeuralField>(MlpShape{options.network, 3},
+                                             static_cast<std::uint64_t>(options.training.seed), false,
+                                             resolve_device(options.machine.device));
+  field->network()->round_products(options.precision == ProductPrecision::bfloat16);
   LoopOptions loop;
   loop.stage = "stylize";
-  loop.iterations = terms.gauss == 0.0 && handles.empty() ? 0 : options.iterations;
-  loop.optimizer = options.optimizer;
-  loop.learning_rate = options.learning_rate;
-  loop.time_budget = options.time_budget;
-  loop.seed = seed;
+  loop.training = options.training;
+  if (terms.gauss == 0.0 && handles.empty()) loop.training.iterations = 0;
   Solution solution = solve_field(field, samples, std::move(terms), loop, progress);
   if (handles.empty()) {
     hold(*field, lowest);

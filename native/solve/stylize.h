@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "solve/options.h"
+#include "options/stylize.h"
 #include "solve/report.h"
 
 namespace arapfields {

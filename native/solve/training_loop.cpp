@@ -17,7 +17,7 @@ namespace {
 std::string message(const LoopOptions& options, int done, double loss, double left) {
   char text[160];
   std::snprintf(text, sizeof text, "%s: iteration %d of %d, loss %.5g, %.0f s left", options.stage.c_str(),
-                done, options.iterations, loss, left);
+                done, options.training.iterations, loss, left);
   return text;
 }
 
@@ -65,10 +65,11 @@ LoopResult minimise(TrainableField& field, Objective& objective, const LoopOptio
                     const Progress& progress, const LoopObserver& observer) {
   const ThreadScope scope;
   constexpr int snapshot_every = 10;
+  const TrainingOptions& how = options.training;
   const Stopwatch watch;
-  const int history_every = std::max(1, options.iterations / 200);
+  const int history_every = std::max(1, how.iterations / 200);
   LoopResult result;
-  Random random(options.seed, 0x5eed);
+  Random random(static_cast<std::uint64_t>(how.seed), 0x5eed);
   Optimizer optimizer(field, options);
   GoodState good{field.parameters().clone(), 0};
   Losses losses(field.parameters());
@@ -78,16 +79,16 @@ LoopResult minimise(TrainableField& field, Objective& objective, const LoopOptio
     smooth = iteration == 0 ? loss : 0.9 * smooth + 0.1 * loss;
     if (iteration % history_every == 0) result.history.emplace_back(iteration, loss);
   };
-  for (int iteration = 0; iteration < options.iterations; ++iteration) {
+  for (int iteration = 0; iteration < how.iterations; ++iteration) {
     progress.check();
     const double elapsed = watch.seconds();
-    double done = static_cast<double>(iteration) / options.iterations;
-    if (options.time_budget > 0.0) {
-      if (elapsed >= options.time_budget) {
+    double done = static_cast<double>(iteration) / how.iterations;
+    if (how.time_budget > 0.0) {
+      if (elapsed >= how.time_budget) {
         result.out_of_time = true;
         break;
       }
-      done = std::max(done, elapsed / options.time_budget);
+      done = std::max(done, elapsed / how.time_budget);
     }
     field.gradient().zero_();
     losses.keep(iteration, objective.accumulate(field, random));

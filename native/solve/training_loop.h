@@ -9,6 +9,7 @@
 #include "core/random.h"
 #include "core/task.h"
 #include "fields/field.h"
+#include "options/training.h"
 
 namespace arapfields {
 
@@ -24,19 +25,16 @@ class Objective {
 /// How to descend. "muon" is neural/muon.h, for fields that are networks; "adam" serves any.
 /// Short memories (momentum, decays) suit the few hundred steps of a solve. The learning rate is held for
 /// `lr_hold_fraction` of the run and then falls along a half cosine to final_share of itself, so that the
-/// last steps average out the noise of the subsets.
+/// last steps average out the noise of the subsets; where a time budget is ahead of the iterations, it
+/// follows the clock.
 struct LoopOptions {
   std::string stage = "solving";  ///< what messages call the loop
-  std::string optimizer = "muon";
-  int iterations = 300;
-  double learning_rate = 0.0;  ///< 0: 0.03 for muon, 0.002 for adam
+  TrainingOptions training;
   double final_share = 0.05;
   double lr_hold_fraction = 0.5;
   double momentum = 0.8;    ///< of muon
   double adam_share = 0.3;  ///< of muon: the rate of biases and the output layer over the matrices'
   double beta1 = 0.8, beta2 = 0.9;
-  double time_budget = 0.0;  ///< seconds; 0: none. The schedule then follows the clock if that is ahead.
-  std::uint64_t seed = 0;
 };
 
 struct LoopResult {

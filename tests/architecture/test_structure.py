@@ -10,7 +10,18 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-FOLDERS = ["core", "mesh", "distance", "neural", "sampling", "fields", "energies", "solve", "extraction"]
+FOLDERS = [
+    "core",
+    "options",
+    "mesh",
+    "distance",
+    "neural",
+    "sampling",
+    "fields",
+    "energies",
+    "solve",
+    "extraction",
+]
 LINE_LIMITS = {".cpp": 350, ".h": 120, ".py": 250}
 SOURCE_FOLDERS = ["native", "addon", "blender_scripts", "tests"]
 

@@ -72,7 +72,7 @@ def run():
     held_out = points_near(mesh, 10000, 99)
     expected = af.signed_distance(*mesh, held_out)
     begin = time.perf_counter()
-    sdf = af.fit_sdf(*mesh, af.FitOptions(steps=STEPS_TO_TARGET, batch=BATCH, seed=SEED))
+    sdf = af.fit_sdf(*mesh, af.FitOptions(iterations=STEPS_TO_TARGET, batch=BATCH, seed=SEED))
     ours = time.perf_counter() - begin
     error = np.abs(sdf(held_out) - expected).mean()
     as_floats = (torch.tensor(x, dtype=torch.float32) for x in (held_out, expected))

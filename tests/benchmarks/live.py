@@ -21,7 +21,7 @@ def drag(live, name, degrees=range(0, FULL + 1, 2)):
 
 
 def converged(live, name):
-    live.solve(targets(name, FULL), steps=300, tolerance=1e-6)
+    live.solve(targets(name, FULL), iterations=300, tolerance=1e-6)
     return live.report
 
 
@@ -91,7 +91,7 @@ def style_row(aim, options, most=60):
         live.set_style("cube")
         steps = 0
         while steps < most:
-            live.solve(steps=2, tolerance=1e-9)
+            live.solve(iterations=2, tolerance=1e-9)
             steps += 2
             if live.report["preference"] >= aim:
                 break
@@ -115,7 +115,7 @@ def slider_row(updates=30):
         ),
     )
     live.set_style("cube", strength=0.3)
-    live.solve(steps=40)
+    live.solve(iterations=40)
     cube = af.preferred_normals("cube")
     row = {"what": "style slider, 600 centers: updates a second"}
     for name in ("strength", "sharpness", "orientation"):

@@ -78,7 +78,7 @@ def compare_rows(name, resolution=96):
         live = deformer(name)
         live.track(vertices)
     with Clock() as our_clock:
-        live.solve(poses, steps=100, tolerance=1e-4)
+        live.solve(poses, iterations=100, tolerance=1e-4)
         ours = live.tracked().astype(float)
     shared = {"vertices": len(vertices)}
     return [
@@ -86,7 +86,7 @@ def compare_rows(name, resolution=96):
             "what": f"{name}: live solver",
             **shared,
             "setup_cpu_s": round(our_setup.cpu, 3),
-            "steps": live.report["steps"],
+            "steps": live.report["iterations"],
             "cpu_s": round(our_clock.cpu, 3),
             "mesh_energy": round(mesh_energy(vertices, triangles, ours), 3),
             "volume_ratio": round(volume(ours, triangles) / whole, 3),
@@ -115,8 +115,8 @@ def cost_row(centers, count):
     with Clock() as clock:
         for degrees in range(5, FULL + 1, 5):
             live.solve(targets("bunny", degrees))
-            steps += live.report["steps"]
-    live.solve(steps=200, tolerance=1e-6)
+            steps += live.report["iterations"]
+    live.solve(iterations=200, tolerance=1e-6)
     return {
         "what": "bunny",
         "centers": centers,
@@ -137,7 +137,7 @@ def finger_row(finger, motion, degrees, axis, interior=True, field=None):
     pair = [cases.moved(palm), cases.moved(box, cases.turn(axis, degrees, pivot))]
     if field is None:
         live = af.LiveDeformer(surface_samples, pair, af.LiveOptions(interior=interior))
-        field = live.solve(steps=100, tolerance=1e-5)
+        field = live.solve(iterations=100, tolerance=1e-5)
         energy, name = (
             live.report["energy"],
             f"radial, {'interior ways' if interior else 'straight distances'}",

@@ -67,7 +67,7 @@ def main(resolution=80):
         (places[1, 2], False, "distances in space"),
     ):
         live = af.LiveDeformer(samples("hand"), pair, af.LiveOptions(interior=interior))
-        field = live.solve(steps=100)
+        field = live.solve(iterations=100)
         draw(place, field(vertices), triangles, view, f"{name}: E = {live.report['energy']:.4f}")
     figure.tight_layout()
     target = ROOT / "docs" / "images" / "live-compare.png"

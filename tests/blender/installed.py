@@ -81,7 +81,7 @@ def use():
     scenes.decorate(bar)
     kept = scenes.everything(bar)
     quick = bar.arapfields.fit
-    quick.steps, quick.width, quick.layers, quick.near_points = 100, 32, 2, 20000
+    quick.iterations, quick.width, quick.layers, quick.near_points = 100, 32, 2, 20000
     bpy.ops.arapfields.fit()
     moving.location.z += 0.3
     bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK)

@@ -138,7 +138,7 @@ def prepared(state):
         bar.vertex_groups.new(name="G").add([0, 1, 2], 1.0, "REPLACE")
         bpy.ops.arapfields.add_handle(kind="GROUP", place="CURSOR")
     elif state in ("fitted", "fit cleared"):
-        for name, value in {"steps": 5, "width": 16, "layers": 2, "near_points": 2000}.items():
+        for name, value in {"iterations": 5, "width": 16, "layers": 2, "near_points": 2000}.items():
             setattr(ours.fit, name, value)
         bpy.ops.arapfields.fit()
         if state == "fit cleared":

@@ -4,7 +4,7 @@
 import pytest
 from inside import in_blender
 
-CASES = {"fit": ("steps", 777), "deform": ("bending", 0.25), "stylize": ("sharpness", 9.0)}
+CASES = {"fit": ("iterations", 777), "deform": ("bending", 0.25), "stylize": ("sharpness", 9.0)}
 
 
 @pytest.mark.parametrize("section", CASES)

@@ -3,7 +3,7 @@
 
 from inside import in_blender
 
-FIT = {"steps": 150, "width": 48, "layers": 2, "near_points": 20000}
+FIT = {"iterations": 150, "width": 48, "layers": 2, "near_points": 20000}
 NEAR = 0.06  # of the bar's size: what so short a fit reaches
 
 
@@ -28,9 +28,9 @@ def test_a_fit_is_cached_and_goes_stale_with_the_mesh():
     assert fit_cache().path(ours.fit_key).exists() and fit_cache().size() > 0
     assert json.loads(ours.fit_report)["near_mean"] < 0.05
     assert read_surface(bpy.context, bar).is_cached and staleness.reason(bar) == ""
-    bar.arapfields.fit.steps += 1
+    bar.arapfields.fit.iterations += 1
     assert staleness.reason(bar) == "The settings changed since the fit"
-    bar.arapfields.fit.steps -= 1
+    bar.arapfields.fit.iterations -= 1
     bar.location.x += 3  # where it is does not matter
     assert read_surface(bpy.context, bar).key == ours.fit_key
     bpy.context.view_layer.update()

@@ -16,17 +16,17 @@ import arapfields as af
 
 LIMITS = {
     "iterations": 12,
-    "steps": 120,
     "width": 64,
     "near_points": 20000,
     "uniform_points": 5000,
     "time_budget": 3.0,
 }
+FIT_ITERATIONS = 120  # fewer leave no surface to sample
 TAKE_OPTIONS = {  # as their third argument
     "fit_sdf": "FitOptions",
     "deform": "DeformOptions",
     "stylize": "StylizeOptions",
-    "train_inverse": "InverseOptions",
+    "train_inverse": "InverseTrainingOptions",
 }
 
 
@@ -35,7 +35,8 @@ def shortened(kind):
 
     def make(**given):
         options = kind(**given)
-        for name, most in LIMITS.items():
+        limits = LIMITS | ({"iterations": FIT_ITERATIONS} if kind.__name__ == "FitOptions" else {})
+        for name, most in limits.items():
             if hasattr(options, name) and (getattr(options, name) > most or getattr(options, name) == 0):
                 setattr(options, name, most)
         return options

@@ -13,7 +13,7 @@ import pages
 import pytest
 
 SHORT = {  # flags that keep a run brief: that it runs is tested, not how well it solves
-    "fit": "--steps 40 --width 32 --near-points 4000 --uniform-points 1000",
+    "fit": "--iterations 40 --width 32 --near-points 4000 --uniform-points 1000",
     "deform": "--iterations 8 --width 32 --resolution 48",
     "stylize": "--iterations 8 --width 32",
     "extract": "--resolution 48",

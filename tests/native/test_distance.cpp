@@ -204,8 +204,8 @@ BOOST_AUTO_TEST_CASE(training_points_carry_exact_distances_in_cube_units) {
   const SignedDistance distance(mesh.vertices, mesh.triangles);
   const Frame frame = mesh_frame(mesh.vertices, mesh.triangles);
   TrainingPointsOptions options;
-  options.near_surface = 4000;
-  options.in_volume = 1000;
+  options.near_points = 4000;
+  options.uniform_points = 1000;
   const TrainingPoints all = training_points(distance, mesh, frame, options);
   BOOST_TEST(all.points.rows() == 5000);
   BOOST_TEST(all.near_surface == 4000);
@@ -222,9 +222,8 @@ BOOST_AUTO_TEST_CASE(training_points_carry_exact_distances_in_cube_units) {
   BOOST_TEST((coarse > 0.030 && coarse < 0.045));
   const TrainingPoints again = training_points(distance, mesh, frame, options);
   BOOST_TEST((all.points == again.points && all.distances == again.distances));
-  options.seed = 1;
-  BOOST_TEST((training_points(distance, mesh, frame, options).points != all.points));
-  options.fine_spread = 0;
+  BOOST_TEST((training_points(distance, mesh, frame, options, 1).points != all.points));
+  options.near_spread = 0;
   BOOST_CHECK_THROW(training_points(distance, mesh, frame, options), InvalidInput);
 }
 

@@ -123,7 +123,7 @@ BOOST_AUTO_TEST_CASE(quasi_newton_descends_to_the_minimum_and_stays) {
   objective.value(u, &cotangents);
   BOOST_TEST(objective.pull_back(cotangents).norm() < 1e-3);
   const RowMatrix<double> before = c;
-  BOOST_TEST(optimizer.minimise(objective, {5, 1e-6}, c).steps == 0);
+  BOOST_TEST(optimizer.minimise(objective, {5, 1e-6}, c).iterations == 0);
   BOOST_TEST((before - c).norm() == 0.0);
   c(0, 0) = std::nan("");
   BOOST_CHECK_THROW(optimizer.minimise(objective, {}, c), Diverged);

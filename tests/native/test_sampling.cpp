@@ -33,7 +33,7 @@ int bin(double fraction, int bins) { return std::clamp(static_cast<int>(fraction
 
 double turn(double y, double x) { return std::atan2(y, x) / (2.0 * std::numbers::pi) + 0.5; }
 
-SurfaceSamples sample(const ImplicitFunction& function, Index count, std::uint64_t seed = 1,
+SurfaceSamples sample(const ImplicitFunction& function, int count, std::int64_t seed = 1,
                       SampleReport* report = nullptr) {
   return sample_surface(function, Frame(), {.count = count, .seed = seed}, {}, report);
 }

@@ -13,6 +13,7 @@ sys.path.insert(0, str(ROOT / "blender_scripts"))
 pytest.importorskip("pybind11", reason="pybind11 is not installed")
 
 from extension import bindings, check, dependencies  # noqa: E402
+from extension.archive import OPTIONS  # noqa: E402
 
 WHEEL = "wheels/arapfields-0.1.0-py3-none-linux_x86_64.whl"
 POLIB = "wheels/polib-1.2.0-py2.py3-none-any.whl"
@@ -20,13 +21,13 @@ MANIFEST = f'platforms = ["linux-x64"]\nwheels = ["./{WHEEL}", "./{POLIB}"]\n'
 PARTS = ["arapfields/libarapfields.so", "arapfields/_native.cpython-311-x86_64-linux-gnu.so"]
 
 
-def make_zip(path, manifest=MANIFEST, wheel=WHEEL, parts=PARTS):
+def make_zip(path, manifest=MANIFEST, wheel=WHEEL, parts=PARTS, others=(OPTIONS,)):
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w") as inner:
         for part in parts:
             inner.writestr(part, "")
     with zipfile.ZipFile(path, "w") as archive:
-        for name in ("__init__.py", "LICENSE"):
+        for name in ("__init__.py", "LICENSE", *others):
             archive.writestr(name, "")
         archive.writestr("blender_manifest.toml", manifest)
         archive.writestr(wheel, content.getvalue())
@@ -43,6 +44,7 @@ def test_a_whole_zip_passes(tmp_path):
     [
         ({}, [(3, 11), (3, 13)], "no binding for Python 3.13"),
         ({"parts": PARTS[1:]}, [(3, 11)], "0 copies"),
+        ({"others": ()}, [(3, 11)], "lacks core/settings/options.json"),
         ({"manifest": MANIFEST.replace("linux-x64", "windows-x64")}, [], "declares windows-x64"),
         ({"manifest": 'platforms = ["linux-x64"]\n'}, [], "declares linux-x64, for which no wheel"),
         ({"manifest": MANIFEST.replace(f', "./{POLIB}"', "")}, [], "lacks the wheel of polib"),

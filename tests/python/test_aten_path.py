@@ -140,7 +140,7 @@ def test_stylize_and_fit_arrive_where_the_kernels_do():
     turned = STYLE @ cases.turn([1, 2, 0], 25)[:3, :3]
     style = af.StylizeOptions(iterations=40, width=48, layers=3, batch=200, threads=1, device="cpu")
     fit = af.FitOptions(
-        steps=60, width=48, layers=3, near_points=4000, uniform_points=1000, threads=1, device="cpu"
+        iterations=60, width=48, layers=3, near_points=4000, uniform_points=1000, threads=1, device="cpu"
     )
     figures = []
     for scope in (contextlib.nullcontext, aten_path):

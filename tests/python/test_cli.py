@@ -53,7 +53,7 @@ def test_fit_saves_what_the_library_makes(made, tmp_path):
     assert run("fit", made / "mesh.obj", "-o", again, "--report", report, "--quiet", *SMALL_FIT) == 0
     points = np.random.default_rng(0).uniform(-1, 1, (50, 3))
     assert np.array_equal(af.NeuralSdf.load(again)(points), af.NeuralSdf.load(made / "sdf.npz")(points))
-    assert json.loads(report.read_text())["steps"] == 60
+    assert json.loads(report.read_text())["iterations"] == 60
 
 
 @pytest.mark.parametrize("source", ["mesh.obj", "sdf.npz"])

@@ -146,9 +146,9 @@ def test_bar_bends_without_folding(bent_bar):
     assert distance.max() <= report.handle_error_max * (1 + 1e-9)
     assert report.handle_error_mean < 0.02 and report.min_determinant > 0.3
     assert report.stretch < 0.03
-    assert report.converged and report.steps > 5
+    assert report.converged and report.iterations > 5
     start = af.deform_curve(points, handles, af.CurveOptions(iterations=0)).report
-    assert start.steps == 0 and report.loss < 0.9 * start.loss
+    assert start.iterations == 0 and report.loss < 0.9 * start.loss
     inside = np.random.default_rng(5).uniform(-1, 1, (500, 2)) * [2.0, 0.3]
     assert np.linalg.det(field.jacobian(inside)).min() > 0.05
 

@@ -11,7 +11,14 @@ from tolerances import FIT_REPORT
 
 import arapfields as af
 
-QUICK = {"steps": 60, "width": 64, "batch": 512, "near_points": 20000, "uniform_points": 5000, "threads": 2}
+QUICK = {
+    "iterations": 60,
+    "width": 64,
+    "batch": 512,
+    "near_points": 20000,
+    "uniform_points": 5000,
+    "threads": 2,
+}
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +34,7 @@ def fitted(ball):
 
 def test_the_report_tells_the_error_in_mesh_units(ball, fitted):
     report, vertices = fitted.report, ball[0]
-    assert report["stopped_by"] == "steps" and report["steps"] == QUICK["steps"]
+    assert report["stopped_by"] == "iterations" and report["iterations"] == QUICK["iterations"]
     assert fitted.frame.scale == pytest.approx(4.0) and report["scale"] == fitted.frame.scale
     rng = np.random.default_rng(0)
     spreads = np.where(np.arange(4000) % 2, 0.05, 0.01)[:, None] * fitted.frame.scale
@@ -57,11 +64,11 @@ def test_same_seed_same_network_other_seed_another(ball, fitted):
 
 
 def test_it_stops_at_the_target_or_when_time_is_up(ball):
-    quick = {**QUICK, "steps": 100000}
+    quick = {**QUICK, "iterations": 100000}
     stopped = af.fit_sdf(*ball, af.FitOptions(**quick, target_error=0.01)).report
     assert stopped["stopped_by"] == "target_error" and stopped["near_mean"] < 0.012 * stopped["scale"]
-    report = af.fit_sdf(*ball, af.FitOptions(**quick, seconds=0.5)).report
-    assert report["stopped_by"] == "seconds" and report["seconds"] > 0.5
+    report = af.fit_sdf(*ball, af.FitOptions(**quick, time_budget=0.5)).report
+    assert report["stopped_by"] == "time_budget" and report["seconds"] > 0.5
 
 
 def test_adam_learns_too(ball):
@@ -83,12 +90,12 @@ def test_cancel_takes_effect_soon_and_progress_only_rises(ball):
     watcher = threading.Thread(target=watch)
     watcher.start()
     with pytest.raises(af.Cancelled):
-        af.fit_sdf(*ball, af.FitOptions(**{**QUICK, "steps": 2000}), task)
+        af.fit_sdf(*ball, af.FitOptions(**{**QUICK, "iterations": 2000}), task)
     latency = time.perf_counter() - times["cancel"]
     watcher.join()
     assert latency < 2.0  # 0.2 s on an idle machine
     assert seen == sorted(seen) and seen[-1] < 1
-    assert "step" in task.message
+    assert "iteration" in task.message
 
 
 def test_leaving_the_finite_numbers_keeps_the_last_good_state(ball):
@@ -109,7 +116,7 @@ def test_a_fit_survives_its_file(fitted, tmp_path):
 @pytest.mark.parametrize(
     "wrong,word",
     [
-        ({"steps": 0}, "steps"),
+        ({"iterations": 0}, "iterations"),
         ({"batch": 0}, "batch"),
         ({"near_share": 1.5}, "near_share"),
         ({"near_spread": float("nan")}, "near_spread"),

@@ -79,7 +79,7 @@ def test_vdb_without_openvdb_says_what_is_needed(tmp_path, monkeypatch):
 
 
 def test_bad_input_is_named(tmp_path):
-    for resolution in (0, 1.5, "8", grids.LARGEST + 1):
+    for resolution in (0, 1.5, "8", grids.RESOLUTION["high"] + 1):
         with pytest.raises(af.InvalidInput, match="resolution"):
             af.sdf_grid(Ball(), resolution)
     for bounds in ([[0, 0, 0]], [[0, 0, 0], [1, 0, 1]], [[0, 0, 0], [1, 1, np.nan]]):

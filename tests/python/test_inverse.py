@@ -26,7 +26,7 @@ def bent(samples):
 
 def test_a_trained_inverse_returns(bent, samples):
     inverse = af.train_inverse(
-        bent, samples, af.InverseOptions(width=64, layers=3, iterations=300, batch=300)
+        bent, samples, af.InverseTrainingOptions(width=64, layers=3, iterations=300, batch=300)
     )
     others = cases.bar_samples(500, seed=9).points
     error = np.linalg.norm(inverse(bent(others)) - others, axis=1)
@@ -36,7 +36,9 @@ def test_a_trained_inverse_returns(bent, samples):
 
 
 def test_a_trained_inverse_is_a_field_with_a_file(bent, samples, tmp_path):
-    inverse = af.train_inverse(bent, samples, af.InverseOptions(width=16, layers=2, iterations=5, batch=50))
+    inverse = af.train_inverse(
+        bent, samples, af.InverseTrainingOptions(width=16, layers=2, iterations=5, batch=50)
+    )
     inverse.save(tmp_path / "inverse.npz")
     again = af.DeformationField.load(tmp_path / "inverse.npz")
     assert np.array_equal(again(samples.points), inverse(samples.points))
@@ -45,9 +47,9 @@ def test_a_trained_inverse_is_a_field_with_a_file(bent, samples, tmp_path):
 
 def test_bad_options_are_named(bent, samples):
     with pytest.raises(af.InvalidInput, match="batch"):
-        af.train_inverse(bent, samples, af.InverseOptions(batch=0))
+        af.train_inverse(bent, samples, af.InverseTrainingOptions(batch=0))
     with pytest.raises(af.InvalidInput, match="device"):
-        af.train_inverse(bent, samples, af.InverseOptions(device="abacus"))
+        af.train_inverse(bent, samples, af.InverseTrainingOptions(device="abacus"))
 
 
 def test_invertibility_penalises_folds(samples):
@@ -136,6 +138,6 @@ def test_inverses_on_published_shapes(data_dir, name):
     sdf = af.NeuralSdf.from_layers(*Network.published(data_dir / "neural_sdf" / f"{name}.pt").layers)
     apart, report = gap_in_voxels(sdf, field, 128)
     assert apart <= 1.5 and report["failures"] <= 0.01 * report["inverted"]
-    trained = af.train_inverse(field, samples, af.InverseOptions(iterations=1500))
+    trained = af.train_inverse(field, samples, af.InverseTrainingOptions(iterations=1500))
     assert gap_in_voxels(sdf, field, 128, inverse=trained)[0] <= 1.5
     assert np.quantile(np.linalg.norm(trained(images) - points, axis=1), 0.95) < 1e-3

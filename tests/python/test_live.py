@@ -27,7 +27,7 @@ def test_a_rest_pose_is_the_identity_and_costs_nothing(samples):
     field = live.solve()
     points = samples.points[:100]
     assert np.abs(field(points) - points).max() < LIVE_IDENTITY
-    assert live.report["energy"] < 1e-15 and live.report["steps"] == 0
+    assert live.report["energy"] < 1e-15 and live.report["iterations"] == 0
     live.solve([LEFT, turned(40) @ RIGHT])
     assert np.abs(live.field(points) - points).max() > 0.1
     live.reset()
@@ -40,7 +40,7 @@ def test_a_common_rigid_motion_is_reproduced(samples):
     motion[:3, :3] = random_rotations(1, np.random.default_rng(1))[0]
     motion[:3, 3] = [0.5, -1, 2]
     live = deformer(samples)
-    field = live.solve([motion @ LEFT, motion @ RIGHT], steps=200, tolerance=1e-12)
+    field = live.solve([motion @ LEFT, motion @ RIGHT], iterations=200, tolerance=1e-12)
     expected = samples.points @ motion[:3, :3].T + motion[:3, 3]
     assert np.abs(field(samples.points) - expected).max() < 1e-4
     assert live.report["energy"] < 1e-8
@@ -48,7 +48,7 @@ def test_a_common_rigid_motion_is_reproduced(samples):
 
 def test_bending_a_bar(samples):
     live = deformer(samples)
-    field = live.solve([LEFT, turned(60) @ RIGHT], steps=100, tolerance=1e-7)
+    field = live.solve([LEFT, turned(60) @ RIGHT], iterations=100, tolerance=1e-7)
     report = live.report
     assert report["converged"] and report["flipped_share"] == 0
     assert report["handle_error_mean"] < 0.03
@@ -64,7 +64,7 @@ def test_steps_never_raise_what_is_minimised(samples):
     targets = [LEFT, turned(120, 2, [0, 0.5, 0]) @ RIGHT]
     values = []
     for _ in range(40):
-        live.solve(targets, steps=1, tolerance=1e-9)
+        live.solve(targets, iterations=1, tolerance=1e-9)
         values.append(live.report["value"])
     assert (np.diff(values) <= 1e-12).all()
     assert values[-1] < 0.5 * values[0]
@@ -73,11 +73,11 @@ def test_steps_never_raise_what_is_minimised(samples):
 def test_returning_to_a_pose_returns_its_solution(samples):
     live, fresh = deformer(samples), deformer(samples)
     pose = [LEFT, turned(30) @ RIGHT]
-    expected = fresh.solve(pose, steps=300, tolerance=1e-9)(samples.points[:500])
+    expected = fresh.solve(pose, iterations=300, tolerance=1e-9)(samples.points[:500])
     rng = np.random.default_rng(2)
     for _ in range(60):
         live.solve([LEFT, turned(rng.normal() * 25, 0) @ turned(rng.normal() * 25, 1) @ RIGHT])
-    found = live.solve(pose, steps=300, tolerance=1e-9)(samples.points[:500])
+    found = live.solve(pose, iterations=300, tolerance=1e-9)(samples.points[:500])
     assert np.abs(found - expected).max() < LIVE_DRIFT * 4  # the bar is 4 long
 
 
@@ -113,7 +113,7 @@ def test_handles_come_and_go_and_points_pull(samples):
         [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, turned(30) @ RIGHT), af.Point([0, 0, 0.5], [0, 0, 0.5])]
     )
     assert np.array_equal(live.field(samples.points[:50]), bent)
-    live.solve([LEFT, turned(30) @ RIGHT, [0, 0, 0.9]], steps=60)
+    live.solve([LEFT, turned(30) @ RIGHT, [0, 0, 0.9]], iterations=60)
     assert live.field(np.array([[0, 0, 0.5]]))[0, 2] == pytest.approx(0.9, abs=0.05)
     with pytest.raises(af.InvalidInput, match="one for each of the 3 handles"):
         live.solve([LEFT])
@@ -121,7 +121,7 @@ def test_handles_come_and_go_and_points_pull(samples):
         live.solve([LEFT, np.diag([-1.0, 1, 1, 1]) @ RIGHT, [0, 0, 1]])
     with pytest.raises(af.InvalidInput, match=r"handles\[0\].*no surface sample"):
         live.set_handles([af.Cuboid(box([9, 9, 9], [1, 1, 1]), box([9, 9, 9], [1, 1, 1]))])
-    live.solve(steps=1)  # and is usable after all that
+    live.solve(iterations=1)  # and is usable after all that
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def test_handles_come_and_go_and_points_pull(samples):
 )
 def test_degenerate_handle_sets_give_a_sensible_field(samples, handles):
     live = af.LiveDeformer(samples, handles, af.LiveOptions(**QUICK))
-    field = live.solve(steps=100, tolerance=1e-7)
+    field = live.solve(iterations=100, tolerance=1e-7)
     moved = field(samples.points)
     assert np.isfinite(moved).all() and np.abs(moved).max() < 10
     assert np.isfinite(live.report["energy"])
@@ -162,9 +162,10 @@ def test_flat_and_tiny_sample_sets():
 
 def test_many_bumps_stay_well_conditioned(samples):
     live = deformer(samples, coarse_centers=300, fine_centers=1200, samples=2000)
-    field = live.solve([LEFT, turned(60) @ RIGHT], steps=30)
+    field = live.solve([LEFT, turned(60) @ RIGHT], iterations=30)
     assert (
-        live.report["energy"] < deformer(samples).solve([LEFT, turned(60) @ RIGHT], steps=30).report["energy"]
+        live.report["energy"]
+        < deformer(samples).solve([LEFT, turned(60) @ RIGHT], iterations=30).report["energy"]
     )
     assert np.abs(field(samples.points)).max() < 4
 
@@ -175,17 +176,17 @@ def test_style_and_handles_together(samples):
     cube = af.preferred_normals("cube") @ turned(20, 0)[:3, :3].T
     before = af.gauss_preference(samples.normals, cube).mean()
     live.set_style(cube)
-    live.solve(steps=40)
+    live.solve(iterations=40)
     assert live.report["preference"] > before + 0.1 and live.report["flipped_share"] == 0
     live.set_style(None)
-    live.solve(steps=60, tolerance=1e-8)
+    live.solve(iterations=60, tolerance=1e-8)
     assert "preference" not in live.report and live.report["energy"] < 1e-4
 
 
 def test_style_without_handles_holds_the_lowest_sample(samples):
     live = af.LiveDeformer(samples, options=af.LiveOptions(**QUICK, bending=1e-3))
     live.set_style(af.preferred_normals("hexagonal prism"), strength=0.5, sharpness=6.0)
-    field = live.solve(steps=30)
+    field = live.solve(iterations=30)
     lowest = samples.points[[samples.points[:, 2].argmin()]]
     assert np.abs(field(lowest) - lowest).max() < 0.1
     half = (samples.points[:, 0] < 0).astype(float)
@@ -202,7 +203,7 @@ def test_bad_options_are_named(samples):
         ("fine_centers", 0),
         ("fine_radius_factor", 0.0),
         ("tolerance", -1.0),
-        ("steps", 0),
+        ("iterations", 0),
     ]:
         with pytest.raises(af.InvalidInput, match=name):
             deformer(samples, **{name: value})

@@ -26,7 +26,7 @@ def test_ten_thousand_motions_leave_no_trace():
         af.LiveDeformer(samples, [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)], options) for _ in range(2)
     )
     pose = [LEFT, turned(30) @ RIGHT]
-    expected = fresh.solve(pose, steps=300, tolerance=1e-9)(samples.points[:500])
+    expected = fresh.solve(pose, iterations=300, tolerance=1e-9)(samples.points[:500])
     rng = np.random.default_rng(0)
     for i in range(10000):
         angles, offset = 25 * rng.normal(size=3), 0.3 * rng.normal(size=3)
@@ -36,7 +36,7 @@ def test_ten_thousand_motions_leave_no_trace():
         if i == 1000:
             memory = resident_mebibytes()
     assert resident_mebibytes() < memory + 2
-    found = live.solve(pose, steps=300, tolerance=1e-9)(samples.points[:500])
+    found = live.solve(pose, iterations=300, tolerance=1e-9)(samples.points[:500])
     assert np.abs(found - expected).max() < LIVE_DRIFT * 4  # the bar is 4 long
     live.reset()
     assert np.abs(live.field(samples.points) - samples.points).max() < 1e-8
@@ -73,10 +73,10 @@ def test_refined_by_a_style_and_handles_at_once():
         live.solve([LEFT, turned(5.0 * i) @ RIGHT])
         assert live.report["flipped_share"] == 0 and live.report["handle_error_mean"] < 0.05
     setup = live.report["setup_seconds"]
-    live.solve(steps=60)
+    live.solve(iterations=60)
     assert live.report["setup_seconds"] == setup
     alone = af.LiveDeformer(samples, [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, turned(25) @ RIGHT)])
-    plain = alone.solve(steps=60)
+    plain = alone.solve(iterations=60)
     twisted = af.gauss_preference(samples.normals, cube @ turned(20.0, 0)[:3, :3].T).mean()
     assert live.report["preference"] > twisted + 0.05
     assert np.abs(live.field(samples.points) - plain(samples.points)).max() > 0.02

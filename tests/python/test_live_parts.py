@@ -19,7 +19,7 @@ def other_leg_moves(samples, interior):
     """Distance by which the left tip moves when the right one is pulled aside, and the live deformer."""
     handles = [af.Cuboid(BOTTOM, BOTTOM), af.Cuboid(TIP, TIP)]
     live = af.LiveDeformer(samples, handles, af.LiveOptions(interior=interior))
-    field = live.solve([BOTTOM, shift([0, 0.4, 0]) @ TIP], steps=100, tolerance=1e-6)
+    field = live.solve([BOTTOM, shift([0, 0.4, 0]) @ TIP], iterations=100, tolerance=1e-6)
     assert live.report["handle_error_mean"] < 0.01
     return np.linalg.norm(field(LEGS[-1]) - LEGS[-1]), live
 
@@ -70,5 +70,5 @@ def test_loose_parts_stay_together():
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     points = 0.5 * normals + np.where(np.arange(6000) < 3000, -0.6, 0.6)[:, None] * [1.0, 0, 0]
     live = af.LiveDeformer(af.SurfaceSamples(points, normals), [af.Point([-1.1, 0, 0], [-1.1, 0, 0])])
-    field = live.solve([[-1.1, 0.5, 0]], steps=100)
+    field = live.solve([[-1.1, 0.5, 0]], iterations=100)
     assert np.abs(field(points) - points - [0, 0.5, 0]).max() < 0.05

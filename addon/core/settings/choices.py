@@ -47,8 +47,3 @@ LIVE_KINDS = (
     ("DEFORM", "Deform", "The shape follows its handles"),
     ("STYLIZE", "Stylize", "The shape follows the style's settings, and its handles where the style does"),
 )
-DEVICES = (
-    ("auto", "Automatic", "The fastest device that is found"),
-    ("cpu", "Processor", "The processor's cores"),
-    ("cuda", "CUDA", "A graphics card, where the native library was built for it"),
-)

@@ -1,7 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings that artists see: names of the native options, labels, explanations, ranges."""
+"""The settings that artists see, from the table of the native options (native/options/options.toml)."""
 
+import importlib.util
+import json
 from dataclasses import dataclass
+from pathlib import Path
+
+LARGEST = 2**31 - 1  # that Blender's integers hold
 
 
 @dataclass(frozen=True)
@@ -14,159 +19,74 @@ class Parameter:
     tip: str
     low: float | None = None
     high: float | None = None
+    soft_low: float | None = None
     soft_high: float | None = None
     items: tuple = ()  # (identifier, label, tip) of a choice
     advanced: bool = False
 
 
-SEED = Parameter(
-    "seed", 0, "Seed", "Same seed, same settings: the same result", 0, 2**31 - 1, 100, advanced=True
-)
-TIME = Parameter(
-    "time_budget",
-    0.0,
-    "Time Limit",
-    "Seconds after which to stop with what was reached; 0 for none",
-    0,
-    36000,
-    300,
-)
-WIDTH = Parameter(
-    "width",
-    256,
-    "Network Width",
-    "Units of each layer; more can bend more finely, and take longer",
-    8,
-    1024,
-    512,
-    advanced=True,
-)
-LAYERS = Parameter("layers", 4, "Network Layers", "Hidden layers of the network", 1, 16, 8, advanced=True)
-LEARNING_RATE = Parameter(
-    "learning_rate",
-    0.0,
-    "Learning Rate",
-    "Size of the steps of the solve; 0 for what suits most shapes",
-    0.0,
-    0.1,
-    0.05,
-    advanced=True,
-)
-OCTAVES = Parameter(
-    "octaves",
-    4,
-    "Detail Octaves",
-    "Octaves of detail of the network's input; more can follow smaller features",
-    0,
-    12,
-    8,
-    advanced=True,
-)
+def read_table():
+    """Name → operation: the snapshot that ships with the extension, else the table of the clone.
 
-SAMPLES = Parameter(
-    "samples",
-    20000,
-    "Samples",
-    "Points spread evenly over the surface at which its rigidity is judged",
-    100,
-    1000000,
-    100000,
-)
-BENDING = Parameter(
-    "bending",
-    0.01,
-    "Stiffness",
-    "Resistance to bending, against stretching: low gives sharp joints, high gives wide, soft bends",
-    0.0,
-    10.0,
-    0.1,
-)
-BARRIER = Parameter(
-    "barrier",
-    0.0,
-    "Fold Barrier",
-    "Keeps the surface from folding through itself locally; 0 for off",
-    0.0,
-    1000.0,
-    1.0,
-    advanced=True,
-)
+    Empty where neither is at hand, in an installation of the source code alone: there is then nothing to set,
+    and core/runtime/native.py says what to install.
+    """
+    here = Path(__file__).resolve()
+    shipped = here.with_name("options.json")
+    if shipped.exists():
+        return json.loads(shipped.read_text(encoding="utf-8"))
+    clone = here.parents[3] / "native" / "options" / "table.py"
+    if not clone.exists():
+        return {}
+    spec = importlib.util.spec_from_file_location("arapfields_options_table", clone)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.resolved()
 
-DEFORM = [
-    Parameter(
-        "field",
-        "neural",
-        "Method",
-        "How the motion is represented",
-        items=(
-            ("neural", "Neural", "A small network trained for this pose: the best quality"),
-            ("radial", "Fast", "Smooth bumps solved directly: interactive, slightly softer"),
-        ),
-    ),
-    Parameter(
-        "iterations", 300, "Iterations", "Steps of the solve; more is finer and takes longer", 1, 100000, 1000
-    ),
-    BENDING,
-    Parameter(
-        "handle_weight",
-        100.0,
-        "Handle Weight",
-        "How strictly the handles are followed, against rigidity",
-        0.01,
-        1e6,
-        1000.0,
-    ),
-    Parameter(
-        "exact_handles",
-        False,
-        "Exact Handles",
-        "What lies in a handle's box follows it exactly instead of nearly",
-    ),
-    Parameter(
-        "margin",
-        0.1,
-        "Fall-off",
-        "Width of the blend around exact handles, relative to the shape's half size",
-        0.001,
-        1.0,
-        0.5,
-        advanced=True,
-    ),
-    TIME,
-    SAMPLES,
-    Parameter(
-        "batch", 300, "Samples per Step", "Samples that each step looks at", 16, 100000, 4000, advanced=True
-    ),
-    Parameter(
-        "start",
-        "identity",
-        "Start",
-        "What the network starts from",
-        items=(
-            ("identity", "Rest Shape", "The shape as it is"),
-            ("radial", "Fast Result", "The result of the fast method, which the network then refines"),
-        ),
-        advanced=True,
-    ),
-    BARRIER,
-    Parameter(
-        "invertibility",
-        0.0,
-        "Invertibility",
-        "Weight of a second network that undoes the motion, which keeps the space from folding; 0 for off",
-        0.0,
-        1000.0,
-        10.0,
-        advanced=True,
-    ),
-    LEARNING_RATE,
-    WIDTH,
-    LAYERS,
-    OCTAVES,
-    SEED,
-]
 
-OURS = {"samples"}  # settings of the add-on that are no native option
+TABLE = read_table()
+
+
+def parameter(option, advanced=False):
+    """An option of the table as a setting."""
+    choices = option["choices"].items()
+    return Parameter(
+        option["name"],
+        option["default"],
+        option["label"],
+        option["sentence"],
+        option["low"],
+        min(option["high"], LARGEST) if option["type"] == "seed" else option["high"],
+        option["soft_low"],
+        option["soft_high"],
+        tuple((name, label, tip) for name, (label, tip) in choices),
+        advanced,
+    )
+
+
+def parameters(operation):
+    """What the panel shows of an operation, in order; of a group without a panel, everything."""
+    block = TABLE.get(operation)
+    if block is None:
+        return []
+    options = {option["name"]: option for option in (*block["options"], *block["further"])}
+    plain = block["panel"] or (() if block["advanced"] else options)
+    return [parameter(options[name]) for name in plain] + [
+        parameter(options[name], advanced=True) for name in block["advanced"]
+    ]
+
+
+def presets(operation):
+    """Identifier → label, tip, what it sets."""
+    given = TABLE.get(operation, {}).get("presets", {})
+    return {key.upper(): (p["label"], p["sentence"], p["values"]) for key, p in given.items()}
+
+
+DEFORM = parameters("deform")
+MACHINE = parameters("machine")
+EXTRACTION = parameters("extraction")
+
+OURS = {option["name"] for block in TABLE.values() for option in block["further"]}  # no native options
 
 
 def native_options(values):

@@ -20,7 +20,7 @@ from ._native import (
     Frame,
     Handle,
     InvalidInput,
-    InverseOptions,
+    InverseTrainingOptions,
     LiveDeformer,
     LiveOptions,
     NeuralSdf,
@@ -54,6 +54,8 @@ from ._native import (
 )
 from .grids import save_grid, sdf_grid
 
+InverseOptions = InverseTrainingOptions  # the older name
+
 __all__ = [
     "Cancelled",
     "Cuboid",
@@ -71,6 +73,7 @@ __all__ = [
     "Handle",
     "InvalidInput",
     "InverseOptions",
+    "InverseTrainingOptions",
     "LiveDeformer",
     "LiveOptions",
     "NeuralSdf",

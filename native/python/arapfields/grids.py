@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from ._native import Cancelled, Frame, InvalidInput, require_memory, signed_distance
+from ._options import options_of
 
 SUFFIXES = (".npz", ".vdb")
 CHUNK = 200_000  # points evaluated between two looks at the task
-LARGEST = 2048
+RESOLUTION = options_of("grid")["resolution"]
 BAND = 3  # voxels on either side of the surface that a level set keeps
 
 
@@ -30,7 +31,7 @@ class MeshDistance:
         return signed_distance(self.vertices, self.triangles, points)
 
 
-def sdf_grid(sdf, resolution=128, bounds=None, task=None):
+def sdf_grid(sdf, resolution=RESOLUTION["default"], bounds=None, task=None):
     """Distances at the nodes of a regular grid: (values, origin, spacing).
 
     `values` (nx, ny, nz) float32, negative inside; node (i, j, k) lies at origin + spacing · (i, j, k), in
@@ -39,8 +40,9 @@ def sdf_grid(sdf, resolution=128, bounds=None, task=None):
     frame's cube).
     InvalidInput for a resolution or bounds that make no grid; Cancelled where `task` is.
     """
-    if not isinstance(resolution, (int, np.integer)) or not 1 <= resolution <= LARGEST:
-        raise InvalidInput(f"resolution: got {resolution!r}; an integer from 1 to {LARGEST} is needed")
+    low, high = RESOLUTION["low"], RESOLUTION["high"]
+    if not isinstance(resolution, (int, np.integer)) or not low <= resolution <= high:
+        raise InvalidInput(f"resolution: got {resolution!r}; an integer from {low} to {high} is needed")
     if bounds is None:
         bounds = sdf.frame.to_mesh([[-1.0] * 3, [1.0] * 3])
     bounds = np.array(bounds, float)

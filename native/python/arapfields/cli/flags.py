@@ -2,6 +2,7 @@
 """Flags that several verbs share."""
 
 from .handles import AddHandle, MoveHandle, triple
+from .options import add_option_flag
 
 MESH = "mesh: .ply, .obj, .stl or .off"
 SOURCE = f"{MESH}; or .npz: a signed distance that fit saved"
@@ -14,11 +15,8 @@ def solve_flags(parser):
     outputs.add_argument("--surface", metavar="FILE", help="the implicit surface, deformed (see --through)")
     outputs.add_argument("--save-field", metavar="FILE", help=".npz with the deformation field")
     report_flag(outputs)
-    resolution_flag(parser, "grid points")
+    add_option_flag(parser, "extraction", "resolution")
     inverse_flag(parser)
-    parser.add_argument(
-        "--samples", type=int, default=20000, metavar="N", help="surface samples the energy sees [20000]"
-    )
     handles = parser.add_argument_group(
         "handles (x, y, z in the mesh's coordinates; inf and -inf leave a side of a box open)"
     )
@@ -60,12 +58,6 @@ def solve_flags(parser):
         action=AddHandle,
         **settings,
         help="one point of the surface goes there",
-    )
-
-
-def resolution_flag(parser, unit):
-    parser.add_argument(
-        "--resolution", type=int, default=128, metavar="N", help=f"{unit} along an edge of the cube [128]"
     )
 
 

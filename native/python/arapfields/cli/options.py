@@ -1,30 +1,40 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Option structs of the library as flags: one for each field, its docstring as help, its default kept."""
+"""Options of the library as flags: one for each, its sentence as help, its default kept."""
 
 import argparse
 
 from .._native import InvalidInput
+from .._options import options_of
+
+NUMBERS = {"int": int, "seed": int, "float": float}
 
 
-def add_option_flags(parser, structure, title, skip=()):
-    """A group of flags, `learning_rate` → `--learning-rate`."""
+def add_option_flags(parser, operation, title):
+    """A group with a flag for each option of the operation, `learning_rate` → `--learning-rate`."""
     group = parser.add_argument_group(title)
-    defaults = structure()
-    for name in structure.fields:
-        if name in skip:
-            continue
-        value = getattr(defaults, name)
-        text = (getattr(structure, name).__doc__ or "").strip().replace("%", "%%")
-        settings = {"dest": f"option_{name}", "default": None, "help": f"{text} [{_shown(value)}]"}
-        flag = "--" + name.replace("_", "-")
-        if isinstance(value, bool):
-            group.add_argument(flag, action=argparse.BooleanOptionalAction, **settings)
-        elif isinstance(value, (int, float)):
-            group.add_argument(
-                flag, type=type(value), metavar="N" if isinstance(value, int) else "X", **settings
-            )
-        elif isinstance(value, str):
-            group.add_argument(flag, metavar="NAME", **settings)
+    for option in options_of(operation).values():
+        add_flag(group, option, dest=f"option_{option['name']}", default=None)
+
+
+def add_option_flag(parser, operation, name):
+    """The flag of one option, which stands for itself: its value is the default where it is not given."""
+    option = options_of(operation)[name]
+    add_flag(parser, option, dest=name, default=option["default"])
+
+
+def add_flag(group, option, **settings):
+    name, kind = option["name"].replace("_", "-"), option["type"]
+    text = f"{option['sentence']} [{_shown(option['default'])}]"
+    settings["help"] = text.replace("%", "%%")
+    if kind == "bool":
+        group.add_argument(f"--{name}", action=argparse.BooleanOptionalAction, **settings)
+    elif kind in NUMBERS:
+        group.add_argument(
+            f"--{name}", type=NUMBERS[kind], metavar="X" if kind == "float" else "N", **settings
+        )
+    else:
+        choices = list(option["choices"]) if kind == "enum" else None
+        group.add_argument(f"--{name}", choices=choices, metavar=None if choices else "NAME", **settings)
 
 
 def given_options(structure, arguments):
@@ -40,7 +50,13 @@ def given_options(structure, arguments):
     return options
 
 
+def given(arguments, operation, name):
+    """One option of an operation: what was given, else its default."""
+    value = getattr(arguments, f"option_{name}")
+    return options_of(operation)[name]["default"] if value is None else value
+
+
 def _shown(value):
     if isinstance(value, bool):
         return "on" if value else "off"
-    return value if value != "" else "none"
+    return value

@@ -8,8 +8,8 @@ import sys
 import arapfields as af
 
 from . import verbs
-from .flags import MESH, SOURCE, inverse_flag, report_flag, resolution_flag, solve_flags
-from .options import add_option_flags
+from .flags import MESH, SOURCE, inverse_flag, report_flag, solve_flags
+from .options import add_option_flag, add_option_flags
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -66,7 +66,7 @@ def _fit(added):
     parser.add_argument("input", help=MESH)
     parser.add_argument("-o", "--output", required=True, metavar="FILE", help=".npz for the signed distance")
     report_flag(parser)
-    add_option_flags(parser, af.FitOptions, "fitting")
+    add_option_flags(parser, "fit", "fitting")
     return parser
 
 
@@ -83,8 +83,8 @@ def _sample(added):
     parser.add_argument(
         "-o", "--output", required=True, metavar="FILE", help=".ply, .npz (points, normals) or .xyz"
     )
-    parser.add_argument("--count", type=int, default=20000, metavar="N", help="points [20000]")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the random points [0]")
+    add_option_flag(parser, "sampling", "count")
+    add_option_flag(parser, "sampling", "seed")
     parser.add_argument("--deformed-by", metavar="FIELD", help="move the points and normals by a saved field")
     return parser
 
@@ -101,7 +101,7 @@ def _deform(added):
         "spot.npz --surface bent.ply --resolution 192 --handles pose.json --exact-handles",
     )
     solve_flags(parser)
-    add_option_flags(parser, af.DeformOptions, "deformation")
+    add_option_flags(parser, "deform", "deformation")
     return parser
 
 
@@ -123,7 +123,7 @@ def _stylize(added):
     parser.add_argument(
         "--style-turn", nargs=2, metavar=("AXIS", "DEGREES"), help="turns the style's normals"
     )
-    add_option_flags(parser, af.StylizeOptions, "stylization")
+    add_option_flags(parser, "stylize", "stylization")
     return parser
 
 
@@ -141,7 +141,7 @@ def _extract(added):
     parser.add_argument("-o", "--output", required=True, metavar="FILE", help=MESH)
     parser.add_argument("--deformed-by", metavar="FIELD", help="move the surface by a saved field")
     inverse_flag(parser)
-    resolution_flag(parser, "grid points")
+    add_option_flag(parser, "extraction", "resolution")
     return parser
 
 
@@ -176,5 +176,5 @@ def _grid(added):
         metavar="FILE",
         help=".npz (values, origin, spacing), or .vdb where Blender's openvdb module is found",
     )
-    resolution_flag(parser, "cells")
+    add_option_flag(parser, "grid", "resolution")
     return parser

@@ -12,7 +12,7 @@ import arapfields as af
 from .. import grids
 from . import files
 from .handles import build_handles, read_handles, rotation, triple
-from .options import given_options
+from .options import given, given_options
 from .running import Outputs, with_progress
 
 SOURCES = (*files.MESH_SUFFIXES, *files.STATE_SUFFIXES)
@@ -167,7 +167,7 @@ def _solve(args, solve, seed, needs_handles):
         source = _Source(args)
         if source.mesh is None and "--output" in places:
             raise af.InvalidInput(f"--output: {source.path} holds no mesh to move; use --surface")
-        samples = _samples(source, args.samples, seed, args)
+        samples = _samples(source, given(args, args.verb, "samples"), seed, args)
         points = samples.points
         bounds = np.array([points.min(0), points.max(0)])
         handles = build_handles(described, bounds) if described or needs_handles else []

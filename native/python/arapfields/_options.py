@@ -1,0 +1,14 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The options of every operation: what native/options/options.toml gave when the library was built."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+TABLE: dict[str, Any] = json.loads(Path(__file__).with_name("options.json").read_text(encoding="utf-8"))
+
+
+def options_of(operation: str) -> dict[str, dict[str, Any]]:
+    """Name → declaration (type, default, low, high, sentence, …) of an operation's options, in order."""
+    block = TABLE[operation]
+    return {option["name"]: option for option in (*block["options"], *block["further"])}

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <optional>
+
+#include "core/types.h"
+#include "energies/arap.h"
+#include "energies/distortion.h"
+
+namespace arapfields {
+
+/// What a solve reached, measured at its own samples; energies in the unit cube, lengths in mesh units.
+struct LiveReport {
+  ArapValue arap;
+  double energy = 0.0;  ///< stretch + bending · bend
+  double value = 0.0;   ///< all that is minimised
+  double handle_mean = 0.0, handle_max = 0.0;
+  std::optional<double> preference;  ///< mean g of the deformed normals, where there is a style
+  Distortion distortion;
+  Index iterations = 0, evaluations = 0;
+  bool converged = false;
+  double setup_seconds = 0.0, seconds = 0.0;
+};
+
+}  // namespace arapfields
