@@ -22,7 +22,8 @@ target_include_directories(_native SYSTEM PRIVATE
 cmake_path(GET ARAPFIELDS_BINDING_HEADERS PARENT_PATH include_dir)
 target_compile_options(_native PRIVATE "SHELL:-idirafter \"${include_dir}\"" -Wall -Wextra -fno-gnu-unique -O1)
 target_compile_definitions(_native PRIVATE
-  ARAPFIELDS_VERSION="${PROJECT_VERSION}" EIGEN_DONT_PARALLELIZE EIGEN_MPL2_ONLY)
+  ARAPFIELDS_VERSION="${PROJECT_VERSION}" EIGEN_DONT_PARALLELIZE EIGEN_MPL2_ONLY
+  EIGEN_MAX_ALIGN_BYTES=16)
 target_link_libraries(_native PRIVATE arapfields_built)
 set_target_properties(_native PROPERTIES
   PREFIX "" SUFFIX "" OUTPUT_NAME "${ARAPFIELDS_BINDING_NAME}"

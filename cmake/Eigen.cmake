@@ -12,4 +12,6 @@ endif()
 set(EIGEN_INCLUDE_DIR "${EIGEN_INCLUDE_DIR}" CACHE PATH "folder that holds Eigen/Core")
 add_library(arapfields_eigen INTERFACE)
 target_include_directories(arapfields_eigen SYSTEM INTERFACE "${EIGEN_INCLUDE_DIR}")
-target_compile_definitions(arapfields_eigen INTERFACE EIGEN_DONT_PARALLELIZE EIGEN_MPL2_ONLY)
+# Eigen's alignment decides how matrices are laid out and freed. It is fixed, so that who uses the library may
+# compile for any instruction set.
+target_compile_definitions(arapfields_eigen INTERFACE EIGEN_DONT_PARALLELIZE EIGEN_MPL2_ONLY EIGEN_MAX_ALIGN_BYTES=16)

@@ -27,6 +27,9 @@ Vec3 as_vec3(const py::handle& value, const std::string& argument);
 /// Any real array as (rows, cols) doubles.
 Eigen::MatrixXd as_matrix(const py::handle& value, const std::string& argument);
 
+/// Raises Python's Diverged with the state that was kept as its attribute `last_good`.
+[[noreturn]] void raise_diverged(const Diverged& error, const py::object& last_good);
+
 void bind_core(py::module_& module);
 void bind_options(py::module_& module);
 void bind_mesh(py::module_& module);

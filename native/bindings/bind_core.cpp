@@ -3,7 +3,7 @@
 #include "core/frame.h"
 #include "core/memory.h"
 #include "core/parallel.h"
-#include "core/simd.h"
+#include "core/simd_level.h"
 
 namespace arapfields::python {
 namespace {
@@ -84,6 +84,14 @@ Vec3 as_vec3(const py::handle& value, const std::string& argument) {
   return vector;
 }
 
+void raise_diverged(const Diverged& error, const py::object& last_good) {
+  const py::object type = py::module_::import("arapfields._native").attr("Diverged");
+  const py::object raised = type(error.what());
+  raised.attr("last_good") = last_good;
+  PyErr_SetObject(type.ptr(), raised.ptr());
+  throw py::error_already_set();
+}
+
 void bind_core(py::module_& module) {
   // Python's own exceptions: InvalidInput is a ValueError, so that callers may catch either.
   auto& invalid = py::register_exception<InvalidInput>(module, "InvalidInput", PyExc_ValueError);
@@ -91,7 +99,9 @@ void bind_core(py::module_& module) {
   auto& diverged = py::register_exception<Diverged>(module, "Diverged", PyExc_RuntimeError);
   invalid.attr("__doc__") = "An argument that cannot be used; names it, what was found and what is allowed.";
   cancelled.attr("__doc__") = "Raised in the caller whose Task was cancelled.";
-  diverged.attr("__doc__") = "An optimization left the finite numbers; names the stage and what to change.";
+  diverged.attr("__doc__") =
+      "An optimization met NaN or infinity; names the stage and what to change.\n"
+      "Its attribute last_good is the field, or the fit, before that.";
 
   py::class_<Task>(module, "Task", "Cancels a long call and reads its progress, from any thread.")
       .def(py::init<>())

@@ -1,16 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bindings/bind.h"
+#include "core/implicit.h"
 #include "core/parallel.h"
 #include "extraction/extract_deformed.h"
-#include "neural/neural_sdf.h"
 
 namespace arapfields::python {
 namespace {
-
-Frame frame_of(const ImplicitFunction& sdf) {
-  const auto* network = dynamic_cast<const NeuralSdf*>(&sdf);
-  return network != nullptr ? network->frame() : Frame();
-}
 
 void fill(const py::dict& report, const ExtractionReport& done) {
   report.attr("update")("evaluations"_a = done.evaluations, "dense_evaluations"_a = done.dense_evaluations,
@@ -22,7 +17,7 @@ py::tuple extract(const ImplicitFunction& sdf, int resolution, Task* task, int t
   ExtractionReport done;
   const TriangleMesh mesh = run_long(task, [&](const Progress& progress) {
     const ThreadScope scope(threads);
-    return extract_surface(sdf, frame_of(sdf), resolution, progress, &done);
+    return extract_surface(sdf, resolution, progress, &done);
   });
   if (report) fill(*report, done);
   return py::make_tuple(mesh.vertices, mesh.triangles);
@@ -34,7 +29,7 @@ py::tuple extract_moved(const ImplicitFunction& sdf, const DeformationField& fie
   DeformedReport done;
   const TriangleMesh mesh = run_long(task, [&](const Progress& progress) {
     const ThreadScope scope(threads);
-    return extract_deformed(sdf, frame_of(sdf), field, inverse, resolution, progress, &done);
+    return extract_deformed(sdf, field, inverse, resolution, progress, &done);
   });
   if (report) {
     fill(*report, done);

@@ -5,6 +5,20 @@
 namespace arapfields::python {
 namespace {
 
+const char* stopped_by_name(StopReason reason) {
+  switch (reason) {
+    case StopReason::time_budget:
+      return "time_budget";
+    case StopReason::target:
+      return "target_error";
+    case StopReason::divergence:
+      return "diverged";
+    case StopReason::iterations:
+      break;
+  }
+  return "iterations";
+}
+
 py::object with_report(const FitResult& result) {
   const FitReport& r = result.report;
   py::object sdf = py::cast(result.sdf);
@@ -12,7 +26,7 @@ py::object with_report(const FitResult& result) {
       py::dict("near_mean"_a = r.near_mean, "near_max"_a = r.near_max, "volume_mean"_a = r.volume_mean,
                "volume_max"_a = r.volume_max, "scale"_a = r.scale, "iterations"_a = r.iterations,
                "seconds"_a = r.seconds, "distance_seconds"_a = r.distance_seconds,
-               "stopped_by"_a = r.stopped_by, "device"_a = r.device);
+               "stopped_by"_a = stopped_by_name(r.stopped_by), "device"_a = r.device);
   return sdf;
 }
 
@@ -25,11 +39,7 @@ py::object fit(const py::object& vertices, const py::object& triangles,
       return fit_sdf(v, f, options.value_or(FitOptions()), progress);
     }));
   } catch (const FitDiverged& error) {
-    const py::object type = py::module_::import("arapfields._native").attr("Diverged");
-    const py::object raised = type(error.what());
-    raised.attr("last_good") = with_report(error.last_good);
-    PyErr_SetObject(type.ptr(), raised.ptr());
-    throw py::error_already_set();
+    raise_diverged(error, with_report(error.last_good));
   }
 }
 

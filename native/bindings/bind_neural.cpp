@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bindings/bind.h"
+#include "neural/layers.h"
 #include "neural/neural_sdf.h"
 
 namespace arapfields::python {
@@ -44,8 +45,8 @@ auto naming_file(const py::object& path, Call&& call) {
 
 void save(const py::object& self, const py::object& path) {
   const NeuralSdf& sdf = py::cast<const NeuralSdf&>(self);
-  const MlpShape& shape = sdf.mlp().shape();
-  const Layers layers = layers_of(sdf.mlp());
+  const MlpShape& shape = sdf.shape();
+  const Layers layers = sdf.layers();
   py::list weights, biases;  // single precision holds all there is
   for (const RowMatrix<double>& weight : layers.weights)
     weights.append(RowMatrix<float>(weight.cast<float>()));
@@ -113,6 +114,15 @@ void bind_sdf(py::module_& module) {
             return run_long(nullptr, [&](const Progress&) { return sdf.gradients(p); });
           },
           "points"_a, "Derivatives (p,3) of the distance by the point: about unit length, pointing outwards.")
+      .def_property_readonly(
+          "layers",
+          [](const NeuralSdf& sdf) {
+            const MlpShape& shape = sdf.shape();
+            Layers layers = sdf.layers();
+            return py::make_tuple(layers.weights, layers.biases, shape.octaves, shape.frequency,
+                                  shape.sharpness);
+          },
+          "The network's numbers, as from_layers takes them: weights, biases, octaves, frequency, sharpness.")
       .def_property_readonly("frame", &NeuralSdf::frame, "Mesh coordinates and the unit cube.")
       .def_property_readonly(
           "report", [](const py::object& self) { return py::getattr(self, "_report", py::dict()); },
@@ -124,7 +134,7 @@ void bind_sdf(py::module_& module) {
           "What save() wrote. OSError for a file that cannot be read, InvalidInput naming the file for\n"
           "one that is damaged, foreign, of another kind or version, or holds unusable numbers.")
       .def("__repr__", [](const NeuralSdf& sdf) {
-        const MlpShape& s = sdf.mlp().shape();
+        const MlpShape& s = sdf.shape();
         return py::str("NeuralSdf({} x {}, octaves={}, frequency={:g})")
             .format(s.layers, s.width, s.octaves, s.frequency);
       });
@@ -153,11 +163,10 @@ void bind_testing(py::module_& module) {
          bool double_precision) {
         const Layers layers = as_layers(weights, biases);
         const MlpShape shape = shape_of(layers, octaves, frequency, sharpness);
-        Mlp mlp = make_mlp(layers, shape, double_precision);
         const Points where = as_points(points, "points");
         const JetOrder jet_order = order_of(order);
         const Vector given = cotangents.is_none() ? Vector() : as_vector(cotangents, "cotangents");
-        const JetSweeps sweeps = sweep_jets(mlp, where, jet_order, given);
+        const JetSweeps sweeps = sweep_jets(layers, shape, double_precision, where, jet_order, given);
         return py::make_tuple(as_array(sweeps.jets, {columns(jet_order), where.rows(), shape.outputs}),
                               sweeps.gradient);
       },
@@ -170,8 +179,8 @@ void bind_testing(py::module_& module) {
       [](const py::sequence& weights, const py::sequence& biases, int octaves, const py::object& gradient,
          double learning_rate) {
         const Layers layers = as_layers(weights, biases);
-        Mlp mlp = make_mlp(layers, shape_of(layers, octaves, 1.0, 30.0), true);
-        return step_muon(mlp, as_vector(gradient, "gradient"), learning_rate).weights;
+        const MlpShape shape = shape_of(layers, octaves, 1.0, 30.0);
+        return step_muon(layers, shape, as_vector(gradient, "gradient"), learning_rate).weights;
       },
       "weights"_a, "biases"_a, "octaves"_a, "gradient"_a, "learning_rate"_a,
       "The weights after one step of orthogonalised momentum from rest.");

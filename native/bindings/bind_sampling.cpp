@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bindings/bind.h"
 #include "core/parallel.h"
-#include "neural/neural_sdf.h"
 #include "sampling/sample_surface.h"
 
 namespace arapfields::python {
@@ -9,17 +8,12 @@ namespace {
 
 SurfaceSamples sample(const std::shared_ptr<ImplicitFunction>& sdf, int count, std::int64_t seed, Task* task,
                       int threads, const std::optional<py::dict>& report) {
-  const auto* network = dynamic_cast<const NeuralSdf*>(sdf.get());
-  const Frame frame = network != nullptr ? network->frame() : Frame();
   SampleReport done;
   SurfaceSamples samples = run_long(task, [&](const Progress& progress) {
     const ThreadScope scope(threads);
-    return sample_surface(*sdf, frame, {.count = count, .seed = seed}, progress, &done);
+    return sample_surface(std::shared_ptr<const ImplicitFunction>(sdf), {.count = count, .seed = seed},
+                          progress, &done);
   });
-  samples.redraw = [sdf, frame](Index again, std::uint64_t other) {
-    return sample_surface(*sdf, frame,
-                          {.count = static_cast<int>(again), .seed = static_cast<std::int64_t>(other >> 11)});
-  };
   if (report)
     report->attr("update")(
         "lines"_a = done.lines, "evaluations"_a = done.value_evaluations + done.gradient_evaluations,

@@ -3,8 +3,8 @@
 #include "core/device.h"
 #include "energies/styles.h"
 #include "solve/deform.h"
+#include "solve/field_measures.h"
 #include "solve/inverse_training.h"
-#include "solve/setup.h"
 #include "solve/stylize.h"
 
 namespace arapfields::python {
@@ -25,8 +25,8 @@ py::dict report_dict(const SolveReport& report, double scale) {
       "handles"_a = py::list(), "min_determinant"_a = report.distortion.min_determinant,
       "flipped_share"_a = report.distortion.flipped_share, "max_stretch"_a = report.distortion.max_stretch,
       "min_stretch"_a = report.distortion.min_stretch, "iterations"_a = report.loop.iterations,
-      "seconds"_a = report.loop.seconds, "out_of_time"_a = report.loop.out_of_time, "scale"_a = scale,
-      "loss"_a = py::list(), "notes"_a = report.notes);
+      "seconds"_a = report.loop.seconds, "out_of_time"_a = report.loop.stopped_by == StopReason::time_budget,
+      "scale"_a = scale, "loss"_a = py::list(), "notes"_a = report.notes);
   for (const auto& [iteration, loss] : report.loop.history)
     py::list(result["loss"]).append(py::cast(std::vector<double>{static_cast<double>(iteration), loss}));
   for (std::size_t i = 0; i < report.handle_mean.size(); ++i)
@@ -42,17 +42,13 @@ py::object wrap(const Solution& solution) {
   return field;
 }
 
-/// Runs a solver without the GIL; a divergence reaches Python with the last good field as its `field`.
+/// Runs a solver without the GIL; a divergence reaches Python with the last good field.
 template <class Solve>
 py::object solve(Task* task, Solve&& call) {
   try {
     return wrap(run_long(task, call));
   } catch (const SolveDiverged& error) {
-    const py::object type = py::module_::import("arapfields._native").attr("Diverged");
-    py::object raised = type(error.what());
-    raised.attr("field") = wrap(error.last_good);
-    PyErr_SetObject(type.ptr(), raised.ptr());
-    throw py::error_already_set();
+    raise_diverged(error, wrap(error.last_good));
   }
 }
 
@@ -68,17 +64,13 @@ Points preferred_from(const py::object& style, const py::object& orientation) {
 }
 
 /// What the field does at points of mesh coordinates.
-SolveReport measure_at(const DeformationField& field, const py::object& points) {
-  SurfaceSamples samples;
-  samples.frame = field.frame();
-  samples.points = field.frame().to_cube(as_points(points, "points"));
-  require_samples(samples);
-  return run_long(nullptr,
-                  [&](const Progress&) { return measure(field, samples, ObjectiveTerms(), samples.size()); });
+FieldMeasures measures(const DeformationField& field, const py::object& points) {
+  const Points where = as_points(points, "points");
+  return run_long(nullptr, [&](const Progress&) { return measure_at(field, where); });
 }
 
 py::tuple energy_of(const DeformationField& field, const py::object& points) {
-  const ArapValue value = measure_at(field, points).arap;
+  const ArapValue value = measures(field, points).arap;
   return py::make_tuple(value.stretch, value.bend);
 }
 
@@ -98,7 +90,7 @@ void bind_solve(py::module_& module) {
       "handle_weight · mean squared handle distance (section 4 of As-Rigid-As-Possible Regularization for\n"
       "Implicit Surfaces, with the stretch as printed there; the authors' package divides it by 3).\n"
       "field.report holds energies, handle errors, the smallest det J, times and the loss history.\n"
-      "Raises InvalidInput, Cancelled, and Diverged, whose attribute `field` is the last good state.");
+      "Raises InvalidInput, Cancelled, and Diverged, whose attribute `last_good` is the field before that.");
   module.def(
       "stylize",
       [](const SurfaceSamples& samples, const py::object& normals, const StylizeOptions& options, Task* task,
@@ -143,7 +135,7 @@ void bind_solve(py::module_& module) {
   module.def(
       "distortion",
       [](const DeformationField& field, const py::object& points) {
-        return measure_at(field, points).distortion;
+        return measures(field, points).distortion;
       },
       "field"_a, "points"_a,
       "The Distortion at points (p, 3) of the rest surface, for instance the vertices of extract_surface:\n"

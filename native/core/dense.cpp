@@ -1,27 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/dense.h"
 
-#include <ATen/ATen.h>
 #include <ATen/core/LegacyTypeDispatch.h>
 
 #include <algorithm>
 
 #include "core/errors.h"
 #include "core/parallel.h"
+#include "core/tensors.h"
 
 namespace arapfields {
 namespace {
-
-template <class Scalar>
-at::Tensor view(const Scalar* data, Index rows, Index cols, Index stride) {
-  return at::from_blob(const_cast<Scalar*>(data), {rows, cols}, {stride, 1},
-                       c10::CppTypeToScalarType<Scalar>::value);
-}
-
-template <class Scalar>
-at::Tensor view(const Eigen::Ref<const RowMatrix<Scalar>>& m) {
-  return view(m.data(), m.rows(), m.cols(), m.outerStride());
-}
 
 /// A dimension in tiles of about equal length. Products of tiles run side by side, on one thread each; the
 /// tiles, and so the results, do not depend on the number of threads.
@@ -46,10 +35,10 @@ void gemm(Transpose transpose_a, Transpose transpose_b, Scalar alpha,
           const Eigen::Ref<const RowMatrix<Scalar>>& a, const Eigen::Ref<const RowMatrix<Scalar>>& b,
           Scalar beta, Eigen::Ref<RowMatrix<Scalar>> c) {
   const ThreadScope scope;
-  at::Tensor ta = view<Scalar>(a), tb = view<Scalar>(b);
+  at::Tensor ta = tensor_view(a), tb = tensor_view(b);
   if (transpose_a == Transpose::yes) ta = ta.t();
   if (transpose_b == Transpose::yes) tb = tb.t();
-  const at::Tensor tc = view(c.data(), c.rows(), c.cols(), c.outerStride());
+  const at::Tensor tc = tensor_view(c);
   const Tiles rows(c.rows()), columns(c.cols());
   parallel_jobs(rows.count() * columns.count(), [&](Index job) {
     const at::AutoDispatchBelowADInplaceOrView quick;
@@ -65,7 +54,7 @@ template <class Scalar>
 RowMatrix<Scalar> cholesky(const Eigen::Ref<const RowMatrix<Scalar>>& a) {
   const ThreadScope scope;
   RowMatrix<Scalar> result = a.template triangularView<Eigen::Lower>();
-  const at::Tensor l = view(result.data(), result.rows(), result.cols(), result.cols());
+  const at::Tensor l = tensor_view(result);
   const Tiles tiles(result.rows());
   const auto tile = [&](Index i, Index j) { return tiles.of(tiles.of(l, 0, i), 1, j); };
   for (Index k = 0; k < tiles.count(); ++k) {
@@ -94,9 +83,9 @@ RowMatrix<Scalar> cholesky(const Eigen::Ref<const RowMatrix<Scalar>>& a) {
 template <class Scalar>
 RowMatrix<Scalar> lower_inverse(const Eigen::Ref<const RowMatrix<Scalar>>& factor) {
   const ThreadScope scope;
-  const at::Tensor l = view<Scalar>(factor);
+  const at::Tensor l = tensor_view(factor);
   RowMatrix<Scalar> result = RowMatrix<Scalar>::Zero(factor.rows(), factor.cols());
-  const at::Tensor x = view(result.data(), result.rows(), result.cols(), result.cols());
+  const at::Tensor x = tensor_view(result);
   const Tiles tiles(result.rows());
   const auto tile = [&](const at::Tensor& of, Index i, Index j) {
     return tiles.of(tiles.of(of, 0, i), 1, j);
@@ -122,8 +111,7 @@ RowMatrix<Scalar> cholesky_solve(const Eigen::Ref<const RowMatrix<Scalar>>& fact
                                  const Eigen::Ref<const RowMatrix<Scalar>>& b) {
   const ThreadScope scope;
   RowMatrix<Scalar> result(b.rows(), b.cols());
-  view(result.data(), result.rows(), result.cols(), result.cols())
-      .copy_(at::cholesky_solve(view<Scalar>(b), view<Scalar>(factor)));
+  tensor_view(result).copy_(at::cholesky_solve(tensor_view(b), tensor_view(factor)));
   return result;
 }
 

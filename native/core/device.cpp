@@ -4,21 +4,9 @@
 #include <ATen/ATen.h>
 #include <ATen/Context.h>
 
-#include <atomic>
-
 #include "core/errors.h"
 
 namespace arapfields {
-namespace {
-
-std::atomic<int> scopes{0};
-
-}  // namespace
-
-bool on_aten_path(const at::Tensor& tensor) { return !tensor.is_cpu() || scopes.load() > 0; }
-
-AtenPathScope::AtenPathScope() { ++scopes; }
-AtenPathScope::~AtenPathScope() { --scopes; }
 
 std::string device_report() {
   if (at::hasCUDA()) return "a CUDA device was found";
@@ -34,11 +22,6 @@ std::string resolve_device(const std::string& device) {
           "'auto', 'cpu' or 'cuda' is allowed");
   require(device == "cpu" || cuda, "device", "'" + device + "'", device_report());
   return device;
-}
-
-at::Tensor upload(const at::Tensor& host, const at::Tensor& beside) {
-  if (beside.is_cpu()) return host.clone(at::MemoryFormat::Contiguous);
-  return host.pin_memory().to(beside.device(), true);
 }
 
 }  // namespace arapfields

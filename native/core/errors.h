@@ -4,11 +4,13 @@
 #include <stdexcept>
 #include <string>
 
+#include "core/export.h"
+
 namespace arapfields {
 
 /// An argument that cannot be used. The text names the argument, what was found and what is allowed.
 /// Python sees arapfields.InvalidInput, a ValueError.
-class InvalidInput : public std::invalid_argument {
+class ARAPFIELDS_EXPORT InvalidInput : public std::invalid_argument {
  public:
   explicit InvalidInput(const std::string& what) : std::invalid_argument(what) {}
   InvalidInput(const std::string& argument, const std::string& found, const std::string& allowed)
@@ -16,13 +18,13 @@ class InvalidInput : public std::invalid_argument {
 };
 
 /// The caller's Task was cancelled. Python sees arapfields.Cancelled.
-class Cancelled : public std::runtime_error {
+class ARAPFIELDS_EXPORT Cancelled : public std::runtime_error {
  public:
   Cancelled() : std::runtime_error("cancelled") {}
 };
 
-/// An optimization left the finite numbers and could not go on. Python sees arapfields.Diverged.
-class Diverged : public std::runtime_error {
+/// An optimization met NaN or infinity and could not go on. Python sees arapfields.Diverged.
+class ARAPFIELDS_EXPORT Diverged : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
@@ -34,12 +36,12 @@ inline void require(bool holds, const std::string& argument, const std::string& 
 }
 
 /// A number as these texts show it: six digits.
-std::string number_text(double value);
+ARAPFIELDS_EXPORT std::string number_text(double value);
 /// Throws InvalidInput unless the value is finite and within [low, high].
-void require_range(const std::string& argument, double value, double low, double high);
+ARAPFIELDS_EXPORT void require_range(const std::string& argument, double value, double low, double high);
 /// Throws InvalidInput unless the value is finite and above 0.
-void require_positive(const std::string& argument, double value);
+ARAPFIELDS_EXPORT void require_positive(const std::string& argument, double value);
 /// Throws InvalidInput unless the value is finite and 0 or more.
-void require_not_negative(const std::string& argument, double value);
+ARAPFIELDS_EXPORT void require_not_negative(const std::string& argument, double value);
 
 }  // namespace arapfields

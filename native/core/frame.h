@@ -6,7 +6,7 @@
 namespace arapfields {
 
 /// Mesh coordinates ↔ the unit cube [-1,1]³ in which networks live: x_cube = (x_mesh − center) / scale.
-struct Frame {
+struct ARAPFIELDS_EXPORT Frame {
   Vec3 center = Vec3::Zero();
   double scale = 1.0;
 

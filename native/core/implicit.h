@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "core/frame.h"
 #include "core/types.h"
 
 namespace arapfields {
@@ -8,7 +9,7 @@ namespace arapfields {
 /// A function Φ on the unit cube [-1,1]³ whose zero set is a surface: negative inside. Sampling and
 /// extraction know no more than this; a neural SDF is one, analytic shapes in tests are others.
 /// Both calls are batched and parallel, and may be made from one thread at a time for each object.
-class ImplicitFunction {
+class ARAPFIELDS_EXPORT ImplicitFunction {
  public:
   virtual ~ImplicitFunction() = default;
   /// values (n) at points (n,3) in cube coordinates.
@@ -16,6 +17,8 @@ class ImplicitFunction {
   /// The same with ∂Φ/∂x (n,3).
   virtual void evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> values,
                         Eigen::Ref<PointsF> gradients) const = 0;
+  /// Where the cube lies in mesh coordinates; sampling and extraction answer in these.
+  virtual Frame frame() const { return {}; }
 };
 
 }  // namespace arapfields

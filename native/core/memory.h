@@ -3,14 +3,16 @@
 
 #include <string>
 
+#include "core/export.h"
+
 namespace arapfields {
 
 /// Bytes that this process can still get: what the system has to spare, and what its control group allows.
 /// Infinity where the system does not say.
-double available_memory();
+ARAPFIELDS_EXPORT double available_memory();
 
 /// Throws InvalidInput before `bytes` are asked for that the machine does not have, rather than be killed
 /// halfway. `argument` is what to make smaller.
-void require_memory(const std::string& argument, double bytes);
+ARAPFIELDS_EXPORT void require_memory(const std::string& argument, double bytes);
 
 }  // namespace arapfields

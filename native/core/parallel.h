@@ -14,18 +14,18 @@ namespace arapfields {
 /// and the grain alone, not on the number of threads. Loops within `body` stay on their thread, as do
 /// libtorch's functions. After an exception in `body` no chunk is begun, and the caller gets it (one, where
 /// there are more).
-void parallel_for(Index begin, Index end, Index grain, const std::function<void(Index, Index)>& body);
+ARAPFIELDS_EXPORT void parallel_for(Index begin, Index end, Index grain, const std::function<void(Index, Index)>& body);
 
 /// The same for jobs 0 to count−1, one by one: for jobs of unequal length.
-void parallel_jobs(Index count, const std::function<void(Index)>& body);
+ARAPFIELDS_EXPORT void parallel_jobs(Index count, const std::function<void(Index)>& body);
 /// body(job, slot): jobs that run at the same time have different slots, which are below thread_count().
-void parallel_jobs_in_slots(Index count, const std::function<void(Index, Index)>& body);
+ARAPFIELDS_EXPORT void parallel_jobs_in_slots(Index count, const std::function<void(Index, Index)>& body);
 
 /// Gives the calling thread's loops a number of threads while it lives, and keeps libtorch's own threads out;
 /// 0 keeps the number that is in force. No other thread and no later call sees any of it. More threads than
 /// the pool may have (256), or than the system grants, are done without: results do not depend on their
 /// number.
-class ThreadScope {
+class ARAPFIELDS_EXPORT ThreadScope {
  public:
   explicit ThreadScope(int threads = 0);
   ~ThreadScope();
@@ -39,6 +39,6 @@ class ThreadScope {
 
 /// The threads that a loop here would be split over: those of the innermost ThreadScope, else as many as
 /// libtorch would use; 1 within a loop's body.
-int thread_count();
+ARAPFIELDS_EXPORT int thread_count();
 
 }  // namespace arapfields

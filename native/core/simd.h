@@ -1,17 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-namespace arapfields {
-
-/// Instruction sets for which kernels are compiled (SIMD sources of CMake). A kernel file defines its
-/// functions in the namespace arapfields::SIMD_LEVEL; a plain source picks one by simd_level().
-enum class SimdLevel { baseline, avx2, avx512 };
-
-/// The best level of this processor; ARAPFIELDS_SIMD=baseline|avx2|avx512 in the environment lowers it.
-SimdLevel simd_level();
-const char* simd_level_name();
-
-}  // namespace arapfields
+#include "core/simd_level.h"
 
 /// Calls function(...) in the namespace of the level at hand.
 #if defined(__x86_64__) || defined(_M_X64)

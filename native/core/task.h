@@ -12,7 +12,7 @@
 namespace arapfields {
 
 /// What a caller holds while a long call runs: it may cancel, and it may read progress, from any thread.
-class Task {
+class ARAPFIELDS_EXPORT Task {
  public:
   void cancel() { cancelled_.store(true, std::memory_order_relaxed); }
   bool cancelled() const { return cancelled_.load(std::memory_order_relaxed); }
@@ -45,7 +45,7 @@ class Task {
 
 /// A stage's share of a Task's progress; what native functions take. Without a Task it does nothing.
 /// Call check() at least every 50 ms of work so that a cancel takes effect within 0.2 s.
-class Progress {
+class ARAPFIELDS_EXPORT Progress {
  public:
   /// Asked at each look at the task, on the thread that looks: true cancels the task.
   using Interruption = std::function<bool()>;

@@ -4,6 +4,11 @@
 #include <Eigen/Core>
 #include <cstdint>
 
+#include "core/export.h"
+
+// Part of the binary interface: it decides how matrices are laid out, and who may free them.
+static_assert(EIGEN_MAX_ALIGN_BYTES == 16, "define EIGEN_MAX_ALIGN_BYTES=16, as the CMake package does");
+
 namespace arapfields {
 
 using Index = std::int64_t;

@@ -14,7 +14,7 @@ constexpr int few_bins = 8;  // for ranges with few primitives, where a sweep co
 constexpr Index many_primitives = 128;
 
 struct Bin {
-  Box box;
+  PrimitiveBox box;
   Index count = 0;
   void add(const Bin& other) {
     box.grow(other.box);
@@ -36,7 +36,7 @@ struct Binning {
   Eigen::Array4f origin, factor;
   int count;
 
-  Binning(const Box& centres, Index primitives)
+  Binning(const PrimitiveBox& centres, Index primitives)
       : origin(centres.low), count(primitives < many_primitives ? few_bins : most_bins) {
     const Eigen::Array4f extent = centres.high - centres.low;
     factor.setZero();
@@ -69,8 +69,8 @@ Plane best_plane(const Bins& bins, const Binning& binning) {
   return best;
 }
 
-Box bounds(const std::vector<Primitive>& primitives, Index begin, Index end) {
-  Box box;
+PrimitiveBox bounds(const std::vector<Primitive>& primitives, Index begin, Index end) {
+  PrimitiveBox box;
   for (Index i = begin; i < end; ++i) box.grow(primitives[static_cast<std::size_t>(i)].box);
   return box;
 }
@@ -80,7 +80,7 @@ Box bounds(const std::vector<Primitive>& primitives, Index begin, Index end) {
 std::pair<PrimitiveRange, PrimitiveRange> split(std::vector<Primitive>& primitives,
                                                 const PrimitiveRange& range) {
   const auto first = primitives.begin() + range.begin, last = primitives.begin() + range.end;
-  Box centres;
+  PrimitiveBox centres;
   for (auto p = first; p != last; ++p) {
     const Eigen::Array4f doubled = p->box.low + p->box.high;
     centres.low = centres.low.min(doubled);

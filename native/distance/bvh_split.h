@@ -10,10 +10,10 @@
 namespace arapfields {
 
 /// An axis-aligned box in the first three of four lanes; the last is idle.
-struct Box {
+struct PrimitiveBox {
   Eigen::Array4f low = Eigen::Array4f::Constant(3e38f);
   Eigen::Array4f high = Eigen::Array4f::Constant(-3e38f);
-  void grow(const Box& other) {
+  void grow(const PrimitiveBox& other) {
     low = low.min(other.low);
     high = high.max(other.high);
   }
@@ -25,7 +25,7 @@ struct Box {
 
 /// A triangle while the hierarchy is being built: its box, rounded outwards.
 struct Primitive {
-  Box box;
+  PrimitiveBox box;
   std::int32_t triangle;
 };
 
@@ -33,7 +33,7 @@ struct Primitive {
 struct PrimitiveRange {
   Index begin = 0, end = 0;
   int level = 0;
-  Box box;
+  PrimitiveBox box;
   Index size() const { return end - begin; }
 };
 

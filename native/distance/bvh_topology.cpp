@@ -13,10 +13,10 @@ namespace {
 constexpr Index grain = 4096;
 
 /// A box that holds the triangle with certainty: single precision, moved outwards by more than its rounding.
-Box outer_box(const Points& vertices, TrianglesIn triangles, Index t) {
+PrimitiveBox outer_box(const Points& vertices, TrianglesIn triangles, Index t) {
   const Vec3 a = vertices.row(triangles(t, 0)), b = vertices.row(triangles(t, 1));
   const Vec3 c = vertices.row(triangles(t, 2));
-  Box box;
+  PrimitiveBox box;
   box.low.head<3>() = a.cwiseMin(b).cwiseMin(c).cast<float>();
   box.high.head<3>() = a.cwiseMax(b).cwiseMax(c).cast<float>();
   box.low[3] = box.high[3] = 0.0f;

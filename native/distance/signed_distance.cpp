@@ -57,7 +57,7 @@ template <class Body>
 void for_blocks(PointsIn points, const Hierarchy& hierarchy, const Progress& progress, const Body& body) {
   std::atomic<Index> done{0};
   for (Index first = 0; first < points.rows(); first += sorted_points) {
-    const Index count = std::min(sorted_points, points.rows() - first);
+    const Index count = std::min<Index>(sorted_points, points.rows() - first);
     const std::vector<std::uint32_t> order = morton_order(points.middleRows(first, count));
     parallel_jobs((count + block_size - 1) / block_size, [&](Index job) {
       progress.check();

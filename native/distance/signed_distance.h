@@ -20,7 +20,7 @@ struct ClosestPoints {
 /// Magnitudes are exact to rounding (float64). A point is inside, and its distance negative, where the
 /// winding number exceeds 1/2, as in Jacobson et al. 2013, "Robust Inside-Outside Segmentation using
 /// Generalized Winding Numbers"; for that the soup may be open, self-intersecting and partly degenerate.
-class SignedDistance {
+class ARAPFIELDS_EXPORT SignedDistance {
  public:
   /// Builds the hierarchy; throws InvalidInput as validate(vertices, triangles) does. `progress` is only
   /// asked whether to stop.
@@ -47,7 +47,7 @@ class SignedDistance {
 };
 
 /// The same for one use: (p) distances of points (p,3). `threads` 0 uses all that are in force.
-Vector signed_distance(PointsIn vertices, TrianglesIn triangles, PointsIn points, int threads = 0,
-                       const Progress& progress = {});
+ARAPFIELDS_EXPORT Vector signed_distance(PointsIn vertices, TrianglesIn triangles, PointsIn points,
+                                         int threads = 0, const Progress& progress = {});
 
 }  // namespace arapfields

@@ -18,6 +18,7 @@ struct ArapValue {
 /// that reflected and collapsed Jacobians have finite values and cotangents. The paper's stretch is meant:
 /// the authors' package divides it by 3.
 template <class Scalar>
-ArapValue arap_energy(JetView<const Scalar> jets, double bending, double weight, JetView<Scalar> cotangents);
+ARAPFIELDS_EXPORT ArapValue arap_energy(JetView<const Scalar> jets, double bending, double weight,
+                                        JetView<Scalar> cotangents);
 
 }  // namespace arapfields

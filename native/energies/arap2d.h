@@ -8,7 +8,7 @@ namespace arapfields {
 
 /// The rotation of the plane closest to J: the angle atan2(J21 − J12, J11 + J22); the identity where both are
 /// 0.
-Mat2 closest_rotation2(const Mat2& jacobian);
+ARAPFIELDS_EXPORT Mat2 closest_rotation2(const Mat2& jacobian);
 
 /// The as-rigid-as-possible energy of a map of the plane. With R the rotation closest to J, t = tr(RᵀJ) the
 /// sum of J's signed singular values, E the quarter turn and D_k = ∂_k J, the rotation's angle turns at ∂_k θ
@@ -16,7 +16,7 @@ Mat2 closest_rotation2(const Mat2& jacobian);
 /// the extrusion (x, y, z) → (f(x, y), z). t is kept above 0.01 in the bend. Adds the cotangents of
 /// weight·(stretch + bending·bend) to `cotangents` (its data may be null: values alone).
 template <class Scalar>
-ArapValue arap_energy2(JetView2<const Scalar> jets, double bending, double weight,
-                       JetView2<Scalar> cotangents);
+ARAPFIELDS_EXPORT ArapValue arap_energy2(JetView2<const Scalar> jets, double bending, double weight,
+                                         JetView2<Scalar> cotangents);
 
 }  // namespace arapfields

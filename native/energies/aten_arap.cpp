@@ -3,8 +3,8 @@
 
 #include <array>
 
-#include "core/device.h"
 #include "core/jets.h"
+#include "core/tensors.h"
 #include "energies/aten_energies.h"
 
 namespace arapfields {

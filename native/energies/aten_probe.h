@@ -9,15 +9,18 @@
 namespace arapfields {
 
 template <class Scalar>
-ArapValue probe_arap(JetView<const Scalar> jets, double bending, double weight, JetView<Scalar> cotangents);
+ARAPFIELDS_EXPORT_TO_TESTS ArapValue probe_arap(JetView<const Scalar> jets, double bending, double weight,
+                                                JetView<Scalar> cotangents);
 template <class Scalar>
-double probe_gauss(JetView<const Scalar> jets, ConstPointsRef<Scalar> normals,
-                   const Eigen::Ref<const Eigen::VectorX<Scalar>>& sample_weights,
-                   const GaussPreference& preference, double weight, JetView<Scalar> cotangents);
+ARAPFIELDS_EXPORT_TO_TESTS double probe_gauss(JetView<const Scalar> jets, ConstPointsRef<Scalar> normals,
+                                              const Eigen::Ref<const Eigen::VectorX<Scalar>>& sample_weights,
+                                              const GaussPreference& preference, double weight,
+                                              JetView<Scalar> cotangents);
 template <class Scalar>
-double probe_barrier(JetView<const Scalar> jets, double threshold, double weight, JetView<Scalar> cotangents);
+ARAPFIELDS_EXPORT_TO_TESTS double probe_barrier(JetView<const Scalar> jets, double threshold, double weight,
+                                                JetView<Scalar> cotangents);
 template <class Scalar>
-double probe_handles(JetView<const Scalar> jets, const HandleBatch<Scalar>& batch, double weight,
-                     JetView<Scalar> cotangents);
+ARAPFIELDS_EXPORT_TO_TESTS double probe_handles(JetView<const Scalar> jets, const HandleBatch<Scalar>& batch,
+                                                double weight, JetView<Scalar> cotangents);
 
 }  // namespace arapfields

@@ -15,11 +15,12 @@ struct Distortion {
 
 /// Jets of at least first order; no points: the identity's measures.
 template <class Scalar>
-Distortion distortion(JetView<const Scalar> jets);
+ARAPFIELDS_EXPORT Distortion distortion(JetView<const Scalar> jets);
 
 /// A barrier against folds: mean of max(0, 1 − det J/threshold)², 0 where det J ≥ threshold > 0. Adds weight
 /// times its cotangents (data may be null).
 template <class Scalar>
-double fold_barrier(JetView<const Scalar> jets, double threshold, double weight, JetView<Scalar> cotangents);
+ARAPFIELDS_EXPORT double fold_barrier(JetView<const Scalar> jets, double threshold, double weight,
+                                      JetView<Scalar> cotangents);
 
 }  // namespace arapfields

@@ -10,7 +10,7 @@
 namespace arapfields {
 
 /// A part of the surface that is asked to follow a rigid motion.
-struct Handle {
+struct ARAPFIELDS_EXPORT Handle {
   enum class Kind {
     cuboid,  ///< the samples inside the box that `rest` makes of [-1,1]³
     point,   ///< one material point, no sample needed
@@ -41,7 +41,7 @@ struct HandleBatch {
 
 /// Handles with their sample members, sources and targets computed once. All in cube coordinates.
 /// The loss is the mean over the handles of weight × mean over the handle's pairs of ‖f(x) − C x‖².
-class BoundHandles {
+class ARAPFIELDS_EXPORT BoundHandles {
  public:
   BoundHandles() = default;
   /// Throws InvalidInput that names the handle which is invalid or holds no sample.
@@ -78,8 +78,8 @@ class BoundHandles {
 /// Value of the batch's loss for jets at batch.sources; adds weight times its cotangents on the value column
 /// (data may be null).
 template <class Scalar>
-double handle_energy(JetView<const Scalar> jets, const HandleBatch<Scalar>& batch, double weight,
-                     JetView<Scalar> cotangents);
+ARAPFIELDS_EXPORT double handle_energy(JetView<const Scalar> jets, const HandleBatch<Scalar>& batch,
+                                       double weight, JetView<Scalar> cotangents);
 
 struct HandleError {
   double mean = 0.0;  ///< mean over handles of the mean distance ‖f(x) − C x‖
@@ -87,6 +87,6 @@ struct HandleError {
 };
 
 /// For the field's values (rows) at handles.sources().
-HandleError handle_error(const BoundHandles& handles, PointsIn values);
+ARAPFIELDS_EXPORT HandleError handle_error(const BoundHandles& handles, PointsIn values);
 
 }  // namespace arapfields

@@ -9,10 +9,10 @@
 namespace arapfields {
 
 /// Names that preferred_normals knows, in the order in which a menu should show them.
-std::vector<std::string> style_names();
+ARAPFIELDS_EXPORT std::vector<std::string> style_names();
 
 /// Unit face normals (k,3) of the named solid; z is its axis where it has one. Curved sides of the cylinder
 /// and the cone are rings of 32. Throws InvalidInput that lists the names.
-Points preferred_normals(const std::string& name);
+ARAPFIELDS_EXPORT Points preferred_normals(const std::string& name);
 
 }  // namespace arapfields

@@ -11,12 +11,12 @@ namespace arapfields {
 /// An implicit function from any batched call, for instance a signed distance at the inverse images of a
 /// deformation. Gradients are central differences, exact to about 1e-3 for values in single precision: enough
 /// for the bound on |∇Φ| by which extraction leaves out empty space.
-class BatchFunction final : public ImplicitFunction {
+class ARAPFIELDS_EXPORT BatchFunction final : public ImplicitFunction {
  public:
   /// Writes the values (n) at points (n,3) in cube coordinates; must be finite, and defined up to 1e-3
   /// outside the cube.
   using Call = std::function<void(ConstPointsRef<float> points, Eigen::Ref<VectorF> values)>;
-  explicit BatchFunction(Call call) : call_(std::move(call)) {}
+  explicit BatchFunction(Call call, const Frame& frame = {}) : call_(std::move(call)), frame_(frame) {}
 
   void evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> values) const override {
     call_(points, values);
@@ -36,8 +36,11 @@ class BatchFunction final : public ImplicitFunction {
     }
   }
 
+  Frame frame() const override { return frame_; }
+
  private:
   Call call_;
+  Frame frame_;
 };
 
 }  // namespace arapfields

@@ -94,13 +94,13 @@ void DeformedFunction::evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF
       found.push_back(static_cast<Index>(k));
       rows.push_back(near[k]);
     }
-  const PointsF at = shape_.rest_frame.to_cube(rest(found, Eigen::all)).cast<float>();
+  const PointsF at = shape_.rest.frame().to_cube(rest(found, Eigen::all)).cast<float>();
   VectorF phi(at.rows());
   shape_.rest.evaluate(at, phi);
   Vector exact = distances;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     double& value = exact[rows[k]];
-    value = static_cast<double>(phi[static_cast<Index>(k)]) * shape_.rest_frame.scale;
+    value = static_cast<double>(phi[static_cast<Index>(k)]) * shape_.rest.frame().scale;
     if (value > 0.0 && distances[rows[k]] < 0.0) doubtful.push_back(rows[k]);
   }
   const std::vector<bool> inside = covered(mesh(doubtful, Eigen::all));

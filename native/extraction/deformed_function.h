@@ -15,7 +15,6 @@ namespace arapfields {
 /// A rest surface {Φ = 0}, its deformation f, and a mesh of the deformed surface.
 struct DeformedShape {
   const ImplicitFunction& rest;
-  Frame rest_frame;
   const DeformationField& field;
   const DeformationField* inverse = nullptr;  ///< a trained one, in its own frame; null: Newton's method
   const TriangleMesh& mesh;                   ///< of the rest surface, mesh coordinates
@@ -34,6 +33,7 @@ class DeformedFunction final : public ImplicitFunction {
   void evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> values) const override;
   void evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> values,
                 Eigen::Ref<PointsF> gradients) const override;
+  Frame frame() const override { return frame_; }
 
   Index inverted() const { return inverted_; }
   Index failures() const { return failures_; }

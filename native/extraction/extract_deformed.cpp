@@ -15,19 +15,18 @@ constexpr double share_at_rest = 0.15;  // of the work
 
 }  // namespace
 
-TriangleMesh extract_deformed(const ImplicitFunction& rest, const Frame& rest_frame,
-                              const DeformationField& field, const DeformationField* inverse, int resolution,
-                              const Progress& progress, DeformedReport* report) {
+TriangleMesh extract_deformed(const ImplicitFunction& rest, const DeformationField& field,
+                              const DeformationField* inverse, int resolution, const Progress& progress,
+                              DeformedReport* report) {
   ExtractionOptions{.resolution = resolution}.validate();
-  const TriangleMesh mesh = extract_surface(rest, rest_frame, resolution, progress.part(0.0, share_at_rest));
+  const TriangleMesh mesh = extract_surface(rest, resolution, progress.part(0.0, share_at_rest));
   Points moved = values_at(field, field.frame().to_cube(mesh.vertices), progress);
   require(moved.allFinite(), "field", "its values are NaN or infinite on the surface",
           "a finite deformation is needed");
   moved = field.frame().to_mesh(moved);
   const Frame frame = Frame::around(moved, half_extent);
-  const double spacing = 2.0 / (resolution - 1) * std::max(frame.scale, rest_frame.scale);
+  const double spacing = 2.0 / (resolution - 1) * std::max(frame.scale, rest.frame().scale);
   const DeformedShape shape{.rest = rest,
-                            .rest_frame = rest_frame,
                             .field = field,
                             .inverse = inverse,
                             .mesh = mesh,
@@ -36,8 +35,7 @@ TriangleMesh extract_deformed(const ImplicitFunction& rest, const Frame& rest_fr
   progress.report(share_at_rest, "inverting the field");
   const DeformedFunction function(shape, frame, progress);
   ExtractionReport done;
-  TriangleMesh result =
-      extract_surface(function, frame, resolution, progress.part(share_at_rest, 1.0), &done);
+  TriangleMesh result = extract_surface(function, resolution, progress.part(share_at_rest, 1.0), &done);
   if (report != nullptr) {
     static_cast<ExtractionReport&>(*report) = done;
     report->inverted = function.inverted();

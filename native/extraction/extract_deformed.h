@@ -17,9 +17,10 @@ struct DeformedReport : ExtractionReport {
 /// surface. f⁻¹ is Newton's method, or `inverse` where it is not null (a trained one). It is evaluated near
 /// the deformed surface alone, known from a mesh that is extracted at rest and moved (see DeformedFunction).
 /// Throws InvalidInput as extract_surface does, and where the field is not finite.
-TriangleMesh extract_deformed(const ImplicitFunction& rest, const Frame& rest_frame,
-                              const DeformationField& field, const DeformationField* inverse,
-                              int resolution = ExtractionOptions().resolution, const Progress& progress = {},
-                              DeformedReport* report = nullptr);
+ARAPFIELDS_EXPORT TriangleMesh extract_deformed(const ImplicitFunction& rest, const DeformationField& field,
+                                                const DeformationField* inverse = nullptr,
+                                                int resolution = ExtractionOptions().resolution,
+                                                const Progress& progress = {},
+                                                DeformedReport* report = nullptr);
 
 }  // namespace arapfields

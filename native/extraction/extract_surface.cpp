@@ -15,8 +15,8 @@ constexpr int grid_steps_a_cell = 4;
 
 }  // namespace
 
-TriangleMesh extract_surface(const ImplicitFunction& implicit, const Frame& frame, int resolution,
-                             const Progress& progress, ExtractionReport* report) {
+TriangleMesh extract_surface(const ImplicitFunction& implicit, int resolution, const Progress& progress,
+                             ExtractionReport* report) {
   ExtractionOptions{.resolution = resolution}.validate();
   const auto start = std::chrono::steady_clock::now();
   progress.report(0.0, "finding the surface");
@@ -34,7 +34,7 @@ TriangleMesh extract_surface(const ImplicitFunction& implicit, const Frame& fram
           "its values have one sign on the whole grid of " + std::to_string(resolution) + " points a side",
           "a function with a zero surface inside the cube [-1, 1]^3 is needed");
   const bool open = (mesh.vertices.array().abs() == 1.0).any();
-  mesh.vertices = frame.to_mesh(mesh.vertices);
+  mesh.vertices = implicit.frame().to_mesh(mesh.vertices);
   if (report != nullptr)
     *report = {.evaluations = function.value_count() + function.gradient_count(),
                .dense_evaluations = static_cast<Index>(resolution) * resolution * resolution,

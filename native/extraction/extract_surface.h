@@ -21,8 +21,9 @@ struct ExtractionReport {
 /// [-1,1]³: the vertices that the whole grid's values would give, from values near the surface alone.
 /// Throws InvalidInput for a bad resolution, a function that is not finite, or one that has no zero surface
 /// which the grid resolves.
-TriangleMesh extract_surface(const ImplicitFunction& function, const Frame& frame,
-                             int resolution = ExtractionOptions().resolution, const Progress& progress = {},
-                             ExtractionReport* report = nullptr);
+ARAPFIELDS_EXPORT TriangleMesh extract_surface(const ImplicitFunction& function,
+                                               int resolution = ExtractionOptions().resolution,
+                                               const Progress& progress = {},
+                                               ExtractionReport* report = nullptr);
 
 }  // namespace arapfields

@@ -99,7 +99,7 @@ Points2 CurveField::operator()(Points2In points) const {
   Points2 result(points.rows(), 2);
   constexpr Index chunk = 4096;
   for (Index begin = 0; begin < points.rows(); begin += chunk) {
-    const Index count = std::min(chunk, points.rows() - begin);
+    const Index count = std::min<Index>(chunk, points.rows() - begin);
     result.middleRows(begin, count) = jets(points.middleRows(begin, count)).topRows(count);
   }
   return (result * scale).rowwise() + center.transpose();

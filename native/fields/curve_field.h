@@ -6,7 +6,7 @@
 namespace arapfields {
 
 /// Gaussian centers exp(−|x − p_m|²/r_m²) in the plane, and the affine maps: centers first, then 1, x, y.
-struct CurveBasis {
+struct ARAPFIELDS_EXPORT CurveBasis {
   Points2 centers;  ///< (m,2)
   Vector radii;     ///< (m)
 
@@ -18,11 +18,11 @@ struct CurveBasis {
 /// Centers at the nodes of a grid that have a point within a cell and a half, and at all nodes of one three
 /// times as coarse over the points' surroundings; each twice its grid's spacing wide. A curve's own points
 /// would be poor centres: straight on a line, no bump centred on it has a slope across.
-CurveBasis curve_basis(Points2In points, double spacing);
+ARAPFIELDS_EXPORT CurveBasis curve_basis(Points2In points, double spacing);
 
 /// A deformation of the plane, made for a curve. Points are in the curve's coordinates; the basis lives in
 /// the square in which the curve's bounding box has half-extent 0.75.
-struct CurveField {
+struct ARAPFIELDS_EXPORT CurveField {
   Vec2 center = Vec2::Zero();
   double scale = 1.0;
   CurveBasis basis;

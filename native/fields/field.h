@@ -15,7 +15,7 @@ class Mlp;
 
 /// A deformation f: R³ → R³ of the unit cube's space that knows its jets: all that energies, extraction and
 /// results ask of it. The frame says where the cube lies in mesh coordinates.
-class DeformationField {
+class ARAPFIELDS_EXPORT DeformationField {
  public:
   virtual ~DeformationField() = default;
   /// Jets at points (n,3), all in cube coordinates; `out` has count n and any order. Batched and parallel.
@@ -44,7 +44,7 @@ class DeformationField {
 
 /// A field whose parameters a first-order method can train: it pulls the cotangents of its jets back to them.
 /// Tensors live on the field's device and have its dtype.
-class TrainableField : public DeformationField {
+class ARAPFIELDS_EXPORT TrainableField : public DeformationField {
  public:
   /// Jets (columns, n, 3) at points (n,3); keeps what pull_back needs until the next call.
   virtual at::Tensor forward(const at::Tensor& points, JetOrder order) = 0;

@@ -78,7 +78,7 @@ HandleBlend::HandleBlend(std::vector<RigidRegion> regions) : regions_(std::move(
     require(std::isfinite(region.margin) && region.margin > 0.0, name, "a margin of " + number(region.margin),
             "it must be positive");
     const Mat3 edges = region.placement.topLeftCorner<3, 3>();
-    Box box{Mat3::Identity(), region.placement.topRightCorner<3, 1>(), edges.colwise().norm()};
+    OrientedBox box{Mat3::Identity(), region.placement.topRightCorner<3, 1>(), edges.colwise().norm()};
     if (box.half_extents.maxCoeff() > 0.0) {
       require(box.half_extents.minCoeff() > 1e-9, name, "a box without volume",
               "exact handles need three edges of positive length");
@@ -91,7 +91,7 @@ HandleBlend::HandleBlend(std::vector<RigidRegion> regions) : regions_(std::move(
 }
 
 double HandleBlend::distance(Index region, const Vec3& point) const {
-  const Box& box = boxes_[static_cast<std::size_t>(region)];
+  const OrientedBox& box = boxes_[static_cast<std::size_t>(region)];
   return ((box.directions * (point - box.center)).cwiseAbs() - box.half_extents).maxCoeff();
 }
 
@@ -104,7 +104,7 @@ void HandleBlend::for_each_point(PointsIn points, Consume&& consume) const {
       std::array<ScalarJet, 3> moved;
       for (int i = 0; i < 3; ++i) moved[i] = linear(Vec3::Unit(i), 0.0, x);
       for (std::size_t r = 0; r < regions_.size(); ++r) {
-        const Box& box = boxes_[r];
+        const OrientedBox& box = boxes_[r];
         if (distance(static_cast<Index>(r), x) >= regions_[r].margin) continue;
         ScalarJet weight = constant(1.0);
         for (int a = 0; a < 3; ++a) {

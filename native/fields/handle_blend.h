@@ -22,7 +22,7 @@ struct RigidRegion {
 ///   h(x) = x + Σ_i W_i (C_i x − x),  W_i = w_i Π_{j<i} (1 − w_j),
 /// so that h is exact in each box that no earlier region's margin reaches (see limit_margins).
 /// A trainable part multiplied by free_weight() = Π_i (1 − w_i) leaves that exactness alone.
-class HandleBlend final : public DeformationField {
+class ARAPFIELDS_EXPORT_TO_TESTS HandleBlend final : public DeformationField {
  public:
   /// Throws InvalidInput for a margin that is not positive or a box that is flat or sheared.
   explicit HandleBlend(std::vector<RigidRegion> regions);
@@ -36,7 +36,7 @@ class HandleBlend final : public DeformationField {
   const std::vector<RigidRegion>& regions() const { return regions_; }
 
  private:
-  struct Box {
+  struct OrientedBox {
     Mat3 directions;  ///< rows: unit directions of the box's edges
     Vec3 center, half_extents;
   };
@@ -44,7 +44,7 @@ class HandleBlend final : public DeformationField {
   void for_each_point(PointsIn points, Consume&& consume) const;
 
   std::vector<RigidRegion> regions_;
-  std::vector<Box> boxes_;
+  std::vector<OrientedBox> boxes_;
 };
 
 /// Shrinks margins until no region's fall-off reaches points of a later one that it would move differently;

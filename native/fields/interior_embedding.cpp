@@ -138,7 +138,7 @@ void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out) const {
 
 std::shared_ptr<const InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn normals) {
   if (samples.rows() < least_nodes || normals.rows() != samples.rows()) return nullptr;
-  const FarthestPoints chosen = farthest_points(samples, std::min(most_nodes, samples.rows()));
+  const FarthestPoints chosen = farthest_points(samples, std::min<Index>(most_nodes, samples.rows()));
   const Index n = static_cast<Index>(chosen.indices.size());
   if (n < least_nodes || !(chosen.fill_distance > 0.0)) return nullptr;
   InteriorEmbedding embedding;

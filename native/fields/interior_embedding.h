@@ -12,7 +12,7 @@ namespace arapfields {
 /// |x − y|² + |ψ(x) − ψ(y)|² is about the squared length of the way from x to y through the interior. ψ is
 /// known with its slope at nodes of the surface and blended between them, with Gaussian weights as wide as
 /// the nodes are apart and a sum of one (Franke and Little's modification of Shepard's method).
-struct InteriorEmbedding {
+struct ARAPFIELDS_EXPORT InteriorEmbedding {
   Points nodes;              ///< (n,3)
   Points values;             ///< (n,3) ψ at the nodes
   RowMatrix<double> slopes;  ///< (n,9) ∂ψ_k/∂x_i at 3 k + i
@@ -25,6 +25,7 @@ struct InteriorEmbedding {
 /// ψ of a surface from samples (n,3) of it and their outward normals: the embedding that best explains by how
 /// much ways through the interior exceed straight lines (classical scaling with landmarks: de Silva and
 /// Tenenbaum). Null where they hardly do, and for less than a hundred different samples.
-std::shared_ptr<const InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn normals);
+ARAPFIELDS_EXPORT std::shared_ptr<const InteriorEmbedding> interior_embedding(PointsIn samples,
+                                                                              PointsIn normals);
 
 }  // namespace arapfields

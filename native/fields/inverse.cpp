@@ -19,7 +19,7 @@ Points values_at(const DeformationField& field, PointsIn points, const Progress&
   Points values(points.rows(), 3);
   for (Index begin = 0; begin < points.rows(); begin += chunk) {
     progress.check();
-    const Index rows = std::min(chunk, points.rows() - begin);
+    const Index rows = std::min<Index>(chunk, points.rows() - begin);
     field.evaluate(points.middleRows(begin, rows), {values.data() + 3 * begin, rows, JetOrder::value});
   }
   return values;
@@ -161,7 +161,7 @@ InverseResult NewtonInverse::operator()(PointsIn targets, const NewtonInverseOpt
   InverseResult result{Points::Constant(targets.rows(), 3, std::numeric_limits<double>::quiet_NaN()), 0, 0.0};
   for (Index begin = 0; begin < targets.rows(); begin += chunk) {
     progress.report(static_cast<double>(begin) / static_cast<double>(targets.rows()), "inverting");
-    const Index rows = std::min(chunk, targets.rows() - begin);
+    const Index rows = std::min<Index>(chunk, targets.rows() - begin);
     std::vector<Index> left;
     for (Index i = begin; i < begin + rows; ++i)
       if (targets.row(i).allFinite()) left.push_back(i);

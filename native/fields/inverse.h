@@ -16,13 +16,13 @@ struct InverseResult {
 };
 
 /// f at points (n,3) in cube coordinates, in pieces between which `progress` may cancel.
-Points values_at(const DeformationField& field, PointsIn points, const Progress& progress);
+ARAPFIELDS_EXPORT Points values_at(const DeformationField& field, PointsIn points, const Progress& progress);
 
 /// Solves f(x) = y by Newton's method with the field's own Jacobian, its steps halved until the residual
 /// falls. It starts from that of `rest` whose image is nearest to y, and where that fails from the nearest
 /// image of a grid over [-1,1]³, then from y itself. Where f folds space there are several x: the start then
 /// decides. Built once for many calls; the field must outlive it.
-class NewtonInverse {
+class ARAPFIELDS_EXPORT NewtonInverse {
  public:
   NewtonInverse(const DeformationField& field, Points rest, const Progress& progress = {});
   ~NewtonInverse();
@@ -38,7 +38,8 @@ class NewtonInverse {
 };
 
 /// The same for one use, from the field's rest points.
-InverseResult invert(const DeformationField& field, PointsIn targets,
-                     const NewtonInverseOptions& options = {}, const Progress& progress = {});
+ARAPFIELDS_EXPORT InverseResult invert(const DeformationField& field, PointsIn targets,
+                                       const NewtonInverseOptions& options = {},
+                                       const Progress& progress = {});
 
 }  // namespace arapfields

@@ -1,25 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fields/neural_field.h"
 
-#include <ATen/ATen.h>
-
-#include "core/device.h"
 #include "core/errors.h"
 #include "core/parallel.h"
+#include "core/tensors.h"
 
 namespace arapfields {
 namespace {
-
-/// Points of any real tensor on any device, as ours.
-Points to_points(const at::Tensor& points) {
-  const at::Tensor host = points.to(at::kCPU, at::kDouble).contiguous();
-  return Eigen::Map<const Points>(host.const_data_ptr<double>(), host.size(0), 3);
-}
-
-/// Numbers in main memory in the dtype and on the device of `like`.
-at::Tensor tensor_of(const double* data, at::IntArrayRef sizes, const at::Tensor& like) {
-  return upload(at::from_blob(const_cast<double*>(data), sizes, at::kDouble).to(like.scalar_type()), like);
-}
 
 void add_identity(JetView<double> jets, PointsIn points) {
   Eigen::Map<Points>(jets.column(0), jets.count, 3) += points;
@@ -88,17 +75,16 @@ void NeuralField::fixed_part(PointsIn points, JetView<double> b, Vector& a) cons
   handles_->free_weight(points, b.order, a.data());
   JetBlock<double> blend(n, b.order);
   handles_->evaluate(points, blend.view());
-  const at::TensorOptions options(at::kDouble);
-  at::Tensor result = at::from_blob(b.data, {count, n, 3}, options);
-  const at::Tensor exact = at::from_blob(blend.view().data, {count, n, 3}, options);
+  at::Tensor result = tensor_view(b);
+  const at::Tensor exact = tensor_view(blend.view());
   if (!base_) {
     result.copy_(exact);
     return;
   }
   JetBlock<double> identity(n, b.order);
   add_identity(identity.view(), points);
-  result.sub_(at::from_blob(identity.view().data, {count, n, 3}, options));
-  result.copy_(product(at::from_blob(a.data(), {count, n, 1}, options), result) + exact);
+  result.sub_(tensor_view(identity.view()));
+  result.copy_(product(tensor_view(a.data(), {count, n, 1}), result) + exact);
 }
 
 void NeuralField::evaluate(PointsIn points, JetView<double> out) const {
@@ -107,11 +93,10 @@ void NeuralField::evaluate(PointsIn points, JetView<double> out) const {
   if (out.count == 0) return;
   Vector a;
   fixed_part(points, out, a);
-  const at::Tensor x = tensor_of(points.data(), {points.rows(), 3}, network_.parameters());
+  const at::Tensor x = tensor_like(points, network_.parameters());
   at::Tensor jets = network_.evaluate(x, out.order).to(at::kCPU, at::kDouble);
-  if (a.size() > 0)
-    jets = product(at::from_blob(a.data(), {columns(out.order), out.count, 1}, at::kDouble), jets);
-  at::from_blob(out.data, {columns(out.order), out.count, 3}, at::kDouble).add_(jets);
+  if (a.size() > 0) jets = product(tensor_view(a.data(), {columns(out.order), out.count, 1}), jets);
+  tensor_view(out).add_(jets);
 }
 
 at::Tensor NeuralField::jets(const at::Tensor& points, JetOrder order) const {
@@ -128,14 +113,14 @@ at::Tensor NeuralField::forward(const at::Tensor& points, JetOrder order) {
   const ThreadScope scope;
   at::Tensor jets = network_.forward(points, order);
   factor_.reset();
-  if (base_ || handles_) return compose(std::move(jets), to_points(points));
+  if (base_ || handles_) return compose(std::move(jets), points_of(points));
   add_identity(jets, points);
   return jets;
 }
 
 at::Tensor NeuralField::forward_at(PointsIn points, JetOrder order) {
   const ThreadScope scope;
-  const at::Tensor x = tensor_of(points.data(), {points.rows(), 3}, network_.parameters());
+  const at::Tensor x = tensor_like(points, network_.parameters());
   if (!base_ && !handles_) return forward(x, order);
   factor_.reset();
   return compose(network_.forward(x, order), points);
@@ -145,9 +130,10 @@ at::Tensor NeuralField::compose(at::Tensor jets, PointsIn points) {
   JetBlock<double> b(points.rows(), static_cast<JetOrder>(jets.size(0)));
   Vector a;
   fixed_part(points, b.view(), a);
-  const at::Tensor fixed = tensor_of(b.view().data, jets.sizes(), jets);
+  const at::Tensor fixed = tensor_like(b.view(), jets);
   if (a.size() == 0) return jets.add_(fixed);
-  factor_ = std::make_shared<at::Tensor>(tensor_of(a.data(), {jets.size(0), jets.size(1), 1}, jets));
+  factor_ =
+      std::make_shared<at::Tensor>(tensor_like(tensor_view(a.data(), {jets.size(0), jets.size(1), 1}), jets));
   return product(*factor_, jets).add_(fixed);
 }
 
@@ -158,7 +144,7 @@ void NeuralField::pull_back(const at::Tensor& cotangents) {
 
 void NeuralField::translate(const Vec3& offset) {
   at::Tensor bias = network_.bias(shape().layers);
-  bias.add_(tensor_of(offset.data(), {3}, bias));
+  bias.add_(tensor_like(offset, bias));
 }
 
 VectorF NeuralField::weights() const {
@@ -172,7 +158,7 @@ void NeuralField::set_weights(const VectorF& weights) {
   at::Tensor& parameters = network_.parameters();
   require(weights.size() == parameters.numel(), "weights", std::to_string(weights.size()) + " numbers",
           "this network has " + std::to_string(parameters.numel()));
-  parameters.copy_(at::from_blob(const_cast<float*>(weights.data()), {weights.size()}, at::kFloat));
+  parameters.copy_(tensor_view(weights));
 }
 
 }  // namespace arapfields

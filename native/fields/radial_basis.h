@@ -19,7 +19,7 @@ struct RadialScale {
 /// e^{−s} for large κ, κ = 6 (fields/radial_kernel.h), but with a bounded support, so that a
 /// point feels nearby centers alone, and κ − 1 times continuously differentiable. Coefficients are (size, 3):
 /// centers, then the constant, then x, y, z. With an embedding ψ, s = (|x − p_m|² + |ψ(x) − ψ(p_m)|²) / r_m².
-struct RadialBasis {
+struct ARAPFIELDS_EXPORT RadialBasis {
   Points centers;  ///< (m,3)
   Vector radii;    ///< (m)
   std::shared_ptr<const InteriorEmbedding> embedding = nullptr;
@@ -36,13 +36,13 @@ struct RadialBasis {
 /// Centers at farthest-point samples of the points, scale by scale (a scale with as many centers as there are
 /// distinct points or more is cut there). Throws InvalidInput for no points or scales without centers or
 /// radius_factor.
-RadialBasis radial_basis(PointsIn points, const std::vector<RadialScale>& scales);
+ARAPFIELDS_EXPORT RadialBasis radial_basis(PointsIn points, const std::vector<RadialScale>& scales);
 
 /// Indices of `count` farthest-point samples, and the largest distance of a point to them.
 struct FarthestPoints {
   std::vector<Index> indices;
   double fill_distance = 0.0;
 };
-FarthestPoints farthest_points(PointsIn points, Index count);
+ARAPFIELDS_EXPORT FarthestPoints farthest_points(PointsIn points, Index count);
 
 }  // namespace arapfields

@@ -7,7 +7,7 @@
 namespace arapfields {
 
 /// A deformation as a weighted sum of compact centers and an affine map, with analytic jets.
-class RadialField : public DeformationField {
+class ARAPFIELDS_EXPORT RadialField : public DeformationField {
  public:
   /// Coefficients (basis.size(), 3); throws InvalidInput for other shapes, non-finite numbers or radii ≤ 0.
   RadialField(RadialBasis basis, RowMatrix<double> coefficients);

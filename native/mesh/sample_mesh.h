@@ -11,7 +11,7 @@
 namespace arapfields {
 
 /// Draws points of a mesh with equal probability per area. Coordinates are those of the given vertices.
-class AreaSampler {
+class ARAPFIELDS_EXPORT AreaSampler {
  public:
   /// Throws InvalidInput for a mesh that validate() refuses and for one whose triangles have no area.
   AreaSampler(PointsIn vertices, TrianglesIn triangles);
@@ -30,10 +30,11 @@ class AreaSampler {
 };
 
 /// The frame of a mesh: the bounding box of its used vertices, centred, its half-extent 0.75.
-Frame mesh_frame(PointsIn vertices, TrianglesIn triangles);
+ARAPFIELDS_EXPORT Frame mesh_frame(PointsIn vertices, TrianglesIn triangles);
 
 /// `count` independent points, uniform by area, with their triangles' unit normals, in cube coordinates of
 /// mesh_frame(). Sample i depends on the seed and i alone. Throws InvalidInput as AreaSampler does.
-SurfaceSamples sample_mesh(PointsIn vertices, TrianglesIn triangles, Index count, std::uint64_t seed);
+ARAPFIELDS_EXPORT SurfaceSamples sample_mesh(PointsIn vertices, TrianglesIn triangles, Index count,
+                                             std::uint64_t seed);
 
 }  // namespace arapfields

@@ -14,10 +14,10 @@ struct TriangleMesh {
 /// Throws InvalidInput naming `vertices` or `triangles` where there are none, where a coordinate is NaN or
 /// infinite (says the first such vertex) or where an index is out of range (says the first such triangle).
 /// Triangles without area are allowed.
-void validate(PointsIn vertices, TrianglesIn triangles);
+ARAPFIELDS_EXPORT void validate(PointsIn vertices, TrianglesIn triangles);
 inline void validate(const TriangleMesh& mesh) { validate(mesh.vertices, mesh.triangles); }
 
 /// The vertices that some triangle refers to, in the order of `vertices`. The mesh must be valid.
-Points used_vertices(PointsIn vertices, TrianglesIn triangles);
+ARAPFIELDS_EXPORT Points used_vertices(PointsIn vertices, TrianglesIn triangles);
 
 }  // namespace arapfields

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "core/device.h"
+#include "core/aten_path.h"
 #include "core/parallel.h"
 #include "neural/adam_kernel.h"
 

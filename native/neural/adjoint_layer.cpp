@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <ATen/ATen.h>
 
-#include "core/device.h"
+#include "core/aten_path.h"
 #include "neural/adjoint_kernels.h"
 #include "neural/jet_layer.h"
 

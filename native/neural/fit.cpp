@@ -1,37 +1,28 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "neural/fit.h"
 
-#include <ATen/ATen.h>
-
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 
 #include "core/device.h"
 #include "core/parallel.h"
 #include "core/random.h"
+#include "core/stopwatch.h"
+#include "core/tensors.h"
 #include "distance/training_points.h"
 #include "mesh/sample_mesh.h"
-#include "neural/muon.h"
+#include "neural/mlp.h"
+#include "neural/training_loop.h"
 
 namespace arapfields {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
-
 /// Points and distances on the network's device, the near-surface ones first.
 struct Examples {
-  Examples(const TrainingPoints& given, const at::Tensor& like) : near_count(given.near_surface) {
-    points = at::from_blob(const_cast<float*>(given.points.data()), {given.points.rows(), 3}, at::kFloat)
-                 .to(like.options(), false, true);
-    distances =
-        at::from_blob(const_cast<float*>(given.distances.data()), {given.distances.size()}, at::kFloat)
-            .to(like.options(), false, true);
-  }
+  Examples(const TrainingPoints& given, const at::Tensor& like)
+      : points(tensor_like(given.points, like)),
+        distances(tensor_like(given.distances, like)),
+        near_count(given.near_surface) {}
   Index count() const { return points.size(0); }
 
   at::Tensor points, distances;
@@ -74,101 +65,53 @@ Errors errors(const Mlp& mlp, const at::Tensor& points, const at::Tensor& distan
   return {off.mean().item<double>(), off.max().item<double>()};
 }
 
-/// One fit: what the loop carries from step to step.
-class Training {
+/// The mean absolute error of a batch.
+class Fit final : public LoopBody {
  public:
-  Training(const FitOptions& options, Mlp& mlp, const Examples& examples, const Examples& held_out)
-      : options_(options),
-        mlp_(mlp),
-        held_out_(held_out),
-        batches_(examples, options),
-        muon_(mlp, {}),
-        adam_(mlp.parameters()),
-        good_(mlp.parameters().clone()),
-        peak_(options.training.learning_rate > 0
-                  ? options.training.learning_rate
-                  : options.automatic_learning_rate(options.training.optimizer)) {}
+  Fit(const FitOptions& options, Mlp& mlp, const Examples& examples, const Examples& held_out)
+      : options_(options), mlp_(mlp), held_out_(held_out), batches_(examples, options) {}
 
-  /// Returns what ended it.
-  std::string run(const Progress& progress) {
-    const Clock::time_point begin = Clock::now();
-    const double budget = options_.training.time_budget;
-    for (steps = 0; steps < options_.training.iterations; ++steps) {
-      const double elapsed = seconds_since(begin);
-      if (budget > 0 && elapsed >= budget) return "time_budget";
-      const double done = std::max(static_cast<double>(steps) / options_.training.iterations,
-                                   budget > 0 ? elapsed / budget : 0.0);
-      if (steps % check_every_ == 0) {
-        if (!at::isfinite(mlp_.parameters()).all().item<bool>()) return restore();
-        good_.copy_(mlp_.parameters());
-        good_steps_ = steps;
-        report(progress, done);
-        if (steps > 0 && options_.target_error > 0 && near_error() <= options_.target_error)
-          return "target_error";
-      }
-      progress.check();
-      step(rate(done));
-    }
-    if (!at::isfinite(mlp_.parameters()).all().item<bool>()) return restore();
-    return "iterations";
-  }
-
-  int steps = 0;
-
- private:
-  static constexpr int warm_up = 20;
-
-  bool use_adam() const { return options_.training.optimizer == OptimizerKind::adam; }
-  double near_error() const {
-    const Index some = std::min<Index>(held_out_.near_count, 4096);
-    return errors(mlp_, held_out_.points.narrow(0, 0, some), held_out_.distances.narrow(0, 0, some)).mean;
-  }
-  /// Rises over the first steps, then falls linearly to zero: the last steps average out the batches' noise.
-  double rate(double done) const { return peak_ * std::min(1.0, (steps + 1.0) / warm_up) * (1.0 - done); }
-
-  void step(double learning_rate) {
+  at::Tensor accumulate(int) override {
     batches_.next();
     const at::Tensor off = mlp_.forward(batches_.points, JetOrder::value).view({-1}) - batches_.distances;
-    loss_ = off;
-    mlp_.gradient().zero_();
     mlp_.pull_back(at::sign(off).div_(static_cast<double>(options_.training.batch)).view({1, -1, 1}));
-    if (use_adam())
-      adam_.step(mlp_.parameters(), mlp_.gradient(), learning_rate);
-    else
-      muon_.step(mlp_, learning_rate);
+    return off.abs_().mean();
+  }
+  bool is_good_enough() override {
+    if (options_.target_error <= 0) return false;
+    const Index some = std::min<Index>(held_out_.near_count, 4096);
+    return errors(mlp_, held_out_.points.narrow(0, 0, some), held_out_.distances.narrow(0, 0, some)).mean <=
+           options_.target_error;
+  }
+  std::string message(int count, double loss, double) const override {
+    char text[120];
+    std::snprintf(text, sizeof text, "iteration %d of %d, mean error %.2g of the cube", count,
+                  options_.training.iterations, loss);
+    return text;
   }
 
-  void report(const Progress& progress, double done) {
-    char text[120] = "fitting";
-    if (loss_.defined())
-      std::snprintf(text, sizeof text, "fitting: iteration %d of %d, mean error %.2g of the cube", steps,
-                    options_.training.iterations, loss_.abs().mean().item<double>());
-    progress.report(done, text);
-  }
-
-  std::string restore() {
-    mlp_.parameters().copy_(good_);
-    steps = good_steps_;
-    return "diverged";
-  }
-
+ private:
   const FitOptions& options_;
   Mlp& mlp_;
   const Examples& held_out_;
   Batches batches_;
-  Muon muon_;
-  AdamStep adam_;
-  at::Tensor good_, loss_;
-  int good_steps_ = 0;
-  int check_every_ = on_aten_path(mlp_.parameters()) ? 25 : 10;  // a check waits for the device
-  double peak_;
 };
+
+LoopOptions loop_options(const FitOptions& options) {
+  LoopOptions loop;
+  loop.training = options.training;
+  double& rate = loop.training.learning_rate;
+  if (rate == 0.0) rate = FitOptions::automatic_learning_rate(options.training.optimizer);
+  loop.optimizer = {.momentum = 0.95, .adam_share = 0.1, .beta1 = 0.9, .beta2 = 0.99};
+  loop.schedule = {.warm_up = 20, .hold_fraction = 0.0, .final_share = 0.0, .fall = Schedule::Fall::linear};
+  return loop;
+}
 
 }  // namespace
 
 FitResult fit_sdf(PointsIn vertices, TrianglesIn triangles, const FitOptions& options,
                   const Progress& progress) {
-  const Clock::time_point begin = Clock::now();
+  const Stopwatch watch;
   options.validate();
   const ThreadScope scope(options.machine.threads);
   const TriangleMesh mesh{vertices, triangles};
@@ -189,11 +132,20 @@ FitResult fit_sdf(PointsIn vertices, TrianglesIn triangles, const FitOptions& op
   const Examples held_out(
       training_points(distance, mesh, frame, where, seed ^ 0x8e1d0f7u, progress.part(0.08, 0.1)),
       mlp.parameters());
-  report.distance_seconds = seconds_since(begin);
+  report.distance_seconds = watch.seconds();
 
-  Training training(options, mlp, examples, held_out);
-  report.stopped_by = training.run(progress.part(0.1, 1.0));
-  report.iterations = training.steps;
+  std::string diverged;
+  LoopResult loop;
+  try {
+    Fit fit(options, mlp, examples, held_out);
+    loop = run_training({mlp.parameters(), mlp.gradient(), &mlp}, fit, loop_options(options),
+                        progress.part(0.1, 1.0));
+  } catch (const LoopDiverged& error) {
+    diverged = error.what();
+    loop = error.result;
+  }
+  report.stopped_by = loop.stopped_by;
+  report.iterations = loop.iterations;
   mlp.release_buffers();
 
   const Index near = held_out.near_count, rest = held_out.count() - near;
@@ -202,15 +154,10 @@ FitResult fit_sdf(PointsIn vertices, TrianglesIn triangles, const FitOptions& op
       errors(mlp, held_out.points.narrow(0, near, rest), held_out.distances.narrow(0, near, rest));
   report.near_mean = close.mean * frame.scale, report.near_max = close.max * frame.scale;
   report.volume_mean = far.mean * frame.scale, report.volume_max = far.max * frame.scale;
-  report.seconds = seconds_since(begin);
+  report.seconds = watch.seconds();
   progress.report(1.0, "fitted");
-  const std::string stopped_by = report.stopped_by;
-  const int steps = report.iterations;
   FitResult result{std::make_shared<NeuralSdf>(std::move(mlp), frame), report};
-  if (stopped_by == "diverged")
-    throw FitDiverged("fit_sdf left the finite numbers after iteration " + std::to_string(steps) +
-                          ", whose state is kept in the error's last_good; a smaller learning_rate may help",
-                      result);
+  if (!diverged.empty()) throw FitDiverged(diverged, result);
   return result;
 }
 

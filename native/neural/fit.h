@@ -6,6 +6,7 @@
 
 #include "core/errors.h"
 #include "core/task.h"
+#include "neural/loop_result.h"
 #include "neural/neural_sdf.h"
 #include "options/fit.h"
 
@@ -18,7 +19,7 @@ struct FitReport {
   double scale = 1;                        ///< mesh units a cube unit
   int iterations = 0;
   double seconds = 0, distance_seconds = 0;  ///< all, and the part spent on exact distances
-  std::string stopped_by;                    ///< "iterations", "time_budget", "target_error", "diverged"
+  StopReason stopped_by = StopReason::iterations;
   std::string device;
 };
 
@@ -27,8 +28,8 @@ struct FitResult {
   FitReport report;
 };
 
-/// Training left the finite numbers; the state before is kept.
-class FitDiverged : public Diverged {
+/// Training met NaN or infinity; the state before is kept.
+class ARAPFIELDS_EXPORT FitDiverged : public Diverged {
  public:
   FitDiverged(const std::string& what, FitResult good) : Diverged(what), last_good(std::move(good)) {}
   FitResult last_good;
@@ -36,7 +37,7 @@ class FitDiverged : public Diverged {
 
 /// Fits a network to the signed distance of a triangle soup (vertices (n,3), triangles (m,3)), in the frame
 /// that centres it and scales it to half-extent 0.75. Throws InvalidInput, FitDiverged, Cancelled.
-FitResult fit_sdf(PointsIn vertices, TrianglesIn triangles, const FitOptions& options = {},
-                  const Progress& progress = {});
+ARAPFIELDS_EXPORT FitResult fit_sdf(PointsIn vertices, TrianglesIn triangles, const FitOptions& options = {},
+                                    const Progress& progress = {});
 
 }  // namespace arapfields

@@ -3,7 +3,7 @@
 
 #include <ATen/ATen.h>
 
-#include "core/device.h"
+#include "core/aten_path.h"
 #include "neural/jet_kernels.h"
 
 namespace arapfields {

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "neural/layers.h"
 
-#include <ATen/ATen.h>
-
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "core/random.h"
+#include "core/tensors.h"
 #include "neural/muon.h"
 
 namespace arapfields {
@@ -14,10 +13,6 @@ namespace {
 std::string size_text(Index rows, Index cols) {
   std::string text = "(";
   return text.append(std::to_string(rows)).append(", ").append(std::to_string(cols)).append(")");
-}
-
-at::Tensor as_tensor(const double* data, at::IntArrayRef sizes, const at::Tensor& like) {
-  return at::from_blob(const_cast<double*>(data), sizes, at::kDouble).to(like.options(), false, true);
 }
 
 }  // namespace
@@ -55,10 +50,8 @@ Mlp make_mlp(const Layers& layers, const MlpShape& shape, bool double_precision,
   const ThreadScope scope;
   Mlp mlp(shape, 0, true, double_precision, device);
   for (int l = 0; l <= shape.layers; ++l) {
-    const RowMatrix<double>& weight = layers.weights[static_cast<std::size_t>(l)];
-    const Vector& bias = layers.biases[static_cast<std::size_t>(l)];
-    mlp.weight(l).copy_(as_tensor(weight.data(), {weight.rows(), weight.cols()}, mlp.parameters()));
-    mlp.bias(l).copy_(as_tensor(bias.data(), {bias.size()}, mlp.parameters()));
+    mlp.weight(l).copy_(tensor_view(layers.weights[static_cast<std::size_t>(l)]));
+    mlp.bias(l).copy_(tensor_view(layers.biases[static_cast<std::size_t>(l)]));
   }
   return mlp;
 }
@@ -68,38 +61,35 @@ Layers layers_of(const Mlp& mlp) {
   Layers layers;
   for (int l = 0; l <= mlp.shape().layers; ++l) {
     const at::Tensor weight = mlp.weight(l).to(at::kCPU, at::kDouble).contiguous();
-    const at::Tensor bias = mlp.bias(l).to(at::kCPU, at::kDouble).contiguous();
     layers.weights.push_back(
         Eigen::Map<const RowMatrix<double>>(weight.data_ptr<double>(), weight.size(0), weight.size(1)));
-    layers.biases.push_back(Eigen::Map<const Vector>(bias.data_ptr<double>(), bias.size(0)));
+    layers.biases.push_back(vector_of(mlp.bias(l)));
   }
   return layers;
 }
 
-JetSweeps sweep_jets(Mlp& mlp, PointsIn points, JetOrder order, const Vector& cotangents) {
+JetSweeps sweep_jets(const Layers& layers, const MlpShape& shape, bool double_precision, PointsIn points,
+                     JetOrder order, const Vector& cotangents) {
   const ThreadScope scope;
-  const auto plain = [](const at::Tensor& tensor) -> Vector {
-    const at::Tensor flat = tensor.to(at::kCPU, at::kDouble).contiguous();
-    return Eigen::Map<const Vector>(flat.data_ptr<double>(), flat.numel());
-  };
-  const at::Tensor where = as_tensor(points.data(), {points.rows(), 3}, mlp.parameters());
-  const at::Tensor jets = mlp.forward(where, order);
+  Mlp mlp = make_mlp(layers, shape, double_precision);
+  const at::Tensor jets = mlp.forward(tensor_like(points, mlp.parameters()), order);
   JetSweeps result;
-  result.jets = plain(jets);
+  result.jets = vector_of(jets);
   if (cotangents.size() == 0) return result;
   require(cotangents.size() == jets.numel(), "cotangents", std::to_string(cotangents.size()) + " numbers",
           "expected " + std::to_string(jets.numel()));
   mlp.gradient().zero_();
-  mlp.pull_back(as_tensor(cotangents.data(), jets.sizes(), jets));
-  result.gradient = plain(mlp.gradient());
+  mlp.pull_back(tensor_like(cotangents, jets).view(jets.sizes()));
+  result.gradient = vector_of(mlp.gradient());
   return result;
 }
 
-Layers step_muon(Mlp& mlp, const Vector& gradient, double learning_rate) {
+Layers step_muon(const Layers& layers, const MlpShape& shape, const Vector& gradient, double learning_rate) {
   const ThreadScope scope;
+  Mlp mlp = make_mlp(layers, shape, true);
   require(gradient.size() == mlp.gradient().numel(), "gradient", std::to_string(gradient.size()) + " numbers",
           "expected " + std::to_string(mlp.gradient().numel()));
-  mlp.gradient().copy_(as_tensor(gradient.data(), {gradient.size()}, mlp.gradient()));
+  mlp.gradient().copy_(tensor_view(gradient));
   Muon(mlp).step(mlp, learning_rate);
   return layers_of(mlp);
 }

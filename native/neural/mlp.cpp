@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/device.h"
+#include "core/aten_path.h"
 #include "core/errors.h"
 #include "core/memory.h"
 #include "core/parallel.h"

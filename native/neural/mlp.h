@@ -6,25 +6,13 @@
 #include <string>
 
 #include "core/jets.h"
-#include "options/network.h"
+#include "neural/mlp_shape.h"
 
 namespace at {
 class Tensor;
 }
 
 namespace arapfields {
-
-/// A network R³ → R^outputs: positional encoding, `layers` hidden layers of `width` softplus units, linear
-/// output. Encoding: for each coordinate c in turn, for k < octaves, the pair cos(2^k·frequency·c),
-/// sin(2^k·frequency·c).
-struct MlpShape : NetworkOptions {
-  int outputs = 3;
-
-  int encoded() const { return 6 * octaves; }
-  int fan_in(int layer) const { return layer == 0 ? encoded() : width; }
-  int fan_out(int layer) const { return layer == layers ? outputs : width; }
-  bool operator==(const MlpShape&) const = default;
-};
 
 /// The network with explicit jets. Values and first input derivatives travel through the layers as columns
 /// (core/jets.h), one matrix product a layer for all of them. Second derivatives need no columns of their

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "core/device.h"
+#include "core/aten_path.h"
 #include "core/parallel.h"
 #include "neural/jet_layer.h"
 

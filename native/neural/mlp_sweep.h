@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The two sweeps through the layers, for one block of points. Only for libtorch sources, which include
-// ATen before this.
+// The two sweeps through the layers, for one block of points; for libtorch sources alone.
 #pragma once
+
+#include <ATen/core/Tensor.h>
 
 #include <functional>
 #include <vector>

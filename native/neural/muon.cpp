@@ -8,7 +8,7 @@
 #include <cmath>
 #include <vector>
 
-#include "core/device.h"
+#include "core/aten_path.h"
 #include "core/parallel.h"
 
 namespace arapfields {

@@ -1,33 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "neural/neural_sdf.h"
 
-#include <ATen/ATen.h>
-
 #include "core/errors.h"
 #include "core/parallel.h"
+#include "core/tensors.h"
+#include "neural/layers.h"
 
 namespace arapfields {
-namespace {
-
-at::Tensor as_tensor(ConstPointsRef<float> points, const Mlp& mlp) {
-  return at::from_blob(const_cast<float*>(points.data()), {points.rows(), 3}, {points.outerStride(), 1},
-                       at::kFloat)
-      .to(mlp.parameters().options())
-      .contiguous();
-}
-
-void copy_out(const at::Tensor& from, float* to, Index stride) {
-  at::Tensor target = from.dim() == 1 ? at::from_blob(to, {from.size(0)}, at::kFloat)
-                                      : at::from_blob(to, {from.size(0), 3}, {stride, 1}, at::kFloat);
-  target.copy_(from);
-}
-
-}  // namespace
-
-NeuralSdf::NeuralSdf(Mlp mlp, const Frame& frame) : mlp_(std::move(mlp)), frame_(frame) {
-  require(mlp_.shape().outputs == 1, "network", std::to_string(mlp_.shape().outputs) + " outputs",
+NeuralSdf::NeuralSdf(Mlp mlp, const Frame& frame)
+    : mlp_(std::make_unique<Mlp>(std::move(mlp))), frame_(frame) {
+  require(shape().outputs == 1, "network", std::to_string(shape().outputs) + " outputs",
           "a distance function has one");
 }
+
+NeuralSdf::~NeuralSdf() = default;
+
+const MlpShape& NeuralSdf::shape() const { return mlp_->shape(); }
+
+Layers NeuralSdf::layers() const { return layers_of(*mlp_); }
 
 std::shared_ptr<NeuralSdf> NeuralSdf::from_layers(const Layers& layers, int octaves, double frequency,
                                                   double sharpness, const Frame& frame) {
@@ -38,7 +28,8 @@ std::shared_ptr<NeuralSdf> NeuralSdf::from_layers(const Layers& layers, int octa
 void NeuralSdf::evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> values) const {
   const ThreadScope scope;
   if (points.rows() == 0) return;
-  copy_out(mlp_.evaluate(as_tensor(points, mlp_), JetOrder::value).view({-1}), values.data(), 1);
+  tensor_view(values).copy_(
+      mlp_->evaluate(tensor_like(points, mlp_->parameters()), JetOrder::value).view({-1}));
 }
 
 void NeuralSdf::evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> values,
@@ -46,9 +37,9 @@ void NeuralSdf::evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> value
   const ThreadScope scope;
   if (points.rows() == 0) return;
   at::Tensor value, gradient;
-  mlp_.evaluate_with_gradient(as_tensor(points, mlp_), value, gradient);
-  copy_out(value, values.data(), 1);
-  copy_out(gradient, gradients.data(), gradients.outerStride());
+  mlp_->evaluate_with_gradient(tensor_like(points, mlp_->parameters()), value, gradient);
+  tensor_view(values).copy_(value);
+  tensor_view(gradients).copy_(gradient);
 }
 
 Vector NeuralSdf::distances(PointsIn points) const {

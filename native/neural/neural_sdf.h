@@ -6,16 +6,19 @@
 
 #include "core/frame.h"
 #include "core/implicit.h"
-#include "neural/layers.h"
+#include "neural/mlp_shape.h"
 
 namespace arapfields {
 
+class Mlp;
+
 /// A network with one output as a signed distance function on the unit cube (cube units, negative inside),
 /// with the frame that places the cube in mesh coordinates.
-class NeuralSdf final : public ImplicitFunction {
+class ARAPFIELDS_EXPORT NeuralSdf final : public ImplicitFunction {
  public:
   /// Throws InvalidInput for a network that has not one output.
   explicit NeuralSdf(Mlp mlp, const Frame& frame = {});
+  ~NeuralSdf() override;
   /// A published network: its frame is the identity. Throws InvalidInput as shape_of() does.
   static std::shared_ptr<NeuralSdf> from_layers(const Layers& layers, int octaves, double frequency,
                                                 double sharpness, const Frame& frame = {});
@@ -30,11 +33,15 @@ class NeuralSdf final : public ImplicitFunction {
   /// ∂distance/∂point (p,3) of the same.
   Points gradients(PointsIn points) const;
 
-  const Frame& frame() const { return frame_; }
-  const Mlp& mlp() const { return mlp_; }
+  Frame frame() const override { return frame_; }
+  const MlpShape& shape() const;
+  /// What from_layers() takes.
+  Layers layers() const;
+  /// The network itself, for sources that know its class.
+  const Mlp& mlp() const { return *mlp_; }
 
  private:
-  Mlp mlp_;
+  std::unique_ptr<Mlp> mlp_;
   Frame frame_;
 };
 

@@ -70,7 +70,8 @@ def automatic_rates(block):
 
 def header(table, name):
     block = table[name]
-    includes = [f'#include "options/{group}.h"\n' for group in block["groups"]]
+    includes = ['#include "core/export.h"\n']
+    includes += [f'#include "options/{group}.h"\n' for group in block["groups"]]
     if any(option["enum"] and not option["group"] for option in block["options"]):
         includes.append('#include "options/choices.h"\n')
     standard = [f"#include <{header}>\n" for header in ("cstdint", "limits", "string")]
@@ -81,7 +82,7 @@ def header(table, name):
         *sorted(includes),
         "\nnamespace arapfields {\n\n",
     ]
-    lines += [comment(block["about"] + "."), f"struct {block['struct']} {{\n"]
+    lines += [comment(block["about"] + "."), f"struct ARAPFIELDS_EXPORT {block['struct']} {{\n"]
     opened = set()
     for option in block["options"]:
         group = option["group"]
@@ -114,14 +115,17 @@ def changed(table, block, group):
 
 
 def choices_header(table):
-    lines = [f"{LICENCE}\n{NOTE}\n#pragma once\n\n#include <string>\n\nnamespace arapfields {{\n"]
+    lines = [
+        f'{LICENCE}\n{NOTE}\n#pragma once\n\n#include <string>\n\n#include "core/export.h"\n\nnamespace arapfields {{\n'
+    ]
     for enum, option in enums(table).items():
         lines += ["\n", comment(option["sentence"] + "."), f"enum class {enum} {{\n"]
         for choice, (_, sentence) in option["choices"].items():
             lines += [comment(sentence + ".", "  "), f"  {choice},\n"]
-        lines.append(f"}};\nconst char* name_of({enum} value);\n")
+        lines.append(f"}};\nARAPFIELDS_EXPORT const char* name_of({enum} value);\n")
         lines.append("/// Throws InvalidInput that names `argument` for a text that is no choice.\n")
-        lines.append(f"void choose(const std::string& text, const std::string& argument, {enum}& value);\n")
+        lines.append("ARAPFIELDS_EXPORT void choose(const std::string& text, const std::string& argument, ")
+        lines.append(f"{enum}& value);\n")
     return "".join([*lines, "\n}  // namespace arapfields\n"])
 
 

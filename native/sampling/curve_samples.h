@@ -15,6 +15,6 @@ struct CurveSamples {
 /// `count` points at equal distances along the polygon with these vertices (m,2). The first is half a
 /// distance after the first vertex. Throws InvalidInput for fewer than two (closed: three) vertices,
 /// non-finite ones, no length, or count < 1.
-CurveSamples sample_curve(Points2In vertices, Index count, bool closed = true);
+ARAPFIELDS_EXPORT CurveSamples sample_curve(Points2In vertices, Index count, bool closed = true);
 
 }  // namespace arapfields

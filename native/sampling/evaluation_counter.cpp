@@ -23,7 +23,7 @@ VectorF EvaluationCounter::values(ConstPointsRef<float> points) {
   VectorF result(points.rows());
   for (Index begin = 0; begin < points.rows(); begin += batch) {
     progress_.check();
-    const Index size = std::min(batch, points.rows() - begin);
+    const Index size = std::min<Index>(batch, points.rows() - begin);
     function_.evaluate(points.middleRows(begin, size), result.segment(begin, size));
   }
   value_count_ += points.rows();
@@ -36,7 +36,7 @@ VectorF EvaluationCounter::values(ConstPointsRef<float> points, PointsF& gradien
   gradients.resize(points.rows(), 3);
   for (Index begin = 0; begin < points.rows(); begin += batch / 4) {
     progress_.check();
-    const Index size = std::min(batch / 4, points.rows() - begin);
+    const Index size = std::min<Index>(batch / 4, points.rows() - begin);
     function_.evaluate(points.middleRows(begin, size), result.segment(begin, size),
                        gradients.middleRows(begin, size));
   }

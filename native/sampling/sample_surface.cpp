@@ -84,8 +84,8 @@ void shuffle(std::vector<Bracket>& items, std::size_t begin, Random& random) {
 
 }  // namespace
 
-SurfaceSamples sample_surface(const ImplicitFunction& implicit, const Frame& frame,
-                              const SampleOptions& options, const Progress& progress, SampleReport* report) {
+SurfaceSamples sample_surface(const ImplicitFunction& implicit, const SampleOptions& options,
+                              const Progress& progress, SampleReport* report) {
   options.validate();
   require_memory("count", 12.0 * sizeof(double) * static_cast<double>(options.count));
   const auto start = std::chrono::steady_clock::now();
@@ -96,7 +96,7 @@ SurfaceSamples sample_surface(const ImplicitFunction& implicit, const Frame& fra
   if (model.active().empty()) throw_empty("its values keep one sign in the whole cube");
 
   SurfaceSamples samples;
-  samples.frame = frame;
+  samples.frame = implicit.frame();
   samples.points.resize(options.count, 3);
   samples.normals.resize(options.count, 3);
   const auto seed = static_cast<std::uint64_t>(options.seed);
@@ -137,6 +137,18 @@ SurfaceSamples sample_surface(const ImplicitFunction& implicit, const Frame& fra
                .largest_value = largest,
                .seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()};
   progress.report(1.0, "sampled the surface");
+  return samples;
+}
+
+SurfaceSamples sample_surface(const std::shared_ptr<const ImplicitFunction>& function,
+                              const SampleOptions& options, const Progress& progress, SampleReport* report) {
+  SurfaceSamples samples = sample_surface(*function, options, progress, report);
+  samples.redraw = [function, options](Index count, std::uint64_t seed) {
+    SampleOptions again = options;
+    again.count = static_cast<int>(count);
+    again.seed = static_cast<std::int64_t>(seed >> 11);  // options hold 53 bits
+    return sample_surface(*function, again);
+  };
   return samples;
 }
 

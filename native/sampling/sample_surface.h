@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <memory>
+
 #include "core/implicit.h"
 #include "core/task.h"
 #include "mesh/surface_samples.h"
@@ -23,8 +25,14 @@ struct SampleReport {
 /// crossings of random lines (Ling et al. 2025, "Uniform sampling of surfaces by casting rays"), thinned to
 /// `count` at random. Depends on the seed, not on the number of threads.
 /// Throws InvalidInput for bad options, a function that is not finite, and a surface that no line crosses.
-SurfaceSamples sample_surface(const ImplicitFunction& function, const Frame& frame,
-                              const SampleOptions& options, const Progress& progress = {},
-                              SampleReport* report = nullptr);
+ARAPFIELDS_EXPORT SurfaceSamples sample_surface(const ImplicitFunction& function,
+                                                const SampleOptions& options = {},
+                                                const Progress& progress = {},
+                                                SampleReport* report = nullptr);
+/// The same, of a function that the samples keep: they can then be drawn anew (SurfaceSamples::redraw).
+ARAPFIELDS_EXPORT SurfaceSamples sample_surface(const std::shared_ptr<const ImplicitFunction>& function,
+                                                const SampleOptions& options = {},
+                                                const Progress& progress = {},
+                                                SampleReport* report = nullptr);
 
 }  // namespace arapfields

@@ -6,8 +6,9 @@
 #include "core/device.h"
 #include "core/parallel.h"
 #include "fields/neural_field.h"
-#include "solve/inverse_training.h"
+#include "solve/invertible_objective.h"
 #include "solve/radial.h"
+#include "solve/report.h"
 #include "solve/setup.h"
 
 namespace arapfields {
@@ -63,7 +64,8 @@ Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handle
 
   const MlpShape shape{options.network, 3};
   const auto seed = static_cast<std::uint64_t>(options.training.seed);
-  auto field = std::make_shared<NeuralField>(shape, seed, false, resolve_device(options.machine.device));
+  const std::string device = resolve_device(options.machine.device);
+  auto field = std::make_shared<NeuralField>(shape, seed, false, device);
   field->network()->round_products(options.precision == ProductPrecision::bfloat16);
   std::vector<std::string> notes;
   if (options.exact_handles) field->set_handles(exact_blend(terms.handles, options.margin, notes));
@@ -72,14 +74,12 @@ Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handle
     field->set_base(radial_start(samples, handles, options, progress.part(0.0, share)));
 
   LoopOptions loop;
-  loop.stage = "deform";
   loop.training = options.training;
   WrapObjective wrap;
   if (options.invertibility > 0.0)
     wrap = [&](Objective& inner) {
       return std::make_unique<InvertibleObjective>(inner, samples, options.training.batch,
-                                                   options.invertibility, shape, loop,
-                                                   resolve_device(options.machine.device));
+                                                   options.invertibility, shape, loop, device);
     };
   Solution solution = solve_field(field, samples, std::move(terms), loop, progress.part(share, 1.0), wrap);
   solution.report.notes = notes;

@@ -34,7 +34,7 @@ struct CurveSolution {
 /// alternating rotations and a linear solve, then quasi-Newton on stretch + λ_bend·bend +
 /// handle_weight·handles. Throws InvalidInput for no handles, indices out of range, and motions that are not
 /// rigid.
-CurveSolution deform_curve(Points2In points, const std::vector<CurveHandle>& handles,
-                           const CurveOptions& options = {}, const Progress& progress = {});
+ARAPFIELDS_EXPORT CurveSolution deform_curve(Points2In points, const std::vector<CurveHandle>& handles,
+                                             const CurveOptions& options = {}, const Progress& progress = {});
 
 }  // namespace arapfields

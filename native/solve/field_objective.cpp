@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "solve/field_objective.h"
 
-#include <ATen/ATen.h>
-
 #include <algorithm>
 
-#include "core/device.h"
+#include "core/aten_path.h"
+#include "core/tensors.h"
 #include "distance/morton.h"
 #include "energies/arap.h"
 #include "energies/aten_energies.h"
@@ -14,27 +13,12 @@
 namespace arapfields {
 namespace {
 
-template <class Scalar>
-at::Tensor to_tensor(const PointsOf<Scalar>& points) {
-  return at::from_blob(const_cast<Scalar*>(points.data()), {points.rows(), 3},
-                       c10::CppTypeToScalarType<Scalar>::value);
-}
-
-/// Rows of numbers in the dtype and on the device of `like`.
-template <class Rows>
-at::Tensor uploaded(const Rows& rows, const at::Tensor& like) {
-  const at::Tensor host =
-      at::from_blob(const_cast<typename Rows::Scalar*>(rows.data()), {rows.rows(), rows.cols()},
-                    c10::CppTypeToScalarType<typename Rows::Scalar>::value);
-  return upload(host.to(like.scalar_type()), like);
-}
-
 /// The field's jets in main memory and a zero block for their cotangents, which pull_back() hands over.
 template <class Scalar>
 struct HostJets {
   HostJets(TrainableField& field, const PointsOf<Scalar>& points, JetOrder order)
       : trained(field),
-        jets(field.forward(to_tensor(points), order)),
+        jets(field.forward(tensor_view(points), order)),
         cotangents(at::zeros_like(jets)),
         count(points.rows()),
         jet_order(order) {}
@@ -55,7 +39,7 @@ struct FieldObjective::Constants {
     if (!terms.preference) return;
     RowMatrix<double> rows(terms.preference->normals.rows(), 4);
     rows << terms.preference->normals, terms.preference->weights;
-    preferred = uploaded(rows, like);
+    preferred = tensor_like(rows, like);
   }
   EnergyTables tables;
   at::Tensor preferred;
@@ -139,10 +123,10 @@ at::Tensor FieldObjective::by_compositions(TrainableField& field, Random& random
   at::Tensor value = terms_.rigidity * (arap[0] + terms_.surface.bending * arap[1]);
   if (styled())
     value +=
-        terms_.gauss *
-        aten_gauss(jets, uploaded(batch.normals, like),
-                   batch.weights.size() > 0 ? uploaded(batch.weights, like).select(1, 0) : at::Tensor(),
-                   constants_->preferred, terms_.preference->sharpness, terms_.gauss, tables, cotangents);
+        terms_.gauss * aten_gauss(jets, tensor_like(batch.normals, like),
+                                  batch.weights.size() > 0 ? tensor_like(batch.weights, like) : at::Tensor(),
+                                  constants_->preferred, terms_.preference->sharpness, terms_.gauss, tables,
+                                  cotangents);
   if (terms_.surface.barrier > 0.0)
     value += terms_.surface.barrier *
              aten_barrier(jets, terms_.surface.barrier_threshold, terms_.surface.barrier, tables, cotangents);
@@ -151,8 +135,8 @@ at::Tensor FieldObjective::by_compositions(TrainableField& field, Random& random
   const HandleBatch<double> pairs = terms_.handles.batch<double>(terms_.pull.handle_batch, random);
   const at::Tensor ends = field.forward_at(pairs.sources, JetOrder::value);
   const at::Tensor pull = at::zeros_like(ends);
-  value += terms_.pull.handle_weight * aten_handles(ends, uploaded(pairs.targets, like),
-                                                    uploaded(pairs.weights, like).select(1, 0),
+  value += terms_.pull.handle_weight * aten_handles(ends, tensor_like(pairs.targets, like),
+                                                    tensor_like(pairs.weights, like),
                                                     terms_.pull.handle_weight, pull);
   field.pull_back(pull);
   return value;

@@ -9,7 +9,7 @@
 #include "mesh/surface_samples.h"
 #include "options/handles.h"
 #include "options/surface.h"
-#include "solve/training_loop.h"
+#include "solve/objective.h"
 
 namespace arapfields {
 

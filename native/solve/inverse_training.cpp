@@ -1,31 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "solve/inverse_training.h"
 
-#include <ATen/ATen.h>
-
 #include "core/device.h"
 #include "core/parallel.h"
+#include "fields/neural_field.h"
+#include "solve/cycle.h"
+#include "solve/objective.h"
 #include "solve/setup.h"
 
 namespace arapfields {
 namespace {
-
-at::Tensor to_tensor(const Points& points, const at::Tensor& like) {
-  const at::Tensor host = at::from_blob(const_cast<double*>(points.data()), {points.rows(), 3}, at::kDouble);
-  return upload(host.to(like.scalar_type()), like);
-}
-
-Points uniform_in(const Vec3& low, const Vec3& high, Index count, Random& random) {
-  Points points(count, 3);
-  for (Index p = 0; p < count; ++p)
-    for (int i = 0; i < 3; ++i) points(p, i) = random.uniform(low[i], high[i]);
-  return points;
-}
-
-/// Rows J_pᵀ r_p.
-at::Tensor transposed_times(const at::Tensor& jets, const at::Tensor& residuals) {
-  return (jets.slice(0, first_column(0), first_column(3)) * residuals).sum(2).t();
-}
 
 /// Trains g for a fixed f.
 class CycleObjective final : public Objective {
@@ -47,11 +31,11 @@ class CycleObjective final : public Objective {
       x.row(p) = rest_.row(i);
     }
     y.bottomRows(batch_ - surface) = uniform_in(low_, high_, batch_ - surface, random);
-    const at::Tensor images = to_tensor(y, inverse.parameters());
+    const at::Tensor images = tensor_like(y, inverse.parameters());
     const at::Tensor back = inverse.forward(images, JetOrder::value)[0];
     const at::Tensor jets = field_.jets(back, JetOrder::first);
     const at::Tensor cycle = jets[0] - images;
-    const at::Tensor direct = back.slice(0, 0, surface) - to_tensor(x, images);
+    const at::Tensor direct = back.slice(0, 0, surface) - tensor_like(x, images);
     const double scale = 1.0 / static_cast<double>(batch_);
     at::Tensor cotangents = 2.0 * scale * transposed_times(jets, cycle);
     cotangents.slice(0, 0, surface).add_(direct, 2.0 * scale);
@@ -81,10 +65,9 @@ Solution train_inverse(const DeformationField& field, const SurfaceSamples& samp
   const Points rest = field.frame().to_cube(samples.frame.to_mesh(samples.points));
   CycleObjective objective(field, rest, options.training.batch);
   LoopOptions loop;
-  loop.stage = "inverse";
   loop.training = options.training;
-  loop.final_share = 0.01;
-  loop.lr_hold_fraction = 0.3;
+  loop.schedule.hold_fraction = 0.3;
+  loop.schedule.final_share = 0.01;
   Solution solution{inverse, {}};
   solution.report.loop = minimise(*inverse, objective, loop, progress);
   Points images(rest.rows(), 3), back(rest.rows(), 3);
@@ -95,34 +78,6 @@ Solution train_inverse(const DeformationField& field, const SurfaceSamples& samp
   solution.report.handle_mean = {error.mean()};
   solution.report.handle_max = {error.maxCoeff()};
   return solution;
-}
-
-InvertibleObjective::InvertibleObjective(Objective& inner, const SurfaceSamples& samples, Index batch,
-                                         double weight, const MlpShape& shape, const LoopOptions& options,
-                                         const std::string& device)
-    : inner_(inner),
-      samples_(samples),
-      batch_(batch),
-      weight_(weight),
-      iterations_(std::max(1, options.training.iterations)),
-      inverse_(shape, static_cast<std::uint64_t>(options.training.seed) + 1, false, device),
-      optimizer_(inverse_, options) {}
-
-at::Tensor InvertibleObjective::accumulate(TrainableField& field, Random& random) {
-  const at::Tensor inner = inner_.accumulate(field, random);
-  Points x = uniform_in(-Vec3::Ones(), Vec3::Ones(), batch_, random);
-  for (Index p = 0; p < batch_ / 2; ++p) x.row(p) = samples_.points.row(random.below(samples_.size()));
-  const at::Tensor images = field.forward_at(x, JetOrder::value)[0];
-  const at::Tensor jets = inverse_.forward(images, JetOrder::first);
-  const at::Tensor residual = jets[0] - to_tensor(x, jets);
-  const double scale = weight_ / static_cast<double>(batch_);
-  at::Tensor inverse_cotangents = at::zeros_like(jets);
-  inverse_cotangents[0].copy_(residual * (2.0 / static_cast<double>(batch_)));
-  field.pull_back((2.0 * scale * transposed_times(jets, residual)).unsqueeze(0));
-  inverse_.gradient().zero_();
-  inverse_.pull_back(inverse_cotangents);
-  optimizer_.step(optimizer_.rate(static_cast<double>(done_++) / iterations_));
-  return inner + scale * residual.square().sum();
 }
 
 }  // namespace arapfields

@@ -16,7 +16,7 @@ constexpr Index most_samples = 1000;
 }  // namespace
 
 RowMatrix<double> surface_stiffness(const RadialBasis& basis, PointsIn samples, double bending) {
-  const Index taken = std::min(samples.rows(), most_samples);
+  const Index taken = std::min<Index>(samples.rows(), most_samples);
   Points some(taken, 3);
   for (Index i = 0; i < taken; ++i) some.row(i) = samples.row(i * samples.rows() / taken);
   RowMatrix<double> rows = radial_rows(basis, some, JetOrder::second);

@@ -1,53 +1,89 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "solve/loss_probe.h"
 
-#include <ATen/ATen.h>
-
 #include "core/parallel.h"
+#include "core/tensors.h"
+#include "fields/neural_field.h"
+#include "solve/field_objective.h"
 
 namespace arapfields {
-
-LossProbe probe_loss(NeuralField& field, FieldObjective& objective, const Vector& parameters,
-                     std::uint64_t seed) {
-  const ThreadScope scope;
-  const at::Tensor given =
-      at::from_blob(const_cast<double*>(parameters.data()), {parameters.size()}, at::kDouble);
-  require(given.numel() == field.parameters().numel(), "parameters",
-          std::to_string(given.numel()) + " numbers",
-          std::to_string(field.parameters().numel()) + " are needed");
-  field.parameters().copy_(given);
-  field.gradient().zero_();
-  Random random(seed);
-  LossProbe probe;
-  probe.loss = objective.accumulate(field, random).item<double>();
-  const at::Tensor gradient = field.gradient().to(at::kDouble).contiguous();
-  probe.gradient = Eigen::Map<const Vector>(gradient.const_data_ptr<double>(), gradient.numel());
-  return probe;
-}
-
 namespace {
 
-ObjectiveTerms rigidity_alone(Index batch, double bending) {
-  ObjectiveTerms terms;
-  terms.batch = batch;
-  terms.surface.bending = bending;
-  return terms;
+std::shared_ptr<const HandleBlend> blend(const BoundHandles& handles, double margin) {
+  std::vector<RigidRegion> regions;
+  for (Index i = 0; i < handles.count(); ++i)
+    regions.push_back({handles.handle(i).rest, handles.motion(i), margin, ""});
+  return std::make_shared<HandleBlend>(std::move(regions));
 }
 
 }  // namespace
 
-EnergyTrial::EnergyTrial(const SurfaceSamples& samples, Index batch, double bending)
-    : samples_(samples),
-      field_(MlpShape{}, 0),
-      objective_(samples_, rigidity_alone(batch, bending)),
-      random_(0) {
-  field_.network()->weight(field_.shape().layers).fill_(0.01);
+struct LossProbe::State {
+  State(const SurfaceSamples& given, int width, ObjectiveTerms terms)
+      : samples(given),
+        field(MlpShape{{width, 2, 2, 1.0, 5.0}, 3}, 0, true),
+        objective(samples, std::move(terms)) {}
+
+  SurfaceSamples samples;
+  NeuralField field;
+  FieldObjective objective;
+};
+
+LossProbe::LossProbe(const SurfaceSamples& samples, const std::vector<Handle>& handles, int width,
+                     double bending, const Points& preferred, double gauss, double barrier, double margin) {
+  ObjectiveTerms terms;
+  terms.batch = 20;
+  terms.surface.bending = bending;
+  if (preferred.rows() > 0) terms.preference = gauss_preference(preferred);
+  terms.gauss = gauss;
+  terms.surface.barrier = barrier;
+  terms.surface.barrier_threshold = 0.9;
+  terms.handles = BoundHandles(handles, samples.points);
+  terms.pull.handle_batch = 8;
+  state_ = std::make_unique<State>(samples, width, std::move(terms));
+  if (margin > 0.0) state_->field.set_handles(blend(state_->objective.terms().handles, margin));
 }
+
+LossProbe::~LossProbe() = default;
+
+Index LossProbe::size() const { return state_->field.parameters().numel(); }
+
+LossGradient LossProbe::operator()(const Vector& parameters, std::uint64_t seed) {
+  const ThreadScope scope;
+  NeuralField& field = state_->field;
+  require(parameters.size() == size(), "parameters", std::to_string(parameters.size()) + " numbers",
+          std::to_string(size()) + " are needed");
+  field.parameters().copy_(tensor_view(parameters));
+  field.gradient().zero_();
+  Random random(seed);
+  const double loss = state_->objective.accumulate(field, random).item<double>();
+  return {loss, vector_of(field.gradient())};
+}
+
+struct EnergyTrial::State {
+  State(const SurfaceSamples& given, ObjectiveTerms terms)
+      : samples(given), field(MlpShape{}, 0), objective(samples, std::move(terms)), random(0) {}
+
+  SurfaceSamples samples;
+  NeuralField field;
+  FieldObjective objective;
+  Random random;
+};
+
+EnergyTrial::EnergyTrial(const SurfaceSamples& samples, Index batch, double bending) {
+  ObjectiveTerms terms;
+  terms.batch = batch;
+  terms.surface.bending = bending;
+  state_ = std::make_unique<State>(samples, std::move(terms));
+  state_->field.network()->weight(state_->field.shape().layers).fill_(0.01);
+}
+
+EnergyTrial::~EnergyTrial() = default;
 
 double EnergyTrial::run() {
   const ThreadScope scope;
-  field_.gradient().zero_();
-  return objective_.accumulate(field_, random_).item<double>();
+  state_->field.gradient().zero_();
+  return state_->objective.accumulate(state_->field, state_->random).item<double>();
 }
 
 }  // namespace arapfields

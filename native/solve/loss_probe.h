@@ -1,34 +1,49 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Objectives as tests and benchmarks ask for them.
 #pragma once
 
+#include <memory>
+
 #include "core/random.h"
-#include "fields/neural_field.h"
-#include "solve/field_objective.h"
+#include "energies/handles.h"
+#include "mesh/surface_samples.h"
 
 namespace arapfields {
 
-/// Value and parameter gradient of an objective in double precision, for comparison with differences.
-struct LossProbe {
+struct LossGradient {
   double loss = 0.0;
   Vector gradient;
 };
 
-/// The field's parameters become `parameters`; the subsets are those of `seed`.
-LossProbe probe_loss(NeuralField& field, FieldObjective& objective, const Vector& parameters,
-                     std::uint64_t seed);
+/// Value and parameter gradient of an objective in double precision, for comparison with differences: a small
+/// network with whatever fixed parts and terms a test asks for. Handles are in cube coordinates, exact with a
+/// margin above 0.
+class ARAPFIELDS_EXPORT_TO_TESTS LossProbe {
+ public:
+  LossProbe(const SurfaceSamples& samples, const std::vector<Handle>& handles, int width, double bending,
+            const Points& preferred, double gauss, double barrier, double margin);
+  ~LossProbe();
+  /// The parameters become these; the subsets are those of the seed.
+  LossGradient operator()(const Vector& parameters, std::uint64_t seed);
+  /// Number of parameters.
+  Index size() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 
 /// The rigidity energy and its parameter gradient in the field's usual network, for timing.
-class EnergyTrial {
+class ARAPFIELDS_EXPORT_TO_TESTS EnergyTrial {
  public:
   /// `batch` samples an evaluation; the network starts with random weights in its last layer as well.
   EnergyTrial(const SurfaceSamples& samples, Index batch, double bending);
+  ~EnergyTrial();
   double run();
 
  private:
-  SurfaceSamples samples_;
-  NeuralField field_;
-  FieldObjective objective_;
-  Random random_;
+  struct State;
+  std::unique_ptr<State> state_;
 };
 
 }  // namespace arapfields

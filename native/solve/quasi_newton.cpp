@@ -96,7 +96,7 @@ QuasiNewtonReport QuasiNewton::minimise(const MeasuredObjectiveOf<Scalar>& objec
   now.u = u;
   now.value = objective.value(now.u, &now.cotangents);
   report.evaluations = 1;
-  if (!std::isfinite(now.value)) throw Diverged("live solve: the energy is not finite at the start");
+  if (!std::isfinite(now.value)) throw Diverged("NaN or infinity in the energy at the start");
   RowMatrix<double> gradient = objective.pull_back(now.cotangents);
   Eigen::VectorX<Scalar> du;
   while (report.iterations < options.iterations) {

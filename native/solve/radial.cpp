@@ -39,7 +39,7 @@ LoopResult run(LiveSolver& live, const TrainingOptions& how, const Progress& pro
     result.seconds = watch.seconds();
     if (live.report().iterations < steps) break;
     if (how.time_budget > 0.0 && result.seconds > how.time_budget) {
-      result.out_of_time = true;
+      result.stopped_by = StopReason::time_budget;
       break;
     }
   }

@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "solve/field_measures.h"
+#include "solve/setup.h"
+
 namespace arapfields {
 namespace {
 
@@ -67,6 +70,15 @@ SolveReport measure(const DeformationField& field, const SurfaceSamples& samples
   return report;
 }
 
+FieldMeasures measure_at(const DeformationField& field, PointsIn points) {
+  SurfaceSamples samples;
+  samples.frame = field.frame();
+  samples.points = samples.frame.to_cube(points);
+  require_samples(samples);
+  const SolveReport report = measure(field, samples, ObjectiveTerms(), samples.size());
+  return {report.arap, report.distortion};
+}
+
 Solution measured(std::shared_ptr<DeformationField> field, const SurfaceSamples& samples,
                   const ObjectiveTerms& terms, LoopResult loop) {
   Solution solution{std::move(field), {}};
@@ -90,10 +102,10 @@ Solution solve_field(std::shared_ptr<TrainableField> field, const SurfaceSamples
         minimise(*field, wrapped ? *wrapped : objective, options, progress.part(0.0, 0.95), shown);
     progress.report(0.95, "measuring the result");
     Solution solution = measured(field, samples, objective.terms(), std::move(loop));
-    progress.report(1.0, options.stage + ": done");
+    progress.report(1.0, "done");
     return solution;
-  } catch (const Diverged& cause) {
-    throw SolveDiverged(cause, measured(field, samples, objective.terms(), {}));
+  } catch (const LoopDiverged& cause) {
+    throw SolveDiverged(cause, measured(field, samples, objective.terms(), cause.result));
   }
 }
 

@@ -2,23 +2,12 @@
 // What the solvers share.
 #pragma once
 
-#include <chrono>
-
 #include "core/errors.h"
+#include "core/stopwatch.h"
 #include "energies/handles.h"
 #include "mesh/surface_samples.h"
 
 namespace arapfields {
-
-class Stopwatch {
- public:
-  double seconds() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
-};
 
 inline void require_samples(const SurfaceSamples& samples) {
   require(samples.size() > 0, "samples", "none were given", "at least one is needed");

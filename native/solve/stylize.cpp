@@ -5,6 +5,7 @@
 #include "core/parallel.h"
 #include "fields/neural_field.h"
 #include "solve/radial.h"
+#include "solve/report.h"
 #include "solve/setup.h"
 
 namespace arapfields {
@@ -65,7 +66,6 @@ Solution stylize(const SurfaceSamples& samples, PointsIn preferred, const Styliz
                                              resolve_device(options.machine.device));
   field->network()->round_products(options.precision == ProductPrecision::bfloat16);
   LoopOptions loop;
-  loop.stage = "stylize";
   loop.training = options.training;
   if (terms.gauss == 0.0 && handles.empty()) loop.training.iterations = 0;
   Solution solution = solve_field(field, samples, std::move(terms), loop, progress);

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "core/task.h"
+#include "energies/handles.h"
+#include "mesh/surface_samples.h"
 #include "options/stylize.h"
-#include "solve/report.h"
+#include "solve/solution.h"
 
 namespace arapfields {
 
@@ -13,8 +16,8 @@ namespace arapfields {
 /// sample is held in place. `weights` (one u ≥ 0 a sample, or empty) blend the effect. Strength 0 is the
 /// identity. Throws InvalidInput for bad options, samples without normals, weights or handles that do not
 /// fit; SolveDiverged; Cancelled.
-Solution stylize(const SurfaceSamples& samples, PointsIn preferred, const StylizeOptions& options,
-                 const Progress& progress = {}, const Vector& weights = {},
-                 const std::vector<Handle>& handles = {});
+ARAPFIELDS_EXPORT Solution stylize(const SurfaceSamples& samples, PointsIn preferred,
+                                   const StylizeOptions& options, const Progress& progress = {},
+                                   const Vector& weights = {}, const std::vector<Handle>& handles = {});
 
 }  // namespace arapfields

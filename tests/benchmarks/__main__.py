@@ -2,6 +2,9 @@
 """make bench: every benchmark module's run(), as one table on the screen and in build/bench.json.
 
 python -m tests.benchmarks [module ...]
+
+Without the published networks (ARAPFIELDS_DATA) it runs on shapes of our own. A section that cannot run is
+left out and says why; what it found at an earlier run stays in the file.
 """
 
 import importlib
@@ -10,14 +13,18 @@ import os
 import pkgutil
 import platform
 import sys
+import traceback
 from pathlib import Path
 
 import numpy as np
 
 import arapfields as af
 
+from . import shapes
+
 FOLDER = Path(__file__).parent
-ROOT = FOLDER.parents[1]
+TARGET = shapes.ROOT / "build" / "bench.json"
+HELPERS = {"__main__", "timing", "render", "live_cases", "live_picture", "shapes"}
 
 
 def machine():
@@ -36,25 +43,61 @@ def machine():
     }
 
 
+def earlier():
+    """What earlier runs found, {} where there are none."""
+    return json.loads(TARGET.read_text()) if TARGET.exists() else {}
+
+
+def keep(results):
+    """Writes the file anew, whole or not at all: a run may be stopped at any time."""
+    TARGET.parent.mkdir(exist_ok=True)
+    partial = TARGET.with_suffix(".partial")
+    partial.write_text(json.dumps(results, indent=1))
+    partial.replace(TARGET)
+
+
+def run(name):
+    """A section's rows, or why it is left out and whether that is an error of ours."""
+    try:
+        return importlib.import_module(f"tests.benchmarks.{name}").run(), None, False
+    except ModuleNotFoundError as error:
+        if (error.name or "").split(".")[0] in ("tests", "arapfields"):
+            raise
+        return None, f"needs the package {error.name}, which is not installed", False
+    except Exception as error:
+        traceback.print_exc()
+        return None, f"{type(error).__name__}: {error}", True
+
+
 def main(names):
-    os.environ.setdefault("ARAPFIELDS_DATA", str(ROOT.parent / "shared" / "data"))
-    skip = {"__main__", "timing", "render", "live_cases", "live_picture"}
-    known = [module.name for module in pkgutil.iter_modules([str(FOLDER)]) if module.name not in skip]
+    os.environ.setdefault("ARAPFIELDS_DATA", str(shapes.data()))
+    known = [module.name for module in pkgutil.iter_modules([str(FOLDER)]) if module.name not in HELPERS]
     unknown = sorted(set(names) - set(known))
     if unknown:
         sys.exit(f"no benchmark {', '.join(unknown)}; there are {', '.join(known)}")
-    target = ROOT / "build" / "bench.json"
-    target.parent.mkdir(exist_ok=True)
-    results = json.loads(target.read_text()) if target.exists() else {}
+    results = earlier()
     results["machine"] = machine()
     print("  ".join(f"{key} {value}" for key, value in results["machine"].items()), flush=True)
+    own = [name for name in shapes.OURS if not shapes.is_published(name)]
+    if own:
+        where = f"no published networks of {', '.join(own)} in {shapes.data()}"
+        print(f"{where}: shapes of our own instead", flush=True)
+    left_out, broken = {}, False
     for name in names or known:
-        module = importlib.import_module(f"tests.benchmarks.{name}")
-        rows = module.run()
+        rows, reason, ours = run(name)
+        broken |= ours
+        if reason:
+            left_out[name] = reason
+            continue
         results[name] = rows
         for row in rows:
             print(f"{name:12}", "  ".join(f"{key} {value}" for key, value in row.items()), flush=True)
-        target.write_text(json.dumps(results, indent=1))
+        keep(results)
+    for name, reason in left_out.items():
+        stays = ", its earlier figures stay" if name in results else ""
+        print(f"left out: {name} ({reason}){stays}", flush=True)
+    return 1 if broken else 0
 
 
-main(sys.argv[1:])
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surfaces of published networks at 256 points a side against dense evaluation and scikit-image.
+"""Surfaces of networks at 256 points a side against dense evaluation and scikit-image.
 
 PyTorch evaluates the dense grid in single precision, a plane of 65,536 points at a time. Both meshes are
 compared vertex by vertex; they differ by what the two evaluations of the network round differently, most on
@@ -13,8 +13,8 @@ from skimage.measure import marching_cubes
 
 import arapfields as af
 
-from . import timing
-from .sampling import DATA, THREADS, Counted, Network
+from . import shapes, timing
+from .sampling import THREADS, Counted
 
 CASES = [("bunny", 256), ("whale", 256), ("cube", 256)]
 
@@ -35,8 +35,7 @@ def run(rounds=1):
     torch.set_num_threads(THREADS)
     rows = []
     for name, resolution in CASES:
-        path = DATA / "neural_sdf" / f"{name}.pt"
-        sdf, network = af.NeuralSdf.from_layers(*Network.published(path).layers), Counted(path)
+        sdf, network = shapes.sdf(name), Counted(shapes.layers(name))
         report, found = {}, {}
 
         def ours(sdf=sdf, n=resolution, report=report, found=found):
@@ -50,7 +49,7 @@ def run(rounds=1):
         distance = max(cKDTree(a).query(b)[0].max(), cKDTree(b).query(a)[0].max())
         share = report["evaluations"] / report["dense_evaluations"]
         rows.append(
-            {"case": f"{name} {resolution}", **times, "evaluated": f"{share:.2%}", "vertices": len(a)}
-            | {"same_number": len(a) == len(b), "largest_distance": f"{distance:.1e}"}
+            {"case": f"{shapes.label(name)} {resolution}", **times, "evaluated": f"{share:.2%}"}
+            | {"vertices": len(a), "same_number": len(a) == len(b), "largest_distance": f"{distance:.1e}"}
         )
     return rows

@@ -5,7 +5,7 @@ import numpy as np
 
 import arapfields as af
 
-from .live_cases import FULL, Clock, deformer, handles, samples, targets
+from .live_cases import FULL, Clock, deformer, handles, label, samples, targets
 
 NEURAL_ITERATIONS = 500
 
@@ -42,7 +42,7 @@ def drag_row(name, neural, rounds=3, **options):
     centers = live.field.centers
     best = converged(live, name)
     return {
-        "what": f"{name}, {centers} centers"
+        "what": f"{label(name)}, {centers} centers"
         + ("" if options.get("interior", True) else ", straight distances"),
         "setup_s": round(setup, 3),
         "setup_cpu_s": round(setup_cpu, 3),
@@ -68,7 +68,7 @@ def polish_row(name, neural, iterations=NEURAL_ITERATIONS // 3):
             samples(name), handles(name, FULL), af.DeformOptions(start="radial", iterations=iterations)
         )
     return {
-        "what": f"{name}: neural polish of the radial field, {iterations} iterations",
+        "what": f"{label(name)}: neural polish of the radial field, {iterations} iterations",
         "energy": round(field.report["energy"], 4),
         "of_neural": round(field.report["energy"] / neural.report["energy"], 2),
         "of_its_time": round(clock.wall / neural.report["seconds"], 2),
@@ -96,7 +96,7 @@ def style_row(aim, options, most=60):
             if live.report["preference"] >= aim:
                 break
     return {
-        "what": f"spot to cube, mean g >= {aim}",
+        "what": f"{label('spot')} to cube, mean g >= {aim}",
         "centers": live.field.centers,
         "steps": steps,
         "seconds": round(clock.wall, 2),

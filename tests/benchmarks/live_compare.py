@@ -6,21 +6,21 @@ import numpy as np
 import arapfields as af
 
 from .live_cases import (
-    FINGERTIPS,
     FULL,
     Clock,
     cases,
     deformer,
+    drag,
+    hand,
     handles,
     inside,
-    rests,
+    label,
+    placements,
     samples,
     surface,
     targets,
     volume,
 )
-
-HAND_LENGTH = 1.48
 
 
 def mesh_energy(vertices, triangles, moved):
@@ -73,7 +73,7 @@ def compare_rows(name, resolution=96):
     vertices, triangles = surface(name, resolution)
     poses, whole = targets(name, FULL), volume(vertices, triangles)
     samples(name)
-    theirs, setup, clock, iterations = igl_arap(vertices, triangles, rests(name), poses)
+    theirs, setup, clock, iterations = igl_arap(vertices, triangles, placements(name), poses)
     with Clock() as our_setup:
         live = deformer(name)
         live.track(vertices)
@@ -83,7 +83,7 @@ def compare_rows(name, resolution=96):
     shared = {"vertices": len(vertices)}
     return [
         {
-            "what": f"{name}: live solver",
+            "what": f"{label(name)}: live solver",
             **shared,
             "setup_cpu_s": round(our_setup.cpu, 3),
             "steps": live.report["iterations"],
@@ -92,7 +92,7 @@ def compare_rows(name, resolution=96):
             "volume_ratio": round(volume(ours, triangles) / whole, 3),
         },
         {
-            "what": f"{name}: libigl, ARAP of the mesh",
+            "what": f"{label(name)}: libigl, ARAP of the mesh",
             **shared,
             "setup_cpu_s": round(setup.cpu, 3),
             "steps": iterations,
@@ -118,7 +118,7 @@ def cost_row(centers, count):
             steps += live.report["iterations"]
     live.solve(iterations=200, tolerance=1e-6)
     return {
-        "what": "bunny",
+        "what": label("bunny"),
         "centers": centers,
         "samples": count,
         "setup_cpu_s": round(setup.cpu, 3),
@@ -128,13 +128,11 @@ def cost_row(centers, count):
     }
 
 
-def finger_row(finger, motion, degrees, axis, interior=True, field=None):
-    palm, surface_samples = rests("hand")[0], samples("hand")
-    box, pivot = {
-        "middle": (rests("hand")[1], (-0.1, -0.05, 0.05)),
-        "index": (cases.box([0, -0.4, 0.45], [0.4, -0.14, 0.7]), (-0.05, -0.2, 0.05)),
-    }[finger]
-    pair = [cases.moved(palm), cases.moved(box, cases.turn(axis, degrees, pivot))]
+def finger_row(finger, motion, degrees, interior=True, field=None):
+    (palm, middle), surface_samples = placements("hand"), samples("hand")
+    box, pivot = (middle, drag("hand")[3]) if finger == "middle" else hand()["index"]
+    box = box if finger == "middle" else cases.box(*box)
+    pair = [cases.moved(palm), cases.moved(box, cases.turn(hand()[motion], degrees, pivot))]
     if field is None:
         live = af.LiveDeformer(surface_samples, pair, af.LiveOptions(interior=interior))
         field = live.solve(iterations=100, tolerance=1e-5)
@@ -146,14 +144,14 @@ def finger_row(finger, motion, degrees, axis, interior=True, field=None):
         trained = af.deform(surface_samples, pair, af.DeformOptions(iterations=300))
         energy, name, field = trained.report["energy"], field, trained
     row = {
-        "what": f"hand, {finger} {motion} {abs(degrees)} degrees",
+        "what": f"{label('hand')}, {finger} {motion} {abs(degrees)} degrees",
         "field": name,
         "energy": round(energy, 4),
     }
-    for tip, place in FINGERTIPS.items():
+    for tip, place in hand()["tips"].items():
         near = np.argsort(np.linalg.norm(surface_samples.points - place, axis=1))[:20]
         points = surface_samples.points[near]
-        share = np.linalg.norm(field(points) - points, axis=1).max() / HAND_LENGTH
+        share = np.linalg.norm(field(points) - points, axis=1).max() / hand()["length"]
         row[tip] = "moved" if tip == finger else f"{100 * share:.1f} %"
     return row
 
@@ -163,13 +161,13 @@ def run():
     for centers in (120, 360, 720, 1200, 1500):
         rows.append(cost_row(centers, 2000))
     rows += [cost_row(360, count) for count in (1000, 4000, 8000)]
-    for finger, motion, degrees, axis in (
-        ("middle", "aside", -25, [1, 0, 0]),
-        ("middle", "forward", 20, [0, 1, 0]),
-        ("middle", "forward", 50, [0, 1, 0]),
-        ("index", "forward", 50, [0, 1, 0]),
+    for finger, motion, degrees in (
+        ("middle", "aside", -25),
+        ("middle", "forward", 20),
+        ("middle", "forward", 50),
+        ("index", "forward", 50),
     ):
         for interior in (True, False):
-            rows.append(finger_row(finger, motion, degrees, axis, interior))
-        rows.append(finger_row(finger, motion, degrees, axis, field="neural, 300 iterations"))
+            rows.append(finger_row(finger, motion, degrees, interior))
+        rows.append(finger_row(finger, motion, degrees, field="neural, 300 iterations"))
     return rows

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The picture of docs/live.md: python -m tests.benchmarks.live_picture (libigl, matplotlib, the data)."""
 
-import os
 from pathlib import Path
 
 import numpy as np
 
-from .live_cases import FULL, cases, deformer, rests, samples, surface, targets
+from .live_cases import FULL, cases, deformer, placements, samples, surface, targets
 from .live_compare import af, igl_arap, volume
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -37,7 +36,6 @@ def draw(axes, vertices, triangles, toward, title, colour=MOVED):
 
 
 def main(resolution=80):
-    os.environ.setdefault("ARAPFIELDS_DATA", str(ROOT.parent / "shared" / "data"))
     import matplotlib
 
     matplotlib.use("Agg")
@@ -46,7 +44,7 @@ def main(resolution=80):
     figure, places = plt.subplots(2, 3, figsize=(9, 7.2))
     vertices, triangles = surface("bunny", resolution)
     whole, view = volume(vertices, triangles), [0.25, -1, 0.15]
-    theirs = igl_arap(vertices, triangles, rests("bunny"), targets("bunny", FULL))[0]
+    theirs = igl_arap(vertices, triangles, placements("bunny"), targets("bunny", FULL))[0]
     ours = deformer("bunny").solve(targets("bunny", FULL))(vertices)
     draw(places[0, 0], vertices, triangles, view, "rest", CLAY)
     for place, moved, name in (
@@ -55,7 +53,7 @@ def main(resolution=80):
     ):
         draw(place, moved, triangles, view, f"{name}: {volume(moved, triangles) / whole:.2f} of the volume")
     vertices, triangles = surface("hand", resolution)
-    palm, finger = rests("hand")
+    palm, finger = placements("hand")
     pair = [
         cases.moved(palm),
         cases.moved(finger, cases.turn([0, 1, 0], 50, (-0.1, -0.05, 0.05))),

@@ -1,13 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""20,000 uniform samples of published networks against iarap.sampling (the paper's authors' own), per point.
+"""20,000 uniform samples of networks against iarap.sampling (the paper's authors' own), per point.
 
 iarap takes a number of lines, not of points, and 2 ms a point: it gets LINES of them, and the same network in
 PyTorch. `uniformity` is the total-variation distance (216 cells) of our samples to area-uniform ones of the
 extracted mesh, over that between two area-uniform sets: 1 is ideal.
 """
-
-import sys
-from pathlib import Path
 
 import iarap.sampling
 import numpy as np
@@ -15,11 +12,7 @@ import torch
 
 import arapfields as af
 
-from . import timing
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from conftest import DATA
-from network_oracle import Network
+from . import shapes, timing
 
 NAMES = ["bunny", "whale", "cube"]
 COUNT = 20_000
@@ -28,20 +21,23 @@ THREADS = 2
 
 
 class Counted:
-    """The published network in single precision, as its authors evaluate it; counts points."""
+    """The network in single precision, as the published ones' authors evaluate them; counts points."""
 
-    def __init__(self, path):
-        state = torch.load(path, map_location="cpu")
-        self.layers = [(state[f"net.net.{i}.weight"], state[f"net.net.{i}.bias"]) for i in (0, 2, 4, 6, 8)]
+    def __init__(self, layers):
+        weights, biases, self.octaves, self.frequency, self.sharpness = layers
+        self.layers = [
+            (torch.tensor(weight, dtype=torch.float32), torch.tensor(bias, dtype=torch.float32))
+            for weight, bias in zip(weights, biases, strict=True)
+        ]
         self.evaluations = 0
 
     @torch.no_grad()
     def __call__(self, x):
         self.evaluations += len(x)
-        angles = x.unsqueeze(-1) * 2.0 ** torch.arange(4)
+        angles = x.unsqueeze(-1) * (self.frequency * 2.0 ** torch.arange(self.octaves))
         h = torch.stack([torch.cos(angles), torch.sin(angles)], -1).flatten(-3)
         for weight, bias in self.layers[:-1]:
-            h = torch.nn.functional.softplus(h @ weight.T + bias, beta=30)
+            h = torch.nn.functional.softplus(h @ weight.T + bias, beta=self.sharpness)
         return h @ self.layers[-1][0].T + self.layers[-1][1]
 
 
@@ -61,8 +57,7 @@ def run(rounds=3):
     torch.set_num_threads(THREADS)
     rows = []
     for name in NAMES:
-        path = DATA / "neural_sdf" / f"{name}.pt"
-        sdf, network = af.NeuralSdf.from_layers(*Network.published(path).layers), Counted(path)
+        sdf, network = shapes.sdf(name), Counted(shapes.layers(name))
         report, theirs_points = {}, []
 
         def ours(sdf=sdf, report=report):
@@ -76,7 +71,7 @@ def run(rounds=3):
         share = COUNT / np.mean(theirs_points)
         rows.append(
             {
-                "case": name,
+                "case": shapes.label(name),
                 "ours_ms_a_point": round(1e3 * times["ours_s"] / COUNT, 4),
                 "iarap_ms_a_point": round(1e3 * times["theirs_s"] * share / COUNT, 3),
                 "times_faster": round(times["times_faster"] * share, 1),

@@ -2,10 +2,10 @@
 """Cost against size: seconds and peak memory above the idle process, each in a process of its own."""
 
 import json
-import os
 import subprocess
 import sys
-from pathlib import Path
+
+from . import shapes
 
 SAMPLES = (300, 1000, 3000, 10_000, 30_000)
 WIDTHS = (64, 128, 256, 512)
@@ -17,10 +17,9 @@ import json, sys, time
 from pathlib import Path
 import numpy as np
 import arapfields as af
-sys.path[:0] = [{tests!r}]
-import cases, meshes
-from network_oracle import Network
-data = Path({data!r})
+sys.path[:0] = [{root!r}]
+from tests.benchmarks import shapes
+import meshes
 def peak(): return int(Path('/proc/self/status').read_text().split('VmHWM:')[1].split()[0]) / 1024
 def torus(count):
     n = int(np.sqrt(count / 2))
@@ -35,8 +34,7 @@ print(json.dumps(dict(seconds=round(seconds, 3), peak_MiB=round(peak() - before)
 
 def measured(prepare, work):
     """The figures of one run, or the error that it ended with."""
-    tests = str(Path(__file__).resolve().parents[1])
-    code = SETTING.format(tests=tests, data=os.environ["ARAPFIELDS_DATA"], prepare=prepare, work=work)
+    code = SETTING.format(root=str(shapes.ROOT), prepare=prepare, work=work)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     if done.returncode:
         return {"error": done.stderr.strip().splitlines()[-1][:100]}
@@ -44,8 +42,9 @@ def measured(prepare, work):
 
 
 def run():
-    bunny = "cases.published_samples(data / 'neural_sdf' / 'bunny.pt', 30000)"
-    solve = "af.deform(samples, cases.bunny_handles(), af.DeformOptions(iterations=5, {}))"
+    shapes.layers("bunny")  # if it has to be fitted, then now
+    bunny = "shapes.samples('bunny', 30000)"
+    solve = "af.deform(samples, shapes.handles('bunny', shapes.FULL), af.DeformOptions(iterations=5, {}))"
     warm = solve.format("batch=8")
     rows = []
     for count in SAMPLES:
@@ -55,9 +54,7 @@ def run():
         cost = measured(f"samples = {bunny}\n{warm}", solve.format(f"batch=1000, width={width}"))
         rows.append({"what": "5 iterations, 1,000 samples, width", "size": width, **cost})
     for resolution in RESOLUTIONS:
-        prepare = (
-            "sdf = af.NeuralSdf.from_layers(*Network.published(data / 'neural_sdf' / 'bunny.pt').layers)"
-        )
+        prepare = "sdf = shapes.sdf('bunny')"
         rows.append(
             {
                 "what": "extraction, points a side",

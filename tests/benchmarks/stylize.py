@@ -1,18 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Gauss stylization of the published cow towards a cube: time to a mean preference of 0.95.
+"""Gauss stylization of a cow towards a cube: time to a mean preference of 0.95.
 
 `at_175_s` are the seconds scaled to a machine whose bare matrix products run at 175 GFLOP/s.
 """
 
-import os
-import sys
-from pathlib import Path
-
 import arapfields as af
 
+from . import shapes
 from .timing import first_good, product_rate
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 PREFERENCE = 0.95
 
@@ -22,10 +17,7 @@ def good(field):
 
 
 def run():
-    import cases
-
-    data = Path(os.environ["ARAPFIELDS_DATA"])
-    samples = cases.published_samples(data / "neural_sdf" / "spot.pt")
+    samples = shapes.samples("spot")
     settings = {
         "neural 4x256": ({}, (60, 80, 100, 140, 200, 300)),
         "neural 4x128": (dict(width=128), (60, 80, 100, 140, 200, 300)),
@@ -42,7 +34,7 @@ def run():
         rate = (rate + product_rate()) / 2
         rows.append(
             {
-                "what": f"cow to a mean preference >= {PREFERENCE}: {name}",
+                "what": f"{shapes.label('spot')} to a mean preference >= {PREFERENCE}: {name}",
                 "iterations": count,
                 "seconds": round(seconds, 2),
                 "products_GFLOPs": round(rate),

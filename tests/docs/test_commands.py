@@ -35,7 +35,7 @@ ALL = [(page, command) for page in pages.PAGES for command in commands(page)]
 
 def test_every_block_is_of_a_kind_that_is_tested():
     kinds = {kind for page in pages.PAGES for kind, _ in pages.FENCE.findall(page.read_text())}
-    assert kinds == {"python", "sh", "json", "cpp"}
+    assert kinds == {"python", "sh", "json", "cpp", "cmake"}
     assert {words[0] for _, words in ALL} == {"make", "arapfields", "blender", "python", ".venv/bin/python"}
 
 
@@ -96,12 +96,25 @@ def test_commands_of_the_package_run(tmp_path):
             assert (tmp_path / name).stat().st_size > 0
 
 
+EXAMPLE = pages.ROOT / "docs" / "examples" / "cpp"
+COMPILED = {  # pages, and the sources that their blocks are parts of, which tests compile and run
+    "development.md": [pages.ROOT / "tests" / "native" / "test_foreign_field.cpp"],
+    "cpp.md": sorted(EXAMPLE.glob("*.cpp")),
+}
+
+
 def test_cpp_blocks_are_compiled():
-    """Between marks in tests/native/test_foreign_field.cpp, which is compiled and, but for the calls, run."""
-    compiled = (pages.ROOT / "tests" / "native" / "test_foreign_field.cpp").read_text()
-    parts = [part.strip() for mark in ("// [roll]\n", "  // [calls]\n") for part in compiled.split(mark)[1:2]]
-    written = [block for page in pages.PAGES for block in blocks(page, "cpp")]
-    assert [block.split() for block in written] == [part.split() for part in parts]
+    """Each is in one of the sources, word by word."""
+    assert {page.name for page in pages.PAGES if blocks(page, "cpp")} == set(COMPILED)
+    for page in pages.PAGES:
+        sources = [" ".join(path.read_text().split()) for path in COMPILED.get(page.name, [])]
+        for block in blocks(page, "cpp"):
+            assert any(" ".join(block.split()) in source for source in sources), block
+
+
+def test_cmake_blocks_are_the_examples():
+    source = (EXAMPLE / "CMakeLists.txt").read_text()
+    assert all(block in source for page in pages.PAGES for block in blocks(page, "cmake"))
 
 
 @pytest.mark.parametrize("name", ["arapfields", "tests.benchmarks.render"])

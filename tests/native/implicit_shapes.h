@@ -34,8 +34,10 @@ class Analytic : public ImplicitFunction {
         gradients(i, axis) = static_cast<float>((above - formula_(x)) / (2.0 * step));
       }
   }
+  Frame frame() const override { return place; }
   double operator()(const Vec3& point) const { return formula_(point); }
 
+  Frame place;
   mutable Index count = 0;
 
  private:

@@ -56,8 +56,8 @@ double apart(const TriangleMesh& a, const TriangleMesh& b) {
   return std::max(forth.maxCoeff(), back.maxCoeff());
 }
 
-TriangleMesh warped(const ImplicitFunction& shape, const Frame& frame, const DeformationField& field, int n) {
-  TriangleMesh mesh = extract_surface(shape, frame, n);
+TriangleMesh warped(const ImplicitFunction& shape, const DeformationField& field, int n) {
+  TriangleMesh mesh = extract_surface(shape, n);
   Points moved(mesh.vertices.rows(), 3);
   field.evaluate(field.frame().to_cube(mesh.vertices), {moved.data(), moved.rows(), JetOrder::value});
   mesh.vertices = field.frame().to_mesh(moved);
@@ -69,11 +69,11 @@ TriangleMesh warped(const ImplicitFunction& shape, const Frame& frame, const Def
 BOOST_AUTO_TEST_CASE(equals_the_moved_surface_by_either_inverse) {
   const auto bar = shapes::box(Vec3(0.8, 0.2, 0.15));
   const Bend bend(1.2), back(1.2, true);
-  const TriangleMesh moved = warped(bar, Frame(), bend, 64);
+  const TriangleMesh moved = warped(bar, bend, 64);
   for (const DeformationField* inverse :
        {static_cast<const DeformationField*>(nullptr), static_cast<const DeformationField*>(&back)}) {
     DeformedReport report;
-    const TriangleMesh mesh = extract_deformed(bar, Frame(), bend, inverse, 64, {}, &report);
+    const TriangleMesh mesh = extract_deformed(bar, bend, inverse, 64, {}, &report);
     BOOST_TEST(apart(mesh, moved) < 1.5 * 2.0 / 63);
     BOOST_TEST(report.failures == 0);
     BOOST_TEST(report.inverted < report.dense_evaluations / 4);
@@ -89,7 +89,7 @@ BOOST_AUTO_TEST_CASE(vertices_lie_on_the_surface) {
   const auto ball = shapes::sphere(0.5);
   const Bend bend(0.8), back(0.8, true);
   DeformedReport report;
-  const TriangleMesh mesh = extract_deformed(ball, Frame(), bend, nullptr, 72, {}, &report);
+  const TriangleMesh mesh = extract_deformed(ball, bend, nullptr, 72, {}, &report);
   Points rest(mesh.vertices.rows(), 3);
   back.evaluate(mesh.vertices, {rest.data(), rest.rows(), JetOrder::value});
   const double worst = (rest.rowwise().norm().array() - 0.5).abs().maxCoeff();
@@ -97,25 +97,25 @@ BOOST_AUTO_TEST_CASE(vertices_lie_on_the_surface) {
 }
 
 BOOST_AUTO_TEST_CASE(frames_may_differ) {
-  const auto ball = shapes::sphere(0.6);
-  const Frame rest_frame{Vec3(3, 0, 0), 2.0};
+  auto ball = shapes::sphere(0.6);
+  ball.place = {Vec3(3, 0, 0), 2.0};
   Bend bend(0.5);
   bend.set_frame({Vec3(3, 0, 1), 4.0});
-  const TriangleMesh moved = warped(ball, rest_frame, bend, 48);
+  const TriangleMesh moved = warped(ball, bend, 48);
   DeformedReport report;
-  const TriangleMesh mesh = extract_deformed(ball, rest_frame, bend, nullptr, 48, {}, &report);
+  const TriangleMesh mesh = extract_deformed(ball, bend, nullptr, 48, {}, &report);
   BOOST_TEST(apart(mesh, moved) < 1.5 * report.spacing);
 }
 
 BOOST_AUTO_TEST_CASE(progress_cancel_and_bad_input) {
   const auto ball = shapes::sphere(0.5);
   const Bend bend(0.8);
-  BOOST_CHECK_THROW(extract_deformed(ball, Frame(), bend, nullptr, 7), InvalidInput);
-  BOOST_CHECK_THROW(extract_deformed(ball, Frame(), Nowhere(), nullptr, 32), InvalidInput);
+  BOOST_CHECK_THROW(extract_deformed(ball, bend, nullptr, 7), InvalidInput);
+  BOOST_CHECK_THROW(extract_deformed(ball, Nowhere(), nullptr, 32), InvalidInput);
   Task task, watched;
   task.cancel();
-  BOOST_CHECK_THROW(extract_deformed(ball, Frame(), bend, nullptr, 32, Progress(&task)), Cancelled);
-  extract_deformed(ball, Frame(), bend, nullptr, 32, Progress(&watched));
+  BOOST_CHECK_THROW(extract_deformed(ball, bend, nullptr, 32, Progress(&task)), Cancelled);
+  extract_deformed(ball, bend, nullptr, 32, Progress(&watched));
   BOOST_TEST(watched.progress() == 1.0);
 }
 

@@ -97,7 +97,7 @@ Topology topology(const TriangleMesh& mesh) {
 }
 
 TriangleMesh extract(const ImplicitFunction& function, int resolution, ExtractionReport* report = nullptr) {
-  return extract_surface(function, Frame(), resolution, {}, report);
+  return extract_surface(function, resolution, {}, report);
 }
 
 void check_closed(const TriangleMesh& mesh) {
@@ -243,8 +243,9 @@ BOOST_AUTO_TEST_CASE(extraction_repeats_and_does_not_depend_on_threads) {
 
 BOOST_AUTO_TEST_CASE(frame_cancel_and_bad_input) {
   const auto shape = shapes::sphere(0.5);
-  const Frame frame{Vec3(1, 2, 3), 2.0};
-  const TriangleMesh moved = extract_surface(shape, frame, 40), plain = extract(shape, 40);
+  auto placed = shape;
+  const Frame frame = placed.place = {Vec3(1, 2, 3), 2.0};
+  const TriangleMesh moved = extract_surface(placed, 40), plain = extract(shape, 40);
   BOOST_TEST((moved.vertices - frame.to_mesh(plain.vertices)).norm() == 0.0);
   BOOST_CHECK_THROW(extract(shape, 7), InvalidInput);
   BOOST_CHECK_THROW(extract(shape, 513), InvalidInput);
@@ -253,9 +254,9 @@ BOOST_AUTO_TEST_CASE(frame_cancel_and_bad_input) {
                     InvalidInput);
   Task task;
   task.cancel();
-  BOOST_CHECK_THROW(extract_surface(shape, Frame(), 64, Progress(&task)), Cancelled);
+  BOOST_CHECK_THROW(extract_surface(shape, 64, Progress(&task)), Cancelled);
   Task watched;
-  extract_surface(shape, Frame(), 64, Progress(&watched));
+  extract_surface(shape, 64, Progress(&watched));
   BOOST_TEST(watched.progress() == 1.0);
 }
 

@@ -58,8 +58,7 @@ Points some_points(Index count) {
 
 // Compiled, so that the documentation's calls are right; the tests below run the same ones on their own
 // points.
-[[maybe_unused]] void calls(const Points& points, const Points& images, const NeuralSdf& sdf,
-                            const Frame& frame) {
+[[maybe_unused]] void calls(const Points& points, const Points& images, const ImplicitFunction& sdf) {
   // [calls]
   JetBlock<double> jets(points.rows(), JetOrder::second);
   Roll(0.9).evaluate(points, jets.view());
@@ -67,7 +66,7 @@ Points some_points(Index count) {
       arap_energy<double>(std::as_const(jets).view(), 0.0, 1.0, {});  // value.stretch, value.bend
   const Distortion worst = distortion<double>(std::as_const(jets).view());
   const InverseResult rest = invert(Roll(0.9), images);
-  const TriangleMesh mesh = extract_deformed(sdf, frame, Roll(0.9), nullptr, 128);
+  const TriangleMesh mesh = extract_deformed(sdf, Roll(0.9), nullptr, 128);
   // [calls]
   static_cast<void>(value), static_cast<void>(worst), static_cast<void>(rest), static_cast<void>(mesh);
 }

@@ -35,7 +35,7 @@ double turn(double y, double x) { return std::atan2(y, x) / (2.0 * std::numbers:
 
 SurfaceSamples sample(const ImplicitFunction& function, int count, std::int64_t seed = 1,
                       SampleReport* report = nullptr) {
-  return sample_surface(function, Frame(), {.count = count, .seed = seed}, {}, report);
+  return sample_surface(function, {.count = count, .seed = seed}, {}, report);
 }
 
 void check_on_surface(const shapes::Analytic& shape, const SurfaceSamples& samples) {
@@ -212,7 +212,7 @@ BOOST_AUTO_TEST_CASE(seeds_and_threads) {
 BOOST_AUTO_TEST_CASE(bad_sampling_input) {
   const auto shape = shapes::sphere(0.5);
   BOOST_CHECK_THROW(sample(shape, 0), InvalidInput);
-  BOOST_CHECK_THROW(sample_surface(shape, Frame(), {.count = 10, .tolerance = 0.0}), InvalidInput);
+  BOOST_CHECK_THROW(sample_surface(shape, {.count = 10, .tolerance = 0.0}), InvalidInput);
   const shapes::Analytic nothing([](const Vec3& x) { return x.squaredNorm() + 0.5; });
   BOOST_CHECK_THROW(sample(nothing, 10), InvalidInput);
   const shapes::Analytic touching([](const Vec3& x) { return x.squaredNorm() + 1e-3; });
@@ -221,7 +221,7 @@ BOOST_AUTO_TEST_CASE(bad_sampling_input) {
   BOOST_CHECK_THROW(sample(broken, 10), InvalidInput);
   Task task;
   task.cancel();
-  BOOST_CHECK_THROW(sample_surface(shape, Frame(), {}, Progress(&task)), Cancelled);
+  BOOST_CHECK_THROW(sample_surface(shape, {}, Progress(&task)), Cancelled);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -187,7 +187,7 @@ def test_time_budget_ends_the_run(samples):
 def test_divergence_keeps_the_last_good_state(samples):
     with pytest.raises(af.Diverged, match="iteration") as caught:
         af.deform(samples, cases.bar_handles(), quick(learning_rate=1e30, optimizer="adam"))
-    assert np.isfinite(caught.value.field(samples.points)).all()
+    assert np.isfinite(caught.value.last_good(samples.points)).all()
 
 
 @pytest.mark.parametrize(

@@ -58,14 +58,4 @@ class ProgressTracker:
     def message(self):
         with self._lock:
             name, detail = self._name, self._task.message if self._task is not None else ""
-        detail = without_verb(detail)
         return f"{name}: {detail}" if detail else name
-
-
-def without_verb(text):
-    """A native message without the library's verb: "deform: iteration 3 of 300" → "iteration 3 of 300".
-
-    The extension names its own: the operator, or the object at fault.
-    """
-    verb, colon, rest = text.partition(": ")
-    return rest if colon and " " not in verb else text

@@ -52,6 +52,7 @@ from ._native import (
     train_inverse,
     winding_number,
 )
+from .cmake import cmake_dir
 from .grids import save_grid, sdf_grid
 
 InverseOptions = InverseTrainingOptions  # the older name
@@ -85,6 +86,7 @@ __all__ = [
     "Task",
     "__version__",
     "arap_energy",
+    "cmake_dir",
     "deform",
     "deform_curve",
     "device_report",

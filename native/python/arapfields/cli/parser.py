@@ -20,6 +20,14 @@ class OneLineParser(argparse.ArgumentParser):
         raise SystemExit(2)
 
 
+class CMakeDir(argparse.Action):
+    """Prints arapfields_DIR."""
+
+    def __call__(self, parser, namespace, values, option_string=None):
+        print(af.cmake_dir())
+        parser.exit()
+
+
 def parse(arguments):
     """The parsed arguments; `run` is the verb's function."""
     # A token such as -inf,0,1 is a value: a blank in front tells argparse so.
@@ -34,6 +42,9 @@ def _parser():
         "`arapfields VERB --help` shows a verb's flags and examples.",
     )
     parser.add_argument("--version", action="version", version=f"arapfields {af.__version__}")
+    parser.add_argument(
+        "--cmake-dir", action=CMakeDir, nargs=0, help="print where CMake finds the C++ package, and exit"
+    )
     added = parser.add_subparsers(dest="verb", metavar="VERB", required=True, parser_class=OneLineParser)
     for add in (_fit, _sample, _deform, _stylize, _extract, _warp, _grid):
         verb = add(added)

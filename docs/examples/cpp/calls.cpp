@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The other calls of docs/cpp.md, on a mesh: calls IN.obj
+#include <arapfields/arapfields.h>
+
+#include <iostream>
+#include <thread>
+
+#include "obj.h"
+
+using namespace arapfields;
+
+// [implicit]
+/// Any function of points, batched: negative inside, in the cube [-1,1]³ of its frame.
+class Ball final : public ImplicitFunction {
+ public:
+  void evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> values) const override {
+    values = points.rowwise().norm().array() - 0.5f;
+  }
+  void evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> values,
+                Eigen::Ref<PointsF> gradients) const override {
+    evaluate(points, values);
+    gradients = points.rowwise().normalized();
+  }
+};
+// [implicit]
+
+int main(int argc, char** argv) {
+  if (argc != 2) return 2;
+  const TriangleMesh mesh = read_obj(argv[1]);
+  // [fit]
+  FitOptions options;
+  options.training.iterations = 40;
+  const FitResult fit = fit_sdf(mesh.vertices, mesh.triangles, options);
+  const TriangleMesh surface = extract_surface(*fit.sdf, 48);
+  const SurfaceSamples samples = sample_surface(fit.sdf, {.count = 2000, .seed = 1});
+  // [fit]
+  // [task]
+  Task task;
+  std::thread caller([&] {
+    try {
+      stylize(samples, preferred_normals("cube"), StylizeOptions(), Progress(&task));
+    } catch (const Cancelled&) {
+      std::cout << "cancelled at " << task.progress() << ": " << task.message() << "\n";
+    }
+  });
+  task.cancel();  // from any thread
+  caller.join();
+  // [task]
+  // [live]
+  Handle end;
+  end.kind = Handle::Kind::point;
+  end.rest_point = end.target_point = mesh.vertices.row(0);
+  LiveSolver live(samples, {end}, LiveOptions());
+  end.target_point.z() += 0.1;
+  live.set_targets({end});
+  const Points moved = live.solve()->at(mesh.vertices);
+  // [live]
+  const TriangleMesh ball = extract_surface(Ball(), 32);
+  std::cout << surface.vertices.rows() << " " << ball.vertices.rows() << " " << moved.rows() << "\n";
+  return 0;
+}

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/export.h"
+
+namespace arapfields {
+
+/// Instruction sets for which kernels are compiled (SIMD sources of CMake). A kernel file defines its
+/// functions in the namespace arapfields::SIMD_LEVEL; a plain source picks one by simd_level().
+enum class SimdLevel { baseline, avx2, avx512 };
+
+/// The best level of this processor; ARAPFIELDS_SIMD=baseline|avx2|avx512 in the environment lowers it.
+ARAPFIELDS_EXPORT SimdLevel simd_level();
+ARAPFIELDS_EXPORT const char* simd_level_name();
+
+}  // namespace arapfields

@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Deformations with their derivatives, and their inverses: DeformationField, RadialField, invert.
+#pragma once
+
+#include "core/jets.h"
+#include "fields/field.h"
+#include "fields/inverse.h"
+#include "fields/radial_field.h"

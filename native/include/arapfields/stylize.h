@@ -1,0 +1,6 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Gauss stylization: stylize.
+#pragma once
+
+#include "energies/styles.h"
+#include "solve/stylize.h"

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <memory>
+
+#include "neural/mlp.h"
+#include "options/training.h"
+
+namespace arapfields {
+
+/// What no option asks for. Short memories (momentum, betas) suit the few hundred steps of a solve.
+struct OptimizerOptions {
+  double momentum = 0.8;    ///< of muon
+  double adam_share = 0.3;  ///< of muon: the rate of biases and the output layer over the matrices'
+  double beta1 = 0.8, beta2 = 0.9;
+};
+
+/// What a first-order method moves: parameters and their gradient, each one contiguous vector, and the
+/// network that holds them, null where there is none.
+struct Trainable {
+  at::Tensor& parameters;
+  at::Tensor& gradient;
+  Mlp* network = nullptr;
+};
+
+/// Steps along the gradient: neural/muon.h for the matrices of networks, or neural/adam_step.h. Parameters
+/// that no network holds are moved by Adam, whatever the options say; a learning rate of 0 is the kind's own.
+class Optimizer {
+ public:
+  Optimizer(const Trainable& trained, const TrainingOptions& training, const OptimizerOptions& options);
+  ~Optimizer();
+  /// One step at `share` of the learning rate.
+  void step(double share);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace arapfields

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "neural/training_loop.h"
+
+#include <ATen/ATen.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/aten_path.h"
+#include "core/parallel.h"
+#include "core/stopwatch.h"
+
+namespace arapfields {
+namespace {
+
+/// Losses stay where they were computed until a run of them is read at once: a read waits for the device.
+class Losses {
+ public:
+  explicit Losses(const at::Tensor& like)
+      : every_(uses_aten_path(like) ? 25 : 1), run_(at::zeros({every_}, like.options().dtype(at::kDouble))) {}
+  /// Whether as many as are read at once are there, the `iteration`-th included.
+  bool due(int iteration) const { return (iteration + 1) % every_ == 0; }
+  void keep(int iteration, const at::Tensor& loss) {
+    run_.select(0, iteration % every_).copy_(loss);
+    kept_ = iteration + 1;
+  }
+  /// Those not read yet: consume(iteration, loss).
+  template <class Consume>
+  void read(Consume&& consume) {
+    const at::Tensor host = run_.to(at::kCPU);
+    const double* values = host.const_data_ptr<double>();
+    for (; read_ < kept_; ++read_) consume(read_, values[read_ % every_]);
+  }
+
+ private:
+  int every_, kept_ = 0, read_ = 0;
+  at::Tensor run_;
+};
+
+/// One run: what the loop carries from iteration to iteration.
+class Run {
+ public:
+  Run(const Trainable& trained, LoopBody& body, const LoopOptions& options, const Progress& progress)
+      : trained_(trained),
+        body_(body),
+        options_(options),
+        progress_(progress),
+        optimizer_(trained, options.training, options.optimizer),
+        losses_(trained.parameters),
+        good_(trained.parameters.clone()) {}
+
+  LoopResult operator()() {
+    int& iteration = result_.iterations;
+    for (; iteration < options_.training.iterations; ++iteration) {
+      progress_.check();
+      const double elapsed = watch_.seconds(), done = done_after(elapsed);
+      if (options_.training.time_budget > 0.0 && elapsed >= options_.training.time_budget) {
+        result_.stopped_by = StopReason::time_budget;
+        break;
+      }
+      trained_.gradient.zero_();
+      losses_.keep(iteration, body_.accumulate(iteration));
+      if (losses_.due(iteration) && look() && body_.is_good_enough()) {
+        result_.stopped_by = StopReason::target;
+        break;
+      }
+      optimizer_.step(options_.schedule.share(iteration, done));
+      report(elapsed, done);
+      body_.iterated(iteration + 1);
+    }
+    read_losses();
+    if (!at::isfinite(trained_.parameters).all().item<bool>()) diverge(iteration);
+    result_.seconds = watch_.seconds();
+    progress_.report(1.0);
+    return result_;
+  }
+
+ private:
+  double done_after(double elapsed) const {
+    const double done = static_cast<double>(result_.iterations) / options_.training.iterations;
+    return options_.training.time_budget > 0.0 ? std::max(done, elapsed / options_.training.time_budget)
+                                               : done;
+  }
+
+  void read_losses() {
+    const int history_every = std::max(1, options_.training.iterations / 200);
+    losses_.read([&](int iteration, double loss) {
+      if (!std::isfinite(loss)) diverge(iteration);
+      smooth_ = iteration == 0 ? loss : 0.9 * smooth_ + 0.1 * loss;
+      if (iteration % history_every == 0) result_.history.emplace_back(iteration, loss);
+    });
+  }
+
+  /// Reads the losses so far and now and then keeps the parameters, whose loss is finite; whether it did.
+  bool look() {
+    constexpr int every = 10;
+    read_losses();
+    if (result_.iterations - good_iteration_ < every) return false;
+    good_.copy_(trained_.parameters);
+    good_iteration_ = result_.iterations;
+    return true;
+  }
+
+  void report(double elapsed, double done) {
+    constexpr double pause = 0.1;
+    if (elapsed - reported_ <= pause) return;
+    reported_ = elapsed;
+    const double left = done > 0.0 ? elapsed * (1.0 - done) / std::max(done, 1e-3) : 0.0;
+    progress_.report(done, body_.message(result_.iterations + 1, smooth_, left));
+  }
+
+  [[noreturn]] void diverge(int iteration) {
+    trained_.parameters.copy_(good_);
+    result_.stopped_by = StopReason::divergence;
+    result_.iterations = good_iteration_;
+    result_.seconds = watch_.seconds();
+    std::erase_if(result_.history, [&](const auto& entry) { return entry.first > good_iteration_; });
+    throw LoopDiverged("NaN or infinity at iteration " + std::to_string(iteration) +
+                           "; the state of iteration " + std::to_string(good_iteration_) +
+                           " was kept. A smaller learning_rate may help",
+                       result_);
+  }
+
+  Trainable trained_;
+  LoopBody& body_;
+  const LoopOptions& options_;
+  const Progress& progress_;
+  const Stopwatch watch_;
+  Optimizer optimizer_;
+  Losses losses_;
+  at::Tensor good_;
+  int good_iteration_ = 0;
+  double smooth_ = 0.0, reported_ = -1.0;
+  LoopResult result_;
+};
+
+}  // namespace
+
+double Schedule::share(int iteration, double done) const {
+  const double rising = warm_up > 0 ? std::min(1.0, (iteration + 1.0) / warm_up) : 1.0;
+  const double fallen = std::clamp((done - hold_fraction) / std::max(1e-9, 1.0 - hold_fraction), 0.0, 1.0);
+  const double left = fall == Fall::linear ? 1.0 - fallen : 0.5 * (1.0 + std::cos(std::numbers::pi * fallen));
+  return rising * (final_share + (1.0 - final_share) * left);
+}
+
+LoopResult run_training(const Trainable& trained, LoopBody& body, const LoopOptions& options,
+                        const Progress& progress) {
+  const ThreadScope scope;
+  return Run(trained, body, options, progress)();
+}
+
+}  // namespace arapfields

@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where the C++ package inside of this one is."""
+
+from pathlib import Path
+
+from ._native import InvalidInput
+
+
+def cmake_dir():
+    """The folder of arapfieldsConfig.cmake, what CMake's variable arapfields_DIR is to be, as a str.
+
+    InvalidInput where the package was installed without its C++ part, as in Blender's extension.
+    """
+    folder = Path(__file__).parent / "share" / "cmake" / "arapfields"
+    if not (folder / "arapfieldsConfig.cmake").is_file():
+        raise InvalidInput(f"{folder}: there is no C++ package; a pip installation of arapfields has one")
+    return str(folder)

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+
+#include "fields/neural_field.h"
+#include "mesh/surface_samples.h"
+#include "solve/objective.h"
+
+namespace arapfields {
+
+/// Another objective, and weight × mean ‖g(f(x)) − x‖² with an inverse g that learns beside f, over samples
+/// and uniform points of the cube: where f folds no g exists, so folds cost.
+class InvertibleObjective final : public Objective {
+ public:
+  InvertibleObjective(Objective& inner, const SurfaceSamples& samples, Index batch, double weight,
+                      const MlpShape& shape, const LoopOptions& options, const std::string& device);
+  at::Tensor accumulate(TrainableField& field, Random& random) override;
+
+ private:
+  Objective& inner_;
+  const SurfaceSamples& samples_;
+  Index batch_;
+  double weight_;
+  LoopOptions options_;
+  int done_ = 0;
+  NeuralField inverse_;
+  Optimizer optimizer_;
+};
+
+}  // namespace arapfields

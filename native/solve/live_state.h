@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a live solver holds, and how it solves.
+#pragma once
+
+#include <memory>
+
+#include "fields/tracked_points.h"
+#include "solve/live_objective.h"
+#include "solve/live_solver.h"
+
+namespace arapfields {
+
+class LiveSolver::State {
+ public:
+  State(const SurfaceSamples& samples, const std::vector<Handle>& handles, const LiveOptions& options,
+        const Progress& progress);
+  void set_handles(const std::vector<Handle>& handles);
+  void set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights);
+  void clear_style();
+  void set_targets(const std::vector<Handle>& moved);
+  std::shared_ptr<RadialField> solve(Index iterations, double tolerance, const Progress& progress);
+  void reset();
+  void track(PointsIn points) { tracked_ = TrackedPoints(basis_, frame_, points); }
+  PointsF tracked() const { return tracked_.moved(coefficients_); }
+  std::shared_ptr<RadialField> field() const;
+  const LiveReport& report() const { return report_; }
+  const std::vector<Handle>& handles() const { return handles_; }
+
+ private:
+  template <class Scalar>
+  struct Precision {
+    std::unique_ptr<LiveObjective<Scalar>> objective;
+    Eigen::VectorX<Scalar> u;  // measurements of the coefficients; empty: not known
+    int uses = 0;              // solves since u was measured afresh
+  };
+  template <class Scalar>
+  void prepare(Precision<Scalar>& precision);
+  template <class Scalar>
+  QuasiNewtonReport descend(Precision<Scalar>& precision, const QuasiNewtonOptions& options,
+                            const Progress& progress);
+  template <class Scalar>
+  void measure(Precision<Scalar>& precision);
+  template <class Call>
+  void for_each_precision(Call&& call);
+  void choose_pairs();
+  void follow_rigidly();
+  void extrapolate();
+  void hold_lowest();
+  int solve_threads() const;
+
+  LiveOptions options_;
+  Frame frame_;
+  Points surface_, surface_normals_;  // all samples, cube coordinates
+  std::vector<Index> chosen_;         // those that the energy sees
+  std::vector<Handle> handles_;
+  BoundHandles bound_;
+  std::vector<Index> pair_rows_;  // rows of bound_ that pull
+  RadialBasis basis_;
+  HandleBatch<double> pairs_;
+  RowMatrix<double> stiffness_, pair_values_, inverse_factor_;
+  std::optional<LiveStyle> style_;
+  double style_strength_ = 0.0;
+  Precision<float> fast_;    // what a drag needs
+  Precision<double> exact_;  // what follows where more is asked for; made when it first is
+  QuasiNewton optimizer_;
+  RowMatrix<double> coefficients_;
+  RowMatrix<double> coefficients_before_;  // where the solve before the last one ended; empty: not known
+  VectorF u_before_;
+  TrackedPoints tracked_;
+  LiveReport report_;
+};
+
+}  // namespace arapfields

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <functional>
+
+#include "core/random.h"
+#include "fields/field.h"
+#include "neural/training_loop.h"
+
+namespace arapfields {
+
+/// A loss of a trainable field, estimated anew at each iteration on a random subset.
+class Objective {
+ public:
+  virtual ~Objective() = default;
+  /// Adds the gradient of the estimate to field.gradient(); returns the estimate, one number wherever it was
+  /// computed.
+  virtual at::Tensor accumulate(TrainableField& field, Random& random) = 0;
+};
+
+/// Called with the number of finished iterations after each of them.
+using LoopObserver = std::function<void(int)>;
+
+/// What an optimizer moves of a field.
+inline Trainable trainable(TrainableField& field) {
+  return {field.parameters(), field.gradient(), field.network()};
+}
+
+/// Minimises by run_training(), with random numbers of the options' seed.
+LoopResult minimise(TrainableField& field, Objective& objective, const LoopOptions& options,
+                    const Progress& progress, const LoopObserver& observer = {});
+
+}  // namespace arapfields

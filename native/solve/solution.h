@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/errors.h"
+#include "energies/arap.h"
+#include "energies/distortion.h"
+#include "fields/field.h"
+#include "neural/loop_result.h"
+
+namespace arapfields {
+
+/// How well a solved field does what it was asked for, measured at surface samples after the solve.
+/// Energies are those of the unit cube, lengths are in mesh units.
+struct SolveReport {
+  ArapValue arap;
+  double energy = 0.0;                          ///< stretch + bending · bend
+  std::vector<double> handle_mean, handle_max;  ///< distances ‖f(x) − C x‖ of each handle
+  std::optional<double> preference;             ///< mean g of the deformed normals
+  Distortion distortion;
+  LoopResult loop;
+  std::vector<std::string> notes;
+};
+
+struct Solution {
+  std::shared_ptr<DeformationField> field;
+  SolveReport report;
+};
+
+/// Diverged, with the last good state.
+class ARAPFIELDS_EXPORT SolveDiverged : public Diverged {
+ public:
+  SolveDiverged(const Diverged& cause, Solution last) : Diverged(cause), last_good(std::move(last)) {}
+  Solution last_good;
+};
+
+}  // namespace arapfields

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The shapes of the benchmarks: published networks where ARAPFIELDS_DATA has them, else shapes of our own.
+
+Figures of the two are not comparable, so rows of our own shapes bear their names.
+"""
+
+import functools
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import arapfields as af
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "blender_scripts")]
+import cases  # noqa: E402
+import meshes  # noqa: E402
+from network_oracle import Network  # noqa: E402
+
+OURS = {"bunny": "dinosaur", "spot": "dog", "hand": "hand", "whale": "lizard", "cube": "mug"}
+FULL = 70  # degrees of a whole drag
+HALF_EXTENT = 0.75  # of our own shapes, as fit_sdf has it: the networks' frame is then the identity
+
+
+def data():
+    return Path(os.environ.get("ARAPFIELDS_DATA", ROOT.parent / "shared" / "data"))
+
+
+def network_file(name):
+    return data() / "neural_sdf" / f"{name}.pt"
+
+
+def is_published(name):
+    return network_file(name).is_file()
+
+
+def label(name):
+    """What a row calls the shape."""
+    return name if is_published(name) else f"our {OURS[name]}"
+
+
+@functools.cache
+def own_mesh(name):
+    """Vertices and triangles of the stand-in, centred, its largest half-extent HALF_EXTENT."""
+    import menagerie
+
+    shape = menagerie.load(OURS[name])
+    vertices = shape.vertices.astype(float)
+    low, high = vertices.min(0), vertices.max(0)
+    return HALF_EXTENT * (vertices - (low + high) / 2) / ((high - low).max() / 2), shape.triangles
+
+
+@functools.cache
+def layers(name):
+    """Weights, biases, octaves, frequency, sharpness of the shape's network, of four layers of 256."""
+    if is_published(name):
+        return Network.published(network_file(name)).layers
+    file = ROOT / "build" / "bench" / f"{OURS[name]}.npz"  # a fit takes longer than most of what is measured
+    if not file.exists():
+        file.parent.mkdir(parents=True, exist_ok=True)
+        af.fit_sdf(*own_mesh(name), af.FitOptions(seed=0)).save(file)
+    return af.NeuralSdf.load(file).layers
+
+
+@functools.cache
+def sdf(name):
+    return af.NeuralSdf.from_layers(*layers(name))
+
+
+@functools.cache
+def samples(name, count=20000):
+    """Uniform samples of the network's zero set; frame identity."""
+    return af.sample_surface(sdf(name), count=count, seed=0)
+
+
+def mesh(name):
+    """The published mesh of that name, or the stand-in's, of half-extent HALF_EXTENT."""
+    file = data() / "meshes" / f"{name}.obj"
+    if not file.is_file():
+        return own_mesh(name)
+    vertices, triangles = meshes.read(file)
+    centre = (vertices.min(0) + vertices.max(0)) / 2
+    return (vertices - centre) / (np.ptp(vertices, 0).max() / (2 * HALF_EXTENT)), triangles
+
+
+# Box held, box moved, axis and pivot of its turn, in the network's cube.
+PUBLISHED_DRAGS = {
+    "bunny": ([[-1, -1, -1], [1, 1, -0.35]], [[-1, -1, 0.6], [1, 1, 1]], [0, 1, 0], (-0.1, 0, 0.3)),
+    "spot": ([[-1, -1, -1], [1, 1, -0.35]], [[-1, 0.2, 0.25], [1, 1, 1]], [0, 0, 1], (0, 0.3, 0)),
+    "hand": (
+        [[-1, -1, -1], [0.1, 1, 0.03]],
+        [[0, -0.2, 0.62], [0.4, 0.08, 0.9]],
+        [0, 1, 0],
+        (-0.1, -0.05, 0.05),
+    ),
+}
+OUR_DRAGS = {
+    "bunny": ([[-1, -1, -1], [1, 1, -0.2]], [[-1, -1, 0.25], [1, 0, 1]], [0, 0, 1], (0, -0.2, 0.2)),
+    "spot": ([[-1, -1, -1], [1, 1, -0.25]], [[-1, -1, 0.2], [1, -0.3, 1]], [0, 0, 1], (0, -0.25, 0.2)),
+    "hand": (
+        [[-1, -1, -1], [1, 1, 0]],
+        [[-0.12, -0.3, 0.55], [0.1, 0.3, 1]],
+        [1, 0, 0],
+        (-0.03, 0, 0.12),
+    ),
+}
+
+
+def drag(name):
+    return (PUBLISHED_DRAGS if is_published(name) else OUR_DRAGS)[name]
+
+
+# Where the hand's fingertips are; of those that move the box and the pivot; axes of a turn aside and forward.
+PUBLISHED_HAND = {
+    "tips": {
+        "thumb": (0.33, -0.38, 0.1),
+        "index": (0.22, -0.27, 0.56),
+        "middle": (0.17, -0.06, 0.73),
+        "ring": (0.24, 0.18, 0.62),
+        "little": (0.16, 0.37, 0.35),
+    },
+    "index": ([[0, -0.4, 0.45], [0.4, -0.14, 0.7]], (-0.05, -0.2, 0.05)),
+    "aside": [1, 0, 0],
+    "forward": [0, 1, 0],
+    "length": 1.48,
+}
+OUR_HAND = {
+    "tips": {
+        "thumb": (0.39, -0.1, 0.15),
+        "index": (0.2, -0.03, 0.61),
+        "middle": (-0.01, -0.03, 0.7),
+        "ring": (-0.23, -0.03, 0.64),
+        "little": (-0.42, -0.03, 0.52),
+    },
+    "index": ([[0.1, -0.3, 0.45], [0.4, 0.3, 1]], (0.1, 0, 0.12)),
+    "aside": [0, 1, 0],
+    "forward": [1, 0, 0],
+    "length": 1.5,
+}
+
+
+def hand():
+    return PUBLISHED_HAND if is_published("hand") else OUR_HAND
+
+
+def placements(name):
+    """(4, 4) of the held box and of the moved one, at rest."""
+    return [cases.box(*corners) for corners in drag(name)[:2]]
+
+
+def targets(name, degrees):
+    """What live.solve takes: the held box, and the moved one after a turn by so many degrees."""
+    held, moved = placements(name)
+    return [held, cases.turn(drag(name)[2], degrees, drag(name)[3]) @ moved]
+
+
+def handles(name, degrees=0.0):
+    pairs = zip(placements(name), targets(name, degrees), strict=True)
+    return [af.Cuboid(rest, target) for rest, target in pairs]

@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The C++ package: found by CMake outside of the tree, its headers whole, its symbols those that it lists."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import meshes
+import numpy as np
+import pytest
+from cases import turn
+
+import arapfields as af
+
+ROOT = Path(__file__).resolve().parents[2]
+NATIVE = ROOT / "native"
+BUILD = ROOT / "build" / "wheel"
+EXAMPLE = ROOT / "docs" / "examples" / "cpp"
+LIBRARY = Path(af.__file__).parent / "libarapfields.so"
+CMAKE = shutil.which("cmake", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+PUBLIC = sorted((NATIVE / "include" / "arapfields").glob("*.h"))
+PRINTED = 1e-5  # coordinates of the example's file have six digits
+LEFT_OUT = ("LD_LIBRARY_PATH", "CMAKE_PREFIX_PATH", "PYTHONPATH")  # nothing is found by chance
+
+
+def run(*command, **keywords):
+    environment = {key: value for key, value in os.environ.items() if key not in LEFT_OUT}
+    command = [str(part) for part in command]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, **keywords)
+    assert done.returncode == 0, (done.stdout + done.stderr)[-4000:]
+    return done.stdout
+
+
+def cached(name):
+    """An entry of the build's CMake cache."""
+    return re.search(rf"^{name}:\w+=(.*)$", (BUILD / "CMakeCache.txt").read_text(), re.M)[1]
+
+
+@pytest.fixture(scope="module")
+def prefix(tmp_path_factory):
+    """What `cmake --install` makes."""
+    folder = tmp_path_factory.mktemp("prefix")
+    run(CMAKE, "--install", BUILD, "--prefix", folder)
+    return folder
+
+
+def build_example(folder, *definitions):
+    """Configures and compiles a copy of the example in `folder`; the program's path."""
+    shutil.copytree(EXAMPLE, folder / "source")
+    ninja = ["-G", "Ninja", f"-DCMAKE_MAKE_PROGRAM={cached('CMAKE_MAKE_PROGRAM')}"]
+    python = f"-DPython_EXECUTABLE={sys.executable}"  # whose cmeel-eigen has Eigen
+    run(CMAKE, "-S", folder / "source", "-B", folder / "build", *ninja, python, *definitions)
+    run(CMAKE, "--build", folder / "build")
+    return folder / "build" / "bend"
+
+
+def pillar():
+    vertices, triangles = meshes.box((0.3, 0.3, 1.0))
+    for _ in range(3):
+        vertices, triangles = meshes.subdivide(vertices, triangles)
+    return vertices, triangles
+
+
+def slab(vertices, start, end):
+    low, high = vertices.min(0), vertices.max(0)
+    bottom, height = low[2], high[2] - low[2]
+    low, high = [*low[:2], bottom + start * height], [*high[:2], bottom + end * height]
+    matrix = np.diag([*(0.51 * np.subtract(high, low)), 1.0])
+    matrix[:3, 3] = np.add(low, high) / 2
+    return matrix
+
+
+def bent(vertices, triangles):
+    """What the example makes of a mesh, in Python."""
+    held, turned = slab(vertices, 0, 1 / 3), slab(vertices, 2 / 3, 1)
+    handles = [af.Cuboid(held, held), af.Cuboid(turned, turn([1, 0, 0], 60) @ turned)]
+    samples = af.sample_mesh(vertices, triangles, count=20000, seed=0)
+    return af.deform(samples, handles, af.DeformOptions(field="radial"))(vertices)
+
+
+@pytest.mark.parametrize("place", ["prefix", "wheel"])
+def test_the_example_gives_what_python_gives(place, prefix, tmp_path):
+    if place == "prefix":
+        found = f"-DCMAKE_PREFIX_PATH={prefix}"
+    else:
+        found = f"-Darapfields_DIR={run(sys.executable, '-m', 'arapfields', '--cmake-dir').strip()}"
+    program = build_example(tmp_path, found)
+    vertices, triangles = pillar()
+    rest, moved = tmp_path / "rest.obj", tmp_path / "moved.obj"
+    lines = [f"v {x} {y} {z}\n" for x, y, z in vertices] + [f"f {a} {b} {c}\n" for a, b, c in triangles + 1]
+    rest.write_text("".join(lines))
+    assert re.fullmatch(r"stretch [\d.e-]+, bend [\d.e-]+\n", run(program, rest, moved, cwd=tmp_path))
+    ours, same_triangles = meshes.read(moved)
+    assert (same_triangles == triangles).all()
+    assert np.abs(ours - bent(vertices, triangles)).max() < PRINTED
+    refused = subprocess.run([program, rest], capture_output=True, text=True)
+    assert refused.returncode == 2 and "arguments" in refused.stderr  # what the library throws is caught
+
+
+def compiler():
+    return cached("CMAKE_CXX_COMPILER")
+
+
+def compile_alone(header, include_dirs, *flags):
+    """Parses a source that includes nothing but the header, twice."""
+    source = f'#include "{header}"\n' * 2
+    includes = [f"-I{folder}" for folder in include_dirs]
+    command = [compiler(), "-std=c++20", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "-x", "c++", *flags]
+    run(*command, *includes, f"-isystem{cached('EIGEN_INCLUDE_DIR')}", "-", input=source)
+
+
+@pytest.mark.parametrize("header", PUBLIC, ids=lambda path: path.stem)
+def test_each_public_header_compiles_alone(header, prefix):
+    compile_alone(f"arapfields/{header.name}", [prefix / "include"], "-DEIGEN_MAX_ALIGN_BYTES=16")
+
+
+def test_installed_headers_need_neither_torch_nor_kernels(prefix):
+    installed = sorted((prefix / "include").rglob("*.h"))
+    assert {path.name for path in PUBLIC} <= {path.name for path in installed}
+    for path in installed:
+        text = path.read_text()
+        wrong = re.findall(
+            r"#include [<\"](?:ATen|torch|c10|immintrin).*|.*(?:SIMD_LEVEL|ARAPFIELDS_DECLARE).*", text
+        )
+        assert not wrong, (path, wrong)
+        for name in re.findall(r'#include "(.*)"', text):
+            assert (prefix / "include" / name).is_file(), f"{path} includes {name}, which is not installed"
+
+
+def test_the_umbrella_has_every_header():
+    umbrella = (NATIVE / "include" / "arapfields" / "arapfields.h").read_text()
+    assert re.findall(r'"arapfields/(\w+)\.h"', umbrella) == [
+        p.stem for p in PUBLIC if p.stem != "arapfields"
+    ]
+    page = (ROOT / "docs" / "cpp.md").read_text()
+    assert all(f"arapfields/{path.name}" in page for path in PUBLIC)
+
+
+def demangled(*options):
+    """Names of the library's dynamic symbols."""
+    return run("nm", "-D", "-C", *options, LIBRARY).splitlines()
+
+
+MARK = r"ARAPFIELDS_EXPORT(?P<tests>_TO_TESTS)? "
+
+
+def marked(path):
+    """(name, for tests alone) of the classes and functions that a header marks as exported."""
+    text = re.sub(r"//[^\n]*", "", path.read_text())
+    for match in re.finditer(rf"(?:class|struct) {MARK}(?P<name>\w+)", text):
+        yield match["name"], bool(match["tests"])
+    for match in re.finditer(rf"^{MARK}[^;{{]*?(?P<name>\w+)\(", text, re.M):
+        yield match["name"], bool(match["tests"])
+
+
+def test_what_is_exported_is_what_headers_mark(prefix):
+    """By class or function: all of them, no other, and what is not for our tests alone is installed."""
+    roots = {path: root for root in (NATIVE, BUILD / "generated") for path in root.rglob("*.h")}
+    headers = [path for path in roots if "include" not in path.relative_to(roots[path]).parts]
+    marks = {name: (path, tests) for path in headers for name, tests in marked(path)}
+    hidden = [
+        f"{name} of {path.name}"
+        for name, (path, tests) in marks.items()
+        if not tests and not (prefix / "include" / "arapfields" / path.relative_to(roots[path])).is_file()
+    ]
+    assert not hidden, f"exported, but in no installed header: {hidden}"
+    exported = set()
+    for line in demangled("--defined-only"):
+        owner = re.search(r"(?:^|[ *&])arapfields::(\w+)", line[19:].split("(")[0].replace("(anonymous", ""))
+        assert owner, f"exported, but not ours: {line}"
+        names = re.findall(r"arapfields::(\w+)", line[19:].split("(")[0])
+        assert set(names) & set(marks), f"exported, but not marked: {line}"
+        exported |= set(names)
+    missing = set(marks) - exported
+    assert not missing, f"marked, but without a symbol: {missing}"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "folder", sorted(path.name for path in NATIVE.iterdir() if (path / "CMakeLists.txt").exists())
+)
+def test_each_header_of_the_tree_compiles_alone(folder):
+    """As the compiler sees them in a source of their kind, but without the precompiled header."""
+    if folder == "bindings":
+        pytest.skip("they need Python's headers, which every source includes first")
+    torch = cached("LIBTORCH_DIR")
+    system = [f"-isystem{torch}/include", f"-isystem{torch}/include/torch/csrc/api/include"]
+    defined = ["-DEIGEN_MAX_ALIGN_BYTES=16", "-DSIMD_LEVEL=baseline", "-Wno-unused-function", "-Wno-psabi"]
+    for header in sorted((NATIVE / folder).glob("*.h")):
+        compile_alone(f"{folder}/{header.name}", [NATIVE], *system, *defined)
