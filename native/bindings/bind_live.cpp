@@ -2,6 +2,7 @@
 #include "bindings/bind.h"
 #include "bindings/jet_arrays.h"
 #include "energies/styles.h"
+#include "options/stylize.h"
 #include "solve/live_solver.h"
 
 namespace arapfields::python {

@@ -120,7 +120,7 @@ void bind_sdf(py::module_& module) {
             const MlpShape& shape = sdf.shape();
             Layers layers = sdf.layers();
             return py::make_tuple(layers.weights, layers.biases, shape.octaves, shape.frequency,
-                                  shape.sharpness);
+                                  shape.softplus_sharpness);
           },
           "The network's numbers, as from_layers takes them: weights, biases, octaves, frequency, sharpness.")
       .def_property_readonly("frame", &NeuralSdf::frame, "Mesh coordinates and the unit cube.")

@@ -14,7 +14,8 @@ namespace arapfields {
 /// and the grain alone, not on the number of threads. Loops within `body` stay on their thread, as do
 /// libtorch's functions. After an exception in `body` no chunk is begun, and the caller gets it (one, where
 /// there are more).
-ARAPFIELDS_EXPORT void parallel_for(Index begin, Index end, Index grain, const std::function<void(Index, Index)>& body);
+ARAPFIELDS_EXPORT void parallel_for(Index begin, Index end, Index grain,
+                                    const std::function<void(Index, Index)>& body);
 
 /// The same for jobs 0 to count−1, one by one: for jobs of unequal length.
 ARAPFIELDS_EXPORT void parallel_jobs(Index count, const std::function<void(Index)>& body);

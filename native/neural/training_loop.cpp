@@ -18,7 +18,7 @@ namespace {
 class Losses {
  public:
   explicit Losses(const at::Tensor& like)
-      : every_(uses_aten_path(like) ? 25 : 1), run_(at::zeros({every_}, like.options().dtype(at::kDouble))) {}
+      : every_(on_aten_path(like) ? 25 : 1), run_(at::zeros({every_}, like.options().dtype(at::kDouble))) {}
   /// Whether as many as are read at once are there, the `iteration`-th included.
   bool due(int iteration) const { return (iteration + 1) % every_ == 0; }
   void keep(int iteration, const at::Tensor& loss) {

@@ -25,7 +25,7 @@ struct Schedule {
 };
 
 struct LoopOptions {
-  TrainingOptions training;       ///< the schedule follows the clock where a time budget is ahead
+  TrainingOptions training;  ///< the schedule follows the clock where a time budget is ahead
   OptimizerOptions optimizer;
   Schedule schedule;
 };

@@ -115,9 +115,8 @@ def changed(table, block, group):
 
 
 def choices_header(table):
-    lines = [
-        f'{LICENCE}\n{NOTE}\n#pragma once\n\n#include <string>\n\n#include "core/export.h"\n\nnamespace arapfields {{\n'
-    ]
+    lines = [f"{LICENCE}\n{NOTE}\n#pragma once\n\n", "#include <string>\n\n", '#include "core/export.h"\n\n']
+    lines += ["namespace arapfields {\n"]
     for enum, option in enums(table).items():
         lines += ["\n", comment(option["sentence"] + "."), f"enum class {enum} {{\n"]
         for choice, (_, sentence) in option["choices"].items():
