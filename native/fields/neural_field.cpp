@@ -59,6 +59,10 @@ NeuralField::NeuralField(const MlpShape& shape, std::uint64_t seed, bool double_
   require(shape.outputs == 3, "outputs", std::to_string(shape.outputs), "a deformation has 3");
 }
 
+NeuralField::~NeuralField() = default;
+
+const MlpShape& NeuralField::shape() const { return network_.shape(); }
+
 void NeuralField::fixed_part(PointsIn points, JetView<double> b, Vector& a) const {
   const ThreadScope scope;
   const Index n = points.rows();

@@ -18,6 +18,7 @@ class ARAPFIELDS_EXPORT_TO_TESTS NeuralField final : public TrainableField {
   /// `shape.outputs` must be 3. See Mlp for the rest.
   NeuralField(const MlpShape& shape, std::uint64_t seed, bool double_precision = false,
               const std::string& device = "cpu");
+  ~NeuralField() override;
 
   /// Null for the identity; a base lives in the same cube.
   void set_base(std::shared_ptr<const DeformationField> base) { base_ = std::move(base); }
@@ -25,7 +26,7 @@ class ARAPFIELDS_EXPORT_TO_TESTS NeuralField final : public TrainableField {
   void set_handles(std::shared_ptr<const HandleBlend> handles) { handles_ = std::move(handles); }
   const std::shared_ptr<const DeformationField>& base() const { return base_; }
   const std::shared_ptr<const HandleBlend>& handles() const { return handles_; }
-  const MlpShape& shape() const { return network_.shape(); }
+  const MlpShape& shape() const;
 
   void evaluate(PointsIn points, JetView<double> out) const override;
   at::Tensor jets(const at::Tensor& points, JetOrder order) const override;
