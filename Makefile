@@ -11,7 +11,7 @@ PIP := $(PY) -m pip install --disable-pip-version-check
 PYTEST := $(PY) -m pytest
 NATIVE_TESTS := build/wheel/tests/native_tests
 
-.PHONY: help setup build demo test test-slow bench sanitize format lint extension repository blenders gallery docs clean
+.PHONY: help setup build demo test test-slow fuzz bench sanitize format lint extension repository blenders gallery docs clean
 
 help:  ## this list
 	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/:.*##/ -/'
@@ -59,6 +59,9 @@ test: build $(NATIVE_TESTS)  ## all tests but the slow ones
 
 test-slow: build $(NATIVE_TESTS)  ## every test
 	$(PYTEST) tests
+
+fuzz: build $(VENV)/.tools  ## the nets, long: 20,000 odd calls and 20,000 damaged files of every kind
+	$(PY) -m tests.fuzz
 
 bench: build $(VENV)/.tools  ## paired benchmarks against the real competitors
 	$(PIP) -q -r tests/benchmarks/requirements.txt

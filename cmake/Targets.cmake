@@ -20,8 +20,8 @@ if(ARAPFIELDS_SANITIZE)
   target_link_options(arapfields_options INTERFACE -fsanitize=${ARAPFIELDS_SANITIZE})
 endif()
 
-# Three object libraries make up the one shared library: sources that need only Eigen, sources that
-# need libtorch, and kernels compiled once per instruction set. Precompiled headers save more than half of the
+# Four object libraries make up the one shared library: sources that need only Eigen, those that need JSON too,
+# those that need libtorch, and kernels compiled once per instruction set. Precompiled headers save more than half of the
 # compiler's time; what each source includes is complete without them (tests/packaging).
 set(ARAPFIELDS_STANDARD_HEADERS <algorithm> <array> <cmath> <cstdint> <functional> <memory> <optional> <string>
   <utility> <vector>)
@@ -29,6 +29,8 @@ add_library(arapfields_plain OBJECT)
 target_link_libraries(arapfields_plain PRIVATE arapfields_options)
 target_precompile_headers(arapfields_plain PRIVATE <Eigen/Dense> ${ARAPFIELDS_STANDARD_HEADERS})
 target_compile_options(arapfields_plain PRIVATE -fpch-preprocess)  # lets ccache see through the header
+add_library(arapfields_io OBJECT)
+target_link_libraries(arapfields_io PRIVATE arapfields_options arapfields_json)
 add_library(arapfields_torch OBJECT)
 target_link_libraries(arapfields_torch PRIVATE arapfields_options libtorch::libtorch)
 target_precompile_headers(arapfields_torch PRIVATE <ATen/ATen.h> <ATen/Parallel.h> <Eigen/Dense>)
@@ -51,13 +53,15 @@ foreach(level ${ARAPFIELDS_SIMD_LEVELS})
     -O3 -fno-math-errno -fno-trapping-math -ffp-contract=fast)
 endforeach()
 
-# arapfields_sources([PLAIN a.cpp ...] [TORCH b.cpp ...] [SIMD c.cpp ...])
+# arapfields_sources([PLAIN a.cpp ...] [JSON d.cpp ...] [TORCH b.cpp ...] [SIMD c.cpp ...])
 function(arapfields_sources)
-  cmake_parse_arguments(arg "" "" "PLAIN;TORCH;SIMD" ${ARGN})
+  cmake_parse_arguments(arg "" "" "PLAIN;JSON;TORCH;SIMD" ${ARGN})
   list(TRANSFORM arg_PLAIN PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/")
+  list(TRANSFORM arg_JSON PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/")
   list(TRANSFORM arg_TORCH PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/")
   list(TRANSFORM arg_SIMD PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/")
   target_sources(arapfields_plain PRIVATE ${arg_PLAIN})
+  target_sources(arapfields_io PRIVATE ${arg_JSON})
   target_sources(arapfields_torch PRIVATE ${arg_TORCH})
   foreach(level ${ARAPFIELDS_SIMD_LEVELS})
     target_sources(arapfields_simd_${level} PRIVATE ${arg_SIMD})

@@ -85,8 +85,8 @@ def bad_meshes(folder, mesh_file):
         "mesh.fbx": TRIANGLE + "f 1 2 3\n",
         "extensionless": TRIANGLE + "f 1 2 3\n",
         f"truncated_real{Path(mesh_file).suffix}": whole[: len(whole) // 4],
-        "empty.npz": "",
-        "garbage.npz": bytes(range(256)) * 3,
+        "empty.safetensors": "",
+        "garbage.safetensors": bytes(range(256)) * 3,
     }
     paths = []
     for name, content in contents.items():
@@ -94,10 +94,11 @@ def bad_meshes(folder, mesh_file):
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
         paths.append(path)
     np.savez(Path(folder) / "foreign.npz", values=np.zeros(3))
+    (Path(folder) / "foreign.npz").rename(Path(folder) / "foreign.safetensors")
     (Path(folder) / "directory.obj").mkdir()
     return [
         *paths,
-        Path(folder) / "foreign.npz",
+        Path(folder) / "foreign.safetensors",
         Path(folder) / "directory.obj",
         Path(folder) / "missing.obj",
     ]

@@ -2,6 +2,7 @@
 """batch: every file of a folder, each in a Blender of its own: one failure or crash stops no other."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from pathlib import Path
 
 from ..core.errors import UserError
 from ..core.runtime import native
+from .launch import PARENT
 from .parser import FORMATS, solve_settings
 from .record import NAME, Record, options_hash, stamp
 
@@ -62,7 +64,10 @@ def plan(options):
         raise UserError(f"{output}: results would overwrite their sources; choose another folder")
     if output.exists() and not output.is_dir():
         raise UserError(f"{output}: is a file, not a folder")
-    found = sorted(folder.rglob(options.pattern) if options.recursive else folder.glob(options.pattern))
+    try:
+        found = sorted(folder.rglob(options.pattern) if options.recursive else folder.glob(options.pattern))
+    except (ValueError, NotImplementedError, IndexError) as error:
+        raise UserError(f"--pattern: {options.pattern!r} is not a pattern of names ({error})") from None
     tasks = []
     for path in found:
         suffix = path.suffix.lower().lstrip(".")
@@ -137,13 +142,17 @@ class Children:
     """The Blenders at work; leaving the block ends those that still are."""
 
     def __init__(self, environment, limit):
-        self.environment, self.limit, self.running, self.stopped = environment, limit, set(), False
+        self.limit, self.running, self.stopped = limit, set(), False
+        self.pipe, self.alive = os.pipe()  # nothing is ever written; the system closes it with this process
+        self.environment = {**environment, PARENT: str(self.pipe)}
 
     def __enter__(self):
         return self
 
     def __exit__(self, *_):
         self.stop()
+        os.close(self.pipe)
+        os.close(self.alive)
 
     def stop(self):
         self.stopped = True
@@ -172,6 +181,7 @@ class Children:
             stderr=subprocess.STDOUT,
             stdin=subprocess.DEVNULL,
             env=self.environment,
+            pass_fds=(self.pipe,),
             start_new_session=True,  # a Ctrl-C reaches the batch, which ends its children
         )
         self.running.add(process)
@@ -194,9 +204,18 @@ def end(process):
         process.wait()
 
 
+def read_objects(report):
+    """What a child says of its objects; nothing where it did not come to that."""
+    try:
+        objects = json.loads(report.read_text())["objects"]
+        return [{**o, "status": str(o["status"]), "message": str(o["message"])} for o in objects]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return []
+
+
 def understand(code, report, log):
     """{"status", "message", "objects"} from what a child left."""
-    objects = json.loads(report.read_text())["objects"] if report.exists() else []
+    objects = read_objects(report)
     failures = [o["message"] for o in objects if o["status"] != "done"]
     if code == 0 and objects:
         return {"status": "done", "message": "; ".join(o["message"] for o in objects), "objects": objects}
@@ -212,4 +231,5 @@ def understand(code, report, log):
 
 
 def say(text):
-    print(text, file=sys.stdout, flush=True)
+    """A line; names of files may hold what the terminal cannot show."""
+    print(text.encode(errors="backslashreplace").decode(), file=sys.stdout, flush=True)

@@ -4,12 +4,12 @@
 import contextlib
 import os
 import re
-import tempfile
 from pathlib import Path
 
 import bpy
 
 from ..core.errors import UserError
+from .arrived import is_whole
 from .parser import FORMATS
 
 AXES = {"forward_axis": "Y", "up_axis": "Z"}  # coordinates stay as they are in the file
@@ -58,16 +58,16 @@ def write(path, items):
         item.hide_set(False)
         item.hide_viewport = False
         item.select_set(True)
-    with tempfile.TemporaryDirectory(prefix=".arapfields-", dir=path.parent) as folder:
-        partial = Path(folder) / path.name
+    from arapfields._files import whole_file, write_text
+
+    with whole_file(path) as partial:
         export(partial, items)
-        if not partial.is_file() or not partial.stat().st_size:
-            raise UserError(f"{path}: Blender wrote nothing")
+        if not partial.is_file() or not is_whole(partial, [item.data for item in items]):
+            raise UserError(f"{path}: Blender could not write all of it; the disk may be full")
         materials = partial.with_suffix(".mtl")
         if materials.exists():
-            materials.write_text(relative_textures(materials.read_text(errors="replace"), path.parent))
-            os.replace(materials, path.with_suffix(".mtl"))
-        os.replace(partial, path)
+            text = materials.read_text(errors="surrogateescape")
+            write_text(path.with_suffix(".mtl"), relative_textures(text, path.parent))
 
 
 def export(path, items):
@@ -96,11 +96,10 @@ def relative_textures(text, folder):
 
 def write_blend(path):
     """Beside its place first, so that paths relative to the file hold."""
-    partial = path.with_name(f".arapfields-{os.getpid()}-{path.name}")
-    try:
-        bpy.ops.wm.save_as_mainfile(filepath=str(partial), copy=True, relative_remap=True)
-        os.replace(partial, path)
-    except RuntimeError as error:
-        raise UserError(f"{path}: {error}") from error
-    finally:
-        partial.unlink(missing_ok=True)
+    from arapfields._files import whole_file
+
+    with whole_file(path, beside=True) as partial:
+        try:
+            bpy.ops.wm.save_as_mainfile(filepath=str(partial), copy=True, relative_remap=True)
+        except RuntimeError as error:
+            raise UserError(f"{path}: {error}") from error

@@ -2,8 +2,34 @@
 """How to start another Blender like this one: a batch gives each file a process of its own."""
 
 import os
+import signal
 import sys
+import threading
+import time
 from pathlib import Path
+
+PARENT = "ARAPFIELDS_PARENT"  # the descriptor of a pipe that closes when the batch ends, however it does
+PATIENCE = 5.0  # seconds in which a Blender that was asked to end may do so
+
+
+def end_with_parent():
+    """In a batch's child: ends this process when the batch is no more, even killed."""
+    try:
+        pipe = int(os.environ.pop(PARENT, ""))
+    except ValueError:
+        return
+
+    def watch():
+        try:
+            while os.read(pipe, 1):
+                pass
+        except OSError:
+            return  # not a batch's child after all
+        os.kill(os.getpid(), signal.SIGTERM)  # an interruption, which leaves no partial file
+        time.sleep(PATIENCE)
+        os._exit(130)
+
+    threading.Thread(target=watch, name="arapfields parent", daemon=True).start()
 
 
 class Launch:

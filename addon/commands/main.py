@@ -7,7 +7,7 @@ import sys
 
 from ..core.errors import UserError
 from ..core.runtime import native
-from .launch import Launch
+from .launch import Launch, end_with_parent
 from .parser import parse
 
 
@@ -21,6 +21,7 @@ def run(arguments, script=None):
     except SystemExit as stop:
         return stop.code or 0
     with interruptible():
+        end_with_parent()
         try:
             native.library()
             return verb(options.verb)(options, Launch(script))

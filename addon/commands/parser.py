@@ -3,7 +3,7 @@
 
 import argparse
 import sys
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from ..core.settings.fitting import QUALITIES
 from ..core.settings.parameters import DEFORM
@@ -13,6 +13,7 @@ FORMATS = ("ply", "obj", "stl", "blend")
 PARAMETERS = {"deform": DEFORM, "stylize": STYLIZE}
 FLAGS = {"deform": ("handles",), "stylize": ("style", "frame")}  # of one verb, beside its parameters
 SHARED = ("result", "surface", "resolution", "quality")
+LONGEST = 1e7  # seconds; a wait cannot be much longer
 FILE = "file: .ply, .obj, .stl, or a .blend, in which each object's own settings and handles count"
 
 
@@ -88,11 +89,13 @@ def add_batch(verbs):
     add_solve_flags(batch, ["stylize", "deform"])
     batch.add_argument("-j", "--jobs", type=count, default=1, metavar="N", help="files at a time [1]")
     batch.add_argument("--format", choices=FORMATS, help="of the results [each input's own]")
-    batch.add_argument("--pattern", default="*", metavar="GLOB", help="which files, such as 'chair*.ply'")
+    batch.add_argument(
+        "--pattern", type=pattern, default="*", metavar="GLOB", help="which files, such as 'chair*.ply'"
+    )
     batch.add_argument("--recursive", action="store_true", help="folders within the folder too")
     batch.add_argument("--again", action="store_true", help="also what is done already")
     batch.add_argument("--dry-run", action="store_true", help="say what would be done, and do nothing")
-    batch.add_argument("--limit", type=float, metavar="SECONDS", help="give up a file after so long")
+    batch.add_argument("--limit", type=seconds, metavar="SECONDS", help="give up a file after so long")
 
 
 def add_solve_flags(one, verbs):
@@ -153,6 +156,24 @@ def count(text):
     if not text.isdigit() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is no number of at least 1")
     return int(text)
+
+
+def seconds(text):
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value <= LONGEST:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds above 0")
+    return value
+
+
+def pattern(text):
+    """Of names within the folder."""
+    path = PurePath(text)
+    if not path.parts or path.is_absolute() or ".." in path.parts:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a pattern of names within the folder")
+    return text
 
 
 def style(text):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a batch has done: a file in the output folder, by which the next run knows what it may skip."""
 
+import contextlib
+import fcntl
 import hashlib
 import json
 import os
@@ -25,24 +27,24 @@ def stamp(path):
 
 
 class Record:
-    """{input: what was made of it}, written anew, whole, after each file."""
+    """{input: what was made of it}, written anew, whole, after each file; several batches may share one."""
 
     def __init__(self, folder):
         self.path = Path(folder) / NAME
-        self.damaged = False
-        self.entries = self._read()
+        self.entries, self.damaged = self._read()
 
     def _read(self):
+        """The entries on the disk, and whether they are damaged."""
         try:
-            content = json.loads(self.path.read_text())
-            entries = content["files"]
-            assert content["version"] == VERSION and isinstance(entries, dict)
-            return entries
+            content = json.loads(self.path.read_text(encoding="utf-8"))
         except FileNotFoundError:
-            return {}
-        except (ValueError, KeyError, TypeError, AssertionError):
-            self.damaged = True
-            return {}
+            return {}, False
+        except (ValueError, RecursionError):
+            return {}, True
+        known = isinstance(content, dict) and content.get("version") == VERSION
+        if not known or not isinstance(content.get("files"), dict):
+            return {}, True
+        return content["files"], False
 
     def is_done(self, name, source, target, options):
         """Whether the result is there, newer than its source, and made with the same options."""
@@ -54,8 +56,22 @@ class Record:
         return target.is_file() and target.stat().st_mtime_ns >= source.stat().st_mtime_ns
 
     def note(self, name, **entry):
-        self.entries[name] = entry
+        """Adds an entry to what is on the disk by now: another batch may have noted its own."""
+        from arapfields._files import json_text, write_text
+
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        partial = self.path.with_name(f".{NAME}.{os.getpid()}")
-        partial.write_text(json.dumps({"version": VERSION, "files": self.entries}, indent=1))
-        os.replace(partial, self.path)
+        with locked(self.path.parent):
+            there, damaged = self._read()
+            self.entries = {**(self.entries if damaged else there), name: entry}
+            write_text(self.path, json_text({"version": VERSION, "files": self.entries}, indent=1))
+
+
+@contextlib.contextmanager
+def locked(folder):
+    """No other process is in such a block with the same folder."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)

@@ -3,7 +3,6 @@
 
 import contextlib
 import json
-import os
 import sys
 import threading
 import time
@@ -139,10 +138,10 @@ def finish_names(options, made):
 
 
 def write_json(path, content):
+    from arapfields._files import json_text, write_text
+
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.name}.{os.getpid()}")
-    partial.write_text(json.dumps(content, indent=1))
-    os.replace(partial, path)
+    write_text(path, json_text(content, indent=1))
 
 
 @contextlib.contextmanager

@@ -19,9 +19,10 @@ HOLDS = {
     "energies": "value and cotangents",
     "solve": "Adam, live solver",
     "extraction": "marching cubes",
+    "io": "files, whole or not",
 }
 UNDER_ALL = ("core", "options")
-WIDTH, STEP, BOX, TOP = 1000, 121, 104, 250
+WIDTH, STEP, BOX, TOP = 1110, 121, 104, 250
 INK, LINE = "#1f2937", "#94a3b8"
 
 

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <cerrno>
+
 #include "bindings/bind.h"
+#include "core/file_error.h"
 #include "core/frame.h"
 #include "core/memory.h"
 #include "core/parallel.h"
@@ -27,12 +30,24 @@ py::array as_array(const py::handle& value, const std::string& argument, const s
 template <class Scalar>
 using Forced = py::array_t<Scalar, py::array::c_style | py::array::forcecast>;
 
+/// The array's numbers one after the other as Scalar. InvalidInput where there is no memory for them: an
+/// array may be larger than what it takes (np.broadcast_to).
+template <class Scalar>
+Forced<Scalar> as_numbers(const py::array& array, const std::string& argument) {
+  const double size = static_cast<double>(array.size()) * sizeof(Scalar);
+  require_memory(argument, 2.0 * size);  // and once more as a matrix of ours
+  Forced<Scalar> numbers = Forced<Scalar>::ensure(array);
+  require(static_cast<bool>(numbers), argument, shape_text(array),
+          "it cannot be converted: there may be no memory for it");
+  return numbers;
+}
+
 template <class Result, class Scalar>
 Result as_rows_of_three(const py::handle& value, const std::string& argument, const std::string& kinds,
                         const std::string& allowed) {
   const py::array array = as_array(value, argument, kinds, allowed);
   require(array.ndim() == 2 && array.shape(1) == 3, argument, shape_text(array), allowed);
-  const Forced<Scalar> forced = Forced<Scalar>::ensure(array);
+  const Forced<Scalar> forced = as_numbers<Scalar>(array, argument);
   return Eigen::Map<const Result>(forced.data(), forced.shape(0), 3);
 }
 
@@ -56,7 +71,7 @@ Eigen::MatrixXd as_matrix(const py::handle& value, const std::string& argument) 
   const std::string allowed = "expected real numbers in a two-dimensional array";
   const py::array array = as_array(value, argument, "fiu", allowed);
   require(array.ndim() == 2, argument, shape_text(array), allowed);
-  const Forced<double> forced = Forced<double>::ensure(array);
+  const Forced<double> forced = as_numbers<double>(array, argument);
   return Eigen::Map<const RowMatrix<double>>(forced.data(), forced.shape(0), forced.shape(1));
 }
 
@@ -64,7 +79,7 @@ Vector as_vector(const py::handle& value, const std::string& argument) {
   const std::string allowed = "expected real numbers of shape (n,)";
   const py::array array = as_array(value, argument, "fiu", allowed);
   require(array.ndim() == 1, argument, shape_text(array), allowed);
-  const Forced<double> forced = Forced<double>::ensure(array);
+  const Forced<double> forced = as_numbers<double>(array, argument);
   return Eigen::Map<const Vector>(forced.data(), forced.shape(0));
 }
 
@@ -92,6 +107,30 @@ void raise_diverged(const Diverged& error, const py::object& last_good) {
   throw py::error_already_set();
 }
 
+namespace {
+
+/// Text as Python shows it; names of files may hold bytes that are no UTF-8.
+py::str as_text(const std::string& text) {
+  return py::reinterpret_steal<py::str>(
+      PyUnicode_DecodeUTF8(text.data(), static_cast<py::ssize_t>(text.size()), "surrogateescape"));
+}
+
+void translate(std::exception_ptr raised) {
+  try {
+    std::rethrow_exception(raised);
+  } catch (const InvalidInput& error) {
+    const py::object type = py::module_::import("arapfields._native").attr("InvalidInput");
+    PyErr_SetObject(type.ptr(), as_text(error.what()).ptr());
+  } catch (const FileError& error) {
+    errno = error.number();
+    PyErr_SetFromErrnoWithFilenameObject(PyExc_OSError, as_text(error.path()).ptr());
+  } catch (const py::cast_error& error) {
+    py::set_error(PyExc_TypeError, error.what());
+  }
+}
+
+}  // namespace
+
 void bind_core(py::module_& module) {
   // Python's own exceptions: InvalidInput is a ValueError, so that callers may catch either.
   auto& invalid = py::register_exception<InvalidInput>(module, "InvalidInput", PyExc_ValueError);
@@ -102,6 +141,8 @@ void bind_core(py::module_& module) {
   diverged.attr("__doc__") =
       "An optimization met NaN or infinity; names the stage and what to change.\n"
       "Its attribute last_good is the field, or the fit, before that.";
+
+  py::register_exception_translator(&translate);
 
   py::class_<Task>(module, "Task", "Cancels a long call and reads its progress, from any thread.")
       .def(py::init<>())

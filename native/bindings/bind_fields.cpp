@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bindings/bind.h"
-#include "bindings/field_state.h"
+#include "bindings/files.h"
 #include "fields/inverse.h"
+#include "io/files.h"
 
 namespace arapfields::python {
 namespace {
@@ -61,15 +62,18 @@ Points inverse(const DeformationField& field, const py::object& points, double t
 py::object report(const py::object& self) { return py::getattr(self, "_report", py::dict()); }
 
 void save(const py::object& self, const py::object& path) {
-  py::dict state = field_state(py::cast<const DeformationField&>(self));
-  state["report"] = report(self);
-  py::module_::import("arapfields._files").attr("save_state")(path, "field", state);
+  const auto& field = py::cast<const DeformationField&>(self);
+  const std::string place = as_path(path), measured = report_text(report(self));
+  const py::gil_scoped_release release;
+  save_field(place, field, measured);
 }
 
 py::object load(const py::object& path) {
-  const py::dict state = py::module_::import("arapfields._files").attr("load_state")(path, "field");
-  py::object field = py::cast(field_from_state(state));
-  if (state.contains("report")) field.attr("_report") = state["report"];
+  const std::string place = as_path(path);
+  std::string measured;
+  py::object field =
+      py::cast(run_long(nullptr, [&](const Progress&) { return load_field(place, &measured); }));
+  field.attr("_report") = report_from(measured);
   return field;
 }
 
@@ -92,9 +96,14 @@ void bind_fields(py::module_& module) {
           "frame", [](const DeformationField& self) { return self.frame(); },
           "Mesh coordinates and the unit cube in which the field works.")
       .def_property_readonly("report", &report, "What the solve measured: a dict; empty for none.")
-      .def("save", &save, "path"_a, "Writes field and report as one file; OSError where that fails.")
-      .def_static("load", &load, "path"_a,
-                  "The field of a file that save wrote; InvalidInput for any other or a damaged one.");
+      .def("save", &save, "path"_a,
+           "Writes field and report as one file, whole or not at all; OSError where that fails, InvalidInput "
+           "for\n"
+           "a place that holds no regular file.")
+      .def_static(
+          "load", &load, "path"_a,
+          "What save() wrote. OSError for a file that cannot be read, InvalidInput naming the file for\n"
+          "one that is damaged, foreign, of another kind or version, or holds unusable numbers.");
 }
 
 }  // namespace arapfields::python

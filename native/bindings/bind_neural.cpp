@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bindings/bind.h"
+#include "bindings/files.h"
+#include "io/files.h"
 #include "neural/layers.h"
 #include "neural/neural_sdf.h"
 
@@ -27,52 +29,21 @@ Points finite_points(const py::object& points) {
   return p;
 }
 
-/// Runs `call`, and names the file in what it finds wrong with the file's content.
-template <class Call>
-auto naming_file(const py::object& path, Call&& call) {
-  const std::string name = py::cast<std::string>(py::str(path));
-  try {
-    return call();
-  } catch (const InvalidInput& error) {
-    throw InvalidInput(name, "cannot be loaded", error.what());
-  } catch (const py::error_already_set& error) {
-    if (!error.matches(PyExc_KeyError) && !error.matches(PyExc_TypeError)) throw;
-    throw InvalidInput(name, "cannot be loaded", "an entry is missing or of the wrong type");
-  } catch (const py::cast_error&) {
-    throw InvalidInput(name, "cannot be loaded", "an entry is of the wrong type");
-  }
-}
+py::object report(const py::object& self) { return py::getattr(self, "_report", py::dict()); }
 
 void save(const py::object& self, const py::object& path) {
-  const NeuralSdf& sdf = py::cast<const NeuralSdf&>(self);
-  const MlpShape& shape = sdf.shape();
-  const Layers layers = sdf.layers();
-  py::list weights, biases;  // single precision holds all there is
-  for (const RowMatrix<double>& weight : layers.weights)
-    weights.append(RowMatrix<float>(weight.cast<float>()));
-  for (const Vector& bias : layers.biases) biases.append(VectorF(bias.cast<float>()));
-  const py::dict network("octaves"_a = shape.octaves, "frequency"_a = shape.frequency,
-                         "sharpness"_a = shape.softplus_sharpness, "weights"_a = weights,
-                         "biases"_a = biases);
-  const py::dict frame("center"_a = sdf.frame().center, "scale"_a = sdf.frame().scale);
-  py::module_::import("arapfields._files")
-      .attr("save_state")(
-          path, "sdf", py::dict("network"_a = network, "frame"_a = frame, "report"_a = self.attr("report")));
+  const auto& sdf = py::cast<const NeuralSdf&>(self);
+  const std::string place = as_path(path), measured = report_text(report(self));
+  const py::gil_scoped_release release;
+  save_sdf(place, sdf, measured);
 }
 
 py::object load(const py::object& path) {
-  const py::dict state = py::module_::import("arapfields._files").attr("load_state")(path, "sdf");
-  return naming_file(path, [&] {
-    const py::dict network = state["network"], place = state["frame"];
-    const Frame frame{as_vec3(place["center"], "center"), py::cast<double>(place["scale"])};
-    require(std::isfinite(frame.scale) && frame.scale > 0, "scale", "got " + std::to_string(frame.scale),
-            "must be positive");
-    py::object sdf = py::cast(NeuralSdf::from_layers(
-        as_layers(network["weights"], network["biases"]), py::cast<int>(network["octaves"]),
-        py::cast<double>(network["frequency"]), py::cast<double>(network["sharpness"]), frame));
-    sdf.attr("_report") = py::dict(state["report"]);
-    return sdf;
-  });
+  const std::string place = as_path(path);
+  std::string measured;
+  py::object sdf = py::cast(run_long(nullptr, [&](const Progress&) { return load_sdf(place, &measured); }));
+  sdf.attr("_report") = report_from(measured);
+  return sdf;
 }
 
 void bind_sdf(py::module_& module) {
@@ -124,9 +95,8 @@ void bind_sdf(py::module_& module) {
           },
           "The network's numbers, as from_layers takes them: weights, biases, octaves, frequency, sharpness.")
       .def_property_readonly("frame", &NeuralSdf::frame, "Mesh coordinates and the unit cube.")
-      .def_property_readonly(
-          "report", [](const py::object& self) { return py::getattr(self, "_report", py::dict()); },
-          "What the fit measured, as a dict (see fit_sdf); empty for none.")
+      .def_property_readonly("report", &report,
+                             "What the fit measured, as a dict (see fit_sdf); empty for none.")
       .def("save", &save, "path"_a,
            "Writes network, frame and report as one file, whole or not at all; OSError where that fails.")
       .def_static(

@@ -26,8 +26,8 @@ SurfaceSamples sample(const std::shared_ptr<ImplicitFunction>& sdf, int count, s
 
 void bind_sampling(py::module_& module) {
   module.def(
-      "sample_surface", &sample, "sdf"_a, "count"_a = SampleOptions().count, "seed"_a = SampleOptions().seed,
-      "task"_a = py::none(), "threads"_a = 0, "report"_a = py::none(),
+      "sample_surface", &sample, "sdf"_a.none(false), "count"_a = SampleOptions().count,
+      "seed"_a = SampleOptions().seed, "task"_a = py::none(), "threads"_a = 0, "report"_a = py::none(),
       "Samples of the zero surface of a signed distance function, uniform by area, with unit normals.\n\n"
       "All crossings of random lines through the cube, thinned to `count` (1 to 100 million) at random, in\n"
       "random order; every point has |sdf| <= 1e-4 of the cube's half side, nearly all <= 2e-6. Follows\n"

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bindings/bind.h"
+#include "bindings/files.h"
+#include "bindings/uninitialised.h"
 
 PYBIND11_MODULE(_native, module) {
   using namespace arapfields::python;
@@ -18,5 +20,7 @@ PYBIND11_MODULE(_native, module) {
   bind_extraction(module);
   bind_live(module);
   bind_curves(module);
+  bind_io(module);
   bind_solve_testing(module);
+  refuse_uninitialised(module);
 }

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/memory.h"
 
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
@@ -34,6 +37,14 @@ double group_memory() {
   return limit < unknown && used < unknown ? std::max(0.0, limit - used) : unknown;
 }
 
+/// What the process's own limit (ulimit -v) leaves.
+double process_memory() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return unknown;
+  const double used = number_in("/proc/self/statm") * static_cast<double>(sysconf(_SC_PAGESIZE));
+  return used < unknown ? std::max(0.0, static_cast<double>(limit.rlim_cur) - used) : unknown;
+}
+
 std::string in_gib(double bytes) {
   char text[32];
   std::snprintf(text, sizeof text, "%.1f GiB", bytes / gib);
@@ -42,7 +53,7 @@ std::string in_gib(double bytes) {
 
 }  // namespace
 
-double available_memory() { return std::min(system_memory(), group_memory()); }
+double available_memory() { return std::min({system_memory(), group_memory(), process_memory()}); }
 
 void require_memory(const std::string& argument, double bytes) {
   if (bytes < gib / 4) return;  // not worth a look

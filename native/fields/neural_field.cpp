@@ -4,6 +4,7 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "core/tensors.h"
+#include "neural/parameters.h"
 
 namespace arapfields {
 namespace {
@@ -151,18 +152,8 @@ void NeuralField::translate(const Vec3& offset) {
   bias.add_(tensor_like(offset, bias));
 }
 
-VectorF NeuralField::weights() const {
-  const ThreadScope scope;
-  const at::Tensor host = network_.parameters().to(at::kCPU, at::kFloat).contiguous();
-  return Eigen::Map<const VectorF>(host.const_data_ptr<float>(), host.numel());
-}
+VectorF NeuralField::weights() const { return parameters_of(network_); }
 
-void NeuralField::set_weights(const VectorF& weights) {
-  const ThreadScope scope;
-  at::Tensor& parameters = network_.parameters();
-  require(weights.size() == parameters.numel(), "weights", std::to_string(weights.size()) + " numbers",
-          "this network has " + std::to_string(parameters.numel()));
-  parameters.copy_(tensor_view(weights));
-}
+void NeuralField::set_weights(const VectorF& weights) { set_parameters(network_, weights); }
 
 }  // namespace arapfields

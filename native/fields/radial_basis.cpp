@@ -9,6 +9,23 @@
 #include "fields/radial_kernel.h"
 
 namespace arapfields {
+namespace {
+
+void validate(const InteriorEmbedding& given) {
+  const Index nodes = given.nodes.rows();
+  require(
+      nodes > 0 && given.values.rows() == nodes && given.slopes.rows() == nodes && given.slopes.cols() == 9,
+      "embedding",
+      std::to_string(nodes) + " nodes, " + std::to_string(given.values.rows()) + " values, " +
+          std::to_string(given.slopes.rows()) + " × " + std::to_string(given.slopes.cols()) + " slopes",
+      "as many values and rows of 9 slopes as nodes are needed, one or more");
+  require(given.nodes.allFinite() && given.values.allFinite() && given.slopes.allFinite(), "embedding",
+          "NaN or infinity", "finite numbers are needed");
+  require_positive("embedding.width", given.width);
+}
+
+}  // namespace
+
 RowMatrix<double> RadialBasis::identity() const {
   RowMatrix<double> result = RowMatrix<double>::Zero(size(), 3);
   result.bottomRows<3>().setIdentity();
@@ -16,6 +33,7 @@ RowMatrix<double> RadialBasis::identity() const {
 }
 
 void RadialBasis::set_embedding(std::shared_ptr<const InteriorEmbedding> other) {
+  if (other) validate(*other);
   embedding = std::move(other);
   embedded.resize(embedding ? center_count() : 0, 3);
   if (embedding) embedding->evaluate(centers, {embedded.data(), center_count(), JetOrder::value});

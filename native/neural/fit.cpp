@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "core/device.h"
+#include "core/memory.h"
 #include "core/parallel.h"
 #include "core/random.h"
 #include "core/stopwatch.h"
@@ -16,6 +17,9 @@
 
 namespace arapfields {
 namespace {
+
+/// What a training point and its distance take while they are made.
+constexpr double example_bytes = 100.0;
 
 /// Points and distances on the network's device, the near-surface ones first.
 struct Examples {
@@ -113,6 +117,8 @@ FitResult fit_sdf(PointsIn vertices, TrianglesIn triangles, const FitOptions& op
                   const Progress& progress) {
   const Stopwatch watch;
   options.validate();
+  require_memory("near_points", example_bytes * options.points.near_points);
+  require_memory("uniform_points", example_bytes * options.points.uniform_points);
   const ThreadScope scope(options.machine.threads);
   const TriangleMesh mesh{vertices, triangles};
   validate(mesh);

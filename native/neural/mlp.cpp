@@ -13,23 +13,9 @@
 #include "core/parallel.h"
 #include "core/random.h"
 #include "neural/mlp_sweep.h"
+#include "neural/parameters.h"
 
 namespace arapfields {
-namespace {
-
-void check(const MlpShape& shape) {
-  require_range("outputs", shape.outputs, 1, 1024);
-  shape.validate();
-}
-
-Index parameter_count(const MlpShape& shape) {
-  Index count = 0;
-  for (int l = 0; l <= shape.layers; ++l)
-    count += static_cast<Index>(shape.fan_out(l)) * (shape.fan_in(l) + 1);
-  return count;
-}
-
-}  // namespace
 
 struct Mlp::State {
   MlpShape shape;
@@ -88,9 +74,10 @@ void Mlp::State::prepare(const at::Tensor& points, JetOrder order) {
 
 Mlp::Mlp(const MlpShape& shape, std::uint64_t seed, bool zero_last_layer, bool double_precision,
          const std::string& device) {
-  check(shape);
+  validate(shape);
   const ThreadScope scope;
   const Index count = parameter_count(shape);
+  require_memory("width", static_cast<double>(count) * (sizeof(double) + 2 * sizeof(float)));
   at::Tensor values = at::zeros({count}, at::kDouble);
   double* next = values.data_ptr<double>();
   for (int l = 0; l < shape.layers + (zero_last_layer ? 0 : 1); ++l) {

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "sampling/curve_samples.h"
 
+#include <cmath>
 #include <vector>
 
 #include "core/errors.h"
+#include "core/memory.h"
 
 namespace arapfields {
 
@@ -13,6 +15,7 @@ CurveSamples sample_curve(Points2In vertices, Index count, bool closed) {
           closed ? "a closed curve has three or more" : "an open curve has two or more");
   require(vertices.allFinite(), "vertices", "some are NaN or infinite", "all must be finite");
   require(count >= 1, "count", std::to_string(count), "must be positive");
+  require_memory("count", 4.0 * sizeof(double) * static_cast<double>(count));
 
   const Index edges = closed ? vertices.rows() : vertices.rows() - 1;
   std::vector<double> ends(static_cast<std::size_t>(edges));
@@ -24,6 +27,8 @@ CurveSamples sample_curve(Points2In vertices, Index count, bool closed) {
     ends[static_cast<std::size_t>(e)] = length;
   }
   require(length > 0, "vertices", "all are the same point", "a curve has a length");
+  require(std::isfinite(length), "vertices", "their distances are too large for floating point",
+          "the curve's length must be finite");
   const double side =
       closed && twice_area < 0 ? -1.0 : 1.0;  // clockwise curves have their inside to the right
 

@@ -2,10 +2,12 @@
 #include "solve/deform_curve.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 #include "core/dense.h"
 #include "core/errors.h"
+#include "core/memory.h"
 #include "core/parallel.h"
 #include "energies/arap2d.h"
 #include "solve/quasi_newton.h"
@@ -17,6 +19,10 @@ using Rows = RowMatrix<double>;
 
 constexpr int local_global_steps = 8;
 constexpr double gain_tolerance = 1e-5;
+/// Rows that are multiplied between two looks at the task.
+constexpr Index rows_at_once = 1024;
+/// Matrices of the problem's size that exist at once while it is set up.
+constexpr double copies = 2.0;
 
 void check(const CurveHandle& handle, std::size_t position, Index samples) {
   const std::string name = "handles[" + std::to_string(position) + "]";
@@ -36,8 +42,13 @@ void check(const CurveHandle& handle, std::size_t position, Index samples) {
 /// second derivatives at the centers, scaled so that their squares add up to the smoothness term.
 class CurveProblem final : public MeasuredObjective {
  public:
-  CurveProblem(Points2In points, const std::vector<CurveHandle>& handles, const CurveOptions& options)
+  CurveProblem(Points2In points, const std::vector<CurveHandle>& handles, const CurveOptions& options,
+               const Progress& progress)
       : options_(options), count_(points.rows()), field_(CurveField::around(points, options.spacing)) {
+    const double size = static_cast<double>(field_.basis.size());
+    require_memory("spacing",
+                   copies * sizeof(double) * size * (columns2 * static_cast<double>(count_) + 7.0 * size));
+    progress.check();
     const Rows jets = field_.basis.rows(field_.to_square(points));
     const Index centers = field_.basis.centers.rows();
     Rows second = field_.basis.rows(field_.basis.centers).bottomRows(3 * centers);
@@ -53,7 +64,7 @@ class CurveProblem final : public MeasuredObjective {
         held_.push_back({s, share, field_.to_square(moved.transpose())});
       }
     }
-    factorise();
+    factorise(progress);
   }
 
   /// Minimises the quadratic surrogate for the rotations that are closest now.
@@ -130,16 +141,21 @@ class CurveProblem final : public MeasuredObjective {
   };
 
   /// Half the Hessian of the surrogate mean ‖J − R‖² + λ_bend mean ‖D‖² + handles + smoothness, R fixed.
-  void factorise() {
+  void factorise(const Progress& progress) {
     const double share = 1.0 / static_cast<double>(count_);
     const double weights[columns2] = {
         0.0, share, share, options_.bending * share, options_.bending * share, 2 * options_.bending * share};
     Vector weight = Vector::Ones(rows_.rows());
     for (int c = 0; c < columns2; ++c) weight.segment(c * count_, count_).setConstant(weights[c]);
     for (const Held& h : held_) weight(h.sample) += h.weight;
-    const Rows scaled = weight.asDiagonal() * rows_;
-    Rows quadratic(rows_.cols(), rows_.cols());
-    gemm<double>(Transpose::yes, Transpose::no, 1.0, rows_, scaled, 0.0, quadratic);
+    Rows quadratic = Rows::Zero(rows_.cols(), rows_.cols());
+    for (Index begin = 0; begin < rows_.rows(); begin += rows_at_once) {
+      progress.check();
+      const Rows block = rows_.middleRows(begin, std::min(rows_at_once, rows_.rows() - begin));
+      const Rows scaled = weight.segment(begin, block.rows()).asDiagonal() * block;
+      gemm<double>(Transpose::yes, Transpose::no, 1.0, block, scaled, 1.0, quadratic);
+    }
+    progress.check();
     quadratic.diagonal().array() += 1e-9 * quadratic.diagonal().mean();
     factor_ = cholesky<double>(quadratic);
   }
@@ -170,7 +186,7 @@ CurveSolution deform_curve(Points2In points, const std::vector<CurveHandle>& han
   for (std::size_t h = 0; h < handles.size(); ++h) check(handles[h], h, points.rows());
   const ThreadScope threads(options.threads);
 
-  CurveProblem problem(points, handles, options);
+  CurveProblem problem(points, handles, options, progress);
   for (int step = 0; step < local_global_steps; ++step) {
     progress.report(0.2 * step / local_global_steps, "rotations");
     problem.local_global_step();

@@ -21,6 +21,7 @@ FOLDERS = [
     "energies",
     "solve",
     "extraction",
+    "io",
 ]
 LINE_LIMITS = {".cpp": 350, ".h": 120, ".py": 250}
 SOURCE_FOLDERS = ["native", "addon", "blender_scripts", "tests"]

@@ -92,7 +92,7 @@ def test_commands_of_the_package_run(tmp_path):
         command = [sys.executable, "-m", *words, *SHORT.get(words[1], "").split()]
         run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
         assert run.returncode == 0, f"{shlex.join(words)}\n{run.stderr[-2000:]}"
-        for name in [word for word in words if Path(word).suffix in (".obj", ".ply", ".npz")]:
+        for name in [word for word in words if Path(word).suffix in (".obj", ".ply", ".npz", ".safetensors")]:
             assert (tmp_path / name).stat().st_size > 0
 
 

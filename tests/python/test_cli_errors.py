@@ -10,9 +10,9 @@ import pytest
 from cli_cases import HELD_AND_SHIFTED, SMALL_SOLVE, bad_meshes, process, run, write_octahedron
 
 VERBS = {
-    "fit": ["--output", "out.npz"],
+    "fit": ["--output", "out.safetensors"],
     "sample": ["--output", "out.ply"],
-    "deform": ["--output", "out.obj", "--save-field", "field.npz", *HELD_AND_SHIFTED],
+    "deform": ["--output", "out.obj", "--save-field", "field.safetensors", *HELD_AND_SHIFTED],
     "stylize": ["--surface", "out.stl", "--style", "cube"],
     "extract": ["--output", "out.ply"],
     "grid": ["--output", "out.npz"],
@@ -55,7 +55,7 @@ def test_bad_files_are_named(verb, folder, data_dir, capsys):
 )
 def test_bad_outputs_are_refused_before_the_work(verb, output, folder, capsys):
     mesh = write_octahedron(folder / "mesh.obj")
-    suffix = ".npz" if verb in ("fit", "grid") else ".ply"
+    suffix = {"fit": ".safetensors", "grid": ".npz"}.get(verb, ".ply")
     (folder / f"folder{suffix}").mkdir()
     output = output.format(suffix)
     extra = HELD_AND_SHIFTED if verb == "deform" else []
@@ -69,12 +69,12 @@ def test_bad_outputs_are_refused_before_the_work(verb, output, folder, capsys):
         (["bend"], "bend"),
         (["fit"], "input"),
         (["fit", "mesh.obj"], "--output"),
-        (["fit", "mesh.obj", "-o", "a.npz", "--width", "wide"], "--width"),
-        (["fit", "mesh.obj", "-o", "a.npz", "--width", "0"], "width"),
-        (["fit", "mesh.obj", "-o", "a.npz", "--device", "abacus"], "device"),
-        (["fit", "mesh.obj", "-o", "a.npz", "--colour", "1"], "--colour"),
+        (["fit", "mesh.obj", "-o", "a.safetensors", "--width", "wide"], "--width"),
+        (["fit", "mesh.obj", "-o", "a.safetensors", "--width", "0"], "width"),
+        (["fit", "mesh.obj", "-o", "a.safetensors", "--device", "abacus"], "device"),
+        (["fit", "mesh.obj", "-o", "a.safetensors", "--colour", "1"], "--colour"),
         (["sample", "mesh.obj", "-o", "a.ply", "--count", "0"], "count"),
-        (["sample", "mesh.obj", "-o", "a.ply", "--deformed-by", "none.npz"], "none.npz"),
+        (["sample", "mesh.obj", "-o", "a.ply", "--deformed-by", "none.safetensors"], "none.safetensors"),
         (["deform", "mesh.obj"], "--output"),
         (["deform", "mesh.obj", "-o", "a.obj"], "handles"),
         (["deform", "mesh.obj", "-o", "a.obj", "--shift", "1,0,0"], "--shift"),

@@ -106,8 +106,8 @@ def test_leaving_the_finite_numbers_keeps_the_last_good_state(ball):
 
 
 def test_a_fit_survives_its_file(fitted, tmp_path):
-    fitted.save(tmp_path / "ball.npz")
-    loaded = af.NeuralSdf.load(tmp_path / "ball.npz")
+    fitted.save(tmp_path / "ball.safetensors")
+    loaded = af.NeuralSdf.load(tmp_path / "ball.safetensors")
     points = np.random.default_rng(3).uniform(1, 8, (100, 3))
     assert np.array_equal(loaded(points), fitted(points))
     assert loaded.frame == fitted.frame and loaded.report == fitted.report

@@ -39,8 +39,8 @@ def test_a_trained_inverse_is_a_field_with_a_file(bent, samples, tmp_path):
     inverse = af.train_inverse(
         bent, samples, af.InverseTrainingOptions(width=16, layers=2, iterations=5, batch=50)
     )
-    inverse.save(tmp_path / "inverse.npz")
-    again = af.DeformationField.load(tmp_path / "inverse.npz")
+    inverse.save(tmp_path / "inverse.safetensors")
+    again = af.DeformationField.load(tmp_path / "inverse.safetensors")
     assert np.array_equal(again(samples.points), inverse(samples.points))
     assert inverse.frame == bent.frame
 

@@ -97,8 +97,8 @@ def test_field_derivatives_and_files(samples, tmp_path):
         assert np.abs(slope - field.jacobian(points)[:, :, k]).max() < 1e-8
         slope = (field.jacobian(points + offset) - field.jacobian(points - offset)) / (2 * step)
         assert np.abs(slope - field.hessian(points)[:, :, :, k]).max() < 1e-7
-    field.save(tmp_path / "bar.npz")
-    again = af.DeformationField.load(tmp_path / "bar.npz")
+    field.save(tmp_path / "bar.safetensors")
+    again = af.DeformationField.load(tmp_path / "bar.safetensors")
     assert isinstance(again, af.RadialField)
     assert np.array_equal(again(points), field(points))
     assert again.report["energy"] == field.report["energy"]

@@ -35,8 +35,8 @@ def test_a_network_refines_the_radial_result(samples, handles, tmp_path):
     cold = af.deform(samples, handles, af.DeformOptions(**options))
     assert refined.report["handle_error_mean"] < 0.3 * cold.report["handle_error_mean"]
     assert refined.report["energy"] < 1.1 * radial.report["energy"]
-    refined.save(tmp_path / "refined.npz")
-    again = af.DeformationField.load(tmp_path / "refined.npz")
+    refined.save(tmp_path / "refined.safetensors")
+    again = af.DeformationField.load(tmp_path / "refined.safetensors")
     assert np.array_equal(again(samples.points[:50]), refined(samples.points[:50]))
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-SUFFIX = ".sdf"
+SUFFIX = ".safetensors"
 IRRELEVANT = {"threads", "device"}  # options that do not change what a fit is
 
 

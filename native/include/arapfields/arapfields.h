@@ -10,6 +10,7 @@
 #include "arapfields/errors.h"
 #include "arapfields/extraction.h"
 #include "arapfields/fields.h"
+#include "arapfields/io.h"
 #include "arapfields/live.h"
 #include "arapfields/mesh.h"
 #include "arapfields/sampling.h"

@@ -1,119 +1,91 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""States of networks and fields as files: one .npz archive, written whole or not at all.
-
-A state is a dict of numbers, strings, booleans, None, NumPy arrays, and lists or dicts of these. Arrays are
-entries of the archive, bit for bit; the rest is JSON in the entry "header", beside the format's name and
-version and the kind of thing that was saved. Nothing in a file is ever executed.
-"""
+"""Outputs that appear whole or not at all, and reports as JSON. Every file of ours is written by these."""
 
 import contextlib
 import json
+import math
 import os
-import tempfile
 import zipfile
 from pathlib import Path
 
 import numpy as np
 
-from ._native import InvalidInput
-
-FORMAT = "arapfields"
-VERSION = 1
-ARRAY = "$array"  # a header's object with this one key stands for the archive's entry of that name
-NAMES = {"sdf": "a neural signed distance function", "field": "a deformation field"}
+from ._native import InvalidInput, OutputFile
 
 
-def save_state(path, kind, state):
-    """Writes `state` to `path`, atomically: a temporary file beside it, synced, then renamed over it.
+@contextlib.contextmanager
+def whole_file(path, beside=False):
+    """The path of a file to write, which becomes `path` when the block ends without an error.
 
-    OSError where that fails, and then nothing new is left behind.
+    It lies in a temporary folder, or `beside` its place for content with paths relative to it. At the end it
+    is brought to the disk, looked at, and renamed; see OutputFile. OSError, also of what the block raises,
+    names `path`; InvalidInput where `path` holds something else than a regular file.
     """
-    arrays = {}
-    header = {"format": FORMAT, "version": VERSION, "kind": kind, "state": _packed(state, arrays)}
-    text = np.frombuffer(json.dumps(header).encode(), np.uint8)
-    path = Path(path)
-    mode = _mode_of_new_files() if not path.exists() else path.stat().st_mode & 0o777
-    descriptor, temporary = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent)
+    output = OutputFile(path)
     try:
-        with os.fdopen(descriptor, "wb") as file:
-            np.savez(file, header=text, **arrays)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(temporary, mode)
-        os.replace(temporary, path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            os.unlink(temporary)
-        raise
+        with naming(output, path):
+            yield Path(output.beside if beside else output.partial)
+        output.commit()
+    finally:
+        output.discard()
 
 
-def load_state(path, kind):
-    """The state that save_state() wrote for the same kind.
-
-    FileNotFoundError (or another OSError) where `path` cannot be read; InvalidInput naming the file where it
-    is truncated, foreign, of another kind or of a newer version, or where an array holds NaN or infinities.
-    """
-    path = Path(path)
-    with open(path, "rb") as file:
-        try:
-            with np.load(file, allow_pickle=False) as archive:
-                entries = {name: archive[name] for name in archive.files}
-            header = json.loads(entries.pop("header").tobytes())
-            found = header["format"], header["version"], header["kind"]
-        except (ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as error:
-            raise _unusable(path, "it is damaged or was not written by arapfields") from error
-    if found[0] != FORMAT:
-        raise _unusable(path, f"its format is {found[0]!r}")
-    if found[1] != VERSION:
-        raise _unusable(path, f"its format version is {found[1]!r}, this release reads {VERSION}")
-    if found[2] != kind:
-        raise _unusable(
-            path, f"it holds {NAMES.get(found[2], repr(found[2]))}, not {NAMES.get(kind, repr(kind))}"
-        )
-    for name, array in entries.items():
-        if array.dtype.kind not in "biufSU":
-            raise _unusable(path, f"array {name} has dtype {array.dtype}")
-        if array.dtype.kind == "f" and not np.isfinite(array).all():
-            raise _unusable(path, f"array {name} holds NaN or infinite numbers")
+@contextlib.contextmanager
+def naming(output, path):
+    """An OSError of the block that names no file, or the output's temporary one, names `path` instead."""
     try:
-        return _unpacked(header["state"], entries)
-    except (KeyError, TypeError) as error:
-        raise _unusable(path, "it is damaged: an array is missing") from error
+        yield
+    except OSError as error:
+        temporary = os.path.normpath(os.path.dirname(output.partial))
+        foreign = error.filename is not None and not os.path.normpath(error.filename).startswith(temporary)
+        if foreign or error.errno is None:
+            raise
+        raise OSError(error.errno, error.strerror, str(path)) from error
 
 
-def _unusable(path, problem):
-    return InvalidInput(f"{path}: cannot be loaded; {problem}")
+def write_text(path, text):
+    """Writes UTF-8, whole or not at all."""
+    with whole_file(path) as partial:
+        partial.write_text(text, encoding="utf-8", errors="surrogateescape")
 
 
-def _packed(value, arrays, name="state"):
-    """`value` as JSON allows it; arrays go to `arrays` under a name that tells where they belong."""
-    if isinstance(value, np.ndarray):
-        arrays[name] = np.ascontiguousarray(value).reshape(value.shape)
-        return {ARRAY: name}
+def write_arrays(file, **arrays):
+    """Writes a NumPy archive, as np.savez does, which tells nobody where its end cannot be written."""
+    with zipfile.ZipFile(file, "w", allowZip64=True) as archive:
+        for name, array in arrays.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as entry:
+                np.lib.format.write_array(entry, np.asanyarray(array), allow_pickle=False)
+
+
+def json_text(value, indent=None):
+    """JSON of dicts, lists, numbers and arrays. NaN and infinities, which JSON has not, become null."""
+    try:
+        return json.dumps(_plain(value), indent=indent, allow_nan=False)
+    except (TypeError, ValueError, RecursionError) as error:
+        raise InvalidInput(f"report: {error}; numbers, texts, arrays, lists and dicts are allowed") from None
+
+
+def _plain(value):
     if isinstance(value, dict):
-        return {str(key): _packed(item, arrays, f"{name}.{key}") for key, item in value.items()}
+        return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_packed(item, arrays, f"{name}.{i}") for i, item in enumerate(value)]
-    if isinstance(value, np.generic):
-        return value.item()
-    if value is None or isinstance(value, bool | int | float | str):
-        return value
-    raise InvalidInput(
-        f"{name}: got {type(value).__name__}; numbers, strings, arrays, lists and dicts are allowed"
-    )
-
-
-def _unpacked(value, arrays):
-    if isinstance(value, dict):
-        if set(value) == {ARRAY}:
-            return arrays[value[ARRAY]]
-        return {key: _unpacked(item, arrays) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_unpacked(item, arrays) for item in value]
+        return [_plain(item) for item in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
     return value
 
 
-def _mode_of_new_files():
-    mask = os.umask(0)
-    os.umask(mask)
-    return 0o666 & ~mask
+def existing_file(path, suffixes=()):
+    """The path of an input; InvalidInput for what is no regular file or has another extension."""
+    path = Path(path)
+    if path.is_dir():
+        raise InvalidInput(f"{path}: is a directory, not a file")
+    if not path.exists():
+        raise InvalidInput(f"{path}: no such file")
+    if not path.is_file():
+        raise InvalidInput(f"{path}: is not a regular file; pipes and devices cannot be read")
+    if suffixes and path.suffix.lower() not in suffixes:
+        raise InvalidInput(f"{path}: unknown extension; readable are {', '.join(suffixes)}")
+    return path

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Signed distances on a regular grid, as arrays, .npz files and OpenVDB volumes."""
 
+import errno
 import importlib
 import importlib.util
 import sys
@@ -8,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ._native import Cancelled, Frame, InvalidInput, require_memory, signed_distance
+from ._files import whole_file, write_arrays
+from ._native import Cancelled, Frame, InvalidInput, Task, require_memory, signed_distance
 from ._options import options_of
 
 SUFFIXES = (".npz", ".vdb")
@@ -43,6 +45,8 @@ def sdf_grid(sdf, resolution=RESOLUTION["default"], bounds=None, task=None):
     low, high = RESOLUTION["low"], RESOLUTION["high"]
     if not isinstance(resolution, (int, np.integer)) or not low <= resolution <= high:
         raise InvalidInput(f"resolution: got {resolution!r}; an integer from {low} to {high} is needed")
+    if not isinstance(task, Task | None):
+        raise InvalidInput(f"task: got {type(task).__name__}; a Task or None is needed")
     if bounds is None:
         bounds = sdf.frame.to_mesh([[-1.0] * 3, [1.0] * 3])
     bounds = np.array(bounds, float)
@@ -60,7 +64,12 @@ def sdf_grid(sdf, resolution=RESOLUTION["default"], bounds=None, task=None):
                 raise Cancelled("cancelled")
             task.report(begin / flat.size, "distances")
         nodes = np.stack(np.unravel_index(np.arange(begin, min(begin + CHUNK, flat.size)), counts), axis=1)
-        flat[begin : begin + CHUNK] = sdf(bounds[0] + spacing * nodes)
+        distances = np.asarray(sdf(bounds[0] + spacing * nodes))
+        if distances.shape != (len(nodes),):
+            raise InvalidInput(
+                f"sdf: shape {distances.shape} for {len(nodes)} points; one number each is needed"
+            )
+        flat[begin : begin + CHUNK] = distances
     return values, bounds[0], spacing
 
 
@@ -70,13 +79,15 @@ def save_grid(path, values, origin, spacing):
     A .vdb holds one float grid, `surface`: a level set whose values are cut off BAND voxels from the surface.
     ImportError where no openvdb module is found, InvalidInput for another extension.
     """
-    path = Path(path)
-    if path.suffix.lower() == ".npz":
-        np.savez(path, values=values, origin=origin, spacing=spacing)
-    elif path.suffix.lower() == ".vdb":
-        _write_vdb(openvdb_module(), path, values, origin, spacing)
-    else:
+    suffix = Path(path).suffix.lower()
+    if suffix not in SUFFIXES:
         raise InvalidInput(f"{path}: unknown extension; allowed are {', '.join(SUFFIXES)}")
+    openvdb = openvdb_module() if suffix == ".vdb" else None
+    with whole_file(path) as partial:
+        if openvdb is None:
+            write_arrays(partial, values=values, origin=origin, spacing=spacing)
+        else:
+            _write_vdb(openvdb, partial, path, values, origin, spacing)
 
 
 def openvdb_module():
@@ -98,7 +109,7 @@ def openvdb_module():
     raise ImportError("writing .vdb needs the module openvdb: run inside Blender, or install the package bpy")
 
 
-def _write_vdb(openvdb, path, values, origin, spacing):
+def _write_vdb(openvdb, partial, path, values, origin, spacing):
     band = BAND * spacing
     grid = openvdb.FloatGrid(band)
     grid.copyFromArray(np.clip(values, -band, band).astype(np.float32))
@@ -107,4 +118,11 @@ def _write_vdb(openvdb, path, values, origin, spacing):
     matrix = np.diag([spacing] * 3 + [1.0])
     matrix[3, :3] = origin  # OpenVDB multiplies row vectors
     grid.transform = openvdb.createLinearTransform(matrix.tolist())
-    openvdb.write(str(path), grids=[grid])
+    # OpenVDB says nothing of a disk that is full: what arrived is read again.
+    try:
+        openvdb.write(str(partial), grids=[grid])
+        arrived = openvdb.read(str(partial), grid.name)
+    except Exception as error:
+        raise OSError(errno.EIO, f"not written whole ({error}); the disk may be full", str(path)) from error
+    if arrived.activeVoxelCount() != grid.activeVoxelCount():
+        raise OSError(errno.EIO, "not written whole; the disk may be full", str(path))

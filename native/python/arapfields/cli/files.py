@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reading and writing meshes, point clouds, normals, SDFs and fields. Every error names the file."""
 
+import contextlib
 import logging
 import re
 from pathlib import Path
@@ -8,12 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from .. import _native
+from .._files import existing_file, write_arrays
 from .._native import InvalidInput
 from .running import uninterrupted
 
 MESH_SUFFIXES = (".ply", ".obj", ".stl", ".off")
 CLOUD_SUFFIXES = (".ply", ".npz", ".xyz")
-STATE_SUFFIXES = (".npz",)
+STATE_SUFFIXES = (".safetensors",)
 OBJ_VERTEX = re.compile(r"^([ \t]*v[ \t]+)(\S+)[ \t]+(\S+)[ \t]+(\S+)", flags=re.M)
 MOST_PREFERRED = 256  # face normals a chosen mesh may have as preferred normals
 
@@ -28,16 +30,18 @@ def _trimesh():
     return trimesh
 
 
-def existing(path, suffixes):
-    """The path of an input file; InvalidInput for none, a directory, or another extension."""
-    path = Path(path)
-    if path.is_dir():
-        raise InvalidInput(f"{path}: is a directory, not a file")
-    if not path.exists():
-        raise InvalidInput(f"{path}: no such file")
-    if path.suffix.lower() not in suffixes:
-        raise InvalidInput(f"{path}: unknown extension; readable are {', '.join(suffixes)}")
-    return path
+@contextlib.contextmanager
+def _readable(path, kind):
+    """InvalidInput naming the file instead of whatever a reader stumbles over in a damaged one."""
+    try:
+        yield
+    except (InvalidInput, MemoryError):
+        raise
+    except OSError as error:
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
+    except Exception as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InvalidInput(f"{path}: not readable as {kind}, perhaps damaged ({reason})") from error
 
 
 def is_mesh(path):
@@ -49,18 +53,11 @@ def read_mesh(path):
 
     Vertices keep the file's order, except that an STL's equal corners become one vertex.
     """
-    path = existing(path, MESH_SUFFIXES)
+    path = existing_file(path, MESH_SUFFIXES)
     trimesh = _trimesh()
-    try:
+    with _readable(path, path.suffix[1:].upper()):
         mesh = trimesh.load(path, force="mesh", process=False, maintain_order=True, skip_materials=True)
         vertices, triangles = np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
-    except OSError:
-        raise
-    except Exception as error:  # a reader meets a damaged file with whatever it stumbles over
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InvalidInput(
-            f"{path}: not readable as {path.suffix[1:].upper()}, perhaps damaged ({reason})"
-        ) from error
     if triangles.size == 0:
         raise InvalidInput(f"{path}: has no faces (or is cut off); a triangle mesh is needed")
     if not np.isfinite(vertices).all():
@@ -95,9 +92,11 @@ def write_moved_mesh(path, source, mesh, move):
     """
     if path.suffix.lower() == Path(source).suffix.lower() == ".obj":
         text = Path(source).read_text(errors="surrogateescape")
-        before = np.array([[float(c) for c in m.groups()[1:]] for m in OBJ_VERTEX.finditer(text)])
+        text = re.sub(r"\\\r?\n", "", text)  # lines that go on in the next
+        with _readable(source, "OBJ"):
+            before = np.array([[float(c) for c in m.groups()[1:]] for m in OBJ_VERTEX.finditer(text)])
         if np.isfinite(before).all():
-            rows = iter(move(before))
+            rows = iter(move(before.reshape(-1, 3)))
             moved = OBJ_VERTEX.sub(lambda m: m[1] + " ".join(f"{c:.9g}" for c in next(rows)), text)
             moved = re.sub(r"^[ \t]*vn[ \t].*\n?", "", moved, flags=re.M)
             moved = re.sub(r"^[ \t]*f[ \t].*$", _without_normals, moved, flags=re.M)
@@ -115,7 +114,7 @@ def write_cloud(path, points, normals):
     """Points (n, 3) with normals (n, 3) as binary PLY, NPZ (`points`, `normals`), or rows of text."""
     suffix = path.suffix.lower()
     if suffix == ".npz":
-        np.savez(path, points=points, normals=normals)
+        write_arrays(path, points=points, normals=normals)
         return
     rows = np.ascontiguousarray(np.hstack([points, normals]))
     if suffix == ".xyz":
@@ -128,26 +127,24 @@ def write_cloud(path, points, normals):
 
 def read_sdf(path):
     """A NeuralSdf that `fit` saved."""
-    return _native.NeuralSdf.load(existing(path, STATE_SUFFIXES))
+    return _native.NeuralSdf.load(existing_file(path, STATE_SUFFIXES))
 
 
 def read_field(path):
     """A DeformationField that `deform` or `stylize` saved."""
-    return _native.DeformationField.load(existing(path, STATE_SUFFIXES))
+    return _native.DeformationField.load(existing_file(path, STATE_SUFFIXES))
 
 
 def read_normals(path):
     """Preferred normals (k, 3): a mesh's distinct face normals, or the rows of a text file or .npy array."""
-    path = existing(path, (*MESH_SUFFIXES, ".txt", ".csv", ".npy"))
+    path = existing_file(path, (*MESH_SUFFIXES, ".txt", ".csv", ".npy"))
     if is_mesh(path):
         return _face_normals(path)
-    try:
-        if path.suffix.lower() == ".npy":
-            normals = np.load(path, allow_pickle=False)
+    with _readable(path, "rows of three numbers"):
+        if path.suffix.lower() == ".npy":  # mapped: its size is compared with the file's
+            normals = np.array(np.lib.format.open_memmap(path, mode="r"), float)
         else:
             normals = np.loadtxt(path.read_text().replace(",", " ").splitlines(), ndmin=2)
-    except (ValueError, UnicodeDecodeError) as error:
-        raise InvalidInput(f"{path}: not rows of three numbers ({error})") from error
     if normals.ndim != 2 or normals.shape[1] != 3 or len(normals) == 0:
         raise InvalidInput(
             f"{path}: holds an array of shape {normals.shape}; rows of three numbers are needed"

@@ -5,7 +5,7 @@ from .handles import AddHandle, MoveHandle, triple
 from .options import add_option_flag
 
 MESH = "mesh: .ply, .obj, .stl or .off"
-SOURCE = f"{MESH}; or .npz: a signed distance that fit saved"
+SOURCE = f"{MESH}; or .safetensors: a signed distance that fit saved"
 
 
 def solve_flags(parser):
@@ -13,7 +13,7 @@ def solve_flags(parser):
     outputs = parser.add_argument_group("outputs (one or more)")
     outputs.add_argument("-o", "--output", metavar="FILE", help="the input mesh with its vertices moved")
     outputs.add_argument("--surface", metavar="FILE", help="the implicit surface, deformed (see --through)")
-    outputs.add_argument("--save-field", metavar="FILE", help=".npz with the deformation field")
+    outputs.add_argument("--save-field", metavar="FILE", help=".safetensors with the deformation field")
     report_flag(outputs)
     add_option_flag(parser, "extraction", "resolution")
     inverse_flag(parser)

@@ -3,10 +3,10 @@
 
 import argparse
 import json
-from pathlib import Path
 
 import numpy as np
 
+from .._files import existing_file
 from .._native import Cuboid, InvalidInput, Point
 
 KEYS = {
@@ -17,14 +17,10 @@ KEYS = {
 
 def read_handles(path):
     """The handles' descriptions in a JSON file: a list, or an object whose `handles` is one."""
-    path = Path(path)
-    if path.is_dir():
-        raise InvalidInput(f"{path}: is a directory, not a file")
-    if not path.exists():
-        raise InvalidInput(f"{path}: no such file")
+    path = existing_file(path)
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise InvalidInput(f"{path}: not JSON ({error})") from error
     if isinstance(content, dict) and set(content) == {"handles"}:
         content = content["handles"]
@@ -38,7 +34,7 @@ def build_handles(described, bounds):
     handles = []
     for name, item in described:
         kind = item.get("type")
-        if kind not in KEYS:
+        if not isinstance(kind, str) or kind not in KEYS:
             raise InvalidInput(f"{name}: type is {kind!r}; 'cuboid' or 'point' is needed")
         unknown = set(item) - KEYS[kind] - {"type"}
         if unknown:
@@ -48,7 +44,7 @@ def build_handles(described, bounds):
             handles.append(make(item, bounds))
         except KeyError as error:
             raise InvalidInput(f"{name}: {error.args[0]!r} is missing") from None
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
             raise InvalidInput(f"{name}: {error}") from None
     if not handles:
         raise InvalidInput("handles: none are given; use --handles, --box or --point")

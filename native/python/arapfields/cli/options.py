@@ -37,6 +37,21 @@ def add_flag(group, option, **settings):
         group.add_argument(f"--{name}", choices=choices, metavar=None if choices else "NAME", **settings)
 
 
+def integer(low, high=2**31 - 1):
+    """A flag's type: an integer from `low` to `high`."""
+
+    def number(text):
+        try:
+            value = int(text)
+        except ValueError:
+            value = None
+        if value is None or not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"{text[:40]!r} is not an integer from {low} to {high}")
+        return value
+
+    return number
+
+
 def given_options(structure, arguments):
     """The struct with the values that were given."""
     options = structure()

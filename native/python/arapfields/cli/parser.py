@@ -71,11 +71,13 @@ def _fit(added):
         "fit",
         verbs.fit,
         "fit a neural signed distance function to a mesh",
-        "spot.obj --output spot.npz",
-        "scan.ply --output scan.npz --seed 1 --report scan.json",
+        "spot.obj --output spot.safetensors",
+        "scan.ply --output scan.safetensors --seed 1 --report scan.json",
     )
     parser.add_argument("input", help=MESH)
-    parser.add_argument("-o", "--output", required=True, metavar="FILE", help=".npz for the signed distance")
+    parser.add_argument(
+        "-o", "--output", required=True, metavar="FILE", help=".safetensors for the signed distance"
+    )
     report_flag(parser)
     add_option_flags(parser, "fit", "fitting")
     return parser
@@ -87,8 +89,8 @@ def _sample(added):
         "sample",
         verbs.sample,
         "points spread uniformly over a surface, with normals",
-        "spot.npz --output points.ply --count 50000",
-        "spot.obj --output points.npz --deformed-by field.npz",
+        "spot.safetensors --output points.ply --count 50000",
+        "spot.obj --output points.npz --deformed-by field.safetensors",
     )
     parser.add_argument("input", help=SOURCE)
     parser.add_argument(
@@ -107,9 +109,9 @@ def _deform(added):
         verbs.deform,
         "move parts of a shape; the rest follows as rigidly as possible",
         "spot.obj -o bent.obj --box -inf,-inf,-inf inf,-0.2,inf --point 0,0.9,-0.4 0.3,1.0,-0.4",
-        "bunny.off -o turned.ply --save-field field.npz --box -inf,-inf,-inf inf,0.06,inf \\\n"
+        "bunny.off -o turned.ply --save-field field.safetensors --box -inf,-inf,-inf inf,0.06,inf \\\n"
         "      --box -inf,0.14,-inf inf,inf,inf --turn 0,1,0 40 --iterations 200",
-        "spot.npz --surface bent.ply --resolution 192 --handles pose.json --exact-handles",
+        "spot.safetensors --surface bent.ply --resolution 192 --handles pose.json --exact-handles",
     )
     solve_flags(parser)
     add_option_flags(parser, "deform", "deformation")
@@ -123,7 +125,7 @@ def _stylize(added):
         verbs.stylize,
         "turn a shape's normals to those of a style",
         "spot.obj -o cubic.obj --style cube --strength 0.8",
-        "spot.npz --surface crystal.ply --normals gem.stl",
+        "spot.safetensors --surface crystal.ply --normals gem.stl",
     )
     solve_flags(parser)
     style = parser.add_mutually_exclusive_group(required=True)
@@ -144,9 +146,9 @@ def _extract(added):
         "extract",
         verbs.extract,
         "triangles of an implicit surface",
-        "spot.npz -o spot.ply --resolution 256",
-        "spot.npz -o bent.stl --deformed-by field.npz",
-        "spot.npz -o even.ply --deformed-by field.npz --through inverse",
+        "spot.safetensors -o spot.ply --resolution 256",
+        "spot.safetensors -o bent.stl --deformed-by field.safetensors",
+        "spot.safetensors -o even.ply --deformed-by field.safetensors --through inverse",
     )
     parser.add_argument("input", help=SOURCE + " (a mesh is fitted first)")
     parser.add_argument("-o", "--output", required=True, metavar="FILE", help=MESH)
@@ -162,9 +164,9 @@ def _warp(added):
         "warp",
         verbs.warp,
         "move any mesh by a saved field",
-        "field.npz teeth.obj -o moved.obj",
+        "field.safetensors teeth.obj -o moved.obj",
     )
-    parser.add_argument("field", help=".npz that deform or stylize saved")
+    parser.add_argument("field", help=".safetensors that deform or stylize saved")
     parser.add_argument("input", help=MESH)
     parser.add_argument("-o", "--output", required=True, metavar="FILE", help=MESH)
     return parser
@@ -176,8 +178,8 @@ def _grid(added):
         "grid",
         verbs.grid,
         "signed distances on a regular grid",
-        "spot.npz -o spot_grid.npz --resolution 128",
-        "spot.npz -o spot.vdb --resolution 256",
+        "spot.safetensors -o spot_grid.npz --resolution 128",
+        "spot.safetensors -o spot.vdb --resolution 256",
     )
     parser.add_argument("input", help=SOURCE + " (a mesh's distances are exact)")
     parser.add_argument(

@@ -3,14 +3,13 @@
 
 import contextlib
 import os
-import shutil
 import signal
 import sys
-import tempfile
 import threading
 from pathlib import Path
 
-from .._native import InvalidInput, Task
+from .._files import naming
+from .._native import InvalidInput, OutputFile, Task
 
 POLL = 0.1  # seconds between looks at a task
 
@@ -90,7 +89,8 @@ class Outputs:
     """Files that a verb promises: places are checked first, contents put there together at the end."""
 
     def __init__(self):
-        self._pending = []  # (target, temporary folder)
+        self._promised = {}  # where it will lie: the flag that asked for it
+        self._pending = []
 
     def check(self, path, suffixes, flag):
         """The path of an output to be; InvalidInput where it cannot become a file of these kinds."""
@@ -105,13 +105,19 @@ class Outputs:
             raise InvalidInput(
                 f"{flag}: {path} cannot be made; the directory {path.parent} cannot be written to"
             )
+        OutputFile(path).discard()  # regular files alone
+        other = self._promised.setdefault(os.path.realpath(path), flag)
+        if other != flag:
+            raise InvalidInput(f"{flag}: {path} is {other}'s file too; each output needs one of its own")
         return path
 
     def write(self, path, writer):
         """Calls `writer(temporary path)`; the file takes its place when the block ends without an error."""
-        folder = tempfile.mkdtemp(prefix=".arapfields-", dir=path.parent)
-        self._pending.append((path, Path(folder)))
-        writer(Path(folder) / path.name)
+        output = OutputFile(path)
+        self._pending.append(output)
+        with naming(output, path):
+            writer(Path(output.partial))
+        output.finish()  # whatever does not arrive shows before any file takes its place
 
     def __enter__(self):
         return self
@@ -119,8 +125,8 @@ class Outputs:
     def __exit__(self, kind, error, trace):
         try:
             if kind is None:
-                for path, folder in self._pending:
-                    os.replace(folder / path.name, path)
+                for output in self._pending:
+                    output.commit()
         finally:
-            for _, folder in self._pending:
-                shutil.rmtree(folder, ignore_errors=True)
+            for output in self._pending:
+                output.discard()

@@ -2,7 +2,6 @@
 """What each verb does: read, check the outputs' places, compute, write."""
 
 import argparse
-import json
 import sys
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 import arapfields as af
 
 from .. import grids
+from .._files import existing_file, json_text
 from . import files
 from .handles import build_handles, read_handles, rotation, triple
 from .options import given, given_options
@@ -110,7 +110,7 @@ class _Source:
 
     def __init__(self, args):
         self._args = args
-        self.path = files.existing(args.input, SOURCES)
+        self.path = existing_file(args.input, SOURCES)
         self.mesh = files.read_mesh(self.path) if files.is_mesh(self.path) else None
         self._sdf = None if self.mesh else files.read_sdf(self.path)
 
@@ -192,13 +192,7 @@ def _report_place(outputs, args):
 
 def _write_report(outputs, place, report):
     if place is not None:
-        outputs.write(
-            place, lambda path: path.write_text(json.dumps(report, indent=2, default=_plain) + "\n")
-        )
-
-
-def _plain(value):
-    return value.tolist() if hasattr(value, "tolist") else str(value)
+        outputs.write(place, lambda path: path.write_text(json_text(report, indent=2) + "\n"))
 
 
 def _summary(args, text, report=None):

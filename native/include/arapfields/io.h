@@ -1,0 +1,6 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Fields and signed distances as files: save_field, load_field, save_sdf, load_sdf; FileError.
+#pragma once
+
+#include "core/file_error.h"
+#include "io/files.h"

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "core/types.h"
+#include "io/input_file.h"
+
+namespace arapfields {
+
+class JsonObject;
+
+/// Named arrays and texts as one file in the layout of safetensors
+/// (https://github.com/huggingface/safetensors): eight bytes with the length of a header, little-endian; the
+/// header, a JSON object with dtype, shape and data_offsets of each array and the texts under "__metadata__";
+/// the arrays, row by row, nothing between them. Nothing is compressed and nothing in a file is executed.
+class ArchiveWriter {
+ public:
+  void add(const std::string& name, const std::vector<Index>& shape, const double* data);
+  void add(const std::string& name, const std::vector<Index>& shape, const float* data);
+  /// Writes the file whole or not at all. Throws FileError, InvalidInput as OutputFile does.
+  void save(const std::string& path, const std::map<std::string, std::string>& texts) const;
+
+ private:
+  struct Entry {
+    std::string name;
+    bool is_double;
+    std::vector<Index> shape;
+    const void* data;
+    std::size_t bytes;
+  };
+  std::vector<Entry> entries_;
+};
+
+/// The same, read by someone who trusts nothing: all sizes are checked against the file's before anything is
+/// allocated. Every error but the system's own is an InvalidInput.
+class ArchiveReader {
+ public:
+  /// Reads the header. InvalidInput where it is none, or arrays overlap, leave gaps or reach beyond the file.
+  explicit ArchiveReader(const std::string& path);
+
+  /// One of the texts. InvalidInput where it is missing.
+  const std::string& text(const std::string& name);
+  /// An array that must have this shape; InvalidInput for another, another dtype, NaN and infinities.
+  Vector doubles(const std::string& name, const std::vector<Index>& shape);
+  VectorF floats(const std::string& name, const std::vector<Index>& shape);
+  Points points(const std::string& name, Index count);
+  /// InvalidInput for an array or a text that nothing has asked for.
+  void require_all_used() const;
+
+ private:
+  struct Entry {
+    std::string dtype;
+    std::vector<Index> shape;
+    std::size_t begin, end;  ///< in the file
+  };
+  void read_entry(const std::string& name, const JsonObject& value);
+  void require_no_gaps(std::size_t begin) const;
+  template <class Result>
+  Result array(const std::string& name, const std::vector<Index>& shape, const char* dtype);
+
+  InputFile file_;
+  std::map<std::string, Entry> entries_;
+  std::map<std::string, std::string> texts_;
+  std::set<std::string> used_;
+  std::size_t data_ = 0;  ///< where arrays begin
+};
+
+}  // namespace arapfields

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What files of every kind say of themselves: format, version, kind, structure and report, as texts.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "core/errors.h"
+#include "core/frame.h"
+#include "io/archive.h"
+#include "io/json.h"
+
+namespace arapfields {
+
+/// The version that is written. One that changes what a file holds gets the next number, and load_document's
+/// callers keep a reader for each number before.
+inline constexpr int file_version = 1;
+
+/// Writes arrays and what is said of them.
+void save_document(const std::string& path, const std::string& kind, const Json& structure,
+                   const std::string& report, const ArchiveWriter& arrays);
+
+/// Opens a file of this kind, hands its arrays, version and structure to `read`, and sees that nothing in it
+/// was left unread. InvalidInput of whatever is wrong begins with the path.
+void load_document(const std::string& path, const std::string& kind, std::string* report,
+                   const std::function<void(ArchiveReader&, int version, const Json&)>& read);
+
+Json frame_structure(const Frame& frame);
+Frame read_frame(const Json& frame, const std::string& name);
+
+}  // namespace arapfields

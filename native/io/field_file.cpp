@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <deque>
+
+#include "core/errors.h"
+#include "fields/neural_field.h"
+#include "fields/radial_field.h"
+#include "io/document.h"
+#include "io/files.h"
+#include "io/network_file.h"
+
+namespace arapfields {
+namespace {
+
+constexpr const char* field_kind = "field";
+constexpr Index most_rows = Index{1} << 40;  ///< declared; what there is of them is the file's size
+
+/// Adds a field's arrays to a file and keeps those that have to be made for it.
+class FieldArrays {
+ public:
+  void add(const DeformationField& field, const std::string& prefix) {
+    if (const auto* neural = dynamic_cast<const NeuralField*>(&field))
+      add_neural(*neural, prefix);
+    else if (const auto* radial = dynamic_cast<const RadialField*>(&field))
+      add_radial(*radial, prefix);
+    add_rows(prefix + "rest_points", field.rest_points());
+  }
+  ArchiveWriter file;
+
+ private:
+  template <class Rows>
+  void add_rows(const std::string& name, const Rows& rows) {
+    file.add(name, {rows.rows(), rows.cols()}, rows.data());
+  }
+  void add_neural(const NeuralField& field, const std::string& prefix) {
+    add_network(file, prefix, field.shape(), kept_.emplace_back(field.weights()));
+    if (field.handles()) add_handles(*field.handles(), prefix + "handles.");
+    if (field.base()) add(*field.base(), prefix + "base.");
+  }
+  void add_handles(const HandleBlend& blend, const std::string& prefix) {
+    const Index count = static_cast<Index>(blend.regions().size());
+    Vector &placements = doubles_.emplace_back(16 * count), &motions = doubles_.emplace_back(16 * count),
+           &margins = doubles_.emplace_back(count);
+    for (Index i = 0; i < count; ++i) {
+      const RigidRegion& region = blend.regions()[static_cast<std::size_t>(i)];
+      placements.segment<16>(16 * i) = region.placement.reshaped<Eigen::RowMajor>();
+      motions.segment<16>(16 * i) = region.motion.reshaped<Eigen::RowMajor>();
+      margins[i] = region.margin;
+    }
+    file.add(prefix + "placements", {count, 4, 4}, placements.data());
+    file.add(prefix + "motions", {count, 4, 4}, motions.data());
+    file.add(prefix + "margins", {count}, margins.data());
+  }
+  void add_radial(const RadialField& field, const std::string& prefix) {
+    const RadialBasis& basis = field.basis();
+    add_rows(prefix + "centers", basis.centers);
+    file.add(prefix + "radii", {basis.radii.size()}, basis.radii.data());
+    add_rows(prefix + "coefficients", field.coefficients());
+    if (!basis.embedding) return;
+    add_rows(prefix + "embedding.nodes", basis.embedding->nodes);
+    add_rows(prefix + "embedding.values", basis.embedding->values);
+    add_rows(prefix + "embedding.slopes", basis.embedding->slopes);
+  }
+
+  std::deque<VectorF> kept_;  // whose elements stay where they are
+  std::deque<Vector> doubles_;
+};
+
+Json structure_of(const DeformationField& field) {
+  Json structure{{"frame", frame_structure(field.frame())}, {"rest_points", field.rest_points().rows()}};
+  if (const auto* neural = dynamic_cast<const NeuralField*>(&field)) {
+    structure["type"] = "neural";
+    structure["network"] = network_structure(neural->shape());
+    if (neural->handles()) structure["handles"] = neural->handles()->regions().size();
+    if (neural->base()) structure["base"] = structure_of(*neural->base());
+  } else if (const auto* radial = dynamic_cast<const RadialField*>(&field)) {
+    structure["type"] = "radial";
+    structure["centers"] = radial->basis().center_count();
+    if (const InteriorEmbedding* embedding = radial->basis().embedding.get())
+      structure["embedding"] = {{"nodes", embedding->nodes.rows()}, {"width", embedding->width}};
+  } else {
+    throw InvalidInput("field", "a kind without a file format", "neural and radial fields can be saved");
+  }
+  return structure;
+}
+
+std::shared_ptr<const HandleBlend> read_handles(ArchiveReader& file, const std::string& prefix, Index count) {
+  const Vector placements = file.doubles(prefix + "placements", {count, 4, 4});
+  const Vector motions = file.doubles(prefix + "motions", {count, 4, 4});
+  const Vector margins = file.doubles(prefix + "margins", {count});
+  std::vector<RigidRegion> regions(static_cast<std::size_t>(count));
+  for (Index i = 0; i < count; ++i) {
+    RigidRegion& region = regions[static_cast<std::size_t>(i)];
+    region.placement = placements.segment<16>(16 * i).reshaped<Eigen::RowMajor>(4, 4);
+    region.motion = motions.segment<16>(16 * i).reshaped<Eigen::RowMajor>(4, 4);
+    region.margin = margins[i];
+    region.name = "handles[" + std::to_string(i) + "]";
+  }
+  return std::make_shared<HandleBlend>(std::move(regions));
+}
+
+std::shared_ptr<DeformationField> read_field(ArchiveReader& file, const Json& structure,
+                                             const std::string& name, const std::string& prefix);
+
+std::shared_ptr<DeformationField> read_neural(ArchiveReader& file, const Json& structure,
+                                              const std::string& name, const std::string& prefix) {
+  const JsonObject object(structure, name, {"type", "frame", "rest_points", "network", "handles", "base"});
+  const MlpShape shape = read_shape(object.at("network"), object.name("network"), 3);
+  const VectorF weights = read_network(file, prefix, shape);
+  const auto field = std::make_shared<NeuralField>(shape, 0);
+  field->set_weights(weights);
+  if (object.has("handles"))
+    field->set_handles(read_handles(file, prefix + "handles.", object.integer("handles", 0, most_rows)));
+  if (object.has("base"))
+    field->set_base(read_field(file, object.at("base"), object.name("base"), prefix + "base."));
+  return field;
+}
+
+std::shared_ptr<DeformationField> read_radial(ArchiveReader& file, const Json& structure,
+                                              const std::string& name, const std::string& prefix) {
+  const JsonObject object(structure, name, {"type", "frame", "rest_points", "centers", "embedding"});
+  const Index count = object.integer("centers", 0, most_rows);
+  RadialBasis basis;
+  basis.centers = file.points(prefix + "centers", count);
+  basis.radii = file.doubles(prefix + "radii", {count});
+  if (object.has("embedding")) {
+    const JsonObject embedding(object.at("embedding"), object.name("embedding"), {"nodes", "width"});
+    const Index nodes = embedding.integer("nodes", 1, most_rows);
+    InteriorEmbedding made;
+    made.width = embedding.number("width");
+    made.nodes = file.points(prefix + "embedding.nodes", nodes);
+    made.values = file.points(prefix + "embedding.values", nodes);
+    const Vector slopes = file.doubles(prefix + "embedding.slopes", {nodes, 9});
+    made.slopes = Eigen::Map<const RowMatrix<double>>(slopes.data(), nodes, 9);
+    basis.set_embedding(std::make_shared<const InteriorEmbedding>(std::move(made)));
+  }
+  return std::make_shared<RadialField>(std::move(basis), file.points(prefix + "coefficients", count + 4));
+}
+
+std::shared_ptr<DeformationField> read_field(ArchiveReader& file, const Json& structure,
+                                             const std::string& name, const std::string& prefix) {
+  require(structure.is_object() && structure.contains("type") && structure["type"].is_string(), name,
+          "'type' is missing", "'neural' or 'radial' is needed");
+  const std::string type = structure["type"].get<std::string>();
+  require(type == "neural" || type == "radial", name + ".type", "'" + type + "'",
+          "'neural' or 'radial' is needed");
+  const auto field = type == "neural" ? read_neural(file, structure, name, prefix)
+                                      : read_radial(file, structure, name, prefix);
+  const JsonObject object(
+      structure, name,
+      {"type", "frame", "rest_points", "network", "handles", "base", "centers", "embedding"});
+  field->set_frame(read_frame(object.at("frame"), object.name("frame")));
+  field->set_rest_points(file.points(prefix + "rest_points", object.integer("rest_points", 0, most_rows)));
+  return field;
+}
+
+}  // namespace
+
+void save_field(const std::string& path, const DeformationField& field, const std::string& report) {
+  const Json structure = structure_of(field);
+  FieldArrays arrays;
+  arrays.add(field, "");
+  save_document(path, field_kind, structure, report, arrays.file);
+}
+
+std::shared_ptr<DeformationField> load_field(const std::string& path, std::string* report) {
+  std::shared_ptr<DeformationField> field;
+  load_document(path, field_kind, report, [&](ArchiveReader& file, int, const Json& structure) {
+    field = read_field(file, structure, "structure", "");
+  });
+  return field;
+}
+
+}  // namespace arapfields

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "neural/parameters.h"
+
+#include "core/errors.h"
+#include "core/parallel.h"
+#include "core/tensors.h"
+
+namespace arapfields {
+
+void validate(const MlpShape& shape) {
+  require_range("outputs", shape.outputs, 1, 1024);
+  shape.validate();
+}
+
+Index parameter_count(const MlpShape& shape) {
+  Index count = 0;
+  for (int l = 0; l <= shape.layers; ++l)
+    count += static_cast<Index>(shape.fan_out(l)) * (shape.fan_in(l) + 1);
+  return count;
+}
+
+VectorF parameters_of(const Mlp& mlp) {
+  const ThreadScope scope;
+  const at::Tensor host = mlp.parameters().to(at::kCPU, at::kFloat).contiguous();
+  return Eigen::Map<const VectorF>(host.const_data_ptr<float>(), host.numel());
+}
+
+void set_parameters(Mlp& mlp, const VectorF& parameters) {
+  const ThreadScope scope;
+  at::Tensor& own = mlp.parameters();
+  require(parameters.size() == own.numel(), "weights", std::to_string(parameters.size()) + " numbers",
+          "this network has " + std::to_string(own.numel()));
+  own.copy_(tensor_view(parameters));
+}
+
+}  // namespace arapfields

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Saved fields and signed distances taken apart and put together, independently of the library: as dicts."""
+
+import json
+import struct
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+import arapfields as af
+
+DTYPES = {"F64": np.dtype("<f8"), "F32": np.dtype("<f4")}
+NAMES = {dtype: name for name, dtype in DTYPES.items()}
+
+
+def read(path):
+    """(texts, arrays): what is under __metadata__, with structure and report parsed, and {name: array}."""
+    content = Path(path).read_bytes()
+    (length,) = struct.unpack("<Q", content[:8])
+    header, data = json.loads(content[8 : 8 + length]), content[8 + length :]
+    texts = header.pop("__metadata__")
+    for name in ("structure", "report"):
+        texts[name] = json.loads(texts[name])
+    arrays = {}
+    for name, entry in header.items():
+        begin, end = entry["data_offsets"]
+        arrays[name] = np.frombuffer(data[begin:end], DTYPES[entry["dtype"]]).reshape(entry["shape"])
+    return texts, arrays
+
+
+def header_of(texts, arrays):
+    """The header's object; arrays lie in the order of the dict."""
+    texts = {k: v if isinstance(v, str) else json.dumps(v) for k, v in texts.items()}
+    header, offset = {"__metadata__": texts}, 0
+    for name, array in arrays.items():
+        end = offset + array.nbytes
+        header[name] = {
+            "dtype": NAMES[array.dtype],
+            "shape": list(array.shape),
+            "data_offsets": [offset, end],
+        }
+        offset = end
+    return header
+
+
+def joined(header, data):
+    """A file's bytes of a header (an object, or bytes as they are) and the arrays' bytes."""
+    text = header if isinstance(header, bytes) else json.dumps(header).encode()
+    return struct.pack("<Q", len(text)) + text + data
+
+
+def packed(texts, arrays):
+    return joined(header_of(texts, arrays), b"".join(array.tobytes() for array in arrays.values()))
+
+
+def make_examples(folder):
+    """One small file of each kind and with each part that files can have: {name: path}."""
+    rng = np.random.default_rng(0)
+    folder = Path(folder)
+    sizes = [12, 8, 8, 1]
+    layers = [rng.normal(size=(b, a)) / a**0.5 for a, b in pairwise(sizes)]
+    sdf = af.NeuralSdf.from_layers(layers, [np.zeros(b) for b in sizes[1:]], octaves=2)
+    turns = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    legs = np.concatenate([[[np.cos(t), np.sin(t), z] for t in turns] for z in np.linspace(-3, 3, 30)])
+    normals = legs * [1, 1, 0]
+    both = np.concatenate([legs * [0.2, 0.2, 1] + [0.3, 0, 0], legs * [0.2, 0.2, 1] - [0.3, 0, 0]])
+    samples = af.SurfaceSamples(both, np.concatenate([normals, normals]))
+    rest = np.diag([1.0, 1.0, 0.5, 1.0])
+    rest[2, 3] = -3.0
+    above = rest.copy()
+    above[2, 3] = 3.0
+    target = above.copy()
+    target[0, 3] = 0.5
+    handles = [af.Cuboid(rest, rest), af.Cuboid(above, target)]
+    small = {"iterations": 3, "batch": 20, "width": 8, "layers": 1, "octaves": 2, "threads": 1}
+    live = {"samples": 200, "coarse_centers": 8, "fine_centers": 20, "steps": 3, "threads": 1}
+    made = {
+        "sdf": sdf,
+        "neural": af.deform(samples, handles, af.DeformOptions(**small)),
+        "exact": af.deform(samples, handles, af.DeformOptions(exact_handles=True, **small)),
+        "refined": af.deform(samples, handles, af.DeformOptions(start="radial", centers=20, **small)),
+        "radial": af.LiveDeformer(samples, handles, af.LiveOptions(interior=False, **live)).solve(),
+        "embedded": af.LiveDeformer(samples, handles, af.LiveOptions(interior=True, **live)).solve(),
+    }
+    for name, thing in made.items():
+        thing.save(folder / f"{name}.safetensors")
+    return {name: folder / f"{name}.safetensors" for name in made}
+
+
+def load(path):
+    """By the class that the file's name calls for."""
+    kind = af.NeuralSdf if Path(path).name.startswith("sdf") else af.DeformationField
+    return kind.load(path)

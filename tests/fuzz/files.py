@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A target for each kind of file: good examples, how to damage them, and what reads (and uses) them."""
+
+import json
+from pathlib import Path
+
+import archives
+import numpy as np
+import trimesh
+
+import arapfields as af
+from addon.commands.batch import read_objects
+from addon.commands.record import NAME, Record
+from arapfields.__main__ import main
+from arapfields.cli import files
+from arapfields.cli.handles import build_handles, read_handles
+
+from . import mutate
+
+POINTS = np.random.default_rng(1).uniform(-1, 1, (5, 3))
+FEW = POINTS[:2]
+
+
+class Target:
+    """Example files by name, `damage(rng, name)` → bytes, and `use(path)` with documented errors alone."""
+
+    documented = (af.InvalidInput, OSError)
+
+    def __init__(self, folder):
+        self.folder = Path(folder)
+        self.examples = self.make()
+        self.contents = {name: path.read_bytes() for name, path in self.examples.items()}
+
+    def case(self, rng):
+        """A damaged file in the folder."""
+        name = sorted(self.examples)[rng.integers(len(self.examples))]
+        path = self.folder / f"case-{self.examples[name].name}"
+        path.write_bytes(self.damage(rng, name))
+        return path
+
+    def damage(self, rng, name):
+        if rng.integers(3):
+            return mutate.mutate_text(rng, self.contents[name])
+        return mutate.mutate_bytes(rng, self.contents[name])
+
+
+class Archives(Target):
+    def make(self):
+        examples = archives.make_examples(self.folder)
+        self.parts = {name: archives.read(path) for name, path in examples.items()}
+        return {name: path for name, path in examples.items() if (name == "sdf") == self.sdf}
+
+    def damage(self, rng, name):
+        return mutate.mutate_archive(rng, self.contents[name], *self.parts[name])
+
+
+class Fields(Archives):
+    """Saved deformation fields: loaded, evaluated with their derivatives, inverted, saved again."""
+
+    sdf = False
+
+    def use(self, path):
+        field = af.DeformationField.load(path)
+        field(POINTS), field.jacobian(POINTS), field.hessian(FEW)
+        field.inverse(FEW)
+        field.save(self.folder / "again")
+
+
+class Sdfs(Archives):
+    """Saved signed distances."""
+
+    sdf = True
+
+    def use(self, path):
+        sdf = af.NeuralSdf.load(path)
+        sdf(POINTS), sdf.gradient(POINTS), repr(sdf)
+        sdf.save(self.folder / "again")
+
+
+class Meshes(Target):
+    """Meshes as the command line reads them, and their vertices moved as it writes them."""
+
+    def make(self):
+        made = {}
+        box = trimesh.creation.box()
+        for suffix in ("ply", "off", "stl"):
+            box.export(self.folder / f"box.{suffix}")
+        box.export(self.folder / "text.ply", encoding="ascii")
+        (self.folder / "text.stl").write_text(trimesh.exchange.stl.export_stl_ascii(box))
+        lines = [f"v {x:.3f} {y:.3f} {z:.3f}" for x, y, z in box.vertices]
+        lines += ["mtllib none.mtl", "vt 0 0", "vn 0 0 1", "usemtl skin"]
+        lines += ["f " + " ".join(f"{i + 1}/1/1" for i in row) for row in box.faces]
+        (self.folder / "box.obj").write_text("\n".join(lines) + "\n")
+        for path in self.folder.glob("*.*"):
+            made[path.name] = path
+        return made
+
+    def use(self, path):
+        mesh = files.read_mesh(path)
+        files.write_moved_mesh(self.folder / f"moved{path.suffix}", path, mesh, lambda points: points + 1.0)
+
+
+class Handles(Target):
+    """Handles as JSON."""
+
+    def make(self):
+        one = {"type": "cuboid", "corners": [[None, -1, 0], [1, None, 2.5]], "weight": 2}
+        one["move"] = {
+            "rotate": {"axis": [0, 0, 1], "degrees": 30},
+            "pivot": [0, 0, 0],
+            "translate": [1, 0, 0],
+        }
+        two = {
+            "type": "cuboid",
+            "center": [0, 0, 0],
+            "half_extents": [1, 2, 3],
+            "rotation": np.eye(3).tolist(),
+        }
+        three = {"type": "cuboid", "rest": np.eye(4).tolist(), "target": np.eye(4).tolist()}
+        point = {"type": "point", "rest": [0, 0, 0], "target": [1, 1, 1], "weight": 0.5}
+        self.value = {"handles": [one, two, three, point]}
+        path = self.folder / "pose.json"
+        path.write_text(json.dumps(self.value))
+        return {"pose": path}
+
+    def damage(self, rng, name):
+        if rng.integers(4) == 0:
+            return mutate.mutate_bytes(rng, self.contents[name])
+        return mutate.dumped(rng, mutate.mutate_json(rng, self.value))
+
+    def use(self, path):
+        build_handles(read_handles(path), np.array([[-1.0] * 3, [1.0] * 3]))
+
+
+class Normals(Target):
+    """Preferred normals as text or arrays."""
+
+    def make(self):
+        rows = np.eye(3)
+        np.savetxt(self.folder / "rows.txt", rows)
+        np.savetxt(self.folder / "rows.csv", rows, delimiter=",")
+        np.save(self.folder / "rows.npy", rows)
+        return {path.name: path for path in self.folder.glob("rows.*")}
+
+    def use(self, path):
+        files.read_normals(path)
+
+
+class Records(Target):
+    """What a batch has noted, and what its children report."""
+
+    def make(self):
+        entry = {"status": "done", "message": "x", "options": "0", "source": [1, 2], "output": "a.ply"}
+        self.values = {
+            "record": {"version": 1, "files": {"a.ply": {**entry, "seconds": 1.0, "objects": []}}},
+            "report": {
+                "input": "a",
+                "objects": [{"object": "a", "status": "done", "message": "x", "figures": {}}],
+            },
+        }
+        for name, value in self.values.items():
+            (self.folder / f"{name}.json").write_text(json.dumps(value))
+        return {name: self.folder / f"{name}.json" for name in self.values}
+
+    damage = Handles.damage
+
+    @property
+    def value(self):
+        return self.values["record"]
+
+    def use(self, path):
+        (self.folder / NAME).write_bytes(path.read_bytes())
+        Record(self.folder).is_done("a.ply", path, path, "0")
+        read_objects(path)
+
+
+class CommandLine(Target):
+    """The command line on damaged fields, meshes and handles: an exit code, never a traceback."""
+
+    def make(self):
+        self.parts = [kind(self.sub(kind.__name__)) for kind in (Fields, Sdfs, Meshes, Handles)]
+        (self.folder / "mesh.obj").write_bytes((self.folder / "Meshes" / "box.obj").read_bytes())
+        return {"mesh": self.folder / "mesh.obj"}
+
+    def sub(self, name):
+        (self.folder / name).mkdir()
+        return self.folder / name
+
+    def case(self, rng):
+        return self.parts[rng.integers(len(self.parts))].case(rng)
+
+    def use(self, path):
+        mesh, out = str(self.folder / "mesh.obj"), str(self.folder / "out.obj")
+        arguments = {
+            ".json": [
+                "deform",
+                mesh,
+                "-o",
+                out,
+                "--handles",
+                str(path),
+                "--iterations",
+                "1",
+                "--samples",
+                "50",
+            ],
+            ".safetensors": ["warp", str(path), mesh, "-o", out],
+        }.get(path.suffix, ["grid", str(path), "-o", str(self.folder / "g.npz"), "--resolution", "2"])
+        code = main([*arguments, *(["--width", "8"] if path.suffix == ".json" else []), "--quiet"])
+        assert code in (0, 1, 2), code
+
+
+TARGETS = {
+    kind.__name__.lower(): kind for kind in (Fields, Sdfs, Meshes, Handles, Normals, Records, CommandLine)
+}

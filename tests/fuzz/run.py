@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs nets in processes of their own, and starts the next one where a case has ended its process."""
+
+import json
+import queue
+import re
+import subprocess
+import sys
+import threading
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+HANG = 60.0  # seconds without a sign of life
+AT_ONCE = 2000  # cases a process
+
+
+@dataclass
+class Findings:
+    """What became of the cases of one target."""
+
+    target: str
+    outcomes: Counter = field(default_factory=Counter)
+    failures: list = field(default_factory=list)  # (number, text)
+    texts: set = field(default_factory=set)  # of all refusals
+
+    def add(self, number, outcome):
+        self.outcomes[outcome["outcome"]] += 1
+        if outcome["outcome"] == "refused":
+            self.texts.add(outcome["text"])
+        if outcome["outcome"] == "failed":
+            self.failures.append((number, outcome["text"]))
+
+
+def run_target(target, seed, count):
+    """Findings of cases 0 to `count`."""
+    findings, first = Findings(target), 0
+    while first < count:
+        first = _run_process(findings, seed, first, min(AT_ONCE, count - first))
+    return findings
+
+
+def _run_process(findings, seed, first, count):
+    """The number of the case to go on with."""
+    command = [sys.executable, "-m", "tests.fuzz.worker", findings.target, str(seed), str(first), str(count)]
+    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    lines, errors = queue.Queue(), []
+    readers = [
+        threading.Thread(target=lambda: [lines.put(line) for line in process.stdout] + [lines.put(None)]),
+        threading.Thread(target=lambda: errors.extend(process.stderr)),
+    ]
+    for reader in readers:
+        reader.start()
+    number, done = None, first
+    try:
+        while (line := lines.get(timeout=HANG)) is not None:
+            said = json.loads(line)
+            if isinstance(said, int):
+                number = said
+            else:
+                findings.add(done, said)
+                done += 1
+    except queue.Empty:
+        findings.add(done, {"outcome": "failed", "text": f"no sign of life for {HANG:g} s"})
+        done += 1
+    finally:
+        process.kill()
+        code = process.wait()
+        for reader in readers:
+            reader.join()
+    if done < first + count and code not in (0, -9):
+        if number is None:
+            raise RuntimeError("".join(errors)[-3000:])
+        findings.add(done, {"outcome": "failed", "text": f"ended by {code}: {''.join(errors)[-1500:]}"})
+        done += 1
+    return done
+
+
+def refusals(
+    folder="native/io", names=("archive", "json", "document", "network_file", "field_file", "input_file")
+):
+    """Of each refusal in the reader's source: file, line, and the fixed parts of its text."""
+    found = []
+    for name in names:
+        text = (ROOT / folder / f"{name}.cpp").read_text()
+        for call in re.finditer(r"\b(?:require|throw InvalidInput)\((?:[^;\"]|\"(?:\\.|[^\"\\])*\")*;", text):
+            parts = re.findall(r'"((?:\\.|[^"\\])*)"', call[0])
+            parts = [part.strip() for part in parts if len(part.strip()) >= 8]
+            if parts:
+                found.append((name, text[: call.start()].count("\n") + 1, parts))
+    return found
+
+
+def unreached(texts, folder="native/io"):
+    """The refusals of which no text was seen."""
+    return [r for r in refusals(folder) if not any(all(part in text for part in r[2]) for text in texts)]

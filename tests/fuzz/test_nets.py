@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The nets, short: every refusal of the readers is reached, and none of the cases does anything worse."""
+
+import pytest
+
+from .run import refusals, run_target, unreached
+
+COUNTS = {
+    "fields": 1200,
+    "sdfs": 400,
+    "meshes": 300,
+    "handles": 400,
+    "normals": 300,
+    "records": 300,
+    "api": 250,
+}
+# A file that shrinks while it is read, a pipe (tests/python/test_files.py), and two refusals of the writer.
+ELSEWHERE = {
+    "it is being written to",
+    "pipes, devices and sockets cannot be read",
+    "a header of",
+    "a kind without a file format",
+}
+
+
+@pytest.fixture(scope="module")
+def findings():
+    return {}
+
+
+@pytest.mark.parametrize("target", COUNTS)
+def test_nothing_but_documented_errors(target, findings):
+    found = findings[target] = run_target(target, seed=1, count=COUNTS[target])
+    assert sum(found.outcomes.values()) == COUNTS[target]
+    assert not found.failures, found.failures[:3]
+    assert found.outcomes["refused"] > COUNTS[target] // 10
+
+
+def test_the_readers_refusals_are_reached(findings):
+    assert len(refusals()) > 30
+    texts = findings["fields"].texts | findings["sdfs"].texts
+    missed = [r for r in unreached(texts) if not ELSEWHERE & set(r[2])]
+    assert not missed, missed

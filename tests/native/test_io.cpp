@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <sys/stat.h>
+
+#include <boost/test/unit_test.hpp>
+#include <filesystem>
+#include <fstream>
+
+#include "core/errors.h"
+#include "core/file_error.h"
+#include "fields/neural_field.h"
+#include "fields/radial_field.h"
+#include "io/files.h"
+#include "io/output_file.h"
+
+using namespace arapfields;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder of its own for each test.
+struct Folder {
+  Folder() {
+    std::string pattern = (fs::temp_directory_path() / "arapfields-XXXXXX").string();
+    path = mkdtemp(pattern.data());
+  }
+  ~Folder() { fs::remove_all(path); }
+  std::string operator/(const char* name) const { return (path / name).string(); }
+  std::size_t size() const {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(path), fs::directory_iterator()));
+  }
+  fs::path path;
+};
+
+RadialField radial_field() {
+  RadialBasis basis;
+  basis.centers = Points::Random(5, 3);
+  basis.radii = Vector::Constant(5, 2.0);
+  InteriorEmbedding embedding;
+  embedding.nodes = Points::Random(4, 3);
+  embedding.values = Points::Random(4, 3);
+  embedding.slopes = RowMatrix<double>::Random(4, 9);
+  embedding.width = 0.5;
+  basis.set_embedding(std::make_shared<const InteriorEmbedding>(embedding));
+  RadialField field(basis, RowMatrix<double>::Random(9, 3));
+  field.set_frame({Vec3(1.0, 2.0, 0.1), 1.0 / 3.0});
+  field.set_rest_points(Points::Random(3, 3));
+  return field;
+}
+
+std::shared_ptr<NeuralField> neural_field() {
+  auto field = std::make_shared<NeuralField>(MlpShape{3, 8, 2, 2, 1.0, 30.0}, 0);
+  RigidRegion region;
+  region.placement.topRightCorner<3, 1>() = Vec3(3.0, 0.0, 0.0);
+  field->set_handles(std::make_shared<HandleBlend>(std::vector<RigidRegion>{region}));
+  field->set_base(std::make_shared<RadialField>(radial_field()));
+  return field;
+}
+
+template <class Call>
+std::string refusal(Call&& call) {
+  try {
+    call();
+  } catch (const InvalidInput& error) {
+    return error.what();
+  }
+  return "nothing was thrown";
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_SUITE(io)
+
+BOOST_AUTO_TEST_CASE(fields_come_back_bit_for_bit) {
+  const Folder folder;
+  const Points points = Points::Random(7, 3);
+  const auto neural = neural_field();
+  const RadialField radial = radial_field();
+  for (const DeformationField* field :
+       {static_cast<const DeformationField*>(neural.get()), static_cast<const DeformationField*>(&radial)}) {
+    std::string report;
+    save_field(folder / "field", *field, R"({"stretch": 0.25})");
+    const auto again = load_field(folder / "field", &report);
+    BOOST_TEST((again->at(points) == field->at(points)));
+    BOOST_TEST((again->frame() == field->frame()));
+    BOOST_TEST((again->rest_points() == field->rest_points()));
+    BOOST_TEST(report == R"({"stretch": 0.25})");
+  }
+  BOOST_TEST(folder.size() == 1u);
+}
+
+BOOST_AUTO_TEST_CASE(signed_distances_come_back_bit_for_bit) {
+  const Folder folder;
+  const PointsF points = PointsF::Random(7, 3);
+  NeuralSdf sdf(Mlp(MlpShape{1, 8, 2, 2, 1.0, 30.0}, 3, false), Frame{Vec3(0.1, 0.2, 0.3), 0.7});
+  save_sdf(folder / "sdf", sdf);
+  const auto again = load_sdf(folder / "sdf");
+  VectorF before(7), after(7);
+  sdf.evaluate(points, before);
+  again->evaluate(points, after);
+  BOOST_TEST((before == after));
+  BOOST_TEST((again->frame() == sdf.frame()));
+  BOOST_TEST(
+      refusal([&] { load_field(folder / "sdf"); }).starts_with((folder / "sdf") + ": cannot be loaded"));
+}
+
+BOOST_AUTO_TEST_CASE(what_cannot_be_read_or_written_is_named) {
+  const Folder folder;
+  BOOST_CHECK_THROW(load_field(folder / "absent"), FileError);
+  BOOST_CHECK_THROW(save_field(folder / "absent/field", radial_field()), FileError);
+  BOOST_TEST(refusal([&] { save_field(folder / "field", radial_field(), "[]"); }).starts_with("report"));
+  BOOST_TEST(refusal([&] { save_field(folder / "field", HandleBlend({})); }).starts_with("field"));
+  std::ofstream(folder / "short") << "{}";
+  BOOST_TEST(refusal([&] { load_sdf(folder / "short"); }).starts_with((folder / "short") + ": "));
+  mkfifo((folder / "pipe").c_str(), 0600);
+  BOOST_TEST(refusal([&] { load_sdf(folder / "pipe"); }).find("regular") != std::string::npos);
+  BOOST_TEST(refusal([&] { OutputFile file(folder / "pipe"); }).find("regular") != std::string::npos);
+  BOOST_TEST(folder.size() == 2u);
+}
+
+BOOST_AUTO_TEST_CASE(embeddings_that_do_not_fit_together_are_refused) {
+  RadialBasis basis;
+  basis.centers = Points::Random(5, 3);
+  const InteriorEmbedding good = *radial_field().basis().embedding;
+  const auto refused = [&](auto&& change) {
+    InteriorEmbedding bad = good;
+    change(bad);
+    BOOST_CHECK_THROW(basis.set_embedding(std::make_shared<const InteriorEmbedding>(bad)), InvalidInput);
+  };
+  refused([](InteriorEmbedding& e) { e.values.conservativeResize(3, 3); });
+  refused([](InteriorEmbedding& e) { e.nodes.conservativeResize(3, 3); });
+  refused([](InteriorEmbedding& e) { e.slopes.conservativeResize(4, 8); });
+  refused([](InteriorEmbedding& e) { e.slopes(0, 0) = std::nan(""); });
+  refused([](InteriorEmbedding& e) { e.width = 0.0; });
+  refused([](InteriorEmbedding& e) { e = InteriorEmbedding(); });
+}
+
+BOOST_AUTO_TEST_CASE(an_output_that_is_given_up_changes_nothing) {
+  const Folder folder;
+  std::ofstream(folder / "x") << "old";
+  {
+    OutputFile file(folder / "x");
+    file.write("new", 3);
+  }
+  std::string text;
+  std::ifstream(folder / "x") >> text;
+  BOOST_TEST(text == "old");
+  {
+    OutputFile file(folder / "x");
+    file.write("new", 3);
+    file.commit();
+  }
+  std::ifstream(folder / "x") >> text;
+  BOOST_TEST(text == "new");
+  BOOST_TEST(folder.size() == 1u);
+}
+
+BOOST_AUTO_TEST_SUITE_END()

@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Saved fields and signed distances: the layout of safetensors, and a reader that trusts nothing."""
+
+import copy
+import json
+import os
+import struct
+import subprocess
+import sys
+
+import archives
+import numpy as np
+import pytest
+import safetensors.numpy
+
+import arapfields as af
+
+
+@pytest.fixture(scope="module")
+def examples(tmp_path_factory):
+    return archives.make_examples(tmp_path_factory.mktemp("examples"))
+
+
+def refusal(path, content=None):
+    """What the reader says of a file that it must refuse."""
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(af.InvalidInput) as error:
+        archives.load(path)
+    assert str(error.value).startswith(f"{path}: "), error.value
+    return str(error.value)
+
+
+@pytest.mark.parametrize("name", ["sdf", "neural", "exact", "refined", "radial", "embedded"])
+def test_any_reader_of_safetensors_opens_them(name, examples):
+    texts, arrays = archives.read(examples[name])
+    found = safetensors.numpy.load_file(examples[name])
+    assert found.keys() == arrays.keys()
+    assert all(np.array_equal(found[key], arrays[key]) for key in arrays)
+    with safetensors.safe_open(examples[name], "np") as file:
+        assert file.metadata()["format"] == "arapfields" and file.metadata()["version"] == "1"
+    assert texts["kind"] == ("sdf" if name == "sdf" else "field")
+
+
+@pytest.mark.parametrize("name", ["sdf", "neural", "exact", "refined", "radial", "embedded"])
+def test_what_is_read_is_written_again(name, examples, tmp_path):
+    archives.load(examples[name]).save(tmp_path / "again")
+    assert (tmp_path / "again").read_bytes() == examples[name].read_bytes()
+    texts, arrays = archives.read(examples[name])
+    shuffled = dict(reversed(arrays.items()))  # the order of arrays is the writer's own affair
+    (tmp_path / examples[name].name).write_bytes(archives.packed(texts, shuffled))
+    points = np.random.default_rng(0).uniform(-1, 1, (20, 3))
+    again = archives.load(tmp_path / examples[name].name)
+    assert np.array_equal(again(points), archives.load(examples[name])(points))
+
+
+def test_the_issues_lift_and_network(examples, tmp_path):
+    """Arrays whose lengths disagree with each other or with what is declared: never in a kernel."""
+    path = tmp_path / "embedded.safetensors"
+    texts, arrays = archives.read(examples["embedded"])
+    for name in ("embedding.values", "embedding.slopes", "embedding.nodes", "radii", "coefficients"):
+        assert name in refusal(path, archives.packed(texts, {**arrays, name: arrays[name][:-1]}))
+    slopes = {**arrays, "embedding.slopes": np.ascontiguousarray(arrays["embedding.slopes"][:, :6])}
+    assert "embedding.slopes" in refusal(path, archives.packed(texts, slopes))
+    for width in (0, -1.0, 1e400, None, "wide"):
+        changed = copy.deepcopy(texts)
+        changed["structure"]["embedding"]["width"] = width
+        assert "width" in refusal(path, archives.packed(changed, arrays)) or width == 1e400
+    texts, arrays = archives.read(examples["neural"])
+    for member, value in [
+        ("width", 8192),
+        ("layers", 64),
+        ("octaves", 32),
+        ("width", 10**15),
+        ("width", 8.5),
+    ]:
+        changed = copy.deepcopy(texts)
+        changed["structure"]["network"][member] = value
+        said = refusal(tmp_path / "neural.safetensors", archives.packed(changed, arrays))
+        assert "layers" in said or member in said
+
+
+HEADERS = {
+    "no object": b"[1, 2]",
+    "not JSON": b'{"a": ',
+    "nested deeper": b'{"a": ' + b"[" * 100000,
+    "twice": b'{"__metadata__": {"format": "a", "format": "b"}}',
+    "'__metadata__' is missing": b"{}",
+    "an object is needed": b'{"__metadata__": 3}',
+    "a text is needed": b'{"__metadata__": {"format": 3}}',
+    "does not begin with an object": b" {}",
+    "ill-formed UTF-8": b'{"\xff": 1}',
+}
+
+
+@pytest.mark.parametrize("text", HEADERS)
+def test_headers_that_are_none(text, tmp_path):
+    assert (
+        text.split("'")[-1] in refusal(tmp_path / "x", archives.joined(HEADERS[text], b""))
+        or text == "no object"
+    )
+
+
+def test_sizes_are_checked_before_memory_is_asked_for(examples, tmp_path):
+    """The declared sizes are far beyond the file's; a reader that believed them would die."""
+    texts, arrays = archives.read(examples["radial"])
+    header = archives.header_of(texts, arrays)
+    data = b"".join(a.tobytes() for a in arrays.values())
+    entry = header["centers"]
+    cases = {
+        "large shape": {**entry, "shape": [10**9, 3]},
+        "overflowing shape": {**entry, "shape": [2**40, 2**40, 2**40]},
+        "negative shape": {**entry, "shape": [-1, 3]},
+        "fractional shape": {**entry, "shape": [28.0, 3]},
+        "many dimensions": {**entry, "shape": [1] * 1000},
+        "beyond the file": {**entry, "data_offsets": [0, 10**12]},
+        "backwards": {**entry, "data_offsets": [100, 0]},
+        "overlapping": {**entry, "data_offsets": [8, 8 + arrays["centers"].nbytes]},
+        "another dtype": {**entry, "dtype": "F16"},
+        "unknown member": {**entry, "strides": [1, 2]},
+        "a number": 7,
+    }
+    for name, changed in cases.items():
+        refusal(tmp_path / name, archives.joined({**header, "centers": changed}, data))
+    refusal(tmp_path / "more", archives.joined(header, data + b"12345678"))
+    refusal(tmp_path / "cut", archives.joined(header, data[:-1]))
+    refusal(tmp_path / "length", struct.pack("<Q", 2**63) + b"{}")
+    declared = copy.deepcopy(texts)
+    declared["structure"]["centers"] = 10**11
+    refusal(tmp_path / "declared", archives.packed(declared, arrays))
+    extra = {**arrays, "extra": np.zeros(3)}
+    assert "extra" in refusal(tmp_path / "extra", archives.packed(texts, extra))
+    lacking = {k: v for k, v in arrays.items() if k != "radii"}
+    assert "radii" in refusal(tmp_path / "lacking", archives.packed(texts, lacking))
+    broken = {**arrays, "centers": arrays["centers"] * np.nan}
+    assert "NaN" in refusal(tmp_path / "nan", archives.packed(texts, broken))
+
+
+@pytest.mark.parametrize(
+    "change, word",
+    [
+        ({"format": "other"}, "format"),
+        ({"version": "99"}, "newer release"),
+        ({"version": "0"}, "version"),
+        ({"version": "one"}, "version"),
+        ({"kind": "sdf"}, "kind"),
+        ({"report": "[]"}, "report"),
+        ({"report": "{"}, "report"),
+        ({"structure": "{}"}, "type"),
+        ({"structure": "[" * 5000}, "nested"),
+        ({"further": "x"}, "further"),
+        ({"format": None}, "missing"),
+    ],
+)
+def test_what_a_file_says_of_itself(change, word, examples, tmp_path):
+    texts, arrays = archives.read(examples["radial"])
+    changed = {k: v for k, v in {**texts, **change}.items() if v is not None}
+    assert word in refusal(tmp_path / "x", archives.packed(changed, arrays))
+
+
+@pytest.mark.parametrize(
+    "where, value",
+    [
+        (["type"], "cubic"),
+        (["frame", "scale"], 0.0),
+        (["frame", "scale"], -1.0),
+        (["frame", "center"], [0, 0]),
+        (["frame", "center"], [0, 0, "x"]),
+        (["frame"], None),
+        (["rest_points"], -1),
+        (["network", "outputs"], 1),
+        (["network", "frequency"], 0),
+        (["network", "colour"], 1),
+        (["handles"], 3),
+        (["handles"], -1),
+        (["base"], {}),
+        (["base", "frame"], 7),
+        (["colour"], 1),
+    ],
+)
+def test_structures_that_do_not_fit(where, value, examples, tmp_path):
+    name = "exact" if where[0] == "handles" else "refined"
+    texts, arrays = archives.read(examples[name])
+    part = texts["structure"]
+    for key in where[:-1]:
+        part = part[key]
+    part[where[-1]] = value
+    refusal(tmp_path / name, archives.packed(texts, arrays))
+
+
+def test_foreign_files_and_places(examples, tmp_path):
+    whole = examples["sdf"].read_bytes()
+    for content in (
+        b"",
+        b"short",
+        whole[: len(whole) // 2],
+        whole[:-4],
+        os.urandom(500),
+        b"PK\3\4" + bytes(80),
+    ):
+        refusal(tmp_path / "x", content)
+    np.savez(tmp_path / "a.npz", a=1)
+    refusal(tmp_path / "a.npz")
+    os.mkfifo(tmp_path / "pipe")
+    assert "regular file" in refusal(tmp_path / "pipe")
+    for kind in (af.NeuralSdf, af.DeformationField):
+        with pytest.raises(FileNotFoundError) as error:
+            kind.load(tmp_path / "absent")
+        assert error.value.filename == str(tmp_path / "absent")
+        with pytest.raises(IsADirectoryError):
+            kind.load(tmp_path)
+        for path in (3, None, "", "a\0b", b"a\0b", object()):
+            with pytest.raises(af.InvalidInput, match="path"):
+                kind.load(path)
+    odd = os.fsencode(tmp_path) + b"/\xff.safetensors"
+    sdf = af.NeuralSdf.load(examples["sdf"])
+    sdf.save(odd)
+    assert af.NeuralSdf.load(odd).frame == sdf.frame
+    with open(odd, "wb") as file:
+        file.write(b"nothing")
+    with pytest.raises(af.InvalidInput):
+        af.NeuralSdf.load(odd)
+
+
+def test_reports_hold_what_json_holds(examples, tmp_path):
+    sdf = af.NeuralSdf.load(examples["sdf"])
+    sdf._report = {"a": np.float32(0.5), "b": np.arange(3), "c": float("nan"), "d": (1, {"e": True})}
+    sdf.save(tmp_path / "x")
+    read = {"a": 0.5, "b": [0, 1, 2], "c": None, "d": [1, {"e": True}]}
+    assert af.NeuralSdf.load(tmp_path / "x").report == read
+    sdf._report = {"a": object()}
+    with pytest.raises(af.InvalidInput, match="report"):
+        sdf.save(tmp_path / "y")
+    assert not (tmp_path / "y").exists()
+    assert json.loads(archives.read(tmp_path / "x")[0]["kind"] and "{}") == {}
+
+
+def test_a_sparse_file_asks_for_no_memory(tmp_path):
+    """34 GB that are not there: refused by comparison with what is free."""
+    header = {
+        "__metadata__": {"format": "arapfields", "version": "1", "kind": "field", "report": "{}"},
+        "centers": {"dtype": "F64", "shape": [1_400_000_000, 3], "data_offsets": [0, 33_600_000_000]},
+    }
+    structure = {
+        "type": "radial",
+        "centers": 1_400_000_000,
+        "rest_points": 0,
+        "frame": {"center": [0] * 3, "scale": 1},
+    }
+    header["__metadata__"]["structure"] = json.dumps(structure)
+    path = tmp_path / "sparse"
+    head = archives.joined(header, b"")
+    path.write_bytes(head)
+    os.truncate(path, len(head) + 33_600_000_000)
+    code = (
+        "import resource, sys; import arapfields as af\n"
+        "resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))\n"
+        "try: af.DeformationField.load(sys.argv[1])\n"
+        "except af.InvalidInput as error: print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True)
+    assert done.returncode == 0 and "GiB" in done.stdout and str(path) in done.stdout, done

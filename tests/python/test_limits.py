@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arguments that could end the process or take all memory: in processes with limits."""
+
+import subprocess
+import sys
+import threading
+
+import numpy as np
+import pytest
+
+import arapfields as af
+
+PRELUDE = """
+import resource, sys, numpy as np, arapfields as af
+from pathlib import Path
+sys.path[:0] = TESTS, ROOT
+from fuzz.api import make_things, TETRAHEDRON, FACES, ROWS, NORMALS
+pages = int(Path("/proc/self/statm").read_text().split()[0])
+limit = pages * resource.getpagesize() + (3 << 30)
+things = make_things()
+resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+def refused(call, *words):
+    try:
+        call()
+    except (af.InvalidInput, TypeError) as error:
+        assert all(word in str(error) for word in words), error
+    else:
+        raise AssertionError(f"nothing was raised, {words}")
+"""
+
+
+def run(code):
+    root = __file__.rsplit("/tests/", 1)[0]
+    prelude = f"TESTS, ROOT = {root + '/tests'!r}, {root!r}\n" + PRELUDE
+    done = subprocess.run([sys.executable, "-c", prelude + code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-3000:]
+
+
+def test_objects_without_init_are_refused():
+    """Whatever is asked of an object that __new__ alone has made."""
+    run("""
+for cls in [v for v in vars(af).values() if isinstance(v, type) and not issubclass(v, BaseException)]:
+    for name in dir(cls):
+        member = getattr(cls, name)
+        if name.startswith("__") and name not in ("__call__", "__len__", "__repr__", "__eq__"):
+            continue
+        for arguments in ((), (ROWS,), (None,)):
+            try:
+                (member.fget if isinstance(member, property) else member)(cls.__new__(cls), *arguments)
+            except (TypeError, af.InvalidInput, AttributeError):
+                pass
+bare = lambda cls: cls.__new__(cls)
+refused(lambda: bare(af.DeformationField)(ROWS), "__init__")
+refused(lambda: af.deform(bare(af.SurfaceSamples), things["handles"]), "__init__")
+refused(lambda: af.sample_surface(bare(af.NeuralSdf)))
+refused(lambda: af.deform(things["samples"], [bare(af.Point)]))
+refused(lambda: af.arap_energy(bare(af.RadialField), ROWS), "__init__")
+""")
+
+
+def test_none_is_no_object():
+    run("""
+refused(lambda: af.sample_surface(None))
+refused(lambda: af.extract_surface(None))
+refused(lambda: af.extract_deformed(things["sdf"], None))
+refused(lambda: af.deform(None, things["handles"]))
+refused(lambda: af.deform(things["samples"], [None]))
+refused(lambda: af.arap_energy(None, ROWS))
+refused(lambda: af.distortion(None, ROWS))
+refused(lambda: af.train_inverse(None, things["samples"]))
+refused(lambda: af.LiveDeformer(None))
+refused(lambda: things["live"].set_handles([None]))
+""")
+
+
+def test_arrays_that_cannot_be_copied_are_named():
+    """Two billion rows that take no memory by themselves."""
+    run("""
+rows = np.broadcast_to(np.float32(0), (2_000_000_000, 3))
+flat = np.broadcast_to(np.float32(0), (3_000_000_000,))
+wide = np.broadcast_to(np.int32(0), (2_000_000_000, 3))
+refused(lambda: af.signed_distance(rows, FACES, ROWS), "vertices")
+refused(lambda: af.signed_distance(TETRAHEDRON, wide, ROWS), "triangles")
+refused(lambda: af.winding_number(TETRAHEDRON, FACES, rows), "points")
+refused(lambda: af.SurfaceSamples(rows, NORMALS), "points")
+refused(lambda: af.Cuboid(rows, np.eye(4)), "rest")
+refused(lambda: af.Point(flat, np.zeros(3)), "rest")
+refused(lambda: things["sdf"](rows), "points")
+refused(lambda: things["field"].inverse(rows), "points")
+refused(lambda: af.gauss_preference(rows, np.eye(3)), "normals")
+refused(lambda: af.NeuralSdf.from_layers([rows], [flat]), "weights")
+refused(lambda: af.sample_curve(np.broadcast_to(0.0, (2_000_000_000, 2)), 10), "vertices")
+""")
+
+
+@pytest.mark.parametrize(
+    "call, words",
+    [
+        ("af.fit_sdf(TETRAHEDRON, FACES, af.FitOptions(near_points=10**9))", ["near_points", "memory"]),
+        ("af.fit_sdf(TETRAHEDRON, FACES, af.FitOptions(uniform_points=10**9))", ["uniform_points", "memory"]),
+        ("af.fit_sdf(TETRAHEDRON, FACES, af.FitOptions(width=8192, layers=64))", ["width", "memory"]),
+        ("af.sample_mesh(TETRAHEDRON, FACES, 10**9)", ["count", "memory"]),
+        ("af.sample_mesh(TETRAHEDRON, FACES, 2**62)", ["count", "memory"]),
+        ("af.sample_surface(things['sdf'], 10**8)", ["count", "memory"]),
+        ("af.sample_curve(ROWS[:, :2], 10**9)", ["count", "memory"]),
+        ("af.sdf_grid(things['sdf'], 2048)", ["resolution", "memory"]),
+        ("af.deform_curve(ROWS[:, :2], [af.CurveHandle([0])], af.CurveOptions(spacing=0.01))", ["spacing"]),
+        (
+            "af.deform_curve(np.random.default_rng(0).normal(size=(20000, 2)), [af.CurveHandle([0])],"
+            " af.CurveOptions(spacing=0.02))",
+            ["spacing", "memory"],
+        ),
+    ],
+)
+def test_sizes_that_memory_cannot_hold_are_named(call, words):
+    run(f"refused(lambda: {call}, *{words!r})")
+
+
+def test_a_curve_hears_cancel():
+    circle = np.stack([np.cos(np.linspace(0, 6, 400)), np.sin(np.linspace(0, 6, 400))], axis=1)
+    task = af.Task()
+    threading.Timer(0.2, task.cancel).start()
+    with pytest.raises(af.Cancelled):
+        af.deform_curve(circle, [af.CurveHandle([0])], af.CurveOptions(spacing=0.02), task)
+    assert task.progress < 1.0
