@@ -4,9 +4,10 @@
 import os
 import signal
 import sys
-import threading
 import time
 from pathlib import Path
+
+from ..core.runtime.threads import start_thread
 
 PARENT = "ARAPFIELDS_PARENT"  # the descriptor of a pipe that closes when the batch ends, however it does
 PATIENCE = 5.0  # seconds in which a Blender that was asked to end may do so
@@ -29,7 +30,7 @@ def end_with_parent():
         time.sleep(PATIENCE)
         os._exit(130)
 
-    threading.Thread(target=watch, name="arapfields parent", daemon=True).start()
+    start_thread("parent", watch)
 
 
 class Launch:

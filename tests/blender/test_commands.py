@@ -2,6 +2,7 @@
 """deform, stylize and batch as scripts of Python's bpy: real files in, real files out."""
 
 import json
+import resource
 import signal
 import subprocess
 import sys
@@ -33,9 +34,13 @@ def needs_bpy():
 
 @pytest.fixture
 def script(user_folder):
-    def run(verb, *arguments, check=True):
+    def run(verb, *arguments, check=True, largest=None):
+        def limit():
+            if largest:  # bytes of a file: stands for a full disk
+                resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
+
         command = [sys.executable, str(ROOT / f"blender_scripts/{verb}.py"), *map(str, arguments)]
-        done = subprocess.run(command, env=user_folder, capture_output=True, text=True)
+        done = subprocess.run(command, env=user_folder, preexec_fn=limit, capture_output=True, text=True)
         assert not check or done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
         return done
 
@@ -85,6 +90,38 @@ def test_stylize_a_file(script, tmp_path, suffix):
     assert [path.name for path in target.parent.iterdir()] == [target.name]  # nothing partial
     if suffix == ".obj":
         assert target.read_text().count("\nvt ") and "o Ball\n" in target.read_text()
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".obj", ".stl", ".blend"])
+def test_a_full_disk_is_named_and_changes_nothing(script, tmp_path, suffix):
+    source, target = tmp_path / "ball.ply", tmp_path / f"results/cubic{suffix}"
+    write_ball(source)
+    target.parent.mkdir()
+    target.write_text("before")
+    done = script("stylize", "--style", "cube", "-i", source, "-o", target, *QUICK, check=False, largest=6000)
+    assert done.returncode not in (0, -25) and str(target) in done.stderr, done
+    assert [path.name for path in target.parent.iterdir()] == [target.name]
+    assert target.read_text() == "before"
+
+
+def test_a_batch_that_is_killed_takes_its_blenders_along(user_folder, tmp_path):
+    (tmp_path / "in").mkdir()
+    write_ball(tmp_path / "in/ball.ply")
+    call = [sys.executable, str(ROOT / "blender_scripts/batch.py"), "--style", "cube", "--input"]
+    call += [str(tmp_path / "in"), "--output", str(tmp_path / "out"), *QUICK, "--iterations", "100000"]
+    process = subprocess.Popen(call, env=user_folder, stdout=subprocess.PIPE, text=True)
+    while "files to do" not in process.stdout.readline():
+        assert process.poll() is None
+    time.sleep(3.0)
+    tasks = Path(f"/proc/{process.pid}/task").glob("*/children")
+    children = [Path(f"/proc/{pid}") for path in tasks for pid in path.read_text().split()]
+    assert children
+    process.kill()
+    process.wait()
+    begin = time.monotonic()
+    while any(path.exists() for path in children):
+        assert time.monotonic() - begin < 60.0
+        time.sleep(0.2)
 
 
 def test_deform_a_file_under_handles(script, tmp_path):

@@ -105,7 +105,7 @@ def make_things():
         "live": af.LiveDeformer(
             samples,
             handles[:1],
-            af.LiveOptions(samples=50, coarse_centers=5, fine_centers=5, steps=2, threads=1),
+            af.LiveOptions(samples=50, coarse_centers=5, fine_centers=5, iterations=2, threads=1),
         ),
         "curve": curve,
         "curve_handle": af.CurveHandle([0, 1]),
@@ -129,8 +129,8 @@ def odd_options(rng, things, structure, **good):
 def calls(rng, things):
     """{name: (function, arguments)}: all of the interface, each argument good."""
     t, task, moved = things, af.Task(), np.eye(4)
-    fit = {"steps": 2, "batch": 64, "near_points": 100, "uniform_points": 100, **TINY}
-    live = {"samples": 50, "coarse_centers": 5, "fine_centers": 5, "steps": 2, "threads": 1}
+    fit = {"iterations": 2, "batch": 64, "near_points": 100, "uniform_points": 100, **TINY}
+    live = {"samples": 50, "coarse_centers": 5, "fine_centers": 5, "iterations": 2, "threads": 1}
     opts = {k: v for k, v in TINY.items()}
     return {
         "signed_distance": lambda: (af.signed_distance, [TETRAHEDRON, FACES, ROWS, 1, task]),

@@ -49,7 +49,7 @@ def mutate_bytes(rng, content):
         length = int(rng.integers(1, 16))
         kind = rng.integers(6)
         if kind == 0:
-            del data[at:]
+            del data[at if rng.integers(3) else int(rng.integers(12)) :]
         elif kind == 1:
             data[at : at + length] = rng.bytes(length)
         elif kind == 2:

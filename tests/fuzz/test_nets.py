@@ -33,7 +33,8 @@ def test_nothing_but_documented_errors(target, findings):
     found = findings[target] = run_target(target, seed=1, count=COUNTS[target])
     assert sum(found.outcomes.values()) == COUNTS[target]
     assert not found.failures, found.failures[:3]
-    assert found.outcomes["refused"] > COUNTS[target] // 10
+    if target != "records":  # which count as damaged instead
+        assert found.outcomes["refused"] > COUNTS[target] // 10
 
 
 def test_the_readers_refusals_are_reached(findings):

@@ -48,8 +48,14 @@ RadialField radial_field() {
   return field;
 }
 
+MlpShape tiny(int outputs) {
+  MlpShape shape;
+  shape.outputs = outputs, shape.width = 8, shape.layers = 2, shape.octaves = 2;
+  return shape;
+}
+
 std::shared_ptr<NeuralField> neural_field() {
-  auto field = std::make_shared<NeuralField>(MlpShape{3, 8, 2, 2, 1.0, 30.0}, 0);
+  auto field = std::make_shared<NeuralField>(tiny(3), 0);
   RigidRegion region;
   region.placement.topRightCorner<3, 1>() = Vec3(3.0, 0.0, 0.0);
   field->set_handles(std::make_shared<HandleBlend>(std::vector<RigidRegion>{region}));
@@ -92,7 +98,7 @@ BOOST_AUTO_TEST_CASE(fields_come_back_bit_for_bit) {
 BOOST_AUTO_TEST_CASE(signed_distances_come_back_bit_for_bit) {
   const Folder folder;
   const PointsF points = PointsF::Random(7, 3);
-  NeuralSdf sdf(Mlp(MlpShape{1, 8, 2, 2, 1.0, 30.0}, 3, false), Frame{Vec3(0.1, 0.2, 0.3), 0.7});
+  NeuralSdf sdf(Mlp(tiny(1), 3, false), Frame{Vec3(0.1, 0.2, 0.3), 0.7});
   save_sdf(folder / "sdf", sdf);
   const auto again = load_sdf(folder / "sdf");
   VectorF before(7), after(7);

@@ -16,14 +16,16 @@ import arapfields as af
 from arapfields.cli import files
 from arapfields.cli.handles import build_handles, read_handles
 
+SDF, FIELD, AGAIN = (f"{name}.safetensors" for name in ("sdf", "field", "again"))
+
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     """A folder with a mesh, a coarse fit of it and a field."""
     folder = tmp_path_factory.mktemp("made")
     write_octahedron(folder / "mesh.obj")
-    assert run("fit", folder / "mesh.obj", "-o", folder / "sdf.safetensors", "--quiet", *SMALL_FIT) == 0
-    arguments = ["--save-field", folder / "field.safetensors", *HELD_AND_SHIFTED, *SMALL_SOLVE, "--quiet"]
+    assert run("fit", folder / "mesh.obj", "-o", folder / SDF, "--quiet", *SMALL_FIT) == 0
+    arguments = ["--save-field", folder / FIELD, *HELD_AND_SHIFTED, *SMALL_SOLVE, "--quiet"]
     assert run("deform", folder / "mesh.obj", *arguments) == 0
     return folder
 
@@ -48,17 +50,14 @@ def test_every_option_is_a_flag(capsys):
 
 
 def test_fit_saves_what_the_library_makes(made, tmp_path):
-    report = tmp_path / "report.json"
-    again = tmp_path / "again.safetensors"
+    report, again = tmp_path / "report.json", tmp_path / AGAIN
     assert run("fit", made / "mesh.obj", "-o", again, "--report", report, "--quiet", *SMALL_FIT) == 0
     points = np.random.default_rng(0).uniform(-1, 1, (50, 3))
-    assert np.array_equal(
-        af.NeuralSdf.load(again)(points), af.NeuralSdf.load(made / "sdf.safetensors")(points)
-    )
+    assert np.array_equal(af.NeuralSdf.load(again)(points), af.NeuralSdf.load(made / SDF)(points))
     assert json.loads(report.read_text())["iterations"] == 60
 
 
-@pytest.mark.parametrize("source", ["mesh.obj", "sdf.safetensors"])
+@pytest.mark.parametrize("source", ["mesh.obj", SDF])
 @pytest.mark.parametrize("suffix", [".ply", ".npz", ".xyz"])
 def test_sample(source, suffix, made, tmp_path, capsys):
     output = tmp_path / f"points{suffix}"
@@ -81,10 +80,10 @@ def test_sample(source, suffix, made, tmp_path, capsys):
 
 
 def test_deformed_samples_follow_the_field(made, tmp_path):
-    for name, extra in {"rest": [], "moved": ["--deformed-by", made / "field.safetensors"]}.items():
+    for name, extra in {"rest": [], "moved": ["--deformed-by", made / FIELD]}.items():
         assert run("sample", made / "mesh.obj", "-o", tmp_path / f"{name}.npz", "--count", "200", *extra) == 0
     rest, moved = (np.load(tmp_path / f"{name}.npz") for name in ("rest", "moved"))
-    field = af.DeformationField.load(made / "field.safetensors")
+    field = af.DeformationField.load(made / FIELD)
     assert np.array_equal(moved["points"], field(rest["points"]))
     # A normal stays orthogonal to the images of the tangents.
     tangent = np.cross(rest["normals"], [0.3, 0.5, 0.8])
@@ -93,11 +92,11 @@ def test_deformed_samples_follow_the_field(made, tmp_path):
 
 
 def test_deform_writes_mesh_surface_field_and_report(made, tmp_path):
-    outputs = ["--save-field", tmp_path / "field.safetensors", "--surface", tmp_path / "surface.ply"]
+    outputs = ["--save-field", tmp_path / FIELD, "--surface", tmp_path / "surface.ply"]
     outputs += ["--report", tmp_path / "report.json", "--resolution", "24"]
-    assert run("deform", made / "sdf.safetensors", *outputs, *HELD_AND_SHIFTED, *SMALL_SOLVE, "--quiet") == 0
-    field = af.DeformationField.load(tmp_path / "field.safetensors")
-    vertices, _ = af.extract_surface(af.NeuralSdf.load(made / "sdf.safetensors"), resolution=24)
+    assert run("deform", made / SDF, *outputs, *HELD_AND_SHIFTED, *SMALL_SOLVE, "--quiet") == 0
+    field = af.DeformationField.load(tmp_path / FIELD)
+    vertices, _ = af.extract_surface(af.NeuralSdf.load(made / SDF), resolution=24)
     written = trimesh.load(tmp_path / "surface.ply", process=False)
     assert np.asarray(written.vertices) == pytest.approx(field(vertices), abs=1e-5)
     report = json.loads((tmp_path / "report.json").read_text())
@@ -105,21 +104,10 @@ def test_deform_writes_mesh_surface_field_and_report(made, tmp_path):
 
 
 def test_extract_through_the_inverse(made, tmp_path):
-    through = [
-        "--through",
-        "inverse",
-        "--deformed-by",
-        made / "field.safetensors",
-        "--resolution",
-        "40",
-        "--quiet",
-    ]
-    assert run("extract", made / "sdf.safetensors", "-o", tmp_path / "even.ply", *through) == 0
+    through = ["--through", "inverse", "--deformed-by", made / FIELD, "--resolution", "40", "--quiet"]
+    assert run("extract", made / SDF, "-o", tmp_path / "even.ply", *through) == 0
     even = trimesh.load(tmp_path / "even.ply", process=False)
-    sdf, field = (
-        af.NeuralSdf.load(made / "sdf.safetensors"),
-        af.DeformationField.load(made / "field.safetensors"),
-    )
+    sdf, field = af.NeuralSdf.load(made / SDF), af.DeformationField.load(made / FIELD)
     expected, triangles = af.extract_deformed(sdf, field, 40)
     assert np.asarray(even.vertices) == pytest.approx(expected, abs=1e-5)
     assert np.array_equal(even.faces, triangles)
@@ -138,7 +126,7 @@ def test_flags_and_handle_file_mean_the_same(made, tmp_path):
     arguments = ["-o", tmp_path / "moved.obj", "--handles", tmp_path / "pose.json", *SMALL_SOLVE, "--quiet"]
     assert run("deform", made / "mesh.obj", *arguments) == 0
     arguments = ["-o", tmp_path / "warped.obj"]
-    assert run("warp", made / "field.safetensors", made / "mesh.obj", *arguments) == 0
+    assert run("warp", made / FIELD, made / "mesh.obj", *arguments) == 0
     assert (tmp_path / "moved.obj").read_text() == (tmp_path / "warped.obj").read_text()
 
 
@@ -164,13 +152,13 @@ def test_obj_keeps_all_but_positions(made, tmp_path):
         "vn 0 0 1\nusemtl red\nf 1/1/1 2/1/1 3/1/1 4/1/1\nf 1//1 2//1 3//1\n"
     )
     (tmp_path / "quad.obj").write_text(text)
-    assert run("warp", made / "field.safetensors", tmp_path / "quad.obj", "-o", tmp_path / "moved.obj") == 0
+    assert run("warp", made / FIELD, tmp_path / "quad.obj", "-o", tmp_path / "moved.obj") == 0
     lines = (tmp_path / "moved.obj").read_text().splitlines()
     kept = [line for line in lines if not line.startswith("v ")]
     assert kept == [
         "# a comment", "mtllib paint.mtl", "o one", "vt 0 1", "usemtl red", "f 1/1 2/1 3/1 4/1", "f 1 2 3"
     ]  # fmt: skip
-    field = af.DeformationField.load(made / "field.safetensors")
+    field = af.DeformationField.load(made / FIELD)
     numbers = [[float(c) for c in line.split()[1:]] for line in lines if line.startswith("v ")]
     assert numbers[0] == pytest.approx([*field([[0, 0, 0.5]])[0], 1, 0, 0], abs=1e-7)
 
@@ -199,17 +187,11 @@ def test_stylize_by_name_and_by_normals(made, tmp_path):
 
 
 def test_extract_and_grid(made, tmp_path):
-    assert (
-        run("extract", made / "sdf.safetensors", "-o", tmp_path / "s.ply", "--resolution", "24", "--quiet")
-        == 0
-    )
+    assert run("extract", made / SDF, "-o", tmp_path / "s.ply", "--resolution", "24", "--quiet") == 0
     vertices, triangles = files.read_mesh(tmp_path / "s.ply")
-    expected = af.extract_surface(af.NeuralSdf.load(made / "sdf.safetensors"), resolution=24)
+    expected = af.extract_surface(af.NeuralSdf.load(made / SDF), resolution=24)
     assert np.array_equal(triangles, expected[1]) and vertices == pytest.approx(expected[0], abs=1e-6)
-    assert (
-        run("grid", made / "sdf.safetensors", "-o", tmp_path / "grid.npz", "--resolution", "16", "--quiet")
-        == 0
-    )
+    assert run("grid", made / SDF, "-o", tmp_path / "grid.npz", "--resolution", "16", "--quiet") == 0
     grid = np.load(tmp_path / "grid.npz")
     assert grid["values"].shape == (17, 17, 17)
 
@@ -229,13 +211,13 @@ def test_real_meshes(name, data_dir, tmp_path):
         run("stylize", mesh, "-o", tmp_path / "styled.ply", "--style", "cube", *SMALL_SOLVE, "--quiet") == 0
     )
     assert run("sample", mesh, "-o", tmp_path / "points.ply", "--count", "500", "--quiet") == 0
-    assert run("fit", mesh, "-o", tmp_path / "sdf.safetensors", "--quiet", *SMALL_FIT) == 0
+    assert run("fit", mesh, "-o", tmp_path / SDF, "--quiet", *SMALL_FIT) == 0
     extraction = ["-o", tmp_path / "surface.ply", "--resolution", "24", "--quiet"]
-    assert run("extract", tmp_path / "sdf.safetensors", *extraction) == 0
+    assert run("extract", tmp_path / SDF, *extraction) == 0
     v, f = files.read_mesh(moved)
     assert v.shape == vertices.shape and np.array_equal(f, triangles)
     assert sorted(path.name for path in tmp_path.iterdir()) == [
-        "moved.ply", "points.ply", "sdf.safetensors", "styled.ply", "surface.ply"
+        "moved.ply", "points.ply", SDF, "styled.ply", "surface.ply"
     ]  # fmt: skip
 
 

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Arguments that could end the process or take all memory: in processes with limits."""
 
+import json
+import os
 import subprocess
 import sys
 import threading
 
+import archives
 import numpy as np
 import pytest
 
@@ -123,3 +126,30 @@ def test_a_curve_hears_cancel():
     with pytest.raises(af.Cancelled):
         af.deform_curve(circle, [af.CurveHandle([0])], af.CurveOptions(spacing=0.02), task)
     assert task.progress < 1.0
+
+
+def test_a_sparse_file_asks_for_no_memory(tmp_path):
+    """34 GB that are not there: refused by comparison with what is free."""
+    header = {
+        "__metadata__": {"format": "arapfields", "version": "1", "kind": "field", "report": "{}"},
+        "centers": {"dtype": "F64", "shape": [1_400_000_000, 3], "data_offsets": [0, 33_600_000_000]},
+    }
+    structure = {
+        "type": "radial",
+        "centers": 1_400_000_000,
+        "rest_points": 0,
+        "frame": {"center": [0] * 3, "scale": 1},
+    }
+    header["__metadata__"]["structure"] = json.dumps(structure)
+    path = tmp_path / "sparse"
+    head = archives.joined(header, b"")
+    path.write_bytes(head)
+    os.truncate(path, len(head) + 33_600_000_000)
+    code = (
+        "import resource, sys; import arapfields as af\n"
+        "resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))\n"
+        "try: af.DeformationField.load(sys.argv[1])\n"
+        "except af.InvalidInput as error: print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True)
+    assert done.returncode == 0 and "GiB" in done.stdout and str(path) in done.stdout, done
