@@ -121,9 +121,9 @@ def test_installed_headers_need_neither_torch_nor_kernels(prefix):
     installed = sorted((prefix / "include").rglob("*.h"))
     assert {path.name for path in PUBLIC} <= {path.name for path in installed}
     for path in installed:
-        text = path.read_text()
+        text = re.sub(r"//[^\n]*", "", path.read_text())
         wrong = re.findall(
-            r"#include [<\"](?:ATen|torch|c10|immintrin).*|.*(?:SIMD_LEVEL|ARAPFIELDS_DECLARE).*", text
+            r"#include [<\"](?:ATen|torch|c10|immintrin).*|.*SIMD_LEVEL.*|.*ARAPFIELDS_DECLARE.*", text
         )
         assert not wrong, (path, wrong)
         for name in re.findall(r'#include "(.*)"', text):

@@ -6,3 +6,4 @@
 #include "extraction/batch_function.h"
 #include "neural/fit.h"
 #include "neural/neural_sdf.h"
+#include "options/grid.h"
