@@ -22,7 +22,7 @@ struct RigidRegion {
 ///   h(x) = x + Σ_i W_i (C_i x − x),  W_i = w_i Π_{j<i} (1 − w_j),
 /// so that h is exact in each box that no earlier region's margin reaches (see limit_margins).
 /// A trainable part multiplied by free_weight() = Π_i (1 − w_i) leaves that exactness alone.
-class ARAPFIELDS_EXPORT_TO_TESTS HandleBlend final : public DeformationField {
+class HandleBlend final : public DeformationField {
  public:
   /// Throws InvalidInput for a margin that is not positive or a box that is flat or sheared.
   explicit HandleBlend(std::vector<RigidRegion> regions);

@@ -13,7 +13,7 @@ namespace arapfields {
 /// f(x) = b(x) + a(x) Ψ(x) with a trained network Ψ whose last layer starts at zero. Alone, b is the identity
 /// and a is 1. Two fixed parts may be put in before training: a base field r, which training then refines,
 /// and exact handles (fields/handle_blend.h), h with its free weight a; b = h + a (r − identity).
-class ARAPFIELDS_EXPORT_TO_TESTS NeuralField final : public TrainableField {
+class NeuralField final : public TrainableField {
  public:
   /// `shape.outputs` must be 3. See Mlp for the rest.
   NeuralField(const MlpShape& shape, std::uint64_t seed, bool double_precision = false,

@@ -110,3 +110,11 @@ def test_layers_that_do_not_fit_are_refused():
             make(weights, biases, **options)
     with pytest.raises(af.InvalidInput, match="points"):
         make(weights, biases)([[0.0, np.nan, 0.0]])
+
+
+def test_layers_are_what_from_layers_takes(sdf):
+    weights, biases, octaves, frequency, sharpness = sdf.layers
+    again = af.NeuralSdf.from_layers(weights, biases, octaves, frequency, sharpness)
+    points = np.random.default_rng(5).uniform(-1, 1, (100, 3))
+    assert np.array_equal(again(points), sdf(points))
+    assert [w.shape for w in weights] == [w.shape for w in small_layers()[0]]
