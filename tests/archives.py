@@ -74,7 +74,7 @@ def make_examples(folder):
     target[0, 3] = 0.5
     handles = [af.Cuboid(rest, rest), af.Cuboid(above, target)]
     small = {"iterations": 3, "batch": 20, "width": 8, "layers": 1, "octaves": 2, "threads": 1}
-    live = {"samples": 200, "coarse_centers": 8, "fine_centers": 20, "steps": 3, "threads": 1}
+    live = {"samples": 200, "coarse_centers": 8, "fine_centers": 20, "iterations": 3, "threads": 1}
     made = {
         "sdf": sdf,
         "neural": af.deform(samples, handles, af.DeformOptions(**small)),

@@ -64,12 +64,12 @@ def _run_process(findings, seed, first, count):
     except queue.Empty:
         findings.add(done, {"outcome": "failed", "text": f"no sign of life for {HANG:g} s"})
         done += 1
-    finally:
         process.kill()
-        code = process.wait()
+    finally:
+        code = process.wait(HANG)
         for reader in readers:
             reader.join()
-    if done < first + count and code not in (0, -9):
+    if done < first + count and (code not in (0, -9) or done == first):
         if number is None:
             raise RuntimeError("".join(errors)[-3000:])
         findings.add(done, {"outcome": "failed", "text": f"ended by {code}: {''.join(errors)[-1500:]}"})
