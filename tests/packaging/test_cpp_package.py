@@ -188,6 +188,7 @@ def test_each_header_of_the_tree_compiles_alone(folder):
         pytest.skip("they need Python's headers, which every source includes first")
     torch = cached("LIBTORCH_DIR")
     system = [f"-isystem{torch}/include", f"-isystem{torch}/include/torch/csrc/api/include"]
+    system += [f"-isystem{cached('JSON_INCLUDE_DIR')}"] if folder == "io" else []
     defined = ["-DEIGEN_MAX_ALIGN_BYTES=16", "-DSIMD_LEVEL=baseline", "-Wno-unused-function", "-Wno-psabi"]
     for header in sorted((NATIVE / folder).glob("*.h")):
-        compile_alone(f"{folder}/{header.name}", [NATIVE], *system, *defined)
+        compile_alone(f"{folder}/{header.name}", [NATIVE, BUILD / "generated"], *system, *defined)
