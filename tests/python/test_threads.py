@@ -34,7 +34,7 @@ def network():
 
 
 def fit(threads):
-    settings = dict(steps=12, width=64, layers=3, batch=600, near_points=9000, uniform_points=3000)
+    settings = dict(iterations=12, width=64, layers=3, batch=600, near_points=9000, uniform_points=3000)
     return af.fit_sdf(*torus(), options=af.FitOptions(threads=threads, **settings))
 
 
