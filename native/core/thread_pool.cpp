@@ -132,7 +132,10 @@ void ThreadPool::serve() {
 #ifdef __linux__
   pthread_setname_np(pthread_self(), "arapfields");
 #endif
-  on_start_();
+  {
+    const std::lock_guard lock(starting_);
+    on_start_();
+  }
   for (;;) {
     std::shared_ptr<Job> job;
     int number = 0;
