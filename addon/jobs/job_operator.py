@@ -77,7 +77,7 @@ class JobOperator(ModalRun):
 
     def coroutine(self, context):
         """All that the main thread does; returns the operator's result."""
-        self.failures, self.successes = [], []
+        self.failures, self.warnings, self.successes = [], [], []
         job = jobs.Job(self.title, [], native.library().Task, low_priority=self.in_window)
         jobs.begin(job, start=False)
         try:
@@ -104,6 +104,7 @@ class JobOperator(ModalRun):
         """Applies what the worker made, reports it, and returns the operator's result."""
         cancelled = job.cancelled and not job.items
         for outcome in job.take_outcomes():
+            self.warnings += [f"{outcome.item.label}: {translated(text)}" for text in outcome.warnings]
             if outcome.cancelled:
                 cancelled = True
             elif outcome.error:
@@ -115,6 +116,8 @@ class JobOperator(ModalRun):
             return {"CANCELLED"}
         for text in self.successes:
             self.add_message("INFO", text)
+        for text in self.warnings:
+            self.add_message("WARNING", text)
         for text in self.failures:
             self.add_message("ERROR" if not self.successes else "WARNING", text)
         return {"FINISHED"} if self.successes else {"CANCELLED"}

@@ -44,10 +44,11 @@ class ARAPFIELDS_OT_fit(JobOperator, bpy.types.Operator):
 
         def apply(sdf):
             source = surface.reference.get()
-            staleness.mark_fitted(source, surface)
-            settings = settings_of(source)
-            settings.fit_key = surface.key
-            settings.fit_report = json.dumps(sdf.report)
+            if surface.is_cached:
+                staleness.mark_fitted(source, surface)
+                settings = settings_of(source)
+                settings.fit_key = surface.key
+                settings.fit_report = json.dumps(sdf.report)
             return translated("surface fitted")
 
         return Item(source.name, work, apply)

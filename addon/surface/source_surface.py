@@ -55,7 +55,10 @@ class SourceSurface:
             return cached
         options = af.FitOptions(**self.fit_options, **supported_options(af.FitOptions, self.machine))
         sdf = af.fit_sdf(self.vertices, self.triangles, options, tracker.start("Fitting", weight))
-        self.cache.save(self.key, sdf.save)
+        try:
+            self.cache.save(self.key, sdf.save)
+        except (ValueError, OSError) as error:
+            tracker.warnings.append(UserError("the fit is used, but could not be kept: {error}", error=error))
         return sdf
 
     def samples(self, tracker, count, seed, use_fit):

@@ -35,6 +35,12 @@ def test_every_change_of_content_changes_the_key(change):
     assert fit_key(v, f, options, version) != fit_key(V, F, OPTIONS, 1)
 
 
+def test_meshes_of_any_unit_are_told_apart():
+    for scale in (1e-9, 1e9):
+        assert fit_key(V * scale, F, OPTIONS, 1) != fit_key(V * scale * 1.01, F, OPTIONS, 1)
+        assert fit_key(V * scale, F, OPTIONS, 1) != fit_key(V[::-1] * scale, F, OPTIONS, 1)
+
+
 def read(path):
     text = Path(path).read_text()
     if text == "broken":

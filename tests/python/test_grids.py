@@ -82,7 +82,8 @@ def test_bad_input_is_named(tmp_path):
     for resolution in (0, 1.5, "8", grids.RESOLUTION["high"] + 1):
         with pytest.raises(af.InvalidInput, match="resolution"):
             af.sdf_grid(Ball(), resolution)
-    for bounds in ([[0, 0, 0]], [[0, 0, 0], [1, 0, 1]], [[0, 0, 0], [1, 1, np.nan]]):
+    odd = [[0, 0, 0]], [[0, 0, 0], [1, 0, 1]], [[0, 0, 0], [1, 1, np.nan]], "box", [[0], [1, 1]], 7
+    for bounds in (*odd, np.ones((2, 3), complex), np.broadcast_to(np.zeros(3), (2_000_000_000, 3))):
         with pytest.raises(af.InvalidInput, match="bounds"):
             af.sdf_grid(Ball(), 4, bounds)
     with pytest.raises(af.InvalidInput, match="extension"):

@@ -16,7 +16,9 @@ def fit_key(vertices, triangles, options, version):
     digest = hashlib.blake2b(digest_size=16)
     kept = {name: value for name, value in options.items() if name not in IRRELEVANT}
     digest.update(json.dumps([version, sorted(kept.items())]).encode())
-    digest.update(np.ascontiguousarray(np.round(vertices, 7), dtype=np.float32).tobytes())
+    size = np.float32(np.abs(vertices).max(initial=0.0) or 1.0)
+    digest.update(size.tobytes())
+    digest.update(np.ascontiguousarray(np.round(vertices / size, 7), dtype=np.float32).tobytes())
     digest.update(np.ascontiguousarray(triangles, dtype=np.int32).tobytes())
     return digest.hexdigest()
 

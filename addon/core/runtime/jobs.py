@@ -5,7 +5,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from ..errors import UserError
@@ -34,6 +34,7 @@ class Outcome:
     error: UserError | None = None
     cancelled: bool = False
     seconds: float = 0.0
+    warnings: list = field(default_factory=list)
 
 
 class Job:
@@ -147,7 +148,7 @@ class Job:
 def run_item(item, tracker):
     """Runs one item and turns whatever it raises into an outcome."""
     begin = time.monotonic()
-    outcome = Outcome(item)
+    outcome = Outcome(item, warnings=tracker.warnings)
     try:
         outcome.value = item.work(tracker)
     except JobCancelled:

@@ -18,6 +18,7 @@ class ProgressTracker:
         self._name = ""
         self._begun = self._weight = 0.0
         self._cancelled = False
+        self.warnings = []  # UserErrors that do not spoil the result, for the user to read
         self.rest_preview_points = None  # (n, 3) whose moved positions every native call shall publish
 
     def start(self, name, weight):

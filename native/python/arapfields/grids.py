@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Signed distances on a regular grid, as arrays, .npz files and OpenVDB volumes."""
 
+import contextlib
 import errno
 import importlib
 import importlib.util
@@ -33,6 +34,17 @@ class MeshDistance:
         return signed_distance(self.vertices, self.triangles, points)
 
 
+def _checked_bounds(bounds):
+    """(2, 3) numbers; InvalidInput for anything that is not a low and a high corner."""
+    with contextlib.suppress(TypeError, ValueError):
+        corners = np.asarray(bounds)
+        if corners.shape == (2, 3) and np.can_cast(corners.dtype, float, "same_kind"):
+            corners = corners.astype(float)
+            if np.isfinite(corners).all() and (corners[0] < corners[1]).all():
+                return corners
+    raise InvalidInput(f"bounds: got {bounds!r:.80}; low and high corner, shape (2, 3), are needed")
+
+
 def sdf_grid(sdf, resolution=RESOLUTION["default"], bounds=None, task=None):
     """Distances at the nodes of a regular grid: (values, origin, spacing).
 
@@ -49,9 +61,7 @@ def sdf_grid(sdf, resolution=RESOLUTION["default"], bounds=None, task=None):
         raise InvalidInput(f"task: got {type(task).__name__}; a Task or None is needed")
     if bounds is None:
         bounds = sdf.frame.to_mesh([[-1.0] * 3, [1.0] * 3])
-    bounds = np.array(bounds, float)
-    if bounds.shape != (2, 3) or not np.isfinite(bounds).all() or not (bounds[0] < bounds[1]).all():
-        raise InvalidInput(f"bounds: got {bounds.tolist()}; low and high corner, shape (2, 3), are needed")
+    bounds = _checked_bounds(bounds)
     size = bounds[1] - bounds[0]
     spacing = float(size.max() / resolution)
     counts = np.maximum(np.ceil(size / spacing - 1e-9).astype(int), 1) + 1
