@@ -81,6 +81,8 @@ def bad_meshes(folder, mesh_file):
         + "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n",
         "garbage.stl": bytes(range(256)) * 3,
         "garbage.ply": bytes(range(256)) * 3,
+        "lines.obj": "v 0\nv 1\nv 2\nf 1 2 3\n",
+        "short_row.obj": TRIANGLE + "v 1\nf 1 2 4\n",
         "flat.obj": "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n",
         "mesh.fbx": TRIANGLE + "f 1 2 3\n",
         "extensionless": TRIANGLE + "f 1 2 3\n",

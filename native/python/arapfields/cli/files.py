@@ -58,6 +58,11 @@ def read_mesh(path):
     with _readable(path, path.suffix[1:].upper()):
         mesh = trimesh.load(path, force="mesh", process=False, maintain_order=True, skip_materials=True)
         vertices, triangles = np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
+    for name, rows in (("vertices", vertices), ("faces", triangles)):
+        if rows.size and (rows.ndim != 2 or rows.shape[1] != 3):
+            raise InvalidInput(
+                f"{path}: {name} are rows of shape {rows.shape[1:]}; three numbers each are needed"
+            )
     if triangles.size == 0:
         raise InvalidInput(f"{path}: has no faces (or is cut off); a triangle mesh is needed")
     if not np.isfinite(vertices).all():
