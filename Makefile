@@ -71,13 +71,13 @@ SANITIZED = $(VENV)/bin/cmake -S . -G Ninja -DPython_EXECUTABLE=$(abspath $(PY))
   -DCMAKE_BUILD_TYPE=RelWithDebInfo -DARAPFIELDS_NATIVE_TESTS=ON
 
 # The thread sanitizer does not follow forks: the tests that make them are left out.
-sanitize: setup  ## the native tests under the address and undefined-behaviour sanitizers, those of threads under the thread sanitizer
+sanitize: setup  ## the native tests under the address and undefined-behaviour sanitizers, those of threads and the live solver under the thread sanitizer
 	$(SANITIZED) -B build/sanitize -DARAPFIELDS_SANITIZE=address,undefined
 	$(VENV)/bin/cmake --build build/sanitize --target native_tests
 	ASAN_OPTIONS=detect_leaks=0:detect_odr_violation=0 UBSAN_OPTIONS=print_stacktrace=1 build/sanitize/tests/native_tests
 	$(SANITIZED) -B build/sanitize-thread -DARAPFIELDS_SANITIZE=thread
 	$(VENV)/bin/cmake --build build/sanitize-thread --target native_tests
-	build/sanitize-thread/tests/native_tests --run_test=threads --run_test='!@fork'
+	build/sanitize-thread/tests/native_tests --run_test=threads,live_threads --run_test='!@fork'
 
 format: setup  ## clang-format and ruff over our files
 	git ls-files '*.h' '*.cpp' | xargs $(VENV)/bin/clang-format -i

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The live solver and its threads; the thread sanitizer runs these.
+#include <atomic>
+#include <boost/test/unit_test.hpp>
+#include <thread>
+
+#include "core/errors.h"
+#include "core/parallel.h"
+#include "core/random.h"
+#include "solve/live_solver.h"
+
+using namespace arapfields;
+
+namespace {
+
+constexpr int frames = 6;
+
+SurfaceSamples ball(Index count) {
+  Random random(11);
+  SurfaceSamples samples;
+  samples.points.resize(count, 3);
+  for (Index i = 0; i < count; ++i) samples.points.row(i) = 0.6 * random.direction().transpose();
+  samples.normals = samples.points.rowwise().normalized();
+  return samples;
+}
+
+Handle point(const Vec3& rest, const Vec3& target) {
+  Handle handle;
+  handle.kind = Handle::Kind::point;
+  handle.rest_point = rest;
+  handle.target_point = target;
+  return handle;
+}
+
+std::vector<Handle> pose(double turn) {
+  return {point({0, 0, -0.6}, {0, 0, -0.6}),
+          point({0, 0, 0.6}, {0.6 * std::sin(turn), 0, 0.6 * std::cos(turn)})};
+}
+
+LiveOptions small_options(int threads) {
+  LiveOptions options;
+  options.samples = 400;
+  options.coarse_centers = 12;
+  options.fine_centers = 40;
+  options.iterations = 3;
+  options.threads = threads;
+  return options;
+}
+
+/// Where a drag over some frames takes the points.
+PointsF dragged(const SurfaceSamples& samples, int threads) {
+  LiveSolver live(samples, pose(0.0), small_options(threads));
+  live.track(samples.points);
+  for (int frame = 1; frame <= frames; ++frame) {
+    live.set_targets(pose(0.1 * frame));
+    live.solve();
+  }
+  return live.tracked();
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_SUITE(live_threads)
+
+BOOST_AUTO_TEST_CASE(solvers_at_once_do_not_know_of_each_other) {
+  const SurfaceSamples samples = ball(600);
+  const PointsF alone = dragged(samples, 1);
+  BOOST_CHECK((alone - samples.points.cast<float>()).norm() > 0.1f);
+  std::atomic<int> same{0};
+  std::vector<std::thread> callers;
+  for (const int threads : {1, 2, 3})
+    callers.emplace_back([&, threads] { same += dragged(samples, threads) == alone; });
+  for (std::thread& caller : callers) caller.join();
+  BOOST_CHECK_EQUAL(same, 3);
+}
+
+BOOST_AUTO_TEST_CASE(a_solve_is_watched_and_cancelled_from_another_thread) {
+  const SurfaceSamples samples = ball(600);
+  LiveSolver live(samples, pose(0.0), small_options(2));
+  live.set_targets(pose(0.8));
+  Task task;
+  std::atomic<bool> ended{false}, monotone{true};
+  std::thread watcher([&] {
+    double seen = 0.0;
+    while (!ended && task.progress() < 0.2) {
+      const double now = task.progress();
+      if (now < seen) monotone = false;
+      seen = now;
+      task.message();
+    }
+    task.cancel();
+  });
+  bool cancelled = false;
+  try {
+    for (int round = 0; round < 200; ++round) live.solve(50, 1e-12, Progress(&task));
+  } catch (const Cancelled&) {
+    cancelled = true;
+  }
+  ended = true;
+  watcher.join();
+  BOOST_CHECK(cancelled);
+  BOOST_CHECK(monotone);
+  BOOST_CHECK(live.solve()->at(samples.points).allFinite());
+}
+
+BOOST_AUTO_TEST_SUITE_END()
