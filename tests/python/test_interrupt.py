@@ -28,14 +28,6 @@ print(af.deform(samples, handles, af.DeformOptions(iterations=3, **options)).rep
 """
 
 
-@pytest.fixture(autouse=True)
-def interrupts():
-    """Python's own handler: a parent that runs the tests in the background may have the signal ignored."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
 def test_ctrl_c_in_a_script():
     running = subprocess.Popen(
         [sys.executable, "-c", SCRIPT, cases.__file__.rsplit("/", 1)[0]], stdout=subprocess.PIPE, text=True

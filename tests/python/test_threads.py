@@ -2,6 +2,7 @@
 """The library's own threads: a number for each call, the same results for all; libtorch's are left alone."""
 
 import os
+import resource
 import subprocess
 import sys
 import threading
@@ -99,12 +100,18 @@ def test_results_are_the_same_for_every_number_of_threads(name):
     assert all(np.array_equal(results[0], result) for result in results[1:])
 
 
-def run_script(code, **environment):
+def run_script(code, stack=None, **environment):
+    """What a process prints; `stack` is the size of its threads' stacks, in bytes."""
     code = f"import sys; sys.path[:0] = [{TESTS!r}, {TESTS + '/python'!r}]\n{code}"
     # Of NumPy's BLAS nothing is wanted here: its threads would be taken for ours.
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", **environment}
     run = subprocess.run(
-        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=300
+        [sys.executable, "-c", code],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        preexec_fn=stack and (lambda: resource.setrlimit(resource.RLIMIT_STACK, (stack, stack))),
     )
     assert run.returncode == 0, f"{run.returncode}: {run.stdout}{run.stderr}"
     return run.stdout.strip()
@@ -195,14 +202,15 @@ def test_more_threads_than_there_may_be():
 
 @needs_proc
 def test_threads_that_the_system_refuses_are_done_without():
-    """An address space in which no further stack of 8 MiB fits."""
+    """Stacks of a gibibyte, of which no further one fits into the address space."""
     assert (
         run_script(
             "import resource, numpy as np, threading, test_threads as t; from pathlib import Path\n"
             "expected = t.numbers(t.deformed(1)); t.deformed(2)\n"
             "used = int(Path('/proc/self/statm').read_text().split()[0]) * resource.getpagesize()\n"
-            "resource.setrlimit(resource.RLIMIT_AS, (used + (200 << 20),) * 2)\n"
-            "print(np.array_equal(expected, t.numbers(t.deformed(1000))))"
+            "resource.setrlimit(resource.RLIMIT_AS, (used + (800 << 20),) * 2)\n"
+            "print(np.array_equal(expected, t.numbers(t.deformed(1000))))",
+            stack=1 << 30,
         )
         == "True"
     )
