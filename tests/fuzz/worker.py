@@ -13,6 +13,7 @@ import sys
 import tempfile
 import traceback
 import zlib
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -100,10 +101,9 @@ def main():
     def say(what):
         print(json.dumps(what), file=lines)
 
-    if target == "api":
-        run_api(seed, first, count, say)
-    else:
-        run_files(target, seed, first, count, say)
+    run = run_api if target == "api" else partial(run_files, target)
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):  # odd paths are written to
+        run(seed, first, count, say)
 
 
 if __name__ == "__main__":
