@@ -15,7 +15,6 @@ from ..results.placement import place_result, require_placeable
 from ..surface.source_surface import read_surface, settings_of
 from ..viewport.previews import Preview
 
-
 @dataclass
 class SolvedMesh:
     """What the worker hands back, in local coordinates."""
@@ -74,5 +73,9 @@ def describe(item, report):
             translated("handles off by {value} on average", value=f"{report['handle_error_mean']:.2g}")
         )
     if report.get("flipped_share"):
-        figures.append(translated("{share} folded", share=f"{report['flipped_share']:.1%}"))
+        share, worst = f"{report['flipped_share']:.1%}", f"{report['min_determinant']:.2g}"
+        figures.append(translated("{share} folded (det J down to {worst})", share=share, worst=worst))
+    if report.get("far_target"):
+        sizes = f"{report['far_target']:.0f}"
+        figures.append(translated("a target is {sizes} times the object's size away", sizes=sizes))
     return ", ".join(figures)

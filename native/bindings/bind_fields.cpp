@@ -53,7 +53,7 @@ FieldArray hessian(const DeformationField& field, const py::object& points) {
 Points inverse(const DeformationField& field, const py::object& points, double tolerance, Task* task) {
   const Points mesh = as_points(points, "points");
   NewtonInverseOptions options;
-  options.tolerance = tolerance / field.frame().scale;
+  options.tolerance = tolerance;
   return run_long(task, [&](const Progress& progress) {
     return field.frame().to_mesh(invert(field, field.frame().to_cube(mesh), options, progress).points);
   });
@@ -89,9 +89,10 @@ void bind_fields(py::module_& module) {
       .def(
           "inverse", &inverse, "points"_a, "tolerance"_a = NewtonInverseOptions().tolerance,
           "task"_a = nullptr,
-          "Points (p, 3) that the field takes to `points` within `tolerance` (a length), by Newton's method\n"
-          "with the analytic Jacobian; rows of NaN where none was found. Where space is folded there are\n"
-          "several, and the one nearest to the surface's rest samples is preferred.")
+          "Points (p, 3) that the field takes to `points`, by Newton's method with the analytic Jacobian; rows\n"
+          "of NaN where none was found within `tolerance`, a share of frame.scale (half the side of the cube\n"
+          "in which the field works), so that the unit of length does not matter. Where space is folded there\n"
+          "are several, and the one nearest to the surface's rest samples is preferred.")
       .def_property_readonly(
           "frame", [](const DeformationField& self) { return self.frame(); },
           "Mesh coordinates and the unit cube in which the field works.")

@@ -31,7 +31,7 @@ py::dict report_dict(const LiveReport& report) {
       "flipped_share"_a = report.distortion.flipped_share, "max_stretch"_a = report.distortion.max_stretch,
       "min_stretch"_a = report.distortion.min_stretch, "iterations"_a = report.iterations,
       "evaluations"_a = report.evaluations, "converged"_a = report.converged, "seconds"_a = report.seconds,
-      "setup_seconds"_a = report.setup_seconds);
+      "setup_seconds"_a = report.setup_seconds, "notes"_a = report.notes);
   if (report.preference) result["preference"] = *report.preference;
   return result;
 }

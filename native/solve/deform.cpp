@@ -82,7 +82,7 @@ Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handle
                                                    options.invertibility, shape, loop, device);
     };
   Solution solution = solve_field(field, samples, std::move(terms), loop, progress.part(share, 1.0), wrap);
-  solution.report.notes = notes;
+  solution.report.notes.insert(solution.report.notes.begin(), notes.begin(), notes.end());
   return solution;
 }
 

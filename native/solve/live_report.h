@@ -2,6 +2,8 @@
 #pragma once
 
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "core/types.h"
 #include "energies/arap.h"
@@ -20,6 +22,7 @@ struct LiveReport {
   Index iterations = 0, evaluations = 0;
   bool converged = false;
   double setup_seconds = 0.0, seconds = 0.0;
+  std::vector<std::string> notes;  ///< sentences on folds and far targets
 };
 
 }  // namespace arapfields

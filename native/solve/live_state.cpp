@@ -10,6 +10,7 @@
 #include "distance/morton.h"
 #include "solve/live_setup.h"
 #include "solve/live_stiffness.h"
+#include "solve/notes.h"
 #include "solve/setup.h"
 
 namespace arapfields {
@@ -252,6 +253,7 @@ void LiveSolver::State::measure(Precision<Scalar>& precision) {
   report_.preference.reset();
   if (style_) report_.preference = 1.0 - terms.gauss;
   report_.distortion = distortion<Scalar>(objective.jets(precision.u));
+  report_.notes = notes_on(report_.distortion, far_target(bound_, surface_));
   const Points values = objective.handle_values(precision.u).template cast<double>();
   const Vector distance = (values - pairs_.targets).rowwise().norm();
   report_.handle_mean = frame_.scale * distance.dot(pairs_.weights) / pairs_.weights.sum();

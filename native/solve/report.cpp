@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "solve/field_measures.h"
+#include "solve/notes.h"
 #include "solve/setup.h"
 
 namespace arapfields {
@@ -83,6 +84,9 @@ Solution measured(std::shared_ptr<DeformationField> field, const SurfaceSamples&
                   const ObjectiveTerms& terms, LoopResult loop) {
   Solution solution{std::move(field), {}};
   solution.report = measure(*solution.field, samples, terms);
+  const std::optional<FarTarget> far = far_target(terms.handles, samples.points);
+  if (far) solution.report.far_target = far->sizes;
+  solution.report.notes = notes_on(solution.report.distortion, far);
   solution.report.loop = std::move(loop);
   return solution;
 }

@@ -14,7 +14,7 @@ namespace arapfields {
 SolveReport measure(const DeformationField& field, const SurfaceSamples& samples, const ObjectiveTerms& terms,
                     Index max_samples = 4000);
 
-/// A report on a field that another solver made.
+/// A report, with its notes, on a field that another solver made.
 Solution measured(std::shared_ptr<DeformationField> field, const SurfaceSamples& samples,
                   const ObjectiveTerms& terms, LoopResult loop);
 

@@ -20,10 +20,11 @@ struct SolveReport {
   ArapValue arap;
   double energy = 0.0;                          ///< stretch + bending · bend
   std::vector<double> handle_mean, handle_max;  ///< distances ‖f(x) − C x‖ of each handle
-  std::optional<double> preference;             ///< mean g of the deformed normals
+  std::optional<double> far_target;  ///< sizes of the shape to the farthest target, where that is far
+  std::optional<double> preference;  ///< mean g of the deformed normals
   Distortion distortion;
   LoopResult loop;
-  std::vector<std::string> notes;
+  std::vector<std::string> notes;  ///< sentences: folds, far targets, margins that were reduced
 };
 
 struct Solution {

@@ -65,6 +65,22 @@ def test_invertibility_penalises_folds(samples):
     assert kept["flipped_share"] < free["flipped_share"]
 
 
+@pytest.mark.parametrize("kind", ["radial", "neural"])
+@pytest.mark.parametrize("unit", [1e-4, 1.0, 1e4])
+def test_newtons_inverse_in_any_unit(unit, kind):
+    """The same bar in other units of length and off the origin: all points come back, as exactly."""
+    small = cases.bar_samples(400)
+    frame = af.Frame([3.0 * unit, -unit, 2.0 * unit], unit)
+    samples = af.SurfaceSamples(frame.to_mesh(small.points), small.normals, frame=frame)
+    place = cases.shift(frame.center) @ np.diag([unit, unit, unit, 1.0])
+    handles = [af.Cuboid(place @ h.rest, place @ h.target) for h in cases.bar_handles()]
+    settings = dict(width=32, layers=3, iterations=60, batch=100, handle_batch=50)
+    field = af.deform(samples, handles, af.DeformOptions(field=kind, **settings))
+    error = np.linalg.norm(field.inverse(field(samples.points)) - samples.points, axis=1) / unit
+    assert not np.isnan(error).any()
+    assert np.quantile(error, 0.95) < tolerances.NEWTON_INVERSE
+
+
 def gap_in_voxels(sdf, field, resolution, **keywords):
     """Symmetric Hausdorff distance, at vertices, of extract_deformed and the warped extraction."""
     report = {}

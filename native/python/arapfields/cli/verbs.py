@@ -198,6 +198,8 @@ def _write_report(outputs, place, report):
 def _summary(args, text, report=None):
     if args.quiet:
         return
+    for note in (report or {}).get("notes", ()):
+        print(f"note: {note}", file=sys.stderr)
     numbers = {
         k: v for k, v in (report or {}).items() if isinstance(v, (int, float)) and not isinstance(v, bool)
     }
