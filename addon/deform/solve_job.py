@@ -15,6 +15,7 @@ from ..results.placement import place_result, require_placeable
 from ..surface.source_surface import read_surface, settings_of
 from ..viewport.previews import Preview
 
+
 @dataclass
 class SolvedMesh:
     """What the worker hands back, in local coordinates."""

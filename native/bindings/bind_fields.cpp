@@ -86,13 +86,15 @@ void bind_fields(py::module_& module) {
       .def("__call__", &values, "points"_a, "Where the points (p, 3) go: (p, 3).")
       .def("jacobian", &jacobian, "points"_a, "(p, 3, 3): [:, i, j] is the derivative of f_i by x_j.")
       .def("hessian", &hessian, "points"_a, "(p, 3, 3, 3): [:, i, j, k] is ∂²f_i/∂x_j∂x_k (1/length).")
-      .def(
-          "inverse", &inverse, "points"_a, "tolerance"_a = NewtonInverseOptions().tolerance,
-          "task"_a = nullptr,
-          "Points (p, 3) that the field takes to `points`, by Newton's method with the analytic Jacobian; rows\n"
-          "of NaN where none was found within `tolerance`, a share of frame.scale (half the side of the cube\n"
-          "in which the field works), so that the unit of length does not matter. Where space is folded there\n"
-          "are several, and the one nearest to the surface's rest samples is preferred.")
+      .def("inverse", &inverse, "points"_a, "tolerance"_a = NewtonInverseOptions().tolerance,
+           "task"_a = nullptr,
+           "Points (p, 3) that the field takes to `points`, by Newton's method with the analytic Jacobian; "
+           "rows\n"
+           "of NaN where none was found within `tolerance`, a share of frame.scale (half the side of the "
+           "cube\n"
+           "in which the field works), so that the unit of length does not matter. Where space is folded "
+           "there\n"
+           "are several, and the one nearest to the surface's rest samples is preferred.")
       .def_property_readonly(
           "frame", [](const DeformationField& self) { return self.frame(); },
           "Mesh coordinates and the unit cube in which the field works.")

@@ -26,8 +26,7 @@ py::dict report_dict(const SolveReport& report, double scale) {
       "flipped_share"_a = report.distortion.flipped_share, "max_stretch"_a = report.distortion.max_stretch,
       "min_stretch"_a = report.distortion.min_stretch, "iterations"_a = report.loop.iterations,
       "seconds"_a = report.loop.seconds, "out_of_time"_a = report.loop.stopped_by == StopReason::time_budget,
-      "scale"_a = scale, "loss"_a = py::list(),
-      "notes"_a = report.notes);
+      "scale"_a = scale, "loss"_a = py::list(), "notes"_a = report.notes);
   for (const auto& [iteration, loss] : report.loop.history)
     py::list(result["loss"]).append(py::cast(std::vector<double>{static_cast<double>(iteration), loss}));
   for (std::size_t i = 0; i < report.handle_mean.size(); ++i)

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <optional>
+
 #include "core/frame.h"
 #include "core/types.h"
 
@@ -17,6 +19,9 @@ class ARAPFIELDS_EXPORT ImplicitFunction {
   /// The same with ∂Φ/∂x (n,3).
   virtual void evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> values,
                         Eigen::Ref<PointsF> gradients) const = 0;
+  /// A bound on |∇Φ| in the cube that holds everywhere, where one is known: 1 for a distance. Extraction then
+  /// finds exactly what the whole grid has; else the bound is measured.
+  virtual std::optional<double> gradient_bound() const { return std::nullopt; }
   /// Where the cube lies in mesh coordinates; sampling and extraction answer in these.
   virtual Frame frame() const { return {}; }
 };

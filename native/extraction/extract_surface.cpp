@@ -2,6 +2,7 @@
 #include "extraction/extract_surface.h"
 
 #include <chrono>
+#include <limits>
 #include <optional>
 
 #include "core/errors.h"
@@ -11,7 +12,20 @@ namespace arapfields {
 namespace {
 
 constexpr int smallest_with_model = 32;  // below, the model would cost more than the grid
-constexpr int grid_steps_a_cell = 4;
+constexpr int grid_steps_a_cell = 3;
+constexpr int grid_steps_a_sure_cell = 2;  // where Φ's own bound on |∇Φ| makes interpolation needless
+constexpr int fewest_coarse_cells = 8;     // a side
+
+/// Cells of about the same number of grid steps at every resolution.
+TricubicSurrogateOptions model_options(int resolution, bool sure) {
+  TricubicSurrogateOptions options{.wanted_cells = std::numeric_limits<Index>::max(), .interpolate = !sure};
+  const int finest = resolution / (sure ? grid_steps_a_sure_cell : grid_steps_a_cell);
+  int halvings = 0;
+  while (finest >> (halvings + 1) >= fewest_coarse_cells) ++halvings;
+  options.coarsest = finest >> halvings;
+  options.max_resolution = options.coarsest << halvings;
+  return options;
+}
 
 }  // namespace
 
@@ -23,8 +37,7 @@ TriangleMesh extract_surface(const ImplicitFunction& implicit, int resolution, c
   EvaluationCounter function(implicit, progress);
   std::optional<TricubicSurrogate> model;
   if (resolution >= smallest_with_model)
-    model.emplace(function, TricubicSurrogateOptions{.wanted_cells = std::numeric_limits<Index>::max(),
-                                                     .max_resolution = resolution / grid_steps_a_cell});
+    model.emplace(function, model_options(resolution, implicit.gradient_bound().has_value()));
   progress.report(0.4, "evaluating the grid");
   SparseGrid grid(resolution, model ? &*model : nullptr);
   grid.refine(function);

@@ -13,6 +13,8 @@ namespace {
 constexpr float far = 1e30f;
 constexpr float nowhere = std::numeric_limits<float>::quiet_NaN();
 constexpr Index blocks_per_chunk = 16;
+// Signs are asked for up to so many times the model's bound on |Φ − p|, which is a measured one.
+constexpr float doubt_safety = 5.0f / 3.0f;
 
 constexpr int neighbours[6][3] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
 
@@ -25,6 +27,7 @@ SparseGrid::SparseGrid(int resolution, const TricubicSurrogate* model)
       width_((resolution + side - 1) / side),
       spacing_(2.0 / (resolution - 1)),
       model_(model),
+      blind_(model == nullptr || !model->interpolates()),
       table_(static_cast<std::size_t>(width_) * width_ * width_, -1) {
   std::vector<std::uint8_t> marked(table_.size(), model == nullptr ? 1 : 0);
   if (model != nullptr) {
@@ -69,7 +72,7 @@ void SparseGrid::keep(Index entry) {
   block.place[2] = static_cast<int>(entry % width_);
   table_[static_cast<std::size_t>(entry)] = static_cast<std::int32_t>(blocks_.size()) - 1;
   std::fill_n(block.exact, points, std::uint8_t{0});
-  std::fill_n(block.error, points, model_ == nullptr ? 2.0f * far : 0.0f);
+  std::fill_n(block.error, points, blind_ ? 2.0f * far : 0.0f);
   for (int i = 0; i < side; ++i)
     for (int j = 0; j < side; ++j)
       for (int k = 0; k < side; ++k) {
@@ -108,10 +111,10 @@ void SparseGrid::predict(Block& block) const {
         const Index cell = model_->cell(cells[0][i0], cells[1][j0], cells[2][k0]);
         const int sign = model_->side(cell);
         CubicBlock nodes;
-        if (sign == 0) nodes = model_->block(cell);
+        if (sign == 0 && !blind_) nodes = model_->block(cell);
         for (int i = i0; i < i1; ++i) {
           float plane[16];
-          for (int n = 0; n < 16 && sign == 0; ++n) {
+          for (int n = 0; n < 16 && sign == 0 && !blind_; ++n) {
             plane[n] = 0.0f;
             for (int a = 0; a < 4; ++a) plane[n] += weights[0][i][a] * nodes.node[16 * a + n];
           }
@@ -120,13 +123,15 @@ void SparseGrid::predict(Block& block) const {
               const int at = local(i, j, k);
               if (sign != 0) {
                 block.value[at] = static_cast<float>(sign) * far;
+                block.error[at] = 0.0f;
                 continue;
               }
+              if (blind_) continue;
               float value = 0.0f;
               for (int b = 0; b < 4; ++b)
                 for (int c = 0; c < 4; ++c) value += weights[1][j][b] * weights[2][k][c] * plane[4 * b + c];
               block.value[at] = value;
-              block.error[at] = model_->error(cell);
+              block.error[at] = doubt_safety * model_->error(cell);
             }
         }
       }
@@ -178,11 +183,13 @@ void SparseGrid::keep_around(const Block& block, const Window& window, int i, in
 }
 
 /// Points of a block to evaluate: ends of edges on which the sign changes, and points whose sign is in doubt.
-/// A doubt is settled without an evaluation where a neighbour's Φ − p, which varies slowly, leaves no choice.
+/// A doubt is settled without an evaluation where a neighbour's |Φ| is more than the step between them allows
+/// Φ to change.
 void SparseGrid::wish(std::int32_t index, bool first_round, Wish& out) const {
   const Block& block = blocks_[static_cast<std::size_t>(index)];
   Window window;
   look(block, window);
+  const auto reach = static_cast<float>(model_ == nullptr ? far : model_->lipschitz() * spacing_);
   for (int i = 0; i < side; ++i)
     for (int j = 0; j < side; ++j)
       for (int k = 0; k < side; ++k) {
@@ -190,18 +197,13 @@ void SparseGrid::wish(std::int32_t index, bool first_round, Wish& out) const {
         const float value = window.value[at];
         if (std::isnan(value)) continue;
         bool change = false, settled = !(std::abs(value) <= window.error[at]);
-        const float reach = model_ == nullptr
-                                ? 0.0f
-                                : model_->slope_error_of(window.error[at]) * static_cast<float>(spacing_);
         for (const auto& step : neighbours) {
           const int next = Window::at(i + step[0], j + step[1], k + step[2]);
           change = change || differs(value, window.value[next]);
-          if (!window.exact[next]) continue;
-          const float corrected = value + window.error[next];
-          settled = settled || (!differs(corrected, value) && std::abs(corrected) > reach);
+          settled = settled || (window.exact[next] && std::abs(window.value[next]) > reach);
         }
         if (change) keep_around(block, window, i, j, k, out.neighbours);
-        if (!window.exact[at] && (change || (!settled && (!first_round || model_ == nullptr))))
+        if (!window.exact[at] && (change || (!settled && (!first_round || blind_))))
           out.points.push_back({index, local(i, j, k)});
       }
 }
@@ -239,7 +241,7 @@ void SparseGrid::refine(EvaluationCounter& function) {
     for (std::size_t row = 0; row < wanted.size(); ++row) {
       Block& block = blocks_[static_cast<std::size_t>(wanted[row].block)];
       const int at = wanted[row].local;
-      block.error[at] = values[static_cast<Index>(row)] - block.value[at];
+      block.error[at] = 0.0f;
       block.value[at] = values[static_cast<Index>(row)];
       block.exact[at] = 1;
     }

@@ -20,7 +20,7 @@ class SparseGrid {
   struct Block {
     int place[3];                ///< in blocks
     float value[points];         ///< Φ, the model's p, or ±1e30 where only the sign is known
-    float error[points];         ///< bound on |Φ − p|; where Φ is known Φ − p itself
+    float error[points];         ///< Φ's sign is in doubt where |value| is not above this
     std::uint8_t exact[points];  ///< whether value is Φ's own
   };
   /// A block with one layer of points around it; NaN outside the grid.
@@ -32,7 +32,8 @@ class SparseGrid {
     static int at(int i, int j, int k) { return ((i + 1) * window_side + j + 1) * window_side + k + 1; }
   };
 
-  /// Without a model (nullptr) all blocks are kept and every point is evaluated.
+  /// Without a model (nullptr) all blocks are kept and every point is evaluated; of a model that does not
+  /// interpolate, every point in its active cells.
   SparseGrid(int resolution, const TricubicSurrogate* model);
   void refine(EvaluationCounter& function);
 
@@ -65,6 +66,7 @@ class SparseGrid {
   int width_;  // blocks a side
   double spacing_;
   const TricubicSurrogate* model_;
+  bool blind_;  // no p: every point whose side is not known is evaluated
   std::vector<std::int32_t>
       table_;  // width³: index into blocks_, −1 for the positive and −2 for the negative
   std::vector<Block> blocks_;

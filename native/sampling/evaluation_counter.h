@@ -16,6 +16,7 @@ class EvaluationCounter {
   VectorF values(ConstPointsRef<float> points);
   VectorF values(ConstPointsRef<float> points, PointsF& gradients);
 
+  std::optional<double> gradient_bound() const { return function_.gradient_bound(); }
   const Progress& progress() const { return progress_; }
   Index value_count() const { return value_count_; }
   Index gradient_count() const { return gradient_count_; }

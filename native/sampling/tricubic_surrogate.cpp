@@ -10,7 +10,6 @@
 namespace arapfields {
 namespace {
 
-constexpr int coarsest = 16;
 // Bound on |Φ − p| in a cell: the largest residual among its own and its neighbours' centres times the first,
 // plus the largest third difference of its block times the second (creases may pass centres by). By the first
 // alone at most 2 of 100,000 points exceed it on two published networks, 8 at creases of exact distances.
@@ -40,12 +39,12 @@ float roughness(const CubicBlock& block) {
 }  // namespace
 
 TricubicSurrogate::TricubicSurrogate(EvaluationCounter& function, const TricubicSurrogateOptions& options)
-    : lipschitz_(measure_lipschitz(function)) {
+    : lipschitz_(function.gradient_bound() ? *function.gradient_bound() : measure_lipschitz(function)) {
   for (int attempt = 0; attempt < max_rebuilds; ++attempt) {
     cull(function, options);
-    if (fill(function)) break;
+    if (!options.interpolate || fill(function)) break;
   }
-  measure_errors();
+  if (options.interpolate) measure_errors();
 }
 
 std::array<int, 3> TricubicSurrogate::coordinates(Index cell) const {
@@ -100,7 +99,7 @@ float TricubicSurrogate::operator()(const Vec3& point) const {
 /// From coarse to fine: evaluates Φ at the centres of the cells that are left and keeps those whose value
 /// does not exclude a zero.
 void TricubicSurrogate::cull(EvaluationCounter& function, const TricubicSurrogateOptions& options) {
-  resolution_ = coarsest;
+  resolution_ = options.coarsest;
   side_.assign(static_cast<std::size_t>(resolution_) * resolution_ * resolution_, 0);
   active_.resize(side_.size());
   for (std::size_t i = 0; i < active_.size(); ++i) active_[i] = static_cast<Index>(i);
@@ -183,7 +182,7 @@ bool TricubicSurrogate::fill(EvaluationCounter& function) {
       steepest = std::max(steepest, std::abs(at(points * points) - at(0)));
   }
   const double seen = steepest / spacing();
-  if (seen <= lipschitz_ * (1.0 + 1e-4)) return true;
+  if (seen <= lipschitz_ * (1.0 + 1e-4) || function.gradient_bound()) return true;
   lipschitz_ = 1.25 * seen;
   return false;
 }

@@ -12,11 +12,13 @@ namespace arapfields {
 
 struct TricubicSurrogateOptions {
   Index wanted_cells = 5000;  ///< halve the cells until so many may hold the surface …
-  int max_resolution = 128;   ///< … or the cube has so many of them a side
+  int max_resolution = 128;   ///< … or the cube would have more than so many of them a side
+  int coarsest = 16;          ///< cells a side to begin with
+  bool interpolate = true;    ///< else the cells' sides alone are known, and p and its errors are not
 };
 
 /// A cheap stand-in for Φ near {Φ = 0}. The cube is cut into resolution³ cells, from coarse to fine; a cell
-/// is dropped where |Φ(centre)| exceeds a measured bound on |∇Φ| times its half diagonal, for then Φ keeps
+/// is dropped where |Φ(centre)| exceeds a bound on |∇Φ| times its half diagonal, for then Φ keeps
 /// its sign there. In the cells that remain, cubic interpolation p of Φ on their corners and the corners
 /// around them replaces Φ, with an error bound measured by Φ − p at cell centres. Sampling and extraction use
 /// p to find where Φ itself must be evaluated.
@@ -26,7 +28,9 @@ class TricubicSurrogate {
 
   int resolution() const { return resolution_; }
   double spacing() const { return 2.0 / resolution_; }
-  /// Bound on |∇Φ| in use: measured, and raised until no difference of grid values contradicts it.
+  bool interpolates() const { return !values_.empty(); }
+  /// Bound on |∇Φ| in use: Φ's own, else measured, and raised until no difference of grid values contradicts
+  /// it.
   double lipschitz() const { return lipschitz_; }
   /// Cells that may hold the surface, ascending; their bounding box (meaningless for none).
   const std::vector<Index>& active() const { return active_; }

@@ -2,6 +2,7 @@
 // Implicit functions with known surfaces, for tests.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <atomic>
 #include <cmath>
 #include <functional>
@@ -35,9 +36,11 @@ class Analytic : public ImplicitFunction {
       }
   }
   Frame frame() const override { return place; }
+  std::optional<double> gradient_bound() const override { return bound; }
   double operator()(const Vec3& point) const { return formula_(point); }
 
   Frame place;
+  std::optional<double> bound;
   mutable Index count = 0;
 
  private:
@@ -55,6 +58,19 @@ inline double box_distance(const Vec3& x, const Vec3& half) {
 
 inline Analytic sphere(double radius, const Vec3& center = Vec3::Zero()) {
   return Analytic([=](const Vec3& x) { return sphere_distance(x, center, radius); });
+}
+
+/// A ball with a fin whose two sides are 1e-4 apart, from which `point` is 3e-5 inside: a distance but where
+/// fin and ball meet.
+inline Analytic finned_ball(const Vec3& point, const Vec3& normal, double half_side) {
+  const Vec3 along = normal.unitOrthogonal(), center = point + 2e-5 * normal + 0.3 * half_side * along;
+  Mat3 turn;
+  turn << along, normal.cross(along), normal;
+  const Vec3 half(half_side, half_side, 5e-5);
+  return Analytic([=](const Vec3& x) {
+    return std::min(sphere_distance(x, Vec3(-0.2, -0.1, 0.0), 0.4),
+                    box_distance(turn.transpose() * (x - center), half));
+  });
 }
 
 inline Analytic box(const Vec3& half) {

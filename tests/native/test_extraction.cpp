@@ -147,6 +147,50 @@ BOOST_AUTO_TEST_CASE(vertices_are_those_of_the_whole_grid) {
   BOOST_TEST(!report.open);
 }
 
+BOOST_AUTO_TEST_CASE(a_single_grid_point_between_two_close_sheets) {
+  for (std::uint64_t trial = 0; trial < 60; ++trial) {
+    Random random(27, trial);
+    const int n = 110 + static_cast<int>(random.below(18));
+    const double step = 2.0 / (n - 1);
+    Vec3 point, normal;
+    for (int axis = 0; axis < 3; ++axis) {
+      point[axis] = std::floor((0.35 + 0.3 * random.uniform()) * n) * step - 1.0;
+      normal[axis] = random.uniform() - 0.5;
+    }
+    normal.normalize();
+    const auto shape = shapes::finned_ball(point, normal, 0.15 + 0.2 * random.uniform());
+    const TriangleMesh mesh = extract(shape, n);
+    int expected = 0, found = 0;  // on the six edges from the point
+    for (int axis = 0; axis < 3; ++axis)
+      for (const double way : {-step, step}) expected += shape(point + way * Vec3::Unit(axis)) >= 0.0;
+    for (Index row = 0; row < mesh.vertices.rows(); ++row) {
+      const Vec3 apart = (mesh.vertices.row(row).transpose() - point).cwiseAbs();
+      found += apart.maxCoeff() < step && apart.maxCoeff() > apart.sum() - 1e-9;
+    }
+    BOOST_TEST(shape(point) < 0.0);
+    BOOST_TEST(found == expected);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_known_bound_on_the_gradient_leaves_nothing_to_chance) {
+  // Distances: to thin sheets that no measurement need meet, and to a ball that grid points touch.
+  shapes::Analytic all[] = {shapes::box(Vec3(0.8, 0.6, 0.002)), shapes::sphere(0.5),
+                            shapes::torus(0.5, 0.02)};
+  for (auto& shape : all) {
+    shape.bound = 1.0;
+    for (const int n : {17, 40, 101, 128}) {
+      ExtractionReport report;
+      const auto expected = dense_crossings(shape, n);
+      if (expected.empty()) continue;
+      const TriangleMesh mesh = extract(shape, n, &report);
+      BOOST_TEST(static_cast<Index>(expected.size()) == mesh.vertices.rows());
+      BOOST_TEST(set_distance(expected, mesh.vertices) < 1e-6);
+      check_closed(mesh);
+      if (n == 128) BOOST_TEST(report.evaluations < 0.1 * static_cast<double>(report.dense_evaluations));
+    }
+  }
+}
+
 BOOST_AUTO_TEST_CASE(noise_gives_closed_manifolds) {
   // Independent signs at all grid points but the outermost: every pattern of cells and ambiguous faces.
   for (const int magnitude : {1, 5}) {  // whole numbers from −magnitude: zeros and equal saddles as well
