@@ -7,7 +7,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from . import commands, install_check
-from .blender import icons, library_loading, timers, translations
+from .blender import icons, library_loading, modifier_stack, timers, translations
 from .blender.host import has_window
 from .core.runtime import jobs
 from .handles import counts
@@ -38,8 +38,25 @@ def after_restore(*_):
 
 @persistent
 def after_update(scene, depsgraph):
-    staleness.watch(depsgraph)
-    sessions.watch(depsgraph)
+    if not modifier_stack.is_stage(scene):
+        staleness.watch(depsgraph)
+        sessions.watch(depsgraph)
+
+
+@persistent
+def before_render(*_):
+    sessions.live.is_rendering = True
+
+
+@persistent
+def after_render(*_):
+    sessions.live.is_rendering = False
+
+
+@persistent
+def after_frame(scene, depsgraph):
+    if sessions.live.is_rendering:
+        sessions.follow_frame(depsgraph)
 
 
 HANDLERS = {  # of bpy.app.handlers
@@ -50,6 +67,10 @@ HANDLERS = {  # of bpy.app.handlers
     "redo_pre": before_undo,
     "redo_post": after_restore,
     "depsgraph_update_post": after_update,
+    "render_init": before_render,
+    "render_complete": after_render,
+    "render_cancel": after_render,
+    "frame_change_post": after_frame,
 }
 DRAWINGS = (previews.draw, handle_boxes.draw)  # over every 3D viewport
 PARTS = (  # what begins with the extension, and how it ends

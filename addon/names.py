@@ -9,6 +9,10 @@ RESULTS = "ARAP Fields"  # collection that holds results
 PROPERTY = "arapfields"  # object.arapfields
 REPORT = "arapfields_report"  # custom property of results: figures as JSON
 WARP_KEY = "ARAP Fields"  # shape key that carries the motion
+FIELD_MODIFIER = "ARAP Fields"  # modifier that carries the motion, and its node group
+OFFSETS = "ARAP Fields"  # point attribute of the motion: an offset in the object's coordinates
+TURNS = "ARAP Fields Turns"  # and how free custom normals turn: axis · angle
+FIELD_GROUP = "arapfields_group"  # custom property of that modifier's node groups: which, and its version
 RESULT_SUFFIX = {
     "DEFORM": "_deformed",
     "STYLIZE": "_stylized",
@@ -17,6 +21,7 @@ RESULT_SUFFIX = {
     "BAKE": "_baked",
 }
 HANDLE_SUFFIX = "_handle"
+HELPER_SUFFIX = "_offsets"  # of the mesh that carries offsets where the source cannot
 
 
 class Op(StrEnum):
@@ -33,6 +38,8 @@ class Op(StrEnum):
     SET_STYLE = "arapfields.set_style"
     LIVE = "arapfields.live"
     LIVE_KEEP = "arapfields.live_keep"
+    APPLY_KEY = "arapfields.apply_as_shape_key"
+    REMOVE_FIELD = "arapfields.remove_field"
     MIRROR_HANDLE = "arapfields.mirror_handle"
     BAKE = "arapfields.bake"
     CANCEL = "arapfields.cancel"

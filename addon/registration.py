@@ -19,7 +19,7 @@ CONTENTS = [  # modules with CLASSES
     *("deform.operators", "deform.panel"),
     *("stylize.operators", "stylize.panel"),
     *("live.operators", "animation.operators"),
-    *("results.panel", "jobs.operators", "jobs.panel"),
+    *("results.operators", "results.panel", "jobs.operators", "jobs.panel"),
     "preferences",
 ]
 MODULES = [importlib.import_module(f".{name}", __package__) for name in CONTENTS]

@@ -168,8 +168,10 @@ def main():
     ):
         activate(monkey)
         with alone(), timed(f"deform, {text}"):
-            bpy.ops.arapfields.deform(output=output)
+            bpy.ops.arapfields.deform(output=output, target="NEW")
         results.append((text, bpy.context.view_layer.objects.active, colour))
+    monkey.hide_render = False  # the picture shows it beside its results
+    monkey.hide_set(False)
     with alone(), timed("picture", lambda: (0.0, "Cycles at work")):
         arrange(monkey, results, rest, targets, options.output / "demo.png")
     with alone():

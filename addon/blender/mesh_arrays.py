@@ -2,13 +2,13 @@
 """Meshes as arrays: what Blender shows of an object (modifiers, shape keys), and meshes from arrays."""
 
 import hashlib
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 
 from ..core.errors import UserError
+from . import modifier_stack
 
 
 @dataclass(frozen=True)
@@ -17,20 +17,7 @@ class MeshArrays:
 
     vertices: np.ndarray  # (n, 3) float64
     triangles: np.ndarray  # (m, 3) int32
-
-
-@contextmanager
-def evaluated_mesh(context, source):
-    """The mesh as shown, for as long as the block runs."""
-    depsgraph = context.evaluated_depsgraph_get()
-    evaluated = source.evaluated_get(depsgraph)
-    mesh = evaluated.to_mesh()
-    if mesh is None:
-        raise UserError("{name}: Blender gives no mesh for it", name=source.name)
-    try:
-        yield mesh
-    finally:
-        evaluated.to_mesh_clear()
+    has_free_normals: bool = False  # custom normals that do not turn by themselves
 
 
 def positions(mesh):
@@ -76,10 +63,10 @@ def triangles(mesh):
     return corners[flat].reshape(-1, 3)
 
 
-def read(context, source):
-    """What there is to fit of an object; UserError that names it when there is nothing."""
-    with evaluated_mesh(context, source) as mesh:
-        arrays = MeshArrays(positions(mesh), triangles(mesh))
+def read(context, source, in_place=False):
+    """What there is to work on of an object; UserError that names it when there is nothing."""
+    with modifier_stack.evaluated_mesh(context, source, in_place) as mesh:
+        arrays = MeshArrays(positions(mesh), triangles(mesh), bool(modifier_stack.free_normals(mesh)))
     if not len(arrays.vertices):
         raise UserError("{name}: the mesh is empty", name=source.name)
     if not np.isfinite(arrays.vertices).all():
@@ -93,13 +80,6 @@ def read(context, source):
     if not len(arrays.triangles):
         raise UserError("{name}: the mesh has no faces", name=source.name)
     return arrays
-
-
-def shown_copy(context, source):
-    """A mesh of its own of what is shown of the source: modifiers and shape keys applied."""
-    depsgraph = context.evaluated_depsgraph_get()
-    evaluated = source.evaluated_get(depsgraph)
-    return bpy.data.meshes.new_from_object(evaluated, preserve_all_data_layers=True, depsgraph=depsgraph)
 
 
 def new_mesh(name, vertices, topology):

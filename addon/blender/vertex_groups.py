@@ -7,14 +7,14 @@ from mathutils.kdtree import KDTree
 
 from ..core.errors import UserError
 from ..core.runtime.coroutines import Pause
-from . import mesh_arrays
+from . import modifier_stack
 from .object_references import ObjectReference
 
 BLOCK = 4000  # vertices that are read at once, some milliseconds
 
 
-def read_weights(context, source, names):
-    """Coroutine that reads the vertex groups with these names: {name: (n,) weights of the shown vertices}."""
+def read_weights(context, source, names, in_place=False):
+    """Coroutine that reads the vertex groups with these names: {name: (n,) weights of the vertices}."""
     names = list(dict.fromkeys(names))
     for name in names:
         if name not in source.vertex_groups:
@@ -22,8 +22,8 @@ def read_weights(context, source, names):
     if not names:
         return {}
     reference, shown = ObjectReference(source), None
-    if any(modifier.show_viewport for modifier in source.modifiers):
-        shown = mesh_arrays.shown_copy(context, source)
+    if modifier_stack.shown_before(source, in_place):
+        shown = modifier_stack.mesh_copy(context, source, in_place)
     try:
         return (yield from _read(reference, shown, names))
     finally:

@@ -107,6 +107,7 @@ def solve(source, options):
         given["style"] = style_identifier(given["style"])
     if "result" in given:
         given["output"] = given.pop("result")
+    given["target"] = "NEW"
     if "quality" in given:
         settings_of(source).fit.quality = given.pop("quality")
     begin = time.perf_counter()

@@ -9,21 +9,19 @@ from ..core.runtime import native
 from ..core.settings.parameters import DEFORM
 from ..handles import empties
 from ..handles.native_handles import native_handles
-from ..jobs.job_operator import JobOperator
 from ..names import Op
 from ..properties.item import output, resolution, surface, target
 from ..surface.source_surface import build_options
-from .solve_job import plan_solve_job
+from .solve_job import SolveOperator, plan_solve_job
 
 
-class ARAPFIELDS_OT_deform(JobOperator, bpy.types.Operator):
-    """Deform the object as rigidly as its handles allow; the result is a new object"""
+class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
+    """Deform the object as rigidly as its handles allow"""
 
     bl_idname = Op.DEFORM
     bl_label = "Deform"
     bl_options = {"UNDO"}
     title = "Deform"
-    refuses = staticmethod(empties.require_handles)
 
     __annotations__ = {
         **annotations(DEFORM, options={"SKIP_SAVE"}),
@@ -32,6 +30,10 @@ class ARAPFIELDS_OT_deform(JobOperator, bpy.types.Operator):
         "target": target(options={"SKIP_SAVE"}),
         "resolution": resolution(options={"SKIP_SAVE"}),
     }
+
+    @classmethod
+    def refuses(cls, source):
+        return empties.require_handles(source) or super().refuses(source)
 
     def groups_of(self, source):
         return empties.group_names(source)

@@ -6,13 +6,16 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ..blender.host import has_window
 from ..blender.language import translated
+from ..blender.object_references import settings_of
 from ..blender.property_definitions import effective_value
 from ..core.errors import UserError
 from ..core.geometry.edges import Topology
 from ..core.runtime.jobs import Item
-from ..results.placement import place_result, require_placeable
-from ..surface.source_surface import read_surface, settings_of
+from ..jobs.job_operator import JobOperator
+from ..results import placement
+from ..surface.source_surface import read_surface
 from ..viewport.previews import Preview
 
 
@@ -23,18 +26,19 @@ class SolvedMesh:
     vertices: np.ndarray
     topology: Topology | None  # of the implicit surface; None for the source's own mesh
     report: dict
+    turns: np.ndarray | None = None  # (n, 3) axis · angle, for free custom normals
 
 
 def plan_solve_job(context, operator, source, kind, samples, seed, solve):
     """The job's item. `solve(tracker, surface, samples, weight)` returns the field, on the worker."""
-    surface = read_surface(context, source)
     settings = settings_of(source)
-    output = effective_value("output", settings, operator)
+    output, target = destination(settings, operator)
     cells = effective_value("resolution", settings, operator)
     choice = effective_value("surface", settings, operator)
-    target = effective_value("target", settings, operator)
-    if target != "NEW":
-        require_placeable(source, output, target, surface.local)
+    reason = placement.refusal(source, output, target)
+    if reason is not None:
+        raise reason
+    surface = read_surface(context, source, in_place=placement.in_place(output, target))
 
     preview = Preview(surface) if operator.in_window else None
 
@@ -55,14 +59,42 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
             after = field(before)
         if not np.isfinite(after).all():
             raise UserError("the result has vertices that are not finite; try other settings")
-        return SolvedMesh(surface.space.to_local(after), topology, report)
+        turns = surface.turns(field, before) if placement.keeps_mesh(output, target) else None
+        return SolvedMesh(surface.space.to_local(after), topology, report, turns)
 
     def apply(solved):
         owner = surface.reference.get()
-        item = place_result(bpy.context, owner, kind, output, target, solved, surface.local)
-        return describe(item, solved.report)
+        item = placement.place_result(bpy.context, owner, kind, output, target, solved, surface.local)
+        said = describe(item, solved.report)
+        hidden = translated("{name} is hidden", name=owner.name) if item != owner else ""
+        return f"{said}, {hidden}" if hidden else said
 
     return Item(source.name, work, apply, preview)
+
+
+def destination(settings, operator):
+    """(output, target) of a call: what is made, and where it goes."""
+    output = effective_value("output", settings, operator)
+    return output, placement.effective_target(output, effective_value("target", settings, operator))
+
+
+def placement_refusal(source):
+    """Why a result cannot go where the object's settings say, as a UserError; None where it can."""
+    settings = settings_of(source)
+    target = placement.effective_target(settings.output, settings.target)
+    return placement.refusal(source, settings.output, target)
+
+
+class SolveOperator(JobOperator):
+    """Mixin of the jobs that solve for a field: what they cannot place is refused before the work."""
+
+    @classmethod
+    def refuses(cls, source):
+        """Told before the button is pressed; a script's own arguments count instead, and are looked at then."""
+        return placement_refusal(source) if has_window() else None
+
+    def in_place(self, source):
+        return placement.in_place(*destination(settings_of(source), self))
 
 
 def describe(item, report):

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..blender import mesh_arrays, timers, vertex_groups
 from ..blender.host import has_window
-from ..blender.object_references import ObjectReference
+from ..blender.object_references import ObjectReference, settings_of
 from ..blender.redraw import redraw
 from ..core.errors import UserError
 from ..core.runtime import native
@@ -38,8 +38,9 @@ def count_inside(context, source):
 
 def counting(context, source):
     """Coroutine that counts for all handles of a source."""
-    reference, mesh = ObjectReference(source), mesh_arrays.read(context, source)
-    weights = yield from vertex_groups.read_weights(context, source, empties.group_names(source))
+    in_place = settings_of(source).in_place
+    reference, mesh = ObjectReference(source), mesh_arrays.read(context, source, in_place)
+    weights = yield from vertex_groups.read_weights(context, source, empties.group_names(source), in_place)
     regions = [
         (entry.empty.session_uid, entry.kind, entry.group, np.array(entry.rest, dtype=np.float64))
         for entry in empties.used(reference.get())

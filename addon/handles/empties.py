@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-from ..blender import mesh_arrays, vertex_groups
+from ..blender import mesh_arrays, modifier_stack, vertex_groups
 from ..blender.object_references import in_scene, settings_of
 from ..core.errors import UserError
 from ..core.geometry.handles import box_matrix, solve_handle
@@ -18,14 +18,14 @@ def matrix_of(item):
     return np.array(item.matrix_world, dtype=np.float64)
 
 
-def current_box(empty):
+def current_box(empty, where=matrix_of):
     """The cube [-1, 1]³ → world, of an Empty where it is now."""
-    return box_matrix(matrix_of(empty), empty.empty_display_size)
+    return box_matrix(where(empty), empty.empty_display_size)
 
 
-def rest_box(source, entry):
+def rest_box(source, entry, where=matrix_of):
     """The cube [-1, 1]³ → world, of a handle's rest box; it goes where the source goes."""
-    return matrix_of(source) @ np.array(entry.rest, dtype=np.float64).reshape(4, 4)
+    return where(source) @ np.array(entry.rest, dtype=np.float64).reshape(4, 4)
 
 
 def store_rest(source, entry):
@@ -55,14 +55,15 @@ def group_names(source):
     return [entry.group for entry in used(source) if entry.kind == "GROUP"]
 
 
-def solve_handles(source, space, weights=None):
+def solve_handles(source, space, weights=None, where=matrix_of):
     """All handles of a source as the solver wants them; UserError when there is none.
 
     `weights` are those of the vertex groups by name; without them, groups say only where they go.
+    `where(object)` is the world matrix of one.
     """
     handles = []
     for entry in used(source):
-        boxes = rest_box(source, entry), current_box(entry.empty)
+        boxes = rest_box(source, entry, where), current_box(entry.empty, where)
         held = weights[entry.group] if weights and entry.kind == "GROUP" else None
         options = {"weights": held, "weight": entry.weight}
         handles.append(solve_handle(entry.empty.name, entry.kind, *boxes, space, **options))
@@ -122,8 +123,9 @@ def new_empty(context, source, kind, group, place):
         return make_empty(context, source, Matrix(selection_box(source, size).tolist()), 1.0)
     where = context.scene.cursor.location
     if kind == "GROUP":
-        weights = run_to_completion(vertex_groups.read_weights(context, source, [group]))[group]
-        with mesh_arrays.evaluated_mesh(context, source) as mesh:
+        in_place = settings_of(source).in_place
+        weights = run_to_completion(vertex_groups.read_weights(context, source, [group], in_place))[group]
+        with modifier_stack.evaluated_mesh(context, source, in_place) as mesh:
             middle = np.average(mesh_arrays.positions(mesh), axis=0, weights=weights)
         where = source.matrix_world @ Vector(middle)
     return make_empty(context, source, Matrix.Translation(where), size)

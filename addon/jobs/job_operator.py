@@ -57,6 +57,10 @@ class JobOperator(ModalRun):
         self.failures += [translated(reason) for reason in refusals.values() if reason]
         return [item for item, reason in refusals.items() if not reason]
 
+    def in_place(self, source):
+        """Whether the shape that is worked on is that at the place of the field's modifier."""
+        return False
+
     def groups_of(self, source):
         """Names of the vertex groups whose weights the plan needs."""
         return []
@@ -67,7 +71,8 @@ class JobOperator(ModalRun):
         for reference in [ObjectReference(source) for source in self.sources(context)]:
             try:
                 source = reference.get()
-                reading = vertex_groups.read_weights(context, source, self.groups_of(source))
+                groups, in_place = self.groups_of(source), self.in_place(source)
+                reading = vertex_groups.read_weights(context, source, groups, in_place)
                 weights = yield from with_progress(job, reading, reference.name)
                 items.append(self.plan(context, reference.get(), weights))
             except (UserError, ValueError) as error:

@@ -1,59 +1,82 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The object that follows while its source is live: made, taken away again, or kept."""
+"""A live shape that is an object of its own: a surface, or the copy that the user wants as the result."""
+
+import json
 
 import bpy
 
-from ..blender.object_references import settings_of
+from ..blender import mesh_arrays
+from ..blender.object_references import ObjectReference, settings_of
 from ..core.errors import UserError
 from ..results import result_objects
 
 LIVE = "LIVE"  # kind of the result that a live source has
 
 
-def show(context, source, mesh):
-    """The live result with this mesh; the source is shown as a mere box meanwhile."""
-    active, selected = context.view_layer.objects.active, list(context.selected_objects)
-    item = result_objects.show(context, source, LIVE, LIVE, mesh, {"output": LIVE}, select=False)
+class LiveObject:
+    """Made at the start; the source is out of sight and out of renders meanwhile."""
+
+    in_place = False
+
+    def __init__(self, context, source, surface):
+        settings = settings_of(source)
+        if not settings.live_hidden:
+            settings.live_hidden = json.dumps([source.hide_get(), source.hide_render])
+        mesh = result_objects.shown_mesh(context, source, len(surface.local))
+        active, selected = context.view_layer.objects.active, list(context.selected_objects)
+        item = result_objects.show(context, source, LIVE, LIVE, mesh, {"output": LIVE}, select=False)
+        context.view_layer.objects.active = active
+        for other in selected:
+            other.select_set(True)
+        self.result = ObjectReference(item)
+
+    def require(self, source):
+        """UserError where the user has deleted it."""
+        self.result.get()
+
+    def show(self, source, shape):
+        """Puts a session's shape on the object; whether it could."""
+        item = self.result.get()
+        if item.mode == "EDIT":
+            return False
+        if len(item.data.vertices) != len(shape.points):
+            if shape.topology is None:
+                return False
+            mesh_arrays.fill(item.data, shape.points, shape.topology)
+        mesh_arrays.set_positions(item.data, shape.points)
+        return True
+
+    def take_away(self, source):
+        """Removes it, also where an undone step left it in no scene; the source, if any, is seen again."""
+        if source is not None:
+            forget(source)
+        leftover = self.result.find()
+        if leftover is not None:
+            result_objects.discard(leftover)
+
+    def keep(self, context, source, kind):
+        """Turns it into an ordinary result of that kind; returns that."""
+        item = self.result.find()
+        if item is None:
+            raise UserError("{name} has no live result", name=source.name)
+        forget(source)
+        mesh = item.data
+        bpy.data.objects.remove(item)
+        return result_objects.show(context, source, kind, settings_of(source).output, mesh, {"output": LIVE})
+
+
+def forget(source):
+    """The source is no longer live: it is seen as before, and lists no live result; returns that, if any."""
     settings = settings_of(source)
-    if not settings.live_display:
-        settings.live_display = source.display_type
-        source.display_type = "BOUNDS"
-    context.view_layer.objects.active = active
-    for other in selected:
-        other.select_set(True)
-    return item
-
-
-def of(source):
-    """The live result of a source, or None."""
-    entries = settings_of(source).results
-    return next((entry.item for entry in entries if entry.kind == LIVE and entry.item is not None), None)
-
-
-def drop(source):
-    """Takes the live result away; the source is displayed as before."""
-    item = of(source)
-    restore(source)
-    if item is not None:
-        result_objects.discard(item)
-
-
-def restore(source):
-    settings = settings_of(source)
-    if settings.live_display:
-        source.display_type = settings.live_display
-        settings.live_display = ""
+    settings.live_kind = ""
+    if settings.live_hidden:
+        seen, rendered = json.loads(settings.live_hidden)
+        source.hide_render = rendered
+        source.hide_set(seen)
+        settings.live_hidden = ""
+    item = None
     for index in reversed(range(len(settings.results))):
         if settings.results[index].kind == LIVE:
+            item = settings.results[index].item
             settings.results.remove(index)
-
-
-def keep(context, source, kind):
-    """Turns the live result into an ordinary one of that kind; returns it."""
-    item = of(source)
-    if item is None:
-        raise UserError("{name} has no live result", name=source.name)
-    restore(source)
-    mesh = item.data
-    bpy.data.objects.remove(item)
-    return result_objects.show(context, source, kind, settings_of(source).output, mesh, {"output": LIVE})
+    return item

@@ -6,6 +6,7 @@ from ..blender.object_references import refusal, source_of
 from ..core.errors import UserError
 from ..core.runtime import jobs, native
 from ..core.settings.choices import LIVE_KINDS
+from ..deform.solve_job import placement_refusal
 from ..handles import empties
 from ..jobs.job_operator import busy
 from ..names import Op
@@ -13,7 +14,7 @@ from . import sessions
 
 
 class ARAPFIELDS_OT_live(bpy.types.Operator):
-    """Let a result follow the handles or the style while they change; again to stop, which takes it away"""
+    """Let the shape follow handles or style while these change; again to stop, which takes that back"""
 
     bl_idname = Op.LIVE
     bl_label = "Live"
@@ -27,6 +28,8 @@ class ARAPFIELDS_OT_live(bpy.types.Operator):
     def poll(cls, context):
         source = source_of(context)
         reason = native.problem() or refusal(source) or busy()
+        if not reason and not sessions.is_live(source):
+            reason = placement_refusal(source)
         if reason:
             cls.poll_message_set(translated(reason))
         return not reason
@@ -62,7 +65,7 @@ class ARAPFIELDS_OT_live(bpy.types.Operator):
 
 
 class ARAPFIELDS_OT_live_keep(bpy.types.Operator):
-    """End live mode and keep the shape as an ordinary result"""
+    """End live mode and keep the shape as the result"""
 
     bl_idname = Op.LIVE_KEEP
     bl_label = "Keep Shape"

@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live mode: while handles move or a style's sliders change, results follow; off, all is as it was."""
+"""Live mode: while handles move or a style's sliders change, shapes follow; off, all is as it was.
+
+A tool or script makes an object live with begin(context, source), has it look at its handles and show the
+newest shape with update(context) (a timer does it by itself in a window; `wait` seconds for the shape to
+follow), and ends it with end(context, source), or end(context, source, keep=True) where the shape shall stay.
+"""
 
 import contextlib
 
@@ -10,6 +15,7 @@ from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..core.runtime import jobs
+from ..handles import empties
 from ..results import result_objects
 from . import live_object
 from .session import Changed, Session
@@ -21,8 +27,11 @@ WAIT = 30.0  # seconds at most that a script waits for the first shape
 class Sessions(dict):
     """{session_uid of the source: Session} of all that is live."""
 
+    is_rendering = False  # then frames are followed one by one, and nothing else
+
     def clear(self):
-        """Ends every one and takes its result away."""
+        """Ends every one and takes its shape away."""
+        self.is_rendering = False
         for uid in list(self):
             session = self.pop(uid)
             session.stop()
@@ -39,32 +48,37 @@ def is_live(source, kind=None):
 
 def begin(context, source, kind="DEFORM"):
     """Makes the source live; UserError when that cannot be. The shape appears when the worker has it."""
-    if source.session_uid in live:
-        live.pop(source.session_uid).stop()
-    session = Session(context, source, kind)
+    earlier = live.pop(source.session_uid, None)
+    if earlier is not None:
+        earlier.stop()
+    session = None
     try:
+        session = Session(context, source, kind, display=earlier.display if earlier else None)
         session.advance()  # a small mesh is read at once
     except UserError:
-        live_object.drop(source)
+        if session or earlier:
+            take_away(session or earlier)
         raise
     live[source.session_uid] = session
     timers.start(poll_live, persistent=True)
 
 
 def end(context, source, keep=False):
-    """Ends live mode: the result goes and the source looks as before; or the result stays (`keep`)."""
+    """Ends live mode: the source looks as before; or the shape stays (`keep`), and its object is returned."""
     session = live.pop(source.session_uid, None)
-    if session is not None:
-        session.stop()
-        session.show_last()
+    if session is None:
+        return None
+    session.stop()
+    session.show_last()
     if keep:
-        return live_object.keep(context, source, session.kind if session else "DEFORM")
-    live_object.drop(source)
+        return session.display.keep(context, source, session.kind)
+    session.display.take_away(source)
     return None
 
 
 def stop_all():
     """Ends every worker; what is in the file stays as it is."""
+    live.is_rendering = False
     while live:
         live.popitem()[1].stop()
 
@@ -80,58 +94,107 @@ def update(context, wait=0.0, refined=False):
         except Changed:
             restart(context, uid, session)
         except (UserError, ValueError, ReferenceError) as error:
-            live.pop(uid, None)
-            session.stop()
-            told = translated("{error}; live mode ended", error=translated(error))
-            jobs.add_message("ERROR", f"{session.source.name}: {told}")
-            take_away(session)
+            give_up(uid, session, error)
+
+
+def give_up(uid, session, error):
+    live.pop(uid, None)
+    session.stop()
+    told = translated("{error}; live mode ended", error=translated(error))
+    jobs.add_message("ERROR", f"{session.source.name}: {told}")
+    take_away(session)
 
 
 def take_away(session):
-    """Takes the live object away, also one that an undone step left in the file but in no scene."""
+    """Takes the live shape away, also where an undone step left the source or the shape in no scene."""
     with contextlib.suppress(UserError, ReferenceError, AttributeError):
-        live_object.drop(session.source.find())
-    leftover = session.result.find()
-    if leftover is not None:
-        result_objects.discard(leftover)
+        session.display.take_away(session.source.find())
 
 
 def watch(depsgraph):
-    """Looks through what Blender has just updated for edits of live sources."""
+    """Looks through what Blender has just updated for edits of live sources, and motion before the field."""
     if not live:
         return
-    meshes = {
-        update.id.original.session_uid
-        for update in depsgraph.updates
-        if update.is_updated_geometry and isinstance(update.id, bpy.types.Mesh)
-    }
-    for session in live.values() if meshes else ():
+    updated = [(u.id.original, u.is_updated_geometry) for u in depsgraph.updates]
+    meshes = {item.session_uid for item, shape in updated if shape and isinstance(item, bpy.types.Mesh)}
+    for session in live.values():
         source = session.source.find()
-        if source is not None and source.data.session_uid in meshes:
-            session.may_be_edited = True
+        if source is None:
+            continue
+        written, session.has_written = session.has_written, False
+        if source.data.session_uid in meshes:
+            session.may_be_edited |= not written
+        elif session.moves_by_itself and any(moves(item, source) for item, _ in updated):
+            session.may_have_moved = True
+
+
+def moves(item, source):
+    """Whether an update of this may move the points of the source before its field does."""
+    if isinstance(item, bpy.types.Object):
+        return item == source or (item.type != "EMPTY" or settings_of(item).handle_of != source)
+    return isinstance(item, bpy.types.Key | bpy.types.Armature | bpy.types.Lattice | bpy.types.Curve)
 
 
 def restart(context, uid, session):
-    """The source or its handles changed: the solver is set up anew, the result stays the same object."""
+    """The source or its handles changed: the solver is set up anew, the shape stays where it is."""
     source = session.source.get()
     try:
         begin(context, source, session.kind)
-    except UserError:  # the last handle was removed
-        live.pop(uid, None)
-        live_object.drop(source)
+    except UserError as error:
+        jobs.add_message("ERROR", f"{source.name}: {translated(error)}")
 
 
 def poll_live():
     """Called between redraws; ends when nothing is live."""
     if not live:
         return None
-    update(bpy.context)
+    if not live.is_rendering:
+        update(bpy.context)
     return INTERVAL
 
 
+def follow_frame(depsgraph):
+    """Shows every live shape as it is at the frame that is about to be rendered."""
+    for uid, session in list(live.items()):
+        try:
+            source = session.source.get()
+            if session.worker is None or source.mode != "OBJECT":
+                continue
+            if session.moves_by_itself:
+                session.read_points(bpy.context, source)
+            seen = source.evaluated_get(depsgraph)
+            request = session.current_request(
+                bpy.context, seen, lambda item: rendered_matrix(item, depsgraph)
+            )
+            session.requested = request
+            session.worker.request(request)
+            session.worker.wait(WAIT, refined=True)
+            session.show()
+        except Changed:
+            continue
+        except (UserError, ValueError, ReferenceError) as error:
+            give_up(uid, session, error)
+
+
+def rendered_matrix(item, depsgraph):
+    return empties.matrix_of(item.original.evaluated_get(depsgraph))
+
+
 def recover():
-    """After a file is loaded or a step undone: takes away live results that no session moves any more."""
+    """After a file is loaded or a step undone: takes away live objects that no session moves any more, and
+    ends sessions whose source is not live in that step."""
+    for uid, session in list(live.items()):
+        source = session.source.find()
+        if source is None or not settings_of(source).live_kind:
+            live.pop(uid)
+            session.stop()
+            if not session.display.in_place:
+                take_away(session)
+        else:
+            session.requested = None  # what it wrote may have been undone
     for source in bpy.data.objects:
-        if settings_of(source).live_display and not is_live(source):
+        if settings_of(source).live_kind and not is_live(source):
             with contextlib.suppress(UserError, RuntimeError, AttributeError):
-                live_object.drop(source)
+                item = live_object.forget(source)
+                if item is not None:
+                    result_objects.discard(item)

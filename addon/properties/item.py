@@ -5,7 +5,7 @@ import bpy
 
 from ..blender.object_references import owner_of, settings_of
 from ..blender.property_definitions import annotations
-from ..core.settings.choices import NORMALS, OUTPUTS, PLACEMENTS, SURFACES
+from ..core.settings.choices import NORMALS, OUTPUTS, PLACEMENT_NUMBERS, PLACEMENTS, SURFACES
 from ..core.settings.parameters import EXTRACTION
 from ..handles.properties import ARAPFIELDS_PG_handle
 from ..names import PROPERTY
@@ -25,8 +25,9 @@ def surface(**extra):
 
 
 def target(**extra):
+    items = tuple((*placement, "NONE", PLACEMENT_NUMBERS[placement[0]]) for placement in PLACEMENTS)
     return bpy.props.EnumProperty(
-        items=PLACEMENTS, name="Result", description="Where the result goes", **extra
+        items=items, name="Result", description="Where the result goes", default="MODIFIER", **extra
     )
 
 
@@ -72,8 +73,10 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     normals: bpy.props.EnumProperty(
         items=NORMALS, name="Normals", description="How meshes of the implicit surface are shaded"
     )
-    live_display: bpy.props.StringProperty(
-        name="Display before Live", description="How the object was displayed before it became live"
+    live_kind: bpy.props.StringProperty(name="Live", description="DEFORM or STYLIZE while the object is live")
+    live_hidden: bpy.props.StringProperty(
+        name="Hidden before Live",
+        description="Whether the object was hidden in viewport and renders, as JSON",
     )
     fit_key: bpy.props.StringProperty(name="Fit", description="Name of the object's last fit in the cache")
     fit_options: bpy.props.StringProperty(
@@ -82,6 +85,11 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     fit_report: bpy.props.StringProperty(
         name="Fit Report", description="Figures of the object's last fit, as JSON"
     )
+
+    @property
+    def in_place(self):
+        """Whether a result goes onto the source's own vertices, where they are at the modifier's place."""
+        return self.output == "WARP" and self.target != "NEW"
 
     @property
     def owner(self):

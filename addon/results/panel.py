@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
+from ..blender import modifier_stack
 from ..blender.object_references import in_scene
 from ..blender.section import Section
 from ..names import Op
@@ -16,6 +17,14 @@ class ARAPFIELDS_PT_result(Section, bpy.types.Panel):
         layout.prop(settings, "resolution")
         layout.prop(settings, "normals")
         layout.operator(Op.EXTRACT, icon="OUTLINER_OB_SURFACE")
+        modifier = modifier_stack.find(source)
+        if modifier is not None:
+            row = layout.row(align=True)
+            row.label(text=modifier.name, icon="GEOMETRY_NODES", translate=False)
+            row.prop(modifier, "show_viewport", text="")
+            row.prop(modifier, "show_render", text="")
+            row.operator(Op.REMOVE_FIELD, text="", icon="X")
+            layout.operator(Op.APPLY_KEY, icon="SHAPEKEY_DATA")
         for entry in settings.results:
             if in_scene(entry.item):
                 row = layout.row()

@@ -6,9 +6,10 @@ import json
 import bpy
 import numpy as np
 
-from ..blender import mesh_arrays
+from ..blender import mesh_arrays, modifier_stack
 from ..blender.object_references import settings_of
 from ..core.errors import UserError
+from ..field_modifier import motion
 from ..names import REPORT, RESULT_SUFFIX, RESULTS, WARP_KEY
 
 
@@ -71,10 +72,18 @@ def show(context, source, kind, output, mesh, report, select=True):
             bpy.data.meshes.remove(old)
     register(source, kind, output, item)
     place(context, source, item)
+    hide(source)
     item[REPORT] = json.dumps(report)
     if select and context.view_layer.objects.active == source:
         select_only(context, item)
     return item
+
+
+def hide(source):
+    """Takes a source out of sight and out of renders, where its result lies in its place."""
+    source.hide_render = True
+    if not source.hide_get():
+        source.hide_set(True)
 
 
 CHANNELS = (
@@ -132,7 +141,8 @@ def warp_mesh(context, source, before, after):
     All else on the mesh is kept. Where modifiers changed the vertices, the copy is of the mesh as shown.
     """
     copied = source.data.copy()
-    if keeps_vertices(source, copied, before):
+    if keeps_vertices(source) and len(copied.vertices) == len(before):
+        motion.write_to(copied, motion.Motion(None))
         if copied.shape_keys is None:
             mesh_arrays.set_positions(copied, after)
         return copied
@@ -144,7 +154,7 @@ def warp_mesh(context, source, before, after):
 
 def shown_mesh(context, source, count):
     """A mesh of its own of what is shown of the source: modifiers and shape keys applied."""
-    applied = mesh_arrays.shown_copy(context, source)
+    applied = modifier_stack.mesh_copy(context, source)
     if len(applied.vertices) != count:
         bpy.data.meshes.remove(applied)
         raise UserError("{name} changed while it was worked on; run again", name=source.name)
@@ -162,12 +172,11 @@ def add_frame(item, frames, number, shape):
         key.keyframe_insert("value", frame=frame)
 
 
-def keeps_vertices(source, mesh, before):
-    """Whether the object is shown with just the vertices of its own mesh: no modifier is at work."""
-    shown = [modifier for modifier in source.modifiers if modifier.show_viewport]
-    keys = mesh.shape_keys
+def keeps_vertices(source, in_place=False):
+    """Whether the shape to work on has just the vertices of the object's own mesh: no modifier acts."""
+    keys = source.data.shape_keys
     usable = keys is None or (keys.use_relative and not source.show_only_shape_key)
-    return not shown and usable and len(mesh.vertices) == len(before)
+    return usable and not modifier_stack.shown_before(source, in_place)
 
 
 def add_warp_key(item, before, after):

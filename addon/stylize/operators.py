@@ -9,10 +9,9 @@ from ..blender.property_definitions import annotations, effective_values
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
 from ..core.settings.styles import STYLIZE
-from ..deform.solve_job import plan_solve_job
+from ..deform.solve_job import SolveOperator, plan_solve_job
 from ..handles import empties
 from ..handles.native_handles import native_handles
-from ..jobs.job_operator import JobOperator
 from ..names import Op
 from ..properties.item import output, resolution, surface, target
 from ..properties.settings import frame, style
@@ -20,8 +19,8 @@ from ..surface.source_surface import build_options
 from . import preference
 
 
-class ARAPFIELDS_OT_stylize(JobOperator, bpy.types.Operator):
-    """Turn the surface towards the faces of a solid, as rigidly as possible; the result is a new object"""
+class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
+    """Turn the surface towards the faces of a solid, as rigidly as possible"""
 
     bl_idname = Op.STYLIZE
     bl_label = "Stylize"
@@ -50,7 +49,7 @@ class ARAPFIELDS_OT_stylize(JobOperator, bpy.types.Operator):
         space = space_of(source.matrix_world, source.name)
         style = preference.requested_style(settings, space, self)
         handles = empties.solve_handles(source, space, of_groups) if settings.use_handles else []
-        weights = preference.region_weights(context, source, settings, of_groups)
+        weights = preference.region_weights(context, source, settings, of_groups, self.in_place(source))
 
         def solve(tracker, rest, samples, weight):
             blend = (

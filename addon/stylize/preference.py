@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..blender import mesh_arrays
+from ..blender import modifier_stack
 from ..blender.property_definitions import effective_value
 from ..core.errors import UserError
 from ..core.geometry.spaces import pose
@@ -34,7 +34,7 @@ class Style:
         return normals, self.turn.tobytes()
 
 
-def requested_style(settings, space, operator=None):
+def requested_style(settings, space, operator=None, where=matrix_of):
     """The style of an object's settings (and the operator's arguments, where given)."""
 
     def setting(name):
@@ -46,29 +46,29 @@ def requested_style(settings, space, operator=None):
         item = settings.style_object
         if item is None:
             raise UserError("choose the object that gives the style its normals")
-        return custom(which, item, to_solve)
+        return custom(which, item, to_solve, where)
     if setting("frame") == "OBJECT":
         return Style(style_name(which), np.eye(3))
-    return Style(style_name(which), to_solve @ axes(setting("frame"), settings.frame_object))
+    return Style(style_name(which), to_solve @ axes(setting("frame"), settings.frame_object, where))
 
 
-def axes(which, item):
+def axes(which, item, where=matrix_of):
     """(3, 3) axes of the style in the world, as columns."""
     if which == "WORLD":
         return np.eye(3)
     if item is None:
         raise UserError("choose the object along whose axes the style stands")
-    return pose(matrix_of(item))[:3, :3]
+    return pose(where(item))[:3, :3]
 
 
-def custom(which, item, to_solve):
+def custom(which, item, to_solve, where=matrix_of):
     if which == "AXES":
-        return Style(np.concatenate([np.eye(3), -np.eye(3)]), to_solve @ pose(matrix_of(item))[:3, :3])
+        return Style(np.concatenate([np.eye(3), -np.eye(3)]), to_solve @ pose(where(item))[:3, :3])
     if item.type != "MESH" or not len(item.data.polygons):
         raise UserError("{name} has no faces that could give the style its normals", name=item.name)
     normals = np.empty(3 * len(item.data.polygons), dtype=np.float32)
     item.data.polygons.foreach_get("normal", normals)
-    across = np.linalg.inv(matrix_of(item)[:3, :3]).T  # normals transform by the inverse transpose
+    across = np.linalg.inv(where(item)[:3, :3]).T  # normals transform by the inverse transpose
     turned = normals.reshape(-1, 3).astype(np.float64) @ across.T
     turned = turned[np.linalg.norm(turned, axis=1) > 0]
     turned = np.unique(np.round(turned / np.linalg.norm(turned, axis=1, keepdims=True), 3), axis=0)
@@ -88,26 +88,26 @@ def group_names(source, settings):
     return [*held, settings.region] if settings.region else held
 
 
-def region_weights(context, source, settings, of_groups):
-    """(n,) weights of the shown vertices: vertex group (one of those by name) times material; None for
+def region_weights(context, source, settings, of_groups, in_place):
+    """(n,) weights of the vertices: vertex group (one of those by name) times material; None for
     everywhere."""
     weights = of_groups[settings.region] if settings.region else None
     if settings.region_material is not None:
-        held = material_weights(context, source, settings.region_material)
+        held = material_weights(context, source, settings.region_material, in_place)
         weights = held if weights is None else weights * held
     if weights is not None and not weights.any():
         raise UserError("the region of {name} holds no vertex", name=source.name)
     return weights
 
 
-def material_weights(context, source, material):
-    """(n,) 1 at the shown vertices of faces with that material."""
+def material_weights(context, source, material, in_place):
+    """(n,) 1 at the vertices of faces with that material."""
     slots = [index for index, slot in enumerate(source.material_slots) if slot.material == material]
     if not slots:
         raise UserError(
             "{name} does not use the material {material}", name=source.name, material=material.name
         )
-    with mesh_arrays.evaluated_mesh(context, source) as mesh:
+    with modifier_stack.evaluated_mesh(context, source, in_place) as mesh:
         numbers = np.empty(len(mesh.polygons), dtype=np.int32)
         counts, corners = np.empty_like(numbers), np.empty(len(mesh.loops), dtype=np.int32)
         mesh.polygons.foreach_get("material_index", numbers)

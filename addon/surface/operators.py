@@ -36,7 +36,7 @@ class ARAPFIELDS_OT_fit(JobOperator, bpy.types.Operator):
     }
 
     def plan(self, context, source, _):
-        surface = read_surface(context, source, self)
+        surface = read_surface(context, source, self, settings_of(source).in_place)
         again = self.again
 
         def work(tracker):

@@ -9,6 +9,7 @@ import numpy as np
 from ..blender import mesh_arrays, property_definitions, user_preferences
 from ..blender.object_references import ObjectReference, settings_of
 from ..core.errors import UserError
+from ..core.geometry import rotations
 from ..core.geometry.edges import build_edges
 from ..core.geometry.spaces import Space, space_of
 from ..core.runtime import native
@@ -25,12 +26,14 @@ class SourceSurface:
 
     reference: ObjectReference
     space: Space
-    local: np.ndarray  # (n, 3) vertices as shown
+    local: np.ndarray  # (n, 3) vertices of the shape that is worked on
     vertices: np.ndarray  # (n, 3) the same in solve space
     triangles: np.ndarray
     fit_options: dict
     cache: FitCache
     machine: dict = field(default_factory=dict)
+    in_place: bool = False  # the shape at the place of the field's modifier, not all that is shown
+    has_free_normals: bool = False
     _sdf: object = None  # the fitted surface, once it was asked for
 
     @cached_property
@@ -68,6 +71,12 @@ class SourceSurface:
             sdf = self.fit(tracker, 0.3)
             return af.sample_surface(sdf, count=count, seed=seed, task=tracker.start("Sampling", 0.15))
         return af.sample_mesh(self.vertices, self.triangles, count=count, seed=seed)
+
+    def turns(self, field, points):
+        """(n, 3) how a field turns free custom normals at points in solve space; None: there are none."""
+        if not self.has_free_normals:
+            return None
+        return rotations.turns(field.jacobian(points), self.space.local_to_solve)
 
     def extract(self, tracker, resolution, weight):
         """(k, 3) vertices and the topology of the implicit surface, in solve space."""
@@ -112,10 +121,10 @@ def fit_values(group, operator):
     return values
 
 
-def read_surface(context, source, operator=None):
+def read_surface(context, source, operator=None, in_place=False):
     """Everything of a source that the worker needs; UserError when it cannot be worked on."""
     context.view_layer.update()
-    mesh = mesh_arrays.read(context, source)
+    mesh = mesh_arrays.read(context, source, in_place)
     space = space_of(source.matrix_world, source.name)
     vertices = space.to_solve(mesh.vertices)
     options = native_options(fit_values(settings_of(source).fit, operator))
@@ -128,4 +137,6 @@ def read_surface(context, source, operator=None):
         fit_options=options,
         cache=user_preferences.fit_cache(),
         machine=user_preferences.machine_options(),
+        in_place=in_place,
+        has_free_normals=mesh.has_free_normals,
     )

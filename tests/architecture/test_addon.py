@@ -8,7 +8,19 @@ import pytest
 
 ADDON = Path(__file__).resolve().parents[2] / "addon"
 # Each folder imports itself and those before it.
-ORDER = ["core", "blender", "jobs", "handles", "surface", "results", "viewport", "deform", "stylize", "live"]
+ORDER = [
+    "core",
+    "blender",
+    "jobs",
+    "field_modifier",
+    "handles",
+    "surface",
+    "results",
+    "viewport",
+    "deform",
+    "stylize",
+    "live",
+]
 ORDER += ["animation", "commands"]
 TOP = {"__init__", "registration", "lifecycle", "preferences", "install_check", "names", "properties"}
 # Operators and panels are what a user meets: they use any feature, and only the contents page lists them.

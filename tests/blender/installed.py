@@ -84,11 +84,11 @@ def use():
     quick.iterations, quick.width, quick.layers, quick.near_points = 100, 32, 2, 20000
     bpy.ops.arapfields.fit()
     moving.location.z += 0.3
-    bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK)
+    bpy.ops.arapfields.deform(output="WARP", **scenes.NEW)
     assert scenes.everything(bpy.data.objects["Bar_deformed"]) == kept
     assert scenes.world_points(bpy.data.objects["Bar_deformed"])[:, 2].max() > 0.4
     scenes.activate(bar)
-    bpy.ops.arapfields.stylize(style="CUBE", **scenes.QUICK)
+    bpy.ops.arapfields.stylize(style="CUBE", **scenes.NEW)
     extract(bar, 32)
 
 

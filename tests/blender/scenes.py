@@ -6,6 +6,8 @@ import numpy as np
 
 QUICK = {"iterations": 40, "samples": 2000, "batch": 100, "width": 32, "layers": 2}
 
+NEW = QUICK | {"target": "NEW"}
+
 
 def activate(*items):
     """Selects the objects and makes the last one active."""

@@ -18,7 +18,7 @@ def test_the_moved_end_follows_and_the_held_end_stays():
     bar, _, moving = scenes.bar_with_handles()
     before = scenes.world_points(bar)
     moving.location.z += 0.4
-    assert bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK | {"iterations": 120}) == {"FINISHED"}
+    assert bpy.ops.arapfields.deform(output="WARP", **scenes.NEW | {"iterations": 120}) == {"FINISHED"}
     after = scenes.world_points(bpy.data.objects["Bar_deformed"])
     shift = after - before
     assert np.abs(shift[before[:, 0] < -0.8]).max() < 0.08
@@ -34,7 +34,7 @@ def test_unmoved_handles_give_the_shape_itself():
 
     bar, *_ = scenes.bar_with_handles()
     before = scenes.world_points(bar)
-    bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK)
+    bpy.ops.arapfields.deform(output="WARP", **scenes.NEW)
     assert np.abs(scenes.world_points(bpy.data.objects["Bar_deformed"]) - before).max() < 5e-3
 
 
@@ -47,7 +47,7 @@ def test_everything_but_positions_is_byte_equal():
     scenes.decorate(bar)
     before = scenes.everything(bar)
     moving.location.z += 0.4
-    bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK)
+    bpy.ops.arapfields.deform(output="WARP", **scenes.NEW)
     result = bpy.data.objects["Bar_deformed"]
     assert scenes.everything(result) == before and len(before) > 12
     assert result.data != bar.data and scenes.everything(bar) == before
@@ -70,7 +70,7 @@ def test_shape_keys_stay_and_the_motion_is_one_more():
     key.data.foreach_get("co", flat)
     shown = scenes.world_points(bar)
     moving.location.z += 0.4
-    bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK)
+    bpy.ops.arapfields.deform(output="WARP", **scenes.NEW)
     result = bpy.data.objects["Bar_deformed"]
     keys = result.data.shape_keys.key_blocks
     assert [k.name for k in keys] == ["Basis", "Fat", "ARAP Fields"]
@@ -94,7 +94,7 @@ def test_modifiers_are_read_and_the_result_is_what_was_shown():
     bar.modifiers.new("Subdivision", "SUBSURF").levels = 1
     before = scenes.world_points(bar)
     moving.location.z += 0.4
-    bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK | {"iterations": 120})
+    bpy.ops.arapfields.deform(output="WARP", **scenes.NEW | {"iterations": 120})
     result = bpy.data.objects["Bar_deformed"]
     after = scenes.world_points(result)
     assert len(after) == len(before) > len(bar.data.vertices) and not result.modifiers
@@ -137,7 +137,7 @@ def test_a_result_lands_on_its_source_wherever_that_is(place):
     middle = Matrix.Translation(bar.matrix_world.translation)
     turn = middle @ Matrix.Rotation(math.radians(25), 4, "Z") @ middle.inverted()
     empty.matrix_world = turn @ empty.matrix_world
-    bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK | {"iterations": 120})
+    bpy.ops.arapfields.deform(output="WARP", **scenes.NEW | {"iterations": 120})
     result = bpy.data.objects["Bar_deformed"]
     assert np.array_equal(np.array(result.matrix_world), np.array(bar.matrix_world))
     turn = np.array(turn)
@@ -153,7 +153,7 @@ def test_a_second_run_updates_the_same_object():
     scenes.bar_with_handles()
     for _ in range(2):
         scenes.activate(bpy.data.objects["Bar"])
-        bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK)
+        bpy.ops.arapfields.deform(output="WARP", **scenes.NEW)
     assert [o.name for o in bpy.data.objects if "deformed" in o.name] == ["Bar_deformed"]
     assert len([m for m in bpy.data.meshes if "deformed" in m.name]) == 1
 
@@ -169,7 +169,7 @@ def test_same_seed_same_result():
     found = []
     for _ in range(2):
         scenes.activate(bar)
-        bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK)
+        bpy.ops.arapfields.deform(output="WARP", **scenes.NEW)
         found.append(scenes.world_points(bpy.data.objects["Bar_deformed"]))
     assert np.array_equal(*found)
 
@@ -182,7 +182,7 @@ def test_several_objects_in_one_call_and_one_that_fails():
     bars = [scenes.bar_with_handles(name)[0] for name in ("One", "Two")]
     bare = scenes.bar("Bare")
     scenes.activate(bare, *bars)
-    assert bpy.ops.arapfields.deform(scope="SELECTED", **scenes.QUICK) == {"FINISHED"}
+    assert bpy.ops.arapfields.deform(scope="SELECTED", **scenes.NEW) == {"FINISHED"}
     assert {"One_deformed", "Two_deformed"} <= set(bpy.data.objects.keys())
     assert "Bare_deformed" not in bpy.data.objects
     from addon.core.runtime import jobs

@@ -105,7 +105,7 @@ def test_with_a_handle_or_a_result_active_the_source_is_still_found():
     bar, fixed, _ = scenes.bar_with_handles()
     scenes.activate(fixed)
     assert source_of(bpy.context) == bar
-    bpy.ops.arapfields.deform(**scenes.QUICK)
+    bpy.ops.arapfields.deform(**scenes.NEW)
     assert bpy.context.view_layer.objects.active == fixed
     scenes.activate(bpy.data.objects["Bar_deformed"])
     assert source_of(bpy.context) == bar
@@ -126,7 +126,7 @@ def test_a_vertex_group_is_a_handle():
     right = bar.arapfields.handles[1].empty
     assert abs(right.location.x - 0.93) < 0.1
     right.location.z += 0.4
-    bpy.ops.arapfields.deform(**scenes.QUICK | {"iterations": 120})
+    bpy.ops.arapfields.deform(**scenes.NEW | {"iterations": 120})
     shift = scenes.world_points(bpy.data.objects["Bar_deformed"]) - before
     assert np.abs(shift[before[:, 0] < -0.8]).max() < 0.1
     assert np.abs(shift[before[:, 0] > 0.8] - [0, 0, 0.4]).max() < 0.15

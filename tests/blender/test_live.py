@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Live mode, stepped by hand: without a window Blender runs no timers."""
 
+import pytest
 from inside import in_blender
 
 WAIT = 30  # seconds for a shape to follow
@@ -28,20 +29,19 @@ def test_the_result_follows_moves_and_returns():
     bar, _, moving = scenes.bar_with_handles()
     before = scenes.world_points(bar)
     assert bpy.ops.arapfields.live() == {"FINISHED"} and sessions.is_live(bar)
-    result = bpy.data.objects["Bar_live"]
-    assert np.abs(scenes.world_points(result) - before).max() < 1e-3
+    assert np.abs(scenes.world_points(bar) - before).max() < 1e-3
     moving.location.z += 0.4
     step()
-    shift = scenes.world_points(result) - before
+    shift = scenes.world_points(bar) - before
     assert np.abs(shift[before[:, 0] < -0.8]).max() < 0.1
     assert np.abs(shift[before[:, 0] > 0.8] - [0, 0, 0.4]).max() < 0.1
     step(refined=True)
-    finer = scenes.world_points(result) - before
+    finer = scenes.world_points(bar) - before
     assert 0 < np.abs(finer - shift).max() < 0.1
     scenes.activate(bar)
     bpy.ops.arapfields.reset_handle(all=True)
     step(refined=True)
-    assert np.abs(scenes.world_points(result) - before).max() < 0.02
+    assert np.abs(scenes.world_points(bar) - before).max() < 0.02
 
 
 @in_blender
@@ -51,44 +51,50 @@ def test_off_restores_what_was_there():
     from test_live import step
 
     bar, _, moving = scenes.bar_with_handles()
-    bar.display_type = "SOLID"
 
     def names():
-        kinds = bpy.data.objects, bpy.data.meshes, bpy.data.collections
+        kinds = bpy.data.objects, bpy.data.meshes, bpy.data.collections, bpy.data.scenes
         return [sorted(kind.keys()) for kind in kinds]
 
     before = scenes.everything(bar), names()
     bpy.ops.arapfields.live()
-    assert bar.display_type == "BOUNDS"
+    assert len(bar.modifiers) == 1 and names() == before[1]
     moving.location.z += 0.4
     step()
     moving.location.z -= 0.4
     scenes.activate(bar)
     bpy.ops.arapfields.live()
     assert before == (scenes.everything(bar), names())
-    assert bar.display_type == "SOLID" and not bar.arapfields.results
+    assert not bar.modifiers and not bpy.data.node_groups and not bar.arapfields.live_kind
 
 
+@pytest.mark.parametrize("target", ["MODIFIER", "REPLACE", "KEY", "NEW"])
 @in_blender
-def test_a_live_shape_can_be_kept():
+def test_a_live_shape_can_be_kept(target):
     import bpy
     import numpy as np
     import scenes
     from test_live import step
 
     bar, _, moving = scenes.bar_with_handles()
+    bar.arapfields.target = target
     scenes.decorate(bar)
-    whole = scenes.everything(bar)
+    whole, names = scenes.everything(bar), sorted(bpy.data.objects.keys())
     bpy.ops.arapfields.live()
     moving.location.z += 0.4
     step()
-    shown = scenes.world_points(bpy.data.objects["Bar_live"])
-    scenes.activate(bar)
+    shown = scenes.world_points(bpy.data.objects["Bar_live"] if target == "NEW" else bar)
+    scenes.activate(moving)
     assert bpy.ops.arapfields.live_keep() == {"FINISHED"}
-    assert "Bar_live" not in bpy.data.objects and bar.display_type == "TEXTURED"
-    kept = bpy.data.objects["Bar_deformed"]
+    kept = bpy.data.objects["Bar_deformed"] if target == "NEW" else bar
     assert np.abs(scenes.world_points(kept) - shown).max() < 0.1
-    assert scenes.everything(kept) == whole
+    found = scenes.everything(kept)
+    assert {key: value for key, value in found.items() if key[0] != "ARAP Fields"} == whole
+    assert len(bar.modifiers) == (target == "MODIFIER") and (bar.data.shape_keys is None) == (target != "KEY")
+    if target == "NEW":
+        assert "Bar_live" not in bpy.data.objects and bar.hide_render and bar.hide_get()
+    else:
+        assert sorted(bpy.data.objects.keys()) == names
 
 
 @in_blender
@@ -102,12 +108,12 @@ def test_several_objects_are_live_at_once():
     for bar, _, _ in pairs:
         scenes.activate(bar)
         bpy.ops.arapfields.live()
-    rest = [scenes.world_points(bpy.data.objects[f"{name}_live"]) for name in ("One", "Two")]
+    rest = [scenes.world_points(bar) for bar, _, _ in pairs]
     pairs[0][2].location.z += 0.3
     pairs[1][2].location.z -= 0.3
     step()
-    for name, before, sign in zip(("One", "Two"), rest, (1, -1), strict=True):
-        moved = scenes.world_points(bpy.data.objects[f"{name}_live"]) - before
+    for (bar, _, _), before, sign in zip(pairs, rest, (1, -1), strict=True):
+        moved = scenes.world_points(bar) - before
         assert np.abs(moved[before[:, 0] > 0.9][:, 2].mean() - 0.3 * sign) < 0.05
 
 
@@ -129,7 +135,7 @@ def test_a_new_handle_sets_the_solver_up_again():
         scenes.activate(bar)
         bpy.ops.arapfields.remove_handle()
     step()
-    assert not sessions.is_live(bar) and "Bar_live" not in bpy.data.objects
+    assert not sessions.is_live(bar) and not bar.modifiers
 
 
 @in_blender
@@ -145,26 +151,33 @@ def test_playback_is_followed():
         moving.keyframe_insert("location", frame=frame)
     scenes.activate(bar)
     bpy.ops.arapfields.live()
-    right, heights = scenes.world_points(bar)[:, 0] > 0.9, []
+    right, heights = np.array([v.co.x for v in bar.data.vertices]) > 0.9, []
     for frame in (1, 5, 9):
         bpy.context.scene.frame_set(frame)
         step()
-        heights.append(scenes.world_points(bpy.data.objects["Bar_live"])[right][:, 2].mean())
+        heights.append(scenes.world_points(bar)[right][:, 2].mean())
     assert abs(heights[0]) < 0.02 and abs(heights[2] - 0.4) < 0.05 and np.all(np.diff(heights) > 0.1)
 
 
+@pytest.mark.parametrize("target", ["MODIFIER", "NEW"])
 @in_blender
-def test_loading_a_file_ends_live_mode_and_cleans_what_was_saved_of_it():
+def test_loading_a_file_ends_live_mode_and_cleans_what_was_saved_of_it(target):
+    """The shape on the source stays as it was saved; a live object goes, and the source is seen again."""
     import tempfile
 
     import bpy
+    import numpy as np
     import scenes
+    from test_live import step
 
     from addon.live import sessions
 
-    bar, *_ = scenes.bar_with_handles()
-    bar.display_type = "WIRE"
+    bar, _, moving = scenes.bar_with_handles()
+    bar.arapfields.target = target
     bpy.ops.arapfields.live()
+    moving.location.z += 0.4
+    step()
+    shown = scenes.world_points(bar)
     path = tempfile.mktemp(suffix=".blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.read_homefile(use_empty=True)
@@ -172,7 +185,9 @@ def test_loading_a_file_ends_live_mode_and_cleans_what_was_saved_of_it():
     bpy.ops.wm.open_mainfile(filepath=path)
     assert "Bar_live" not in bpy.data.objects
     bar = bpy.data.objects["Bar"]
-    assert bar.display_type == "WIRE" and not bar.arapfields.results
+    assert not bar.arapfields.live_kind and not bar.arapfields.results
+    assert not bar.hide_get() and not bar.hide_render
+    assert np.array_equal(scenes.world_points(bar), shown)
 
 
 @in_blender

@@ -29,7 +29,7 @@ def test_a_deleted_empty_is_no_handle_though_a_pointer_keeps_it():
     assert [entry.empty for entry in empties.used(bar)] == [fixed]
     delete(fixed)
     with pytest.raises(RuntimeError, match="Add a handle first"):
-        bpy.ops.arapfields.deform(**scenes.QUICK)
+        bpy.ops.arapfields.deform(**scenes.NEW)
 
 
 @in_blender
@@ -41,7 +41,7 @@ def test_a_deleted_source_is_worked_on_no_more():
     from addon.blender.object_references import source_of
 
     bar, fixed, _ = scenes.bar_with_handles()
-    bpy.ops.arapfields.deform(**scenes.QUICK)
+    bpy.ops.arapfields.deform(**scenes.NEW)
     result = bpy.data.objects["Bar_deformed"]
     delete(bar)
     scenes.activate(fixed)
@@ -51,7 +51,7 @@ def test_a_deleted_source_is_worked_on_no_more():
     assert source_of(bpy.context) == result  # an object like any other
 
 
-@pytest.mark.parametrize("which", ["source", "live object"])
+@pytest.mark.parametrize("which", ["source", "live object", "modifier"])
 @in_blender
 def test_live_ends_when_its_source_or_its_object_is_deleted(which):
     import bpy
@@ -62,12 +62,17 @@ def test_live_ends_when_its_source_or_its_object_is_deleted(which):
     from addon.live import sessions
 
     bar, _, moving = scenes.bar_with_handles()
+    bar.arapfields.target = "NEW" if which == "live object" else "MODIFIER"
     bpy.ops.arapfields.live()
-    delete(bar if which == "source" else bpy.data.objects["Bar_live"])
+    if which == "modifier":
+        bar.modifiers.remove(bar.modifiers[0])
+    else:
+        delete(bar if which == "source" else bpy.data.objects["Bar_live"])
     moving.location.z += 0.4
     step()
     assert not sessions.live and "Bar_live" not in bpy.data.objects
-    assert bar.display_type == "TEXTURED" and not bar.arapfields.results
+    assert not bar.hide_render and not bar.arapfields.results and not bar.modifiers
+    assert "ARAP Fields" not in bar.data.attributes
 
 
 @in_blender
@@ -186,19 +191,19 @@ def test_edits_of_a_live_source_are_followed():
     step()
     step()
     assert sessions.live[bar.session_uid] is not session
-    shown = scenes.world_points(bpy.data.objects["Bar_live"])
-    assert np.abs(shown - points).max() < 0.05
+    assert np.abs(scenes.world_points(bar) - points).max() < 0.05
 
 
 @in_blender
 def test_live_waits_while_its_source_is_in_edit_mode():
     import bpy
+    import numpy as np
     import scenes
     from test_live import step
 
     from addon.live import sessions
 
-    bar, *_ = scenes.bar_with_handles()
+    bar, _, moving = scenes.bar_with_handles()
     bpy.ops.arapfields.live()
     scenes.activate(bar)
     bpy.ops.object.mode_set(mode="EDIT")
@@ -210,7 +215,12 @@ def test_live_waits_while_its_source_is_in_edit_mode():
     step()
     step()
     assert sessions.is_live(bar)
-    assert len(bpy.data.objects["Bar_live"].data.vertices) == len(bar.data.vertices)
+    assert len(bar.data.attributes["ARAP Fields"].data) == len(bar.data.vertices)
+    before = np.array([vertex.co for vertex in bar.data.vertices])
+    moving.location.z += 0.4
+    step()
+    shift = scenes.world_points(bar) - before
+    assert np.abs(shift[before[:, 0] > 0.8] - [0, 0, 0.4]).max() < 0.1
 
 
 @in_blender
@@ -239,9 +249,10 @@ def test_a_live_object_that_undo_left_in_no_scene_goes_too():
     from addon.live import sessions
 
     bar, *_ = scenes.bar_with_handles()
+    bar.arapfields.target = "NEW"
     bpy.ops.arapfields.live()
     delete(bpy.data.objects["Bar_live"])
     bar.arapfields.results.clear()  # as in the step before
-    bar.display_type, bar.arapfields.live_display = "TEXTURED", ""
+    bar.arapfields.live_kind = bar.arapfields.live_hidden = ""
     step()
     assert not sessions.live and "Bar_live" not in bpy.data.objects and "Bar_live" not in bpy.data.meshes

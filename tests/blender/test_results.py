@@ -68,7 +68,7 @@ def test_the_surface_can_take_the_sources_place():
 
 REFUSED = {
     "a key on a surface": "a shape key keeps the mesh",
-    "modifiers": "modifiers of Bar change its vertices",
+    "a modifier": "Mirror of Bar change its vertices before; apply them, or choose Modifier",
     "live": "Bar is live; end live mode first",
 }
 
@@ -77,20 +77,27 @@ REFUSED = {
 @in_blender
 def test_what_the_source_cannot_take_is_refused_before_the_work(case):
     import bpy
+    import re
+
     import scenes
     from test_results import REFUSED
+
+    from addon.deform.solve_job import placement_refusal
 
     bar, *_ = scenes.bar_with_handles()
     arguments = {"target": "KEY"}
     if case == "a key on a surface":
         arguments["output"] = "SURFACE"
-    elif case == "modifiers":
-        bar.modifiers.new("S", "SUBSURF")
+    elif case == "a modifier":
+        bar.modifiers.new("Mirror", "MIRROR")
     else:
         bpy.ops.arapfields.live()
         scenes.activate(bar)
     with pytest.raises(RuntimeError, match=REFUSED[case]):
         bpy.ops.arapfields.deform(**arguments, **scenes.QUICK)
+    for name, value in arguments.items():
+        setattr(bar.arapfields, name, value)
+    assert re.search(REFUSED[case], str(placement_refusal(bar)))  # which a window tells before
 
 
 @in_blender
@@ -117,7 +124,7 @@ def test_linked_objects_give_results_but_are_never_written():
         bpy.ops.arapfields.add_handle()
     with pytest.raises(RuntimeError, match="linked from another file"):
         bpy.ops.arapfields.stylize(target="REPLACE", **scenes.QUICK)
-    assert bpy.ops.arapfields.stylize(**scenes.QUICK) == {"FINISHED"}
+    assert bpy.ops.arapfields.stylize(**scenes.NEW) == {"FINISHED"}
     result = bpy.data.objects["Linked_stylized"]
     assert result.library is None and result.data.library is None
     assert np.array_equal(scenes.world_points(linked), before)
@@ -135,18 +142,19 @@ def test_without_a_window_the_course_gives_what_blocking_gives():
 
     bar, _, moving = scenes.bar_with_handles()
     moving.location.z += 0.4
-    bpy.ops.arapfields.deform(**scenes.QUICK)
+    bpy.ops.arapfields.deform(**scenes.NEW)
     blocking = scenes.world_points(bpy.data.objects["Bar_deformed"])
-    for name, value in scenes.QUICK.items():
+    for name, value in scenes.NEW.items():
         setattr(bar.arapfields.deform, name, value)
     scenes.activate(bar)
     cls = deform.ARAPFIELDS_OT_deform
 
     class Operator:
         title, in_window, scope, looks, fraction = "Deform", True, "ACTIVE", 0, 0.0
-        properties = type("P", (), {"is_property_set": staticmethod(lambda name: False)})
+        properties = type("P", (), {"is_property_set": staticmethod(lambda name: name == "target")})
+        target = "NEW"
         coroutine, prepare, sources, plan = cls.coroutine, cls.prepare, cls.sources, cls.plan
-        groups_of = cls.groups_of
+        groups_of, in_place = cls.groups_of, cls.in_place
         conclude, apply_one = cls.conclude, cls.apply_one
 
         def add_message(self, level, text):

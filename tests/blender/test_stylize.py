@@ -13,7 +13,7 @@ def ball(name="Ball"):
     return bpy.context.object
 
 
-SETTINGS = {"iterations": 60, "samples": 2000, "batch": 200, "width": 32, "layers": 2}
+SETTINGS = {"target": "NEW", "iterations": 60, "samples": 2000, "batch": 200, "width": 32, "layers": 2}
 
 
 @in_blender

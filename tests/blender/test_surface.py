@@ -106,7 +106,7 @@ def test_the_surface_is_deformed_like_the_mesh():
     for name, value in FIT.items():
         setattr(bar.arapfields.fit, name, value)
     moving.location.z += 0.4
-    settings = scenes.QUICK | {"iterations": 120}
+    settings = scenes.NEW | {"iterations": 120}
     bpy.ops.arapfields.deform(output="SURFACE", resolution=48, **settings)
     surface = bpy.context.view_layer.objects.active
     scenes.activate(bar)
@@ -141,7 +141,7 @@ def test_a_remeshed_surface_is_even_where_the_shape_is_stretched():
     for name, value in FIT.items():
         setattr(bar.arapfields.fit, name, value)
     moving.location.x += 0.8
-    settings = scenes.QUICK | {"iterations": 120, "resolution": 48}
+    settings = scenes.NEW | {"iterations": 120, "resolution": 48}
     made = {}
     for output in ("SURFACE", "REMESH"):
         scenes.activate(bar)

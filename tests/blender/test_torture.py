@@ -48,7 +48,7 @@ def test_what_cannot_be_deformed_is_named(case):
     objects = set(bpy.data.objects)
     try:
         with pytest.raises(RuntimeError) as caught:
-            bpy.ops.arapfields.deform(**scenes.QUICK)
+            bpy.ops.arapfields.deform(**scenes.NEW)
     finally:
         if case == "edit mode":
             bpy.ops.object.mode_set(mode="OBJECT")
@@ -133,7 +133,7 @@ def test_odd_meshes_deform(case):
     bpy.context.view_layer.update()
     before = scenes.world_points(item)
     moving.location.z += 0.3
-    assert bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK) == {"FINISHED"}
+    assert bpy.ops.arapfields.deform(output="WARP", **scenes.NEW) == {"FINISHED"}
     after = scenes.world_points(bpy.data.objects["Mesh_deformed"])
     assert len(after) == len(before) and np.isfinite(after).all()
     right = before[:, 0] > 0.8
@@ -160,7 +160,7 @@ def test_tiny_and_huge_units(scale):
         bpy.ops.arapfields.set_rest(all=True)
         moving.location.z += 0.3 * size
         scenes.activate(item)
-        bpy.ops.arapfields.deform(output="WARP", **scenes.QUICK)
+        bpy.ops.arapfields.deform(output="WARP", **scenes.NEW)
         found[size] = scenes.world_points(bpy.context.view_layer.objects.active) / size
         for other in list(bpy.data.objects):
             bpy.data.objects.remove(other)
@@ -189,7 +189,7 @@ def test_half_a_million_triangles():
     scenes.activate(item)
     assert len(item.data.polygons) == 250000
     moving.location.z += 0.3
-    bpy.ops.arapfields.deform(**scenes.QUICK)
+    bpy.ops.arapfields.deform(**scenes.NEW)
     after = scenes.world_points(bpy.data.objects[f"{item.name}_deformed"])
     assert np.isfinite(after).all() and abs((after - points)[points[:, 0] > 0.9][:, 2].mean() - 0.3) < 0.1
     scenes.activate(item)

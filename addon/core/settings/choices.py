@@ -35,10 +35,17 @@ OUTPUTS = (
     ),
 )
 PLACEMENTS = (  # of a result
-    ("NEW", "New Object", "An object of its own beside the source; a later run updates it"),
+    (
+        "MODIFIER",
+        "Modifier",
+        "A modifier of the source itself, which can be faded, masked and moved in its stack; for the surface "
+        "outputs a new object",
+    ),
+    ("NEW", "New Object", "An object of its own in the place of the source, which is hidden"),
     ("REPLACE", "Replace Mesh", "The source itself moves; its handles' poses become their rest poses"),
     ("KEY", "Shape Key", "One more shape key of the source, which can be blended and animated"),
 )
+PLACEMENT_NUMBERS = {"NEW": 0, "REPLACE": 1, "KEY": 2, "MODIFIER": 3}  # as files store them
 NORMALS = (
     ("SMOOTH", "Smooth", "Shaded as one smooth surface"),
     ("FLAT", "Flat", "Every triangle shaded for itself"),

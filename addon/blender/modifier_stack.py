@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The place of the field's modifier in an object's stack, and the object's shape there.
+
+The shape is that of a copy whose stack is cut, in a scene of its own: nothing of the user's is switched.
+"""
+
+from contextlib import contextmanager
+
+import bpy
+
+from ..core.errors import UserError
+from ..names import FIELD_GROUP
+
+STAGE = "arapfields_stage"  # custom property of the scene that holds the copy
+FREE_NORMALS = "custom_normal"  # attribute of custom normals; free ones are vectors, Blender 4.5 and later
+# What a new field modifier comes before, at the end of a stack: it refines the shape and follows it.
+REFINING = {"SUBSURF", "MULTIRES", "BEVEL", "SOLIDIFY", "EDGE_SPLIT", "WEIGHTED_NORMAL", "NORMAL_EDIT"}
+REFINING |= {"TRIANGULATE", "WIREFRAME"}
+# Modifiers that keep every vertex and its number.
+KEEPING = {"ARMATURE", "CAST", "CLOTH", "COLLISION", "CORRECTIVE_SMOOTH", "CURVE", "DATA_TRANSFER"}
+KEEPING |= {"DISPLACE", "HOOK", "LAPLACIANDEFORM", "LAPLACIANSMOOTH", "LATTICE", "MESH_CACHE", "MESH_DEFORM"}
+KEEPING |= {"NORMAL_EDIT", "SHRINKWRAP", "SIMPLE_DEFORM", "SMOOTH", "SOFT_BODY", "SURFACE_DEFORM"}
+KEEPING |= {"UV_PROJECT", "UV_WARP", "VERTEX_WEIGHT_EDIT", "VERTEX_WEIGHT_MIX", "VERTEX_WEIGHT_PROXIMITY"}
+KEEPING |= {"WARP", "WAVE", "WEIGHTED_NORMAL"}
+
+
+def find(source):
+    """The object's field modifier, or None."""
+    return next((modifier for modifier in source.modifiers if is_field(modifier)), None)
+
+
+def is_field(modifier):
+    return modifier.type == "NODES" and modifier.node_group is not None and FIELD_GROUP in modifier.node_group
+
+
+def place(source):
+    """Where the field modifier is in the stack, or would come: before what only refines the shape."""
+    stack = list(source.modifiers)
+    found = next((index for index, modifier in enumerate(stack) if is_field(modifier)), None)
+    if found is not None:
+        return found
+    end = len(stack)
+    while end and (stack[end - 1].type in REFINING or getattr(stack[end - 1], "use_pin_to_last", False)):
+        end -= 1
+    return end
+
+
+def before(source, in_place):
+    """The modifiers that make the shape to work on: those before the place, else all but the field's."""
+    stack = list(source.modifiers)
+    return stack[: place(source)] if in_place else [m for m in stack if not is_field(m)]
+
+
+def shown_before(source, in_place):
+    return [modifier for modifier in before(source, in_place) if modifier.show_viewport]
+
+
+def keeps_vertices(source):
+    """Whether the vertices at the field's place are those of the mesh, by number, shown and rendered."""
+    return all(
+        modifier.type in KEEPING
+        for modifier in before(source, in_place=True)
+        if modifier.show_viewport or modifier.show_render
+    )
+
+
+def is_stage(scene):
+    return STAGE in scene
+
+
+@contextmanager
+def evaluated(context, source, kept):
+    """(object, depsgraph) of the object with these of its modifiers alone, for as long as the block runs."""
+    if all(modifier in kept for modifier in source.modifiers if modifier.show_viewport):
+        depsgraph = context.evaluated_depsgraph_get()
+        yield source.evaluated_get(depsgraph), depsgraph
+        return
+    stage = bpy.data.scenes.new("ARAP Fields")
+    copied = None
+    try:
+        stage[STAGE] = True
+        stage.frame_current, stage.frame_subframe = context.scene.frame_current, context.scene.frame_subframe
+        layer = stage.view_layers[0]
+        with context.temp_override(scene=stage, view_layer=layer):
+            context.evaluated_depsgraph_get()  # the frame is set before there is anything to animate
+            copied = cut_copy(source, {modifier.name for modifier in kept})
+            stage.collection.objects.link(copied)
+            depsgraph = context.evaluated_depsgraph_get()
+        yield copied.evaluated_get(depsgraph), depsgraph
+    finally:
+        if copied is not None:
+            bpy.data.objects.remove(copied)
+        bpy.data.scenes.remove(stage)
+
+
+def cut_copy(source, kept):
+    """A copy of the object, which shares its mesh, with these of its modifiers alone."""
+    copied = source.copy()
+    copied.hide_viewport = False
+    for modifier in list(copied.modifiers):
+        if modifier.name not in kept:
+            copied.modifiers.remove(modifier)
+    return copied
+
+
+@contextmanager
+def evaluated_mesh(context, source, in_place=False):
+    """The mesh that is worked on, for as long as the block runs."""
+    with _mesh_of(context, source, before(source, in_place)) as mesh:
+        yield mesh
+
+
+@contextmanager
+def moved_mesh(context, source):
+    """The mesh just after the field's modifier, for as long as the block runs."""
+    with _mesh_of(context, source, list(source.modifiers)[: place(source) + 1]) as mesh:
+        yield mesh
+
+
+@contextmanager
+def _mesh_of(context, source, kept):
+    with evaluated(context, source, kept) as (item, depsgraph):
+        mesh = item.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
+        if mesh is None:
+            raise UserError("{name}: Blender gives no mesh for it", name=source.name)
+        try:
+            yield mesh
+        finally:
+            item.to_mesh_clear()
+
+
+def mesh_copy(context, source, in_place=False):
+    """A mesh of its own of the shape that is worked on."""
+    with evaluated(context, source, before(source, in_place)) as (item, depsgraph):
+        return bpy.data.meshes.new_from_object(item, preserve_all_data_layers=True, depsgraph=depsgraph)
+
+
+def free_normals(mesh):
+    """The domain of free custom normals (POINT, FACE or CORNER), or "" where normals turn by themselves."""
+    normals = mesh.attributes.get(FREE_NORMALS)
+    return normals.domain if normals is not None and normals.data_type == "FLOAT_VECTOR" else ""

@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An object's motion: its modifier, and where the offsets lie.
+
+They lie on the mesh itself; on a helper mesh, in no scene, where modifiers before make the vertices, other
+objects share the mesh, or it is linked.
+"""
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..blender import modifier_stack
+from ..core.errors import UserError
+from ..names import FIELD_MODIFIER, HELPER_SUFFIX, OFFSETS, TURNS
+from . import inputs, node_group
+
+
+@dataclass
+class Motion:
+    """(n, 3) offsets and turns (axis · angle) of the points, in local coordinates; None: there are none."""
+
+    offsets: np.ndarray | None
+    turns: np.ndarray | None = None
+
+
+def refusal(source):
+    """Why an object cannot have a field modifier, as a UserError; None where it can."""
+    if source.library is not None:
+        return UserError(
+            "{name} is linked from another file; choose New Object for the result", name=source.name
+        )
+    return None
+
+
+def bind(context, source):
+    """Gives the object its modifier and a mesh that carries the offsets, none yet; returns the modifier.
+
+    Where there is one already, its place and inputs stay, and its motion where the points are as many.
+    """
+    modifier = modifier_stack.find(source)
+    made = None
+    with modifier_stack.evaluated_mesh(context, source, in_place=True) as mesh:
+        normals, count = modifier_stack.free_normals(mesh), len(mesh.vertices)
+    on_mesh = lies_on_mesh(source)
+    if not on_mesh:
+        made = modifier_stack.mesh_copy(context, source, in_place=True)
+    if modifier is None:
+        modifier = add(source, normals)
+    else:
+        choose_group(modifier, normals)
+    if on_mesh:
+        forget_helper(modifier)
+    else:
+        take_helper(source, modifier, made)
+    mesh = carrier(source, modifier)
+    if len(mesh.vertices) != count:
+        raise UserError("{name} changed while it was worked on; run again", name=source.name)
+    return modifier
+
+
+def lies_on_mesh(source):
+    mesh = source.data
+    return mesh.library is None and mesh.users == 1 and modifier_stack.keeps_vertices(source)
+
+
+def add(source, normals):
+    """A new field modifier at its place."""
+    index = modifier_stack.place(source)
+    modifier = source.modifiers.new(FIELD_MODIFIER, "NODES")
+    modifier.node_group = node_group.find_or_make(normals)
+    source.modifiers.move(source.modifiers.find(modifier.name), index)
+    return source.modifiers[index]
+
+
+def choose_group(modifier, normals):
+    """Exchanges the node group where the normals ask for another; what the user set stays."""
+    group = node_group.find_or_make(normals)
+    if modifier.node_group == group:
+        return
+    factor, mask = inputs.get(modifier, "Factor"), inputs.get(modifier, "Mask")
+    masked, helper = inputs.get_attribute(modifier, "Mask"), inputs.get(modifier, "Offsets")
+    modifier.node_group = group
+    for name, value in (("Factor", factor), ("Mask", mask), ("Offsets", helper)):
+        inputs.put(modifier, name, value)
+    inputs.put_attribute(modifier, "Mask", masked)
+
+
+def take_helper(source, modifier, mesh):
+    """Has the modifier read its offsets from this mesh."""
+    for attribute in list(mesh.attributes):
+        if not attribute.is_required and not attribute.is_internal and attribute.name not in (OFFSETS, TURNS):
+            mesh.attributes.remove(attribute)
+    mesh.materials.clear()
+    helper = inputs.get(modifier, "Offsets")
+    mesh.name = f"{source.name}{HELPER_SUFFIX}"
+    if helper is None or helper.users > 1 or helper.library is not None:  # a copied object shares it
+        inputs.put(modifier, "Offsets", bpy.data.objects.new(mesh.name, mesh))
+        return
+    old, count = helper.data, len(mesh.vertices)
+    motion = read_from(old)
+    helper.data = mesh
+    bpy.data.meshes.remove(old)
+    if motion.offsets is not None and len(motion.offsets) == count:
+        write_to(mesh, motion)
+
+
+def forget_helper(modifier):
+    helper = inputs.get(modifier, "Offsets")
+    if helper is not None:
+        inputs.put(modifier, "Offsets", None)
+        discard_helper(helper)
+
+
+def discard_helper(helper):
+    if helper.users == 0 and helper.library is None:
+        mesh = helper.data
+        bpy.data.objects.remove(helper)
+        if mesh.users == 0:
+            bpy.data.meshes.remove(mesh)
+
+
+def carrier(source, modifier):
+    """The mesh on which the offsets lie."""
+    helper = inputs.get(modifier, "Offsets")
+    return source.data if helper is None else helper.data
+
+
+def write(source, motion):
+    """Moves the object's points; UserError where its modifier is gone or the points are others."""
+    modifier = modifier_stack.find(source)
+    if modifier is None:
+        raise UserError("the modifier of {name} was removed", name=source.name)
+    mesh = carrier(source, modifier)
+    if len(mesh.vertices) != len(motion.offsets):
+        raise UserError("{name} changed while it was worked on; run again", name=source.name)
+    write_to(mesh, motion)
+
+
+def write_to(mesh, motion):
+    for name, vectors in ((OFFSETS, motion.offsets), (TURNS, motion.turns)):
+        attribute = mesh.attributes.get(name)
+        if vectors is None:
+            if attribute is not None:
+                mesh.attributes.remove(attribute)
+            continue
+        if attribute is not None and (attribute.domain, attribute.data_type) != ("POINT", "FLOAT_VECTOR"):
+            mesh.attributes.remove(attribute)
+            attribute = None
+        if attribute is None:
+            attribute = mesh.attributes.new(name, "FLOAT_VECTOR", "POINT")
+        attribute.data.foreach_set("vector", np.ascontiguousarray(vectors, dtype=np.float32).ravel())
+    mesh.update_tag()
+
+
+def read_from(mesh):
+    return Motion(*(vectors(mesh, name) for name in (OFFSETS, TURNS)))
+
+
+def vectors(mesh, name):
+    attribute = mesh.attributes.get(name)
+    if attribute is None or attribute.data_type != "FLOAT_VECTOR" or attribute.domain != "POINT":
+        return None
+    flat = np.empty(3 * len(attribute.data), dtype=np.float32)
+    attribute.data.foreach_get("vector", flat)
+    return flat.reshape(-1, 3)
+
+
+def snapshot(source):
+    """The object's motion, to be restored; None where it has no field modifier."""
+    modifier = modifier_stack.find(source)
+    return None if modifier is None else read_from(carrier(source, modifier))
+
+
+def restore(source, motion):
+    """Makes the object's motion what a snapshot holds, bit for bit; points that are others do not move."""
+    modifier = modifier_stack.find(source)
+    if motion is None:
+        remove(source)
+    elif modifier is not None:
+        mesh = carrier(source, modifier)
+        fits = motion.offsets is not None and len(motion.offsets) == len(mesh.vertices)
+        write_to(mesh, motion if fits else Motion(None))
+
+
+def remove(source):
+    """Takes the object's modifier away, with all that was made for it."""
+    modifier = modifier_stack.find(source)
+    if modifier is not None:
+        helper, group = inputs.get(modifier, "Offsets"), modifier.node_group
+        source.modifiers.remove(modifier)
+        if helper is not None:
+            discard_helper(helper)
+        if group.users == 0:
+            bpy.data.node_groups.remove(group)
+    if source.data.library is None and source.data.users == 1:
+        write_to(source.data, Motion(None))

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A live shape on the source itself: its field modifier moves, nothing is added or hidden."""
+
+import numpy as np
+
+from ..blender import modifier_stack
+from ..blender.object_references import settings_of
+from ..core.errors import UserError
+from ..deform.solve_job import SolvedMesh
+from ..field_modifier import motion
+from ..results import placement
+from .live_object import LIVE
+
+
+class LiveModifier:
+    """Made at the start, which keeps the motion that the source had before."""
+
+    in_place = True
+
+    def __init__(self, context, source, _):
+        self.before, self.shown = motion.snapshot(source), None
+        self.bind(context, source)
+
+    def bind(self, context, source):
+        """Also when the source has changed: what was there before stays to be restored."""
+        motion.bind(context, source)
+
+    def require(self, source):
+        """UserError where the user has removed or applied it."""
+        if modifier_stack.find(source) is None:
+            raise UserError("the modifier of {name} was removed", name=source.name)
+
+    def show(self, source, shape):
+        """Moves the source's points to a session's shape; whether it could."""
+        if source.mode in PAUSING:
+            return False
+        motion.write(source, motion.Motion(shape.points - shape.rest, shape.turns))
+        self.shown = shape
+        return True
+
+    def take_away(self, source):
+        """Gives the source the motion that it had before, or none."""
+        if source is not None:
+            settings_of(source).live_kind = ""
+            if source.mode != "EDIT":
+                motion.restore(source, self.before)
+
+    def keep(self, context, source, kind):
+        """Leaves the motion where it is, or puts it where the user wants the result; returns the object."""
+        settings = settings_of(source)
+        settings.live_kind = ""
+        target, shape = settings.target, self.shown
+        if target in ("REPLACE", "KEY") and shape is not None:
+            solved = SolvedMesh(shape.points.astype(np.float64), None, {"output": LIVE})
+            placement.place_result(context, source, kind, "WARP", target, solved, shape.rest)
+        return source
+
+
+PAUSING = ("EDIT", "SCULPT")  # modes in which the user changes the mesh

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a live solver is set up for; where that changes, it is set up anew."""
+
+import numpy as np
+
+from ..blender import modifier_stack
+from ..blender.object_references import settings_of
+from ..blender.property_definitions import from_single_precision
+from ..handles import empties
+
+
+def energy_weights(settings, kind):
+    """The weights of the energy's terms by name, as the section that is live has them."""
+    group = settings.deform if kind == "DEFORM" else settings.stylize
+    weights = {"bending": group.bending, "barrier": group.barrier}
+    weights["handle_weight"] = settings.deform.handle_weight
+    if kind == "STYLIZE":
+        weights["rigidity"] = group.rigidity
+    return {name: from_single_precision(value) for name, value in weights.items()}
+
+
+def uses_handles(settings, kind):
+    return kind == "DEFORM" or settings.stylize.use_handles
+
+
+def layout_of(source, kind):
+    """What the solver was set up for: the handles and their rest regions, and what is shown."""
+    settings = settings_of(source)
+    held = [(e.empty.session_uid, e.kind, e.group, e.weight, tuple(e.rest)) for e in empties.used(source)]
+    style = settings.stylize.region, settings.stylize.region_material
+    further = (*energy_weights(settings, kind).items(), settings.output, settings.target, settings.surface)
+    if kind == "STYLIZE":
+        further += (*style, settings.stylize.use_handles)
+    return (held if uses_handles(settings, kind) else [], further, stack_of(source))
+
+
+def stack_of(source):
+    """The modifiers before the field's, and where its offsets can lie."""
+    kept = modifier_stack.before(source, in_place=True)
+    shown = [(modifier.name, modifier.type, modifier.show_viewport) for modifier in kept]
+    return shown, source.data.users > 1
+
+
+def same(a, b):
+    """Whether two requests ask for the same."""
+    if (a[1] and a[1][0]) != (b[1] and b[1][0]):
+        return False
+    return a[2] is b[2] and all(np.array_equal(x, y) for x, y in zip(a[0], b[0], strict=True))

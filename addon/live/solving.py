@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a live session's worker does: the solver is set up, then makes a shape for each request."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..blender import vertex_groups
+from ..blender.user_preferences import machine_options
+from ..core.errors import UserError
+from ..core.geometry.edges import Topology
+from ..core.runtime import native
+from ..core.runtime.progress import ProgressTracker
+from ..core.settings.parameters import presets
+from ..handles.native_handles import native_handles
+from ..surface.source_surface import supported_options
+
+SAMPLES = 6000
+REFINEMENTS, STEPS_AT_ONCE, FINE_TOLERANCE = 40, 10, 1e-6
+STYLE = presets("live").get("STYLE")  # label, tip, and options for a style, which acts everywhere
+LEAST_RIGIDITY = 1e-3  # of a live style
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What the worker makes, in local coordinates, single precision."""
+
+    points: np.ndarray  # (n, 3)
+    rest: np.ndarray | None  # (n, 3) where the source's own points are without the field; None for surfaces
+    turns: np.ndarray | None = None  # (n, 3) axis · angle, for free custom normals
+    topology: Topology | None = None
+
+
+class Solving:
+    """Mixin of a session: all of this runs on its worker, or on another thread than the main one."""
+
+    def prepare(self):
+        """Sets the solver up; on the worker."""
+        af, surface = native.library(), self.surface
+        use_fit = self.output != "WARP" or self.choice == "FIT"
+        use_fit = use_fit or (self.choice == "AUTO" and surface.is_cached)
+        self.samples = surface.samples(ProgressTracker(af.Task), SAMPLES, 0, use_fit)
+        options = {**self.energy}
+        if self.kind == "STYLIZE":
+            options |= STYLE[2]
+            # The live energy has stretch with weight 1: all others are relative to it.
+            rigidity = max(options.pop("rigidity"), LEAST_RIGIDITY)
+            options["gauss_weight"] = af.LiveOptions().gauss_weight
+            for name in ("bending", "barrier", "gauss_weight", "handle_weight"):
+                options[name] /= rigidity
+            if self.weights is not None:
+                self.weights = vertex_groups.at_points(surface.vertices, self.weights, self.samples.points)
+        handles = native_handles(af, self.handles, surface, self.samples)
+        options["interior"] = bool(handles)  # a style alone acts everywhere alike
+        options |= supported_options(af.LiveOptions, machine_options())
+        self.solver = af.LiveDeformer(self.samples, handles, af.LiveOptions(**options))
+        if self.output != "WARP":
+            self.rest, self.topology = surface.extract(ProgressTracker(af.Task), self.cells, 0.1)
+            self.solver.track(self.rest)
+        else:
+            self.follow_points(surface.local)
+
+    def follow_points(self, points):
+        """Has the solver move these (n, 3) points of the source, in local coordinates; on the worker."""
+        if points is not self.points and self.topology is None:
+            self.points, self.rest = points, self.surface.space.to_solve(points)
+            self.solver.track(self.rest)
+
+    def moved(self, request):
+        """The shape for this request, quickly; on the worker."""
+        self.solve(request)
+        return self.shape(self.solver.tracked())
+
+    def solve(self, request, **further):
+        targets, style, points = request
+        self.follow_points(points)
+        if style is not None and style[0] != self.style_set:
+            directions, strength, sharpness = style[1:]
+            self.solver.set_style(directions, strength, sharpness, self.weights)
+            self.style_set = style[0]
+        self.solver.solve(targets if self.handles else None, **further)
+
+    def refined(self, request, token):
+        """Better and better shapes, until the energy falls no more; on the worker."""
+        for _ in range(REFINEMENTS):
+            self.solve(request, iterations=STEPS_AT_ONCE, tolerance=FINE_TOLERANCE)
+            if token.cancelled:
+                return
+            if self.solver.report["iterations"] < STEPS_AT_ONCE:
+                break
+            yield self.shape(self.solver.tracked())
+        yield self.shape(self.solver.field(self.rest))
+
+    def shape(self, solved):
+        if self.topology is not None:
+            return Shape(self.local(solved), None, topology=self.topology)
+        turns = self.surface.turns(self.solver.field, self.rest) if self.surface.in_place else None
+        return Shape(self.local(solved), np.asarray(self.points, dtype=np.float32), turns)
+
+    def local(self, solved):
+        if not np.isfinite(solved).all():
+            raise UserError("the shape has vertices that are NaN or infinite; move the handles less far")
+        return np.ascontiguousarray(self.surface.space.to_local(solved), dtype=np.float32)

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+
+from ..blender import mesh_arrays, modifier_stack
+from ..blender.language import translated
+from ..blender.object_references import refusal, settings_of, source_of
+from ..core.errors import UserError
+from ..field_modifier import motion
+from ..names import Op
+from . import placement, result_objects
+
+
+class FieldOperator:
+    """Mixin: works on the field's modifier of the panel's source."""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        source = source_of(context)
+        reason = refusal(source) or cls.refuses(source)
+        if reason:
+            cls.poll_message_set(translated(reason))
+        return not reason
+
+    @classmethod
+    def refuses(cls, source):
+        if modifier_stack.find(source) is None:
+            return UserError("{name} has no ARAP Fields modifier", name=source.name)
+        if settings_of(source).live_kind:
+            return UserError("{name} is live; end live mode first", name=source.name)
+        return None
+
+
+class ARAPFIELDS_OT_apply_as_shape_key(FieldOperator, bpy.types.Operator):
+    """Turn the ARAP Fields modifier, as it acts now, into a shape key; Blender's own operator refuses it"""
+
+    bl_idname = Op.APPLY_KEY
+    bl_label = "Apply as Shape Key"
+
+    @classmethod
+    def refuses(cls, source):
+        return super().refuses(source) or placement.refusal(source, "WARP", "KEY")
+
+    def execute(self, context):
+        source = source_of(context)
+        with modifier_stack.evaluated_mesh(context, source, in_place=True) as mesh:
+            before = mesh_arrays.positions(mesh)
+        with modifier_stack.moved_mesh(context, source) as mesh:
+            after = mesh_arrays.positions(mesh)
+        placement.single_user(source)
+        if source.data.shape_keys is None:
+            source.shape_key_add(name="Basis", from_mix=False)
+        result_objects.add_warp_key(source, before, after)
+        motion.remove(source)
+        return {"FINISHED"}
+
+
+class ARAPFIELDS_OT_remove_field(FieldOperator, bpy.types.Operator):
+    """Take the ARAP Fields modifier away, with the motion that it carries"""
+
+    bl_idname = Op.REMOVE_FIELD
+    bl_label = "Remove"
+
+    def execute(self, context):
+        motion.remove(source_of(context))
+        return {"FINISHED"}
+
+
+CLASSES = [ARAPFIELDS_OT_apply_as_shape_key, ARAPFIELDS_OT_remove_field]
