@@ -10,6 +10,7 @@ from . import commands, install_check
 from .blender import icons, library_loading, modifier_stack, timers, translations
 from .blender.host import has_window
 from .core.runtime import jobs
+from .field_modifier import motion
 from .handles import counts
 from .jobs.display import display
 from .live import sessions
@@ -41,6 +42,7 @@ def after_update(scene, depsgraph):
     if not modifier_stack.is_stage(scene):
         staleness.watch(depsgraph)
         sessions.watch(depsgraph)
+        motion.written.clear()
 
 
 @persistent
@@ -82,7 +84,8 @@ PARTS = (  # what begins with the extension, and how it ends
 )
 # What may be there when the extension is disabled, in the order in which it ends; each has clear().
 # Timers are started by blender/timers.py, threads by core/runtime/threads.py.
-STATE = (jobs.board, display, sessions.live, counts.pending, staleness.changed, previews.shown, timers)
+STATE = (jobs.board, display, sessions.live, counts.pending, staleness.changed, motion.written)
+STATE += (previews.shown, timers)
 
 _begun, _drawn = [], []
 

@@ -99,6 +99,7 @@ def add_keys(context, source, session, frames, shapes, job):
             result_objects.add_frame(item, frames, number, shapes[number])
             yield Pause.REDRAW
         context.scene.frame_set(context.scene.frame_current)  # else the key stored last stays on
+        result_objects.hide(source)
         kept = True
     finally:
         if not kept:

@@ -43,8 +43,22 @@ def settings_of(item):
 def owner_of(item):
     """The object that a handle or a result belongs to; None for others, and where that was deleted."""
     settings = settings_of(item)
-    owner = settings.handle_of or settings.result_of
+    owner = settings.handle_of or (maker_of(item, settings.made_from) if settings.made_from else None)
     return owner if in_scene(owner) else None
+
+
+def maker_of(item, name):
+    """The object of that name, unless it was renamed, that lists this result; None where it is gone.
+
+    No pointer leads from a result to its source: it would drag it along when the result is appended.
+    """
+    named = bpy.data.objects.get(name)
+    among = bpy.data.objects if named is None else [named]
+    return next((other for other in among if lists(other, item)), None)
+
+
+def lists(source, item):
+    return any(entry.item == item for entry in settings_of(source).results)
 
 
 def source_of(context):

@@ -53,7 +53,7 @@ def run_single(options, _):
 def wanted(options):
     """The objects to work on."""
     meshes = [item for item in bpy.context.view_layer.objects if item.type == "MESH"]
-    meshes = [item for item in meshes if settings_of(item).result_of is None]
+    meshes = [item for item in meshes if not settings_of(item).made_from]
     if options.objects:
         by_name = {item.name: item for item in meshes}
         unknown = [name for name in options.objects if name not in by_name]

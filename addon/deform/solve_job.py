@@ -90,7 +90,7 @@ class SolveOperator(JobOperator):
 
     @classmethod
     def refuses(cls, source):
-        """Told before the button is pressed; a script's own arguments count instead, and are looked at then."""
+        """Told before the button is pressed; a script's own arguments are looked at when they are there."""
         return placement_refusal(source) if has_window() else None
 
     def in_place(self, source):

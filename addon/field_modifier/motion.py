@@ -15,6 +15,8 @@ from ..core.errors import UserError
 from ..names import FIELD_MODIFIER, HELPER_SUFFIX, OFFSETS, TURNS
 from . import inputs, node_group
 
+written = set()  # session_uid of objects that were moved since Blender's last update, which is ours alone
+
 
 @dataclass
 class Motion:
@@ -131,6 +133,7 @@ def write(source, motion):
     modifier = modifier_stack.find(source)
     if modifier is None:
         raise UserError("the modifier of {name} was removed", name=source.name)
+    written.add(source.session_uid)
     mesh = carrier(source, modifier)
     if len(mesh.vertices) != len(motion.offsets):
         raise UserError("{name} changed while it was worked on; run again", name=source.name)

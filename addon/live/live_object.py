@@ -25,6 +25,7 @@ class LiveObject:
         mesh = result_objects.shown_mesh(context, source, len(surface.local))
         active, selected = context.view_layer.objects.active, list(context.selected_objects)
         item = result_objects.show(context, source, LIVE, LIVE, mesh, {"output": LIVE}, select=False)
+        result_objects.hide(source)
         context.view_layer.objects.active = active
         for other in selected:
             other.select_set(True)
@@ -62,7 +63,9 @@ class LiveObject:
         forget(source)
         mesh = item.data
         bpy.data.objects.remove(item)
-        return result_objects.show(context, source, kind, settings_of(source).output, mesh, {"output": LIVE})
+        item = result_objects.show(context, source, kind, settings_of(source).output, mesh, {"output": LIVE})
+        result_objects.hide(source)
+        return item
 
 
 def forget(source):

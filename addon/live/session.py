@@ -45,7 +45,7 @@ class Session(Solving):
         self.surface = read_surface(context, source, in_place=in_place)
         self.moves_by_itself = in_place and has_motion_before(source)
         self.fingerprint = mesh_arrays.fingerprint(source.data)
-        self.may_be_edited = self.may_have_moved = self.has_written = False
+        self.may_be_edited = self.may_have_moved = False
         self.cells = min(settings.resolution, PREVIEW_CELLS)
         self.handles, self.weights = [], None
         self.energy = energy_weights(settings, kind)
@@ -169,8 +169,7 @@ class Session(Solving):
             raise UserError(error)
         if shape is None:
             return False
-        self.has_written = self.display.show(self.source.get(), shape)
-        return self.has_written
+        return self.display.show(self.source.get(), shape)
 
     def show_last(self):
         """What the worker made before it ended; an error of it no longer matters."""

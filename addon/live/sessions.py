@@ -15,6 +15,7 @@ from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..core.runtime import jobs
+from ..field_modifier import motion
 from ..handles import empties
 from ..results import result_objects
 from . import live_object
@@ -121,9 +122,8 @@ def watch(depsgraph):
         source = session.source.find()
         if source is None:
             continue
-        written, session.has_written = session.has_written, False
         if source.data.session_uid in meshes:
-            session.may_be_edited |= not written
+            session.may_be_edited |= source.session_uid not in motion.written
         elif session.moves_by_itself and any(moves(item, source) for item, _ in updated):
             session.may_have_moved = True
 

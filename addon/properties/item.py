@@ -60,8 +60,8 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     handle_of: bpy.props.PointerProperty(
         type=bpy.types.Object, name="Handle Of", description="The object that this Empty is a handle of"
     )
-    result_of: bpy.props.PointerProperty(
-        type=bpy.types.Object, name="Result Of", description="The object that this result was made from"
+    made_from: bpy.props.StringProperty(
+        name="Made From", description="Name of the object that this result was made from when it was made"
     )
     results: bpy.props.CollectionProperty(
         type=ARAPFIELDS_PG_result, name="Results", description="Objects made from this one"

@@ -56,7 +56,7 @@ def register(source, kind, output, item):
             entries.remove(index)
     entry = entries.add()
     entry.kind, entry.output, entry.item = kind, output, item
-    settings_of(item).result_of = source
+    settings_of(item).made_from = source.name
 
 
 def show(context, source, kind, output, mesh, report, select=True):
@@ -72,7 +72,6 @@ def show(context, source, kind, output, mesh, report, select=True):
             bpy.data.meshes.remove(old)
     register(source, kind, output, item)
     place(context, source, item)
-    hide(source)
     item[REPORT] = json.dumps(report)
     if select and context.view_layer.objects.active == source:
         select_only(context, item)

@@ -78,6 +78,7 @@ class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):
             item = result_objects.show(
                 bpy.context, owner, "EXTRACT", "SURFACE", result_objects.surface_mesh(owner, *mesh), report
             )
+            result_objects.hide(owner)
             return translated("{name} with {count} triangles", name=item.name, count=f"{len(mesh[1]):,}")
 
         return Item(source.name, work, apply)

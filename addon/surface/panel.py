@@ -3,7 +3,7 @@ import json
 
 import bpy
 
-from ..blender import object_references
+from ..blender import modifier_stack, object_references
 from ..blender.language import translated
 from ..blender.section import Section, job_button, presets, settings_column, wrapped
 from ..blender.user_preferences import fit_cache
@@ -46,9 +46,13 @@ class ARAPFIELDS_PT_source(Section, bpy.types.Panel):
 
 def remarks(source):
     """What the user should know about how the source is read."""
-    shown = [modifier for modifier in source.modifiers if modifier.show_viewport]
+    in_place = object_references.settings_of(source).in_place
+    shown = modifier_stack.shown_before(source, in_place)
+    after = [m.name for m in modifier_stack.shown_before(source, False) if m not in shown]
     if shown:
         yield translated("Read with its modifiers applied ({count})", count=len(shown))
+    if after:
+        yield translated("Read before {names}, which follow it", names=", ".join(after))
     if source.data.shape_keys:
         yield translated("Read with its shape keys as they are set")
     if not len(source.data.polygons) and not shown:

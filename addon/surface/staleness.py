@@ -7,6 +7,7 @@ import bpy
 
 from ..blender.object_references import settings_of
 from ..core.settings.parameters import native_options
+from ..field_modifier import motion
 from .source_surface import fit_values
 
 changed = set()  # session_uid of objects whose geometry was updated since their fit
@@ -36,5 +37,5 @@ def watch(depsgraph):
     for update in depsgraph.updates:
         if update.is_updated_geometry and isinstance(update.id, bpy.types.Object):
             source = update.id.original
-            if settings_of(source).fit_key:
+            if settings_of(source).fit_key and source.session_uid not in motion.written:
                 changed.add(source.session_uid)

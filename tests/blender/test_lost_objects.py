@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Objects that users delete, duplicate, override or edit at the wrong moment."""
 
-import pytest
 from inside import in_blender
 
 
@@ -49,30 +48,6 @@ def test_a_deleted_source_is_worked_on_no_more():
     assert fixed.arapfields.owner == fixed.arapfields
     scenes.activate(result)
     assert source_of(bpy.context) == result  # an object like any other
-
-
-@pytest.mark.parametrize("which", ["source", "live object", "modifier"])
-@in_blender
-def test_live_ends_when_its_source_or_its_object_is_deleted(which):
-    import bpy
-    import scenes
-    from test_live import step
-    from test_lost_objects import delete
-
-    from addon.live import sessions
-
-    bar, _, moving = scenes.bar_with_handles()
-    bar.arapfields.target = "NEW" if which == "live object" else "MODIFIER"
-    bpy.ops.arapfields.live()
-    if which == "modifier":
-        bar.modifiers.remove(bar.modifiers[0])
-    else:
-        delete(bar if which == "source" else bpy.data.objects["Bar_live"])
-    moving.location.z += 0.4
-    step()
-    assert not sessions.live and "Bar_live" not in bpy.data.objects
-    assert not bar.hide_render and not bar.arapfields.results and not bar.modifiers
-    assert "ARAP Fields" not in bar.data.attributes
 
 
 @in_blender
@@ -171,59 +146,6 @@ def test_a_library_override_is_refused_before_pressing():
 
 
 @in_blender
-def test_edits_of_a_live_source_are_followed():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_live import step
-
-    from addon.live import sessions
-
-    bar, *_ = scenes.bar_with_handles()
-    bpy.ops.arapfields.live()
-    session = sessions.live[bar.session_uid]
-    bar.data.update_tag()
-    step()
-    assert sessions.live[bar.session_uid] is session  # nothing was changed
-    points = np.array([vertex.co for vertex in bar.data.vertices])
-    points[:, 1] *= 1.5
-    scenes.set_positions(bar.data, points)
-    step()
-    step()
-    assert sessions.live[bar.session_uid] is not session
-    assert np.abs(scenes.world_points(bar) - points).max() < 0.05
-
-
-@in_blender
-def test_live_waits_while_its_source_is_in_edit_mode():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_live import step
-
-    from addon.live import sessions
-
-    bar, _, moving = scenes.bar_with_handles()
-    bpy.ops.arapfields.live()
-    scenes.activate(bar)
-    bpy.ops.object.mode_set(mode="EDIT")
-    bpy.ops.mesh.select_all(action="SELECT")
-    bpy.ops.mesh.subdivide()
-    step()
-    assert sessions.is_live(bar)
-    bpy.ops.object.mode_set(mode="OBJECT")
-    step()
-    step()
-    assert sessions.is_live(bar)
-    assert len(bar.data.attributes["ARAP Fields"].data) == len(bar.data.vertices)
-    before = np.array([vertex.co for vertex in bar.data.vertices])
-    moving.location.z += 0.4
-    step()
-    shift = scenes.world_points(bar) - before
-    assert np.abs(shift[before[:, 0] > 0.8] - [0, 0, 0.4]).max() < 0.1
-
-
-@in_blender
 def test_after_a_bake_the_present_frame_is_shown():
     import bpy
     import numpy as np
@@ -237,22 +159,3 @@ def test_after_a_bake_the_present_frame_is_shown():
     assert [round(key.value, 3) for key in keys[1:]] == [1.0, 0.0, 0.0]
     shift = scenes.world_points(bpy.data.objects["Bar_baked"]) - scenes.world_points(bar)
     assert np.abs(shift).max() < 0.05
-
-
-@in_blender
-def test_a_live_object_that_undo_left_in_no_scene_goes_too():
-    import bpy
-    import scenes
-    from test_live import step
-    from test_lost_objects import delete
-
-    from addon.live import sessions
-
-    bar, *_ = scenes.bar_with_handles()
-    bar.arapfields.target = "NEW"
-    bpy.ops.arapfields.live()
-    delete(bpy.data.objects["Bar_live"])
-    bar.arapfields.results.clear()  # as in the step before
-    bar.arapfields.live_kind = bar.arapfields.live_hidden = ""
-    step()
-    assert not sessions.live and "Bar_live" not in bpy.data.objects and "Bar_live" not in bpy.data.meshes

@@ -76,9 +76,9 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 @in_blender
 def test_what_the_source_cannot_take_is_refused_before_the_work(case):
-    import bpy
     import re
 
+    import bpy
     import scenes
     from test_results import REFUSED
 

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The result as a modifier: compared with the field applied by hand, wherever it is in the stack."""
+
+import pytest
+from inside import in_blender
+
+BY_HAND = 1e-5  # single precision of positions of size one, through Blender's modifiers
+STACKS = {  # modifiers, with FIELD where the field's own is; "keys": shape keys
+    "alone": ["FIELD"],
+    "subdivision after": ["FIELD", "SUBSURF"],
+    "subdivision before": ["SUBSURF", "FIELD"],
+    "mirror before": ["MIRROR", "FIELD"],
+    "mirror after": ["FIELD", "MIRROR"],
+    "armature before": ["ARMATURE", "FIELD"],
+    "armature after": ["FIELD", "ARMATURE"],
+    "shape keys": ["keys", "FIELD"],
+    "all": ["keys", "MIRROR", "ARMATURE", "FIELD", "SUBSURF"],
+}
+
+
+@pytest.mark.parametrize("case", STACKS)
+@in_blender
+def test_the_modifier_does_what_the_field_does_by_hand(case):
+    import bpy
+    import numpy as np
+    from stacks import build, by_hand, local_points
+    from test_modifier import BY_HAND, STACKS
+
+    from addon.blender import modifier_stack
+    from addon.field_modifier import inputs
+
+    bar, _, field = build(STACKS[case])
+    own = [kind for kind in STACKS[case] if kind != "keys"]
+    assert [modifier_stack.is_field(m) for m in bar.modifiers] == [kind == "FIELD" for kind in own]
+    modifier = modifier_stack.find(bar)
+    modifier.show_viewport = False
+    rest = local_points(bar)
+    modifier.show_viewport = True
+    moved = local_points(bar)
+    assert np.abs(moved - rest).max() > 0.3
+    assert np.abs(moved - by_hand(bar, field)).max() < BY_HAND
+    inputs.put(modifier, "Factor", 0.5)
+    assert np.abs(local_points(bar) - by_hand(bar, field, 0.5)).max() < BY_HAND
+    inputs.put(modifier, "Factor", 1.0)
+    group = bar.vertex_groups.new(name="Mask")
+    group.add([v.index for v in bar.data.vertices if v.co.x > 0.5], 1.0, "REPLACE")
+    inputs.put_attribute(modifier, "Mask", "Mask")
+    masked = local_points(bar)
+    assert np.abs(masked - rest).max() > 0.3
+    if case in ("alone", "armature before", "shape keys", "mirror before"):
+        left = (
+            rest[:, 0] < 0.55
+            if case != "armature before"
+            else np.array([v.co.x <= 0.5 for v in bar.data.vertices])
+        )
+        assert left.any() and np.array_equal(masked[left], rest[left])
+        assert np.array_equal(masked[~left], moved[~left]) or case == "mirror before"
+    group.remove([v.index for v in bar.data.vertices])
+    assert local_points(bar).tobytes() == rest.tobytes()
+    assert len(bpy.data.scenes) == 1
+
+
+@in_blender
+def test_nothing_but_a_modifier_an_attribute_and_a_group_is_added():
+    import bpy
+    import scenes
+
+    bar, _, moving = scenes.bar_with_handles()
+    scenes.decorate(bar)
+    before = scenes.everything(bar)
+    moving.location.z += 0.4
+    for _ in range(2):
+        scenes.activate(bar)
+        bpy.ops.arapfields.deform(**scenes.QUICK)
+    found = scenes.everything(bar)
+    assert {key: value for key, value in found.items() if key[0] != "ARAP Fields"} == before
+    assert sorted(o.name for o in bpy.data.objects) == ["Bar", "Fixed", "Moving"]
+    assert [g.name for g in bpy.data.node_groups] == ["ARAP Fields"] and len(bar.modifiers) == 1
+    assert not bar.hide_render and not bar.hide_get()
+    bpy.ops.arapfields.remove_field()
+    assert scenes.everything(bar) == before and not bpy.data.node_groups and not bar.modifiers
+
+
+@in_blender
+def test_where_there_are_more_vertices_than_offsets_they_come_from_the_nearest_place():
+    """As in a render at a higher level of subdivision than the viewport's."""
+    import bpy
+    import numpy as np
+    from stacks import build, local_points
+
+    bar, _, field = build(["SUBSURF", "FIELD"])
+    bar.modifiers["Subsurf"].levels = 2
+    modifier = bar.modifiers["ARAP Fields"]
+    modifier.show_viewport = False
+    rest = local_points(bar).astype(np.float64)
+    modifier.show_viewport = True
+    moved = local_points(bar)
+    assert len(bpy.data.objects["Bar_offsets"].data.vertices) < len(rest)
+    expected = field(rest)
+    assert np.abs(expected - rest).max() > 0.3 and np.abs(moved - expected).max() < 0.02

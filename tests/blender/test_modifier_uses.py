@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The result as a modifier: shared meshes, applying, free normals, files."""
+
+import pytest
+from inside import in_blender
+
+
+@in_blender
+def test_objects_that_share_a_mesh_move_alone():
+    import bpy
+    import numpy as np
+    import scenes
+    from stacks import local_points
+
+    bar, _, moving = scenes.bar_with_handles()
+    other = bpy.data.objects.new("Other", bar.data)
+    bpy.context.collection.objects.link(other)
+    moving.location.z += 0.4
+    rest = local_points(bar)
+    bpy.ops.arapfields.deform(**scenes.QUICK)
+    assert other.data == bar.data and np.array_equal(local_points(other), rest)
+    moved = local_points(bar)
+    assert np.abs(moved - rest).max() > 0.3
+    copied = bar.copy()  # as Alt+D does: with the modifier, whose helper it shares
+    bpy.context.collection.objects.link(copied)
+    bpy.context.view_layer.update()
+    assert np.array_equal(local_points(copied), moved)
+    scenes.activate(copied)
+    copied.arapfields.stylize.style = "CYLINDER"
+    bpy.ops.arapfields.stylize(**scenes.QUICK)
+    assert not np.array_equal(local_points(copied), moved) and np.array_equal(local_points(bar), moved)
+    bpy.ops.arapfields.remove_field()
+    assert np.array_equal(local_points(copied), rest) and np.array_equal(local_points(bar), moved)
+    assert len([o for o in bpy.data.objects if "offsets" in o.name]) == 1
+
+
+@pytest.mark.parametrize("case", ["alone", "mirror before", "shape keys"])
+@in_blender
+def test_the_modifier_can_be_applied(case):
+    import bpy
+    import numpy as np
+    import pytest
+    import scenes
+    from stacks import build, local_points
+    from test_modifier import STACKS
+
+    bar, *_ = build(STACKS[case])
+    moved = local_points(bar)
+    scenes.activate(bar)
+    if case == "mirror before":
+        with pytest.raises(RuntimeError, match="Mirror of Bar change its vertices before"):
+            bpy.ops.arapfields.apply_as_shape_key()
+        bpy.ops.object.modifier_apply(modifier="Mirror")
+        bpy.ops.object.modifier_apply(modifier="ARAP Fields")
+        assert np.array_equal(local_points(bar), moved)
+        return
+    bar.modifiers["ARAP Fields"].show_viewport = False
+    rest = local_points(bar)
+    bar.modifiers["ARAP Fields"].show_viewport = True
+    assert bpy.ops.arapfields.apply_as_shape_key() == {"FINISHED"}
+    assert not bar.modifiers and "ARAP Fields" not in bar.data.attributes
+    assert np.abs(local_points(bar) - moved).max() < 1e-6
+    bar.data.shape_keys.key_blocks["ARAP Fields"].value = 0.0
+    assert np.abs(local_points(bar) - rest).max() < 1e-6
+
+
+@in_blender
+def test_replacing_or_keying_supersedes_the_modifier():
+    import bpy
+    import numpy as np
+    import scenes
+    from stacks import local_points
+
+    for target in ("REPLACE", "KEY"):
+        bar, _, moving = scenes.bar_with_handles(f"Bar{target}")
+        bar.modifiers.new("Subdivision", "SUBSURF")
+        moving.location.z += 0.4
+        bpy.ops.arapfields.deform(**scenes.QUICK)
+        moved = local_points(bar)
+        scenes.activate(bar)
+        bpy.ops.arapfields.deform(target=target, **scenes.QUICK)
+        assert [modifier.name for modifier in bar.modifiers] == ["Subdivision"]
+        assert np.abs(local_points(bar) - moved).max() < 1e-5
+
+
+@in_blender
+def test_free_normals_turn_with_the_field():
+    import math
+
+    import bpy
+    import numpy as np
+    import pytest
+    import scenes
+    from mathutils import Matrix
+    from stacks import local_points
+
+    if bpy.app.version < (4, 5, 0):
+        pytest.skip("this Blender has no free normals")
+    for domain in ("POINT", "CORNER", "FACE"):
+        bar = scenes.bar(f"Bar{domain}")
+        normals = bar.data.attributes.new("custom_normal", "FLOAT_VECTOR", domain)
+        given = np.random.default_rng(0).normal(size=(len(normals.data), 3)).astype(np.float32)
+        given /= np.linalg.norm(given, axis=1, keepdims=True)
+        normals.data.foreach_set("vector", given.ravel())
+        empty = scenes.cube_empty((0, 0, 0), (2, 2, 2))
+        bpy.context.view_layer.update()
+        scenes.activate(empty, bar)
+        bpy.ops.arapfields.add_handle()
+        turn = Matrix.Rotation(math.radians(40), 4, (1, 2, 3))
+        empty.matrix_world = turn @ empty.matrix_world
+        scenes.activate(bar)
+        bpy.ops.arapfields.deform(**scenes.QUICK | {"iterations": 120})
+        turn = np.array(turn)[:3, :3]
+        assert np.abs(local_points(bar) - np.array([v.co for v in bar.data.vertices]) @ turn.T).max() < 0.03
+        mesh = bar.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+        flat = np.empty(given.size, np.float32)
+        mesh.attributes["custom_normal"].data.foreach_get("vector", flat)
+        assert mesh.attributes["custom_normal"].domain == domain
+        assert np.abs(flat.reshape(-1, 3) - given @ turn.T).max() < 0.1
+
+
+@in_blender
+def test_reading_the_shape_leaves_unkeyed_poses_alone():
+    import bpy
+    from stacks import build
+    from test_modifier import STACKS
+
+    bar, *_ = build(STACKS["armature before"])
+    bone = bar.modifiers["Armature"].object.pose.bones["Second"]
+    bone.keyframe_insert("rotation_euler", frame=1)
+    bpy.context.scene.frame_set(7)
+    bone.rotation_euler.z = 1.1
+    bpy.context.view_layer.update()
+    from addon.blender import modifier_stack
+
+    with modifier_stack.evaluated_mesh(bpy.context, bar, in_place=True) as mesh:
+        seen = max(vertex.co.y for vertex in mesh.vertices)
+    assert abs(bone.rotation_euler.z - 1.1) < 1e-6 and seen > 0.6
+
+
+@in_blender
+def test_a_result_brings_no_source_along_when_it_is_appended():
+    import tempfile
+
+    import bpy
+    import scenes
+
+    from addon.blender.object_references import source_of
+
+    bar, *_ = scenes.bar_with_handles()
+    bpy.ops.arapfields.deform(**scenes.NEW)
+    result = bpy.data.objects["Bar_deformed"]
+    assert bpy.context.view_layer.objects.active == result and source_of(bpy.context) == bar
+    assert bar.hide_get() and bar.hide_render
+    bar.name = "Renamed"
+    assert source_of(bpy.context) == bar
+    path = tempfile.mktemp(suffix=".blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(path) as (_, into):
+        into.objects = ["Bar_deformed"]
+    assert [item.name for item in bpy.data.objects] == ["Bar_deformed"]
+    bpy.context.collection.objects.link(into.objects[0])
+    scenes.activate(into.objects[0])
+    assert source_of(bpy.context) == into.objects[0]
+
+
+@in_blender
+def test_moving_the_modifier_does_not_age_the_fit():
+    import bpy
+    import scenes
+    from test_surface import FIT
+
+    from addon.surface import staleness
+
+    bar, _, moving = scenes.bar_with_handles()
+    for name, value in FIT.items():
+        setattr(bar.arapfields.fit, name, value)
+    bpy.ops.arapfields.fit()
+    moving.location.z += 0.4
+    bpy.ops.arapfields.deform(**scenes.QUICK)
+    bpy.context.view_layer.update()
+    assert not staleness.reason(bar)
+    bar.data.vertices[0].co.z += 0.1
+    bar.data.update()
+    bpy.context.view_layer.update()
+    assert staleness.reason(bar)
