@@ -67,3 +67,11 @@ ROUNDED_SOLVE = 0.1
 # How many times as long a call may take beside as many busy processes as there are processors: fair is 2, the
 # rest is what threads that wait for each other lose to the scheduler.
 BUSY_SLOWDOWN = 2.5
+# The weighted terms of a loss add up to it, in another order.
+TERMS_OF_LOSS = 1e-9
+# An energy of ours, written in Python in double precision, against the kernel in single: of the loss.
+ENERGY_IN_PYTHON = 1e-4
+# Central differences over 1e-3 of the cube, against the exact gradient of a smooth function.
+FUNCTION_DIFFERENCES = 1e-5
+# Vertices of an analytic sphere's extraction: values in single precision, linear between grid points.
+SPHERE_EXTRACTION = 2e-3

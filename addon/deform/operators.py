@@ -47,7 +47,7 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
 
         def solve(tracker, rest, samples, weight):
             natives = native_handles(af, handles, rest, samples)
-            return af.deform(samples, natives, options, tracker.start("Deforming", weight))
+            return af.deform(samples, natives, options, task=tracker.start("Deforming", weight))
 
         return plan_solve_job(context, self, source, "DEFORM", values["samples"], values["seed"], solve)
 

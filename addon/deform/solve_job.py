@@ -48,7 +48,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
         use_fit = choice == "FIT" or output != "WARP" or (choice == "AUTO" and surface.is_cached)
         weight = 1.0 if output == "WARP" else 0.7  # of the solve in what is left to do
         field = solve(tracker, surface, surface.samples(tracker, samples, seed, use_fit), weight)
-        topology, report = None, {"output": output, **dict(field.report)}
+        topology, report = None, {"output": output, **field.report.to_dict()}
         if output == "REMESH":
             after, topology, figures = surface.extract_moved(tracker, field, cells)
             report |= figures

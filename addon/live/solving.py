@@ -76,7 +76,7 @@ class Solving:
         self.follow_points(points)
         if style is not None and style[0] != self.style_set:
             directions, strength, sharpness = style[1:]
-            self.solver.set_style(directions, strength, sharpness, self.weights)
+            self.solver.set_style(directions, strength, sharpness=sharpness, weights=self.weights)
             self.style_set = style[0]
         self.solver.solve(targets if self.handles else None, **further)
 
@@ -86,7 +86,7 @@ class Solving:
             self.solve(request, iterations=STEPS_AT_ONCE, tolerance=FINE_TOLERANCE)
             if token.cancelled:
                 return
-            if self.solver.report["iterations"] < STEPS_AT_ONCE:
+            if self.solver.report.iterations < STEPS_AT_ONCE:
                 break
             yield self.shape(self.solver.tracked())
         yield self.shape(self.solver.field(self.rest))

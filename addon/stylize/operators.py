@@ -59,9 +59,9 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
                 samples,
                 style.directions(af),
                 options,
-                tracker.start("Stylizing", weight),
                 weights=blend,
                 handles=native_handles(af, handles, rest, samples),
+                task=tracker.start("Stylizing", weight),
             )
 
         return plan_solve_job(context, self, source, "STYLIZE", values["samples"], values["seed"], solve)

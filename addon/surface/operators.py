@@ -48,7 +48,7 @@ class ARAPFIELDS_OT_fit(JobOperator, bpy.types.Operator):
                 staleness.mark_fitted(source, surface)
                 settings = settings_of(source)
                 settings.fit_key = surface.key
-                settings.fit_report = json.dumps(sdf.report)
+                settings.fit_report = json.dumps(sdf.report.to_dict())
             return translated("surface fitted")
 
         return Item(source.name, work, apply)

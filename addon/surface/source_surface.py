@@ -57,7 +57,7 @@ class SourceSurface:
         if cached is not None:
             return cached
         options = af.FitOptions(**self.fit_options, **supported_options(af.FitOptions, self.machine))
-        sdf = af.fit_sdf(self.vertices, self.triangles, options, tracker.start("Fitting", weight))
+        sdf = af.fit_sdf(self.vertices, self.triangles, options, task=tracker.start("Fitting", weight))
         try:
             self.cache.save(self.key, sdf.save)
         except (ValueError, OSError) as error:
@@ -87,10 +87,10 @@ class SourceSurface:
 
     def extract_moved(self, tracker, field, resolution):
         """The same of the surface where the field moves it, by marching cubes there; and a report."""
-        sdf, report = self.fit(tracker, 0.0), {}
+        sdf = self.fit(tracker, 0.0)
         task = tracker.start("Extracting", 1.0)
-        mesh = native.library().extract_deformed(sdf, field, resolution, task=task, report=report)
-        return *checked_mesh(*mesh), {name: report[name] for name in ("inverted", "failures")}
+        mesh = native.library().extract_deformed(sdf, field, resolution, task=task)
+        return *checked_mesh(*mesh), {name: mesh.report[name] for name in ("inverted", "failures")}
 
 
 def checked_mesh(vertices, corners):

@@ -121,6 +121,6 @@ def render(output):
     stage.photograph(shown, output / "character.png", elevation=8)
     return {
         "deformed": measured(field),
-        "stylized": {"preference": round(live.report["preference"], 3)},
+        "stylized": {"preference": round(live.report.preference, 3)},
         "uv_and_materials_equal": kept(item, shown[1]) and kept(item, shown[2]),
     }

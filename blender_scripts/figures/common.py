@@ -43,7 +43,7 @@ class Box(NamedTuple):
 
 
 def samples_of(shape, count=SAMPLES, seed=0):
-    return af.sample_mesh(shape.vertices, shape.triangles, count, seed)
+    return af.sample_mesh(shape.vertices, shape.triangles, count, seed=seed)
 
 
 def deformed(shape, boxes, samples=None, **options):

@@ -24,7 +24,7 @@ def render(output):
         live.reset()
         live.set_style(style, 0.7)
         shapes.append(warped(dinosaur, live.solve()))
-        results[style] = {"preference": round(live.report["preference"], 3)}
+        results[style] = {"preference": round(live.report.preference, 3)}
     stage.clear()
     shown = []
     for column, (made, text) in enumerate(zip(shapes, TEXTS, strict=True)):

@@ -36,15 +36,16 @@ def evenness(made):
 
 def pulled_back(sdf, field, inverse, colour, forward):
     """The zero set of Φ∘f⁻¹, and how far it is from the surface moved forward, in cells of its grid."""
-    report, begin = {}, time.perf_counter()
-    made = surface(*af.extract_deformed(sdf, field, INVERSE, inverse, report=report), colour)
-    seconds = time.perf_counter() - begin
-    cells = surface_distances(forward, made) / report["spacing"]
+    begin = time.perf_counter()
+    extracted = af.extract_deformed(sdf, field, INVERSE, inverse=inverse)
+    seconds, report = time.perf_counter() - begin, extracted.report
+    made = surface(*extracted, colour)
+    cells = surface_distances(forward, made) / report.spacing
     return made, {
         "seconds": round(seconds, 1),
-        "cell": round(float(report["spacing"]), 4),
-        "points_inverted": report["inverted"],
-        "failures": report["failures"],
+        "cell": round(float(report.spacing), 4),
+        "points_inverted": report.inverted,
+        "failures": report.failures,
         "cells_apart_mean": round(float(cells.mean()), 3),
         "cells_apart_95_percent": round(float(np.quantile(cells, 0.95)), 3),
         "cells_apart_largest": round(float(cells.max()), 3),
@@ -78,8 +79,8 @@ def render(output):
     stage.photograph(shown, output / "inverse.png", elevation=12)
     return {
         "deformed": measured(field),
-        "fit_near_error": round(float(sdf.report["near_mean"]), 5),
-        "trained_error_mean": round(float(inverse.report["error_mean"]), 5),
+        "fit_near_error": round(float(sdf.report.near_mean), 5),
+        "trained_error_mean": round(float(inverse.report.error_mean), 5),
         "forward_evenness": evenness(forward),
         "newton": by_newton,
         "trained": by_training,

@@ -50,6 +50,6 @@ def render(output):
         "solves": len(seconds),
         "median_solve_ms": round(1000 * median(seconds), 1),
         "set_up_s": round(set_up, 3),
-        "energy": round(report["energy"], 4),
-        "min_determinant": round(report["min_determinant"], 3),
+        "energy": round(report.energy, 4),
+        "min_determinant": round(report.min_determinant, 3),
     }

@@ -55,9 +55,9 @@ def stylized(rest, live, style):
         "preference_rest": round(
             float(np.mean(af.gauss_preference(live.normals, af.preferred_normals(style)))), 3
         ),
-        "preference": round(live.deformer.report["preference"], 3),
-        "flipped_share": round(live.deformer.report["flipped_share"], 4),
-        "min_determinant": round(live.deformer.report["min_determinant"], 3),
+        "preference": round(live.deformer.report.preference, 3),
+        "flipped_share": round(live.deformer.report.flipped_share, 4),
+        "min_determinant": round(live.deformer.report.min_determinant, 3),
     }
 
 

@@ -6,14 +6,18 @@ python docs/examples/curves.py [output.png]
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+import numpy.typing as npt
 
 import arapfields as af
+
+Array = npt.NDArray[np.float64]
 
 BONES = [  # two ends and two radii: head, trunk, arms, legs
     ((0, 1.25), (0, 1.3), 0.42, 0.42),
@@ -27,25 +31,27 @@ ROUNDING = 0.06
 COLORS = ("black", "tab:red", "tab:orange", "tab:green")
 
 
-def figure_distance(points):
+def figure_distance(points: Array) -> Array:
     """About the distance to the figure's outline (p,), negative inside: a smooth union of capsules."""
     distances = []
-    for a, b, ra, rb in BONES:
-        a, b = np.array(a, float), np.array(b, float)
+    for start, end, ra, rb in BONES:
+        a, b = np.array(start, float), np.array(end, float)
         t = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
         distances.append(np.linalg.norm(points - a - t[:, None] * (b - a), axis=1) - ra - t * (rb - ra))
-    return -ROUNDING * np.log(np.sum(np.exp(-np.array(distances) / ROUNDING), axis=0))
+    union: Array = -ROUNDING * np.log(np.sum(np.exp(-np.array(distances) / ROUNDING), axis=0))
+    return union
 
 
-def outline():
+def outline() -> Array:
     """The closed curve (m, 2) on which figure_distance vanishes."""
     x, y = np.linspace(-2, 2, 401), np.linspace(-2.2, 2.2, 441)
     nodes = np.stack(np.meshgrid(x, y), -1)
     values = figure_distance(nodes.reshape(-1, 2)).reshape(nodes.shape[:2])
-    return max(plt.contour(x, y, values, [0.0]).allsegs[0], key=len)
+    longest: Array = max(plt.contour(x, y, values, [0.0]).allsegs[0], key=len)
+    return longest
 
 
-def turn(degrees, pivot):
+def turn(degrees: float, pivot: tuple[float, float]) -> Array:
     """(3, 3): a rotation of the plane about a point."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     motion = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
@@ -53,11 +59,11 @@ def turn(degrees, pivot):
     return motion
 
 
-def shift(x, y):
+def shift(x: float, y: float) -> Array:
     return np.array([[1, 0, x], [0, 1, y], [0, 0, 1.0]])
 
 
-def draw_grid(axes, field):
+def draw_grid(axes: Any, field: af.CurveField | None) -> None:
     """Lines of the plane inside the figure, where the field takes them."""
     along, across = np.linspace(-2, 2, 400), np.arange(-2, 2.01, 0.1)
     for swap in (False, True):
@@ -69,7 +75,7 @@ def draw_grid(axes, field):
             axes.plot(*moved.T, color="0.75", linewidth=0.6, zorder=1)
 
 
-def main(output):
+def main(output: str | Path) -> None:
     samples = af.sample_curve(outline(), 600)
     x, y = samples.points.T
     parts = {
@@ -80,11 +86,11 @@ def main(output):
     }
     handles = [af.CurveHandle(indices, motion) for indices, motion in parts.values()]
 
-    panels = [("rest", None)]
+    panels: list[tuple[str, af.CurveField | None]] = [("rest", None)]
     for bending in (0.001, 0.1):
-        field = af.deform_curve(samples.points, handles, af.CurveOptions(bending=bending))
-        report = field.report
-        panels.append((f"bending {bending:g}: stretch {report.stretch:.3f}, bend {report.bend:.2f}", field))
+        solved = af.deform_curve(samples.points, handles, af.CurveOptions(bending=bending))
+        report = solved.report
+        panels.append((f"bending {bending:g}: stretch {report.stretch:.3f}, bend {report.bend:.2f}", solved))
         print(f"bending {bending:g}: stretch {report.stretch:.4f}, bend {report.bend:.3f}, handles")
         print(f"  within {report.handle_error_max:.4f}, smallest det J {report.min_determinant:.2f}")
 

@@ -1,18 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The API reference, written from the docstrings of the installed package while the site is built."""
 
+import ast
 import importlib
 import inspect
 import re
+import textwrap
 
 from mkdocs.structure.files import File
 
 PAGE = "reference.md"
 INTRODUCTION = """# API reference
 
-Written from the docstrings of `arapfields` {version}. Arrays are NumPy; `n`, `m`, `p`, `k` are counts. All
-coordinates are the mesh's own unless a docstring says *cube*; distances are negative inside. Options go
-by name, `DeformOptions(bending=0.1)`, and have a method `to_dict()`. Bad arguments raise `InvalidInput`, a
+Written from the docstrings of `arapfields` {version}. Arrays are NumPy, and what is taken for one
+(`ArrayLike`) may be anything [like them](extending.md#arrays); `n`, `m`, `p`, `k` are counts. All coordinates
+are the mesh's own unless a docstring says *cube*; distances are negative inside. Options go by name,
+`DeformOptions(bending=0.1)`, and have a method `to_dict()`. Bad arguments raise `InvalidInput`, a
 `ValueError` that names the argument, what was found and what is allowed.
 """
 
@@ -40,7 +43,7 @@ def page():
     text = [INTRODUCTION.format(version=package.__version__)]
     names = [name for name in in_pipeline_order(package) if not name.startswith("__")]
     kinds = {
-        "Functions": [n for n in names if not inspect.isclass(getattr(package, n))],
+        "Functions": [n for n in names if inspect.isroutine(getattr(package, n))],
         "Classes": [n for n in names if is_class(package, n) and not is_error(package, n)],
         "Errors": [n for n in names if is_error(package, n)],
     }
@@ -73,7 +76,7 @@ def entry(value, name):
 
 
 def members(owner, name):
-    rows, calls = [], []
+    rows, calls = fields(owner), []
     defaults = owner().to_dict() if name.endswith("Options") else {}
     for key, member in vars(owner).items():
         if key.startswith("_") and key not in {"__init__", "__call__"}:
@@ -96,6 +99,21 @@ def members(owner, name):
     return [*calls, "\n".join([columns, *rows, ""]) if rows else ""]
 
 
+def fields(owner):
+    """Rows of the fields that a class of ours declares in Python, each with the text below it."""
+    rows = []
+    for kind in reversed(owner.__mro__):
+        if not kind.__module__.startswith("arapfields.") or kind.__module__.endswith("_native"):
+            continue
+        body = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0].body
+        for node, following in zip(body, [*body[1:], None], strict=True):
+            if not isinstance(node, ast.AnnAssign) or "ClassVar" in ast.unparse(node.annotation):
+                continue
+            text = isinstance(following, ast.Expr) and isinstance(following.value, ast.Constant)
+            rows.append(f"| `{node.target.id}` | {one_line(following.value.value) if text else ''} |")
+    return rows
+
+
 def signature(value, shown):
     """The signature as a code block: pybind11 writes it as the docstring's first line."""
     first = (value.__doc__ or "").split("\n", 1)[0]
@@ -108,7 +126,11 @@ def signature(value, shown):
         except (TypeError, ValueError):
             return ""
     text = re.sub(r"self: [\w.]+(, )?", "", text)
-    text = re.sub(r"(arapfields\._native|collections\.abc|numpy\.typing|typing|pathlib|os)\.", "", text)
+    text = re.sub(
+        r"(arapfields\.(_native|arrays|reports|energies)|collections\.abc|numpy\.typing|typing|pathlib|os)\.",
+        "",
+        text,
+    )
     for long, short in PLAIN.items():
         text = re.sub(long, short, text)
     text = re.sub(r" -> (object|None)$", "", text.replace("(self, ", "(").replace("(self)", "()"))

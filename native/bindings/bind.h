@@ -17,16 +17,6 @@ namespace arapfields::python {
 namespace py = pybind11;
 using namespace pybind11::literals;
 
-/// NumPy input → our arrays. Shapes and dtypes that do not fit raise InvalidInput naming `argument`;
-/// (real) integer and float dtypes are accepted for points, integers alone for triangles.
-Points as_points(const py::handle& value, const std::string& argument);
-Triangles as_triangles(const py::handle& value, const std::string& argument);
-Vector as_vector(const py::handle& value, const std::string& argument);
-Mat4 as_matrix4(const py::handle& value, const std::string& argument);
-Vec3 as_vec3(const py::handle& value, const std::string& argument);
-/// Any real array as (rows, cols) doubles.
-Eigen::MatrixXd as_matrix(const py::handle& value, const std::string& argument);
-
 /// Raises Python's Diverged with the state that was kept as its attribute `last_good`.
 [[noreturn]] void raise_diverged(const Diverged& error, const py::object& last_good);
 
@@ -34,6 +24,7 @@ void bind_core(py::module_& module);
 void bind_options(py::module_& module);
 void bind_mesh(py::module_& module);
 void bind_distance(py::module_& module);
+void bind_implicit(py::module_& module);
 void bind_neural(py::module_& module);
 void bind_sampling(py::module_& module);
 void bind_fit(py::module_& module);

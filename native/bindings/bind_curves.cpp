@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Curves of the plane: the energy's other dimension, from samples to field.
+#include "bindings/arguments.h"
+#include "bindings/arrays.h"
 #include "bindings/bind.h"
 #include "energies/arap2d.h"
 #include "sampling/curve_samples.h"
@@ -17,7 +19,7 @@ Points2 as_points2(const py::handle& value, const std::string& argument) {
 }
 
 /// Python's field: the solution with its report.
-py::array_t<double> jacobian(const CurveSolution& self, const py::object& points) {
+py::array_t<double> jacobian(const CurveSolution& self, const ArrayArgument& points) {
   const Points2 at = as_points2(points, "points");
   const RowMatrix<double> jets = self.field.jets(at);
   const Index n = at.rows();
@@ -55,10 +57,10 @@ void bind_curves(py::module_& module) {
                     "(n, 2) unit normals: outward of a closed curve, right-hand of an open one.");
   module.def(
       "sample_curve",
-      [](const py::object& vertices, Index count, bool closed) {
+      [](const ArrayArgument& vertices, Index count, bool closed) {
         return sample_curve(as_points2(vertices, "vertices"), count, closed);
       },
-      "vertices"_a, "count"_a = 400, "closed"_a = true,
+      "vertices"_a, "count"_a = 400, py::kw_only(), "closed"_a = true,
       "CurveSamples at equal distances along the polygon with these vertices (m, 2); closed: the last is "
       "joined\n"
       "to the first. InvalidInput for too few or non-finite vertices, a curve without length, count < 1.");
@@ -67,11 +69,12 @@ void bind_curves(py::module_& module) {
       module, "CurveHandle",
       "Samples of a plane curve (indices) that a rigid motion is to move. `motion` (3, 3) maps\n"
       "homogeneous (x, y, 1); the identity, its default, holds them in place.")
-      .def(py::init([](std::vector<Index> samples, const py::object& motion, double weight) {
+      .def(py::init([](const ArrayArgument& samples, const std::optional<ArrayArgument>& motion,
+                       double weight) {
              CurveHandle handle;
-             handle.samples = std::move(samples);
-             if (!motion.is_none()) {
-               const Eigen::MatrixXd matrix = as_matrix(motion, "motion");
+             handle.samples = as_indices(samples, "samples");
+             if (motion) {
+               const Eigen::MatrixXd matrix = as_matrix(*motion, "motion");
                require(matrix.rows() == 3 && matrix.cols() == 3, "motion",
                        "shape (" + std::to_string(matrix.rows()) + ", " + std::to_string(matrix.cols()) + ")",
                        "expected (3, 3)");
@@ -99,7 +102,7 @@ void bind_curves(py::module_& module) {
                             "A deformation of the plane, made for a curve by deform_curve.")
       .def(
           "__call__",
-          [](const CurveSolution& self, const py::object& points) {
+          [](const CurveSolution& self, const ArrayArgument& points) {
             return self.field(as_points2(points, "points"));
           },
           "points"_a, "(p, 2) → (p, 2), in the curve's coordinates.")
@@ -108,14 +111,15 @@ void bind_curves(py::module_& module) {
 
   module.def(
       "deform_curve",
-      [](const py::object& points, const std::vector<CurveHandle>& handles, const CurveOptions& options,
+      [](const ArrayArgument& points, const CurveHandlesArgument& handles, const CurveOptions& options,
          Task* task) {
         const Points2 samples = as_points2(points, "points");
-        return run_long(task, [&](const Progress& progress) {
-          return deform_curve(samples, handles, options, progress);
-        });
+        const auto held = as_items<CurveHandle>(handles, "handles", "CurveHandles are needed");
+        return run_long(
+            task, [&](const Progress& progress) { return deform_curve(samples, held, options, progress); });
       },
-      "points"_a, "handles"_a, py::arg_v("options", CurveOptions(), "CurveOptions()"), "task"_a = py::none(),
+      "points"_a, "handles"_a, py::arg_v("options", CurveOptions(), "CurveOptions()"), py::kw_only(),
+      "task"_a = py::none(),
       "Deforms a plane curve, given by its samples (n, 2), as rigidly as possible so that the handles' "
       "samples\n"
       "follow their motions. The energy is that of surfaces with d = 2; the field is a sum of Gaussian "

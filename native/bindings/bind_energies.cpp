@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "bindings/arguments.h"
+#include "bindings/arrays.h"
 #include "bindings/bind.h"
 #include "bindings/jet_arrays.h"
 #include "energies/arap.h"
@@ -25,10 +27,10 @@ void bind_handles(py::module_& module) {
           "motion", [](const Handle& self) { return self.motion(); },
           "(4, 4) rigid motion rest → target; InvalidInput where it scales, shears or mirrors.");
   py::class_<CuboidHandle, Handle>(
-      module, "Cuboid",
+      module, "CuboidHandle",
       "The surface inside a box. `rest` and `target` (4, 4) map the cube [-1, 1]³ onto the box before and\n"
       "after; target·rest⁻¹ must be rigid. A box that does not move holds its part in place.")
-      .def(py::init([](const py::object& rest, const py::object& target, double weight) {
+      .def(py::init([](const ArrayArgument& rest, const ArrayArgument& target, double weight) {
              CuboidHandle handle;
              handle.rest = as_matrix4(rest, "rest");
              handle.target = as_matrix4(target, "target");
@@ -39,9 +41,9 @@ void bind_handles(py::module_& module) {
            "rest"_a, "target"_a, "weight"_a = 1.0)
       .def_property_readonly("rest", [](const CuboidHandle& self) { return self.rest; })
       .def_property_readonly("target", [](const CuboidHandle& self) { return self.target; });
-  py::class_<PointHandle, Handle>(module, "Point",
+  py::class_<PointHandle, Handle>(module, "PointHandle",
                                   "One material point: `rest` (3,) is to arrive at `target` (3,).")
-      .def(py::init([](const py::object& rest, const py::object& target, double weight) {
+      .def(py::init([](const ArrayArgument& rest, const ArrayArgument& target, double weight) {
              PointHandle handle;
              handle.kind = Handle::Kind::point;
              handle.rest_point = as_vec3(rest, "rest");
@@ -53,13 +55,13 @@ void bind_handles(py::module_& module) {
       .def_property_readonly("rest", [](const PointHandle& self) { return self.rest_point; })
       .def_property_readonly("target", [](const PointHandle& self) { return self.target_point; });
   py::class_<RegionHandle, Handle>(
-      module, "Region",
+      module, "RegionHandle",
       "The listed samples (indices into the surface samples), moved by target·rest⁻¹ (4, 4 each, rigid).")
-      .def(py::init([](std::vector<Index> samples, const py::object& rest, const py::object& target,
+      .def(py::init([](const ArrayArgument& samples, const ArrayArgument& rest, const ArrayArgument& target,
                        double weight) {
              RegionHandle handle;
              handle.kind = Handle::Kind::region;
-             handle.samples = std::move(samples);
+             handle.samples = as_indices(samples, "samples");
              handle.rest = as_matrix4(rest, "rest");
              handle.target = as_matrix4(target, "target");
              handle.weight = weight;
@@ -74,15 +76,16 @@ void bind_handles(py::module_& module) {
 
 void bind_styles(py::module_& module) {
   module.def("style_names", &style_names, "Names of the preset styles, in menu order.");
-  module.def("preferred_normals", &preferred_normals, "name"_a,
-             "Unit face normals (k, 3) of a preset style's solid; its axis, where it has one, is z.");
+  module.def(
+      "preferred_normals", [](const StyleArgument& name) { return preferred_normals(as_text(name, "name")); },
+      "name"_a, "Unit face normals (k, 3) of a preset style's solid; its axis, where it has one, is z.");
   module.def(
       "gauss_preference",
-      [](const py::object& normals, const py::object& preferred, double sharpness) {
+      [](const ArrayArgument& normals, const ArrayArgument& preferred, double sharpness) {
         const Points directions = as_points(normals, "normals");
         return gauss_preference(as_points(preferred, "preferred"), sharpness).values(directions);
       },
-      "normals"_a, "preferred"_a, "sharpness"_a = StylizeOptions().sharpness,
+      "normals"_a, "preferred"_a, py::kw_only(), "sharpness"_a = StylizeOptions().sharpness,
       "How much each unit normal (n, 3) agrees with the preferred normals (k, 3): (n,) values\n"
       "g = sum_k w_k exp(sharpness n·n_k) with g(n_k) = 1, small far from all of them. Coinciding preferred\n"
       "normals raise InvalidInput that names the pair. After Kohlbrenner et al., Gauss Stylization (2021).");

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "bindings/arguments.h"
 #include "bindings/bind.h"
+#include "bindings/reports.h"
 #include "core/implicit.h"
 #include "core/parallel.h"
 #include "extraction/extract_deformed.h"
@@ -7,54 +9,54 @@
 namespace arapfields::python {
 namespace {
 
-void fill(const py::dict& report, const ExtractionReport& done) {
-  report.attr("update")("evaluations"_a = done.evaluations, "dense_evaluations"_a = done.dense_evaluations,
-                        "open"_a = done.open, "seconds"_a = done.seconds);
+py::dict fields(const ExtractionReport& done) {
+  return py::dict("evaluations"_a = done.evaluations, "dense_evaluations"_a = done.dense_evaluations,
+                  "open"_a = done.open, "seconds"_a = done.seconds);
 }
 
-py::tuple extract(const ImplicitFunction& sdf, int resolution, Task* task, int threads,
-                  const std::optional<py::dict>& report) {
+py::object extraction(const TriangleMesh& mesh, const char* kind, const py::dict& fields) {
+  return py::module_::import("arapfields.reports")
+      .attr("Extraction")(mesh.vertices, mesh.triangles, make_report(kind, fields));
+}
+
+ExtractionResult extract(const ImplicitFunction& sdf, int resolution, int threads, Task* task) {
   ExtractionReport done;
   const TriangleMesh mesh = run_long(task, [&](const Progress& progress) {
     const ThreadScope scope(threads);
     return extract_surface(sdf, resolution, progress, &done);
   });
-  if (report) fill(*report, done);
-  return py::make_tuple(mesh.vertices, mesh.triangles);
+  return extraction(mesh, "ExtractionReport", fields(done));
 }
 
-py::tuple extract_moved(const ImplicitFunction& sdf, const DeformationField& field, int resolution,
-                        const DeformationField* inverse, Task* task, int threads,
-                        const std::optional<py::dict>& report) {
+DeformedExtractionResult extract_moved(const ImplicitFunction& sdf, const DeformationField& field,
+                                       int resolution, const DeformationField* inverse, int threads,
+                                       Task* task) {
   DeformedReport done;
   const TriangleMesh mesh = run_long(task, [&](const Progress& progress) {
     const ThreadScope scope(threads);
     return extract_deformed(sdf, field, inverse, resolution, progress, &done);
   });
-  if (report) {
-    fill(*report, done);
-    report->attr("update")("inverted"_a = done.inverted, "failures"_a = done.failures,
-                           "spacing"_a = done.spacing);
-  }
-  return py::make_tuple(mesh.vertices, mesh.triangles);
+  py::dict all = fields(done);
+  all.attr("update")("inverted"_a = done.inverted, "failures"_a = done.failures, "spacing"_a = done.spacing);
+  return extraction(mesh, "DeformedExtractionReport", all);
 }
 
 }  // namespace
 
 void bind_extraction(py::module_& module) {
   module.def(
-      "extract_surface", &extract, "sdf"_a, "resolution"_a = ExtractionOptions().resolution,
-      "task"_a = py::none(), "threads"_a = 0, "report"_a = py::none(),
+      "extract_surface", &extract, "sdf"_a, "resolution"_a = ExtractionOptions().resolution, py::kw_only(),
+      "threads"_a = 0, "task"_a = py::none(),
       "The zero surface of a signed distance function as a mesh: V (n,3), F (m,3), in mesh coordinates.\n\n"
       "Marching cubes on `resolution` (8 to 512) grid points a side over the frame's cube, evaluated only\n"
       "where a measured bound on the gradient lets the surface be; the vertices are those of the whole "
       "grid.\n"
       "Triangles are counter-clockwise seen from outside; the mesh is a closed manifold unless the surface\n"
-      "leaves the cube. A dict given as `report` receives evaluations and dense_evaluations (points of the\n"
-      "grid), open (the mesh has a boundary) and seconds. InvalidInput for a bad resolution or no surface.");
+      "leaves the cube. What is returned unpacks into V and F, and has a `report` beside them.\n"
+      "InvalidInput for a bad resolution or no surface.");
   module.def(
       "extract_deformed", &extract_moved, "sdf"_a, "field"_a, "resolution"_a = ExtractionOptions().resolution,
-      "inverse"_a = py::none(), "task"_a = py::none(), "threads"_a = 0, "report"_a = py::none(),
+      py::kw_only(), "inverse"_a = py::none(), "threads"_a = 0, "task"_a = py::none(),
       "The deformed surface as the zero set of sdf ∘ field⁻¹: V (n,3), F (m,3), in mesh coordinates.\n\n"
       "Marching cubes on `resolution` (8 to 512) grid points a side over a cube around the deformed "
       "surface;\n"
@@ -62,12 +64,8 @@ void bind_extraction(py::module_& module) {
       "the\n"
       "field are not. Rest positions come from Newton's method, or from `inverse`, the field that\n"
       "train_inverse made of this one. They are asked for near the deformed surface alone; farther away\n"
-      "extract_surface's mesh, moved, decides the sides. A dict given as `report` receives what "
-      "extract_surface's does,\n"
-      "and inverted (points asked for), failures (those without a rest position beside the surface, where "
-      "the\n"
-      "distance to that mesh stands in) and spacing (of the grid, a length). Raises as extract_surface does, "
-      "and\n"
+      "extract_surface's mesh, moved, decides the sides. Returns and raises as extract_surface does, and "
+      "raises\n"
       "InvalidInput for a field that is not finite on the surface.");
 }
 

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "bindings/arguments.h"
+#include "bindings/arrays.h"
 #include "bindings/bind.h"
 #include "bindings/files.h"
+#include "bindings/reports.h"
 #include "fields/inverse.h"
 #include "io/files.h"
 
@@ -10,7 +13,7 @@ namespace {
 using FieldArray = py::array_t<double>;
 
 /// Jets at points of mesh coordinates, as one block.
-JetBlock<double> evaluate(const DeformationField& field, const py::object& points, JetOrder order,
+JetBlock<double> evaluate(const DeformationField& field, const ArrayArgument& points, JetOrder order,
                           Index& count) {
   const Points mesh = as_points(points, "points");
   require(mesh.allFinite(), "points", "some coordinates are NaN or infinite", "all must be finite");
@@ -20,13 +23,13 @@ JetBlock<double> evaluate(const DeformationField& field, const py::object& point
   return block;
 }
 
-Points values(const DeformationField& field, const py::object& points) {
+Points values(const DeformationField& field, const ArrayArgument& points) {
   const Points mesh = as_points(points, "points");
   require(mesh.allFinite(), "points", "some coordinates are NaN or infinite", "all must be finite");
   return run_long(nullptr, [&](const Progress&) { return field.at(mesh); });
 }
 
-FieldArray jacobian(const DeformationField& field, const py::object& points) {
+FieldArray jacobian(const DeformationField& field, const ArrayArgument& points) {
   Index count = 0;
   JetBlock<double> block = evaluate(field, points, JetOrder::first, count);
   FieldArray result({count, Index{3}, Index{3}});
@@ -37,7 +40,7 @@ FieldArray jacobian(const DeformationField& field, const py::object& points) {
   return result;
 }
 
-FieldArray hessian(const DeformationField& field, const py::object& points) {
+FieldArray hessian(const DeformationField& field, const ArrayArgument& points) {
   Index count = 0;
   JetBlock<double> block = evaluate(field, points, JetOrder::second, count);
   FieldArray result({count, Index{3}, Index{3}, Index{3}});
@@ -50,7 +53,7 @@ FieldArray hessian(const DeformationField& field, const py::object& points) {
   return result;
 }
 
-Points inverse(const DeformationField& field, const py::object& points, double tolerance, Task* task) {
+Points inverse(const DeformationField& field, const ArrayArgument& points, double tolerance, Task* task) {
   const Points mesh = as_points(points, "points");
   NewtonInverseOptions options;
   options.tolerance = tolerance;
@@ -59,21 +62,19 @@ Points inverse(const DeformationField& field, const py::object& points, double t
   });
 }
 
-py::object report(const py::object& self) { return py::getattr(self, "_report", py::dict()); }
-
-void save(const py::object& self, const py::object& path) {
+void save(const py::object& self, const PathArgument& path) {
   const auto& field = py::cast<const DeformationField&>(self);
-  const std::string place = as_path(path), measured = report_text(report(self));
+  const std::string place = as_path(path), measured = report_text(report_or_none(self));
   const py::gil_scoped_release release;
   save_field(place, field, measured);
 }
 
-py::object load(const py::object& path) {
+FieldResult load(const PathArgument& path) {
   const std::string place = as_path(path);
   std::string measured;
   py::object field =
       py::cast(run_long(nullptr, [&](const Progress&) { return load_field(place, &measured); }));
-  field.attr("_report") = report_from(measured);
+  attach_report(field, report_from(measured, place));
   return field;
 }
 
@@ -86,8 +87,8 @@ void bind_fields(py::module_& module) {
       .def("__call__", &values, "points"_a, "Where the points (p, 3) go: (p, 3).")
       .def("jacobian", &jacobian, "points"_a, "(p, 3, 3): [:, i, j] is the derivative of f_i by x_j.")
       .def("hessian", &hessian, "points"_a, "(p, 3, 3, 3): [:, i, j, k] is ∂²f_i/∂x_j∂x_k (1/length).")
-      .def("inverse", &inverse, "points"_a, "tolerance"_a = NewtonInverseOptions().tolerance,
-           "task"_a = nullptr,
+      .def("inverse", &inverse, "points"_a, py::kw_only(), "tolerance"_a = NewtonInverseOptions().tolerance,
+           "task"_a = py::none(),
            "Points (p, 3) that the field takes to `points`, by Newton's method with the analytic Jacobian; "
            "rows\n"
            "of NaN where none was found within `tolerance`, a share of frame.scale (half the side of the "
@@ -98,7 +99,12 @@ void bind_fields(py::module_& module) {
       .def_property_readonly(
           "frame", [](const DeformationField& self) { return self.frame(); },
           "Mesh coordinates and the unit cube in which the field works.")
-      .def_property_readonly("report", &report, "What the solve measured: a dict; empty for none.")
+      .def_property_readonly(
+          "report", [](const py::object& self) { return FieldReportResult(report_of(self)); },
+          "What the solve measured: SolveReport of deform and stylize, LiveReport, InverseReport.\n"
+          "AttributeError for a field without one.")
+      // DeformationField[SolveReport] in annotations that are evaluated; see the stub.
+      .def_static("__class_getitem__", [](const py::object&) { return py::type::of<DeformationField>(); })
       .def("save", &save, "path"_a,
            "Writes field and report as one file, whole or not at all; OSError where that fails, InvalidInput "
            "for\n"

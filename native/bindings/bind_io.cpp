@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "bindings/arguments.h"
 #include "bindings/files.h"
 #include "io/output_file.h"
 
@@ -19,11 +20,16 @@ std::string as_path(const py::object& path) {
 }
 
 std::string report_text(const py::object& report) {
-  return py::cast<std::string>(py::module_::import("arapfields._files").attr("json_text")(report));
+  return py::cast<std::string>(py::module_::import("arapfields._report_files").attr("to_json")(report));
 }
 
-py::dict report_from(const std::string& text) {
-  return py::module_::import("json").attr("loads")(text).cast<py::dict>();
+py::object report_from(const std::string& text, const std::string& place) {
+  try {
+    return py::module_::import("arapfields._report_files").attr("from_json")(text);
+  } catch (const py::error_already_set& error) {
+    if (!error.matches(PyExc_Exception)) throw;
+    throw InvalidInput(place + ": " + py::cast<std::string>(py::str(error.value())));
+  }
 }
 
 void bind_io(py::module_& module) {
@@ -34,18 +40,18 @@ void bind_io(py::module_& module) {
       "by\n"
       "the next output of the same name. OSError where the system refuses, InvalidInput for a place that is\n"
       "no regular file and where nothing arrived.")
-      .def(py::init([](const py::object& path) { return std::make_unique<OutputFile>(as_path(path)); }),
+      .def(py::init([](const PathArgument& path) { return std::make_unique<OutputFile>(as_path(path)); }),
            "path"_a)
       .def_property_readonly(
           "partial",
           [](const OutputFile& self) {
-            return py::module_::import("os").attr("fsdecode")(py::bytes(self.partial()));
+            return py::str(py::module_::import("os").attr("fsdecode")(py::bytes(self.partial())));
           },
           "Where to write: a file of the same name in a temporary folder beside its place.")
       .def_property_readonly(
           "beside",
           [](const OutputFile& self) {
-            return py::module_::import("os").attr("fsdecode")(py::bytes(self.beside()));
+            return py::str(py::module_::import("os").attr("fsdecode")(py::bytes(self.beside())));
           },
           "The same in the place's own folder, for content with paths relative to it.")
       .def("finish", &OutputFile::finish, py::call_guard<py::gil_scoped_release>(),

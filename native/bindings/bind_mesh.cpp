@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "bindings/arguments.h"
+#include "bindings/arrays.h"
 #include "bindings/bind.h"
+#include "bindings/reports.h"
 #include "mesh/sample_mesh.h"
 #include "options/sampling.h"
 
 namespace arapfields::python {
 namespace {
 
-SurfaceSamples checked_samples(const py::object& points, const py::object& normals,
+SurfaceSamples checked_samples(const ArrayArgument& points, const ArrayArgument& normals,
                                const std::optional<Frame>& frame) {
   const Points p = as_points(points, "points");
   Points n = as_points(normals, "normals");
@@ -34,7 +37,7 @@ std::string text(const Frame& frame) {
 
 void bind_mesh(py::module_& module) {
   py::class_<SurfaceSamples>(
-      module, "SurfaceSamples",
+      module, "SurfaceSamples", py::dynamic_attr(),
       "Points spread uniformly by area over a rest surface, with outward unit normals.\n\n"
       "Arrays are in mesh coordinates; `frame` maps them to the unit cube in which fields\n"
       "and energies live, and fields solved on the samples inherit it.")
@@ -48,6 +51,9 @@ void bind_mesh(py::module_& module) {
       .def_property_readonly(
           "normals", [](const SurfaceSamples& s) { return s.normals; }, "(n,3), unit length.")
       .def_readonly("frame", &SurfaceSamples::frame, "Mesh coordinates and the unit cube.")
+      .def_property_readonly(
+          "report", [](const py::object& self) { return SampleReportResult(report_of(self)); },
+          "What sample_surface did; AttributeError for samples of anything else.")
       .def("__len__", [](const SurfaceSamples& s) { return s.size(); })
       .def("__repr__", [](const SurfaceSamples& s) {
         return "SurfaceSamples(" + std::to_string(s.size()) + " points, " + text(s.frame) + ")";
@@ -55,12 +61,13 @@ void bind_mesh(py::module_& module) {
 
   module.def(
       "sample_mesh",
-      [](const py::object& vertices, const py::object& triangles, Index count, std::uint64_t seed) {
+      [](const ArrayArgument& vertices, const ArrayArgument& triangles, Index count, std::uint64_t seed) {
         const Points v = as_points(vertices, "vertices");
         const Triangles f = as_triangles(triangles, "triangles");
         return run_long(nullptr, [&](const Progress&) { return sample_mesh(v, f, count, seed); });
       },
-      "vertices"_a, "triangles"_a, "count"_a = SampleOptions().count, "seed"_a = SampleOptions().seed,
+      "vertices"_a, "triangles"_a, "count"_a = SampleOptions().count, py::kw_only(),
+      "seed"_a = SampleOptions().seed,
       "Independent samples of a mesh, uniform by area, with the triangles' unit normals.\n\n"
       "vertices (n,3), triangles (m,3) counter-clockwise seen from outside. The frame centres the bounding "
       "box\n"

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "bindings/arguments.h"
+#include "bindings/arrays.h"
 #include "bindings/bind.h"
 #include "bindings/files.h"
+#include "bindings/reports.h"
 #include "io/files.h"
 #include "neural/layers.h"
 #include "neural/neural_sdf.h"
@@ -8,11 +11,25 @@
 namespace arapfields::python {
 namespace {
 
-Layers as_layers(const py::sequence& weights, const py::sequence& biases) {
+/// More than any network that the options allow has.
+constexpr std::size_t most_layers = 1024;
+
+std::vector<py::object> listed(const py::object& arrays, const std::string& argument) {
+  std::vector<py::object> items;
+  for_each_item(arrays, argument, "a list of arrays, one a layer, is needed", sizeof(py::object),
+                [&](const py::object& item, const std::string&) {
+                  require(items.size() < most_layers, argument, "more than " + std::to_string(most_layers),
+                          "one a layer is needed");
+                  items.push_back(item);
+                });
+  return items;
+}
+
+Layers as_layers(const py::object& weights, const py::object& biases) {
   Layers layers;
-  for (const auto& weight : weights)
+  for (const py::object& weight : listed(weights, "weights"))
     layers.weights.emplace_back(as_matrix(weight, "weights[" + std::to_string(layers.weights.size()) + "]"));
-  for (const auto& bias : biases)
+  for (const py::object& bias : listed(biases, "biases"))
     layers.biases.emplace_back(as_vector(bias, "biases[" + std::to_string(layers.biases.size()) + "]"));
   return layers;
 }
@@ -23,33 +40,28 @@ py::array_t<double> as_array(const Vector& flat, const std::vector<Index>& shape
   return array;
 }
 
-Points finite_points(const py::object& points) {
+Points finite_points(const ArrayArgument& points) {
   Points p = as_points(points, "points");
   require(p.allFinite(), "points", "some coordinates are NaN or infinite", "all must be finite");
   return p;
 }
 
-py::object report(const py::object& self) { return py::getattr(self, "_report", py::dict()); }
-
-void save(const py::object& self, const py::object& path) {
+void save(const py::object& self, const PathArgument& path) {
   const auto& sdf = py::cast<const NeuralSdf&>(self);
-  const std::string place = as_path(path), measured = report_text(report(self));
+  const std::string place = as_path(path), measured = report_text(report_or_none(self));
   const py::gil_scoped_release release;
   save_sdf(place, sdf, measured);
 }
 
-py::object load(const py::object& path) {
+NeuralSdfResult load(const PathArgument& path) {
   const std::string place = as_path(path);
   std::string measured;
   py::object sdf = py::cast(run_long(nullptr, [&](const Progress&) { return load_sdf(place, &measured); }));
-  sdf.attr("_report") = report_from(measured);
+  attach_report(sdf, report_from(measured, place));
   return sdf;
 }
 
 void bind_sdf(py::module_& module) {
-  py::class_<ImplicitFunction, std::shared_ptr<ImplicitFunction>>(
-      module, "ImplicitFunction",
-      "A function on the unit cube whose zero set is a surface; negative inside.");
   py::class_<NeuralSdf, ImplicitFunction, std::shared_ptr<NeuralSdf>>(
       module, "NeuralSdf", py::dynamic_attr(),
       "A signed distance function by a network: negative inside, in the mesh's coordinates and unit.\n\n"
@@ -59,7 +71,7 @@ void bind_sdf(py::module_& module) {
       "its value at the cube's nearest point plus the distance to that point.")
       .def_static(
           "from_layers",
-          [](const py::sequence& weights, const py::sequence& biases, int octaves, double frequency,
+          [](const ArraysArgument& weights, const ArraysArgument& biases, int octaves, double frequency,
              double sharpness) {
             return NeuralSdf::from_layers(as_layers(weights, biases), octaves, frequency, sharpness);
           },
@@ -73,14 +85,14 @@ void bind_sdf(py::module_& module) {
           "sharpness is softplus's beta. InvalidInput where shapes do not fit or numbers are not finite.")
       .def(
           "__call__",
-          [](const NeuralSdf& sdf, const py::object& points) {
+          [](const NeuralSdf& sdf, const ArrayArgument& points) {
             const Points p = finite_points(points);
             return run_long(nullptr, [&](const Progress&) { return sdf.distances(p); });
           },
           "points"_a, "Distances (p,) at points (p,3), negative inside; mesh coordinates and unit.")
       .def(
           "gradient",
-          [](const NeuralSdf& sdf, const py::object& points) {
+          [](const NeuralSdf& sdf, const ArrayArgument& points) {
             const Points p = finite_points(points);
             return run_long(nullptr, [&](const Progress&) { return sdf.gradients(p); });
           },
@@ -90,13 +102,14 @@ void bind_sdf(py::module_& module) {
           [](const NeuralSdf& sdf) {
             const MlpShape& shape = sdf.shape();
             Layers layers = sdf.layers();
-            return py::make_tuple(layers.weights, layers.biases, shape.octaves, shape.frequency,
-                                  shape.softplus_sharpness);
+            return std::make_tuple(layers.weights, layers.biases, shape.octaves, shape.frequency,
+                                   shape.softplus_sharpness);
           },
           "The network's numbers, as from_layers takes them: weights, biases, octaves, frequency, sharpness.")
       .def_property_readonly("frame", &NeuralSdf::frame, "Mesh coordinates and the unit cube.")
-      .def_property_readonly("report", &report,
-                             "What the fit measured, as a dict (see fit_sdf); empty for none.")
+      .def_property_readonly(
+          "report", [](const py::object& self) { return FitReportResult(report_of(self)); },
+          "What the fit measured; AttributeError for a network that fit_sdf did not make.")
       .def("save", &save, "path"_a,
            "Writes network, frame and report as one file, whole or not at all; OSError where that fails.")
       .def_static(
@@ -128,9 +141,8 @@ void bind_testing(py::module_& module) {
       .def("run", &JetTrial::run, py::call_guard<py::gil_scoped_release>());
   testing.def(
       "mlp_jets",
-      [](const py::sequence& weights, const py::sequence& biases, int octaves, double frequency,
-         double sharpness, const py::object& points, int order, const py::object& cotangents,
-         bool double_precision) {
+      [](const py::object& weights, const py::object& biases, int octaves, double frequency, double sharpness,
+         const py::object& points, int order, const py::object& cotangents, bool double_precision) {
         const Layers layers = as_layers(weights, biases);
         const MlpShape shape = shape_of(layers, octaves, frequency, sharpness);
         const Points where = as_points(points, "points");
@@ -146,7 +158,7 @@ void bind_testing(py::module_& module) {
       "gradient.");
   testing.def(
       "step_muon",
-      [](const py::sequence& weights, const py::sequence& biases, int octaves, const py::object& gradient,
+      [](const py::object& weights, const py::object& biases, int octaves, const py::object& gradient,
          double learning_rate) {
         const Layers layers = as_layers(weights, biases);
         const MlpShape shape = shape_of(layers, octaves, 1.0, 30.0);
@@ -159,6 +171,7 @@ void bind_testing(py::module_& module) {
 }  // namespace
 
 void bind_neural(py::module_& module) {
+  bind_implicit(module);
   bind_sdf(module);
   bind_testing(module);
 }

@@ -1,24 +1,30 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "bindings/arguments.h"
 #include "bindings/bind.h"
+#include "bindings/python_function.h"
+#include "bindings/reports.h"
 #include "core/parallel.h"
 #include "sampling/sample_surface.h"
 
 namespace arapfields::python {
 namespace {
 
-SurfaceSamples sample(const std::shared_ptr<ImplicitFunction>& sdf, int count, std::int64_t seed, Task* task,
-                      int threads, const std::optional<py::dict>& report) {
+SurfaceSamplesResult sample(const FunctionArgument& sdf, int count, std::int64_t seed, int threads,
+                            Task* task) {
+  const std::shared_ptr<const ImplicitFunction> function = as_function(sdf, "sdf");
   SampleReport done;
-  SurfaceSamples samples = run_long(task, [&](const Progress& progress) {
+  py::object samples = py::cast(run_long(task, [&](const Progress& progress) {
     const ThreadScope scope(threads);
-    return sample_surface(std::shared_ptr<const ImplicitFunction>(sdf), {.count = count, .seed = seed},
-                          progress, &done);
-  });
-  if (report)
-    report->attr("update")(
-        "lines"_a = done.lines, "evaluations"_a = done.value_evaluations + done.gradient_evaluations,
-        "gradient_evaluations"_a = done.gradient_evaluations, "model_evaluations"_a = done.model_evaluations,
-        "lipschitz"_a = done.lipschitz, "largest_value"_a = done.largest_value, "seconds"_a = done.seconds);
+    return sample_surface(function, {.count = count, .seed = seed}, progress, &done);
+  }));
+  attach_report(
+      samples,
+      make_report("SampleReport",
+                  py::dict("lines"_a = done.lines,
+                           "evaluations"_a = done.value_evaluations + done.gradient_evaluations,
+                           "gradient_evaluations"_a = done.gradient_evaluations,
+                           "model_evaluations"_a = done.model_evaluations, "lipschitz"_a = done.lipschitz,
+                           "largest_value"_a = done.largest_value, "seconds"_a = done.seconds)));
   return samples;
 }
 
@@ -26,15 +32,13 @@ SurfaceSamples sample(const std::shared_ptr<ImplicitFunction>& sdf, int count, s
 
 void bind_sampling(py::module_& module) {
   module.def(
-      "sample_surface", &sample, "sdf"_a.none(false), "count"_a = SampleOptions().count,
-      "seed"_a = SampleOptions().seed, "task"_a = py::none(), "threads"_a = 0, "report"_a = py::none(),
+      "sample_surface", &sample, "sdf"_a, "count"_a = SampleOptions().count, py::kw_only(),
+      "seed"_a = SampleOptions().seed, "threads"_a = 0, "task"_a = py::none(),
       "Samples of the zero surface of a signed distance function, uniform by area, with unit normals.\n\n"
       "All crossings of random lines through the cube, thinned to `count` (1 to 100 million) at random, in\n"
       "random order; every point has |sdf| <= 1e-4 of the cube's half side, nearly all <= 2e-6. Follows\n"
       "Ling et al. 2025, \"Uniform sampling of surfaces by casting rays\". The same seed gives the same\n"
-      "points. A dict given as `report` receives lines, evaluations (of the network, in points, those with\n"
-      "gradients included), gradient_evaluations, model_evaluations (spent before the first line),\n"
-      "lipschitz (the bound on the gradient), largest_value and seconds.\n"
+      "points. report: a SampleReport.\n"
       "InvalidInput for a bad count and for a function without a zero surface in its cube.");
 }
 

@@ -1,5 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "bindings/arguments.h"
+#include "bindings/arrays.h"
 #include "bindings/bind.h"
+#include "bindings/handles.h"
+#include "bindings/python_function.h"
+#include "bindings/reports.h"
 #include "core/device.h"
 #include "energies/styles.h"
 #include "solve/deform.h"
@@ -10,42 +15,39 @@
 namespace arapfields::python {
 namespace {
 
-py::dict report_dict(const SolveReport& report, double scale) {
-  const auto mean_of = [](const std::vector<double>& values) {
-    double sum = 0.0;
-    for (const double value : values) sum += value;
-    return values.empty() ? 0.0 : sum / static_cast<double>(values.size());
-  };
-  const auto max_of = [](const std::vector<double>& values) {
-    return values.empty() ? 0.0 : *std::max_element(values.begin(), values.end());
-  };
-  py::dict result(
-      "stretch"_a = report.arap.stretch, "bend"_a = report.arap.bend, "energy"_a = report.energy,
-      "handle_error_mean"_a = mean_of(report.handle_mean), "handle_error_max"_a = max_of(report.handle_max),
-      "handles"_a = py::list(), "min_determinant"_a = report.distortion.min_determinant,
-      "flipped_share"_a = report.distortion.flipped_share, "max_stretch"_a = report.distortion.max_stretch,
-      "min_stretch"_a = report.distortion.min_stretch, "iterations"_a = report.loop.iterations,
-      "seconds"_a = report.loop.seconds, "out_of_time"_a = report.loop.stopped_by == StopReason::time_budget,
-      "scale"_a = scale, "loss"_a = py::list(), "notes"_a = report.notes);
-  for (const auto& [iteration, loss] : report.loop.history)
-    py::list(result["loss"]).append(py::cast(std::vector<double>{static_cast<double>(iteration), loss}));
-  for (std::size_t i = 0; i < report.handle_mean.size(); ++i)
-    py::list(result["handles"])
-        .append(py::dict("error_mean"_a = report.handle_mean[i], "error_max"_a = report.handle_max[i]));
-  if (report.preference) result["preference"] = *report.preference;
-  if (report.far_target) result["far_target"] = *report.far_target;
-  return result;
+py::object solve_report(const SolveReport& report, double scale) {
+  double mean = 0.0, max = 0.0;
+  py::list handles, loss;
+  const py::object handle_error = py::module_::import("arapfields.reports").attr("HandleError");
+  for (std::size_t i = 0; i < report.handle_mean.size(); ++i) {
+    mean += report.handle_mean[i] / static_cast<double>(report.handle_mean.size());
+    max = std::max(max, report.handle_max[i]);
+    handles.append(
+        handle_error("error_mean"_a = report.handle_mean[i], "error_max"_a = report.handle_max[i]));
+  }
+  for (const auto& [iteration, value] : report.loop.history) loss.append(py::make_tuple(iteration, value));
+  return make_report(
+      "SolveReport",
+      py::dict("stretch"_a = report.arap.stretch, "bend"_a = report.arap.bend, "energy"_a = report.energy,
+               "handle_error_mean"_a = mean, "handle_error_max"_a = max, "handles"_a = py::tuple(handles),
+               "min_determinant"_a = report.distortion.min_determinant,
+               "flipped_share"_a = report.distortion.flipped_share,
+               "max_stretch"_a = report.distortion.max_stretch,
+               "min_stretch"_a = report.distortion.min_stretch, "iterations"_a = report.loop.iterations,
+               "seconds"_a = report.loop.seconds, "stopped_by"_a = name_of(report.loop.stopped_by),
+               "scale"_a = scale, "loss"_a = py::tuple(loss), "notes"_a = py::tuple(py::cast(report.notes)),
+               "preference"_a = report.preference, "far_target"_a = report.far_target));
 }
 
 py::object wrap(const Solution& solution) {
   py::object field = py::cast(solution.field);
-  field.attr("_report") = report_dict(solution.report, solution.field->frame().scale);
+  attach_report(field, solve_report(solution.report, solution.field->frame().scale));
   return field;
 }
 
 /// Runs a solver without the GIL; a divergence reaches Python with the last good field.
 template <class Solve>
-py::object solve(Task* task, Solve&& call) {
+FieldResult solve(Task* task, Solve&& call) {
   try {
     return wrap(run_long(task, call));
   } catch (const SolveDiverged& error) {
@@ -53,81 +55,104 @@ py::object solve(Task* task, Solve&& call) {
   }
 }
 
-Points preferred_from(const py::object& style, const py::object& orientation) {
+FieldResult deform_samples(const SurfaceSamples& samples, const HandlesArgument& handles,
+                           const DeformOptions& options, const EnergiesArgument& energies,
+                           const std::optional<CallbackArgument>& callback, Task* task) {
+  const auto held = as_handles(handles);
+  const SolveHooks hooks{as_energies(energies, samples.frame), as_observer(callback.value_or(py::none()))};
+  return solve(task, [&](const Progress& p) { return deform(samples, held, options, p, hooks); });
+}
+
+Points preferred_from(const NormalsArgument& style, const std::optional<ArrayArgument>& orientation) {
   const Points normals = py::isinstance<py::str>(style) ? preferred_normals(py::cast<std::string>(style))
                                                         : as_points(style, "normals");
-  if (orientation.is_none()) return normals;
-  const Eigen::MatrixXd turn = as_matrix(orientation, "orientation");
+  if (!orientation) return normals;
+  const Eigen::MatrixXd turn = as_matrix(*orientation, "orientation");
   require(turn.rows() == 3 && turn.cols() == 3 && turn.allFinite() &&
               (turn.transpose() * turn - Mat3::Identity()).norm() < 1e-4,
           "orientation", "not an orthogonal 3×3 matrix", "a rotation is needed");
   return normals * turn.transpose();
 }
 
+FieldResult stylize_samples(const SurfaceSamples& samples, const NormalsArgument& normals,
+                            const StylizeOptions& options, const HandlesArgument& handles,
+                            const std::optional<ArrayArgument>& weights,
+                            const std::optional<ArrayArgument>& orientation, const EnergiesArgument& energies,
+                            const std::optional<CallbackArgument>& callback, Task* task) {
+  const Points preferred = preferred_from(normals, orientation);
+  const Vector blend = weights ? as_vector(*weights, "weights") : Vector();
+  const auto held = as_handles(handles);
+  const SolveHooks hooks{as_energies(energies, samples.frame), as_observer(callback.value_or(py::none()))};
+  return solve(
+      task, [&](const Progress& p) { return stylize(samples, preferred, options, p, blend, held, hooks); });
+}
+
+InverseResult inverse_of(const DeformationField& field, const SurfaceSamples& samples,
+                         const InverseTrainingOptions& options, Task* task) {
+  const Solution solution =
+      run_long(task, [&](const Progress& p) { return train_inverse(field, samples, options, p); });
+  py::object result = py::cast(solution.field);
+  const SolveReport& r = solution.report;
+  attach_report(result,
+                make_report("InverseReport",
+                            py::dict("error_mean"_a = r.handle_mean[0], "error_max"_a = r.handle_max[0],
+                                     "iterations"_a = r.loop.iterations, "seconds"_a = r.loop.seconds)));
+  return result;
+}
+
 /// What the field does at points of mesh coordinates.
-FieldMeasures measures(const DeformationField& field, const py::object& points) {
+FieldMeasures measures(const DeformationField& field, const ArrayArgument& points) {
   const Points where = as_points(points, "points");
   return run_long(nullptr, [&](const Progress&) { return measure_at(field, where); });
 }
 
-py::tuple energy_of(const DeformationField& field, const py::object& points) {
+std::pair<double, double> energy_of(const DeformationField& field, const ArrayArgument& points) {
   const ArapValue value = measures(field, points).arap;
-  return py::make_tuple(value.stretch, value.bend);
+  return {value.stretch, value.bend};
 }
 
 }  // namespace
 
 void bind_solve(py::module_& module) {
   module.def(
-      "deform",
-      [](const SurfaceSamples& samples, const std::vector<Handle>& handles, const DeformOptions& options,
-         Task* task) {
-        return solve(task, [&](const Progress& p) { return deform(samples, handles, options, p); });
-      },
-      "samples"_a, "handles"_a, py::arg_v("options", DeformOptions(), "DeformOptions()"), "task"_a = nullptr,
-      "The DeformationField that moves the surface's handles (Cuboid, Point, Region) to their targets and is "
-      "as\n"
-      "rigid as possible on the samples elsewhere: it minimises mean stretch + bending · mean bend +\n"
-      "handle_weight · mean squared handle distance (section 4 of As-Rigid-As-Possible Regularization for\n"
-      "Implicit Surfaces, with the stretch as printed there; the authors' package divides it by 3).\n"
-      "field.report holds energies, handle errors, the smallest det J, times and the loss history.\n"
+      "deform", &deform_samples, "samples"_a, "handles"_a,
+      py::arg_v("options", DeformOptions(), "DeformOptions()"), py::kw_only(), "energies"_a = py::tuple(),
+      "callback"_a = py::none(), "task"_a = py::none(),
+      "The DeformationField that moves the surface's handles (CuboidHandle, PointHandle, RegionHandle) to "
+      "their\n"
+      "targets and is as rigid as possible on the samples elsewhere: it minimises mean stretch + bending · "
+      "mean\n"
+      "bend + handle_weight · mean squared handle distance (section 4 of As-Rigid-As-Possible "
+      "Regularization\n"
+      "for Implicit Surfaces, with the stretch as printed there; the authors' package divides it by 3), and\n"
+      "each of `energies`, functions of Jets that return an EnergyValue. `callback` is told of each "
+      "Iteration\n"
+      "(terms: stretch, bend, barrier, handles, invertibility, energies[i], those that there are); raising\n"
+      "StopIteration in it ends the solve with what was reached, anything else comes through.\n"
+      "field.report is a SolveReport: energies, handle errors, the smallest det J, times, the loss history.\n"
       "Raises InvalidInput, Cancelled, and Diverged, whose attribute `last_good` is the field before that.");
   module.def(
-      "stylize",
-      [](const SurfaceSamples& samples, const py::object& normals, const StylizeOptions& options, Task* task,
-         const py::object& weights, const std::vector<Handle>& handles, const py::object& orientation) {
-        const Points preferred = preferred_from(normals, orientation);
-        const Vector blend = weights.is_none() ? Vector() : as_vector(weights, "weights");
-        return solve(
-            task, [&](const Progress& p) { return stylize(samples, preferred, options, p, blend, handles); });
-      },
-      "samples"_a, "normals"_a, py::arg_v("options", StylizeOptions(), "StylizeOptions()"),
-      "task"_a = nullptr, "weights"_a = py::none(), "handles"_a = std::vector<Handle>(),
-      "orientation"_a = py::none(),
+      "stylize", &stylize_samples, "samples"_a, "normals"_a,
+      py::arg_v("options", StylizeOptions(), "StylizeOptions()"), py::kw_only(), "handles"_a = py::tuple(),
+      "weights"_a = py::none(), "orientation"_a = py::none(), "energies"_a = py::tuple(),
+      "callback"_a = py::none(), "task"_a = py::none(),
       "The DeformationField that turns the surface's normals to preferred ones: `normals` (k, 3) or a "
       "style's\n"
       "name, turned by `orientation` (3, 3). `weights` (n,) blend the effect sample by sample. Without "
       "handles\n"
-      "the lowest sample stays in place; strength 0 is the identity. field.report['preference'] is the mean\n"
-      "preference reached. Raises as deform does.");
+      "the lowest sample stays in place (nearly, beside `energies`); strength 0 is the identity. `energies` "
+      "and `callback` are deform's, "
+      "with\n"
+      "one more term, style. field.report is a SolveReport with the mean preference reached. Raises as "
+      "deform\n"
+      "does.");
   module.def(
-      "train_inverse",
-      [](const DeformationField& field, const SurfaceSamples& samples, const InverseTrainingOptions& options,
-         Task* task) {
-        const Solution solution =
-            run_long(task, [&](const Progress& p) { return train_inverse(field, samples, options, p); });
-        py::object result = py::cast(solution.field);
-        const SolveReport& r = solution.report;
-        result.attr("_report") = py::dict("error_mean"_a = r.handle_mean[0], "error_max"_a = r.handle_max[0],
-                                          "iterations"_a = r.loop.iterations, "seconds"_a = r.loop.seconds);
-        return result;
-      },
-      "field"_a, "samples"_a, py::arg_v("options", InverseTrainingOptions(), "InverseTrainingOptions()"),
-      "task"_a = nullptr,
+      "train_inverse", &inverse_of, "field"_a, "samples"_a,
+      py::arg_v("options", InverseTrainingOptions(), "InverseTrainingOptions()"), py::kw_only(),
+      "task"_a = py::none(),
       "A network that approximates field's inverse, as a DeformationField: trained so that the field takes\n"
       "its values back, at deformed samples and in their box (the paper's cycle loss), and on the samples'\n"
-      "own pairs. report: error_mean and error_max over the samples, in mesh units. For exact inverses of\n"
-      "single points use field.inverse.");
+      "own pairs. report: an InverseReport. For exact inverses of single points use field.inverse.");
   module.def("device_report", &device_report,
              "In words: whether device='cuda' can be asked for, and if not, why.");
   module.def("arap_energy", &energy_of, "field"_a, "points"_a,
@@ -135,7 +160,7 @@ void bind_solve(py::module_& module) {
              "stretch ‖J − R‖² with R the rotation closest to J, bend the squared speed at which R turns.");
   module.def(
       "distortion",
-      [](const DeformationField& field, const py::object& points) {
+      [](const DeformationField& field, const ArrayArgument& points) {
         return measures(field, points).distortion;
       },
       "field"_a, "points"_a,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bindings/bind.h"
 #include "bindings/jet_arrays.h"
+#include "bindings/python_function.h"
 #include "core/aten_path.h"
 #include "solve/loss_probe.h"
 
@@ -8,10 +9,14 @@ namespace arapfields::python {
 void bind_solve_testing(py::module_& module) {
   py::module_ testing = testing_module(module);
   py::class_<LossProbe>(testing, "LossProbe")
-      .def(py::init<const SurfaceSamples&, const std::vector<Handle>&, int, double, const Points&, double,
-                    double, double>(),
+      .def(py::init([](const SurfaceSamples& samples, const std::vector<Handle>& handles, int width,
+                       double bending, const Points& preferred, double gauss, double barrier, double margin,
+                       const py::object& energies) {
+             return std::make_unique<LossProbe>(samples, handles, width, bending, preferred, gauss, barrier,
+                                                margin, as_energies(energies, samples.frame));
+           }),
            "samples"_a, "handles"_a, "width"_a = 8, "bending"_a = 0.0, "preferred"_a = Points(),
-           "gauss"_a = 0.0, "barrier"_a = 0.0, "margin"_a = 0.0)
+           "gauss"_a = 0.0, "barrier"_a = 0.0, "margin"_a = 0.0, "energies"_a = py::tuple())
       .def(
           "__call__",
           [](LossProbe& self, const Vector& parameters, std::uint64_t seed) {

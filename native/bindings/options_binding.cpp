@@ -50,13 +50,24 @@ void bind_attributes(py::object cls, const std::vector<OptionAttribute>& attribu
     fields.append(attribute.name);
   }
   cls.attr("fields") = py::tuple(fields);
+  const py::handle kind = cls;  // a class of ours lives as long as its module
+  const auto mine = [kind](py::handle self) {
+    if (!py::isinstance(self, kind))
+      throw py::type_error("a method of " + py::cast<std::string>(kind.attr("__name__")) + ": got " +
+                           py::cast<std::string>(py::str(py::type::handle_of(self))));
+    return self;
+  };
   const auto method = [&](const char* name, const auto& body, const char* doc) {
     cls.attr(name) = py::cpp_function(body, py::name(name), py::is_method(cls), py::doc(doc));
   };
-  method("to_dict", &to_dict, "to_dict(self) -> dict[str, typing.Any]\n\nThe options by name, in order.");
-  method("__repr__", &shown, "__repr__(self) -> str");
+  method(
+      "to_dict", [mine](py::handle self) { return to_dict(mine(self)); },
+      "to_dict(self) -> dict[str, typing.Any]\n\nThe options by name, in order.");
+  method("__repr__", [mine](py::handle self) { return shown(mine(self)); }, "__repr__(self) -> str");
   cls.attr("__hash__") = py::none();
-  method("__eq__", &equal, "__eq__(self, other: object) -> bool");
+  method(
+      "__eq__", [mine](py::handle self, py::handle other) { return equal(mine(self), other); },
+      "__eq__(self, other: object) -> bool");
 }
 
 void set_attributes(py::handle self, const py::kwargs& given) {

@@ -79,7 +79,7 @@ class Fit final : public LoopBody {
     batches_.next();
     const at::Tensor off = mlp_.forward(batches_.points, JetOrder::value).view({-1}) - batches_.distances;
     mlp_.pull_back(at::sign(off).div_(static_cast<double>(options_.training.batch)).view({1, -1, 1}));
-    return off.abs_().mean();
+    return error_ = off.abs_().mean();
   }
   bool is_good_enough() override {
     if (options_.target_error <= 0) return false;
@@ -87,6 +87,7 @@ class Fit final : public LoopBody {
     return errors(mlp_, held_out_.points.narrow(0, 0, some), held_out_.distances.narrow(0, 0, some)).mean <=
            options_.target_error;
   }
+  std::vector<LossTerm> terms() const override { return {{"error", error_.item<double>()}}; }
   std::string message(int count, double loss, double) const override {
     char text[120];
     std::snprintf(text, sizeof text, "iteration %d of %d, mean error %.2g of the cube", count,
@@ -99,10 +100,12 @@ class Fit final : public LoopBody {
   Mlp& mlp_;
   const Examples& held_out_;
   Batches batches_;
+  at::Tensor error_;
 };
 
-LoopOptions loop_options(const FitOptions& options) {
+LoopOptions loop_options(const FitOptions& options, const IterationObserver& observer) {
   LoopOptions loop;
+  loop.observer = observer;
   loop.training = options.training;
   double& rate = loop.training.learning_rate;
   if (rate == 0.0) rate = FitOptions::automatic_learning_rate(options.training.optimizer);
@@ -114,7 +117,7 @@ LoopOptions loop_options(const FitOptions& options) {
 }  // namespace
 
 FitResult fit_sdf(PointsIn vertices, TrianglesIn triangles, const FitOptions& options,
-                  const Progress& progress) {
+                  const Progress& progress, const IterationObserver& observer) {
   const Stopwatch watch;
   options.validate();
   require_memory("near_points", example_bytes * options.points.near_points);
@@ -144,7 +147,7 @@ FitResult fit_sdf(PointsIn vertices, TrianglesIn triangles, const FitOptions& op
   LoopResult loop;
   try {
     Fit fit(options, mlp, examples, held_out);
-    loop = run_training({mlp.parameters(), mlp.gradient(), &mlp}, fit, loop_options(options),
+    loop = run_training({mlp.parameters(), mlp.gradient(), &mlp}, fit, loop_options(options, observer),
                         progress.part(0.1, 1.0));
   } catch (const LoopDiverged& error) {
     diverged = error.what();

@@ -6,6 +6,7 @@
 
 #include "core/errors.h"
 #include "core/task.h"
+#include "neural/iteration.h"
 #include "neural/loop_result.h"
 #include "neural/neural_sdf.h"
 #include "options/fit.h"
@@ -36,8 +37,9 @@ class ARAPFIELDS_EXPORT FitDiverged : public Diverged {
 };
 
 /// Fits a network to the signed distance of a triangle soup (vertices (n,3), triangles (m,3)), in the frame
-/// that centres it and scales it to half-extent 0.75. Throws InvalidInput, FitDiverged, Cancelled.
+/// that centres it and scales it to half-extent 0.75. An observer is told of one term, error. Throws
+/// InvalidInput, FitDiverged, Cancelled.
 ARAPFIELDS_EXPORT FitResult fit_sdf(PointsIn vertices, TrianglesIn triangles, const FitOptions& options = {},
-                                    const Progress& progress = {});
+                                    const Progress& progress = {}, const IterationObserver& observer = {});
 
 }  // namespace arapfields

@@ -7,7 +7,7 @@
 namespace arapfields {
 
 /// Why a loop ended.
-enum class StopReason { iterations, time_budget, target, divergence };
+enum class StopReason { iterations, time_budget, target, observer, divergence };
 
 struct LoopResult {
   int iterations = 0;

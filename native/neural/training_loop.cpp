@@ -68,6 +68,11 @@ class Run {
       optimizer_.step(options_.schedule.share(iteration, done));
       report(elapsed, done);
       body_.iterated(iteration + 1);
+      if (options_.observer && !observed(iteration)) {
+        ++iteration;
+        result_.stopped_by = StopReason::observer;
+        break;
+      }
     }
     read_losses();
     if (!at::isfinite(trained_.parameters).all().item<bool>()) diverge(iteration);
@@ -87,6 +92,7 @@ class Run {
     const int history_every = std::max(1, options_.training.iterations / 200);
     losses_.read([&](int iteration, double loss) {
       if (!std::isfinite(loss)) diverge(iteration);
+      last_ = loss;
       smooth_ = iteration == 0 ? loss : 0.9 * smooth_ + 0.1 * loss;
       if (iteration % history_every == 0) result_.history.emplace_back(iteration, loss);
     });
@@ -100,6 +106,12 @@ class Run {
     good_.copy_(trained_.parameters);
     good_iteration_ = result_.iterations;
     return true;
+  }
+
+  /// Tells the observer, and returns whether it wants to go on.
+  bool observed(int iteration) {
+    read_losses();
+    return options_.observer({iteration + 1, last_, body_.terms(), watch_.seconds()});
   }
 
   void report(double elapsed, double done) {
@@ -131,7 +143,7 @@ class Run {
   Losses losses_;
   at::Tensor good_;
   int good_iteration_ = 0;
-  double smooth_ = 0.0, reported_ = -1.0;
+  double last_ = 0.0, smooth_ = 0.0, reported_ = -1.0;
   LoopResult result_;
 };
 

@@ -6,6 +6,7 @@
 
 #include "core/errors.h"
 #include "core/task.h"
+#include "neural/iteration.h"
 #include "neural/loop_result.h"
 #include "neural/optimizer.h"
 
@@ -28,6 +29,7 @@ struct LoopOptions {
   TrainingOptions training;  ///< the schedule follows the clock where a time budget is ahead
   OptimizerOptions optimizer;
   Schedule schedule;
+  IterationObserver observer;  ///< none: nothing is read for it
 };
 
 /// A loss of parameters, estimated anew at each iteration on a random subset.
@@ -41,6 +43,8 @@ class LoopBody {
   virtual bool is_good_enough() { return false; }
   /// After each iteration, of which `count` are done.
   virtual void iterated(int count) { static_cast<void>(count); }
+  /// The weighted terms of the last estimate, for an observer.
+  virtual std::vector<LossTerm> terms() const { return {}; }
   /// What a progress report says.
   virtual std::string message(int count, double loss, double seconds_left) const = 0;
 };

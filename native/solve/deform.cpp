@@ -51,16 +51,17 @@ ObjectiveTerms terms_of(const SurfaceSamples& samples, const std::vector<Handle>
 }  // namespace
 
 Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handles,
-                const DeformOptions& options, const Progress& progress) {
+                const DeformOptions& options, const Progress& progress, const SolveHooks& hooks) {
   options.validate();
   require_samples(samples);
   require(!handles.empty(), "handles", "none were given", "at least one is needed");
   require(options.fresh_samples == 0 || samples.redraw, "options.fresh_samples",
           "the samples are a plain list of points",
           "samples of sample_mesh or sample_surface are needed, which know their surface");
-  if (options.field == FieldKind::radial) return deform_radial(samples, handles, options, progress);
+  if (options.field == FieldKind::radial) return deform_radial(samples, handles, options, progress, hooks);
   const ThreadScope threads(options.machine.threads);
   ObjectiveTerms terms = terms_of(samples, handles, options);
+  terms.external = hooks.energies;
 
   const MlpShape shape{options.network, 3};
   const auto seed = static_cast<std::uint64_t>(options.training.seed);
@@ -75,6 +76,7 @@ Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handle
 
   LoopOptions loop;
   loop.training = options.training;
+  loop.observer = hooks.observer;
   WrapObjective wrap;
   if (options.invertibility > 0.0)
     wrap = [&](Objective& inner) {

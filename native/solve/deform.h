@@ -5,14 +5,17 @@
 #include "energies/handles.h"
 #include "mesh/surface_samples.h"
 #include "options/deform.h"
+#include "solve/hooks.h"
 #include "solve/solution.h"
 
 namespace arapfields {
 
 /// Deforms a surface as rigidly as possible so that its handles (mesh coordinates) follow their motions.
 /// Throws InvalidInput for bad options, no samples, no handles, or a handle that cannot be used (named),
-/// SolveDiverged, Cancelled.
+/// SolveDiverged, Cancelled. The terms an observer is told of are stretch, bend, barrier, handles,
+/// invertibility and energies[i], those that there are.
 ARAPFIELDS_EXPORT Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handles,
-                                  const DeformOptions& options, const Progress& progress = {});
+                                  const DeformOptions& options, const Progress& progress = {},
+                                  const SolveHooks& hooks = {});
 
 }  // namespace arapfields

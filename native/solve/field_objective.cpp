@@ -45,6 +45,12 @@ struct FieldObjective::Constants {
   at::Tensor preferred;
 };
 
+struct FieldObjective::Computed {
+  const char* name;
+  double here;
+  at::Tensor on_device;
+};
+
 FieldObjective::FieldObjective(const SurfaceSamples& samples, ObjectiveTerms terms)
     : samples_(samples), terms_(std::move(terms)), order_(morton_order(samples.points)) {}
 
@@ -94,14 +100,25 @@ double FieldObjective::by_kernels(TrainableField& field, Random& random) {
   HostJets<Scalar> jets(field, batch.points.cast<Scalar>(), order_of_terms());
   const ArapValue arap =
       arap_energy<Scalar>(jets.view(), terms_.surface.bending, terms_.rigidity, jets.cotangent_view());
-  double value = terms_.rigidity * (arap.stretch + terms_.surface.bending * arap.bend);
+  computed_.clear();
+  double value = 0.0;
+  const auto add = [&](const char* name, double term) {
+    computed_.push_back({name, term, {}});
+    value += term;
+  };
+  add("stretch", terms_.rigidity * arap.stretch);
+  if (terms_.surface.bending > 0.0) add("bend", terms_.rigidity * terms_.surface.bending * arap.bend);
   if (styled())
-    value += terms_.gauss * gauss_energy<Scalar>(jets.view(), batch.normals.cast<Scalar>(),
-                                                 batch.weights.cast<Scalar>(), *terms_.preference,
-                                                 terms_.gauss, jets.cotangent_view());
+    add("style", terms_.gauss * gauss_energy<Scalar>(jets.view(), batch.normals.cast<Scalar>(),
+                                                     batch.weights.cast<Scalar>(), *terms_.preference,
+                                                     terms_.gauss, jets.cotangent_view()));
   if (terms_.surface.barrier > 0.0)
-    value += terms_.surface.barrier * fold_barrier<Scalar>(jets.view(), terms_.surface.barrier_threshold,
-                                                           terms_.surface.barrier, jets.cotangent_view());
+    add("barrier",
+        terms_.surface.barrier * fold_barrier<Scalar>(jets.view(), terms_.surface.barrier_threshold,
+                                                      terms_.surface.barrier, jets.cotangent_view()));
+  external_ =
+      external_energies<Scalar>(terms_.external, batch.points, jets.view(), 1.0, jets.cotangent_view());
+  for (const double term : external_) value += term;
   jets.pull_back();
   if (!pulled()) return value;
   const HandleBatch<Scalar> pairs = terms_.handles.batch<Scalar>(terms_.pull.handle_batch, random);
@@ -109,7 +126,8 @@ double FieldObjective::by_kernels(TrainableField& field, Random& random) {
   const double off =
       handle_energy<Scalar>(ends.view(), pairs, terms_.pull.handle_weight, ends.cotangent_view());
   ends.pull_back();
-  return value + terms_.pull.handle_weight * off;
+  add("handles", terms_.pull.handle_weight * off);
+  return value;
 }
 
 at::Tensor FieldObjective::by_compositions(TrainableField& field, Random& random) {
@@ -120,26 +138,54 @@ at::Tensor FieldObjective::by_compositions(TrainableField& field, Random& random
   const at::Tensor jets = field.forward_at(batch.points, order_of_terms());
   const at::Tensor cotangents = at::zeros_like(jets);
   const at::Tensor arap = aten_arap(jets, terms_.surface.bending, terms_.rigidity, tables, cotangents);
-  at::Tensor value = terms_.rigidity * (arap[0] + terms_.surface.bending * arap[1]);
+  computed_.clear();
+  at::Tensor value = at::zeros({}, arap.options());
+  const auto add = [&](const char* name, const at::Tensor& term) {
+    computed_.push_back({name, 0.0, term});
+    value += term;
+  };
+  add("stretch", terms_.rigidity * arap[0]);
+  if (terms_.surface.bending > 0.0) add("bend", terms_.rigidity * terms_.surface.bending * arap[1]);
   if (styled())
-    value +=
+    add("style",
         terms_.gauss * aten_gauss(jets, tensor_like(batch.normals, like),
                                   batch.weights.size() > 0 ? tensor_like(batch.weights, like) : at::Tensor(),
                                   constants_->preferred, terms_.preference->sharpness, terms_.gauss, tables,
-                                  cotangents);
+                                  cotangents));
   if (terms_.surface.barrier > 0.0)
-    value += terms_.surface.barrier *
-             aten_barrier(jets, terms_.surface.barrier_threshold, terms_.surface.barrier, tables, cotangents);
+    add("barrier", terms_.surface.barrier * aten_barrier(jets, terms_.surface.barrier_threshold,
+                                                         terms_.surface.barrier, tables, cotangents));
+  if (!terms_.external.empty()) add_external(batch.points, jets, cotangents, value);
   field.pull_back(cotangents);
   if (!pulled()) return value;
   const HandleBatch<double> pairs = terms_.handles.batch<double>(terms_.pull.handle_batch, random);
   const at::Tensor ends = field.forward_at(pairs.sources, JetOrder::value);
   const at::Tensor pull = at::zeros_like(ends);
-  value += terms_.pull.handle_weight * aten_handles(ends, tensor_like(pairs.targets, like),
-                                                    tensor_like(pairs.weights, like),
-                                                    terms_.pull.handle_weight, pull);
+  add("handles", terms_.pull.handle_weight * aten_handles(ends, tensor_like(pairs.targets, like),
+                                                          tensor_like(pairs.weights, like),
+                                                          terms_.pull.handle_weight, pull));
   field.pull_back(pull);
   return value;
+}
+
+void FieldObjective::add_external(const Points& points, const at::Tensor& jets, at::Tensor cotangents,
+                                  at::Tensor& value) {
+  const at::Tensor host = jets.to(at::kCPU, at::kDouble).contiguous(), derivatives = at::zeros_like(host);
+  const auto order = static_cast<JetOrder>(host.size(0));
+  external_ = external_energies<double>(terms_.external, points,
+                                        {host.const_data_ptr<double>(), points.rows(), order}, 1.0,
+                                        {derivatives.data_ptr<double>(), points.rows(), order});
+  cotangents += tensor_like(derivatives, jets);
+  for (const double term : external_) value += term;
+}
+
+std::vector<LossTerm> FieldObjective::terms() const {
+  std::vector<LossTerm> result;
+  for (const Computed& term : computed_)
+    result.push_back({term.name, term.on_device.defined() ? term.on_device.item<double>() : term.here});
+  for (std::size_t i = 0; i < external_.size(); ++i)
+    result.push_back({"energies[" + std::to_string(i) + "]", external_[i]});
+  return result;
 }
 
 }  // namespace arapfields

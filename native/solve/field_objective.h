@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 
+#include "energies/external_energy.h"
 #include "energies/gauss.h"
 #include "energies/handles.h"
 #include "mesh/surface_samples.h"
@@ -14,7 +15,7 @@
 namespace arapfields {
 
 /// What a deformation is asked for, as weights of the terms:
-///   rigidity·(stretch + bending·bend) + gauss·mean(1 − g) + barrier·fold_barrier + handles.
+///   rigidity·(stretch + bending·bend) + gauss·mean(1 − g) + barrier·fold_barrier + handles + external.
 struct ObjectiveTerms {
   Index batch = 0;  ///< samples an iteration
   Index fresh = 0;  ///< of the batch, samples that the surface is asked for anew; needs samples.redraw
@@ -25,6 +26,7 @@ struct ObjectiveTerms {
   Vector preference_weights;  ///< a weight a sample; empty: all 1
   BoundHandles handles;
   HandleOptions pull;
+  ExternalEnergies external;
 };
 
 /// Estimates the terms on random subsets of the samples: the samples are put in spatial order and one is
@@ -36,7 +38,8 @@ class FieldObjective final : public Objective {
   FieldObjective(const SurfaceSamples& samples, ObjectiveTerms terms);
   ~FieldObjective() override;
   at::Tensor accumulate(TrainableField& field, Random& random) override;
-  const ObjectiveTerms& terms() const { return terms_; }
+  std::vector<LossTerm> terms() const override;
+  const ObjectiveTerms& asked() const { return terms_; }
 
  private:
   /// Samples of one iteration; normals and weights where the terms use them.
@@ -51,11 +54,13 @@ class FieldObjective final : public Objective {
   bool styled() const { return terms_.preference && terms_.gauss > 0.0; }
   bool pulled() const { return terms_.handles.count() > 0 && terms_.pull.handle_weight != 0.0; }
   JetOrder order_of_terms() const {
-    return terms_.surface.bending > 0.0 ? JetOrder::second : JetOrder::first;
+    return highest_order(terms_.external, terms_.surface.bending > 0.0 ? JetOrder::second : JetOrder::first);
   }
   template <class Scalar>
   double by_kernels(TrainableField& field, Random& random);
   at::Tensor by_compositions(TrainableField& field, Random& random);
+  /// The external energies of jets on a device.
+  void add_external(const Points& points, const at::Tensor& jets, at::Tensor cotangents, at::Tensor& value);
 
   /// The next fresh sample; draws another pool of as many as there are samples when one is used up.
   Index next_fresh(Random& random);
@@ -66,6 +71,10 @@ class FieldObjective final : public Objective {
   SurfaceSamples pool_;
   Index used_ = 0;
   std::unique_ptr<Constants> constants_;
+  /// The last estimate's weighted terms, where they were computed.
+  struct Computed;
+  std::vector<Computed> computed_;
+  std::vector<double> external_;  // those of external energies
 };
 
 }  // namespace arapfields

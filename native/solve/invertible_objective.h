@@ -16,6 +16,7 @@ class InvertibleObjective final : public Objective {
   InvertibleObjective(Objective& inner, const SurfaceSamples& samples, Index batch, double weight,
                       const MlpShape& shape, const LoopOptions& options, const std::string& device);
   at::Tensor accumulate(TrainableField& field, Random& random) override;
+  std::vector<LossTerm> terms() const override;
 
  private:
   Objective& inner_;
@@ -26,6 +27,7 @@ class InvertibleObjective final : public Objective {
   int done_ = 0;
   NeuralField inverse_;
   Optimizer optimizer_;
+  at::Tensor cycle_;  // the last estimate of the weighted term
 };
 
 }  // namespace arapfields

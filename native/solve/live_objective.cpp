@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "solve/live_objective.h"
 
+#include <numeric>
+
 #include "core/errors.h"
 #include "energies/distortion.h"
 
@@ -51,6 +53,26 @@ void LiveObjective<Scalar>::set_style(const std::optional<LiveStyle>& style) {
 }
 
 template <class Scalar>
+void LiveObjective<Scalar>::set_hooks(const LiveHooks& hooks, PointsIn rest) {
+  hooks_ = hooks;
+  rest_ = rest;
+}
+
+template <class Scalar>
+bool LiveObjective<Scalar>::accepted(const Measurements& u) const {
+  if (!hooks_.observer) return true;
+  const LiveTerms terms = evaluate(u, nullptr);
+  std::vector<LossTerm> told{{"stretch", terms.arap.stretch}};
+  if (bending_ > 0.0) told.push_back({"bend", bending_ * terms.arap.bend});
+  if (style_) told.push_back({"style", style_->weight * terms.gauss});
+  if (barrier_ > 0.0) told.push_back({"barrier", barrier_ * terms.barrier});
+  told.push_back({"handles", handle_weight_ * terms.handles});
+  for (std::size_t i = 0; i < terms.external.size(); ++i)
+    told.push_back({"energies[" + std::to_string(i) + "]", terms.external[i]});
+  return hooks_.observer(told);
+}
+
+template <class Scalar>
 void LiveObjective<Scalar>::measure(const RowMatrix<double>& c, Measurements& u) const {
   u.resize(center_offset() + 3 * center_count_);
   samples_.evaluate(c, {u.data(), samples_.size(), JetOrder::second});
@@ -76,6 +98,7 @@ LiveTerms LiveObjective<Scalar>::evaluate(const Measurements& u, Measurements* c
                                        style_->weight, jet_cotangents);
   if (barrier_ > 0.0)
     terms.barrier = fold_barrier<Scalar>(jets(u), barrier_threshold_, barrier_, jet_cotangents);
+  terms.external = external_energies<Scalar>(hooks_.energies, rest_, jets(u), hooks_.weight, jet_cotangents);
   return terms;
 }
 
@@ -86,6 +109,7 @@ double LiveObjective<Scalar>::value(const Measurements& u, Measurements* cotange
   if (cotangents != nullptr) cotangents->tail(3 * center_count_) = Scalar(2.0 * coefficient_weight) * centers;
   return terms.arap.stretch + bending_ * terms.arap.bend + handle_weight_ * terms.handles +
          (style_ ? style_->weight * terms.gauss : 0.0) + barrier_ * terms.barrier +
+         std::accumulate(terms.external.begin(), terms.external.end(), 0.0) +
          coefficient_weight * static_cast<double>(centers.squaredNorm());
 }
 

@@ -8,6 +8,7 @@
 #include "energies/gauss.h"
 #include "energies/handles.h"
 #include "fields/radial_evaluator.h"
+#include "solve/live_hooks.h"
 #include "solve/quasi_newton.h"
 
 namespace arapfields {
@@ -23,14 +24,16 @@ struct LiveStyle {
 /// What the terms of the energy come to.
 struct LiveTerms {
   ArapValue arap;
-  double handles = 0.0;  ///< mean squared distance to the targets
-  double gauss = 0.0;    ///< mean(1 − g), where there is a style
-  double barrier = 0.0;  ///< energies/distortion.h
+  double handles = 0.0;          ///< mean squared distance to the targets
+  double gauss = 0.0;            ///< mean(1 − g), where there is a style
+  double barrier = 0.0;          ///< energies/distortion.h
+  std::vector<double> external;  ///< weighted
 };
 
-/// stretch + λ_bend·bend + weight·handles + λ_Gauss·gauss + barrier + a vanishing pull of all centers towards
-/// zero, of the fields of one radial basis. Measurements: jets at the samples, values at the handles'
-/// sources, centers. In single precision a step costs half, and the value is good to some 1e-6 of itself.
+/// stretch + λ_bend·bend + weight·handles + λ_Gauss·gauss + barrier + external + a vanishing pull of all
+/// centers towards zero, of the fields of one radial basis. Measurements: jets at the samples, values at the
+/// handles' sources, centers. In single precision a step costs half, and the value is good to some 1e-6 of
+/// itself.
 template <class Scalar>
 class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
  public:
@@ -45,6 +48,8 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
   /// New targets for the pairs in place.
   void set_targets(PointsIn targets);
   void set_style(const std::optional<LiveStyle>& style);
+  /// `rest` (n,3): the samples.
+  void set_hooks(const LiveHooks& hooks, PointsIn rest);
 
   LiveTerms terms(const Measurements& u) const { return evaluate(u, nullptr); }
   JetView<const Scalar> jets(const Measurements& u) const {
@@ -59,6 +64,7 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
   double value(const Measurements& u, Measurements* cotangents) const override;
   RowMatrix<double> pull_back(const Measurements& cotangents) const override;
   RowMatrix<double> precondition(const RowMatrix<double>& gradient) const override;
+  bool accepted(const Measurements& u) const override;
 
  private:
   LiveTerms evaluate(const Measurements& u, Measurements* cotangents) const;
@@ -74,6 +80,8 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
   std::optional<LiveStyle> style_;
   PointsOf<Scalar> style_normals_;
   Eigen::VectorX<Scalar> style_weights_;
+  LiveHooks hooks_;
+  Points rest_;  // for external energies
 };
 
 }  // namespace arapfields

@@ -21,6 +21,8 @@ void LiveSolver::set_style(PointsIn preferred, double strength, double sharpness
 
 void LiveSolver::clear_style() { state_->clear_style(); }
 
+void LiveSolver::set_hooks(const LiveHooks& hooks) { state_->set_hooks(hooks); }
+
 void LiveSolver::set_targets(const std::vector<Handle>& moved) { state_->set_targets(moved); }
 
 std::shared_ptr<RadialField> LiveSolver::solve(Index iterations, double tolerance, const Progress& progress) {

@@ -8,6 +8,7 @@
 #include "fields/radial_field.h"
 #include "mesh/surface_samples.h"
 #include "options/live.h"
+#include "solve/live_hooks.h"
 #include "solve/live_report.h"
 
 namespace arapfields {
@@ -29,6 +30,8 @@ class ARAPFIELDS_EXPORT LiveSolver {
   /// surface sample given to the constructor, or empty).
   void set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights = {});
   void clear_style();
+  /// Energies that join the solver's own, and an observer of its steps.
+  void set_hooks(const LiveHooks& hooks);
   /// Moves the handles' targets.
   void set_targets(const std::vector<Handle>& moved);
   /// Improves the field for the targets and the style at hand; 0 iterations or tolerance: the options'.

@@ -70,6 +70,7 @@ void LiveSolver::State::prepare(Precision<Scalar>& precision) {
   precision.objective->set_barrier(options_.surface.barrier, options_.surface.barrier_threshold);
   if (pairs_.sources.rows() > 0) precision.objective->set_handles(pairs_, pair_values_, inverse_factor_);
   precision.objective->set_style(style_);
+  precision.objective->set_hooks(hooks_, rows_of(surface_, chosen_));
 }
 
 template <class Call>
@@ -158,6 +159,13 @@ void LiveSolver::State::clear_style() {
   optimizer_.forget();
 }
 
+void LiveSolver::State::set_hooks(const LiveHooks& hooks) {
+  hooks_ = hooks;
+  for_each_precision(
+      [&](auto& precision) { precision.objective->set_hooks(hooks_, rows_of(surface_, chosen_)); });
+  optimizer_.forget();
+}
+
 int LiveSolver::State::solve_threads() const {
   const Index work = static_cast<Index>(chosen_.size()) * basis_.center_count();
   return options_.threads == 0 && work < worth_threads ? 1 : options_.threads;
@@ -186,15 +194,16 @@ std::shared_ptr<RadialField> LiveSolver::State::solve(Index iterations, double t
   if (!handles_.empty() && !style_) follow_rigidly();
   extrapolate();
   const bool fast_alone = tolerance >= single_tolerance;
-  descend(fast_, {iterations, std::max(tolerance, single_tolerance), single_floor}, progress);
+  const bool ended =
+      descend(fast_, {iterations, std::max(tolerance, single_tolerance), single_floor}, progress).ended;
   if (!fast_alone) {
     if (!exact_.objective) prepare(exact_);
     exact_.u.resize(0);
-    if (report_.iterations < iterations)
+    if (report_.iterations < iterations && !ended)
       descend(exact_, {iterations - report_.iterations, tolerance}, progress);
     fast_.u.resize(0);
   }
-  if (handles_.empty()) hold_lowest();
+  if (handles_.empty() && hooks_.energies.empty()) hold_lowest();
   if (fast_alone)
     measure(fast_);
   else
@@ -234,7 +243,7 @@ void LiveSolver::State::extrapolate() {
   coefficients_before_ = from;
 }
 
-/// No energy feels a translation: what is left of one is taken out exactly.
+/// No energy of ours feels a translation: what is left of one is taken out exactly.
 void LiveSolver::State::hold_lowest() {
   Points value(1, 3);
   RadialEvaluator<double>(basis_, pairs_.sources).evaluate(coefficients_, {value.data(), 1, JetOrder::value});

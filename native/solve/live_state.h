@@ -17,6 +17,7 @@ class LiveSolver::State {
   void set_handles(const std::vector<Handle>& handles);
   void set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights);
   void clear_style();
+  void set_hooks(const LiveHooks& hooks);
   void set_targets(const std::vector<Handle>& moved);
   std::shared_ptr<RadialField> solve(Index iterations, double tolerance, const Progress& progress);
   void reset();
@@ -59,6 +60,7 @@ class LiveSolver::State {
   HandleBatch<double> pairs_;
   RowMatrix<double> stiffness_, pair_values_, inverse_factor_;
   std::optional<LiveStyle> style_;
+  LiveHooks hooks_;
   double style_strength_ = 0.0;
   Precision<float> fast_;    // what a drag needs
   Precision<double> exact_;  // what follows where more is asked for; made when it first is

@@ -30,9 +30,11 @@ struct LossProbe::State {
 };
 
 LossProbe::LossProbe(const SurfaceSamples& samples, const std::vector<Handle>& handles, int width,
-                     double bending, const Points& preferred, double gauss, double barrier, double margin) {
+                     double bending, const Points& preferred, double gauss, double barrier, double margin,
+                     const ExternalEnergies& external) {
   ObjectiveTerms terms;
   terms.batch = 20;
+  terms.external = external;
   terms.surface.bending = bending;
   if (preferred.rows() > 0) terms.preference = gauss_preference(preferred);
   terms.gauss = gauss;
@@ -41,7 +43,7 @@ LossProbe::LossProbe(const SurfaceSamples& samples, const std::vector<Handle>& h
   terms.handles = BoundHandles(handles, samples.points);
   terms.pull.handle_batch = 8;
   state_ = std::make_unique<State>(samples, width, std::move(terms));
-  if (margin > 0.0) state_->field.set_handles(blend(state_->objective.terms().handles, margin));
+  if (margin > 0.0) state_->field.set_handles(blend(state_->objective.asked().handles, margin));
 }
 
 LossProbe::~LossProbe() = default;

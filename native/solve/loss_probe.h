@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "core/random.h"
+#include "energies/external_energy.h"
 #include "energies/handles.h"
 #include "mesh/surface_samples.h"
 
@@ -21,7 +22,8 @@ struct LossGradient {
 class ARAPFIELDS_EXPORT_TO_TESTS LossProbe {
  public:
   LossProbe(const SurfaceSamples& samples, const std::vector<Handle>& handles, int width, double bending,
-            const Points& preferred, double gauss, double barrier, double margin);
+            const Points& preferred, double gauss, double barrier, double margin,
+            const ExternalEnergies& external = {});
   ~LossProbe();
   /// The parameters become these; the subsets are those of the seed.
   LossGradient operator()(const Vector& parameters, std::uint64_t seed);

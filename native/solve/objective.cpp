@@ -19,6 +19,7 @@ class FieldLoop final : public LoopBody {
         random_(static_cast<std::uint64_t>(options.training.seed), 0x5eed) {}
 
   at::Tensor accumulate(int) override { return objective_.accumulate(field_, random_); }
+  std::vector<LossTerm> terms() const override { return objective_.terms(); }
   void iterated(int count) override {
     if (observer_) observer_(count);
   }

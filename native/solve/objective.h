@@ -16,6 +16,8 @@ class Objective {
   /// Adds the gradient of the estimate to field.gradient(); returns the estimate, one number wherever it was
   /// computed.
   virtual at::Tensor accumulate(TrainableField& field, Random& random) = 0;
+  /// The weighted terms of the last estimate, whose sum it is.
+  virtual std::vector<LossTerm> terms() const { return {}; }
 };
 
 /// Called with the number of finished iterations after each of them.

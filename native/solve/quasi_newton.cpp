@@ -133,6 +133,10 @@ QuasiNewtonReport QuasiNewton::minimise(const MeasuredObjectiveOf<Scalar>& objec
     gradient = std::move(next_gradient);
     now = std::move(next);
     ++report.iterations;
+    if (!objective.accepted(now.u)) {
+      report.ended = true;
+      break;
+    }
   }
   report.value = now.value;
   u = std::move(now.u);

@@ -21,6 +21,11 @@ class MeasuredObjectiveOf {
   virtual RowMatrix<double> pull_back(const Eigen::VectorX<Scalar>& cotangents) const = 0;
   /// An approximation of the inverse Hessian, times a gradient.
   virtual RowMatrix<double> precondition(const RowMatrix<double>& gradient) const = 0;
+  /// After each accepted step: false ends the descent there.
+  virtual bool accepted(const Eigen::VectorX<Scalar>& u) const {
+    static_cast<void>(u);
+    return true;
+  }
 };
 
 using MeasuredObjective = MeasuredObjectiveOf<double>;
@@ -36,6 +41,7 @@ struct QuasiNewtonReport {
   Index evaluations = 0;
   double value = 0.0;
   bool converged = false;
+  bool ended = false;  ///< by the objective
 };
 
 /// Preconditioned L-BFGS. A line search costs no product with Φ, since u is linear in the step. Every

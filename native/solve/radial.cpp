@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "solve/live_objective.h"
 #include "solve/live_solver.h"
 #include "solve/setup.h"
 
@@ -24,20 +25,40 @@ LiveOptions live_options(const Options& options) {
   return live;
 }
 
-/// Solves until it converges, is out of steps, or out of time.
-LoopResult run(LiveSolver& live, const TrainingOptions& how, const Progress& progress) {
+/// Solves until it converges, is out of steps or time, or the observer ends it. The solver's energy is the
+/// loss divided by `rigidity`.
+LoopResult run(LiveSolver& live, const TrainingOptions& how, const Progress& progress,
+               const SolveHooks& hooks, double rigidity) {
   const int iterations = how.iterations;
   const Stopwatch watch;
   LoopResult result;
+  Iteration told;
+  bool ended = false;
+  LiveHooks steps{hooks.energies, 1.0 / rigidity, {}};
+  if (hooks.observer)
+    steps.observer = [&](const std::vector<LossTerm>& terms) {
+      ++told.number;
+      told.loss = 0.0;
+      told.terms = terms;
+      for (LossTerm& term : told.terms) told.loss += term.value *= rigidity;
+      told.seconds = watch.seconds();
+      ended = !hooks.observer(told);
+      return !ended;
+    };
+  live.set_hooks(steps);
   while (result.iterations < iterations) {
-    const int steps = std::min(steps_at_once, iterations - result.iterations);
+    const int at_once = std::min(steps_at_once, iterations - result.iterations);
     const double done = static_cast<double>(result.iterations) / iterations;
-    live.solve(steps, 0.0, progress.part(done, done + static_cast<double>(steps) / iterations));
+    live.solve(at_once, 0.0, progress.part(done, done + static_cast<double>(at_once) / iterations));
     progress.look([&](PointsIn points) { return live.field()->at(points); });
     result.iterations += static_cast<int>(live.report().iterations);
     result.history.emplace_back(result.iterations, live.report().value);
     result.seconds = watch.seconds();
-    if (live.report().iterations < steps) break;
+    if (ended) {
+      result.stopped_by = StopReason::observer;
+      break;
+    }
+    if (live.report().iterations < at_once) break;
     if (how.time_budget > 0.0 && result.seconds > how.time_budget) {
       result.stopped_by = StopReason::time_budget;
       break;
@@ -55,7 +76,7 @@ Solution finish(const LiveSolver& live, const SurfaceSamples& samples, const Obj
 }  // namespace
 
 Solution deform_radial(const SurfaceSamples& samples, const std::vector<Handle>& handles,
-                       const DeformOptions& options, const Progress& progress) {
+                       const DeformOptions& options, const Progress& progress, const SolveHooks& hooks) {
   require(options.handles.handle_weight > 0.0, "handle_weight", "0", "must be positive for 'radial'");
   LiveOptions live = live_options(options);
   live.samples = std::max(live.samples, 8 * options.centers);
@@ -63,7 +84,7 @@ Solution deform_radial(const SurfaceSamples& samples, const std::vector<Handle>&
   live.fine_centers = options.centers;
   live.handle_weight = options.handles.handle_weight;
   LiveSolver solver(samples, handles, live, progress.part(0.0, 0.3));
-  const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95));
+  const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95), hooks, 1.0);
   ObjectiveTerms terms;
   terms.surface = options.surface;
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
@@ -81,7 +102,8 @@ std::shared_ptr<const DeformationField> radial_start(const SurfaceSamples& sampl
 }
 
 Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const StylizeOptions& options,
-                        const Progress& progress, const Vector& weights, const std::vector<Handle>& handles) {
+                        const Progress& progress, const Vector& weights, const std::vector<Handle>& handles,
+                        const SolveHooks& hooks) {
   // The live solver's energy has weight 1: all other weights are divided by this one's.
   LiveOptions live = live_options(options);
   live.samples = 6000;
@@ -94,7 +116,7 @@ Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const
   live.interior = !handles.empty();  // a style alone acts everywhere alike: nothing is to be held apart
   LiveSolver solver(samples, handles, live, progress.part(0.0, 0.3));
   solver.set_style(preferred, options.strength, options.sharpness, weights);
-  const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95));
+  const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95), hooks, options.rigidity);
   ObjectiveTerms terms;
   terms.rigidity = options.rigidity;
   terms.surface = options.surface;

@@ -4,6 +4,7 @@
 
 #include "options/deform.h"
 #include "options/stylize.h"
+#include "solve/hooks.h"
 #include "solve/report.h"
 
 namespace arapfields {
@@ -11,7 +12,7 @@ namespace arapfields {
 /// As deform (solve/deform.h) for options.field "radial". `iterations` bounds the quasi-Newton steps; options
 /// of networks do not matter.
 Solution deform_radial(const SurfaceSamples& samples, const std::vector<Handle>& handles,
-                       const DeformOptions& options, const Progress& progress);
+                       const DeformOptions& options, const Progress& progress, const SolveHooks& hooks = {});
 
 /// What a network may refine: deform_radial's field after some tens of steps, whatever options.field says and
 /// without exact handles, which the network's own blend adds.
@@ -21,6 +22,7 @@ std::shared_ptr<const DeformationField> radial_start(const SurfaceSamples& sampl
 
 /// As stylize (solve/stylize.h) for options.field "radial".
 Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const StylizeOptions& options,
-                        const Progress& progress, const Vector& weights, const std::vector<Handle>& handles);
+                        const Progress& progress, const Vector& weights, const std::vector<Handle>& handles,
+                        const SolveHooks& hooks = {});
 
 }  // namespace arapfields

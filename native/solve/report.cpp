@@ -105,11 +105,11 @@ Solution solve_field(std::shared_ptr<TrainableField> field, const SurfaceSamples
     LoopResult loop =
         minimise(*field, wrapped ? *wrapped : objective, options, progress.part(0.0, 0.95), shown);
     progress.report(0.95, "measuring the result");
-    Solution solution = measured(field, samples, objective.terms(), std::move(loop));
+    Solution solution = measured(field, samples, objective.asked(), std::move(loop));
     progress.report(1.0, "done");
     return solution;
   } catch (const LoopDiverged& cause) {
-    throw SolveDiverged(cause, measured(field, samples, objective.terms(), cause.result));
+    throw SolveDiverged(cause, measured(field, samples, objective.asked(), cause.result));
   }
 }
 

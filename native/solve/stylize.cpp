@@ -32,7 +32,7 @@ Handle hold_lowest(const SurfaceSamples& samples) {
   return handle;
 }
 
-/// No other term of the loss changes by a translation, so the point may be put back exactly.
+/// No other term of ours changes by a translation, so the point may be put back exactly.
 void hold(NeuralField& field, const Handle& handle) {
   Points value(1, 3);
   field.evaluate(handle.rest_point.transpose(), {value.data(), 1, JetOrder::value});
@@ -42,11 +42,12 @@ void hold(NeuralField& field, const Handle& handle) {
 }  // namespace
 
 Solution stylize(const SurfaceSamples& samples, PointsIn preferred, const StylizeOptions& options,
-                 const Progress& progress, const Vector& weights, const std::vector<Handle>& handles) {
+                 const Progress& progress, const Vector& weights, const std::vector<Handle>& handles,
+                 const SolveHooks& hooks) {
   options.validate();
   check_samples(samples, weights);
   if (options.field == FieldKind::radial)
-    return stylize_radial(samples, preferred, options, progress, weights, handles);
+    return stylize_radial(samples, preferred, options, progress, weights, handles, hooks);
   const ThreadScope threads(options.machine.threads);
   ObjectiveTerms terms;
   terms.batch = options.training.batch;
@@ -55,6 +56,7 @@ Solution stylize(const SurfaceSamples& samples, PointsIn preferred, const Styliz
   terms.preference = gauss_preference(preferred, options.sharpness);
   terms.gauss = options.strength * options.gauss_weight;
   terms.preference_weights = weights;
+  terms.external = hooks.energies;
   const Handle lowest = hold_lowest(samples);
   terms.handles = handles.empty() ? BoundHandles({lowest}, samples.points)
                                   : BoundHandles(in_cube(handles, samples.frame), samples.points);
@@ -67,10 +69,11 @@ Solution stylize(const SurfaceSamples& samples, PointsIn preferred, const Styliz
   field->network()->round_products(options.precision == ProductPrecision::bfloat16);
   LoopOptions loop;
   loop.training = options.training;
-  if (terms.gauss == 0.0 && handles.empty()) loop.training.iterations = 0;
+  loop.observer = hooks.observer;
+  if (terms.gauss == 0.0 && handles.empty() && hooks.energies.empty()) loop.training.iterations = 0;
   Solution solution = solve_field(field, samples, std::move(terms), loop, progress);
   if (handles.empty()) {
-    hold(*field, lowest);
+    if (hooks.energies.empty()) hold(*field, lowest);
     solution.report.handle_mean.clear();
     solution.report.handle_max.clear();
   }

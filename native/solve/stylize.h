@@ -5,6 +5,7 @@
 #include "energies/handles.h"
 #include "mesh/surface_samples.h"
 #include "options/stylize.h"
+#include "solve/hooks.h"
 #include "solve/solution.h"
 
 namespace arapfields {
@@ -14,10 +15,13 @@ namespace arapfields {
 /// ñ the unit normals of the deformed surface. (The paper's text has the sign of the first term reversed and
 /// leaves the normals without unit length, which a collapsing surface would win.) Without handles the lowest
 /// sample is held in place. `weights` (one u ≥ 0 a sample, or empty) blend the effect. Strength 0 is the
-/// identity. Throws InvalidInput for bad options, samples without normals, weights or handles that do not
-/// fit; SolveDiverged; Cancelled.
+/// identity. External energies may feel where
+/// the surface is: beside them the lowest sample is held by its spring alone. An observer is told of deform's
+/// terms, and of style. Throws InvalidInput for bad options,
+/// samples without normals, weights or handles that do not fit; SolveDiverged; Cancelled.
 ARAPFIELDS_EXPORT Solution stylize(const SurfaceSamples& samples, PointsIn preferred,
                                    const StylizeOptions& options, const Progress& progress = {},
-                                   const Vector& weights = {}, const std::vector<Handle>& handles = {});
+                                   const Vector& weights = {}, const std::vector<Handle>& handles = {},
+                                   const SolveHooks& hooks = {});
 
 }  // namespace arapfields

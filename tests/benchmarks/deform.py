@@ -34,7 +34,7 @@ class Bar(NamedTuple):
         return energy <= self.energy and handle_error <= self.handle_error
 
     def good(self, field):
-        return self.met(field.report["energy"], field.report["handle_error_mean"])
+        return self.met(field.report.energy, field.report.handle_error_mean)
 
     def __str__(self):
         return f"{shapes.label('bunny')} to E <= {self.energy:.4g}"
@@ -166,8 +166,8 @@ def run():
                 "what": f"{bar}: {name}",
                 "iterations": count,
                 "seconds": round(seconds, 2),
-                "energy": round(report["energy"], 4),
-                "handle_error": round(report["handle_error_mean"], 4),
+                "energy": round(report.energy, 4),
+                "handle_error": round(report.handle_error_mean, 4),
             }
         )
     theirs = TheirLoop(samples, handles, 300).run_to_quality(bar)

@@ -36,18 +36,19 @@ def run(rounds=1):
     rows = []
     for name, resolution in CASES:
         sdf, network = shapes.sdf(name), Counted(shapes.layers(name))
-        report, found = {}, {}
+        found = {}
 
-        def ours(sdf=sdf, n=resolution, report=report, found=found):
-            found["ours"] = af.extract_surface(sdf, n, threads=THREADS, report=report)[0]
+        def ours(sdf=sdf, n=resolution, found=found):
+            found["ours"] = af.extract_surface(sdf, n, threads=THREADS)
 
         def theirs(network=network, n=resolution, found=found):
             found["theirs"] = dense(network, n)
 
         times = timing.paired(ours, theirs, rounds, warm_up=False)
-        a, b = found["ours"], found["theirs"]
+        a, b = found["ours"].vertices, found["theirs"]
         distance = max(cKDTree(a).query(b)[0].max(), cKDTree(b).query(a)[0].max())
-        share = report["evaluations"] / report["dense_evaluations"]
+        report = found["ours"].report
+        share = report.evaluations / report.dense_evaluations
         rows.append(
             {"case": f"{shapes.label(name)} {resolution}", **times, "evaluated": f"{share:.2%}"}
             | {"vertices": len(a), "same_number": len(a) == len(b), "largest_distance": f"{distance:.1e}"}

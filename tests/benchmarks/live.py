@@ -34,7 +34,7 @@ def drag_row(name, neural, rounds=3, **options):
         with Clock() as clock:
             live.solve(targets(name, FULL))
         whole.append((clock.wall, clock.cpu))
-    twelve = live.report["energy"]
+    twelve = live.report.energy
     steps = [drag(live, name) for _ in range(rounds)]
     (setup, setup_cpu), (rest, rest_cpu), (step, step_cpu) = (
         np.min(times, axis=0) for times in (setups, whole, steps)
@@ -52,7 +52,7 @@ def drag_row(name, neural, rounds=3, **options):
         "rest_to_70_cpu_s": round(rest_cpu, 3),
         "energy_12_steps": round(twelve, 4),
         "energy": round(best["energy"], 4),
-        "of_neural": round(twelve / neural.report["energy"], 2) if neural else "",
+        "of_neural": round(twelve / neural.report.energy, 2) if neural else "",
         "handle_error": round(best["handle_error_mean"], 4),
     }
 
@@ -69,10 +69,10 @@ def polish_row(name, neural, iterations=NEURAL_ITERATIONS // 3):
         )
     return {
         "what": f"{label(name)}: neural polish of the radial field, {iterations} iterations",
-        "energy": round(field.report["energy"], 4),
-        "of_neural": round(field.report["energy"] / neural.report["energy"], 2),
-        "of_its_time": round(clock.wall / neural.report["seconds"], 2),
-        "handle_error": round(field.report["handle_error_mean"], 4),
+        "energy": round(field.report.energy, 4),
+        "of_neural": round(field.report.energy / neural.report.energy, 2),
+        "of_its_time": round(clock.wall / neural.report.seconds, 2),
+        "handle_error": round(field.report.handle_error_mean, 4),
     }
 
 
@@ -93,7 +93,7 @@ def style_row(aim, options, most=60):
         while steps < most:
             live.solve(iterations=2, tolerance=1e-9)
             steps += 2
-            if live.report["preference"] >= aim:
+            if live.report.preference >= aim:
                 break
     return {
         "what": f"{label('spot')} to cube, mean g >= {aim}",
@@ -101,8 +101,8 @@ def style_row(aim, options, most=60):
         "steps": steps,
         "seconds": round(clock.wall, 2),
         "cpu_s": round(clock.cpu, 2),
-        "preference": round(live.report["preference"], 3),
-        "flipped_share": live.report["flipped_share"],
+        "preference": round(live.report.preference, 3),
+        "flipped_share": live.report.flipped_share,
     }
 
 

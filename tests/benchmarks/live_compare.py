@@ -86,7 +86,7 @@ def compare_rows(name, resolution=96):
             "what": f"{label(name)}: live solver",
             **shared,
             "setup_cpu_s": round(our_setup.cpu, 3),
-            "steps": live.report["iterations"],
+            "steps": live.report.iterations,
             "cpu_s": round(our_clock.cpu, 3),
             "mesh_energy": round(mesh_energy(vertices, triangles, ours), 3),
             "volume_ratio": round(volume(ours, triangles) / whole, 3),
@@ -115,7 +115,7 @@ def cost_row(centers, count):
     with Clock() as clock:
         for degrees in range(5, FULL + 1, 5):
             live.solve(targets("bunny", degrees))
-            steps += live.report["iterations"]
+            steps += live.report.iterations
     live.solve(iterations=200, tolerance=1e-6)
     return {
         "what": label("bunny"),
@@ -124,7 +124,7 @@ def cost_row(centers, count):
         "setup_cpu_s": round(setup.cpu, 3),
         "handle_added_cpu_s": round(added.cpu, 3),
         "step_cpu_ms": round(1e3 * clock.cpu / steps, 2),
-        "energy": round(live.report["energy"], 4),
+        "energy": round(live.report.energy, 4),
     }
 
 
@@ -137,12 +137,12 @@ def finger_row(finger, motion, degrees, interior=True, field=None):
         live = af.LiveDeformer(surface_samples, pair, af.LiveOptions(interior=interior))
         field = live.solve(iterations=100, tolerance=1e-5)
         energy, name = (
-            live.report["energy"],
+            live.report.energy,
             f"radial, {'interior ways' if interior else 'straight distances'}",
         )
     else:
         trained = af.deform(surface_samples, pair, af.DeformOptions(iterations=300))
-        energy, name, field = trained.report["energy"], field, trained
+        energy, name, field = trained.report.energy, field, trained
     row = {
         "what": f"{label('hand')}, {finger} {motion} {abs(degrees)} degrees",
         "field": name,

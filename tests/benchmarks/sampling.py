@@ -58,10 +58,10 @@ def run(rounds=3):
     rows = []
     for name in NAMES:
         sdf, network = shapes.sdf(name), Counted(shapes.layers(name))
-        report, theirs_points = {}, []
+        made, theirs_points = {}, []
 
-        def ours(sdf=sdf, report=report):
-            af.sample_surface(sdf, COUNT, threads=THREADS, report=report)
+        def ours(sdf=sdf, made=made):
+            made["samples"] = af.sample_surface(sdf, COUNT, threads=THREADS)
 
         def theirs(network=network, points=theirs_points):
             points.append(len(iarap.sampling.uniform_sample(network, LINES, device="cpu")))
@@ -75,7 +75,7 @@ def run(rounds=3):
                 "ours_ms_a_point": round(1e3 * times["ours_s"] / COUNT, 4),
                 "iarap_ms_a_point": round(1e3 * times["theirs_s"] * share / COUNT, 3),
                 "times_faster": round(times["times_faster"] * share, 1),
-                "ours_evaluations_a_point": round(report["evaluations"] / COUNT, 2),
+                "ours_evaluations_a_point": round(made["samples"].report.evaluations / COUNT, 2),
                 "iarap_evaluations_a_point": round(network.evaluations / sum(theirs_points), 1),
                 "uniformity": round(uniformity(sdf, af.sample_surface(sdf, COUNT).points), 3),
             }

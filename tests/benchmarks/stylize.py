@@ -13,7 +13,7 @@ PREFERENCE = 0.95
 
 
 def good(field):
-    return field.report["preference"] >= PREFERENCE
+    return field.report.preference >= PREFERENCE
 
 
 def run():
@@ -39,8 +39,8 @@ def run():
                 "seconds": round(seconds, 2),
                 "products_GFLOPs": round(rate),
                 "at_175_s": round(seconds * rate / 175, 2),
-                "preference": round(report["preference"], 3),
-                "flipped": report["flipped_share"],
+                "preference": round(report.preference, 3),
+                "flipped": report.flipped_share,
             }
         )
     return rows

@@ -55,29 +55,12 @@ def odd(rng, things):
         arrays = odd_arrays(rng)
         return arrays[rng.integers(len(arrays))]
     if kind == 1:
-        values = [*NUMBERS, *FLOATS, 10**9, 10**12]
-        return values[rng.integers(len(values))]
+        return [*NUMBERS, *FLOATS, 10**9, 10**12][rng.integers(len(NUMBERS) + len(FLOATS) + 2)]
     if kind == 2:
-        values = [
-            None,
-            True,
-            "",
-            "x",
-            "\ud800",
-            b"x",
-            [],
-            {},
-            [None],
-            object(),
-            lambda x: x,
-            1j,
-            range(3),
-            "nan",
-        ]
+        values = [None, True, "", "x", "\ud800", b"x", [], {}, [None], object(), lambda x: x, 1j, range(3)]
         return values[rng.integers(len(values))]
     if kind == 3:
-        classes = [value for value in vars(af).values() if isinstance(value, type)]
-        chosen = classes[rng.integers(len(classes))]
+        chosen = rng.choice([value for value in vars(af._native).values() if isinstance(value, type)])
         try:
             return chosen.__new__(chosen)
         except TypeError:
@@ -126,18 +109,33 @@ def odd_options(rng, things, structure, **good):
     return structure(**good)
 
 
+def by_name(function, *names):
+    """The function with its last arguments, which go by name, taken in order."""
+
+    def call(*given):
+        first = len(given) - len(names)
+        return function(*given[:first], **dict(zip(names, given[first:], strict=True)))
+
+    return call
+
+
 def calls(rng, things):
     """{name: (function, arguments)}: all of the interface, each argument good."""
     t, task, moved = things, af.Task(), np.eye(4)
     fit = {"iterations": 2, "batch": 64, "near_points": 100, "uniform_points": 100, **TINY}
     live = {"samples": 50, "coarse_centers": 5, "fine_centers": 5, "iterations": 2, "threads": 1}
-    opts = {k: v for k, v in TINY.items()}
     return {
-        "signed_distance": lambda: (af.signed_distance, [TETRAHEDRON, FACES, ROWS, 1, task]),
-        "winding_number": lambda: (af.winding_number, [TETRAHEDRON, FACES, ROWS, 1, task]),
+        "signed_distance": lambda: (
+            by_name(af.signed_distance, "threads", "task"),
+            [TETRAHEDRON, FACES, ROWS, 1, task],
+        ),
+        "winding_number": lambda: (
+            by_name(af.winding_number, "threads", "task"),
+            [TETRAHEDRON, FACES, ROWS, 1, task],
+        ),
         "fit_sdf": lambda: (
-            af.fit_sdf,
-            [TETRAHEDRON, FACES, odd_options(rng, t, af.FitOptions, **fit), task],
+            by_name(af.fit_sdf, "callback", "task"),
+            [TETRAHEDRON, FACES, odd_options(rng, t, af.FitOptions, **fit), None, task],
         ),
         "from_layers": lambda: (
             af.NeuralSdf.from_layers,
@@ -145,56 +143,70 @@ def calls(rng, things):
         ),
         "sdf": lambda: (t["sdf"], [ROWS]),
         "sdf.gradient": lambda: (t["sdf"].gradient, [ROWS]),
-        "sample_mesh": lambda: (af.sample_mesh, [TETRAHEDRON, FACES, 50, 0]),
-        "sample_surface": lambda: (af.sample_surface, [t["sdf"], 20, 0, task, 1, {}]),
+        "sample_mesh": lambda: (by_name(af.sample_mesh, "seed"), [TETRAHEDRON, FACES, 50, 0]),
+        "sample_surface": lambda: (
+            by_name(af.sample_surface, "seed", "threads", "task"),
+            [t["sdf"], 20, 0, 1, task],
+        ),
         "SurfaceSamples": lambda: (af.SurfaceSamples, [ROWS, NORMALS, t["frame"]]),
         "Cuboid": lambda: (af.Cuboid, [np.eye(4), moved, 1.0]),
         "Point": lambda: (af.Point, [ROWS[0], ROWS[1], 1.0]),
         "Region": lambda: (af.Region, [[0, 1], np.eye(4), moved, 1.0]),
         "Frame": lambda: (af.Frame, [ROWS[0], 1.0]),
         "Frame.to_cube": lambda: (t["frame"].to_cube, [ROWS]),
-        "deform": lambda: (af.deform, [t["samples"], t["handles"], deform_options(rng, t), task]),
+        "deform": lambda: (
+            by_name(af.deform, "energies", "callback", "task"),
+            [t["samples"], t["handles"], deform_options(rng, t), [], None, task],
+        ),
         "stylize": lambda: (
-            af.stylize,
+            by_name(af.stylize, "weights", "handles", "orientation", "energies", "callback", "task"),
             [
                 t["samples"],
                 "cube",
-                odd_options(rng, t, af.StylizeOptions, iterations=2, batch=20, **opts),
-                task,
-                *[np.ones(60), t["handles"][:1], np.eye(3)],
+                odd_options(rng, t, af.StylizeOptions, iterations=2, batch=20, **TINY),
+                *[np.ones(60), t["handles"][:1], np.eye(3), [], None, task],
             ],
         ),
         "train_inverse": lambda: (
-            af.train_inverse,
+            by_name(af.train_inverse, "task"),
             [
                 t["field"],
                 t["samples"],
-                odd_options(rng, t, af.InverseOptions, iterations=2, batch=20, **opts),
+                odd_options(rng, t, af.InverseOptions, iterations=2, batch=20, **TINY),
                 task,
             ],
         ),
         "field": lambda: (t["field"], [ROWS]),
         "field.jacobian": lambda: (t["field"].jacobian, [ROWS]),
         "field.hessian": lambda: (t["field"].hessian, [ROWS]),
-        "field.inverse": lambda: (t["field"].inverse, [ROWS[:5], 1e-6, task]),
+        "field.inverse": lambda: (by_name(t["field"].inverse, "tolerance", "task"), [ROWS[:5], 1e-6, task]),
         "arap_energy": lambda: (af.arap_energy, [t["field"], ROWS]),
         "distortion": lambda: (af.distortion, [t["field"], ROWS]),
-        "gauss_preference": lambda: (af.gauss_preference, [NORMALS, np.eye(3), 5.0]),
+        "gauss_preference": lambda: (by_name(af.gauss_preference, "sharpness"), [NORMALS, np.eye(3), 5.0]),
         "preferred_normals": lambda: (af.preferred_normals, ["cube"]),
-        "extract_surface": lambda: (af.extract_surface, [t["sdf"], 9, task, 1, {}]),
-        "extract_deformed": lambda: (af.extract_deformed, [t["sdf"], t["field"], 9, None, task, 1, {}]),
+        "extract_surface": lambda: (by_name(af.extract_surface, "threads", "task"), [t["sdf"], 9, 1, task]),
+        "extract_deformed": lambda: (
+            by_name(af.extract_deformed, "inverse", "threads", "task"),
+            [t["sdf"], t["field"], 9, None, 1, task],
+        ),
         "LiveDeformer": lambda: (
-            af.LiveDeformer,
+            by_name(af.LiveDeformer, "task"),
             [t["samples"], t["handles"], odd_options(rng, t, af.LiveOptions, **live), task],
         ),
-        "live.solve": lambda: (t["live"].solve, [[ROWS[1]], 2, 0.1, task]),
+        "live.solve": lambda: (
+            by_name(t["live"].solve, "iterations", "tolerance", "task"),
+            [[ROWS[1]], 2, 0.1, task],
+        ),
         "live.track": lambda: (t["live"].track, [ROWS]),
-        "live.set_style": lambda: (t["live"].set_style, ["cube", 0.5, 5.0, np.ones(60)]),
+        "live.set_style": lambda: (
+            by_name(t["live"].set_style, "sharpness", "weights"),
+            ["cube", 0.5, 5.0, np.ones(60)],
+        ),
         "live.set_handles": lambda: (t["live"].set_handles, [t["handles"][:1]]),
-        "sample_curve": lambda: (af.sample_curve, [CIRCLE, 50, True]),
+        "sample_curve": lambda: (by_name(af.sample_curve, "closed"), [CIRCLE, 50, True]),
         "CurveHandle": lambda: (af.CurveHandle, [[0, 1], np.eye(3), 1.0]),
         "deform_curve": lambda: (
-            af.deform_curve,
+            by_name(af.deform_curve, "task"),
             [
                 t["curve"].points,
                 [t["curve_handle"]],
@@ -204,7 +216,10 @@ def calls(rng, things):
         ),
         "Task.watch": lambda: (af.Task().watch, [ROWS, 0.1]),
         "Task.report": lambda: (af.Task().report, [0.5, "x"]),
-        "sdf_grid": lambda: (af.sdf_grid, [t["sdf"], 3, [[-1, -1, -1], [1, 1, 1]], task]),
+        "sdf_grid": lambda: (
+            by_name(af.sdf_grid, "bounds", "task"),
+            [t["sdf"], 3, [[-1, -1, -1], [1, 1, 1]], task],
+        ),
         "NeuralSdf.load": lambda: (af.NeuralSdf.load, ["/nonexistent"]),
         "DeformationField.load": lambda: (af.DeformationField.load, ["/nonexistent"]),
         "sdf.save": lambda: (t["sdf"].save, ["/nonexistent/x"]),
@@ -214,8 +229,8 @@ def calls(rng, things):
 
 def unbound(rng):
     """A method of a class, called on something that is no good instance of it."""
-    classes = [v for v in vars(af).values() if isinstance(v, type) and not issubclass(v, BaseException)]
-    chosen = classes[rng.integers(len(classes))]
+    native = [v for v in vars(af._native).values() if isinstance(v, type)]
+    chosen = rng.choice([v for v in native if not issubclass(v, BaseException)])
     names = [
         n for n in dir(chosen) if not n.startswith("__") or n in ("__call__", "__len__", "__repr__", "__eq__")
     ]

@@ -61,7 +61,7 @@ def rate(found, folder):
     area.spaces.active.overlay.show_overlays = True
     bpy.context.preferences.system.viewport_aa = "8"
     yield from settled("Bar")
-    found["live_refined"] = {"converged": session.solver.report["converged"]}
+    found["live_refined"] = {"converged": session.solver.report.converged}
     yield 1.0
     stage.picture(folder, "live")
     bar.hide_set(False)

@@ -146,7 +146,7 @@ def test_stylize_and_fit_arrive_where_the_kernels_do():
     for scope in (contextlib.nullcontext, aten_path):
         with scope():
             stylized = af.stylize(samples, turned, style).report
-            near_mean = af.fit_sdf(vertices, faces, fit).report["near_mean"]
+            near_mean = af.fit_sdf(vertices, faces, fit).report.near_mean
             figures.append((stylized["energy"], stylized["preference"], near_mean))
     assert figures[1] == pytest.approx(figures[0], rel=tolerances.COMPOSED_SOLVE)
 
@@ -172,9 +172,7 @@ def test_a_cuda_device_arrives_where_the_processor_does(extra):
         options = af.DeformOptions(iterations=60, width=64, batch=200, device=device, **extra)
         field = af.deform(cases.bar_samples(600), cases.bar_handles(40.0), options)
         results.append(field)
-    assert results[1].report["energy"] == pytest.approx(
-        results[0].report["energy"], rel=tolerances.COMPOSED_SOLVE
-    )
+    assert results[1].report.energy == pytest.approx(results[0].report.energy, rel=tolerances.COMPOSED_SOLVE)
     points = cases.bar_samples(100, seed=1).points
     assert np.abs(results[1](points) - results[0](points)).max() < 0.05
 

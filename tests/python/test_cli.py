@@ -100,7 +100,7 @@ def test_deform_writes_mesh_surface_field_and_report(made, tmp_path):
     written = trimesh.load(tmp_path / "surface.ply", process=False)
     assert np.asarray(written.vertices) == pytest.approx(field(vertices), abs=1e-5)
     report = json.loads((tmp_path / "report.json").read_text())
-    assert report["iterations"] == 15 and report["stretch"] == pytest.approx(field.report["stretch"])
+    assert report["iterations"] == 15 and report["stretch"] == pytest.approx(field.report.stretch)
 
 
 def test_extract_through_the_inverse(made, tmp_path):

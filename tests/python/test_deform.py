@@ -24,16 +24,16 @@ def quick(**changes):
 def test_handles_follow_and_the_rest_bends_smoothly(samples):
     field = af.deform(samples, cases.bar_handles(), quick(iterations=250))
     report = field.report
-    assert report["handle_error_mean"] < 0.02
-    assert report["stretch"] < 0.05 and report["flipped_share"] == 0.0 and report["min_determinant"] > 0.3
+    assert report.handle_error_mean < 0.02
+    assert report.stretch < 0.05 and report.flipped_share == 0.0 and report.min_determinant > 0.3
     stretch, bend = af.arap_energy(field, samples.points)
-    assert stretch == pytest.approx(report["stretch"], rel=1e-6)
-    assert bend == pytest.approx(report["bend"], rel=1e-6)
-    assert report["energy"] == pytest.approx(stretch + 0.01 * bend, rel=1e-6)
-    assert [h["error_mean"] for h in report["handles"]] == pytest.approx(
-        2 * [report["handle_error_mean"]], abs=report["handle_error_max"]
+    assert stretch == pytest.approx(report.stretch, rel=1e-6)
+    assert bend == pytest.approx(report.bend, rel=1e-6)
+    assert report.energy == pytest.approx(stretch + 0.01 * bend, rel=1e-6)
+    assert [h.error_mean for h in report.handles] == pytest.approx(
+        2 * [report.handle_error_mean], abs=report.handle_error_max
     )
-    assert report["loss"][-1][1] < 0.3 * report["loss"][0][1]
+    assert report.loss[-1][1] < 0.3 * report.loss[0][1]
 
 
 def test_no_motion_is_the_identity(samples):
@@ -66,8 +66,8 @@ def test_exact_handles_interpolate(samples, motion):
     left, right = (h.rest for h in cases.bar_handles())
     matrix = cases.shift([0, 0.1, 0.2]) if motion == "shift" else cases.turn([1, 1, 0], 40, (0.5, 0, 0))
     field = af.deform(samples, [cases.moved(left), cases.moved(right, matrix)], quick(exact_handles=True))
-    assert field.report["handle_error_max"] < tolerances.EXACT_HANDLE
-    assert field.report["flipped_share"] == 0.0
+    assert field.report.handle_error_max < tolerances.EXACT_HANDLE
+    assert field.report.flipped_share == 0.0
     inside = np.abs((samples.points - right[:3, 3]) @ np.linalg.inv(right[:3, :3]).T).max(1) <= 1
     expected = samples.points[inside] @ matrix[:3, :3].T + matrix[:3, 3]
     assert np.abs(field(samples.points[inside]) - expected).max() < tolerances.EXACT_HANDLE
@@ -84,7 +84,7 @@ def test_exact_handles_that_overlap_are_named(samples):
     field = af.deform(
         samples, [cases.moved(a, together), cases.moved(b, together)], quick(exact_handles=True)
     )
-    assert field.report["handle_error_max"] < tolerances.EXACT_HANDLE
+    assert field.report.handle_error_max < tolerances.EXACT_HANDLE
 
 
 def test_exact_handles_that_nearly_overlap_stay_exact_and_are_named(samples):
@@ -92,8 +92,8 @@ def test_exact_handles_that_nearly_overlap_stay_exact_and_are_named(samples):
     b = cases.box([0.03, -0.3, -0.3], [0.9, 0.3, 0.3])
     handles = [cases.moved(a), cases.moved(b, cases.turn([0, 1, 0], 20))]
     field = af.deform(samples, handles, quick(exact_handles=True))
-    assert field.report["handle_error_max"] < tolerances.EXACT_HANDLE
-    assert "handles[0] and handles[1]" in field.report["notes"][0]
+    assert field.report.handle_error_max < tolerances.EXACT_HANDLE
+    assert "handles[0] and handles[1]" in field.report.notes[0]
 
 
 def test_points_and_regions(samples):
@@ -118,9 +118,7 @@ def test_a_heavier_handle_is_followed_more_closely(samples):
     errors = []
     for weight in (0.02, 1.0):
         handles = [cases.moved(left), cases.moved(right, pull, weight=weight)]
-        errors.append(
-            af.deform(samples, handles, quick(handle_weight=10.0)).report["handles"][1]["error_mean"]
-        )
+        errors.append(af.deform(samples, handles, quick(handle_weight=10.0)).report.handles[1].error_mean)
     assert errors[1] < 0.5 * errors[0]
 
 
@@ -149,15 +147,15 @@ def test_radial_fields_and_starts(samples, changes):
     """Bumps alone, and a network on top of them, bend the bar as the network alone does."""
     field = af.deform(samples, cases.bar_handles(), quick(centers=80, **changes))
     alone = af.deform(samples, cases.bar_handles(), quick(iterations=250))
-    assert field.report["handle_error_mean"] < 0.02
-    assert field.report["energy"] < 1.5 * alone.report["energy"]
+    assert field.report.handle_error_mean < 0.02
+    assert field.report.energy < 1.5 * alone.report.energy
     middle = samples.points[np.abs(samples.points[:, 0]) < 0.5]
     assert np.abs(field(middle) - alone(middle)).max() < 0.1
 
 
 def test_both_optimizers_descend(samples):
     for optimizer in ("muon", "adam"):
-        loss = af.deform(samples, cases.bar_handles(), quick(optimizer=optimizer)).report["loss"]
+        loss = af.deform(samples, cases.bar_handles(), quick(optimizer=optimizer)).report.loss
         assert np.mean([l for _, l in loss[-10:]]) < 0.1 * loss[0][1]
 
 
@@ -181,7 +179,7 @@ def test_cancel_from_another_thread(samples):
 
 def test_time_budget_ends_the_run(samples):
     field = af.deform(samples, cases.bar_handles(), quick(iterations=10_000_000, time_budget=0.5))
-    assert field.report["out_of_time"] and 0 < field.report["iterations"] < 10_000_000
+    assert field.report.out_of_time and 0 < field.report.iterations < 10_000_000
 
 
 def test_divergence_keeps_the_last_good_state(samples):
@@ -237,8 +235,8 @@ def test_the_bunnys_figures(data_dir):
     """The reference case: 300 iterations of the 4×256 network."""
     samples = cases.published_samples(data_dir / "neural_sdf" / "bunny.pt")
     report = af.deform(samples, cases.bunny_handles(), af.DeformOptions(iterations=300)).report
-    assert report["energy"] <= 0.0285 and report["handle_error_mean"] <= 0.005
-    assert report["flipped_share"] == 0.0
+    assert report.energy <= 0.0285 and report.handle_error_mean <= 0.005
+    assert report.flipped_share == 0.0
 
 
 @pytest.mark.slow
@@ -246,5 +244,5 @@ def test_the_bunny_with_exact_handles(data_dir):
     samples = cases.published_samples(data_dir / "neural_sdf" / "bunny.pt")
     options = af.DeformOptions(iterations=400, exact_handles=True, width=128)
     report = af.deform(samples, cases.bunny_handles(), options).report
-    assert report["energy"] <= 0.050 and report["handle_error_max"] <= tolerances.EXACT_HANDLE
-    assert report["flipped_share"] == 0.0
+    assert report.energy <= 0.050 and report.handle_error_max <= tolerances.EXACT_HANDLE
+    assert report.flipped_share == 0.0

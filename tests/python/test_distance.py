@@ -45,7 +45,7 @@ def queries(v, f, count, seed=0):
     rng = np.random.default_rng(seed)
     low, high = v.min(0), v.max(0)
     diagonal = np.linalg.norm(high - low)
-    near = af.sample_mesh(v, f, count - count // 2, seed).points
+    near = af.sample_mesh(v, f, count - count // 2, seed=seed).points
     near = near + rng.normal(0, 0.01 * diagonal, near.shape)
     return np.concatenate(
         [rng.uniform(low - 0.1 * diagonal, high + 0.1 * diagonal, (count // 2, 3)), near]

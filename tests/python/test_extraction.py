@@ -50,13 +50,14 @@ def test_equals_scikit_image_on_a_coarse_grid(data_dir, name):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_equals_scikit_image_from_few_evaluations(data_dir, name):
-    sdf, report = published(data_dir, name), {}
-    V, F = af.extract_surface(sdf, 128, report=report)
+    sdf = published(data_dir, name)
+    mesh = af.extract_surface(sdf, 128)
+    (V, F), report = mesh, mesh.report
     check_same_vertices(V, dense_surface(sdf, 128))
     check_closed(V, F)
-    assert report["dense_evaluations"] == 128**3
-    assert report["evaluations"] <= DENSE_SHARE * 128**3
-    assert not report["open"]
+    assert report.dense_evaluations == 128**3
+    assert report.evaluations <= DENSE_SHARE * 128**3
+    assert not report.open
 
 
 def test_bad_arguments_and_cancel(data_dir):

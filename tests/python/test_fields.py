@@ -71,7 +71,7 @@ def test_derivatives_in_mesh_coordinates():
     assert np.allclose(b.jacobian(y), a.jacobian(x), atol=1e-5)
     assert np.allclose(b.hessian(y) * 10, a.hessian(x), atol=1e-4)
     assert np.allclose(b.inverse(b(y)), y, atol=1e-4)
-    assert b.report["handle_error_max"] == pytest.approx(10 * a.report["handle_error_max"], rel=1e-4)
+    assert b.report.handle_error_max == pytest.approx(10 * a.report.handle_error_max, rel=1e-4)
 
 
 def test_inverse_returns_to_the_start(bent, samples):

@@ -34,17 +34,17 @@ def fitted(ball):
 
 def test_the_report_tells_the_error_in_mesh_units(ball, fitted):
     report, vertices = fitted.report, ball[0]
-    assert report["stopped_by"] == "iterations" and report["iterations"] == QUICK["iterations"]
-    assert fitted.frame.scale == pytest.approx(4.0) and report["scale"] == fitted.frame.scale
+    assert report.stopped_by == "iterations" and report.iterations == QUICK["iterations"]
+    assert fitted.frame.scale == pytest.approx(4.0) and report.scale == fitted.frame.scale
     rng = np.random.default_rng(0)
     spreads = np.where(np.arange(4000) % 2, 0.05, 0.01)[:, None] * fitted.frame.scale
     near = af.sample_mesh(*ball, count=4000, seed=9).points + rng.normal(size=(4000, 3)) * spreads
     error = np.abs(fitted(near) - af.signed_distance(*ball, near))
-    assert error.mean() == pytest.approx(report["near_mean"], rel=FIT_REPORT)
+    assert error.mean() == pytest.approx(report.near_mean, rel=FIT_REPORT)
     anywhere = fitted.frame.to_mesh(rng.uniform(-1, 1, (4000, 3)))
     error = np.abs(fitted(anywhere) - af.signed_distance(*ball, anywhere))
-    assert error.mean() == pytest.approx(report["volume_mean"], rel=FIT_REPORT)
-    assert report["near_mean"] < 0.01 * np.ptp(vertices) and report["near_mean"] < report["near_max"]
+    assert error.mean() == pytest.approx(report.volume_mean, rel=FIT_REPORT)
+    assert report.near_mean < 0.01 * np.ptp(vertices) and report.near_mean < report.near_max
 
 
 def test_the_sign_and_the_gradient_are_right(ball, fitted):
@@ -68,12 +68,12 @@ def test_it_stops_at_the_target_or_when_time_is_up(ball):
     stopped = af.fit_sdf(*ball, af.FitOptions(**quick, target_error=0.01)).report
     assert stopped["stopped_by"] == "target_error" and stopped["near_mean"] < 0.012 * stopped["scale"]
     report = af.fit_sdf(*ball, af.FitOptions(**quick, time_budget=0.5)).report
-    assert report["stopped_by"] == "time_budget" and report["seconds"] > 0.5
+    assert report.stopped_by == "time_budget" and report.seconds > 0.5
 
 
 def test_adam_learns_too(ball):
     options = af.FitOptions(**QUICK, optimizer="adam", learning_rate=5e-3)
-    assert af.fit_sdf(*ball, options).report["near_mean"] < 0.15
+    assert af.fit_sdf(*ball, options).report.near_mean < 0.15
 
 
 def test_cancel_takes_effect_soon_and_progress_only_rises(ball):
@@ -90,7 +90,7 @@ def test_cancel_takes_effect_soon_and_progress_only_rises(ball):
     watcher = threading.Thread(target=watch)
     watcher.start()
     with pytest.raises(af.Cancelled):
-        af.fit_sdf(*ball, af.FitOptions(**{**QUICK, "iterations": 2000}), task)
+        af.fit_sdf(*ball, af.FitOptions(**{**QUICK, "iterations": 2000}), task=task)
     latency = time.perf_counter() - times["cancel"]
     watcher.join()
     assert latency < 2.0  # 0.2 s on an idle machine
@@ -102,7 +102,7 @@ def test_leaving_the_finite_numbers_keeps_the_last_good_state(ball):
     with pytest.raises(af.Diverged, match="learning_rate") as error:
         af.fit_sdf(*ball, af.FitOptions(**QUICK, learning_rate=1e30))
     good = error.value.last_good
-    assert np.isfinite(good(ball[0])).all() and good.report["stopped_by"] == "diverged"
+    assert np.isfinite(good(ball[0])).all() and good.report.stopped_by == "diverged"
 
 
 def test_a_fit_survives_its_file(fitted, tmp_path):

@@ -40,7 +40,7 @@ def test_platonic_normals_are_equally_surrounded(name):
 @pytest.mark.parametrize("name", list(COUNTS))
 def test_preference_is_one_at_preferred_normals(name, sharpness):
     normals = af.preferred_normals(name)
-    assert np.abs(af.gauss_preference(normals, normals, sharpness) - 1).max() < GAUSS_WEIGHTS
+    assert np.abs(af.gauss_preference(normals, normals, sharpness=sharpness) - 1).max() < GAUSS_WEIGHTS
 
 
 def test_preference_of_many_and_of_close_normals():
@@ -66,7 +66,7 @@ def test_bad_preferences_are_named():
         with pytest.raises(af.InvalidInput, match=message):
             af.gauss_preference(cube, preferred)
     with pytest.raises(af.InvalidInput, match="sharpness"):
-        af.gauss_preference(cube, cube, 0.0)
+        af.gauss_preference(cube, cube, sharpness=0.0)
 
 
 @pytest.mark.parametrize("name", ["cube", "dodecahedron", "cone", "plane pair"])

@@ -26,7 +26,7 @@ def nodes(values, origin, spacing):
 @pytest.mark.parametrize("bounds", [None, [[0.0, 1.0, 2.5], [2.0, 3.0, 3.2]]])
 def test_values_lie_where_origin_and_spacing_say(bounds):
     ball = Ball()
-    values, origin, spacing = af.sdf_grid(ball, 20, bounds)
+    values, origin, spacing = af.sdf_grid(ball, 20, bounds=bounds)
     expected = ball(nodes(values, origin, spacing).reshape(-1, 3)).reshape(values.shape)
     assert values.dtype == np.float32 and np.abs(values - expected).max() < 1e-6
     low, high = np.array(bounds) if bounds else ball.frame.to_mesh([[-1.0] * 3, [1.0] * 3])
@@ -85,7 +85,7 @@ def test_bad_input_is_named(tmp_path):
     odd = [[0, 0, 0]], [[0, 0, 0], [1, 0, 1]], [[0, 0, 0], [1, 1, np.nan]], "box", [[0], [1, 1]], 7
     for bounds in (*odd, np.ones((2, 3), complex), np.broadcast_to(np.zeros(3), (2_000_000_000, 3))):
         with pytest.raises(af.InvalidInput, match="bounds"):
-            af.sdf_grid(Ball(), 4, bounds)
+            af.sdf_grid(Ball(), 4, bounds=bounds)
     with pytest.raises(af.InvalidInput, match="extension"):
         af.save_grid(tmp_path / "grid.txt", *af.sdf_grid(Ball(), 4))
 

@@ -29,5 +29,5 @@ def test_the_other_fingers_stay(data_dir, seed):
         moved = np.linalg.norm(field(samples.points[tip]) - samples.points[tip], axis=1)
         assert moved.max() < 0.02 * length, name
     report = field.report
-    assert report["handle_error_max"] < 0.01 * length and report["flipped_share"] == 0.0
-    assert report["energy"] < 0.005
+    assert report.handle_error_max < 0.01 * length and report.flipped_share == 0.0
+    assert report.energy < 0.005

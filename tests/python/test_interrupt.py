@@ -24,7 +24,7 @@ try:
     af.deform(samples, handles, af.DeformOptions(iterations=10_000_000, **options))
 except KeyboardInterrupt:
     print("interrupted", flush=True)
-print(af.deform(samples, handles, af.DeformOptions(iterations=3, **options)).report["iterations"])
+print(af.deform(samples, handles, af.DeformOptions(iterations=3, **options)).report.iterations)
 """
 
 
@@ -76,4 +76,4 @@ def test_a_handler_that_raises_nothing_changes_nothing():
         interrupted_after(0.2, call)
     finally:
         signal.signal(signal.SIGINT, before)
-    assert len(seen) == 1 and field.report["out_of_time"]
+    assert len(seen) == 1 and field.report.out_of_time

@@ -32,7 +32,7 @@ def test_a_trained_inverse_returns(bent, samples):
     error = np.linalg.norm(inverse(bent(others)) - others, axis=1)
     moved = np.linalg.norm(bent(others) - others, axis=1)
     assert np.quantile(error, 0.95) < 0.02 * moved.max()
-    assert inverse.report["error_mean"] == pytest.approx(error.mean(), rel=0.2)
+    assert inverse.report.error_mean == pytest.approx(error.mean(), rel=0.2)
 
 
 def test_a_trained_inverse_is_a_field_with_a_file(bent, samples, tmp_path):
@@ -83,12 +83,12 @@ def test_newtons_inverse_in_any_unit(unit, kind):
 
 def gap_in_voxels(sdf, field, resolution, **keywords):
     """Symmetric Hausdorff distance, at vertices, of extract_deformed and the warped extraction."""
-    report = {}
-    V, F = af.extract_deformed(sdf, field, resolution, report=report, **keywords)
+    mesh = af.extract_deformed(sdf, field, resolution, **keywords)
+    (V, F), report = mesh, mesh.report
     rest, G = af.extract_surface(sdf, resolution)
     W = field(rest)
     apart = max(np.abs(af.signed_distance(W, G, V)).max(), np.abs(af.signed_distance(V, F, W)).max())
-    return apart / report["spacing"], report
+    return apart / report.spacing, report
 
 
 @pytest.fixture(scope="module")
@@ -104,8 +104,8 @@ def test_extraction_through_newtons_inverse(bunny):
     sdf, field = bunny
     apart, report = gap_in_voxels(sdf, field, 40)
     assert apart <= 1.5
-    assert report["failures"] < 0.05 * report["inverted"] and not report["open"]
-    assert report["inverted"] < report["dense_evaluations"] / 2
+    assert report.failures < 0.05 * report.inverted and not report.open
+    assert report.inverted < report.dense_evaluations / 2
 
 
 def test_extraction_stops_and_names_bad_input(bunny):
@@ -153,7 +153,7 @@ def test_inverses_on_published_shapes(data_dir, name):
     assert np.nanquantile(error, 0.95) < tolerances.NEWTON_INVERSE
     sdf = af.NeuralSdf.from_layers(*Network.published(data_dir / "neural_sdf" / f"{name}.pt").layers)
     apart, report = gap_in_voxels(sdf, field, 128)
-    assert apart <= 1.5 and report["failures"] <= 0.01 * report["inverted"]
+    assert apart <= 1.5 and report.failures <= 0.01 * report.inverted
     trained = af.train_inverse(field, samples, af.InverseTrainingOptions(iterations=1500))
     assert gap_in_voxels(sdf, field, 128, inverse=trained)[0] <= 1.5
     assert np.quantile(np.linalg.norm(trained(images) - points, axis=1), 0.95) < 1e-3

@@ -124,7 +124,7 @@ def test_a_curve_hears_cancel():
     task = af.Task()
     threading.Timer(0.2, task.cancel).start()
     with pytest.raises(af.Cancelled):
-        af.deform_curve(circle, [af.CurveHandle([0])], af.CurveOptions(spacing=0.02), task)
+        af.deform_curve(circle, [af.CurveHandle([0])], af.CurveOptions(spacing=0.02), task=task)
     assert task.progress < 1.0
 
 

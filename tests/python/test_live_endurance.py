@@ -32,7 +32,7 @@ def test_ten_thousand_motions_leave_no_trace():
         angles, offset = 25 * rng.normal(size=3), 0.3 * rng.normal(size=3)
         motion = turned(angles[0], 0) @ turned(angles[1], 1) @ turned(angles[2], 2, offset)
         live.solve([LEFT, motion @ RIGHT])
-        assert np.isfinite(live.report["value"]) and np.isfinite(live.report["handle_error_max"])
+        assert np.isfinite(live.report.value) and np.isfinite(live.report.handle_error_max)
         if i == 1000:
             memory = resident_mebibytes()
     assert resident_mebibytes() < memory + 2
@@ -54,7 +54,7 @@ def test_a_finger_of_a_hand_moves_nearly_alone(data_dir):
         live = af.LiveDeformer(samples, handles, af.LiveOptions(interior=interior))
         field = live.solve()
         shares.append(np.linalg.norm(field(tips) - tips, axis=1).max() / 1.48)
-        energies.append(live.report["energy"])
+        energies.append(live.report.energy)
     assert shares[0] < 0.05 < 0.1 < shares[1]
     assert energies[0] < 0.5 * energies[1]
 
@@ -71,12 +71,12 @@ def test_refined_by_a_style_and_handles_at_once():
     for i in range(1, 6):
         live.set_style(cube @ turned(4.0 * i, 0)[:3, :3].T, strength=0.2 * i, sharpness=4 + 0.4 * i)
         live.solve([LEFT, turned(5.0 * i) @ RIGHT])
-        assert live.report["flipped_share"] == 0 and live.report["handle_error_mean"] < 0.05
-    setup = live.report["setup_seconds"]
+        assert live.report.flipped_share == 0 and live.report.handle_error_mean < 0.05
+    setup = live.report.setup_seconds
     live.solve(iterations=60)
-    assert live.report["setup_seconds"] == setup
+    assert live.report.setup_seconds == setup
     alone = af.LiveDeformer(samples, [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, turned(25) @ RIGHT)])
     plain = alone.solve(iterations=60)
     twisted = af.gauss_preference(samples.normals, cube @ turned(20.0, 0)[:3, :3].T).mean()
-    assert live.report["preference"] > twisted + 0.05
+    assert live.report.preference > twisted + 0.05
     assert np.abs(live.field(samples.points) - plain(samples.points)).max() > 0.02

@@ -21,7 +21,7 @@ def other_leg_moves(samples, interior):
     handles = [af.Cuboid(BOTTOM, BOTTOM), af.Cuboid(TIP, TIP)]
     live = af.LiveDeformer(samples, handles, af.LiveOptions(interior=interior))
     field = live.solve([BOTTOM, shift([0, 0.4, 0]) @ TIP], iterations=100, tolerance=1e-6)
-    assert live.report["handle_error_mean"] < 0.01
+    assert live.report.handle_error_mean < 0.01
     return np.linalg.norm(field(LEGS[-1]) - LEGS[-1]), live
 
 
@@ -30,7 +30,7 @@ def test_a_leg_of_a_fork_moves_alone(samples):
     together, plain = other_leg_moves(samples, False)
     assert apart < 0.04 * 1.5  # of the fork's length
     assert together > 2 * apart
-    assert live.report["energy"] < plain.report["energy"]
+    assert live.report.energy < plain.report.energy
 
 
 def test_derivatives_and_files_of_such_a_field(samples, tmp_path):

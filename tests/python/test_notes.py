@@ -19,23 +19,23 @@ def test_folds_and_far_targets_are_noted(kind):
         handles = [cases.moved(left), cases.moved(right, cases.shift([way, 0.0, 0.0]))]
         return af.deform(samples, handles, af.DeformOptions(field=kind, **QUICK)).report
 
-    assert solve(0.1)["notes"] == [] and "far_target" not in solve(0.1)
+    assert solve(0.1).notes == () and solve(0.1).far_target is None
     torn = solve(-800.0)  # 500 times its length, through itself
-    assert torn["flipped_share"] > 0.0
-    folds, far = torn["notes"]
+    assert torn.flipped_share > 0.0
+    folds, far = torn.notes
     assert f"{100 * torn['flipped_share']:.3g} %" in folds and f"{torn['min_determinant']:.3g}" in folds
     assert far.startswith("handles[1]") and f"{torn['far_target']:.3g} times" in far
-    assert torn["far_target"] == pytest.approx(500.0, rel=0.01)
+    assert torn.far_target == pytest.approx(500.0, rel=0.01)
 
 
 def test_live_notes_come_and_go():
     left, right = (h.rest for h in cases.bar_handles())
     live = af.LiveDeformer(cases.bar_samples(), [cases.moved(left), cases.moved(right)])
     live.solve([left, cases.shift([-800.0, 0.0, 0.0]) @ right])
-    assert any("handles[1]" in note for note in live.report["notes"])
+    assert any("handles[1]" in note for note in live.report.notes)
     live.reset()
     live.solve([left, right])
-    assert live.report["notes"] == []
+    assert live.report.notes == ()
 
 
 def test_notes_are_printed(tmp_path, capsys):

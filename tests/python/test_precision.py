@@ -21,8 +21,8 @@ def test_a_solve_with_rounded_products_is_as_good(extra):
     places = [field(samples.points) for field in (exact, rounded, again)]
     assert np.abs(places[1] - places[0]).max() > 1e-6  # another arithmetic did run
     assert np.array_equal(places[1], places[2])
-    assert rounded.report["energy"] < exact.report["energy"] * (1 + tolerances.ROUNDED_SOLVE)
-    assert rounded.report["handle_error_mean"] < exact.report["handle_error_mean"] + 1e-3
+    assert rounded.report.energy < exact.report.energy * (1 + tolerances.ROUNDED_SOLVE)
+    assert rounded.report.handle_error_mean < exact.report.handle_error_mean + 1e-3
 
 
 def test_stylize_takes_the_option_too():

@@ -22,9 +22,9 @@ def test_deform_radial_reaches_less_energy_than_a_short_training(samples, handle
     radial = af.deform(samples, handles, af.DeformOptions(field="radial"))
     neural = af.deform(samples, handles, af.DeformOptions(width=64, iterations=60, learning_rate=5e-3))
     assert isinstance(radial, af.RadialField)
-    assert radial.report["energy"] < 0.9 * neural.report["energy"]
-    assert radial.report["flipped_share"] == 0 and radial.report["iterations"] < 300
-    values = [value for _, value in radial.report["loss"]]
+    assert radial.report.energy < 0.9 * neural.report.energy
+    assert radial.report.flipped_share == 0 and radial.report.iterations < 300
+    values = [value for _, value in radial.report.loss]
     assert (np.diff(values) <= 1e-12).all()
 
 
@@ -33,8 +33,8 @@ def test_a_network_refines_the_radial_result(samples, handles, tmp_path):
     radial = af.deform(samples, handles, af.DeformOptions(field="radial"))
     refined = af.deform(samples, handles, af.DeformOptions(start="radial", **options))
     cold = af.deform(samples, handles, af.DeformOptions(**options))
-    assert refined.report["handle_error_mean"] < 0.3 * cold.report["handle_error_mean"]
-    assert refined.report["energy"] < 1.1 * radial.report["energy"]
+    assert refined.report.handle_error_mean < 0.3 * cold.report.handle_error_mean
+    assert refined.report.energy < 1.1 * radial.report.energy
     refined.save(tmp_path / "refined.safetensors")
     again = af.DeformationField.load(tmp_path / "refined.safetensors")
     assert np.array_equal(again(samples.points[:50]), refined(samples.points[:50]))
@@ -45,8 +45,8 @@ def test_stylize_radial_turns_normals_and_holds_the_lowest_sample(samples):
     before = af.gauss_preference(samples.normals, cube).mean()
     options = af.StylizeOptions(field="radial", iterations=30)
     field = af.stylize(samples, cube, options)
-    assert field.report["preference"] > before + 0.1
-    assert field.report["flipped_share"] == 0
+    assert field.report.preference > before + 0.1
+    assert field.report.flipped_share == 0
     lowest = samples.points[[samples.points[:, 2].argmin()]]
     assert np.abs(field(lowest) - lowest).max() < 1e-9
     unchanged = af.stylize(samples, cube, af.StylizeOptions(field="radial", strength=0.0))
@@ -65,4 +65,4 @@ def test_cancel_stops_a_radial_solve(samples, handles):
     task = af.Task()
     task.cancel()
     with pytest.raises(af.Cancelled):
-        af.deform(samples, handles, af.DeformOptions(field="radial"), task)
+        af.deform(samples, handles, af.DeformOptions(field="radial"), task=task)

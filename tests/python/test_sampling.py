@@ -47,12 +47,12 @@ def test_as_uniform_as_samples_by_area(bunny, samples):
 
 
 def test_seed_decides_and_report_is_filled(bunny):
-    report = {}
-    a = af.sample_surface(bunny, 500, seed=3, report=report)
+    a = af.sample_surface(bunny, 500, seed=3)
+    report = a.report
     assert np.array_equal(a.points, af.sample_surface(bunny, 500, seed=3).points)
     assert not np.array_equal(a.points, af.sample_surface(bunny, 500, seed=4).points)
-    assert report["evaluations"] > report["gradient_evaluations"] >= 500
-    assert report["largest_value"] <= ON_SURFACE
+    assert report.evaluations > report.gradient_evaluations >= 500
+    assert report.largest_value <= ON_SURFACE
 
 
 def test_bad_arguments_cancel_and_no_surface(bunny):

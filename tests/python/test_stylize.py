@@ -28,7 +28,7 @@ def moved_normals(field, samples):
 
 
 def mean_preference(field, samples, preferred, sharpness=5.0):
-    return af.gauss_preference(moved_normals(field, samples), preferred, sharpness).mean()
+    return af.gauss_preference(moved_normals(field, samples), preferred, sharpness=sharpness).mean()
 
 
 def test_strength_zero_is_the_identity(ball):
@@ -39,7 +39,7 @@ def test_strength_zero_is_the_identity(ball):
 
 
 def test_strength_grades_the_effect(ball):
-    values = [af.stylize(ball, "cube", quick(strength=s)).report["preference"] for s in (0.0, 0.15, 1.0)]
+    values = [af.stylize(ball, "cube", quick(strength=s)).report.preference for s in (0.0, 0.15, 1.0)]
     assert values[0] + 0.02 < values[1] < values[2] - 0.02
 
 
@@ -48,9 +48,9 @@ def test_the_preference_rises(ball, style):
     preferred = af.preferred_normals(style)
     before = af.gauss_preference(ball.normals, preferred).mean()
     field = af.stylize(ball, style, quick())
-    assert 1 - field.report["preference"] < 0.5 * (1 - before)
-    assert mean_preference(field, ball, preferred) == pytest.approx(field.report["preference"], abs=1e-3)
-    assert field.report["flipped_share"] <= 0.001
+    assert 1 - field.report.preference < 0.5 * (1 - before)
+    assert mean_preference(field, ball, preferred) == pytest.approx(field.report.preference, abs=1e-3)
+    assert field.report.flipped_share <= 0.001
 
 
 @pytest.mark.parametrize("shape", ["ball", "torus", "egg"])
@@ -61,7 +61,7 @@ def test_every_style_raises_it_on_every_shape(shape):
     for style in af.style_names():
         before = af.gauss_preference(samples.normals, af.preferred_normals(style)).mean()
         report = af.stylize(samples, style, quick(width=32, layers=2, iterations=50, batch=100)).report
-        assert 1 - report["preference"] < 0.8 * (1 - before), (style, before, report["preference"])
+        assert 1 - report.preference < 0.8 * (1 - before), (style, before, report.preference)
 
 
 def test_the_lowest_sample_stays(ball):
@@ -95,8 +95,8 @@ def test_handles_and_style_together(ball):
     top, bottom = cases.box([-1, -1, 0.5], [1, 1, 1]), cases.box([-1, -1, -1], [1, 1, -0.5])
     handles = [cases.moved(bottom), cases.moved(top, cases.shift([0, 0, 0.2]))]
     field = af.stylize(ball, "cube", quick(), handles=handles)
-    assert field.report["handle_error_mean"] < 0.05
-    assert field.report["preference"] > af.gauss_preference(ball.normals, af.preferred_normals("cube")).mean()
+    assert field.report.handle_error_mean < 0.05
+    assert field.report.preference > af.gauss_preference(ball.normals, af.preferred_normals("cube")).mean()
 
 
 def test_bad_input_is_named(ball):
@@ -120,7 +120,7 @@ def test_spot_becomes_a_cube(data_dir):
     preferred = af.preferred_normals("cube")
     assert af.gauss_preference(samples.normals, preferred).mean() == pytest.approx(0.66, abs=0.02)
     report = af.stylize(samples, "cube", af.StylizeOptions(gauss_weight=2.0, iterations=300)).report
-    assert report["preference"] >= 0.90
+    assert report.preference >= 0.90
     full = af.stylize(samples, "cube", af.StylizeOptions()).report
     assert full["preference"] >= 0.96 and full["flipped_share"] <= 0.001
 

@@ -20,7 +20,7 @@ def test_a_watched_solve_shows_the_shape_and_ends_the_same(field):
     points = samples.points[:50]
     assert task.looks == 0 and task.watched.shape == (0, 3)
     task.watch(points, seconds=0.0)
-    watched = af.deform(samples, HANDLES, options, task)
+    watched = af.deform(samples, HANDLES, options, task=task)
     assert np.array_equal(alone(points), watched(points))
     assert task.looks > 0 and task.watched.shape == points.shape
     assert np.abs(task.watched - points).max() > 0.01  # it had begun to move

@@ -24,6 +24,20 @@ class Ball final : public ImplicitFunction {
 };
 // [implicit]
 
+// [energy]
+/// Holds the surface back: half the mean squared distance of its samples from their rest positions.
+class Hold final : public ExternalEnergy {
+ public:
+  double evaluate(PointsIn points, const JetView<const double>& jets,
+                  const JetView<double>& cotangents) override {
+    const Points off = Eigen::Map<const Points>(jets.data, jets.count, 3) - points;
+    const double weight = 1.0 / static_cast<double>(jets.count);
+    Eigen::Map<Points>(cotangents.data, jets.count, 3) += weight * off;
+    return 0.5 * weight * off.squaredNorm();
+  }
+};
+// [energy]
+
 int main(int argc, char** argv) {
   if (argc != 2) return 2;
   const TriangleMesh mesh = read_obj(argv[1]);
@@ -55,7 +69,16 @@ int main(int argc, char** argv) {
   live.set_targets({end});
   const Points moved = live.solve()->at(mesh.vertices);
   // [live]
+  // [hooks]
+  DeformOptions quick;
+  quick.field = FieldKind::radial;
+  SolveHooks hooks;
+  hooks.energies = {std::make_shared<Hold>()};
+  hooks.observer = [](const Iteration& iteration) { return iteration.loss > 1e-3; };  // false ends the solve
+  const Solution held = deform(samples, {end}, quick, {}, hooks);
+  // [hooks]
   const TriangleMesh ball = extract_surface(Ball(), 32);
-  std::cout << surface.vertices.rows() << " " << ball.vertices.rows() << " " << moved.rows() << "\n";
+  std::cout << surface.vertices.rows() << " " << ball.vertices.rows() << " " << moved.rows() << " "
+            << held.report.loop.iterations << "\n";
   return 0;
 }

@@ -4,4 +4,5 @@
 
 #include "energies/handles.h"
 #include "solve/deform.h"
+#include "solve/hooks.h"
 #include "solve/inverse_training.h"

@@ -4,6 +4,7 @@
 
 #include "energies/arap.h"
 #include "energies/distortion.h"
+#include "energies/external_energy.h"
 #include "energies/gauss.h"
 #include "energies/rotation.h"
 #include "energies/styles.h"

@@ -6,7 +6,7 @@ Arrays are NumPy, all coordinates are the mesh's own; distances are negative ins
 
 from ._native import (
     Cancelled,
-    Cuboid,
+    CuboidHandle,
     CurveField,
     CurveHandle,
     CurveOptions,
@@ -19,14 +19,15 @@ from ._native import (
     FitOptions,
     Frame,
     Handle,
+    ImplicitFunction,
     InvalidInput,
     InverseTrainingOptions,
     LiveDeformer,
     LiveOptions,
     NeuralSdf,
-    Point,
+    PointHandle,
     RadialField,
-    Region,
+    RegionHandle,
     StylizeOptions,
     SurfaceSamples,
     Task,
@@ -52,14 +53,36 @@ from ._native import (
     train_inverse,
     winding_number,
 )
+from .arrays import ArrayLike
 from .cmake import cmake_dir
+from .energies import Energy, EnergyValue, Jets
 from .grids import save_grid, sdf_grid
+from .reports import (
+    DeformedExtractionReport,
+    EnergyReport,
+    Extraction,
+    ExtractionReport,
+    FitReport,
+    HandleError,
+    InverseReport,
+    Iteration,
+    LiveReport,
+    Report,
+    SampleReport,
+    SolveReport,
+)
 
-InverseOptions = InverseTrainingOptions  # the older name
+# The shorter and the older names.
+Cuboid = CuboidHandle
+Point = PointHandle
+Region = RegionHandle
+InverseOptions = InverseTrainingOptions
 
 __all__ = [
+    "ArrayLike",
     "Cancelled",
     "Cuboid",
+    "CuboidHandle",
     "CurveField",
     "CurveHandle",
     "CurveOptions",
@@ -67,20 +90,38 @@ __all__ = [
     "CurveSamples",
     "DeformOptions",
     "DeformationField",
+    "DeformedExtractionReport",
     "Distortion",
     "Diverged",
+    "Energy",
+    "EnergyReport",
+    "EnergyValue",
+    "Extraction",
+    "ExtractionReport",
     "FitOptions",
+    "FitReport",
     "Frame",
     "Handle",
+    "HandleError",
+    "ImplicitFunction",
     "InvalidInput",
     "InverseOptions",
+    "InverseReport",
     "InverseTrainingOptions",
+    "Iteration",
+    "Jets",
     "LiveDeformer",
     "LiveOptions",
+    "LiveReport",
     "NeuralSdf",
     "Point",
+    "PointHandle",
     "RadialField",
     "Region",
+    "RegionHandle",
+    "Report",
+    "SampleReport",
+    "SolveReport",
     "StylizeOptions",
     "SurfaceSamples",
     "Task",

@@ -6,7 +6,7 @@ from pathlib import Path
 from ._native import InvalidInput
 
 
-def cmake_dir():
+def cmake_dir() -> str:
     """The folder of arapfieldsConfig.cmake, what CMake's variable arapfields_DIR is to be, as a str.
 
     InvalidInput where the package was installed without its C++ part, as in Blender's extension.

@@ -1,18 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Signed distances on a regular grid, as arrays, .npz files and OpenVDB volumes."""
 
-import contextlib
 import errno
 import importlib
 import importlib.util
+import os
 import sys
 from pathlib import Path
+from typing import Protocol, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from ._files import whole_file, write_arrays
-from ._native import Cancelled, Frame, InvalidInput, Task, require_memory, signed_distance
+from ._native import Cancelled, Frame, InvalidInput, Task, real_array, require_memory, signed_distance
 from ._options import options_of
+from .arrays import ArrayLike
 
 SUFFIXES = (".npz", ".vdb")
 CHUNK = 200_000  # points evaluated between two looks at the task
@@ -20,32 +23,48 @@ RESOLUTION = options_of("grid")["resolution"]
 BAND = 3  # voxels on either side of the surface that a level set keeps
 
 
+Array: TypeAlias = npt.NDArray[np.float64]
+FilePath: TypeAlias = str | os.PathLike[str]
+
+
+class Distance(Protocol):
+    """A function of points (p, 3) → (p,) with the frame of its surface."""
+
+    @property
+    def frame(self) -> Frame: ...
+
+    def __call__(self, points: Array, /) -> ArrayLike: ...
+
+
 class MeshDistance:
     """The exact signed distance of a mesh with the frame that its samples have."""
 
-    def __init__(self, vertices, triangles):
+    def __init__(self, vertices: ArrayLike, triangles: ArrayLike) -> None:
         self.vertices = np.asarray(vertices, float)
         self.triangles = triangles
         used = self.vertices[np.unique(triangles)]
         low, high = used.min(0), used.max(0)
         self.frame = Frame((low + high) / 2, (high - low).max() / 2 / 0.75)
 
-    def __call__(self, points):
+    def __call__(self, points: ArrayLike) -> Array:
         return signed_distance(self.vertices, self.triangles, points)
 
 
-def _checked_bounds(bounds):
+def _checked_bounds(bounds: ArrayLike) -> Array:
     """(2, 3) numbers; InvalidInput for anything that is not a low and a high corner."""
-    with contextlib.suppress(TypeError, ValueError):
-        corners = np.asarray(bounds)
-        if corners.shape == (2, 3) and np.can_cast(corners.dtype, float, "same_kind"):
-            corners = corners.astype(float)
-            if np.isfinite(corners).all() and (corners[0] < corners[1]).all():
-                return corners
-    raise InvalidInput(f"bounds: got {bounds!r:.80}; low and high corner, shape (2, 3), are needed")
+    corners = real_array(bounds, "bounds")
+    if corners.shape != (2, 3) or not np.isfinite(corners).all() or not (corners[0] < corners[1]).all():
+        raise InvalidInput(f"bounds: got {bounds!r:.80}; low and high corner, shape (2, 3), are needed")
+    return corners
 
 
-def sdf_grid(sdf, resolution=RESOLUTION["default"], bounds=None, task=None):
+def sdf_grid(
+    sdf: Distance,
+    resolution: int = RESOLUTION["default"],
+    *,
+    bounds: ArrayLike | None = None,
+    task: Task | None = None,
+) -> tuple[npt.NDArray[np.float32], Array, float]:
     """Distances at the nodes of a regular grid: (values, origin, spacing).
 
     `values` (nx, ny, nz) float32, negative inside; node (i, j, k) lies at origin + spacing · (i, j, k), in
@@ -59,10 +78,8 @@ def sdf_grid(sdf, resolution=RESOLUTION["default"], bounds=None, task=None):
         raise InvalidInput(f"resolution: got {resolution!r}; an integer from {low} to {high} is needed")
     if not isinstance(task, Task | None):
         raise InvalidInput(f"task: got {type(task).__name__}; a Task or None is needed")
-    if bounds is None:
-        bounds = sdf.frame.to_mesh([[-1.0] * 3, [1.0] * 3])
-    bounds = _checked_bounds(bounds)
-    size = bounds[1] - bounds[0]
+    corners = sdf.frame.to_mesh([[-1.0] * 3, [1.0] * 3]) if bounds is None else _checked_bounds(bounds)
+    size = corners[1] - corners[0]
     spacing = float(size.max() / resolution)
     counts = np.maximum(np.ceil(size / spacing - 1e-9).astype(int), 1) + 1
     require_memory("resolution", 4.0 * float(np.prod(counts, dtype=float)))
@@ -74,16 +91,16 @@ def sdf_grid(sdf, resolution=RESOLUTION["default"], bounds=None, task=None):
                 raise Cancelled("cancelled")
             task.report(begin / flat.size, "distances")
         nodes = np.stack(np.unravel_index(np.arange(begin, min(begin + CHUNK, flat.size)), counts), axis=1)
-        distances = np.asarray(sdf(bounds[0] + spacing * nodes))
+        distances = np.asarray(sdf(corners[0] + spacing * nodes))
         if distances.shape != (len(nodes),):
             raise InvalidInput(
                 f"sdf: shape {distances.shape} for {len(nodes)} points; one number each is needed"
             )
         flat[begin : begin + CHUNK] = distances
-    return values, bounds[0], spacing
+    return values, corners[0], spacing
 
 
-def save_grid(path, values, origin, spacing):
+def save_grid(path: FilePath, values: ArrayLike, origin: ArrayLike, spacing: float) -> None:
     """Writes a grid of sdf_grid as .npz (`values`, `origin`, `spacing`) or .vdb, by the path's extension.
 
     A .vdb holds one float grid, `surface`: a level set whose values are cut off BAND voxels from the surface.

@@ -7,7 +7,7 @@ import json
 import numpy as np
 
 from .._files import existing_file
-from .._native import Cuboid, InvalidInput, Point
+from .._native import CuboidHandle, InvalidInput, PointHandle
 
 KEYS = {
     "cuboid": {"rest", "target", "corners", "center", "half_extents", "rotation", "move", "weight"},
@@ -52,7 +52,7 @@ def build_handles(described, bounds):
 
 
 def _point(item, _):
-    return Point(_numbers(item["rest"], (3,)), _numbers(item["target"], (3,)), item.get("weight", 1.0))
+    return PointHandle(_numbers(item["rest"], (3,)), _numbers(item["target"], (3,)), item.get("weight", 1.0))
 
 
 def _cuboid(item, bounds):
@@ -71,7 +71,7 @@ def _cuboid(item, bounds):
         target = _numbers(item["target"], (4, 4))
     else:
         target = _motion(item.get("move", {}), rest[:3, 3]) @ rest
-    return Cuboid(rest, target, item.get("weight", 1.0))
+    return CuboidHandle(rest, target, item.get("weight", 1.0))
 
 
 def _box(item):

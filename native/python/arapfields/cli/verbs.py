@@ -48,7 +48,7 @@ def deform(args):
     options = given_options(af.DeformOptions, args)
 
     def solve(samples, handles, task):
-        return af.deform(samples, handles, options, task)
+        return af.deform(samples, handles, options, task=task)
 
     _solve(args, solve, options.seed, needs_handles=True)
 
@@ -68,7 +68,7 @@ def stylize(args):
             raise af.InvalidInput(f"--style-turn: expected AXIS as x,y,z and DEGREES ({error})") from error
 
     def solve(samples, handles, task):
-        return af.stylize(samples, normals, options, task, handles=handles)
+        return af.stylize(samples, normals, options, handles=handles, task=task)
 
     _solve(args, solve, options.seed, needs_handles=False)
 
@@ -124,12 +124,12 @@ class _Source:
 
 
 def _fitted(vertices, triangles, options, args):
-    return with_progress("fit", lambda task: af.fit_sdf(vertices, triangles, options, task), args.quiet)
+    return with_progress("fit", lambda task: af.fit_sdf(vertices, triangles, options, task=task), args.quiet)
 
 
 def _samples(source, count, seed, args):
     if source.mesh:
-        return af.sample_mesh(*source.mesh, count, seed)
+        return af.sample_mesh(*source.mesh, count, seed=seed)
     return with_progress(
         "sample", lambda task: af.sample_surface(source.sdf(), count=count, seed=seed, task=task), args.quiet
     )
@@ -192,16 +192,18 @@ def _report_place(outputs, args):
 
 def _write_report(outputs, place, report):
     if place is not None:
-        outputs.write(place, lambda path: path.write_text(json_text(report, indent=2) + "\n"))
+        outputs.write(place, lambda path: path.write_text(json_text(report.to_dict(), indent=2) + "\n"))
 
 
 def _summary(args, text, report=None):
     if args.quiet:
         return
-    for note in (report or {}).get("notes", ()):
+    for note in getattr(report, "notes", ()):
         print(f"note: {note}", file=sys.stderr)
     numbers = {
-        k: v for k, v in (report or {}).items() if isinstance(v, (int, float)) and not isinstance(v, bool)
+        k: v
+        for k, v in (report.to_dict() if report else {}).items()
+        if isinstance(v, (int, float)) and not isinstance(v, bool)
     }
     if numbers:
         text += "; " + ", ".join(f"{name.replace('_', ' ')} {value:.4g}" for name, value in numbers.items())

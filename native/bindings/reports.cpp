@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bindings/reports.h"
+
+#include "bindings/arrays.h"
+
+namespace arapfields::python {
+
+py::object make_report(const char* kind, const py::dict& fields) {
+  return py::module_::import("arapfields.reports").attr(kind)(**fields);
+}
+
+const char* name_of(StopReason reason) {
+  switch (reason) {
+    case StopReason::time_budget:
+      return "time_budget";
+    case StopReason::target:
+      return "target_error";
+    case StopReason::observer:
+      return "callback";
+    case StopReason::divergence:
+      return "diverged";
+    case StopReason::iterations:
+      break;
+  }
+  return "iterations";
+}
+
+void attach_report(const py::object& self, const py::object& report) { self.attr("_report") = report; }
+
+py::object report_or_none(const py::object& self) { return py::getattr(self, "_report", py::none()); }
+
+py::object report_of(const py::object& self) {
+  py::object report = report_or_none(self);
+  if (report.is_none())
+    throw py::attribute_error("report: this " + py::cast<std::string>(py::type::of(self).attr("__name__")) +
+                              " has none; what a fit, a solve or sample_surface returns has one");
+  return report;
+}
+
+IterationObserver as_observer(const py::object& callback) {
+  if (callback.is_none()) return {};
+  require(PyCallable_Check(callback.ptr()) != 0, "callback", "got " + type_text(callback),
+          "a function of an Iteration is needed");
+  const std::shared_ptr<py::object> held = kept_alive(callback);
+  return [held](const Iteration& iteration) {
+    const py::gil_scoped_acquire acquire;
+    py::dict terms;
+    for (const LossTerm& term : iteration.terms) terms[py::str(term.name)] = term.value;
+    try {
+      (*held)(make_report("Iteration", py::dict("iteration"_a = iteration.number, "loss"_a = iteration.loss,
+                                                "terms"_a = terms, "seconds"_a = iteration.seconds)));
+    } catch (const py::error_already_set& raised) {
+      if (!raised.matches(PyExc_StopIteration)) throw;
+      return false;
+    }
+    return true;
+  };
+}
+
+}  // namespace arapfields::python

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Energies of one's own: what deform and stylize ask of them."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ._native import InvalidInput
+from .arrays import ArrayLike
+
+
+@dataclass(frozen=True, eq=False)
+class Jets:
+    """A field f at n samples of the rest surface, in the mesh's coordinates."""
+
+    points: npt.NDArray[np.float64]
+    """Rest positions x (n, 3)."""
+    values: npt.NDArray[np.float64]
+    """f(x) (n, 3)."""
+    jacobians: npt.NDArray[np.float64]
+    """(n, 3, 3): [:, i, j] = ∂f_i/∂x_j."""
+    second: npt.NDArray[np.float64] | None = None
+
+    @property
+    def hessians(self) -> npt.NDArray[np.float64]:
+        """(n, 3, 3, 3): [:, i, j, k] = ∂²f_i/∂x_j∂x_k (1/length). InvalidInput for an energy of order 1."""
+        if self.second is None:
+            raise InvalidInput("hessians: the energy's order is 1; one of order 2 has them")
+        return self.second
+
+
+class EnergyValue(NamedTuple):
+    """An energy's value and its derivatives by the jets that it was given; None where it does not look."""
+
+    value: float
+    values: ArrayLike | None = None
+    """∂value/∂values (n, 3)."""
+    jacobians: ArrayLike | None = None
+    """∂value/∂jacobians (n, 3, 3)."""
+    hessians: ArrayLike | None = None
+    """∂value/∂hessians (n, 3, 3, 3), each of its numbers taken for a variable of its own."""
+
+
+class Energy(ABC):
+    """A term of the loss, written in Python: `deform(samples, handles, options, energies=[mine])`.
+
+    Each iteration calls it with the jets at that iteration's samples; what it returns joins the loss with
+    weight 1. A mean over the samples keeps its meaning whatever their number; a plain function of the jets
+    does where order 1 is enough.
+    """
+
+    order: int = 1
+    """Highest derivatives that it looks at: 1 or 2, which then has the second derivatives computed."""
+
+    @abstractmethod
+    def __call__(self, jets: Jets) -> EnergyValue:
+        """The value and its derivatives."""

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "energies/external_energy.h"
+#include "neural/iteration.h"
+
+namespace arapfields {
+
+/// What a caller of deform or stylize may add to the solve.
+struct SolveHooks {
+  ExternalEnergies energies;   ///< terms that join the loss
+  IterationObserver observer;  ///< told of each iteration
+};
+
+}  // namespace arapfields

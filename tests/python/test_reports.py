@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reports: one frozen class for each kind, the same from attributes, by name, as a dict and from a file."""
+
+import dataclasses
+import json
+import pickle
+
+import cases
+import numpy as np
+import pytest
+from meshes import sphere
+
+import arapfields as af
+from arapfields import _report_files
+
+FIT = dict(iterations=150, width=32, layers=2, batch=256, near_points=5000, uniform_points=1000)
+
+
+@pytest.fixture(scope="module")
+def made():
+    """Something that has each kind of report."""
+    samples = cases.bar_samples(400)
+    field = af.deform(samples, cases.bar_handles(), af.DeformOptions(field="radial", iterations=5))
+    live = af.LiveDeformer(samples, cases.bar_handles())
+    sdf = af.fit_sdf(*sphere(1.0, 2), af.FitOptions(**FIT))
+    tiny = af.InverseTrainingOptions(iterations=2, width=8, layers=1)
+    return {
+        "FitReport": sdf,
+        "SolveReport": field,
+        "LiveReport": live.solve(),
+        "InverseReport": af.train_inverse(field, samples, tiny),
+        "SampleReport": af.sample_surface(sdf, 100),
+        "ExtractionReport": af.extract_surface(sdf, 16),
+        "DeformedExtractionReport": af.extract_deformed(sdf, live.solve(), 16),
+    }
+
+
+KINDS = [
+    *("FitReport", "SolveReport", "LiveReport", "InverseReport"),
+    *("SampleReport", "ExtractionReport", "DeformedExtractionReport"),
+]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_report_is_frozen_typed_and_plain(made, kind):
+    report = made[kind].report
+    assert type(report) is getattr(af, kind)
+    fields = dataclasses.fields(report)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        setattr(report, fields[0].name, 1.0)
+    for field in fields:
+        value = getattr(report, field.name)
+        assert report[field.name] is value or report[field.name] == value
+        if field.type in (int, float, bool, str):
+            assert type(value) is field.type, field.name
+    plain = report.to_dict()
+    assert list(plain) == list(report) == [field.name for field in fields]
+    assert json.loads(json.dumps(plain)) == plain
+    with pytest.raises(KeyError):
+        report["colour"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_report_survives_json(made, kind):
+    report = made[kind].report
+    assert _report_files.from_json(_report_files.to_json(report)) == report
+
+
+@pytest.mark.parametrize("kind", ["FitReport", "SolveReport", "LiveReport", "InverseReport"])
+def test_a_report_survives_its_file(made, kind, tmp_path):
+    made[kind].save(tmp_path / "file")
+    load = af.NeuralSdf.load if kind == "FitReport" else af.DeformationField.load
+    assert load(tmp_path / "file").report == made[kind].report
+
+
+def test_what_was_not_measured_has_no_report(made, tmp_path):
+    layers = made["FitReport"].layers
+    sdf = af.NeuralSdf.from_layers(*layers)
+    sdf.save(tmp_path / "bare")
+    for bare in (sdf, af.NeuralSdf.load(tmp_path / "bare"), af.sample_mesh(*sphere(1.0, 1), 10)):
+        assert getattr(bare, "report", None) is None
+        with pytest.raises(AttributeError, match="report"):
+            bare.report  # noqa: B018
+
+
+def test_reports_from_before_kinds_were_written_are_read(made):
+    old = made["SolveReport"].report.to_dict()
+    old["out_of_time"] = old.pop("stopped_by") == "time_budget"
+    assert _report_files.from_json(json.dumps(old)) == made["SolveReport"].report
+    for kind in ("FitReport", "LiveReport", "InverseReport"):
+        old = made[kind].report.to_dict()
+        assert _report_files.from_json(json.dumps(old)) == made[kind].report
+
+
+@pytest.mark.parametrize("text", ["{}", '{"kind": "Sermon"}', '{"author": "somebody else"}'])
+def test_what_another_program_wrote_is_no_report(text):
+    assert _report_files.from_json(text) is None
+
+
+PART = '{"kind": "FitReport", "iterations": 1}'
+
+
+@pytest.mark.parametrize("text", [PART, '{"near_mean": 1}', "[1]", '{"kind": "FitReport", "x": 1}'])
+def test_a_text_that_is_no_report_is_refused(text):
+    with pytest.raises(ValueError, match="report"):
+        _report_files.from_json(text)
+
+
+def test_numbers_that_json_has_not_come_back_as_nan(made):
+    report = dataclasses.replace(made["InverseReport"].report, error_max=float("nan"))
+    assert np.isnan(_report_files.from_json(_report_files.to_json(report)).error_max)
+
+
+def test_an_extraction_unpacks_and_keeps_its_report(made):
+    mesh = made["ExtractionReport"]
+    V, F = mesh
+    assert V is mesh.vertices and F is mesh.triangles and len(mesh) == 2
+    assert V.dtype == np.float64 and F.dtype == np.int32
+    again = pickle.loads(pickle.dumps(mesh))
+    assert np.array_equal(again.vertices, V) and again.report == mesh.report
+    with pytest.raises(AttributeError):
+        mesh.report = None
+
+
+def test_older_names_are_the_same_classes():
+    assert (af.Cuboid, af.Point, af.Region) == (af.CuboidHandle, af.PointHandle, af.RegionHandle)
+    assert af.InverseOptions is af.InverseTrainingOptions
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda s, t: af.deform(s, [], af.DeformOptions(), t),
+        lambda s, t: af.stylize(s, "cube", af.StylizeOptions(), t),
+        lambda s, t: af.fit_sdf(np.eye(3), [[0, 1, 2]], af.FitOptions(), t),
+        lambda s, t: af.LiveDeformer(s, [], af.LiveOptions(), t),
+        lambda s, t: af.sample_mesh(np.eye(3), [[0, 1, 2]], 10, 0),
+        lambda s, t: af.signed_distance(np.eye(3), [[0, 1, 2]], np.eye(3), 1),
+        lambda s, t: af.deform_curve(np.zeros((3, 2)), [], af.CurveOptions(), t),
+    ],
+)
+def test_what_comes_after_the_options_goes_by_name(call):
+    with pytest.raises(TypeError):
+        call(cases.bar_samples(50), af.Task())
