@@ -51,7 +51,9 @@ void bind_extraction(py::module_& module) {
       "grid.\n"
       "Triangles are counter-clockwise seen from outside; the mesh is a closed manifold unless the surface\n"
       "leaves the cube. A dict given as `report` receives evaluations and dense_evaluations (points of the\n"
-      "grid), open (the mesh has a boundary) and seconds. InvalidInput for a bad resolution or no surface.");
+      "grid), open (the mesh has a boundary) and seconds. Where the function jumps, as the distance of an "
+      "open\n"
+      "soup does across its holes, there is no surface. InvalidInput for a bad resolution or no surface.");
   module.def(
       "extract_deformed", &extract_moved, "sdf"_a, "field"_a, "resolution"_a = ExtractionOptions().resolution,
       "inverse"_a = py::none(), "task"_a = py::none(), "threads"_a = 0, "report"_a = py::none(),

@@ -11,27 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from ._files import whole_file, write_arrays
-from ._native import Cancelled, Frame, InvalidInput, Task, require_memory, signed_distance
+from ._native import Cancelled, InvalidInput, Task, require_memory
 from ._options import options_of
 
 SUFFIXES = (".npz", ".vdb")
 CHUNK = 200_000  # points evaluated between two looks at the task
 RESOLUTION = options_of("grid")["resolution"]
 BAND = 3  # voxels on either side of the surface that a level set keeps
-
-
-class MeshDistance:
-    """The exact signed distance of a mesh with the frame that its samples have."""
-
-    def __init__(self, vertices, triangles):
-        self.vertices = np.asarray(vertices, float)
-        self.triangles = triangles
-        used = self.vertices[np.unique(triangles)]
-        low, high = used.min(0), used.max(0)
-        self.frame = Frame((low + high) / 2, (high - low).max() / 2 / 0.75)
-
-    def __call__(self, points):
-        return signed_distance(self.vertices, self.triangles, points)
 
 
 def _checked_bounds(bounds):
@@ -49,7 +35,7 @@ def sdf_grid(sdf, resolution=RESOLUTION["default"], bounds=None, task=None):
     """Distances at the nodes of a regular grid: (values, origin, spacing).
 
     `values` (nx, ny, nz) float32, negative inside; node (i, j, k) lies at origin + spacing · (i, j, k), in
-    the coordinates of `sdf`, a NeuralSdf or any function of points (p, 3) → (p,) with a `frame`.
+    the coordinates of `sdf`, a NeuralSdf, a MeshSdf or any function of points (p, 3) → (p,) with a `frame`.
     `resolution` cells span the longest side of `bounds` ((2, 3): low and high corner; without it the
     frame's cube).
     InvalidInput for a resolution or bounds that make no grid; Cancelled where `task` is.
