@@ -77,8 +77,8 @@ def sdf_flag(parser):
         "--sdf",
         choices=("exact", "fit"),
         default="exact",
-        help="a mesh's implicit surface: its own triangles, as far as they lie between inside and outside, or "
-        "a smooth fit, which takes a while and closes holes [exact]",
+        help="a mesh's implicit surface: its own triangles, as far as they lie between inside and outside, "
+        "or a smooth fit, which takes a while and closes holes [exact]",
     )
 
 
