@@ -60,6 +60,15 @@ def box(half=(1.0, 1.0, 1.0)):
     return corners, np.array([t for a, b, c, d in quads for t in ([a, b, c], [a, c, d])])
 
 
+def check_closed(V, F):
+    """A closed manifold, counter-clockwise seen from outside."""
+    edges = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]).astype(np.int64)
+    forwards, backwards = edges @ [len(V), 1], edges @ [1, len(V)]
+    assert len(np.unique(forwards)) == len(forwards)  # no edge is run through twice the same way
+    assert np.array_equal(np.sort(forwards), np.sort(backwards))  # each once in either
+    assert np.einsum("ij,ij->i", V[F[:, 0]], np.cross(V[F[:, 1]], V[F[:, 2]])).sum() > 0
+
+
 def read(path):
     """Vertices and triangles of an OBJ or OFF file; larger faces become fans."""
     path = Path(path)

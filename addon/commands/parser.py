@@ -116,7 +116,7 @@ def add_solve_flags(one, verbs):
     group.add_argument(
         "--result", choices=("warp", "surface", "remesh"), help="the mesh itself moved, or a new one"
     )
-    group.add_argument("--surface", choices=("auto", "fit", "mesh"), help="what is taken for the rest shape")
+    group.add_argument("--surface", choices=("exact", "fit"), help="the triangles, or a fit of them")
     group.add_argument("--resolution", type=count, metavar="N", help="cells of a new mesh's grid")
     group.add_argument("--quality", choices=[name.lower() for name in QUALITIES], help="of a fit")
     done = set()

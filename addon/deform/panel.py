@@ -18,7 +18,6 @@ class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
     def fill(self, context, source, settings):
         layout = self.layout
         layout.prop(settings, "output")
-        layout.prop(settings, "surface")
         layout.prop(settings, "target")
         settings_column(layout, settings.deform, DEFORM)
         job_button(layout, Op.DEFORM, "MOD_SIMPLEDEFORM")

@@ -34,20 +34,20 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
     settings = settings_of(source)
     output, target = destination(settings, operator)
     cells = effective_value("resolution", settings, operator)
-    choice = effective_value("surface", settings, operator)
     reason = placement.refusal(source, output, target)
     if reason is not None:
         raise reason
     surface = read_surface(context, source, in_place=placement.in_place(output, target))
+    surface.exact = effective_value("surface", settings, operator) == "EXACT"
 
     preview = Preview(surface) if operator.in_window else None
 
     def work(tracker):
         if preview is not None:
             tracker.rest_preview_points = preview.points
-        use_fit = choice == "FIT" or output != "WARP" or (choice == "AUTO" and surface.is_cached)
+        own_triangles = surface.exact and output == "WARP"
         weight = 1.0 if output == "WARP" else 0.7  # of the solve in what is left to do
-        field = solve(tracker, surface, surface.samples(tracker, samples, seed, use_fit), weight)
+        field = solve(tracker, surface, surface.samples(tracker, samples, seed, own_triangles), weight)
         topology, report = None, {"output": output, **field.report.to_dict()}
         if output == "REMESH":
             after, topology, figures = surface.extract_moved(tracker, field, cells)

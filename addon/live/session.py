@@ -40,9 +40,10 @@ class Session(Solving):
     def __init__(self, context, source, kind="DEFORM", shown=True, follow=True, display=None):
         settings = settings_of(source)
         self.source, self.kind, self.layout = ObjectReference(source), kind, layout_of(source, kind)
-        self.output, self.choice = settings.output, settings.surface
+        self.output = settings.output
         in_place = shown and placement.in_place(self.output, settings.target)
         self.surface = read_surface(context, source, in_place=in_place)
+        self.surface.exact = settings.surface == "EXACT"
         self.moves_by_itself = in_place and has_motion_before(source)
         self.fingerprint = mesh_arrays.fingerprint(source.data)
         self.may_be_edited = self.may_have_moved = False

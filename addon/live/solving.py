@@ -37,9 +37,8 @@ class Solving:
     def prepare(self):
         """Sets the solver up; on the worker."""
         af, surface = native.library(), self.surface
-        use_fit = self.output != "WARP" or self.choice == "FIT"
-        use_fit = use_fit or (self.choice == "AUTO" and surface.is_cached)
-        self.samples = surface.samples(ProgressTracker(af.Task), SAMPLES, 0, use_fit)
+        own_triangles = surface.exact and self.output == "WARP"
+        self.samples = surface.samples(ProgressTracker(af.Task), SAMPLES, 0, own_triangles)
         options = {**self.energy}
         if self.kind == "STYLIZE":
             options |= STYLE[2]

@@ -20,7 +20,10 @@ def output(**extra):
 
 def surface(**extra):
     return bpy.props.EnumProperty(
-        items=SURFACES, name="Surface", description="What the solve takes for the surface at rest", **extra
+        items=SURFACES,
+        name="Surface",
+        description="What the implicit surface is made of, which solves sample and new meshes show",
+        **extra,
     )
 
 

@@ -13,6 +13,7 @@ from ..core.settings.fitting import FIT
 from ..jobs.job_operator import JobOperator, busy
 from ..names import Op
 from ..properties.item import resolution
+from ..properties.item import surface as surface_choice
 from ..properties.settings import quality
 from ..results import result_objects
 from . import staleness
@@ -55,7 +56,7 @@ class ARAPFIELDS_OT_fit(JobOperator, bpy.types.Operator):
 
 
 class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):
-    """Make a mesh of the fitted surface itself, undeformed (fits first where needed)"""
+    """Make a mesh of the implicit surface itself, undeformed"""
 
     bl_idname = Op.EXTRACT
     bl_label = "Extract Surface"
@@ -63,9 +64,11 @@ class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):
     title = "Extract"
 
     resolution: resolution(options={"SKIP_SAVE"})
+    surface: surface_choice(options={"SKIP_SAVE"})
 
     def plan(self, context, source, _):
         surface = read_surface(context, source)
+        surface.exact = effective_value("surface", settings_of(source), self) == "EXACT"
         cells = effective_value("resolution", settings_of(source), self)
 
         def work(tracker):

@@ -69,6 +69,9 @@ class ARAPFIELDS_PT_surface(Section, bpy.types.Panel):
 
     def fill(self, context, source, settings):
         layout = self.layout
+        layout.prop(settings, "surface", expand=True)
+        if settings.surface == "EXACT":
+            return
         layout.prop(settings.fit, "quality")
         settings_column(layout, settings.fit, FIT)
         job_button(layout, Op.FIT, "MOD_REMESH")

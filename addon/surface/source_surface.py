@@ -34,7 +34,9 @@ class SourceSurface:
     machine: dict = field(default_factory=dict)
     in_place: bool = False  # the shape at the place of the field's modifier, not all that is shown
     has_free_normals: bool = False
+    exact: bool = True  # whether the implicit surface is the triangles', or a fit of them
     _sdf: object = None  # the fitted surface, once it was asked for
+    _triangles: object = None  # the exact one
 
     @cached_property
     def key(self):
@@ -64,11 +66,19 @@ class SourceSurface:
             tracker.warnings.append(UserError("the fit is used, but could not be kept: {error}", error=error))
         return sdf
 
-    def samples(self, tracker, count, seed, use_fit):
-        """Points spread evenly over the surface: the fit's when there is one, else the triangles'."""
+    def implicit(self, tracker, weight):
+        """The implicit surface that was chosen; runs on the worker."""
+        if not self.exact:
+            return self.fit(tracker, weight)
+        if self._triangles is None:
+            self._triangles = native.library().MeshSdf(self.vertices, self.triangles)
+        return self._triangles
+
+    def samples(self, tracker, count, seed, own_triangles):
+        """Points spread evenly over the implicit surface, or over all of the mesh's own triangles."""
         af = native.library()
-        if use_fit:
-            sdf = self.fit(tracker, 0.3)
+        if not own_triangles:
+            sdf = self.implicit(tracker, 0.3)
             return af.sample_surface(sdf, count=count, seed=seed, task=tracker.start("Sampling", 0.15))
         return af.sample_mesh(self.vertices, self.triangles, count=count, seed=seed)
 
@@ -81,13 +91,13 @@ class SourceSurface:
     def extract(self, tracker, resolution, weight):
         """(k, 3) vertices and the topology of the implicit surface, in solve space."""
         af = native.library()
-        sdf = self.fit(tracker, weight)
+        sdf = self.implicit(tracker, weight)
         task = tracker.start("Extracting", 1.0)
         return checked_mesh(*af.extract_surface(sdf, resolution=resolution, task=task))
 
     def extract_moved(self, tracker, field, resolution):
         """The same of the surface where the field moves it, by marching cubes there; and a report."""
-        sdf = self.fit(tracker, 0.0)
+        sdf = self.implicit(tracker, 0.0)
         task = tracker.start("Extracting", 1.0)
         mesh = native.library().extract_deformed(sdf, field, resolution, task=task)
         return *checked_mesh(*mesh), {name: mesh.report[name] for name in ("inverted", "failures")}

@@ -26,6 +26,7 @@ void bind_mesh(py::module_& module);
 void bind_distance(py::module_& module);
 void bind_implicit(py::module_& module);
 void bind_neural(py::module_& module);
+void bind_mesh_sdf(py::module_& module);
 void bind_sampling(py::module_& module);
 void bind_fit(py::module_& module);
 void bind_fields(py::module_& module);

@@ -52,7 +52,8 @@ void bind_extraction(py::module_& module) {
       "where a measured bound on the gradient lets the surface be; the vertices are those of the whole "
       "grid.\n"
       "Triangles are counter-clockwise seen from outside; the mesh is a closed manifold unless the surface\n"
-      "leaves the cube. What is returned unpacks into V and F, and has a `report` beside them.\n"
+      "leaves the cube. What is returned unpacks into V and F, and has a `report` beside them. Where the\n"
+      "function jumps, as the distance of an open soup does across its holes, there is no surface.\n"
       "InvalidInput for a bad resolution or no surface.");
   module.def(
       "extract_deformed", &extract_moved, "sdf"_a, "field"_a, "resolution"_a = ExtractionOptions().resolution,

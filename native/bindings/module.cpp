@@ -12,6 +12,7 @@ PYBIND11_MODULE(_native, module) {
   bind_mesh(module);
   bind_distance(module);
   bind_neural(module);
+  bind_mesh_sdf(module);
   bind_sampling(module);
   bind_fit(module);
   bind_fields(module);

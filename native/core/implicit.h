@@ -22,6 +22,9 @@ class ARAPFIELDS_EXPORT ImplicitFunction {
   /// A bound on |∇Φ| in the cube that holds everywhere, where one is known: 1 for a distance. Extraction then
   /// finds exactly what the whole grid has; else the bound is measured.
   virtual std::optional<double> gradient_bound() const { return std::nullopt; }
+  /// Whether Φ is continuous. Where it is not, its sign may also change by a jump, and there is no surface
+  /// there: extraction leaves the mesh open.
+  virtual bool continuous() const { return true; }
   /// Where the cube lies in mesh coordinates; sampling and extraction answer in these.
   virtual Frame frame() const { return {}; }
 };

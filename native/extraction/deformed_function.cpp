@@ -101,7 +101,12 @@ void DeformedFunction::evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF
   for (std::size_t k = 0; k < rows.size(); ++k) {
     double& value = exact[rows[k]];
     value = static_cast<double>(phi[static_cast<Index>(k)]) * shape_.rest.frame().scale;
-    if (value > 0.0 && distances[rows[k]] < 0.0) doubtful.push_back(rows[k]);
+    const double distance = distances[rows[k]];
+    const bool beside = std::abs(distance) > probe_in_bands * shape_.band;
+    if (!continuous() && beside && (value < 0.0) != (distance < 0.0))
+      value = distance;  // both jump, and need not at the same place: no zero between the two
+    else if (value > 0.0 && distance < 0.0)
+      doubtful.push_back(rows[k]);
   }
   const std::vector<bool> inside = covered(mesh(doubtful, Eigen::all));
   for (std::size_t k = 0; k < doubtful.size(); ++k)

@@ -34,6 +34,7 @@ class DeformedFunction final : public ImplicitFunction {
   void evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> values,
                 Eigen::Ref<PointsF> gradients) const override;
   Frame frame() const override { return frame_; }
+  bool continuous() const override { return shape_.rest.continuous(); }
 
   Index inverted() const { return inverted_; }
   Index failures() const { return failures_; }

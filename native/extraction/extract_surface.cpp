@@ -27,6 +27,32 @@ TricubicSurrogateOptions model_options(int resolution, bool sure) {
   return options;
 }
 
+/// Leaves out the triangles with a corner at which |Φ| exceeds what a crossing of the grid can leave there.
+/// Whether there were any.
+bool drop_jumps(EvaluationCounter& function, double most, TriangleMesh& mesh) {
+  const VectorF values = function.values(mesh.vertices.cast<float>());
+  std::vector<std::int32_t> number(static_cast<std::size_t>(mesh.vertices.rows()), -1);
+  std::vector<Index> kept, used;
+  for (Index t = 0; t < mesh.triangles.rows(); ++t) {
+    bool whole = true;
+    for (int c = 0; c < 3; ++c) whole = whole && std::abs(values[mesh.triangles(t, c)]) <= most;
+    if (!whole) continue;
+    kept.push_back(t);
+    for (int c = 0; c < 3; ++c) {
+      std::int32_t& own = number[static_cast<std::size_t>(mesh.triangles(t, c))];
+      if (own >= 0) continue;
+      own = static_cast<std::int32_t>(used.size());
+      used.push_back(mesh.triangles(t, c));
+    }
+  }
+  if (static_cast<Index>(kept.size()) == mesh.triangles.rows()) return false;
+  mesh.triangles = Triangles(mesh.triangles(kept, Eigen::all));
+  mesh.vertices = Points(mesh.vertices(used, Eigen::all));
+  for (Index t = 0; t < mesh.triangles.rows(); ++t)
+    for (int c = 0; c < 3; ++c) mesh.triangles(t, c) = number[static_cast<std::size_t>(mesh.triangles(t, c))];
+  return true;
+}
+
 }  // namespace
 
 TriangleMesh extract_surface(const ImplicitFunction& implicit, int resolution, const Progress& progress,
@@ -46,7 +72,13 @@ TriangleMesh extract_surface(const ImplicitFunction& implicit, int resolution, c
   require(mesh.triangles.rows() > 0, "sdf",
           "its values have one sign on the whole grid of " + std::to_string(resolution) + " points a side",
           "a function with a zero surface inside the cube [-1, 1]^3 is needed");
-  const bool open = (mesh.vertices.array().abs() == 1.0).any();
+  bool open = (mesh.vertices.array().abs() == 1.0).any();
+  if (!implicit.continuous()) {
+    const double bound = model ? model->lipschitz() : implicit.gradient_bound().value_or(1.0);
+    open = drop_jumps(function, 0.5 * bound * 2.0 / (resolution - 1), mesh) || open;
+    require(mesh.triangles.rows() > 0, "sdf", "its sign changes by jumps alone",
+            "a function with a zero surface inside the cube [-1, 1]^3 is needed");
+  }
   mesh.vertices = implicit.frame().to_mesh(mesh.vertices);
   if (report != nullptr)
     *report = {.evaluations = function.value_count() + function.gradient_count(),

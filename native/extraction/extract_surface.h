@@ -13,12 +13,13 @@ namespace arapfields {
 struct ExtractionReport {
   Index evaluations = 0;        ///< points at which Φ was evaluated, those with gradients included
   Index dense_evaluations = 0;  ///< points of the grid
-  bool open = false;            ///< the surface leaves the cube, the mesh has a boundary there
+  bool open = false;            ///< the mesh has a boundary: the surface leaves the cube, or ends at a hole
   double seconds = 0.0;
 };
 
 /// {Φ = 0} in mesh coordinates by marching cubes on the grid of `resolution`³ points (8 to 512) over the cube
-/// [-1,1]³: the vertices that the whole grid's values would give, from values near the surface alone.
+/// [-1,1]³: the vertices that the whole grid's values would give, from values near the surface alone. Where Φ
+/// jumps from one sign to the other there is no surface.
 /// Throws InvalidInput for a bad resolution, a function that is not finite, or one that has no zero surface
 /// which the grid resolves.
 ARAPFIELDS_EXPORT TriangleMesh extract_surface(const ImplicitFunction& function,

@@ -17,6 +17,7 @@ class EvaluationCounter {
   VectorF values(ConstPointsRef<float> points, PointsF& gradients);
 
   std::optional<double> gradient_bound() const { return function_.gradient_bound(); }
+  bool continuous() const { return function_.continuous(); }
   const Progress& progress() const { return progress_; }
   Index value_count() const { return value_count_; }
   Index gradient_count() const { return gradient_count_; }
@@ -31,7 +32,8 @@ class EvaluationCounter {
 /// A bound on |∇Φ| over the cube: the largest of a stratified sample of gradients (strata³ of them,
 /// jittered), times a safety factor of 1.25. The largest of 40,000 gradients of the published networks
 /// is 1.04 to 1.23 times what such a sample sees. TricubicSurrogate raises the bound where grid values
-/// contradict it.
+/// contradict it. Of a function that is not continuous the steepest tenth, which may be jumps, does not
+/// count.
 double measure_lipschitz(EvaluationCounter& function, int strata = 12);
 
 }  // namespace arapfields

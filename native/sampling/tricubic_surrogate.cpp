@@ -182,7 +182,7 @@ bool TricubicSurrogate::fill(EvaluationCounter& function) {
       steepest = std::max(steepest, std::abs(at(points * points) - at(0)));
   }
   const double seen = steepest / spacing();
-  if (seen <= lipschitz_ * (1.0 + 1e-4) || function.gradient_bound()) return true;
+  if (seen <= lipschitz_ * (1.0 + 1e-4) || function.gradient_bound() || !function.continuous()) return true;
   lipschitz_ = 1.25 * seen;
   return false;
 }

@@ -137,7 +137,10 @@ def prepared(state):
     elif state == "a group's handle":
         bar.vertex_groups.new(name="G").add([0, 1, 2], 1.0, "REPLACE")
         bpy.ops.arapfields.add_handle(kind="GROUP", place="CURSOR")
+    elif state == "a mesh":
+        ours.surface = "FIT"
     elif state in ("fitted", "fit cleared"):
+        ours.surface = "FIT"
         for name, value in {"iterations": 5, "width": 16, "layers": 2, "near_points": 2000}.items():
             setattr(ours.fit, name, value)
         bpy.ops.arapfields.fit()

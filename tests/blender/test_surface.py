@@ -57,7 +57,7 @@ def test_a_fit_that_cannot_be_kept_is_used_and_said():
     user_preferences.cache_folder = lambda: __file__  # a file, where no folder can be made
     for name, value in FIT.items():
         setattr(bar.arapfields.fit, name, value)
-    assert bpy.ops.arapfields.extract(resolution=24) == {"FINISHED"}
+    assert bpy.ops.arapfields.extract(resolution=24, surface="FIT") == {"FINISHED"}
     assert len(bpy.data.objects["Bar_implicit"].data.vertices) > 100
     (level, text), (_, done) = jobs.messages()[::-1]
     assert level == "WARNING" and "could not be kept" in text
@@ -79,7 +79,7 @@ def test_extraction_lies_on_the_source_in_world_space():
     bpy.context.view_layer.update()
     for name, value in FIT.items():
         setattr(bar.arapfields.fit, name, value)
-    bpy.ops.arapfields.extract(resolution=48)
+    bpy.ops.arapfields.extract(resolution=48, surface="FIT")
     result = bpy.data.objects["Bar_implicit"]
     made, source = scenes.world_points(result), scenes.world_points(bar)
     assert len(result.data.polygons) > 500 and all(face.use_smooth for face in result.data.polygons)
@@ -107,7 +107,7 @@ def test_the_surface_is_deformed_like_the_mesh():
         setattr(bar.arapfields.fit, name, value)
     moving.location.z += 0.4
     settings = scenes.NEW | {"iterations": 120}
-    bpy.ops.arapfields.deform(output="SURFACE", resolution=48, **settings)
+    bpy.ops.arapfields.deform(output="SURFACE", surface="FIT", resolution=48, **settings)
     surface = bpy.context.view_layer.objects.active
     scenes.activate(bar)
     bpy.ops.arapfields.deform(output="WARP", surface="FIT", **settings)
@@ -118,6 +118,37 @@ def test_the_surface_is_deformed_like_the_mesh():
     tree = BVHTree.FromObject(surface, bpy.context.evaluated_depsgraph_get())
     off = [tree.find_nearest(v.co)[3] for v in warped.data.vertices]
     assert np.mean(off) < NEAR
+
+
+@in_blender
+def test_exact_surfaces_need_no_fit():
+    import bpy
+    import numpy as np
+    import scenes
+
+    from addon.blender.user_preferences import fit_cache
+
+    fit_cache().clear()
+    bar, _, moving = scenes.bar_with_handles()
+    assert bar.arapfields.surface == "EXACT"
+    assert bpy.ops.arapfields.extract(resolution=48) == {"FINISHED"}
+    from mathutils.bvhtree import BVHTree
+
+    graph = bpy.context.evaluated_depsgraph_get()
+    tree, surface = BVHTree.FromObject(bar, graph), bpy.data.objects["Bar_implicit"]
+    cell = 2 * max(bar.dimensions) / 1.5 / 47
+    assert max(tree.find_nearest(v.co)[3] for v in surface.data.vertices) < 0.5 * cell
+    scenes.activate(bar)
+    moving.location.z += 0.4
+    settings = scenes.QUICK | {"iterations": 60}
+    meshes = {}
+    for output in ("SURFACE", "REMESH"):
+        scenes.activate(bar)
+        bpy.ops.arapfields.deform(output=output, resolution=48, **settings)
+        meshes[output] = bpy.context.view_layer.objects.active
+    assert fit_cache().size() == 0 and bar.arapfields.fit_key == ""
+    tree = BVHTree.FromObject(meshes["SURFACE"], bpy.context.evaluated_depsgraph_get())
+    assert np.mean([tree.find_nearest(v.co)[3] for v in meshes["REMESH"].data.vertices]) < cell
 
 
 @in_blender

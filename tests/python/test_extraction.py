@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from meshes import check_closed
 from network_oracle import Network
 from tolerances import SAME_VERTICES
 
@@ -29,14 +30,6 @@ def check_same_vertices(ours, theirs):
     assert len(ours) == len(theirs)
     assert spatial.cKDTree(theirs).query(ours)[0].max() < SAME_VERTICES
     assert spatial.cKDTree(ours).query(theirs)[0].max() < SAME_VERTICES
-
-
-def check_closed(V, F):
-    edges = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]).astype(np.int64)
-    forwards, backwards = edges @ [len(V), 1], edges @ [1, len(V)]
-    assert len(np.unique(forwards)) == len(forwards)  # no edge is run through twice the same way
-    assert np.array_equal(np.sort(forwards), np.sort(backwards))  # each once in either
-    assert np.einsum("ij,ij->i", V[F[:, 0]], np.cross(V[F[:, 1]], V[F[:, 2]])).sum() > 0
 
 
 @pytest.mark.parametrize("name", ["bunny"])

@@ -41,7 +41,7 @@ def test_mesh_distance_has_the_frame_of_its_samples():
     vertices = np.vstack(
         [vertices + np.array([3.0, 0, 0]), [[100.0, 0, 0]]]
     )  # the last one is in no triangle
-    distance = grids.MeshDistance(vertices, triangles)
+    distance = af.MeshSdf(vertices, triangles)
     assert distance.frame == af.sample_mesh(vertices, triangles, 10).frame
     assert distance([[3.0, 0, 0]])[0] < -1.8
 

@@ -17,16 +17,20 @@ SCOPES = (  # of a job
     ("COLLECTION", "Collection", "Every mesh object of the active object's collections"),
 )
 SURFACES = (
-    ("AUTO", "Automatic", "The fitted surface where it is up to date, else the mesh's own triangles"),
-    ("FIT", "Fitted", "The fitted surface; it is fitted first where it is out of date"),
-    ("MESH", "Mesh", "The mesh's own triangles; no fit is needed"),
+    ("EXACT", "Exact", "The mesh's own triangles, as far as they lie between inside and outside; at once"),
+    (
+        "FIT",
+        "Fit",
+        "A smooth surface that a network learns from the mesh, which also closes its holes; fitted first "
+        "where it is out of date",
+    ),
 )
 OUTPUTS = (
     ("WARP", "Original Mesh", "The object's own vertices moved: UVs, materials, groups and topology stay"),
     (
         "SURFACE",
         "Implicit Surface",
-        "A new mesh of the fitted surface, moved along: even triangles, no seams",
+        "A new mesh of the implicit surface, moved along: even triangles, no seams",
     ),
     (
         "REMESH",

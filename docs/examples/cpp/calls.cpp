@@ -21,6 +21,7 @@ class Ball final : public ImplicitFunction {
     evaluate(points, values);
     gradients = points.rowwise().normalized();
   }
+  std::optional<double> gradient_bound() const override { return 1.0; }  // where it is known
 };
 // [implicit]
 
@@ -48,6 +49,11 @@ int main(int argc, char** argv) {
   const TriangleMesh surface = extract_surface(*fit.sdf, 48);
   const SurfaceSamples samples = sample_surface(fit.sdf, {.count = 2000, .seed = 1});
   // [fit]
+  // [exact]
+  const auto exact = std::make_shared<MeshSdf>(mesh.vertices, mesh.triangles);
+  const TriangleMesh remeshed = extract_surface(*exact, 48);
+  const SurfaceSamples on_triangles = sample_surface(exact, {.count = 2000, .seed = 1});
+  // [exact]
   // [task]
   Task task;
   std::thread caller([&] {
@@ -80,5 +86,6 @@ int main(int argc, char** argv) {
   const TriangleMesh ball = extract_surface(Ball(), 32);
   std::cout << surface.vertices.rows() << " " << ball.vertices.rows() << " " << moved.rows() << " "
             << held.report.loop.iterations << "\n";
+  std::cout << remeshed.vertices.rows() << " " << on_triangles.size() << "\n";
   return 0;
 }

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._files import whole_file, write_arrays
-from ._native import Cancelled, Frame, InvalidInput, Task, real_array, require_memory, signed_distance
+from ._native import Cancelled, Frame, InvalidInput, Task, real_array, require_memory
 from ._options import options_of
 from .arrays import ArrayLike
 
@@ -36,20 +36,6 @@ class Distance(Protocol):
     def __call__(self, points: Array, /) -> ArrayLike: ...
 
 
-class MeshDistance:
-    """The exact signed distance of a mesh with the frame that its samples have."""
-
-    def __init__(self, vertices: ArrayLike, triangles: ArrayLike) -> None:
-        self.vertices = np.asarray(vertices, float)
-        self.triangles = triangles
-        used = self.vertices[np.unique(triangles)]
-        low, high = used.min(0), used.max(0)
-        self.frame = Frame((low + high) / 2, (high - low).max() / 2 / 0.75)
-
-    def __call__(self, points: ArrayLike) -> Array:
-        return signed_distance(self.vertices, self.triangles, points)
-
-
 def _checked_bounds(bounds: ArrayLike) -> Array:
     """(2, 3) numbers; InvalidInput for anything that is not a low and a high corner."""
     corners = real_array(bounds, "bounds")
@@ -68,7 +54,7 @@ def sdf_grid(
     """Distances at the nodes of a regular grid: (values, origin, spacing).
 
     `values` (nx, ny, nz) float32, negative inside; node (i, j, k) lies at origin + spacing · (i, j, k), in
-    the coordinates of `sdf`, a NeuralSdf or any function of points (p, 3) → (p,) with a `frame`.
+    the coordinates of `sdf`, a NeuralSdf, a MeshSdf or any function of points (p, 3) → (p,) with a `frame`.
     `resolution` cells span the longest side of `bounds` ((2, 3): low and high corner; without it the
     frame's cube).
     InvalidInput for a resolution or bounds that make no grid; Cancelled where `task` is.

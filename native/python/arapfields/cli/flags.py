@@ -17,6 +17,7 @@ def solve_flags(parser):
     report_flag(outputs)
     add_option_flag(parser, "extraction", "resolution")
     inverse_flag(parser)
+    sdf_flag(parser)
     handles = parser.add_argument_group(
         "handles (x, y, z in the mesh's coordinates; inf and -inf leave a side of a box open)"
     )
@@ -68,6 +69,16 @@ def inverse_flag(parser):
         default="warp",
         help="a deformed surface's triangles: those at rest, moved (warp), or new and even ones, extracted "
         "through the field's inverse [warp]",
+    )
+
+
+def sdf_flag(parser):
+    parser.add_argument(
+        "--sdf",
+        choices=("exact", "fit"),
+        default="exact",
+        help="a mesh's implicit surface: its own triangles, as far as they lie between inside and outside, "
+        "or a smooth fit, which takes a while and closes holes [exact]",
     )
 
 

@@ -8,7 +8,7 @@ import sys
 import arapfields as af
 
 from . import verbs
-from .flags import MESH, SOURCE, inverse_flag, report_flag, solve_flags
+from .flags import MESH, SOURCE, inverse_flag, report_flag, sdf_flag, solve_flags
 from .options import add_option_flag, add_option_flags
 
 
@@ -149,11 +149,13 @@ def _extract(added):
         "spot.safetensors -o spot.ply --resolution 256",
         "spot.safetensors -o bent.stl --deformed-by field.safetensors",
         "spot.safetensors -o even.ply --deformed-by field.safetensors --through inverse",
+        "scan.obj -o even.ply --sdf exact",
     )
-    parser.add_argument("input", help=SOURCE + " (a mesh is fitted first)")
+    parser.add_argument("input", help=SOURCE)
     parser.add_argument("-o", "--output", required=True, metavar="FILE", help=MESH)
     parser.add_argument("--deformed-by", metavar="FIELD", help="move the surface by a saved field")
     inverse_flag(parser)
+    sdf_flag(parser)
     add_option_flag(parser, "extraction", "resolution")
     return parser
 

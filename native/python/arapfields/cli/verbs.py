@@ -116,11 +116,12 @@ class _Source:
 
     def sdf(self):
         if self._sdf is None:
-            self._sdf = _fitted(*self.mesh, af.FitOptions(), self._args)
+            exact = self._args.sdf == "exact"
+            self._sdf = self.distances() if exact else _fitted(*self.mesh, af.FitOptions(), self._args)
         return self._sdf
 
     def distances(self):
-        return grids.MeshDistance(*self.mesh) if self.mesh else self._sdf
+        return af.MeshSdf(*self.mesh) if self.mesh else self._sdf
 
 
 def _fitted(vertices, triangles, options, args):
