@@ -91,9 +91,20 @@ std::optional<double> PythonFunction::gradient_bound() const {
   return *number.data();
 }
 
+bool PythonFunction::continuous() const {
+  const std::lock_guard only(one_at_a_time_);
+  const py::gil_scoped_acquire acquire;
+  const py::object self =
+      py::cast(static_cast<const ImplicitFunction*>(this), py::return_value_policy::reference);
+  const py::object said = self.attr("continuous");
+  require(py::isinstance<py::bool_>(said), "sdf.continuous", py::cast<std::string>(py::repr(said)),
+          "True or False is needed");
+  return said.cast<bool>();
+}
+
 std::shared_ptr<const ImplicitFunction> as_function(const py::object& given, const std::string& argument) {
   require(py::isinstance<ImplicitFunction>(given), argument, "got " + type_text(given),
-          "an ImplicitFunction is needed, such as a NeuralSdf or a subclass of your own");
+          "an ImplicitFunction is needed, such as a NeuralSdf, a MeshSdf or a subclass of your own");
   return {kept_alive(given), &given.cast<const ImplicitFunction&>()};
 }
 
@@ -124,6 +135,13 @@ void bind_implicit(py::module_& module) {
           },
           "A bound on the gradient's length that holds everywhere in the cube, where one is known (1 for a\n"
           "distance), or None: it is then measured. A subclass may set it.")
+      .def_property_readonly(
+          "continuous",
+          [](const ImplicitFunction& self) {
+            return dynamic_cast<const PythonFunction*>(&self) != nullptr || self.continuous();
+          },
+          "Whether it is continuous. Where it jumps from one sign to the other there is no surface, and\n"
+          "extraction leaves the mesh open. A subclass may set it to False.")
       .def_property_readonly("frame", &ImplicitFunction::frame, "Mesh coordinates and the unit cube.");
 }
 

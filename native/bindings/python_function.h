@@ -21,6 +21,7 @@ class PythonFunction final : public ImplicitFunction {
   void evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> values,
                 Eigen::Ref<PointsF> gradients) const override;
   std::optional<double> gradient_bound() const override;
+  bool continuous() const override;
   Frame frame() const override { return frame_; }
 
  private:

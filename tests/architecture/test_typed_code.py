@@ -61,6 +61,8 @@ REVEALED = {
     "live.solve().report": "arapfields.reports.LiveReport",
     "sdf(V)": ARRAY,
     "sdf.gradient(V)": ARRAY,
+    "af.MeshSdf(V, F)(V)": ARRAY,
+    "af.MeshSdf(V, F).gradient(V)": ARRAY,
     "sdf.report": "arapfields.reports.FitReport",
     "af.signed_distance(V, F, V)": ARRAY,
     "af.sample_surface(sdf).report": "arapfields.reports.SampleReport",

@@ -151,6 +151,21 @@ def FIELD():
     return af.LiveDeformer(samples, [cases.moved(rest)], af.LiveOptions(fine_centers=20)).solve()
 
 
+def test_a_jump_is_no_surface_where_the_function_says_that_it_jumps():
+    """A ball cut in half by a change of sign beside its middle."""
+
+    class Half(Ball):
+        continuous = False
+
+        def __call__(self, points):
+            values = super().__call__(points)
+            return np.where(points[:, 0] > CENTER[0] + 0.01, values, np.abs(values) + 0.2)
+
+    mesh = af.extract_surface(Half(), 64)
+    assert mesh.vertices[:, 0].min() > CENTER[0] - 0.1
+    assert np.abs(np.linalg.norm(mesh.vertices - CENTER, axis=1) - RADIUS).max() < 0.05
+
+
 def test_cancel_takes_effect():
     task = af.Task()
 

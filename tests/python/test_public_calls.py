@@ -27,6 +27,8 @@ def test_meshes_distances_and_samples() -> None:
     points: Array = np.zeros((2, 3))
     assert (af.signed_distance(V, F, points, threads=1) < 0).all()
     assert af.winding_number(V, F, points, task=af.Task()) == pytest.approx(1.0, abs=1e-3)
+    exact: af.ImplicitFunction = af.MeshSdf(V, F, task=None)
+    assert len(af.extract_surface(exact, 16).vertices) > 0 and exact.gradient_bound == 1.0
     samples = af.sample_mesh(V, F, 200, seed=1)
     assert len(samples) == 200 and samples.points.shape == samples.normals.shape
     assert len(af.sample_surface(Cube(), 100, seed=2, threads=1)) == 100
