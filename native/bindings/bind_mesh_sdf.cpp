@@ -47,7 +47,7 @@ void bind_mesh_sdf(py::module_& module) {
       .def_property_readonly("closed", &MeshSdf::continuous, "Whether the triangles close up everywhere.")
       .def(
           "save",
-          [](const MeshSdf&, const py::object&) {
+          [](const MeshSdf&, const PathArgument&) {
             throw InvalidInput("save", "an exact distance, which is its mesh",
                                "save the mesh instead, or a fit of it (fit_sdf)");
           },

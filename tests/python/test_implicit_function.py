@@ -161,9 +161,11 @@ def test_a_jump_is_no_surface_where_the_function_says_that_it_jumps():
             values = super().__call__(points)
             return np.where(points[:, 0] > CENTER[0] + 0.01, values, np.abs(values) + 0.2)
 
-    mesh = af.extract_surface(Half(), 64)
-    assert mesh.vertices[:, 0].min() > CENTER[0] - 0.1
-    assert np.abs(np.linalg.norm(mesh.vertices - CENTER, axis=1) - RADIUS).max() < 0.05
+    mesh, cell = af.extract_surface(Half(), 64), 2 * FRAME.scale / 63
+    assert mesh.vertices[:, 0].min() > CENTER[0] - cell
+    assert np.abs(np.linalg.norm(mesh.vertices - CENTER, axis=1) - RADIUS).max() < cell  # its rim
+    Half.continuous = True
+    assert np.abs(np.linalg.norm(af.extract_surface(Half(), 64).vertices - CENTER, axis=1)).min() < RADIUS / 2
 
 
 def test_cancel_takes_effect():
