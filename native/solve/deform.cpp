@@ -6,6 +6,7 @@
 #include "core/device.h"
 #include "core/parallel.h"
 #include "fields/neural_field.h"
+#include "solve/field_choice.h"
 #include "solve/invertible_objective.h"
 #include "solve/radial.h"
 #include "solve/report.h"
@@ -85,7 +86,7 @@ Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handle
   require(options.fresh_samples == 0 || samples.redraw, "options.fresh_samples",
           "the samples are a plain list of points",
           "samples of sample_mesh or sample_surface are needed, which know their surface");
-  if (options.field == FieldKind::radial)
+  if (chosen_field(options) == FieldKind::radial)
     return options.exact_handles ? exact_radial(samples, handles, options, progress)
                                  : deform_radial(samples, handles, options, progress);
   const ThreadScope threads(options.machine.threads);

@@ -4,6 +4,7 @@
 #include "core/device.h"
 #include "core/parallel.h"
 #include "fields/neural_field.h"
+#include "solve/field_choice.h"
 #include "solve/radial.h"
 #include "solve/report.h"
 #include "solve/setup.h"
@@ -45,7 +46,7 @@ Solution stylize(const SurfaceSamples& samples, PointsIn preferred, const Styliz
                  const Progress& progress, const Vector& weights, const std::vector<Handle>& handles) {
   options.validate();
   check_samples(samples, weights);
-  if (options.field == FieldKind::radial)
+  if (chosen_field(options) == FieldKind::radial)
     return stylize_radial(samples, preferred, options, progress, weights, handles);
   const ThreadScope threads(options.machine.threads);
   ObjectiveTerms terms;

@@ -199,7 +199,6 @@ def test_divergence_keeps_the_last_good_state(samples):
         dict(learning_rate=-1.0),
         dict(optimizer="newton"),
         dict(field="radial", centers=1),
-        dict(barrier=1.0, field="radial"),
         dict(field="splines"),
         dict(start="nowhere"),
         dict(device="abacus"),
