@@ -34,7 +34,7 @@ LiveReportResult report(const LiveSolver& live) {
   const LiveReport& r = live.report();
   return make_report(
       "LiveReport",
-      py::dict("stretch"_a = r.arap.stretch, "bend"_a = r.arap.bend, "energy"_a = r.energy,
+      py::dict("stretch"_a = r.arap.stretch, "bend"_a = r.arap.bend, "energy"_a = r.arap.energy,
                "value"_a = r.value, "handle_error_mean"_a = r.handle_mean,
                "handle_error_max"_a = r.handle_max, "min_determinant"_a = r.distortion.min_determinant,
                "flipped_share"_a = r.distortion.flipped_share, "max_stretch"_a = r.distortion.max_stretch,

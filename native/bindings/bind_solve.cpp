@@ -28,9 +28,9 @@ py::object solve_report(const SolveReport& report, double scale) {
   for (const auto& [iteration, value] : report.loop.history) loss.append(py::make_tuple(iteration, value));
   return make_report(
       "SolveReport",
-      py::dict("stretch"_a = report.arap.stretch, "bend"_a = report.arap.bend, "energy"_a = report.energy,
-               "handle_error_mean"_a = mean, "handle_error_max"_a = max, "handles"_a = py::tuple(handles),
-               "min_determinant"_a = report.distortion.min_determinant,
+      py::dict("stretch"_a = report.arap.stretch, "bend"_a = report.arap.bend,
+               "energy"_a = report.arap.energy, "handle_error_mean"_a = mean, "handle_error_max"_a = max,
+               "handles"_a = py::tuple(handles), "min_determinant"_a = report.distortion.min_determinant,
                "flipped_share"_a = report.distortion.flipped_share,
                "max_stretch"_a = report.distortion.max_stretch,
                "min_stretch"_a = report.distortion.min_stretch, "iterations"_a = report.loop.iterations,

@@ -3,11 +3,16 @@
 #include "bindings/jet_arrays.h"
 #include "bindings/python_function.h"
 #include "core/aten_path.h"
+#include "options/deform.h"
 #include "solve/loss_probe.h"
 
 namespace arapfields::python {
 void bind_solve_testing(py::module_& module) {
   py::module_ testing = testing_module(module);
+  testing.def("thickness", &probe_thickness, "samples"_a);
+  testing.def(
+      "bending", [](const SurfaceSamples& s, const DeformOptions& o) { return probe_bending(s, o.surface); },
+      "samples"_a, "options"_a);
   py::class_<LossProbe>(testing, "LossProbe")
       .def(py::init([](const SurfaceSamples& samples, const std::vector<Handle>& handles, int width,
                        double bending, const Points& preferred, double gauss, double barrier, double margin,

@@ -30,7 +30,7 @@ struct LiveTerms {
   std::vector<double> external;  ///< weighted
 };
 
-/// stretch + λ_bend·bend + weight·handles + λ_Gauss·gauss + barrier + external + a vanishing pull of all
+/// mean (stretch + λ·bend) + weight·handles + λ_Gauss·gauss + barrier + external + a vanishing pull of all
 /// centers towards zero, of the fields of one radial basis. Measurements: jets at the samples, values at the
 /// handles' sources, centers. In single precision a step costs half, and the value is good to some 1e-6 of
 /// itself.
@@ -39,7 +39,8 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
  public:
   using Measurements = Eigen::VectorX<Scalar>;
 
-  LiveObjective(const RadialBasis& basis, PointsIn samples, double bending, double handle_weight);
+  /// `bending` (n): λ of each sample.
+  LiveObjective(const RadialBasis& basis, PointsIn samples, const Vector& bending, double handle_weight);
   /// A barrier against folds with this weight and threshold; 0: none.
   void set_barrier(double weight, double threshold);
   /// Other handles (cube coordinates), with the factor of the preconditioner that goes with them.
@@ -60,6 +61,10 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
     return {u.data() + handle_offset(), pairs_.sources.rows(), 3};
   }
 
+  /// Twice the weights of the surrogate mean (‖J‖² + λ‖D‖²) + weight·handles, whose inverse precondition()
+  /// has, times measurements.
+  Measurements weighted(const Measurements& u) const;
+
   void measure(const RowMatrix<double>& c, Measurements& u) const override;
   double value(const Measurements& u, Measurements* cotangents) const override;
   RowMatrix<double> pull_back(const Measurements& cotangents) const override;
@@ -72,8 +77,9 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
   Index center_offset() const { return handle_offset() + 3 * pairs_.sources.rows(); }
 
   Index center_count_;
-  double bending_, handle_weight_, barrier_ = 0.0, barrier_threshold_ = 0.1;
+  double handle_weight_, barrier_ = 0.0, barrier_threshold_ = 0.1;
   RadialEvaluator<Scalar> samples_;
+  Eigen::VectorX<Scalar> bending_;
   HandleBatch<Scalar> pairs_;
   TallMatrix<Scalar> handle_basis_;   // (pairs, size)
   TallMatrix<float> inverse_factor_;  // L⁻¹ of the preconditioner's matrix L Lᵀ

@@ -21,6 +21,7 @@ class LiveSolver::State {
   void set_targets(const std::vector<Handle>& moved);
   std::shared_ptr<RadialField> solve(Index iterations, double tolerance, const Progress& progress);
   void reset();
+  void adopt(const DeformationField& field);
   void track(PointsIn points) { tracked_ = TrackedPoints(basis_, frame_, points); }
   PointsF tracked() const { return tracked_.moved(coefficients_); }
   std::shared_ptr<RadialField> field() const;
@@ -53,6 +54,7 @@ class LiveSolver::State {
   Frame frame_;
   Points surface_, surface_normals_;  // all samples, cube coordinates
   std::vector<Index> chosen_;         // those that the energy sees
+  Vector bending_;                    // λ of these
   std::vector<Handle> handles_;
   BoundHandles bound_;
   std::vector<Index> pair_rows_;  // rows of bound_ that pull

@@ -4,6 +4,7 @@
 #include "core/device.h"
 #include "core/parallel.h"
 #include "fields/neural_field.h"
+#include "solve/field_choice.h"
 #include "solve/radial.h"
 #include "solve/report.h"
 #include "solve/setup.h"
@@ -46,13 +47,15 @@ Solution stylize(const SurfaceSamples& samples, PointsIn preferred, const Styliz
                  const SolveHooks& hooks) {
   options.validate();
   check_samples(samples, weights);
-  if (options.field == FieldKind::radial)
+  if (chosen_field(options) == FieldKind::radial)
     return stylize_radial(samples, preferred, options, progress, weights, handles, hooks);
   const ThreadScope threads(options.machine.threads);
   ObjectiveTerms terms;
   terms.batch = options.training.batch;
   terms.rigidity = options.rigidity;
-  terms.surface = options.surface;
+  terms.stiffness = SurfaceStiffness(samples, options.surface);
+  terms.barrier = options.surface.barrier;
+  terms.barrier_threshold = options.surface.barrier_threshold;
   terms.preference = gauss_preference(preferred, options.sharpness);
   terms.gauss = options.strength * options.gauss_weight;
   terms.preference_weights = weights;
