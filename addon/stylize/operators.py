@@ -60,6 +60,7 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
                 style.directions(af),
                 options,
                 weights=blend,
+                up=style.up,
                 handles=native_handles(af, handles, rest, samples),
                 task=tracker.start("Stylizing", weight),
             )

@@ -7,6 +7,7 @@
 #include "energies/external_energy.h"
 #include "energies/gauss.h"
 #include "energies/handles.h"
+#include "energies/stance.h"
 #include "mesh/surface_samples.h"
 #include "options/handles.h"
 #include "solve/objective.h"
@@ -15,7 +16,8 @@
 namespace arapfields {
 
 /// What a deformation is asked for, as weights of the terms:
-///   rigidity·mean w(stretch + λ·bend) + gauss·mean(1 − g) + barrier·fold_barrier + handles + external.
+///   rigidity·mean w(stretch + λ·bend) + gauss·mean(1 − g) + keep_stance·stance + barrier·fold_barrier +
+///   handles + external.
 struct ObjectiveTerms {
   Index batch = 0;  ///< samples an iteration
   Index fresh = 0;  ///< of the batch, samples that the surface is asked for anew; needs samples.redraw
@@ -26,6 +28,8 @@ struct ObjectiveTerms {
   std::optional<GaussPreference> preference;
   double gauss = 0.0;
   Vector preference_weights;  ///< a weight a sample; empty: all 1
+  double keep_stance = 0.0;
+  Stance stance;  ///< of the samples
   BoundHandles handles;
   HandleOptions pull;
   ExternalEnergies external;
@@ -48,12 +52,14 @@ class FieldObjective final : public Objective {
   struct Batch {
     Points points, normals;
     Vector bending, weights, preference_weights;
+    Stance stance;
   };
   /// What the terms need on a device, beside each batch.
   struct Constants;
 
   Batch draw(Random& random);
   bool styled() const { return terms_.preference && terms_.gauss > 0.0; }
+  bool stands() const { return terms_.keep_stance > 0.0; }
   bool pulled() const { return terms_.handles.count() > 0 && terms_.pull.handle_weight != 0.0; }
   JetOrder order_of_terms() const {
     return highest_order(terms_.external, terms_.stiffness.bends() ? JetOrder::second : JetOrder::first);

@@ -65,11 +65,18 @@ bool LiveObjective<Scalar>::accepted(const Measurements& u) const {
   std::vector<LossTerm> told{{"stretch", terms.arap.stretch}};
   if ((bending_.array() > 0).any()) told.push_back({"bend", terms.arap.energy - terms.arap.stretch});
   if (style_) told.push_back({"style", style_->weight * terms.gauss});
+  if (stance_) told.push_back({"stance", stance_->weight * terms.stance});
   if (barrier_ > 0.0) told.push_back({"barrier", barrier_ * terms.barrier});
   told.push_back({"handles", handle_weight_ * terms.handles});
   for (std::size_t i = 0; i < terms.external.size(); ++i)
     told.push_back({"energies[" + std::to_string(i) + "]", terms.external[i]});
   return hooks_.observer(told);
+}
+
+template <class Scalar>
+void LiveObjective<Scalar>::set_stance(const std::optional<LiveStance>& stance) {
+  stance_ = stance;
+  if (stance) stance_rest_ = stance->rest.template cast<Scalar>();
 }
 
 template <class Scalar>
@@ -96,6 +103,9 @@ LiveTerms LiveObjective<Scalar>::evaluate(const Measurements& u, Measurements* c
   if (style_)
     terms.gauss = gauss_energy<Scalar>(jets(u), style_normals_, style_weights_, style_->preference,
                                        style_->weight, jet_cotangents);
+  if (stance_)
+    terms.stance =
+        stance_energy<Scalar>(jets(u), stance_rest_, stance_->stance, stance_->weight, jet_cotangents);
   if (barrier_ > 0.0)
     terms.barrier = fold_barrier<Scalar>(jets(u), barrier_threshold_, barrier_, jet_cotangents);
   terms.external = external_energies<Scalar>(hooks_.energies, rest_, jets(u), hooks_.weight, jet_cotangents);
@@ -126,7 +136,8 @@ double LiveObjective<Scalar>::value(const Measurements& u, Measurements* cotange
   const auto centers = u.tail(3 * center_count_);
   if (cotangents != nullptr) cotangents->tail(3 * center_count_) = Scalar(2.0 * coefficient_weight) * centers;
   return terms.arap.energy + handle_weight_ * terms.handles + (style_ ? style_->weight * terms.gauss : 0.0) +
-         barrier_ * terms.barrier + std::accumulate(terms.external.begin(), terms.external.end(), 0.0) +
+         (stance_ ? stance_->weight * terms.stance : 0.0) + barrier_ * terms.barrier +
+         std::accumulate(terms.external.begin(), terms.external.end(), 0.0) +
          coefficient_weight * static_cast<double>(centers.squaredNorm());
 }
 

@@ -78,22 +78,17 @@ void LiveSolver::State::prepare(Precision<Scalar>& precision) {
   precision.objective = std::make_unique<LiveObjective<Scalar>>(basis_, rows_of(surface_, chosen_), bending_,
                                                                 options_.handle_weight);
   precision.objective->set_barrier(options_.surface.barrier, options_.surface.barrier_threshold);
-  if (pairs_.sources.rows() > 0) precision.objective->set_handles(pairs_, pair_values_, inverse_factor_);
+  if (inverse_factor_.size() > 0) precision.objective->set_handles(pairs_, pair_values_, inverse_factor_);
   precision.objective->set_style(style_);
   precision.objective->set_hooks(hooks_, rows_of(surface_, chosen_));
-}
-
-template <class Call>
-void LiveSolver::State::for_each_precision(Call&& call) {
-  if (fast_.objective) call(fast_);
-  if (exact_.objective) call(exact_);
+  precision.objective->set_stance(stance_);
 }
 
 void LiveSolver::State::choose_pairs() {
   pair_rows_.clear();
   if (handles_.empty()) {
     Index lowest = 0;
-    surface_.col(2).minCoeff(&lowest);
+    (surface_ * up_).minCoeff(&lowest);
     pairs_ = {surface_.row(lowest), surface_.row(lowest),
               Vector::Constant(1, anchor_weight / options_.handle_weight)};
     return;
@@ -118,10 +113,27 @@ void LiveSolver::State::set_handles(const std::vector<Handle>& handles) {
   bound_ = BoundHandles(in_cube(handles, frame_), surface_);
   handles_ = handles;
   choose_pairs();
+  choose_stance();
+  inverse_factor_.resize(0, 0);
+  if (!handles_.empty()) factorise();
+}
+
+/// The preconditioner of the handles and the stance at hand.
+void LiveSolver::State::factorise() {
   pair_values_ = radial_rows(basis_, pairs_.sources, JetOrder::value);
-  inverse_factor_ = inverse_factor(stiffness_, pair_values_, options_.handle_weight * pairs_.weights);
+  RowMatrix<double> values = pair_values_;
+  Vector weights = options_.handle_weight * pairs_.weights;
+  if (stance_) {
+    const auto [rows, shares] = stance_rows(basis_, stance_->rest, stance_->stance);
+    values.conservativeResize(values.rows() + rows.rows(), Eigen::NoChange);
+    weights.conservativeResize(values.rows());
+    values.bottomRows(rows.rows()) = rows;
+    weights.tail(rows.rows()) = stance_->weight * shares;
+  }
+  inverse_factor_ = inverse_factor(stiffness_, values, weights);
   for_each_precision([&](auto& precision) {
     precision.objective->set_handles(pairs_, pair_values_, inverse_factor_);
+    precision.objective->set_stance(stance_);
     precision.u.resize(0);
   });
   u_before_.resize(0);
@@ -137,36 +149,6 @@ void LiveSolver::State::set_targets(const std::vector<Handle>& moved) {
   if (handles_.empty()) return;
   pairs_.targets = rows_of(bound_.targets(), pair_rows_);
   for_each_precision([&](auto& precision) { precision.objective->set_targets(pairs_.targets); });
-}
-
-void LiveSolver::State::set_style(PointsIn preferred, double strength, double sharpness,
-                                  const Vector& weights) {
-  require_range("strength", strength, 0, 1e6);
-  require(
-      weights.size() == 0 ||
-          (weights.size() == surface_.rows() && weights.allFinite() && weights.minCoeff() >= 0),
-      "weights", std::to_string(weights.size()) + " numbers, or negative or non-finite ones",
-      "one weight ≥ 0 for each of the " + std::to_string(surface_.rows()) + " samples, or none, is needed");
-  if (strength == 0.0) return clear_style();
-  require(surface_normals_.rows() == surface_.rows(), "samples", "they have no normals",
-          "a style needs samples with normals");
-  style_ = LiveStyle{gauss_preference(preferred, sharpness),
-                     rows_of(surface_normals_, chosen_),
-                     {},
-                     strength * options_.gauss_weight};
-  if (weights.size() > 0) {
-    style_->sample_weights.resize(static_cast<Index>(chosen_.size()));
-    for (std::size_t i = 0; i < chosen_.size(); ++i)
-      style_->sample_weights[static_cast<Index>(i)] = weights[chosen_[i]];
-  }
-  for_each_precision([&](auto& precision) { precision.objective->set_style(style_); });
-  optimizer_.forget();
-}
-
-void LiveSolver::State::clear_style() {
-  style_.reset();
-  for_each_precision([&](auto& precision) { precision.objective->set_style(style_); });
-  optimizer_.forget();
 }
 
 void LiveSolver::State::set_hooks(const LiveHooks& hooks) {
@@ -201,6 +183,7 @@ std::shared_ptr<RadialField> LiveSolver::State::solve(Index iterations, double t
   if (iterations <= 0) iterations = options_.iterations;
   if (tolerance <= 0.0) tolerance = options_.tolerance;
   report_.iterations = report_.evaluations = 0;
+  if (inverse_factor_.size() == 0) factorise();
   if (!handles_.empty() && !style_) follow_rigidly();
   extrapolate();
   const bool fast_alone = tolerance >= single_tolerance;

@@ -23,7 +23,7 @@ struct LossGradient {
 class ARAPFIELDS_EXPORT_TO_TESTS LossProbe {
  public:
   LossProbe(const SurfaceSamples& samples, const std::vector<Handle>& handles, int width, double bending,
-            const Points& preferred, double gauss, double barrier, double margin,
+            const Points& preferred, double gauss, double barrier, double margin, double keep_stance,
             const ExternalEnergies& external = {});
   ~LossProbe();
   /// The parameters become these; the subsets are those of the seed.
