@@ -104,7 +104,9 @@ def add_solve_flags(one, verbs):
     if "stylize" in verbs:
         names = ", ".join(name for name, _ in STYLES)
         group.add_argument("--style", type=style, metavar="NAME", help=names)
-        group.add_argument("--frame", choices=("object", "world"), help="whose axes the style stands along")
+        group.add_argument(
+            "--frame", choices=("upright", "object", "world"), help="whose axes the style stands along"
+        )
     if "deform" in verbs:
         group.add_argument(
             "--handles", type=Path, metavar="FILE", help="handles as JSON, in the file's space"

@@ -15,7 +15,7 @@ def energy_weights(settings, kind):
     weights = {"bending": group.bending, "barrier": group.barrier}
     weights["handle_weight"] = settings.deform.handle_weight
     if kind == "STYLIZE":
-        weights["rigidity"] = group.rigidity
+        weights["rigidity"], weights["keep_stance"] = group.rigidity, group.keep_stance
     return {name: from_single_precision(value) for name, value in weights.items()}
 
 

@@ -61,6 +61,7 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
                 options,
                 tracker.start("Stylizing", weight),
                 weights=blend,
+                up=style.up,
                 handles=native_handles(af, handles, rest, samples),
             )
 

@@ -53,13 +53,13 @@ py::object solve(LiveSolver& live, const py::object& targets, Index iterations, 
 }
 
 void set_style(LiveSolver& live, const py::object& normals, double strength, double sharpness,
-               const py::object& weights) {
+               const py::object& weights, const py::object& up) {
   if (normals.is_none()) return live.clear_style();
   const Points preferred = py::isinstance<py::str>(normals)
                                ? preferred_normals(py::cast<std::string>(normals))
                                : as_points(normals, "normals");
-  live.set_style(preferred, strength, sharpness,
-                 weights.is_none() ? Vector() : as_vector(weights, "weights"));
+  live.set_style(preferred, strength, sharpness, weights.is_none() ? Vector() : as_vector(weights, "weights"),
+                 up.is_none() ? Vec3(Vec3::UnitZ()) : as_vec3(up, "up"));
 }
 
 }  // namespace
@@ -110,10 +110,12 @@ void bind_live(py::module_& module) {
       .def("set_handles", &LiveSolver::set_handles, "handles"_a,
            "Other handles for the same surface; the shape at hand is kept as the start of the next solve.")
       .def("set_style", &set_style, "normals"_a, "strength"_a = StylizeOptions().strength,
-           "sharpness"_a = StylizeOptions().sharpness, "weights"_a = py::none(),
+           "sharpness"_a = StylizeOptions().sharpness, "weights"_a = py::none(), "up"_a = py::none(),
            "Turns the surface towards preferred normals, (k, 3) or a style's name, from the next solve on; "
            "None\n"
-           "or strength 0: no style. `weights` (one for each sample given at the start) blend the effect.")
+           "or strength 0: no style. `weights` (one for each sample given at the start) blend the effect; "
+           "`up`\n"
+           "(3,), else z, is where the figure's head is: without handles it stands on what lies lowest.")
       .def("reset", &LiveSolver::reset, "Back to the identity and to handles at rest.")
       .def_property_readonly("field", &with_report, "The deformation at hand, as a DeformationField.")
       .def_property_readonly(

@@ -95,20 +95,25 @@ void bind_solve(py::module_& module) {
   module.def(
       "stylize",
       [](const SurfaceSamples& samples, const py::object& normals, const StylizeOptions& options, Task* task,
-         const py::object& weights, const std::vector<Handle>& handles, const py::object& orientation) {
+         const py::object& weights, const std::vector<Handle>& handles, const py::object& orientation,
+         const py::object& up) {
         const Points preferred = preferred_from(normals, orientation);
         const Vector blend = weights.is_none() ? Vector() : as_vector(weights, "weights");
-        return solve(
-            task, [&](const Progress& p) { return stylize(samples, preferred, options, p, blend, handles); });
+        const Vec3 upwards = up.is_none() ? Vec3(Vec3::UnitZ()) : as_vec3(up, "up");
+        return solve(task, [&](const Progress& p) {
+          return stylize(samples, preferred, options, p, blend, handles, upwards);
+        });
       },
       "samples"_a, "normals"_a, py::arg_v("options", StylizeOptions(), "StylizeOptions()"),
       "task"_a = nullptr, "weights"_a = py::none(), "handles"_a = std::vector<Handle>(),
-      "orientation"_a = py::none(),
+      "orientation"_a = py::none(), "up"_a = py::none(),
       "The DeformationField that turns the surface's normals to preferred ones: `normals` (k, 3) or a "
       "style's\n"
       "name, turned by `orientation` (3, 3). `weights` (n,) blend the effect sample by sample. Without "
       "handles\n"
-      "the lowest sample stays in place; strength 0 is the identity. field.report['preference'] is the mean\n"
+      "the figure keeps its stance (options.keep_stance) and the lowest sample stays in place, seen along "
+      "`up`\n"
+      "(3,), else z; strength 0 is the identity. field.report['preference'] is the mean\n"
       "preference reached. Raises as deform does.");
   module.def(
       "train_inverse",

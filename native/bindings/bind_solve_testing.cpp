@@ -9,9 +9,9 @@ void bind_solve_testing(py::module_& module) {
   py::module_ testing = testing_module(module);
   py::class_<LossProbe>(testing, "LossProbe")
       .def(py::init<const SurfaceSamples&, const std::vector<Handle>&, int, double, const Points&, double,
-                    double, double>(),
+                    double, double, double>(),
            "samples"_a, "handles"_a, "width"_a = 8, "bending"_a = 0.0, "preferred"_a = Points(),
-           "gauss"_a = 0.0, "barrier"_a = 0.0, "margin"_a = 0.0)
+           "gauss"_a = 0.0, "barrier"_a = 0.0, "margin"_a = 0.0, "keep_stance"_a = 0.0)
       .def(
           "__call__",
           [](LossProbe& self, const Vector& parameters, std::uint64_t seed) {

@@ -2,8 +2,8 @@
 // The energies of this folder as compositions of libtorch's operations, for tensors outside main memory. For
 // libtorch sources alone. Nothing is read back, so nothing waits for the
 // device. `jets` and `cotangents` are (columns, n, 3), contiguous; weight times the cotangents is added to
-// the latter unless they are undefined. Values are means as in arap.h, gauss.h, distortion.h and handles.h,
-// as tensors.
+// the latter unless they are undefined. Values are means as in arap.h, gauss.h, distortion.h, handles.h and
+// stance.h, as tensors.
 #pragma once
 
 #include <ATen/core/Tensor.h>
@@ -44,5 +44,9 @@ at::Tensor aten_barrier(const at::Tensor& jets, double threshold, double weight,
 /// Targets (n,3) and weights (n) as in HandleBatch.
 at::Tensor aten_handles(const at::Tensor& jets, const at::Tensor& targets, const at::Tensor& weights,
                         double weight, at::Tensor cotangents);
+/// Rest points (n,3), the stance's upward direction (3) and ground weights (n); its scale belongs to the
+/// weight.
+at::Tensor aten_stance(const at::Tensor& jets, const at::Tensor& rest, const at::Tensor& up,
+                       const at::Tensor& ground, double weight, at::Tensor cotangents);
 
 }  // namespace arapfields

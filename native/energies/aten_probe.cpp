@@ -42,14 +42,27 @@ double probe_handles(JetView<const Scalar> jets, const HandleBatch<Scalar>& batc
       .template item<double>();
 }
 
-#define ARAPFIELDS_PROBES(Scalar)                                                                  \
-  template ArapValue probe_arap<Scalar>(JetView<const Scalar>, double, double, JetView<Scalar>);   \
-  template double probe_gauss<Scalar>(JetView<const Scalar>, ConstPointsRef<Scalar>,               \
-                                      const Eigen::Ref<const Eigen::VectorX<Scalar>>&,             \
-                                      const GaussPreference&, double, JetView<Scalar>);            \
-  template double probe_barrier<Scalar>(JetView<const Scalar>, double, double, JetView<Scalar>);   \
-  template double probe_handles<Scalar>(JetView<const Scalar>, const HandleBatch<Scalar>&, double, \
-                                        JetView<Scalar>);
+template <class Scalar>
+double probe_stance(JetView<const Scalar> jets, ConstPointsRef<Scalar> rest, const Stance& stance,
+                    double weight, JetView<Scalar> cotangents) {
+  const at::Tensor given = tensor_view(jets);
+  const Vector up = stance.up;
+  return stance.scale * aten_stance(given, tensor_view(rest), tensor_view(up).to(given.scalar_type()),
+                                    tensor_view(stance.ground).to(given.scalar_type()), weight * stance.scale,
+                                    tensor_view(cotangents))
+                            .template item<double>();
+}
+
+#define ARAPFIELDS_PROBES(Scalar)                                                                            \
+  template ArapValue probe_arap<Scalar>(JetView<const Scalar>, double, double, JetView<Scalar>);             \
+  template double probe_gauss<Scalar>(JetView<const Scalar>, ConstPointsRef<Scalar>,                         \
+                                      const Eigen::Ref<const Eigen::VectorX<Scalar>>&,                       \
+                                      const GaussPreference&, double, JetView<Scalar>);                      \
+  template double probe_barrier<Scalar>(JetView<const Scalar>, double, double, JetView<Scalar>);             \
+  template double probe_handles<Scalar>(JetView<const Scalar>, const HandleBatch<Scalar>&, double,           \
+                                        JetView<Scalar>);                                                    \
+  template double probe_stance<Scalar>(JetView<const Scalar>, ConstPointsRef<Scalar>, const Stance&, double, \
+                                       JetView<Scalar>);
 ARAPFIELDS_PROBES(float)
 ARAPFIELDS_PROBES(double)
 

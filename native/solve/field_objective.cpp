@@ -61,7 +61,8 @@ Index FieldObjective::next_fresh(Random& random) {
 FieldObjective::Batch FieldObjective::draw(Random& random) {
   const Index available = samples_.size(), count = std::min(terms_.batch, available);
   Batch batch{Points(count, 3), Points(styled() ? count : 0, 3),
-              Vector(styled() && terms_.preference_weights.size() > 0 ? count : 0)};
+              Vector(styled() && terms_.preference_weights.size() > 0 ? count : 0), terms_.stance};
+  batch.stance.ground.setZero(stands() ? count : 0);
   // Fresh samples stand evenly among the others: stretch b has one where b·fresh/count steps up.
   for (Index b = 0; b < count; ++b) {
     if (terms_.fresh > 0 && b * terms_.fresh / count != (b + 1) * terms_.fresh / count) {
@@ -77,6 +78,7 @@ FieldObjective::Batch FieldObjective::draw(Random& random) {
     batch.points.row(b) = samples_.points.row(i);
     if (styled()) batch.normals.row(b) = samples_.normals.row(i);
     if (batch.weights.size() > 0) batch.weights[b] = terms_.preference_weights[i];
+    if (stands()) batch.stance.ground[b] = terms_.stance.ground[i];
   }
   return batch;
 }
@@ -99,6 +101,10 @@ double FieldObjective::by_kernels(TrainableField& field, Random& random) {
     value += terms_.gauss * gauss_energy<Scalar>(jets.view(), batch.normals.cast<Scalar>(),
                                                  batch.weights.cast<Scalar>(), *terms_.preference,
                                                  terms_.gauss, jets.cotangent_view());
+  if (stands())
+    value +=
+        terms_.keep_stance * stance_energy<Scalar>(jets.view(), batch.points.cast<Scalar>(), batch.stance,
+                                                   terms_.keep_stance, jets.cotangent_view());
   if (terms_.surface.barrier > 0.0)
     value += terms_.surface.barrier * fold_barrier<Scalar>(jets.view(), terms_.surface.barrier_threshold,
                                                            terms_.surface.barrier, jets.cotangent_view());
@@ -127,6 +133,12 @@ at::Tensor FieldObjective::by_compositions(TrainableField& field, Random& random
                                   batch.weights.size() > 0 ? tensor_like(batch.weights, like) : at::Tensor(),
                                   constants_->preferred, terms_.preference->sharpness, terms_.gauss, tables,
                                   cotangents);
+  if (stands()) {
+    const double weight = terms_.keep_stance * batch.stance.scale;
+    value += weight * aten_stance(jets, tensor_like(batch.points, like),
+                                  tensor_like(Vector(batch.stance.up), like),
+                                  tensor_like(batch.stance.ground, like), weight, cotangents);
+  }
   if (terms_.surface.barrier > 0.0)
     value += terms_.surface.barrier *
              aten_barrier(jets, terms_.surface.barrier_threshold, terms_.surface.barrier, tables, cotangents);

@@ -6,6 +6,7 @@
 
 #include "energies/gauss.h"
 #include "energies/handles.h"
+#include "energies/stance.h"
 #include "mesh/surface_samples.h"
 #include "options/handles.h"
 #include "options/surface.h"
@@ -14,7 +15,8 @@
 namespace arapfields {
 
 /// What a deformation is asked for, as weights of the terms:
-///   rigidity·(stretch + bending·bend) + gauss·mean(1 − g) + barrier·fold_barrier + handles.
+///   rigidity·(stretch + bending·bend) + gauss·mean(1 − g) + keep_stance·stance + barrier·fold_barrier +
+///   handles.
 struct ObjectiveTerms {
   Index batch = 0;  ///< samples an iteration
   Index fresh = 0;  ///< of the batch, samples that the surface is asked for anew; needs samples.redraw
@@ -23,6 +25,8 @@ struct ObjectiveTerms {
   std::optional<GaussPreference> preference;
   double gauss = 0.0;
   Vector preference_weights;  ///< a weight a sample; empty: all 1
+  double keep_stance = 0.0;
+  Stance stance;  ///< of the samples
   BoundHandles handles;
   HandleOptions pull;
 };
@@ -43,12 +47,14 @@ class FieldObjective final : public Objective {
   struct Batch {
     Points points, normals;
     Vector weights;
+    Stance stance;
   };
   /// What the terms need on a device, beside each batch.
   struct Constants;
 
   Batch draw(Random& random);
   bool styled() const { return terms_.preference && terms_.gauss > 0.0; }
+  bool stands() const { return terms_.keep_stance > 0.0; }
   bool pulled() const { return terms_.handles.count() > 0 && terms_.pull.handle_weight != 0.0; }
   JetOrder order_of_terms() const {
     return terms_.surface.bending > 0.0 ? JetOrder::second : JetOrder::first;

@@ -51,6 +51,12 @@ void LiveObjective<Scalar>::set_style(const std::optional<LiveStyle>& style) {
 }
 
 template <class Scalar>
+void LiveObjective<Scalar>::set_stance(const std::optional<LiveStance>& stance) {
+  stance_ = stance;
+  if (stance) stance_rest_ = stance->rest.template cast<Scalar>();
+}
+
+template <class Scalar>
 void LiveObjective<Scalar>::measure(const RowMatrix<double>& c, Measurements& u) const {
   u.resize(center_offset() + 3 * center_count_);
   samples_.evaluate(c, {u.data(), samples_.size(), JetOrder::second});
@@ -74,6 +80,9 @@ LiveTerms LiveObjective<Scalar>::evaluate(const Measurements& u, Measurements* c
   if (style_)
     terms.gauss = gauss_energy<Scalar>(jets(u), style_normals_, style_weights_, style_->preference,
                                        style_->weight, jet_cotangents);
+  if (stance_)
+    terms.stance =
+        stance_energy<Scalar>(jets(u), stance_rest_, stance_->stance, stance_->weight, jet_cotangents);
   if (barrier_ > 0.0)
     terms.barrier = fold_barrier<Scalar>(jets(u), barrier_threshold_, barrier_, jet_cotangents);
   return terms;
@@ -85,8 +94,8 @@ double LiveObjective<Scalar>::value(const Measurements& u, Measurements* cotange
   const auto centers = u.tail(3 * center_count_);
   if (cotangents != nullptr) cotangents->tail(3 * center_count_) = Scalar(2.0 * coefficient_weight) * centers;
   return terms.arap.stretch + bending_ * terms.arap.bend + handle_weight_ * terms.handles +
-         (style_ ? style_->weight * terms.gauss : 0.0) + barrier_ * terms.barrier +
-         coefficient_weight * static_cast<double>(centers.squaredNorm());
+         (style_ ? style_->weight * terms.gauss : 0.0) + (stance_ ? stance_->weight * terms.stance : 0.0) +
+         barrier_ * terms.barrier + coefficient_weight * static_cast<double>(centers.squaredNorm());
 }
 
 template <class Scalar>

@@ -7,6 +7,7 @@
 #include "energies/arap.h"
 #include "energies/gauss.h"
 #include "energies/handles.h"
+#include "energies/stance.h"
 #include "fields/radial_evaluator.h"
 #include "solve/quasi_newton.h"
 
@@ -20,17 +21,26 @@ struct LiveStyle {
   double weight = 1.0;    ///< λ_Gauss
 };
 
+/// What keeps a figure's stance at the samples of a live solve.
+struct LiveStance {
+  Stance stance;
+  Points rest;  ///< (n,3) samples
+  double weight = 0.0;
+};
+
 /// What the terms of the energy come to.
 struct LiveTerms {
   ArapValue arap;
   double handles = 0.0;  ///< mean squared distance to the targets
   double gauss = 0.0;    ///< mean(1 − g), where there is a style
   double barrier = 0.0;  ///< energies/distortion.h
+  double stance = 0.0;   ///< energies/stance.h
 };
 
-/// stretch + λ_bend·bend + weight·handles + λ_Gauss·gauss + barrier + a vanishing pull of all centers towards
-/// zero, of the fields of one radial basis. Measurements: jets at the samples, values at the handles'
-/// sources, centers. In single precision a step costs half, and the value is good to some 1e-6 of itself.
+/// stretch + λ_bend·bend + weight·handles + λ_Gauss·gauss + stance + barrier + a vanishing pull of all
+/// centers towards zero, of the fields of one radial basis. Measurements: jets at the samples, values at the
+/// handles' sources, centers. In single precision a step costs half, and the value is good to some 1e-6 of
+/// itself.
 template <class Scalar>
 class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
  public:
@@ -45,6 +55,7 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
   /// New targets for the pairs in place.
   void set_targets(PointsIn targets);
   void set_style(const std::optional<LiveStyle>& style);
+  void set_stance(const std::optional<LiveStance>& stance);
 
   LiveTerms terms(const Measurements& u) const { return evaluate(u, nullptr); }
   JetView<const Scalar> jets(const Measurements& u) const {
@@ -72,6 +83,8 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
   TallMatrix<Scalar> handle_basis_;   // (pairs, size)
   TallMatrix<float> inverse_factor_;  // L⁻¹ of the preconditioner's matrix L Lᵀ
   std::optional<LiveStyle> style_;
+  std::optional<LiveStance> stance_;
+  PointsOf<Scalar> stance_rest_;
   PointsOf<Scalar> style_normals_;
   Eigen::VectorX<Scalar> style_weights_;
 };

@@ -25,9 +25,11 @@ class ARAPFIELDS_EXPORT LiveSolver {
 
   /// Other handles for the same surface; the shape at hand stays the start of the next solve.
   void set_handles(const std::vector<Handle>& handles);
-  /// Preferred normals (k,3), strength ≥ 0 (0 takes the style away), sharpness σ, and weights (one for each
-  /// surface sample given to the constructor, or empty).
-  void set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights = {});
+  /// Preferred normals (k,3), strength ≥ 0 (0 takes the style away), sharpness σ (0: from the normals),
+  /// weights (one for each surface sample given to the constructor, or empty); `up` is where the figure's
+  /// head is: without handles it stands on what lies lowest.
+  void set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights = {},
+                 const Vec3& up = Vec3::UnitZ());
   void clear_style();
   /// Moves the handles' targets.
   void set_targets(const std::vector<Handle>& moved);

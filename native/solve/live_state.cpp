@@ -68,8 +68,9 @@ void LiveSolver::State::prepare(Precision<Scalar>& precision) {
   precision.objective = std::make_unique<LiveObjective<Scalar>>(
       basis_, rows_of(surface_, chosen_), options_.surface.bending, options_.handle_weight);
   precision.objective->set_barrier(options_.surface.barrier, options_.surface.barrier_threshold);
-  if (pairs_.sources.rows() > 0) precision.objective->set_handles(pairs_, pair_values_, inverse_factor_);
+  if (inverse_factor_.size() > 0) precision.objective->set_handles(pairs_, pair_values_, inverse_factor_);
   precision.objective->set_style(style_);
+  precision.objective->set_stance(stance_);
 }
 
 template <class Call>
@@ -82,7 +83,7 @@ void LiveSolver::State::choose_pairs() {
   pair_rows_.clear();
   if (handles_.empty()) {
     Index lowest = 0;
-    surface_.col(2).minCoeff(&lowest);
+    (surface_ * up_).minCoeff(&lowest);
     pairs_ = {surface_.row(lowest), surface_.row(lowest),
               Vector::Constant(1, anchor_weight / options_.handle_weight)};
     return;
@@ -107,10 +108,35 @@ void LiveSolver::State::set_handles(const std::vector<Handle>& handles) {
   bound_ = BoundHandles(in_cube(handles, frame_), surface_);
   handles_ = handles;
   choose_pairs();
+  choose_stance();
+  inverse_factor_.resize(0, 0);
+  if (!handles_.empty()) factorise();
+}
+
+/// Without handles, a style's figure keeps its stance.
+void LiveSolver::State::choose_stance() {
+  stance_.reset();
+  if (style_ && handles_.empty() && options_.keep_stance > 0.0)
+    stance_ =
+        LiveStance{Stance::of(surface_, up_).at(chosen_), rows_of(surface_, chosen_), options_.keep_stance};
+}
+
+/// The preconditioner of the handles and the stance at hand.
+void LiveSolver::State::factorise() {
   pair_values_ = radial_rows(basis_, pairs_.sources, JetOrder::value);
-  inverse_factor_ = inverse_factor(stiffness_, pair_values_, options_.handle_weight * pairs_.weights);
+  RowMatrix<double> values = pair_values_;
+  Vector weights = options_.handle_weight * pairs_.weights;
+  if (stance_) {
+    const auto [rows, shares] = stance_rows(basis_, stance_->rest, stance_->stance);
+    values.conservativeResize(values.rows() + rows.rows(), Eigen::NoChange);
+    weights.conservativeResize(values.rows());
+    values.bottomRows(rows.rows()) = rows;
+    weights.tail(rows.rows()) = stance_->weight * shares;
+  }
+  inverse_factor_ = inverse_factor(stiffness_, values, weights);
   for_each_precision([&](auto& precision) {
     precision.objective->set_handles(pairs_, pair_values_, inverse_factor_);
+    precision.objective->set_stance(stance_);
     precision.u.resize(0);
   });
   u_before_.resize(0);
@@ -129,7 +155,7 @@ void LiveSolver::State::set_targets(const std::vector<Handle>& moved) {
 }
 
 void LiveSolver::State::set_style(PointsIn preferred, double strength, double sharpness,
-                                  const Vector& weights) {
+                                  const Vector& weights, const Vec3& up) {
   require_range("strength", strength, 0, 1e6);
   require(
       weights.size() == 0 ||
@@ -139,23 +165,36 @@ void LiveSolver::State::set_style(PointsIn preferred, double strength, double sh
   if (strength == 0.0) return clear_style();
   require(surface_normals_.rows() == surface_.rows(), "samples", "they have no normals",
           "a style needs samples with normals");
-  style_ = LiveStyle{gauss_preference(preferred, sharpness),
+  const GaussPreference preference = gauss_preference(preferred, sharpness);
+  require(up.allFinite() && up.norm() > 0.0, "up", "zero, NaN or infinite", "a finite direction is needed");
+  const bool other_way_up = up != up_, first = !style_;
+  up_ = up;
+  style_ = LiveStyle{preference,
                      rows_of(surface_normals_, chosen_),
                      {},
-                     strength * options_.gauss_weight};
-  if (weights.size() > 0) {
-    style_->sample_weights.resize(static_cast<Index>(chosen_.size()));
+                     strength * options_.gauss_weight * preference.balance};
+  style_->sample_weights = preference.reach(style_->normals);
+  if (weights.size() > 0)
     for (std::size_t i = 0; i < chosen_.size(); ++i)
-      style_->sample_weights[static_cast<Index>(i)] = weights[chosen_[i]];
-  }
+      style_->sample_weights[static_cast<Index>(i)] *= weights[chosen_[i]];
   for_each_precision([&](auto& precision) { precision.objective->set_style(style_); });
   optimizer_.forget();
+  if (handles_.empty() && (first || other_way_up)) stand_otherwise();
 }
 
 void LiveSolver::State::clear_style() {
+  const bool stood = stance_.has_value();
   style_.reset();
   for_each_precision([&](auto& precision) { precision.objective->set_style(style_); });
   optimizer_.forget();
+  if (stood) stand_otherwise();
+}
+
+/// What is held of a figure without handles has changed; the next solve makes up for it.
+void LiveSolver::State::stand_otherwise() {
+  choose_pairs();
+  choose_stance();
+  inverse_factor_.resize(0, 0);
 }
 
 int LiveSolver::State::solve_threads() const {
@@ -183,6 +222,7 @@ std::shared_ptr<RadialField> LiveSolver::State::solve(Index iterations, double t
   if (iterations <= 0) iterations = options_.iterations;
   if (tolerance <= 0.0) tolerance = options_.tolerance;
   report_.iterations = report_.evaluations = 0;
+  if (inverse_factor_.size() == 0) factorise();
   if (!handles_.empty() && !style_) follow_rigidly();
   extrapolate();
   const bool fast_alone = tolerance >= single_tolerance;

@@ -15,7 +15,8 @@ class LiveSolver::State {
   State(const SurfaceSamples& samples, const std::vector<Handle>& handles, const LiveOptions& options,
         const Progress& progress);
   void set_handles(const std::vector<Handle>& handles);
-  void set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights);
+  void set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights,
+                 const Vec3& up);
   void clear_style();
   void set_targets(const std::vector<Handle>& moved);
   std::shared_ptr<RadialField> solve(Index iterations, double tolerance, const Progress& progress);
@@ -43,6 +44,9 @@ class LiveSolver::State {
   template <class Call>
   void for_each_precision(Call&& call);
   void choose_pairs();
+  void choose_stance();
+  void stand_otherwise();
+  void factorise();
   void follow_rigidly();
   void extrapolate();
   void hold_lowest();
@@ -59,7 +63,8 @@ class LiveSolver::State {
   HandleBatch<double> pairs_;
   RowMatrix<double> stiffness_, pair_values_, inverse_factor_;
   std::optional<LiveStyle> style_;
-  double style_strength_ = 0.0;
+  Vec3 up_ = Vec3::UnitZ();
+  std::optional<LiveStance> stance_;
   Precision<float> fast_;    // what a drag needs
   Precision<double> exact_;  // what follows where more is asked for; made when it first is
   QuasiNewton optimizer_;

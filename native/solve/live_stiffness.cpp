@@ -28,6 +28,21 @@ RowMatrix<double> surface_stiffness(const RadialBasis& basis, PointsIn samples, 
   return result;
 }
 
+std::pair<RowMatrix<double>, Vector> stance_rows(const RadialBasis& basis, PointsIn samples,
+                                                 const Stance& stance) {
+  const Index taken = std::min<Index>(samples.rows(), most_samples);
+  Points some(taken, 3);
+  Vector weights(taken);
+  for (Index i = 0; i < taken; ++i) {
+    const Index pick = i * samples.rows() / taken;
+    some.row(i) = samples.row(pick);
+    weights[i] = stance.scale * (1.0 + stance.ground[pick] / 3.0) / static_cast<double>(taken);
+  }
+  RowMatrix<double> rows = radial_rows(basis, some, JetOrder::value);
+  rows.rowwise() -= (weights.transpose() * rows / weights.sum()).eval();
+  return {std::move(rows), std::move(weights)};
+}
+
 RowMatrix<double> inverse_factor(RowMatrix<double> stiffness, const RowMatrix<double>& values,
                                  const Vector& weights) {
   const RowMatrix<double> weighted = weights.cwiseSqrt().asDiagonal() * values;

@@ -30,12 +30,15 @@ struct LossProbe::State {
 };
 
 LossProbe::LossProbe(const SurfaceSamples& samples, const std::vector<Handle>& handles, int width,
-                     double bending, const Points& preferred, double gauss, double barrier, double margin) {
+                     double bending, const Points& preferred, double gauss, double barrier, double margin,
+                     double keep_stance) {
   ObjectiveTerms terms;
   terms.batch = 20;
   terms.surface.bending = bending;
-  if (preferred.rows() > 0) terms.preference = gauss_preference(preferred);
+  if (preferred.rows() > 0) terms.preference = gauss_preference(preferred, 5.0);
   terms.gauss = gauss;
+  terms.keep_stance = keep_stance;
+  terms.stance = Stance::of(samples.points, Vec3(0.1, 0.2, 1.0));
   terms.surface.barrier = barrier;
   terms.surface.barrier_threshold = 0.9;
   terms.handles = BoundHandles(handles, samples.points);

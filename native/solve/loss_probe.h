@@ -21,7 +21,7 @@ struct LossGradient {
 class ARAPFIELDS_EXPORT_TO_TESTS LossProbe {
  public:
   LossProbe(const SurfaceSamples& samples, const std::vector<Handle>& handles, int width, double bending,
-            const Points& preferred, double gauss, double barrier, double margin);
+            const Points& preferred, double gauss, double barrier, double margin, double keep_stance);
   ~LossProbe();
   /// The parameters become these; the subsets are those of the seed.
   LossGradient operator()(const Vector& parameters, std::uint64_t seed);

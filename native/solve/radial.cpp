@@ -81,7 +81,8 @@ std::shared_ptr<const DeformationField> radial_start(const SurfaceSamples& sampl
 }
 
 Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const StylizeOptions& options,
-                        const Progress& progress, const Vector& weights, const std::vector<Handle>& handles) {
+                        const Progress& progress, const Vector& weights, const std::vector<Handle>& handles,
+                        const Vec3& up) {
   // The live solver's energy has weight 1: all other weights are divided by this one's.
   LiveOptions live = live_options(options);
   live.samples = 6000;
@@ -91,9 +92,10 @@ Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const
   live.handle_weight = std::max(options.handles.handle_weight, 1e-3) / options.rigidity;
   live.surface.barrier = options.surface.barrier / options.rigidity;
   live.gauss_weight = options.gauss_weight / options.rigidity;
+  live.keep_stance = options.keep_stance / options.rigidity;
   live.interior = !handles.empty();  // a style alone acts everywhere alike: nothing is to be held apart
   LiveSolver solver(samples, handles, live, progress.part(0.0, 0.3));
-  solver.set_style(preferred, options.strength, options.sharpness, weights);
+  solver.set_style(preferred, options.strength, options.sharpness, weights, up);
   const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95));
   ObjectiveTerms terms;
   terms.rigidity = options.rigidity;

@@ -21,6 +21,7 @@ std::shared_ptr<const DeformationField> radial_start(const SurfaceSamples& sampl
 
 /// As stylize (solve/stylize.h) for options.field "radial".
 Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const StylizeOptions& options,
-                        const Progress& progress, const Vector& weights, const std::vector<Handle>& handles);
+                        const Progress& progress, const Vector& weights, const std::vector<Handle>& handles,
+                        const Vec3& up);
 
 }  // namespace arapfields

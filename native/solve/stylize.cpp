@@ -23,9 +23,9 @@ void check_samples(const SurfaceSamples& samples, const Vector& weights) {
 }
 
 /// The surface's lowest sample, asked to stay where it is.
-Handle hold_lowest(const SurfaceSamples& samples) {
+Handle hold_lowest(const SurfaceSamples& samples, const Vec3& up) {
   Index lowest = 0;
-  samples.points.col(2).minCoeff(&lowest);
+  (samples.points * up).minCoeff(&lowest);
   Handle handle;
   handle.kind = Handle::Kind::point;
   handle.rest_point = handle.target_point = samples.points.row(lowest);
@@ -42,24 +42,30 @@ void hold(NeuralField& field, const Handle& handle) {
 }  // namespace
 
 Solution stylize(const SurfaceSamples& samples, PointsIn preferred, const StylizeOptions& options,
-                 const Progress& progress, const Vector& weights, const std::vector<Handle>& handles) {
+                 const Progress& progress, const Vector& weights, const std::vector<Handle>& handles,
+                 const Vec3& up) {
   options.validate();
   check_samples(samples, weights);
   if (options.field == FieldKind::radial)
-    return stylize_radial(samples, preferred, options, progress, weights, handles);
+    return stylize_radial(samples, preferred, options, progress, weights, handles, up);
   const ThreadScope threads(options.machine.threads);
   ObjectiveTerms terms;
   terms.batch = options.training.batch;
   terms.rigidity = options.rigidity;
   terms.surface = options.surface;
   terms.preference = gauss_preference(preferred, options.sharpness);
-  terms.gauss = options.strength * options.gauss_weight;
-  terms.preference_weights = weights;
-  const Handle lowest = hold_lowest(samples);
+  terms.gauss = options.strength * options.gauss_weight * terms.preference->balance;
+  terms.preference_weights = terms.preference->reach(samples.normals);
+  if (weights.size() > 0) terms.preference_weights = terms.preference_weights.cwiseProduct(weights);
+  const Handle lowest = hold_lowest(samples, up);
   terms.handles = handles.empty() ? BoundHandles({lowest}, samples.points)
                                   : BoundHandles(in_cube(handles, samples.frame), samples.points);
   terms.pull = options.handles;
-  if (handles.empty()) terms.pull.handle_weight = 1.0;
+  if (handles.empty()) {
+    terms.pull.handle_weight = 1.0;
+    terms.keep_stance = options.keep_stance;
+    terms.stance = Stance::of(samples.points, up);
+  }
 
   auto field = std::make_shared<NeuralField>(MlpShape{options.network, 3},
                                              static_cast<std::uint64_t>(options.training.seed), false,

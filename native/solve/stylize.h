@@ -10,14 +10,16 @@
 namespace arapfields {
 
 /// Deforms a surface so that its normals turn to the preferred ones (k,3), as rigidly as possible:
-///   strength·gauss_weight·mean u(1 − g(ñ)) + rigidity·(stretch + bending·bend) + handles,
+///   strength·gauss_weight·mean u(1 − g(ñ)) + rigidity·(stretch + bending·bend) + keep_stance·stance +
+///   handles,
 /// ñ the unit normals of the deformed surface. (The paper's text has the sign of the first term reversed and
 /// leaves the normals without unit length, which a collapsing surface would win.) Without handles the lowest
-/// sample is held in place. `weights` (one u ≥ 0 a sample, or empty) blend the effect. Strength 0 is the
-/// identity. Throws InvalidInput for bad options, samples without normals, weights or handles that do not
-/// fit; SolveDiverged; Cancelled.
+/// sample, against the direction `up`, is held in place; with handles, there is no stance. `weights` (one u ≥
+/// 0 a sample, or empty) blend the effect. Strength 0 is the identity. Throws InvalidInput for bad options,
+/// samples without normals, weights or handles that do not fit; SolveDiverged; Cancelled.
 ARAPFIELDS_EXPORT Solution stylize(const SurfaceSamples& samples, PointsIn preferred,
                                    const StylizeOptions& options, const Progress& progress = {},
-                                   const Vector& weights = {}, const std::vector<Handle>& handles = {});
+                                   const Vector& weights = {}, const std::vector<Handle>& handles = {},
+                                   const Vec3& up = Vec3::UnitZ());
 
 }  // namespace arapfields

@@ -136,6 +136,11 @@ def _stylize(added):
     parser.add_argument(
         "--style-turn", nargs=2, metavar=("AXIS", "DEGREES"), help="turns the style's normals"
     )
+    parser.add_argument(
+        "--up",
+        metavar="X,Y,Z",
+        help="what is up in the file (z without it): the style's axis and the figure's stance",
+    )
     add_option_flags(parser, "stylize", "stylization")
     return parser
 

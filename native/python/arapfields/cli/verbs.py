@@ -11,7 +11,7 @@ import arapfields as af
 from .. import grids
 from .._files import existing_file, json_text
 from . import files
-from .handles import build_handles, read_handles, rotation, triple
+from .handles import build_handles, read_handles, rotation, triple, turn_upright
 from .options import given, given_options
 from .running import Outputs, with_progress
 
@@ -60,6 +60,13 @@ def stylize(args):
             f"--style: unknown style {args.style!r}; known are {', '.join(af.style_names())}"
         )
     normals = af.preferred_normals(args.style) if args.style else files.read_normals(args.normals)
+    up = None
+    if args.up:
+        try:
+            up = np.array(triple(args.up))
+            normals = normals @ turn_upright(up).T
+        except (ValueError, argparse.ArgumentTypeError) as error:
+            raise af.InvalidInput(f"--up: expected a direction as x,y,z ({error})") from error
     if args.style_turn:
         try:
             turn = {"axis": triple(args.style_turn[0]), "degrees": float(args.style_turn[1])}
@@ -68,7 +75,7 @@ def stylize(args):
             raise af.InvalidInput(f"--style-turn: expected AXIS as x,y,z and DEGREES ({error})") from error
 
     def solve(samples, handles, task):
-        return af.stylize(samples, normals, options, task, handles=handles)
+        return af.stylize(samples, normals, options, task, handles=handles, up=up)
 
     _solve(args, solve, options.seed, needs_handles=False)
 
