@@ -19,8 +19,8 @@ constexpr double cube_sharpness = 5.0, most_sharpness = 25.0;
 /// Directions closer than 15° are facets of one curved face.
 constexpr double one_face = 0.9659258262890683;
 
-/// Cosines of 60° and 85°: between them a style loses its hold.
-constexpr double reach_full = 0.5, reach_none = 0.08715574274765817;
+/// Cosines of 60° and 80°: between them a style loses its hold.
+constexpr double reach_full = 0.5, reach_none = 0.17364817766693036;
 
 Points unit_normals(PointsIn normals) {
   require(normals.rows() > 0, "normals", "none were given", "at least one is needed");
@@ -141,7 +141,7 @@ GaussPreference gauss_preference(PointsIn normals, double sharpness) {
   if (sharpness == 0.0) {
     result.sharpness = sharpness = style_sharpness(normals);
     result.automatic = true;
-    result.balance = cube_angle() / mean_angle(result.normals);
+    result.balance = std::max(1.0, cube_angle() / mean_angle(result.normals));
   }
   // exp(σ(n·m − 1)): the same system with every weight scaled by e^σ, whose diagonal is 1.
   const Eigen::MatrixXd kernel =

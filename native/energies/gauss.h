@@ -14,14 +14,15 @@ struct ARAPFIELDS_EXPORT GaussPreference {
   double sharpness = 5.0;  ///< σ
   /// Whether σ follows from the normals; the style's weight and reach then do, too.
   bool automatic = false;
-  /// Factor of the style's weight with which all styles turn a like share of what there is to turn: the mean
-  /// angle from a direction to the cube's nearest normal over that to this style's. 1 unless automatic.
+  /// Factor of the style's weight with which styles of many faces turn as much of what there is to turn as
+  /// the cube: the mean angle from a direction to the cube's nearest normal over that to this style's, where
+  /// that is above 1. 1 unless automatic.
   double balance = 1.0;
   double value(const Vec3& normal) const;
   /// (n) values at unit normals (n,3).
   Vector values(PointsIn directions) const;
   /// (n) how much surfaces with these rest normals (n,3) are to follow: 1 up to 60° from a preferred normal,
-  /// 0 from 85° on, so that no wall becomes a floor and no shape paper-thin. All 1 unless automatic.
+  /// 0 from 80° on, so that no wall becomes a floor and no shape paper-thin. All 1 unless automatic.
   Vector reach(PointsIn directions) const;
 };
 

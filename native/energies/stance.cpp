@@ -11,7 +11,7 @@ namespace arapfields {
 namespace {
 
 /// Share of the height within which a figure touches the ground, and what that weighs against all else.
-constexpr double ground_height = 0.05, ground_weight = 4.0;
+constexpr double ground_height = 0.05, ground_weight = 8.0;
 
 }  // namespace
 
