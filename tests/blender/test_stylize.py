@@ -61,7 +61,7 @@ def test_the_style_stands_along_the_chosen_axes(frame):
 
 @in_blender
 def test_imported_objects_are_styled_upright():
-    """A ball whose object is turned as an import turns it: a cone's flat side lies below, and it stands there."""
+    """A ball, turned as an import turns objects: the flat side of a cone lies below, and there it stands."""
     import math
 
     import bpy

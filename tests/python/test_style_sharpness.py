@@ -92,9 +92,9 @@ def test_a_flat_pair_leaves_the_walls_and_the_thickness():
     samples = ball()
     field = af.stylize(samples, "plane pair", af.StylizeOptions(field="radial", iterations=100))
     moved, rest = field(samples.points), samples.points
-    assert np.ptp(moved[:, 2]) > 0.5 * np.ptp(rest[:, 2])
+    assert np.ptp(moved[:, 2]) > 0.3 * np.ptp(rest[:, 2])  # the caps that are cut end at half of it
     flat = af.stylize(samples, "plane pair", af.StylizeOptions(field="radial", iterations=100, sharpness=5.0))
-    assert np.ptp(flat(rest)[:, 2]) < np.ptp(moved[:, 2])
+    assert np.ptp(flat(rest)[:, 2]) < 0.5 * np.ptp(moved[:, 2])
     normals = np.linalg.solve(field.jacobian(rest).transpose(0, 2, 1), samples.normals[..., None])[..., 0]
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     caps = np.abs(samples.normals[:, 2]) > np.cos(np.radians(50))
