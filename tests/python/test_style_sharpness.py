@@ -8,6 +8,7 @@ import pytest
 from tolerances import GAUSS_WEIGHTS
 
 import arapfields as af
+from arapfields.cli.handles import turn_upright
 
 LOWEST, HIGHEST = 5.0, 25.0
 FACES = {"octahedron": 8, "dodecahedron": 12, "icosahedron": 20, "hexagonal prism": 8, "square pyramid": 5}
@@ -99,3 +100,10 @@ def test_a_flat_pair_leaves_the_walls_and_the_thickness():
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     caps = np.abs(samples.normals[:, 2]) > np.cos(np.radians(50))
     assert (np.abs(normals[caps, 2]) > np.cos(np.radians(10))).mean() > 0.8
+
+
+@pytest.mark.parametrize("up", [[0, 0, 1], [0, 0, -2], [0, 3, 0], [0.3, -1, 0.2]])
+def test_the_command_line_turns_styles_upright(up):
+    turn = turn_upright(np.array(up, float))
+    assert np.allclose(turn @ [0, 0, 1], np.array(up) / np.linalg.norm(up))
+    assert np.allclose(turn.T @ turn, np.eye(3)) and np.linalg.det(turn) > 0
