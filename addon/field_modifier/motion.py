@@ -82,7 +82,9 @@ def choose_group(modifier, normals):
         return
     factor, mask = inputs.get(modifier, "Factor"), inputs.get(modifier, "Mask")
     masked, helper = inputs.get_attribute(modifier, "Mask"), inputs.get(modifier, "Offsets")
-    modifier.node_group = group
+    old, modifier.node_group = modifier.node_group, group
+    if old.users == 0:
+        bpy.data.node_groups.remove(old)
     for name, value in (("Factor", factor), ("Mask", mask), ("Offsets", helper)):
         inputs.put(modifier, name, value)
     inputs.put_attribute(modifier, "Mask", masked)

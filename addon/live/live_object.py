@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A live shape that is an object of its own: a surface, or the copy that the user wants as the result."""
 
+import contextlib
 import json
 
 import bpy
@@ -75,7 +76,8 @@ def forget(source):
     if settings.live_hidden:
         seen, rendered = json.loads(settings.live_hidden)
         source.hide_render = rendered
-        source.hide_set(seen)
+        with contextlib.suppress(RuntimeError):  # in a collection that the view layer leaves out
+            source.hide_set(seen)
         settings.live_hidden = ""
     item = None
     for index in reversed(range(len(settings.results))):

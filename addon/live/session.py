@@ -143,12 +143,12 @@ class Session(Solving):
         self.may_be_edited = False
         return mesh_arrays.fingerprint(source.data) != self.fingerprint
 
-    def current_request(self, context, source, where=empties.matrix_of):
+    def current_request(self, context, source, where=empties.matrix_of, seen=None):
         """(targets of the handles, (key, directions, strength, sharpness) of the style or None, points).
 
-        `where(object)` is the world matrix of one, as a render sees it for instance.
+        `where(object)` is the world matrix of one, and `seen` the source, as a render has them for instance.
         """
-        space, settings = space_of(where(source), source.name), settings_of(source).stylize
+        space, settings = space_of(where(source), source.name), settings_of(seen or source).stylize
         targets = []
         if self.handles:
             current = empties.solve_handles(source, space, where=where)

@@ -7,6 +7,7 @@ follow), and ends it with end(context, source), or end(context, source, keep=Tru
 """
 
 import contextlib
+import functools
 
 import bpy
 
@@ -162,10 +163,10 @@ def follow_frame(depsgraph):
                 continue
             if session.moves_by_itself:
                 session.read_points(bpy.context, source)
+            warn_of_hidden(source, session, depsgraph)
             seen = source.evaluated_get(depsgraph)
-            request = session.current_request(
-                bpy.context, seen, lambda item: rendered_matrix(item, depsgraph)
-            )
+            where = functools.partial(rendered_matrix, depsgraph=depsgraph)
+            request = session.current_request(bpy.context, source, where, seen)
             session.requested = request
             session.worker.request(request)
             session.worker.wait(WAIT, refined=True)
@@ -174,6 +175,19 @@ def follow_frame(depsgraph):
             continue
         except (UserError, ValueError, ReferenceError) as error:
             give_up(uid, session, error)
+
+
+def warn_of_hidden(source, session, depsgraph):
+    """Says once which handles a render does not see, and so cannot follow."""
+    there = {item.original.session_uid for item in depsgraph.ids}
+    hidden = [e.empty.name for e in empties.used(source) if e.empty.session_uid not in there]
+    if hidden and session.handles:
+        text = translated(
+            "{names} is hidden in renders, which therefore do not follow it", names=", ".join(hidden)
+        )
+        message = "WARNING", f"{source.name}: {text}"
+        if message not in jobs.messages():
+            jobs.add_message(*message)
 
 
 def rendered_matrix(item, depsgraph):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Result objects: made once for a source and kind, updated in place by later runs."""
 
+import contextlib
 import json
 
 import bpy
@@ -81,7 +82,7 @@ def show(context, source, kind, output, mesh, report, select=True):
 def hide(source):
     """Takes a source out of sight and out of renders, where its result lies in its place."""
     source.hide_render = True
-    if not source.hide_get():
+    with contextlib.suppress(RuntimeError):  # in a collection that the view layer leaves out
         source.hide_set(True)
 
 

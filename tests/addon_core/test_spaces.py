@@ -6,7 +6,7 @@ import pytest
 
 from addon.core.errors import UserError
 from addon.core.geometry.handles import box_matrix, require_held, solve_handle
-from addon.core.geometry.spaces import pose, rigid_motion, space_of, transform
+from addon.core.geometry.spaces import inverse, pose, rigid_motion, space_of, transform
 
 EXACT = 1e-9  # float64 arithmetic on numbers near one
 
@@ -33,6 +33,13 @@ CASES = {
     "tiny": ((1e-3, 2e-3, 1e-3), 0.0),
     "huge": ((1e3, 1e3, 3e3), 0.1),
 }
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_inverse_of_an_affine_matrix(name):
+    matrix = world_matrix(np.random.default_rng(3), *CASES[name])
+    assert np.abs(inverse(matrix) @ matrix - np.eye(4)).max() < EXACT
+    assert np.abs(matrix @ inverse(matrix) - np.eye(4)).max() < EXACT
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -8,7 +8,7 @@ import numpy as np
 import scenes
 import stage
 
-LONG = {**scenes.QUICK, "iterations": 200000}
+LONG = {**scenes.NEW, "iterations": 200000}
 
 
 def invoke(settings):
@@ -82,7 +82,7 @@ def escape(found, before):
 def result(found, folder):
     from addon.viewport import previews
 
-    invoke(scenes.QUICK)
+    invoke(scenes.NEW)
     yield from until_idle(120)
     modal = stage.positions("Bar_deformed")
     found["preview_gone"] = not previews.shown.mesh is not None
@@ -95,7 +95,7 @@ def result(found, folder):
     found["one_undo_step"] = there and gone and abs(bpy.data.objects["Moving"].location.z - 0.5) < 1e-6
     with stage.override():
         scenes.activate(bpy.data.objects["Bar"])
-        bpy.ops.arapfields.deform("EXEC_DEFAULT", **scenes.QUICK)
+        bpy.ops.arapfields.deform("EXEC_DEFAULT", **scenes.NEW)
     found["modal_against_blocking"] = float(np.abs(stage.positions("Bar_deformed") - modal).max())
 
 

@@ -63,14 +63,12 @@ def steps():
     yield from picture("handles", {"source", "handles", "deform"})
     with stage.override():
         bpy.ops.arapfields.deform(output="WARP")
-        suzanne.hide_set(True)
     yield from picture("deformed", {"source", "deform", "result", "status"})
     with stage.override():
-        suzanne.hide_set(False)
         scenes.activate(suzanne)
         bpy.ops.arapfields.stylize(style="CUBE")
         for item in bpy.data.objects:
-            item.hide_set(item.name != "Suzanne_stylized")
+            item.hide_set(item != suzanne)
     yield from picture("style", {"source", "stylize"})
 
 

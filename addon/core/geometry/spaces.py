@@ -27,11 +27,11 @@ class Space:
 
     def to_local(self, points):
         """(n, 3) solve → local."""
-        return transform(np.linalg.inv(self.local_to_solve), points)
+        return transform(inverse(self.local_to_solve), points)
 
     @property
     def world_to_solve(self):
-        return np.linalg.inv(self.solve_to_world)
+        return inverse(self.solve_to_world)
 
 
 def transform(matrix, points):
@@ -40,6 +40,25 @@ def transform(matrix, points):
     if np.array_equal(matrix, np.eye(4)):
         return points.copy()
     return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def inverse(matrix):
+    """The inverse of a 4×4 affine matrix.
+
+    By cofactors: NumPy's solver wakes its threads even for this, which costs milliseconds on a busy machine.
+    """
+    (a, b, c), (d, e, f), (g, h, i) = matrix[:3, :3].tolist()
+    cofactors = (
+        (e * i - f * h, c * h - b * i, b * f - c * e),
+        (f * g - d * i, a * i - c * g, c * d - a * f),
+        (d * h - e * g, b * g - a * h, a * e - b * d),
+    )
+    result = np.eye(4)
+    result[:3, :3] = np.array(cofactors) / sum(
+        x * row[0] for x, row in zip((a, b, c), cofactors, strict=True)
+    )
+    result[:3, 3] = -result[:3, :3] @ matrix[:3, 3]
+    return result
 
 
 def space_of(matrix_world, name="object"):
@@ -72,7 +91,7 @@ def pose(matrix):
 
 def rigid_motion(rest, target):
     """The proper rigid motion that takes the pose of one matrix to that of the other; scale is ignored."""
-    motion = pose(target) @ np.linalg.inv(pose(rest))
+    motion = pose(target) @ inverse(pose(rest))
     left, _, right = np.linalg.svd(motion[:3, :3])
     mirror = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
     motion[:3, :3] = left @ mirror @ right

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Run in any Blender, without the native library: the modifier with offsets of our own, and its inputs.
+
+blender -b --factory-startup --python tests/blender/modifier_alone.py     or with PyPI's bpy: python ...
+"""
+
+import sys
+import tempfile
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests/blender")]
+
+import scenes  # noqa: E402
+
+from addon.blender import modifier_stack  # noqa: E402
+from addon.field_modifier import inputs, motion  # noqa: E402
+
+EXACT = 1e-6  # single precision of positions of size one
+
+
+def points(item):
+    mesh = item.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    flat = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("co", flat)
+    return flat.reshape(-1, 3)
+
+
+def offsets(count):
+    return np.random.default_rng(0).normal(size=(count, 3)).astype(np.float32)
+
+
+def check_inputs():
+    bar = scenes.bar()
+    rest, given = points(bar), offsets(len(bar.data.vertices))
+    modifier = motion.bind(bpy.context, bar)
+    motion.write(bar, motion.Motion(given))
+    assert np.abs(points(bar) - (rest + given)).max() < EXACT
+    inputs.put(modifier, "Factor", 0.5)
+    assert np.abs(points(bar) - (rest + given / 2)).max() < EXACT and inputs.get(modifier, "Factor") == 0.5
+    group = bar.vertex_groups.new(name="Some")
+    group.add(list(range(100)), 1.0, "REPLACE")
+    inputs.put_attribute(modifier, "Mask", "Some")
+    assert inputs.get_attribute(modifier, "Mask") == "Some"
+    masked = points(bar)
+    assert masked[100:].tobytes() == rest[100:].tobytes()
+    assert np.abs(masked[:100] - (rest + given / 2)[:100]).max() < EXACT
+    if bpy.app.version >= (4, 5, 0):
+        motion.choose_group(modifier, "POINT")
+    assert inputs.get(modifier, "Factor") == 0.5 and inputs.get_attribute(modifier, "Mask") == "Some"
+    inputs.put_attribute(modifier, "Mask", "")
+    assert np.abs(points(bar) - (rest + given / 2)).max() < EXACT
+    modifier.show_viewport = False
+    assert points(bar).tobytes() == rest.tobytes()
+    motion.remove(bar)
+    assert not bar.modifiers and not bpy.data.node_groups and points(bar).tobytes() == rest.tobytes()
+
+
+def check_helper():
+    """After Mirror, through a file; the copied object keeps it, and a motion of its own leaves the first."""
+    bar = scenes.bar("Mirrored")
+    mirror = bar.modifiers.new("Mirror", "MIRROR")
+    mirror.use_axis, mirror.use_mirror_merge = (False, False, True), False
+    bpy.context.view_layer.update()
+    rest = points(bar)
+    given = offsets(len(rest))
+    motion.bind(bpy.context, bar)
+    motion.write(bar, motion.Motion(given))
+    assert np.abs(points(bar) - (rest + given)).max() < EXACT
+    copied = bar.copy()
+    copied.name = "Copied"
+    bpy.context.collection.objects.link(copied)
+    motion.bind(bpy.context, copied)
+    motion.write(copied, motion.Motion(-given))
+    path = tempfile.mktemp(suffix=".blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    for name, sign in (("Mirrored", 1), ("Copied", -1)):
+        assert np.abs(points(bpy.data.objects[name]) - (rest + sign * given)).max() < EXACT, name
+
+
+def check_free_normals():
+    bar = scenes.bar("Normals")
+    count = len(bar.data.vertices)
+    attribute = bar.data.attributes.new("custom_normal", "FLOAT_VECTOR", "POINT")
+    given = offsets(count)
+    given /= np.linalg.norm(given, axis=1, keepdims=True)
+    attribute.data.foreach_set("vector", given.ravel())
+    motion.bind(bpy.context, bar)
+    turns = np.tile(np.array([0, 0, np.pi / 2], np.float32), (count, 1))
+    motion.write(bar, motion.Motion(np.zeros((count, 3), np.float32), turns))
+    mesh = bar.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    flat = np.empty(3 * count, np.float32)
+    mesh.attributes["custom_normal"].data.foreach_get("vector", flat)
+    expected = np.stack([-given[:, 1], given[:, 0], given[:, 2]], axis=1)
+    assert np.abs(flat.reshape(-1, 3) - expected).max() < EXACT
+
+
+bpy.ops.wm.read_factory_settings(use_empty=True)
+check_inputs()
+check_helper()
+if bpy.app.version >= (4, 5, 0):
+    check_free_normals()
+assert len(bpy.data.scenes) == 1 and modifier_stack.find(bpy.data.objects["Mirrored"]) is not None
+print("modifier works in", bpy.app.version_string)

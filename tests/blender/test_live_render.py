@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What renders show of a source that is live, and of a file that is opened without the extension."""
+
+import pytest
+from inside import in_blender
+
+
+def camera(size=48):
+    """A small picture by Cycles, which needs no graphics card, from the front."""
+    import bpy
+
+    scene = bpy.context.scene
+    lens = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    lens.data.type, lens.data.ortho_scale = "ORTHO", 3.2
+    lens.location, lens.rotation_euler = (0, -5, 0), (1.5707963, 0, 0)
+    scene.collection.objects.link(lens)
+    scene.camera, scene.render.engine = lens, "CYCLES"
+    scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.device = 1, False, "CPU"
+    scene.render.resolution_x = scene.render.resolution_y = size
+    scene.world = bpy.data.worlds.new("World")
+    scene.world.use_nodes = True
+    scene.world.node_tree.nodes["Background"].inputs[0].default_value = (0, 0, 0, 1)
+    scene.render.image_settings.file_format, scene.render.film_transparent = "PNG", True
+    return scene
+
+
+def picture(path):
+    """(height, width, 4) pixels of a file."""
+    import bpy
+    import numpy as np
+
+    image = bpy.data.images.load(str(path))
+    pixels = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(pixels)
+    width, height = image.size
+    bpy.data.images.remove(image)
+    return pixels.reshape(height, width, 4)
+
+
+def counted(item):
+    """How many visible meshes of the evaluated scene are this source's or its results'."""
+    import bpy
+
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    shown = [i.object.original for i in depsgraph.object_instances if i.object.type == "MESH"]
+    return sum(one.name.startswith(item.name) and not one.hide_render for one in shown)
+
+
+@pytest.mark.parametrize("target", ["MODIFIER", "NEW"])
+@in_blender
+def test_a_render_of_an_animation_follows_the_handles_while_live(target):
+    import tempfile
+    from pathlib import Path
+
+    import bpy
+    import numpy as np
+    import scenes
+    from test_bake import animated
+    from test_live import step
+    from test_live_render import camera, counted, picture
+
+    from addon.live import sessions
+
+    bar = animated()
+    bar.arapfields.target = target
+    scene, folder = camera(), Path(tempfile.mkdtemp())
+    scene.frame_set(1)
+    bpy.ops.arapfields.live()
+    assert counted(bar) == 1
+    scene.frame_start, scene.frame_end, scene.render.filepath = 1, 5, str(folder / "frame")
+    bpy.ops.render.render(animation=True)
+    assert sessions.is_live(bar) and not sessions.live.is_rendering
+    shown = bar if target == "MODIFIER" else bpy.data.objects["Bar_live"]
+    heights = []
+    for frame in range(1, 6):
+        seen = picture(folder / f"frame{frame:04}.png")[:, :, 3] > 0.5
+        scene.frame_set(frame)
+        step(refined=True)
+        points = scenes.world_points(shown)
+        right = points[points[:, 0] > 0.7]
+        rows = np.flatnonzero(seen[:, int((0.85 + 1.6) / 3.2 * 48)]) / 48 * 3.2 - 1.6
+        assert abs(rows.mean() - right[:, 2].mean()) < 3.2 / 48 * 1.5, frame  # pixels
+        heights.append(rows.mean())
+    assert np.all(np.diff(heights) > 0.03), heights
+    assert counted(bar) == 1
+
+
+@in_blender
+def test_a_handle_hidden_in_renders_is_said():
+    import tempfile
+
+    import bpy
+    from test_bake import animated
+    from test_live_render import camera
+
+    from addon.core.runtime import jobs
+
+    jobs.board.messages.clear()
+    animated()
+    scene = camera(16)
+    bpy.data.objects["Moving"].hide_render = True
+    bpy.ops.arapfields.live()
+    scene.frame_start, scene.frame_end, scene.render.filepath = 1, 2, tempfile.mkdtemp() + "/frame"
+    bpy.ops.render.render(animation=True)
+    said = [text for _, text in jobs.messages()]
+    assert said == ["Bar: Moving is hidden in renders, which therefore do not follow it"]
+
+
+@in_blender
+def test_a_file_looks_the_same_without_the_extension():
+    """Opened by a Blender that never heard of it: the same points bit for bit, the same picture."""
+    import subprocess
+    import sys
+    import tempfile
+    from pathlib import Path
+
+    import bpy
+    import numpy as np
+    from stacks import build, local_points
+    from test_live_render import camera, picture
+
+    for stack in (["FIELD", "SUBSURF"], ["MIRROR", "FIELD"]):
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        build(stack)
+        scene, folder = camera(), Path(tempfile.mkdtemp())
+        bpy.data.objects["Bar"].modifiers["ARAP Fields"].show_viewport = True
+        scene.render.filepath = str(folder / "with.png")
+        bpy.ops.render.render(write_still=True)
+        np.save(folder / "points.npy", local_points(bpy.data.objects["Bar"]))
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / "file.blend"))
+        script = f"""
+import bpy, numpy as np
+bpy.ops.wm.read_factory_settings(use_empty=True)
+bpy.ops.wm.open_mainfile(filepath={str(folder / "file.blend")!r})
+assert not hasattr(bpy.types.Object, "arapfields")
+mesh = bpy.data.objects["Bar"].evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+flat = np.empty(3 * len(mesh.vertices), np.float32)
+mesh.vertices.foreach_get("co", flat)
+assert flat.tobytes() == np.load({str(folder / "points.npy")!r}).tobytes(), "points"
+bpy.context.scene.render.filepath = {str(folder / "without.png")!r}
+bpy.ops.render.render(write_still=True)
+import os
+os._exit(7)
+"""
+        done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+        assert done.returncode == 7, done.stderr
+        with_it, without = (picture(folder / f"{name}.png") for name in ("with", "without"))
+        assert (with_it[:, :, 3] > 0.5).sum() > 100 and np.array_equal(with_it, without)

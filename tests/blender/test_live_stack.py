@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live mode among other modifiers: what moves before the field, and modes in which it pauses."""
+
+import pytest
+from inside import in_blender
+
+BY_HAND = 1e-5  # single precision of positions of size one
+
+
+@in_blender
+def test_the_field_is_evaluated_where_the_modifiers_before_have_the_points():
+    """The armature before it moves while live: the field stays, and moves the points where they are now."""
+    import bpy
+    import numpy as np
+    import scenes
+    from stacks import add_modifier, local_points
+    from test_live import step
+    from test_live_stack import BY_HAND
+
+    from addon.blender import mesh_arrays, modifier_stack
+    from addon.live import sessions
+
+    bar, _, moving = scenes.bar_with_handles()
+    add_modifier(bar, "ARMATURE")
+    assert bpy.ops.arapfields.live() == {"FINISHED"}
+    moving.location.z += 0.3
+    step(refined=True)
+    session = sessions.live[bar.session_uid]
+    bone = bar.modifiers["Armature"].object.pose.bones["Second"]
+    for angle in (0.3, 0.8):
+        bone.rotation_euler.z = angle
+        step(refined=True)
+        with modifier_stack.evaluated_mesh(bpy.context, bar, in_place=True) as mesh:
+            points = mesh_arrays.positions(mesh)
+        space, field = session.surface.space, session.solver.field
+        expected = space.to_local(field(space.to_solve(points)))
+        assert np.abs(local_points(bar) - expected).max() < BY_HAND
+        assert np.abs(expected - points).max() > 0.2
+    assert sessions.live[bar.session_uid] is session and len(bpy.data.scenes) == 1
+    reads = []
+    session.read_points = lambda *given: reads.append(given)
+    for _ in range(5):
+        step()
+    assert not reads  # what live mode does itself moves nothing before it
+
+
+@pytest.mark.parametrize("mode", ["EDIT", "SCULPT"])
+@in_blender
+def test_live_pauses_in_modes_that_change_the_mesh(mode):
+    import bpy
+    import numpy as np
+    import scenes
+    from test_live import step
+
+    from addon.field_modifier import motion
+    from addon.live import sessions
+
+    bar, _, moving = scenes.bar_with_handles()
+    bpy.ops.arapfields.live()
+    moving.location.z += 0.2
+    step()
+    held = motion.snapshot(bar).offsets
+    scenes.activate(bar)
+    bpy.ops.object.mode_set(mode=mode)
+    moving.location.z += 0.2
+    step()
+    if mode == "SCULPT":
+        assert np.array_equal(motion.snapshot(bar).offsets, held)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for _ in range(2):
+        step()
+    assert sessions.is_live(bar)
+    rest = np.array([vertex.co for vertex in bar.data.vertices])
+    shift = scenes.world_points(bar) - rest
+    assert np.abs(shift[rest[:, 0] > 0.8] - [0, 0, 0.4]).max() < 0.1
+    scenes.activate(bar)
+    bpy.ops.arapfields.live()
+    assert not bar.modifiers and np.array_equal(scenes.world_points(bar), rest)
+
+
+@in_blender
+def test_a_modifier_added_before_binds_the_handles_anew():
+    import bpy
+    import numpy as np
+    import scenes
+    from stacks import add_modifier, local_points
+    from test_live import step
+
+    from addon.live import sessions
+
+    bar, _, moving = scenes.bar_with_handles()
+    bpy.ops.arapfields.live()
+    moving.location.z += 0.3
+    step()
+    add_modifier(bar, "MIRROR")
+    scenes.activate(bar)
+    bpy.ops.object.modifier_move_to_index(modifier="Mirror", index=0)
+    for _ in range(2):
+        step()
+    assert sessions.is_live(bar) and len(bpy.data.objects["Bar_offsets"].data.vertices) == len(
+        local_points(bar)
+    )
+    assert local_points(bar)[:, 2].max() > 0.4
+    bpy.ops.arapfields.live()
+    rest = np.array([vertex.co for vertex in bar.data.vertices])
+    assert [m.name for m in bar.modifiers] == ["Mirror"] and "Bar_offsets" not in bpy.data.objects
+    assert np.array_equal(local_points(bar)[: len(rest)], rest.astype(np.float32))
+
+
+@in_blender
+def test_what_was_there_before_live_mode_comes_back_bit_for_bit():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_live import step
+
+    from addon.field_modifier import inputs
+
+    bar, _, moving = scenes.bar_with_handles()
+    moving.location.z += 0.3
+    bpy.ops.arapfields.deform(**scenes.QUICK)
+    inputs.put(bar.modifiers[0], "Factor", 0.7)
+    before, points = scenes.everything(bar), scenes.world_points(bar)
+    bpy.ops.arapfields.live()
+    moving.location.x += 0.3
+    step()
+    assert not np.array_equal(scenes.world_points(bar), points)
+    scenes.activate(bar)
+    bpy.ops.arapfields.live()
+    assert scenes.everything(bar) == before and np.array_equal(scenes.world_points(bar), points)
+    assert inputs.get(bar.modifiers[0], "Factor") > 0.69
+
+
+@in_blender
+def test_undone_steps_end_or_refresh_live_mode():
+    """As after an undone step: a source that is not live in it, and one whose offsets are older."""
+    import bpy
+    import numpy as np
+    import scenes
+    from test_live import step
+
+    from addon.field_modifier import motion
+    from addon.live import sessions
+
+    bar, _, moving = scenes.bar_with_handles()
+    bpy.ops.arapfields.live()
+    moving.location.z += 0.3
+    step()
+    shown = scenes.world_points(bar)
+    motion.write(bar, motion.Motion(np.zeros((len(bar.data.vertices), 3), np.float32)))
+    sessions.recover()
+    step()
+    assert sessions.is_live(bar) and np.abs(scenes.world_points(bar) - shown).max() < 0.05
+    bar.arapfields.live_kind = ""
+    sessions.recover()
+    assert not sessions.live
