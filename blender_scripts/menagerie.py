@@ -5,7 +5,7 @@ import functools
 
 import numpy as np
 from creatures import dinosaur, dog, lizard, octopus
-from shapes import Cone, Ellipsoid, Ring, RoundBox, Shape, build, tube
+from shapes import Cone, Ellipsoid, Ring, RoundBox, Shape, build, mirrored, tube
 
 
 @functools.cache
@@ -60,6 +60,25 @@ class Cup(RoundBox):
 
 
 @functools.cache
+def chapel():
+    """A nave with buttresses and an apse, a tower with a spire, a dome: faces and curves of a building."""
+    wall, roof, dark = (0.70, 0.60, 0.44), (0.42, 0.12, 0.06), (0.05, 0.04, 0.05)
+    nave = [
+        RoundBox((0, 0.1, 0.36), (0.36, 0.62, 0.36), 0.03),
+        Cone((0, -0.45, 0.70), (0, 0.65, 0.70), 0.29, 0.29, roof),
+        Cone((0, 0.72, 0.1), (0, 0.72, 0.5), 0.27, 0.27),
+        Ellipsoid((0, 0.25, 0.95), (0.25, 0.25, 0.36), roof),
+    ]
+    tower = [
+        RoundBox((0, -0.68, 0.72), (0.21, 0.21, 0.72), 0.03),
+        Cone((0, -0.68, 1.44), (0, -0.68, 2.05), 0.20, 0.03, roof),
+    ]
+    side = [RoundBox((0.39, y, 0.24), (0.08, 0.06, 0.24), 0.02) for y in (-0.25, 0.1, 0.45)]
+    doors = [Ellipsoid((0, -0.90, 0.1), (0.09, 0.06, 0.24), dark)]
+    return build([*nave, *tower, *mirrored(side)], 0.03, paint=doors, base=wall, cells=110)
+
+
+@functools.cache
 def bar(length=1.6, width=0.22):
     """A slender box along x with rounded edges."""
     return build(
@@ -79,7 +98,7 @@ def ring():
     return build([Ring((0, 0, 0.8), 0.6, 0.2)], base=(0.10, 0.30, 0.55), cells=64)
 
 
-SHAPES = {f.__name__: f for f in (hand, lizard, dinosaur, dog, octopus, mug, bar, slender_bar, ring)}
+SHAPES = {f.__name__: f for f in (hand, lizard, dinosaur, dog, octopus, mug, chapel, bar, slender_bar, ring)}
 
 
 def load(name) -> Shape:

@@ -144,7 +144,7 @@ class Session(Solving):
         return mesh_arrays.fingerprint(source.data) != self.fingerprint
 
     def current_request(self, context, source, where=empties.matrix_of, seen=None):
-        """(targets of the handles, (key, directions, strength, sharpness) of the style or None, points).
+        """(targets of the handles, (key, directions, strength, sharpness, up) of the style or None, points).
 
         `where(object)` is the world matrix of one, and `seen` the source, as a render has them for instance.
         """
@@ -161,7 +161,8 @@ class Session(Solving):
             from_single_precision(settings.sharpness),
         )
         directions = style.directions(native.library())
-        return targets, ((*style.key(), strength, sharpness), directions, strength, sharpness), self.placed
+        key = (*style.key(), strength, sharpness)
+        return targets, (key, directions, strength, sharpness, style.up), self.placed
 
     def show(self):
         """Shows the newest shape; True when there was one."""

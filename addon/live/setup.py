@@ -15,8 +15,9 @@ def energy_weights(settings, kind):
     weights = {"bending": group.bending, "barrier": group.barrier}
     weights["handle_weight"] = settings.deform.handle_weight
     if kind == "STYLIZE":
-        weights["rigidity"] = group.rigidity
-    return {name: from_single_precision(value) for name, value in weights.items()}
+        weights["rigidity"], weights["keep_stance"] = group.rigidity, group.keep_stance
+    weights = {name: from_single_precision(value) for name, value in weights.items()}
+    return weights | {"bending_unit": group.bending_unit.lower()}
 
 
 def uses_handles(settings, kind):

@@ -45,7 +45,7 @@ class Solving:
             # The live energy has stretch with weight 1: all others are relative to it.
             rigidity = max(options.pop("rigidity"), LEAST_RIGIDITY)
             options["gauss_weight"] = af.LiveOptions().gauss_weight
-            for name in ("bending", "barrier", "gauss_weight", "handle_weight"):
+            for name in ("bending", "barrier", "gauss_weight", "keep_stance", "handle_weight"):
                 options[name] /= rigidity
             if self.weights is not None:
                 self.weights = vertex_groups.at_points(surface.vertices, self.weights, self.samples.points)
@@ -74,8 +74,8 @@ class Solving:
         targets, style, points = request
         self.follow_points(points)
         if style is not None and style[0] != self.style_set:
-            directions, strength, sharpness = style[1:]
-            self.solver.set_style(directions, strength, sharpness=sharpness, weights=self.weights)
+            directions, strength, sharpness, up = style[1:]
+            self.solver.set_style(directions, strength, sharpness=sharpness, weights=self.weights, up=up)
             self.style_set = style[0]
         self.solver.solve(targets if self.handles else None, **further)
 

@@ -14,6 +14,7 @@ STYLE_ITEMS = tuple(
     for name, label in STYLES
 ) + tuple((key, label, tip) for key, (label, tip) in CUSTOM.items())
 FRAMES = (
+    ("UPRIGHT", "World Upright", "The style stands upright in the world and heads where the object does"),
     ("OBJECT", "Object", "The style stands along the object's own axes"),
     ("WORLD", "World", "The style stands along the world's axes"),
     ("EMPTY", "Empty", "The style stands along the axes of a chosen object"),

@@ -8,7 +8,7 @@ import numpy as np
 from ..blender import modifier_stack
 from ..blender.property_definitions import effective_value
 from ..core.errors import UserError
-from ..core.geometry.spaces import pose
+from ..core.geometry.spaces import pose, upright
 from ..core.settings.styles import CUSTOM, style_name
 from ..handles import empties
 from ..handles.empties import matrix_of
@@ -18,10 +18,11 @@ MOST_NORMALS = 64  # of a custom style; more are no preference
 
 @dataclass(frozen=True)
 class Style:
-    """A native style's name or (k, 3) normals, and the (3, 3) turn of them into solve space."""
+    """A native style's name or (k, 3) normals, the (3, 3) turn of them into solve space, what is up there."""
 
     normals: str | np.ndarray
     turn: np.ndarray
+    up: np.ndarray
 
     def directions(self, af):
         """(k, 3) preferred normals in solve space."""
@@ -31,7 +32,7 @@ class Style:
     def key(self):
         """Equal for equal styles."""
         normals = self.normals if isinstance(self.normals, str) else self.normals.tobytes()
-        return normals, self.turn.tobytes()
+        return normals, self.turn.tobytes(), self.up.tobytes()
 
 
 def requested_style(settings, space, operator=None, where=matrix_of):
@@ -42,18 +43,23 @@ def requested_style(settings, space, operator=None, where=matrix_of):
 
     which = setting("style")
     to_solve = pose(space.world_to_solve)[:3, :3]
+    up = to_solve[:, 2]
     if which in CUSTOM:
         item = settings.style_object
         if item is None:
             raise UserError("choose the object that gives the style its normals")
-        return custom(which, item, to_solve, where)
+        normals, turn = custom(which, item, where)
+        return Style(normals, to_solve @ turn, up)
     if setting("frame") == "OBJECT":
-        return Style(style_name(which), np.eye(3))
-    return Style(style_name(which), to_solve @ axes(setting("frame"), settings.frame_object, where))
+        return Style(style_name(which), np.eye(3), up)
+    turn = axes(setting("frame"), space, settings.frame_object, where)
+    return Style(style_name(which), to_solve @ turn, up)
 
 
-def axes(which, item, where=matrix_of):
+def axes(which, space, item, where=matrix_of):
     """(3, 3) axes of the style in the world, as columns."""
+    if which == "UPRIGHT":
+        return upright(pose(space.solve_to_world)[:3, :3])
     if which == "WORLD":
         return np.eye(3)
     if item is None:
@@ -61,9 +67,10 @@ def axes(which, item, where=matrix_of):
     return pose(where(item))[:3, :3]
 
 
-def custom(which, item, to_solve, where=matrix_of):
+def custom(which, item, where=matrix_of):
+    """(k, 3) normals that an object gives, and the (3, 3) turn of them into the world."""
     if which == "AXES":
-        return Style(np.concatenate([np.eye(3), -np.eye(3)]), to_solve @ pose(where(item))[:3, :3])
+        return np.concatenate([np.eye(3), -np.eye(3)]), pose(where(item))[:3, :3]
     if item.type != "MESH" or not len(item.data.polygons):
         raise UserError("{name} has no faces that could give the style its normals", name=item.name)
     normals = np.empty(3 * len(item.data.polygons), dtype=np.float32)
@@ -79,7 +86,7 @@ def custom(which, item, to_solve, where=matrix_of):
             count=len(turned),
             most=MOST_NORMALS,
         )
-    return Style(turned / np.linalg.norm(turned, axis=1, keepdims=True), to_solve)
+    return turned / np.linalg.norm(turned, axis=1, keepdims=True), np.eye(3)
 
 
 def group_names(source, settings):

@@ -28,7 +28,9 @@ Array = npt.NDArray[np.float64]
 Handles = Sequence[af.Handle]
 
 WEIGHTS = [0.0, 1e-3, 1e-2, 1e-1]
-THIN_PARTS: dict[str, Any] = dict(frequency=4.0, octaves=6, bending=1e-3, learning_rate=0.02, iterations=600)
+THIN_PARTS: dict[str, Any] = dict(
+    frequency=4.0, octaves=6, bending=0.1, bending_unit="cube", learning_rate=0.02, iterations=600
+)
 
 
 def solved(samples: af.SurfaceSamples, handles: Handles, **options: Any) -> af.DeformationField:
@@ -37,7 +39,7 @@ def solved(samples: af.SurfaceSamples, handles: Handles, **options: Any) -> af.D
 
 def trade(samples: af.SurfaceSamples, handles: Handles) -> Array:
     """(4, 2): mean stretch and mean bend for each weight of the bend."""
-    fields = [solved(samples, handles, bending=weight) for weight in WEIGHTS]
+    fields = [solved(samples, handles, bending=100 * weight, bending_unit="cube") for weight in WEIGHTS]
     return np.array([af.arap_energy(field, samples.points) for field in fields])
 
 

@@ -9,6 +9,7 @@
 #include "energies/gauss.h"
 #include "energies/handles.h"
 #include "energies/rotation.h"
+#include "energies/stance.h"
 #include "energies/styles.h"
 
 namespace arapfields::python {
@@ -88,7 +89,15 @@ void bind_styles(py::module_& module) {
       "normals"_a, "preferred"_a, py::kw_only(), "sharpness"_a = StylizeOptions().sharpness,
       "How much each unit normal (n, 3) agrees with the preferred normals (k, 3): (n,) values\n"
       "g = sum_k w_k exp(sharpness n·n_k) with g(n_k) = 1, small far from all of them. Coinciding preferred\n"
-      "normals raise InvalidInput that names the pair. After Kohlbrenner et al., Gauss Stylization (2021).");
+      "normals raise InvalidInput that names the pair. sharpness 0: style_sharpness(preferred). After\n"
+      "Kohlbrenner et al., Gauss Stylization (2021).");
+  module.def(
+      "style_sharpness",
+      [](const ArrayArgument& preferred) { return style_sharpness(as_points(preferred, "preferred")); },
+      "preferred"_a,
+      "The sharpness at which neighbours of the preferred normals (k, 3) overlap midway as the cube's do at "
+      "5;\n"
+      "from 5 to 25. Normals within 15 degrees of each other are one curved face.");
 }
 
 template <class Scalar>
@@ -99,10 +108,22 @@ void bind_testing(py::module_& module) {
         JetArray<Scalar> cotangents = zeros_like(jets);
         const auto energy = aten ? &probe_arap<Scalar> : &arap_energy<Scalar>;
         const ArapValue value =
-            energy(jet_view<const Scalar>(jets), bending, weight, jet_view<Scalar>(cotangents));
+            energy(jet_view<const Scalar>(jets), bending, weight, jet_view<Scalar>(cotangents), {});
         return py::make_tuple(value.stretch, value.bend, cotangents);
       },
       "jets"_a.noconvert(), "bending"_a, "weight"_a = 1.0, "aten"_a = false);
+  module.def(
+      "arap_energy_by_points",
+      [](JetArray<Scalar> jets, double bending, const Eigen::VectorX<Scalar>& weights,
+         const Eigen::VectorX<Scalar>& bending_factors, bool aten) {
+        JetArray<Scalar> cotangents = zeros_like(jets);
+        const auto energy = aten ? &probe_arap<Scalar> : &arap_energy<Scalar>;
+        const ArapValue value =
+            energy(jet_view<const Scalar>(jets), bending, 1.0, jet_view<Scalar>(cotangents),
+                   {weights.data(), bending_factors.data()});
+        return py::make_tuple(value.energy, cotangents);
+      },
+      "jets"_a.noconvert(), "bending"_a, "weights"_a, "bending_factors"_a, "aten"_a = false);
   module.def(
       "closest_rotations",
       [](JetArray<Scalar> jacobians) {
@@ -134,6 +155,17 @@ void bind_testing(py::module_& module) {
         return py::make_tuple(value, cotangents);
       },
       "jets"_a.noconvert(), "handles"_a, "weight"_a = 1.0, "aten"_a = false);
+  module.def(
+      "stance_energy",
+      [](JetArray<Scalar> jets, const PointsOf<Scalar>& rest, const Stance& stance, double weight,
+         bool aten) {
+        JetArray<Scalar> cotangents = zeros_like(jets);
+        const auto energy = aten ? &probe_stance<Scalar> : &stance_energy<Scalar>;
+        const double value =
+            energy(jet_view<const Scalar>(jets), rest, stance, weight, jet_view<Scalar>(cotangents));
+        return py::make_tuple(value, cotangents);
+      },
+      "jets"_a.noconvert(), "rest"_a, "stance"_a, "weight"_a = 1.0, "aten"_a = false);
   module.def(
       "fold_barrier",
       [](JetArray<Scalar> jets, double threshold, double weight, bool aten) {
@@ -170,6 +202,12 @@ void bind_energies(py::module_& module) {
         const HandleError error = handle_error(self, values);
         return py::make_tuple(error.mean, error.max);
       });
+  py::class_<Stance>(testing, "Stance")
+      .def(py::init(
+          [](const Points& points, const py::object& up) { return Stance::of(points, as_vec3(up, "up")); }))
+      .def_readonly("up", &Stance::up)
+      .def_readonly("scale", &Stance::scale)
+      .def_readonly("ground", &Stance::ground);
   testing.def("gauss_weights", [](const Points& normals, double sharpness) {
     const GaussPreference preference = gauss_preference(normals, sharpness);
     return py::make_tuple(preference.normals, preference.weights);

@@ -11,7 +11,10 @@ namespace {
 
 py::dict fields(const ExtractionReport& done) {
   return py::dict("evaluations"_a = done.evaluations, "dense_evaluations"_a = done.dense_evaluations,
-                  "open"_a = done.open, "seconds"_a = done.seconds);
+                  "open"_a = done.open, "seconds"_a = done.seconds, "pieces"_a = done.pieces,
+                  "thin_cells"_a = done.thin_cells, "refinement"_a = done.refinement,
+                  "holding_resolution"_a = done.holding_resolution,
+                  "notes"_a = py::tuple(py::cast(done.notes)));
 }
 
 py::object extraction(const TriangleMesh& mesh, const char* kind, const py::dict& fields) {
@@ -19,22 +22,24 @@ py::object extraction(const TriangleMesh& mesh, const char* kind, const py::dict
       .attr("Extraction")(mesh.vertices, mesh.triangles, make_report(kind, fields));
 }
 
-ExtractionResult extract(const ImplicitFunction& sdf, int resolution, int threads, Task* task) {
+ExtractionResult extract(const ImplicitFunction& sdf, int resolution, bool refine_thin, int threads,
+                         Task* task) {
   ExtractionReport done;
   const TriangleMesh mesh = run_long(task, [&](const Progress& progress) {
     const ThreadScope scope(threads);
-    return extract_surface(sdf, resolution, progress, &done);
+    return extract_surface(sdf, {.resolution = resolution, .refine_thin = refine_thin}, progress, &done);
   });
   return extraction(mesh, "ExtractionReport", fields(done));
 }
 
 DeformedExtractionResult extract_moved(const ImplicitFunction& sdf, const DeformationField& field,
-                                       int resolution, const DeformationField* inverse, int threads,
-                                       Task* task) {
+                                       int resolution, bool refine_thin, const DeformationField* inverse,
+                                       int threads, Task* task) {
   DeformedReport done;
   const TriangleMesh mesh = run_long(task, [&](const Progress& progress) {
     const ThreadScope scope(threads);
-    return extract_deformed(sdf, field, inverse, resolution, progress, &done);
+    return extract_deformed(sdf, field, inverse, {.resolution = resolution, .refine_thin = refine_thin},
+                            progress, &done);
   });
   py::dict all = fields(done);
   all.attr("update")("inverted"_a = done.inverted, "failures"_a = done.failures, "spacing"_a = done.spacing);
@@ -46,18 +51,24 @@ DeformedExtractionResult extract_moved(const ImplicitFunction& sdf, const Deform
 void bind_extraction(py::module_& module) {
   module.def(
       "extract_surface", &extract, "sdf"_a, "resolution"_a = ExtractionOptions().resolution, py::kw_only(),
-      "threads"_a = 0, "task"_a = py::none(),
+      "refine_thin"_a = ExtractionOptions().refine_thin, "threads"_a = 0, "task"_a = py::none(),
       "The zero surface of a signed distance function as a mesh: V (n,3), F (m,3), in mesh coordinates.\n\n"
       "Marching cubes on `resolution` (8 to 512) grid points a side over the frame's cube, evaluated only\n"
       "where a measured bound on the gradient lets the surface be; the vertices are those of the whole "
       "grid.\n"
       "Triangles are counter-clockwise seen from outside; the mesh is a closed manifold unless the surface\n"
       "leaves the cube. What is returned unpacks into V and F, and has a `report` beside them. Where the\n"
-      "function jumps, as the distance of an open soup does across its holes, there is no surface.\n"
-      "InvalidInput for a bad resolution or no surface.");
+      "function jumps, as the distance of an open soup does across its holes, there is no surface. Where "
+      "parts\n"
+      "are thinner than two cells, refine_thin cuts the cells there into finer ones, without cracks; the "
+      "report\n"
+      "says whether the surface came apart and which resolution holds it. InvalidInput for a bad resolution "
+      "or\n"
+      "no surface.");
   module.def(
       "extract_deformed", &extract_moved, "sdf"_a, "field"_a, "resolution"_a = ExtractionOptions().resolution,
-      py::kw_only(), "inverse"_a = py::none(), "threads"_a = 0, "task"_a = py::none(),
+      py::kw_only(), "refine_thin"_a = ExtractionOptions().refine_thin, "inverse"_a = py::none(),
+      "threads"_a = 0, "task"_a = py::none(),
       "The deformed surface as the zero set of sdf ∘ field⁻¹: V (n,3), F (m,3), in mesh coordinates.\n\n"
       "Marching cubes on `resolution` (8 to 512) grid points a side over a cube around the deformed "
       "surface;\n"

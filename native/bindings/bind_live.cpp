@@ -34,7 +34,7 @@ LiveReportResult report(const LiveSolver& live) {
   const LiveReport& r = live.report();
   return make_report(
       "LiveReport",
-      py::dict("stretch"_a = r.arap.stretch, "bend"_a = r.arap.bend, "energy"_a = r.energy,
+      py::dict("stretch"_a = r.arap.stretch, "bend"_a = r.arap.bend, "energy"_a = r.arap.energy,
                "value"_a = r.value, "handle_error_mean"_a = r.handle_mean,
                "handle_error_max"_a = r.handle_max, "min_determinant"_a = r.distortion.min_determinant,
                "flipped_share"_a = r.distortion.flipped_share, "max_stretch"_a = r.distortion.max_stretch,
@@ -61,12 +61,14 @@ RadialFieldResult solve(LiveSolver& live, const std::optional<ArraysArgument>& t
 }
 
 void set_style(LiveSolver& live, const std::optional<NormalsArgument>& normals, double strength,
-               double sharpness, const std::optional<ArrayArgument>& weights) {
+               double sharpness, const std::optional<ArrayArgument>& weights,
+               const std::optional<ArrayArgument>& up) {
   if (!normals) return live.clear_style();
   const Points preferred = py::isinstance<py::str>(*normals)
                                ? preferred_normals(py::cast<std::string>(*normals))
                                : as_points(*normals, "normals");
-  live.set_style(preferred, strength, sharpness, weights ? as_vector(*weights, "weights") : Vector());
+  live.set_style(preferred, strength, sharpness, weights ? as_vector(*weights, "weights") : Vector(),
+                 up ? as_vec3(*up, "up") : Vec3(Vec3::UnitZ()));
 }
 
 }  // namespace
@@ -121,10 +123,12 @@ void bind_live(py::module_& module) {
           "handles"_a,
           "Other handles for the same surface; the shape at hand is kept as the start of the next solve.")
       .def("set_style", &set_style, "normals"_a, "strength"_a = StylizeOptions().strength, py::kw_only(),
-           "sharpness"_a = StylizeOptions().sharpness, "weights"_a = py::none(),
+           "sharpness"_a = StylizeOptions().sharpness, "weights"_a = py::none(), "up"_a = py::none(),
            "Turns the surface towards preferred normals, (k, 3) or a style's name, from the next solve on; "
            "None\n"
-           "or strength 0: no style. `weights` (one for each sample given at the start) blend the effect.")
+           "or strength 0: no style. `weights` (one for each sample given at the start) blend the effect; "
+           "`up`\n"
+           "(3,), else z, is where the figure's head is: without handles it stands on what lies lowest.")
       .def("reset", &LiveSolver::reset, "Back to the identity and to handles at rest.")
       .def_property_readonly("field", &with_report, "The deformation at hand, as a DeformationField.")
       .def_property_readonly(

@@ -28,9 +28,9 @@ py::object solve_report(const SolveReport& report, double scale) {
   for (const auto& [iteration, value] : report.loop.history) loss.append(py::make_tuple(iteration, value));
   return make_report(
       "SolveReport",
-      py::dict("stretch"_a = report.arap.stretch, "bend"_a = report.arap.bend, "energy"_a = report.energy,
-               "handle_error_mean"_a = mean, "handle_error_max"_a = max, "handles"_a = py::tuple(handles),
-               "min_determinant"_a = report.distortion.min_determinant,
+      py::dict("stretch"_a = report.arap.stretch, "bend"_a = report.arap.bend,
+               "energy"_a = report.arap.energy, "handle_error_mean"_a = mean, "handle_error_max"_a = max,
+               "handles"_a = py::tuple(handles), "min_determinant"_a = report.distortion.min_determinant,
                "flipped_share"_a = report.distortion.flipped_share,
                "max_stretch"_a = report.distortion.max_stretch,
                "min_stretch"_a = report.distortion.min_stretch, "iterations"_a = report.loop.iterations,
@@ -77,14 +77,17 @@ Points preferred_from(const NormalsArgument& style, const std::optional<ArrayArg
 FieldResult stylize_samples(const SurfaceSamples& samples, const NormalsArgument& normals,
                             const StylizeOptions& options, const HandlesArgument& handles,
                             const std::optional<ArrayArgument>& weights,
-                            const std::optional<ArrayArgument>& orientation, const EnergiesArgument& energies,
+                            const std::optional<ArrayArgument>& orientation,
+                            const std::optional<ArrayArgument>& up, const EnergiesArgument& energies,
                             const std::optional<CallbackArgument>& callback, Task* task) {
   const Points preferred = preferred_from(normals, orientation);
   const Vector blend = weights ? as_vector(*weights, "weights") : Vector();
+  const Vec3 upwards = up ? as_vec3(*up, "up") : Vec3(Vec3::UnitZ());
   const auto held = as_handles(handles);
   const SolveHooks hooks{as_energies(energies, samples.frame), as_observer(callback.value_or(py::none()))};
-  return solve(
-      task, [&](const Progress& p) { return stylize(samples, preferred, options, p, blend, held, hooks); });
+  return solve(task, [&](const Progress& p) {
+    return stylize(samples, preferred, options, p, blend, held, upwards, hooks);
+  });
 }
 
 InverseResult inverse_of(const DeformationField& field, const SurfaceSamples& samples,
@@ -134,18 +137,18 @@ void bind_solve(py::module_& module) {
   module.def(
       "stylize", &stylize_samples, "samples"_a, "normals"_a,
       py::arg_v("options", StylizeOptions(), "StylizeOptions()"), py::kw_only(), "handles"_a = py::tuple(),
-      "weights"_a = py::none(), "orientation"_a = py::none(), "energies"_a = py::tuple(),
+      "weights"_a = py::none(), "orientation"_a = py::none(), "up"_a = py::none(), "energies"_a = py::tuple(),
       "callback"_a = py::none(), "task"_a = py::none(),
       "The DeformationField that turns the surface's normals to preferred ones: `normals` (k, 3) or a "
       "style's\n"
       "name, turned by `orientation` (3, 3). `weights` (n,) blend the effect sample by sample. Without "
       "handles\n"
-      "the lowest sample stays in place (nearly, beside `energies`); strength 0 is the identity. `energies` "
-      "and `callback` are deform's, "
-      "with\n"
-      "one more term, style. field.report is a SolveReport with the mean preference reached. Raises as "
-      "deform\n"
-      "does.");
+      "the figure keeps its stance (options.keep_stance) and the lowest sample stays in place (nearly, "
+      "beside\n"
+      "`energies`), seen along `up` (3,), else z; strength 0 is the identity. `energies` and `callback` are\n"
+      "deform's, with two more terms, style and stance. field.report is a SolveReport with the mean "
+      "preference\n"
+      "reached. Raises as deform does.");
   module.def(
       "train_inverse", &inverse_of, "field"_a, "samples"_a,
       py::arg_v("options", InverseTrainingOptions(), "InverseTrainingOptions()"), py::kw_only(),

@@ -3,20 +3,26 @@
 #include "bindings/jet_arrays.h"
 #include "bindings/python_function.h"
 #include "core/aten_path.h"
+#include "options/deform.h"
 #include "solve/loss_probe.h"
 
 namespace arapfields::python {
 void bind_solve_testing(py::module_& module) {
   py::module_ testing = testing_module(module);
+  testing.def("thickness", &probe_thickness, "samples"_a);
+  testing.def(
+      "bending", [](const SurfaceSamples& s, const DeformOptions& o) { return probe_bending(s, o.surface); },
+      "samples"_a, "options"_a);
   py::class_<LossProbe>(testing, "LossProbe")
       .def(py::init([](const SurfaceSamples& samples, const std::vector<Handle>& handles, int width,
                        double bending, const Points& preferred, double gauss, double barrier, double margin,
-                       const py::object& energies) {
+                       double keep_stance, const py::object& energies) {
              return std::make_unique<LossProbe>(samples, handles, width, bending, preferred, gauss, barrier,
-                                                margin, as_energies(energies, samples.frame));
+                                                margin, keep_stance, as_energies(energies, samples.frame));
            }),
            "samples"_a, "handles"_a, "width"_a = 8, "bending"_a = 0.0, "preferred"_a = Points(),
-           "gauss"_a = 0.0, "barrier"_a = 0.0, "margin"_a = 0.0, "energies"_a = py::tuple())
+           "gauss"_a = 0.0, "barrier"_a = 0.0, "margin"_a = 0.0, "keep_stance"_a = 0.0,
+           "energies"_a = py::tuple())
       .def(
           "__call__",
           [](LossProbe& self, const Vector& parameters, std::uint64_t seed) {

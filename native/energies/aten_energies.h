@@ -2,8 +2,8 @@
 // The energies of this folder as compositions of libtorch's operations, for tensors outside main memory. For
 // libtorch sources alone. Nothing is read back, so nothing waits for the
 // device. `jets` and `cotangents` are (columns, n, 3), contiguous; weight times the cotangents is added to
-// the latter unless they are undefined. Values are means as in arap.h, gauss.h, distortion.h and handles.h,
-// as tensors.
+// the latter unless they are undefined. Values are means as in arap.h, gauss.h, distortion.h, handles.h and
+// stance.h, as tensors.
 #pragma once
 
 #include <ATen/core/Tensor.h>
@@ -32,9 +32,14 @@ struct AtenPolar {
 };
 AtenPolar aten_polar(const at::Tensor& jacobians, const EnergyTables& tables);
 
-/// (2): stretch and bend; the bend is 0 where the jets have no second derivatives.
+/// Factors (n) of single points, on their energy and on their bending; undefined: ones.
+struct AtenFactors {
+  at::Tensor weights, bending;
+};
+
+/// (3): stretch, bend and energy; the bend is 0 where the jets have no second derivatives.
 at::Tensor aten_arap(const at::Tensor& jets, double bending, double weight, const EnergyTables& tables,
-                     at::Tensor cotangents);
+                     at::Tensor cotangents, const AtenFactors& factors = {});
 /// Normals (n,3), weights (n) or undefined, the preference as rows (normal, weight) (k,4).
 at::Tensor aten_gauss(const at::Tensor& jets, const at::Tensor& normals, const at::Tensor& sample_weights,
                       const at::Tensor& preferred, double sharpness, double weight,
@@ -44,5 +49,9 @@ at::Tensor aten_barrier(const at::Tensor& jets, double threshold, double weight,
 /// Targets (n,3) and weights (n) as in HandleBatch.
 at::Tensor aten_handles(const at::Tensor& jets, const at::Tensor& targets, const at::Tensor& weights,
                         double weight, at::Tensor cotangents);
+/// Rest points (n,3), the stance's upward direction (3) and ground weights (n); its scale belongs to the
+/// weight.
+at::Tensor aten_stance(const at::Tensor& jets, const at::Tensor& rest, const at::Tensor& up,
+                       const at::Tensor& ground, double weight, at::Tensor cotangents);
 
 }  // namespace arapfields

@@ -6,11 +6,17 @@
 
 namespace arapfields {
 template <class Scalar>
-ArapValue probe_arap(JetView<const Scalar> jets, double bending, double weight, JetView<Scalar> cotangents) {
+ArapValue probe_arap(JetView<const Scalar> jets, double bending, double weight, JetView<Scalar> cotangents,
+                     ArapFactors<Scalar> factors) {
   const at::Tensor given = tensor_view(jets);
+  const auto per_point = [&](const Scalar* numbers) {
+    if (numbers == nullptr) return at::Tensor();
+    return tensor_view(numbers, {jets.count});
+  };
+  const AtenFactors own{per_point(factors.weights), per_point(factors.bending)};
   const at::Tensor values =
-      aten_arap(given, bending, weight, EnergyTables(given), tensor_view(cotangents)).to(at::kDouble);
-  return {values[0].item<double>(), values[1].item<double>()};
+      aten_arap(given, bending, weight, EnergyTables(given), tensor_view(cotangents), own).to(at::kDouble);
+  return {values[0].item<double>(), values[1].item<double>(), values[2].item<double>()};
 }
 
 template <class Scalar>
@@ -42,14 +48,28 @@ double probe_handles(JetView<const Scalar> jets, const HandleBatch<Scalar>& batc
       .template item<double>();
 }
 
-#define ARAPFIELDS_PROBES(Scalar)                                                                  \
-  template ArapValue probe_arap<Scalar>(JetView<const Scalar>, double, double, JetView<Scalar>);   \
-  template double probe_gauss<Scalar>(JetView<const Scalar>, ConstPointsRef<Scalar>,               \
-                                      const Eigen::Ref<const Eigen::VectorX<Scalar>>&,             \
-                                      const GaussPreference&, double, JetView<Scalar>);            \
-  template double probe_barrier<Scalar>(JetView<const Scalar>, double, double, JetView<Scalar>);   \
-  template double probe_handles<Scalar>(JetView<const Scalar>, const HandleBatch<Scalar>&, double, \
-                                        JetView<Scalar>);
+template <class Scalar>
+double probe_stance(JetView<const Scalar> jets, ConstPointsRef<Scalar> rest, const Stance& stance,
+                    double weight, JetView<Scalar> cotangents) {
+  const at::Tensor given = tensor_view(jets);
+  const Vector up = stance.up;
+  return stance.scale * aten_stance(given, tensor_view(rest), tensor_view(up).to(given.scalar_type()),
+                                    tensor_view(stance.ground).to(given.scalar_type()), weight * stance.scale,
+                                    tensor_view(cotangents))
+                            .template item<double>();
+}
+
+#define ARAPFIELDS_PROBES(Scalar)                                                                            \
+  template ArapValue probe_arap<Scalar>(JetView<const Scalar>, double, double, JetView<Scalar>,              \
+                                        ArapFactors<Scalar>);                                                \
+  template double probe_gauss<Scalar>(JetView<const Scalar>, ConstPointsRef<Scalar>,                         \
+                                      const Eigen::Ref<const Eigen::VectorX<Scalar>>&,                       \
+                                      const GaussPreference&, double, JetView<Scalar>);                      \
+  template double probe_barrier<Scalar>(JetView<const Scalar>, double, double, JetView<Scalar>);             \
+  template double probe_handles<Scalar>(JetView<const Scalar>, const HandleBatch<Scalar>&, double,           \
+                                        JetView<Scalar>);                                                    \
+  template double probe_stance<Scalar>(JetView<const Scalar>, ConstPointsRef<Scalar>, const Stance&, double, \
+                                       JetView<Scalar>);
 ARAPFIELDS_PROBES(float)
 ARAPFIELDS_PROBES(double)
 

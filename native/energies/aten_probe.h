@@ -5,12 +5,13 @@
 #include "energies/arap.h"
 #include "energies/gauss.h"
 #include "energies/handles.h"
+#include "energies/stance.h"
 
 namespace arapfields {
 
 template <class Scalar>
 ARAPFIELDS_EXPORT_TO_TESTS ArapValue probe_arap(JetView<const Scalar> jets, double bending, double weight,
-                                                JetView<Scalar> cotangents);
+                                                JetView<Scalar> cotangents, ArapFactors<Scalar> factors);
 template <class Scalar>
 ARAPFIELDS_EXPORT_TO_TESTS double probe_gauss(JetView<const Scalar> jets, ConstPointsRef<Scalar> normals,
                                               const Eigen::Ref<const Eigen::VectorX<Scalar>>& sample_weights,
@@ -22,5 +23,9 @@ ARAPFIELDS_EXPORT_TO_TESTS double probe_barrier(JetView<const Scalar> jets, doub
 template <class Scalar>
 ARAPFIELDS_EXPORT_TO_TESTS double probe_handles(JetView<const Scalar> jets, const HandleBatch<Scalar>& batch,
                                                 double weight, JetView<Scalar> cotangents);
+template <class Scalar>
+ARAPFIELDS_EXPORT_TO_TESTS double probe_stance(JetView<const Scalar> jets, ConstPointsRef<Scalar> rest,
+                                               const Stance& stance, double weight,
+                                               JetView<Scalar> cotangents);
 
 }  // namespace arapfields

@@ -65,4 +65,15 @@ at::Tensor aten_handles(const at::Tensor& jets, const at::Tensor& targets, const
   return (scaled * difference).sum();
 }
 
+at::Tensor aten_stance(const at::Tensor& jets, const at::Tensor& rest, const at::Tensor& up,
+                       const at::Tensor& ground, double weight, at::Tensor cotangents) {
+  const double share = 1.0 / static_cast<double>(std::max<int64_t>(jets.size(1), 1));
+  const at::Tensor ways = jets[0] - rest, touching = ground.unsqueeze(1);
+  const at::Tensor others = ways - ways.mean(0, true), rises = at::mm(ways, up.unsqueeze(1));
+  const at::Tensor uneven = rises - (touching * rises).sum() / at::clamp_min(ground.sum(), 1e-30);
+  const at::Tensor lifted = touching * uneven;
+  if (cotangents.defined()) cotangents[0].add_(others + lifted * up.unsqueeze(0), 2.0 * weight * share);
+  return ((others * others).sum() + (lifted * uneven).sum()) * share;
+}
+
 }  // namespace arapfields

@@ -2,7 +2,9 @@
 #include "energies/gauss.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 
 #include "core/errors.h"
@@ -11,6 +13,14 @@
 
 namespace arapfields {
 namespace {
+
+/// Those of the cube overlap midway as much as they should at this sharpness.
+constexpr double cube_sharpness = 5.0, most_sharpness = 25.0;
+/// Directions closer than 15° are facets of one curved face.
+constexpr double one_face = 0.9659258262890683;
+
+/// Cosines of 60° and 80°: between them a style loses its hold.
+constexpr double reach_full = 0.5, reach_none = 0.17364817766693036;
 
 Points unit_normals(PointsIn normals) {
   require(normals.rows() > 0, "normals", "none were given", "at least one is needed");
@@ -22,6 +32,11 @@ Points unit_normals(PointsIn normals) {
             "finite directions of any positive length are allowed");
     unit.row(i) /= length;
   }
+  return unit;
+}
+
+Points different_normals(PointsIn normals) {
+  const Points unit = unit_normals(normals);
   for (Index i = 0; i < unit.rows(); ++i)
     for (Index j = 0; j < i; ++j)
       require((unit.row(i) - unit.row(j)).norm() > 1e-6, "normals",
@@ -44,7 +59,55 @@ Vector truncated_solution(const Eigen::MatrixXd& kernel,
   return weights;
 }
 
+/// The curved face to which each normal belongs, by number: neighbours within 15° share one.
+std::vector<Index> faces_of(const Eigen::MatrixXd& cosines) {
+  std::vector<Index> faces(static_cast<std::size_t>(cosines.rows()), -1), open;
+  for (Index first = 0; first < cosines.rows(); ++first) {
+    if (faces[static_cast<std::size_t>(first)] >= 0) continue;
+    for (open = {first}; !open.empty();) {
+      const Index i = open.back();
+      open.pop_back();
+      faces[static_cast<std::size_t>(i)] = first;
+      for (Index j = 0; j < cosines.rows(); ++j)
+        if (faces[static_cast<std::size_t>(j)] < 0 && cosines(i, j) > one_face) open.push_back(j);
+    }
+  }
+  return faces;
+}
+
+/// Mean angle from a direction to the nearest of unit normals, over the sphere (a Fibonacci lattice).
+double mean_angle(const Points& unit) {
+  constexpr int directions = 2000;
+  double sum = 0.0;
+  for (int i = 0; i < directions; ++i) {
+    const double z = 1.0 - (2.0 * i + 1.0) / directions, radius = std::sqrt(1.0 - z * z);
+    const double turn = 2.0 * std::numbers::pi * i / std::numbers::phi;
+    const Vec3 direction(radius * std::cos(turn), radius * std::sin(turn), z);
+    sum += std::acos(std::clamp((unit * direction).maxCoeff(), -1.0, 1.0));
+  }
+  return sum / directions;
+}
+
+/// mean_angle of the cube's normals.
+double cube_angle() {
+  static const double angle = mean_angle((Points(6, 3) << Mat3::Identity(), -Mat3::Identity()).finished());
+  return angle;
+}
+
 }  // namespace
+
+double style_sharpness(PointsIn normals) {
+  const Points unit = unit_normals(normals);
+  const Eigen::MatrixXd cosines = unit * unit.transpose();
+  const std::vector<Index> faces = faces_of(cosines);
+  double nearest = -1.0;
+  for (Index i = 0; i < unit.rows(); ++i)
+    for (Index j = 0; j < i; ++j)
+      if (faces[static_cast<std::size_t>(i)] != faces[static_cast<std::size_t>(j)])
+        nearest = std::max(nearest, cosines(i, j));
+  const double midway = std::sqrt(0.5 + 0.5 * std::clamp(nearest, -1.0, 1.0));
+  return std::clamp(cube_sharpness * (1.0 - std::sqrt(0.5)) / (1.0 - midway), cube_sharpness, most_sharpness);
+}
 
 double GaussPreference::value(const Vec3& normal) const {
   return (sharpness * (normals * normal)).array().exp().matrix().dot(weights);
@@ -58,10 +121,28 @@ Vector GaussPreference::values(PointsIn directions) const {
   return result;
 }
 
+Vector GaussPreference::reach(PointsIn directions) const {
+  Vector result = Vector::Ones(directions.rows());
+  if (!automatic) return result;
+  for_ranges(directions.rows(), [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) {
+      const double cosine = (normals * directions.row(i).transpose()).maxCoeff();
+      const double t = std::clamp((cosine - reach_none) / (reach_full - reach_none), 0.0, 1.0);
+      result[i] = t * t * (3.0 - 2.0 * t);
+    }
+  });
+  return result;
+}
+
 GaussPreference gauss_preference(PointsIn normals, double sharpness) {
-  require(sharpness > 0.0 && sharpness <= 100.0, "sharpness", std::to_string(sharpness),
-          "must be positive and at most 100");
-  GaussPreference result{unit_normals(normals), {}, sharpness};
+  require(sharpness >= 0.0 && sharpness <= 100.0, "sharpness", std::to_string(sharpness),
+          "0 (from the normals) to 100 is allowed");
+  GaussPreference result{different_normals(normals), {}, sharpness};
+  if (sharpness == 0.0) {
+    result.sharpness = sharpness = style_sharpness(normals);
+    result.automatic = true;
+    result.balance = std::max(1.0, cube_angle() / mean_angle(result.normals));
+  }
   // exp(σ(n·m − 1)): the same system with every weight scaled by e^σ, whose diagonal is 1.
   const Eigen::MatrixXd kernel =
       (sharpness * ((result.normals * result.normals.transpose()).array() - 1.0)).exp().matrix();

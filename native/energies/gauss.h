@@ -9,18 +9,32 @@ namespace arapfields {
 /// A function g on the sphere of directions that is 1 at each preferred normal n_k and small far from all of
 /// them: g(n) = Σ_k w_k exp(sharpness · n·n_k) (Kohlbrenner et al., "Gauss Stylization", 2021).
 struct ARAPFIELDS_EXPORT GaussPreference {
-  Points normals;                                 ///< (k,3), unit length
-  Vector weights;                                 ///< (k)
-  double sharpness = StylizeOptions().sharpness;  ///< σ
+  Points normals;          ///< (k,3), unit length
+  Vector weights;          ///< (k)
+  double sharpness = 5.0;  ///< σ
+  /// Whether σ follows from the normals; the style's weight and reach then do, too.
+  bool automatic = false;
+  /// Factor of the style's weight with which styles of many faces turn as much of what there is to turn as
+  /// the cube: the mean angle from a direction to the cube's nearest normal over that to this style's, where
+  /// that is above 1. 1 unless automatic.
+  double balance = 1.0;
   double value(const Vec3& normal) const;
   /// (n) values at unit normals (n,3).
   Vector values(PointsIn directions) const;
+  /// (n) how much surfaces with these rest normals (n,3) are to follow: 1 up to 60° from a preferred normal,
+  /// 0 from 80° on, so that no wall becomes a floor and no shape paper-thin. All 1 unless automatic.
+  Vector reach(PointsIn directions) const;
 };
 
+/// σ = 5 (1 − cos 45°) / (1 − cos θ/2), so that neighbours at the angle θ, the smallest of the style, overlap
+/// midway as the cube's do at 5; from 5 to 25. Normals within 15° of each other belong to one curved face,
+/// and count as one. Throws InvalidInput for none, non-finite or zero normals.
+ARAPFIELDS_EXPORT double style_sharpness(PointsIn normals);
+
 /// Solves g(n_k) = 1 for the weights. Directions need not have unit length. Where the system is numerically
-/// singular (many close normals) the smallest weights that still satisfy it are taken. Throws InvalidInput
-/// for none, non-finite or zero normals, for a pair that coincides (named), and for sharpness outside (0,
-/// 100].
+/// singular (many close normals) the smallest weights that still satisfy it are taken. Sharpness 0 stands for
+/// style_sharpness(). Throws InvalidInput for none, non-finite or zero normals, for a pair that coincides
+/// (named), and for sharpness outside [0, 100].
 ARAPFIELDS_EXPORT GaussPreference gauss_preference(PointsIn normals,
                                                    double sharpness = StylizeOptions().sharpness);
 

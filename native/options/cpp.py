@@ -30,11 +30,16 @@ def comment(text, indent="", mark="///"):
     return "".join(f"{indent}{mark} {line}\n" for line in textwrap.wrap(text, width))
 
 
+def enumerator(choice):
+    """A choice as C++ has it: `auto` is a word of the language."""
+    return {"auto": "automatic"}.get(choice, choice)
+
+
 def literal(option, value=None):
     """A value of the option as C++."""
     value = option["default"] if value is None else value
     if option["type"] == "enum":
-        return f"{option['enum']}::{value}"
+        return f"{option['enum']}::{enumerator(value)}"
     if option["type"] == "device":
         return f'"{value}"'
     if isinstance(value, bool):
@@ -120,7 +125,7 @@ def choices_header(table):
     for enum, option in enums(table).items():
         lines += ["\n", comment(option["sentence"] + "."), f"enum class {enum} {{\n"]
         for choice, (_, sentence) in option["choices"].items():
-            lines += [comment(sentence + ".", "  "), f"  {choice},\n"]
+            lines += [comment(sentence + ".", "  "), f"  {enumerator(choice)},\n"]
         lines.append(f"}};\nARAPFIELDS_EXPORT const char* name_of({enum} value);\n")
         lines.append("/// Throws InvalidInput that names `argument` for a text that is no choice.\n")
         lines.append("ARAPFIELDS_EXPORT void choose(const std::string& text, const std::string& argument, ")
@@ -138,8 +143,10 @@ def source(table):
     lines += ['#include "core/device.h"\n#include "core/errors.h"\n\nnamespace arapfields {\n']
     for enum, option in enums(table).items():
         names = list(option["choices"])
-        cases = "".join(f'    case {enum}::{name}: return "{name}";\n' for name in names)
-        tests = "".join(f'  if (text == "{name}") return void(value = {enum}::{name});\n' for name in names)
+        cases = "".join(f'    case {enum}::{enumerator(name)}: return "{name}";\n' for name in names)
+        tests = "".join(
+            f'  if (text == "{name}") return void(value = {enum}::{enumerator(name)});\n' for name in names
+        )
         allowed = ", ".join(f"'{name}'" for name in names[:-1]) + f" or '{names[-1]}' is allowed"
         lines.append(
             f'\nconst char* name_of({enum} value) {{\n  switch (value) {{\n{cases}  }}\n  return "";\n}}\n'

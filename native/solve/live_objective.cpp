@@ -15,12 +15,12 @@ constexpr double coefficient_weight = 1e-10;
 }  // namespace
 
 template <class Scalar>
-LiveObjective<Scalar>::LiveObjective(const RadialBasis& basis, PointsIn samples, double bending,
+LiveObjective<Scalar>::LiveObjective(const RadialBasis& basis, PointsIn samples, const Vector& bending,
                                      double handle_weight)
     : center_count_(basis.center_count()),
-      bending_(bending),
       handle_weight_(handle_weight),
-      samples_(basis, samples) {}
+      samples_(basis, samples),
+      bending_(bending.cast<Scalar>()) {}
 
 template <class Scalar>
 void LiveObjective<Scalar>::set_barrier(double weight, double threshold) {
@@ -63,13 +63,20 @@ bool LiveObjective<Scalar>::accepted(const Measurements& u) const {
   if (!hooks_.observer) return true;
   const LiveTerms terms = evaluate(u, nullptr);
   std::vector<LossTerm> told{{"stretch", terms.arap.stretch}};
-  if (bending_ > 0.0) told.push_back({"bend", bending_ * terms.arap.bend});
+  if ((bending_.array() > 0).any()) told.push_back({"bend", terms.arap.energy - terms.arap.stretch});
   if (style_) told.push_back({"style", style_->weight * terms.gauss});
+  if (stance_) told.push_back({"stance", stance_->weight * terms.stance});
   if (barrier_ > 0.0) told.push_back({"barrier", barrier_ * terms.barrier});
   told.push_back({"handles", handle_weight_ * terms.handles});
   for (std::size_t i = 0; i < terms.external.size(); ++i)
     told.push_back({"energies[" + std::to_string(i) + "]", terms.external[i]});
   return hooks_.observer(told);
+}
+
+template <class Scalar>
+void LiveObjective<Scalar>::set_stance(const std::optional<LiveStance>& stance) {
+  stance_ = stance;
+  if (stance) stance_rest_ = stance->rest.template cast<Scalar>();
 }
 
 template <class Scalar>
@@ -88,7 +95,7 @@ LiveTerms LiveObjective<Scalar>::evaluate(const Measurements& u, Measurements* c
   Scalar* out = cotangents != nullptr ? cotangents->data() : nullptr;
   const JetView<Scalar> jet_cotangents{out, samples_.size(), JetOrder::second};
   LiveTerms terms;
-  terms.arap = arap_energy<Scalar>(jets(u), bending_, 1.0, jet_cotangents);
+  terms.arap = arap_energy<Scalar>(jets(u), 1.0, 1.0, jet_cotangents, {nullptr, bending_.data()});
   const Index pairs = pairs_.sources.rows();
   terms.handles =
       handle_energy<Scalar>({u.data() + handle_offset(), pairs, JetOrder::value}, pairs_, handle_weight_,
@@ -96,6 +103,9 @@ LiveTerms LiveObjective<Scalar>::evaluate(const Measurements& u, Measurements* c
   if (style_)
     terms.gauss = gauss_energy<Scalar>(jets(u), style_normals_, style_weights_, style_->preference,
                                        style_->weight, jet_cotangents);
+  if (stance_)
+    terms.stance =
+        stance_energy<Scalar>(jets(u), stance_rest_, stance_->stance, stance_->weight, jet_cotangents);
   if (barrier_ > 0.0)
     terms.barrier = fold_barrier<Scalar>(jets(u), barrier_threshold_, barrier_, jet_cotangents);
   terms.external = external_energies<Scalar>(hooks_.energies, rest_, jets(u), hooks_.weight, jet_cotangents);
@@ -103,12 +113,30 @@ LiveTerms LiveObjective<Scalar>::evaluate(const Measurements& u, Measurements* c
 }
 
 template <class Scalar>
+Eigen::VectorX<Scalar> LiveObjective<Scalar>::weighted(const Measurements& u) const {
+  Measurements result = Measurements::Zero(u.size());
+  const Index n = samples_.size(), pairs = pairs_.sources.rows();
+  for (int c = 1; c < 10; ++c) {
+    const Eigen::Map<const PointsOf<Scalar>> from(u.data() + 3 * c * n, n, 3);
+    Eigen::Map<PointsOf<Scalar>> to(result.data() + 3 * c * n, n, 3);
+    const Scalar share = Scalar(c < 7 ? 2.0 : 4.0) / static_cast<Scalar>(n);
+    if (c < 4)
+      to = share * from;
+    else
+      to = share * (bending_.asDiagonal() * from);
+  }
+  Eigen::Map<PointsOf<Scalar>>(result.data() + handle_offset(), pairs, 3) =
+      Scalar(2.0 * handle_weight_) * (pairs_.weights.asDiagonal() * handle_values(u));
+  return result;
+}
+
+template <class Scalar>
 double LiveObjective<Scalar>::value(const Measurements& u, Measurements* cotangents) const {
   const LiveTerms terms = evaluate(u, cotangents);
   const auto centers = u.tail(3 * center_count_);
   if (cotangents != nullptr) cotangents->tail(3 * center_count_) = Scalar(2.0 * coefficient_weight) * centers;
-  return terms.arap.stretch + bending_ * terms.arap.bend + handle_weight_ * terms.handles +
-         (style_ ? style_->weight * terms.gauss : 0.0) + barrier_ * terms.barrier +
+  return terms.arap.energy + handle_weight_ * terms.handles + (style_ ? style_->weight * terms.gauss : 0.0) +
+         (stance_ ? stance_->weight * terms.stance : 0.0) + barrier_ * terms.barrier +
          std::accumulate(terms.external.begin(), terms.external.end(), 0.0) +
          coefficient_weight * static_cast<double>(centers.squaredNorm());
 }

@@ -7,6 +7,7 @@
 #include "energies/arap.h"
 #include "energies/gauss.h"
 #include "energies/handles.h"
+#include "energies/stance.h"
 #include "fields/radial_evaluator.h"
 #include "solve/live_hooks.h"
 #include "solve/quasi_newton.h"
@@ -21,25 +22,34 @@ struct LiveStyle {
   double weight = 1.0;    ///< λ_Gauss
 };
 
+/// What keeps a figure's stance at the samples of a live solve.
+struct LiveStance {
+  Stance stance;
+  Points rest;  ///< (n,3) samples
+  double weight = 0.0;
+};
+
 /// What the terms of the energy come to.
 struct LiveTerms {
   ArapValue arap;
   double handles = 0.0;          ///< mean squared distance to the targets
   double gauss = 0.0;            ///< mean(1 − g), where there is a style
   double barrier = 0.0;          ///< energies/distortion.h
+  double stance = 0.0;           ///< energies/stance.h
   std::vector<double> external;  ///< weighted
 };
 
-/// stretch + λ_bend·bend + weight·handles + λ_Gauss·gauss + barrier + external + a vanishing pull of all
-/// centers towards zero, of the fields of one radial basis. Measurements: jets at the samples, values at the
-/// handles' sources, centers. In single precision a step costs half, and the value is good to some 1e-6 of
-/// itself.
+/// mean (stretch + λ·bend) + weight·handles + λ_Gauss·gauss + stance + barrier + external + a vanishing pull
+/// of all centers towards zero, of the fields of one radial basis. Measurements: jets at the samples, values
+/// at the handles' sources, centers. In single precision a step costs half, and the value is good to some
+/// 1e-6 of itself.
 template <class Scalar>
 class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
  public:
   using Measurements = Eigen::VectorX<Scalar>;
 
-  LiveObjective(const RadialBasis& basis, PointsIn samples, double bending, double handle_weight);
+  /// `bending` (n): λ of each sample.
+  LiveObjective(const RadialBasis& basis, PointsIn samples, const Vector& bending, double handle_weight);
   /// A barrier against folds with this weight and threshold; 0: none.
   void set_barrier(double weight, double threshold);
   /// Other handles (cube coordinates), with the factor of the preconditioner that goes with them.
@@ -50,6 +60,7 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
   void set_style(const std::optional<LiveStyle>& style);
   /// `rest` (n,3): the samples.
   void set_hooks(const LiveHooks& hooks, PointsIn rest);
+  void set_stance(const std::optional<LiveStance>& stance);
 
   LiveTerms terms(const Measurements& u) const { return evaluate(u, nullptr); }
   JetView<const Scalar> jets(const Measurements& u) const {
@@ -59,6 +70,10 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
   Eigen::Map<const PointsOf<Scalar>> handle_values(const Measurements& u) const {
     return {u.data() + handle_offset(), pairs_.sources.rows(), 3};
   }
+
+  /// Twice the weights of the surrogate mean (‖J‖² + λ‖D‖²) + weight·handles, whose inverse precondition()
+  /// has, times measurements.
+  Measurements weighted(const Measurements& u) const;
 
   void measure(const RowMatrix<double>& c, Measurements& u) const override;
   double value(const Measurements& u, Measurements* cotangents) const override;
@@ -72,12 +87,15 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
   Index center_offset() const { return handle_offset() + 3 * pairs_.sources.rows(); }
 
   Index center_count_;
-  double bending_, handle_weight_, barrier_ = 0.0, barrier_threshold_ = 0.1;
+  double handle_weight_, barrier_ = 0.0, barrier_threshold_ = 0.1;
   RadialEvaluator<Scalar> samples_;
+  Eigen::VectorX<Scalar> bending_;
   HandleBatch<Scalar> pairs_;
   TallMatrix<Scalar> handle_basis_;   // (pairs, size)
   TallMatrix<float> inverse_factor_;  // L⁻¹ of the preconditioner's matrix L Lᵀ
   std::optional<LiveStyle> style_;
+  std::optional<LiveStance> stance_;
+  PointsOf<Scalar> stance_rest_;
   PointsOf<Scalar> style_normals_;
   Eigen::VectorX<Scalar> style_weights_;
   LiveHooks hooks_;

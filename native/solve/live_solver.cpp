@@ -15,8 +15,9 @@ LiveSolver& LiveSolver::operator=(LiveSolver&&) noexcept = default;
 
 void LiveSolver::set_handles(const std::vector<Handle>& handles) { state_->set_handles(handles); }
 
-void LiveSolver::set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights) {
-  state_->set_style(preferred, strength, sharpness, weights);
+void LiveSolver::set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights,
+                           const Vec3& up) {
+  state_->set_style(preferred, strength, sharpness, weights, up);
 }
 
 void LiveSolver::clear_style() { state_->clear_style(); }
@@ -30,6 +31,8 @@ std::shared_ptr<RadialField> LiveSolver::solve(Index iterations, double toleranc
 }
 
 void LiveSolver::reset() { state_->reset(); }
+
+void LiveSolver::adopt(const DeformationField& field) { state_->adopt(field); }
 
 void LiveSolver::track(PointsIn points) { state_->track(points); }
 

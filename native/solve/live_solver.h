@@ -26,9 +26,11 @@ class ARAPFIELDS_EXPORT LiveSolver {
 
   /// Other handles for the same surface; the shape at hand stays the start of the next solve.
   void set_handles(const std::vector<Handle>& handles);
-  /// Preferred normals (k,3), strength ≥ 0 (0 takes the style away), sharpness σ, and weights (one for each
-  /// surface sample given to the constructor, or empty).
-  void set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights = {});
+  /// Preferred normals (k,3), strength ≥ 0 (0 takes the style away), sharpness σ (0: from the normals),
+  /// weights (one for each surface sample given to the constructor, or empty); `up` is where the figure's
+  /// head is: without handles it stands on what lies lowest.
+  void set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights = {},
+                 const Vec3& up = Vec3::UnitZ());
   void clear_style();
   /// Energies that join the solver's own, and an observer of its steps.
   void set_hooks(const LiveHooks& hooks);
@@ -39,6 +41,9 @@ class ARAPFIELDS_EXPORT LiveSolver {
                                      const Progress& progress = {});
   /// Back to the identity, and the handles' targets to rest.
   void reset();
+  /// Takes another field's shape, as well as its own centers can, as the start of the next solve. In the
+  /// samples' frame.
+  void adopt(const DeformationField& field);
 
   /// Points (n,3) of mesh coordinates whose places tracked() tells cheaply.
   void track(PointsIn points);

@@ -7,17 +7,21 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "distance/morton.h"
+#include "sampling/canonical_order.h"
+#include "sampling/local_thickness.h"
 #include "solve/live_setup.h"
 #include "solve/live_stiffness.h"
 #include "solve/notes.h"
 #include "solve/setup.h"
+#include "solve/surface_stiffness.h"
 
 namespace arapfields {
 namespace {
 
 /// Samples that the centers' centers are chosen from.
 constexpr Index center_candidates = 6000;
+/// Centers stand as densely as the root of the thickness asks, down to this share of its median.
+constexpr double least_size = 0.1;
 /// Weight, against the surface's energy, with which a style without handles holds the lowest sample in place.
 constexpr double anchor_weight = 1.0;
 
@@ -44,19 +48,25 @@ LiveSolver::State::State(const SurfaceSamples& samples, const std::vector<Handle
   const Stopwatch watch;
   const ThreadScope threads(options.threads);
   Random random(static_cast<std::uint64_t>(options.seed));
-  const std::vector<std::uint32_t> order = morton_order(surface_);
+  const std::vector<std::uint32_t> order = canonical_order(surface_);
+  const LocalThickness thickness(surface_, surface_normals_, order);
   chosen_ = stratified(order, options.samples, random);
   const std::vector<Index> candidates = stratified(order, center_candidates, random);
   std::vector<RadialScale> scales;
   if (options.coarse_centers > 0) scales.push_back({options.coarse_centers, options.coarse_radius_factor});
-  scales.push_back({options.fine_centers, options.fine_radius_factor});
+  scales.push_back({options.fine_centers, options.fine_radius_factor, true});
   const Points spread = rows_of(surface_, candidates);
-  basis_ = radial_basis(spread, scales);
-  if (options.interior && surface_normals_.rows() == surface_.rows())
-    basis_.set_embedding(interior_embedding(spread, rows_of(surface_normals_, candidates)));
+  const Vector thick = thickness.at(spread);
+  const bool oriented = surface_normals_.rows() == surface_.rows();
+  const Points spread_normals = oriented ? rows_of(surface_normals_, candidates) : Points();
+  RadialLayout layout{.sizes = (thick / thickness.median()).cwiseMax(least_size).cwiseSqrt(), .inner = {}};
+  if (oriented) layout.inner = spread - thick.asDiagonal() * spread_normals;
+  basis_ = radial_basis(spread, scales, layout);
+  if (options.interior && oriented) basis_.set_embedding(interior_embedding(spread, spread_normals));
   coefficients_ = basis_.identity();
   progress.report(0.2, "centers placed");
-  stiffness_ = surface_stiffness(basis_, rows_of(surface_, chosen_), options.surface.bending);
+  bending_ = SurfaceStiffness(samples, options.surface, order).bending(rows_of(surface_, chosen_));
+  stiffness_ = stiffness_matrix(basis_, rows_of(surface_, chosen_), bending_);
   progress.report(0.8, "stiffness");
   prepare(fast_);
   set_handles(handles);
@@ -65,25 +75,20 @@ LiveSolver::State::State(const SurfaceSamples& samples, const std::vector<Handle
 
 template <class Scalar>
 void LiveSolver::State::prepare(Precision<Scalar>& precision) {
-  precision.objective = std::make_unique<LiveObjective<Scalar>>(
-      basis_, rows_of(surface_, chosen_), options_.surface.bending, options_.handle_weight);
+  precision.objective = std::make_unique<LiveObjective<Scalar>>(basis_, rows_of(surface_, chosen_), bending_,
+                                                                options_.handle_weight);
   precision.objective->set_barrier(options_.surface.barrier, options_.surface.barrier_threshold);
-  if (pairs_.sources.rows() > 0) precision.objective->set_handles(pairs_, pair_values_, inverse_factor_);
+  if (inverse_factor_.size() > 0) precision.objective->set_handles(pairs_, pair_values_, inverse_factor_);
   precision.objective->set_style(style_);
   precision.objective->set_hooks(hooks_, rows_of(surface_, chosen_));
-}
-
-template <class Call>
-void LiveSolver::State::for_each_precision(Call&& call) {
-  if (fast_.objective) call(fast_);
-  if (exact_.objective) call(exact_);
+  precision.objective->set_stance(stance_);
 }
 
 void LiveSolver::State::choose_pairs() {
   pair_rows_.clear();
   if (handles_.empty()) {
     Index lowest = 0;
-    surface_.col(2).minCoeff(&lowest);
+    (surface_ * up_).minCoeff(&lowest);
     pairs_ = {surface_.row(lowest), surface_.row(lowest),
               Vector::Constant(1, anchor_weight / options_.handle_weight)};
     return;
@@ -108,10 +113,27 @@ void LiveSolver::State::set_handles(const std::vector<Handle>& handles) {
   bound_ = BoundHandles(in_cube(handles, frame_), surface_);
   handles_ = handles;
   choose_pairs();
+  choose_stance();
+  inverse_factor_.resize(0, 0);
+  if (!handles_.empty()) factorise();
+}
+
+/// The preconditioner of the handles and the stance at hand.
+void LiveSolver::State::factorise() {
   pair_values_ = radial_rows(basis_, pairs_.sources, JetOrder::value);
-  inverse_factor_ = inverse_factor(stiffness_, pair_values_, options_.handle_weight * pairs_.weights);
+  RowMatrix<double> values = pair_values_;
+  Vector weights = options_.handle_weight * pairs_.weights;
+  if (stance_) {
+    const auto [rows, shares] = stance_rows(basis_, stance_->rest, stance_->stance);
+    values.conservativeResize(values.rows() + rows.rows(), Eigen::NoChange);
+    weights.conservativeResize(values.rows());
+    values.bottomRows(rows.rows()) = rows;
+    weights.tail(rows.rows()) = stance_->weight * shares;
+  }
+  inverse_factor_ = inverse_factor(stiffness_, values, weights);
   for_each_precision([&](auto& precision) {
     precision.objective->set_handles(pairs_, pair_values_, inverse_factor_);
+    precision.objective->set_stance(stance_);
     precision.u.resize(0);
   });
   u_before_.resize(0);
@@ -127,36 +149,6 @@ void LiveSolver::State::set_targets(const std::vector<Handle>& moved) {
   if (handles_.empty()) return;
   pairs_.targets = rows_of(bound_.targets(), pair_rows_);
   for_each_precision([&](auto& precision) { precision.objective->set_targets(pairs_.targets); });
-}
-
-void LiveSolver::State::set_style(PointsIn preferred, double strength, double sharpness,
-                                  const Vector& weights) {
-  require_range("strength", strength, 0, 1e6);
-  require(
-      weights.size() == 0 ||
-          (weights.size() == surface_.rows() && weights.allFinite() && weights.minCoeff() >= 0),
-      "weights", std::to_string(weights.size()) + " numbers, or negative or non-finite ones",
-      "one weight ≥ 0 for each of the " + std::to_string(surface_.rows()) + " samples, or none, is needed");
-  if (strength == 0.0) return clear_style();
-  require(surface_normals_.rows() == surface_.rows(), "samples", "they have no normals",
-          "a style needs samples with normals");
-  style_ = LiveStyle{gauss_preference(preferred, sharpness),
-                     rows_of(surface_normals_, chosen_),
-                     {},
-                     strength * options_.gauss_weight};
-  if (weights.size() > 0) {
-    style_->sample_weights.resize(static_cast<Index>(chosen_.size()));
-    for (std::size_t i = 0; i < chosen_.size(); ++i)
-      style_->sample_weights[static_cast<Index>(i)] = weights[chosen_[i]];
-  }
-  for_each_precision([&](auto& precision) { precision.objective->set_style(style_); });
-  optimizer_.forget();
-}
-
-void LiveSolver::State::clear_style() {
-  style_.reset();
-  for_each_precision([&](auto& precision) { precision.objective->set_style(style_); });
-  optimizer_.forget();
 }
 
 void LiveSolver::State::set_hooks(const LiveHooks& hooks) {
@@ -191,6 +183,7 @@ std::shared_ptr<RadialField> LiveSolver::State::solve(Index iterations, double t
   if (iterations <= 0) iterations = options_.iterations;
   if (tolerance <= 0.0) tolerance = options_.tolerance;
   report_.iterations = report_.evaluations = 0;
+  if (inverse_factor_.size() == 0) factorise();
   if (!handles_.empty() && !style_) follow_rigidly();
   extrapolate();
   const bool fast_alone = tolerance >= single_tolerance;
@@ -258,7 +251,6 @@ void LiveSolver::State::measure(Precision<Scalar>& precision) {
   if (precision.u.size() == 0) objective.measure(coefficients_, precision.u);
   const LiveTerms terms = objective.terms(precision.u);
   report_.arap = terms.arap;
-  report_.energy = terms.arap.stretch + options_.surface.bending * terms.arap.bend;
   report_.preference.reset();
   if (style_) report_.preference = 1.0 - terms.gauss;
   report_.distortion = distortion<Scalar>(objective.jets(precision.u));
@@ -284,6 +276,32 @@ void LiveSolver::State::reset() {
   const double setup = report_.setup_seconds;
   report_ = {};
   report_.setup_seconds = setup;
+}
+
+/// The projection in the surrogate's norm; its factor is that of fewer samples, so it takes some rounds.
+void LiveSolver::State::adopt(const DeformationField& field) {
+  constexpr int rounds = 3;
+  const ThreadScope threads(options_.threads);
+  const LiveObjective<float>& objective = *fast_.objective;
+  const Points places = rows_of(surface_, chosen_);
+  JetBlock<double> jets(places.rows(), JetOrder::second);
+  field.evaluate(places, jets.view());
+  Points ends(pairs_.sources.rows(), 3);
+  field.evaluate(pairs_.sources, {ends.data(), ends.rows(), JetOrder::value});
+  VectorF wanted = VectorF::Zero(30 * places.rows() + 3 * ends.rows() + 3 * basis_.center_count());
+  wanted.head(30 * places.rows()) =
+      Eigen::Map<const Vector>(jets.view().data, 30 * places.rows()).cast<float>();
+  wanted.segment(30 * places.rows(), 3 * ends.rows()) =
+      Eigen::Map<const Vector>(ends.data(), 3 * ends.rows()).cast<float>();
+  VectorF u;
+  for (int round = 0; round < rounds; ++round) {
+    objective.measure(coefficients_, u);
+    coefficients_ += objective.precondition(objective.pull_back(objective.weighted(wanted - u)));
+  }
+  fast_.u.resize(0);
+  exact_.u.resize(0);
+  u_before_.resize(0);
+  optimizer_.forget();
 }
 
 std::shared_ptr<RadialField> LiveSolver::State::field() const {

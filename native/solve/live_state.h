@@ -15,12 +15,14 @@ class LiveSolver::State {
   State(const SurfaceSamples& samples, const std::vector<Handle>& handles, const LiveOptions& options,
         const Progress& progress);
   void set_handles(const std::vector<Handle>& handles);
-  void set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights);
+  void set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights,
+                 const Vec3& up);
   void clear_style();
   void set_hooks(const LiveHooks& hooks);
   void set_targets(const std::vector<Handle>& moved);
   std::shared_ptr<RadialField> solve(Index iterations, double tolerance, const Progress& progress);
   void reset();
+  void adopt(const DeformationField& field);
   void track(PointsIn points) { tracked_ = TrackedPoints(basis_, frame_, points); }
   PointsF tracked() const { return tracked_.moved(coefficients_); }
   std::shared_ptr<RadialField> field() const;
@@ -42,8 +44,14 @@ class LiveSolver::State {
   template <class Scalar>
   void measure(Precision<Scalar>& precision);
   template <class Call>
-  void for_each_precision(Call&& call);
+  void for_each_precision(Call&& call) {
+    if (fast_.objective) call(fast_);
+    if (exact_.objective) call(exact_);
+  }
   void choose_pairs();
+  void choose_stance();
+  void stand_otherwise();
+  void factorise();
   void follow_rigidly();
   void extrapolate();
   void hold_lowest();
@@ -53,6 +61,7 @@ class LiveSolver::State {
   Frame frame_;
   Points surface_, surface_normals_;  // all samples, cube coordinates
   std::vector<Index> chosen_;         // those that the energy sees
+  Vector bending_;                    // λ of these
   std::vector<Handle> handles_;
   BoundHandles bound_;
   std::vector<Index> pair_rows_;  // rows of bound_ that pull
@@ -61,7 +70,8 @@ class LiveSolver::State {
   RowMatrix<double> stiffness_, pair_values_, inverse_factor_;
   std::optional<LiveStyle> style_;
   LiveHooks hooks_;
-  double style_strength_ = 0.0;
+  Vec3 up_ = Vec3::UnitZ();
+  std::optional<LiveStance> stance_;
   Precision<float> fast_;    // what a drag needs
   Precision<double> exact_;  // what follows where more is asked for; made when it first is
   QuasiNewton optimizer_;

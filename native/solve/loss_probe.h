@@ -8,6 +8,7 @@
 #include "energies/external_energy.h"
 #include "energies/handles.h"
 #include "mesh/surface_samples.h"
+#include "options/surface.h"
 
 namespace arapfields {
 
@@ -22,7 +23,7 @@ struct LossGradient {
 class ARAPFIELDS_EXPORT_TO_TESTS LossProbe {
  public:
   LossProbe(const SurfaceSamples& samples, const std::vector<Handle>& handles, int width, double bending,
-            const Points& preferred, double gauss, double barrier, double margin,
+            const Points& preferred, double gauss, double barrier, double margin, double keep_stance,
             const ExternalEnergies& external = {});
   ~LossProbe();
   /// The parameters become these; the subsets are those of the seed.
@@ -47,5 +48,9 @@ class ARAPFIELDS_EXPORT_TO_TESTS EnergyTrial {
   struct State;
   std::unique_ptr<State> state_;
 };
+
+/// Local thickness at the samples, in mesh units; λ there, in the samples' cube.
+ARAPFIELDS_EXPORT_TO_TESTS Vector probe_thickness(const SurfaceSamples& samples);
+ARAPFIELDS_EXPORT_TO_TESTS Vector probe_bending(const SurfaceSamples& samples, const SurfaceOptions& options);
 
 }  // namespace arapfields

@@ -23,6 +23,6 @@ std::shared_ptr<const DeformationField> radial_start(const SurfaceSamples& sampl
 /// As stylize (solve/stylize.h) for options.field "radial".
 Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const StylizeOptions& options,
                         const Progress& progress, const Vector& weights, const std::vector<Handle>& handles,
-                        const SolveHooks& hooks = {});
+                        const Vec3& up, const SolveHooks& hooks = {});
 
 }  // namespace arapfields

@@ -4,6 +4,7 @@
 #include "core/device.h"
 #include "core/parallel.h"
 #include "fields/neural_field.h"
+#include "solve/field_choice.h"
 #include "solve/radial.h"
 #include "solve/report.h"
 #include "solve/setup.h"
@@ -23,9 +24,9 @@ void check_samples(const SurfaceSamples& samples, const Vector& weights) {
 }
 
 /// The surface's lowest sample, asked to stay where it is.
-Handle hold_lowest(const SurfaceSamples& samples) {
+Handle hold_lowest(const SurfaceSamples& samples, const Vec3& up) {
   Index lowest = 0;
-  samples.points.col(2).minCoeff(&lowest);
+  (samples.points * up).minCoeff(&lowest);
   Handle handle;
   handle.kind = Handle::Kind::point;
   handle.rest_point = handle.target_point = samples.points.row(lowest);
@@ -43,25 +44,32 @@ void hold(NeuralField& field, const Handle& handle) {
 
 Solution stylize(const SurfaceSamples& samples, PointsIn preferred, const StylizeOptions& options,
                  const Progress& progress, const Vector& weights, const std::vector<Handle>& handles,
-                 const SolveHooks& hooks) {
+                 const Vec3& up, const SolveHooks& hooks) {
   options.validate();
   check_samples(samples, weights);
-  if (options.field == FieldKind::radial)
-    return stylize_radial(samples, preferred, options, progress, weights, handles, hooks);
+  if (chosen_field(options) == FieldKind::radial)
+    return stylize_radial(samples, preferred, options, progress, weights, handles, up, hooks);
   const ThreadScope threads(options.machine.threads);
   ObjectiveTerms terms;
   terms.batch = options.training.batch;
   terms.rigidity = options.rigidity;
-  terms.surface = options.surface;
+  terms.stiffness = SurfaceStiffness(samples, options.surface);
+  terms.barrier = options.surface.barrier;
+  terms.barrier_threshold = options.surface.barrier_threshold;
   terms.preference = gauss_preference(preferred, options.sharpness);
-  terms.gauss = options.strength * options.gauss_weight;
-  terms.preference_weights = weights;
+  terms.gauss = options.strength * options.gauss_weight * terms.preference->balance;
+  terms.preference_weights = terms.preference->reach(samples.normals);
+  if (weights.size() > 0) terms.preference_weights = terms.preference_weights.cwiseProduct(weights);
   terms.external = hooks.energies;
-  const Handle lowest = hold_lowest(samples);
+  const Handle lowest = hold_lowest(samples, up);
   terms.handles = handles.empty() ? BoundHandles({lowest}, samples.points)
                                   : BoundHandles(in_cube(handles, samples.frame), samples.points);
   terms.pull = options.handles;
-  if (handles.empty()) terms.pull.handle_weight = 1.0;
+  if (handles.empty()) {
+    terms.pull.handle_weight = 1.0;
+    terms.keep_stance = options.keep_stance;
+    terms.stance = Stance::of(samples.points, up);
+  }
 
   auto field = std::make_shared<NeuralField>(MlpShape{options.network, 3},
                                              static_cast<std::uint64_t>(options.training.seed), false,

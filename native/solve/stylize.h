@@ -11,17 +11,18 @@
 namespace arapfields {
 
 /// Deforms a surface so that its normals turn to the preferred ones (k,3), as rigidly as possible:
-///   strength·gauss_weight·mean u(1 − g(ñ)) + rigidity·(stretch + bending·bend) + handles,
+///   strength·gauss_weight·mean u(1 − g(ñ)) + rigidity·(stretch + bending·bend) + keep_stance·stance +
+///   handles,
 /// ñ the unit normals of the deformed surface. (The paper's text has the sign of the first term reversed and
 /// leaves the normals without unit length, which a collapsing surface would win.) Without handles the lowest
-/// sample is held in place. `weights` (one u ≥ 0 a sample, or empty) blend the effect. Strength 0 is the
-/// identity. External energies may feel where
+/// sample, against the direction `up`, is held in place; with handles, there is no stance. `weights` (one u ≥
+/// 0 a sample, or empty) blend the effect. Strength 0 is the identity. External energies may feel where
 /// the surface is: beside them the lowest sample is held by its spring alone. An observer is told of deform's
-/// terms, and of style. Throws InvalidInput for bad options,
+/// terms, of style and of stance. Throws InvalidInput for bad options,
 /// samples without normals, weights or handles that do not fit; SolveDiverged; Cancelled.
 ARAPFIELDS_EXPORT Solution stylize(const SurfaceSamples& samples, PointsIn preferred,
                                    const StylizeOptions& options, const Progress& progress = {},
                                    const Vector& weights = {}, const std::vector<Handle>& handles = {},
-                                   const SolveHooks& hooks = {});
+                                   const Vec3& up = Vec3::UnitZ(), const SolveHooks& hooks = {});
 
 }  // namespace arapfields

@@ -6,7 +6,7 @@ import pytest
 
 from addon.core.errors import UserError
 from addon.core.geometry.handles import box_matrix, require_held, solve_handle
-from addon.core.geometry.spaces import inverse, pose, rigid_motion, space_of, transform
+from addon.core.geometry.spaces import inverse, pose, rigid_motion, space_of, transform, upright
 
 EXACT = 1e-9  # float64 arithmetic on numbers near one
 
@@ -135,3 +135,18 @@ def test_handles_that_hold_nothing_are_named():
 def test_a_flat_box_is_refused():
     with pytest.raises(UserError, match="Empty: its box is flat"):
         solve_handle("Empty", "CUBE", np.diag([1.0, 1.0, 0.0, 1.0]), np.eye(4), space_of(np.eye(4)))
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_upright_axes_stand_and_head_where_the_object_does(axis, sign):
+    """Whichever axis points up: z is the world's up, x is level and lies along one of the object's axes."""
+    rng = np.random.default_rng(axis)
+    turn = np.roll(np.eye(3), axis, axis=0) * [1, sign, sign]
+    angle = rng.uniform(0, 2 * np.pi)
+    about = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    axes = upright(about @ turn)
+    assert np.allclose(axes.T @ axes, np.eye(3)) and np.linalg.det(axes) > 0
+    assert np.array_equal(axes[:, 2], [0, 0, 1])
+    assert np.isclose(np.abs((about @ turn).T @ axes[:, 0]).max(), 1)
+    assert np.allclose(upright(about), about)

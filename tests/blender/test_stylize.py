@@ -29,7 +29,7 @@ def test_a_ball_turns_towards_a_cube_and_keeps_its_mesh():
     assert json.loads(result["arapfields_report"])["preference"] > 0.75
 
 
-@pytest.mark.parametrize("frame", ["OBJECT", "WORLD", "EMPTY"])
+@pytest.mark.parametrize("frame", ["UPRIGHT", "OBJECT", "WORLD", "EMPTY"])
 @in_blender
 def test_the_style_stands_along_the_chosen_axes(frame):
     """A ball, turned: the cube's axes are those along which its result is most flat."""
@@ -56,7 +56,41 @@ def test_the_style_stands_along_the_chosen_axes(frame):
 
     # A cube reaches least along its axes.
     flattest = min((20, 0, -25), key=reach)
-    assert flattest == {"OBJECT": 20, "WORLD": 0, "EMPTY": -25}[frame]
+    assert flattest == {"UPRIGHT": 20, "OBJECT": 20, "WORLD": 0, "EMPTY": -25}[frame]
+
+
+@in_blender
+def test_imported_objects_are_styled_upright():
+    """A ball, turned as an import turns objects: the flat side of a cone lies below, and there it stands."""
+    import math
+
+    import bpy
+    import numpy as np
+    import scenes
+    from test_stylize import SETTINGS, ball
+
+    item = ball()
+    item.rotation_euler.x = math.radians(90)
+    bpy.context.view_layer.update()
+    lowest = scenes.world_points(item)[:, 2].argmin()
+    start = scenes.world_points(item)[lowest]
+
+    def low_and_high():
+        points = scenes.world_points(bpy.data.objects["Ball_stylized"])
+        radii = np.linalg.norm(points[:, :2] - points[:, :2].mean(axis=0), axis=1)
+        heights = points[:, 2] - points[:, 2].min()
+        return radii[heights < 0.1 * np.ptp(heights)].max(), radii[heights > 0.9 * np.ptp(heights)].max()
+
+    bpy.ops.arapfields.stylize(style="CONE", **SETTINGS)
+    assert item.arapfields.stylize.frame == "UPRIGHT"
+    below, above = low_and_high()
+    assert below > 1.5 * above
+    moved = scenes.world_points(bpy.data.objects["Ball_stylized"])[lowest]
+    assert np.linalg.norm(moved - start) < 0.05
+    scenes.activate(item)
+    bpy.ops.arapfields.stylize(style="CONE", frame="OBJECT", **SETTINGS)
+    below, above = low_and_high()
+    assert below < 1.5 * above
 
 
 @in_blender

@@ -159,12 +159,12 @@ def calls(rng, things):
             [t["samples"], t["handles"], deform_options(rng, t), [], None, task],
         ),
         "stylize": lambda: (
-            by_name(af.stylize, "weights", "handles", "orientation", "energies", "callback", "task"),
+            by_name(af.stylize, "weights", "handles", "orientation", "up", "energies", "callback", "task"),
             [
                 t["samples"],
                 "cube",
                 odd_options(rng, t, af.StylizeOptions, iterations=2, batch=20, **TINY),
-                *[np.ones(60), t["handles"][:1], np.eye(3), [], None, task],
+                *[np.ones(60), t["handles"][:1], np.eye(3), np.ones(3), [], None, task],
             ],
         ),
         "train_inverse": lambda: (
@@ -183,6 +183,7 @@ def calls(rng, things):
         "arap_energy": lambda: (af.arap_energy, [t["field"], ROWS]),
         "distortion": lambda: (af.distortion, [t["field"], ROWS]),
         "gauss_preference": lambda: (by_name(af.gauss_preference, "sharpness"), [NORMALS, np.eye(3), 5.0]),
+        "style_sharpness": lambda: (af.style_sharpness, [NORMALS]),
         "preferred_normals": lambda: (af.preferred_normals, ["cube"]),
         "extract_surface": lambda: (by_name(af.extract_surface, "threads", "task"), [t["sdf"], 9, 1, task]),
         "extract_deformed": lambda: (
@@ -199,8 +200,8 @@ def calls(rng, things):
         ),
         "live.track": lambda: (t["live"].track, [ROWS]),
         "live.set_style": lambda: (
-            by_name(t["live"].set_style, "sharpness", "weights"),
-            ["cube", 0.5, 5.0, np.ones(60)],
+            by_name(t["live"].set_style, "sharpness", "weights", "up"),
+            ["cube", 0.5, 5.0, np.ones(60), np.ones(3)],
         ),
         "live.set_handles": lambda: (t["live"].set_handles, [t["handles"][:1]]),
         "sample_curve": lambda: (by_name(af.sample_curve, "closed"), [CIRCLE, 50, True]),

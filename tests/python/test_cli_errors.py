@@ -91,6 +91,8 @@ def test_bad_outputs_are_refused_before_the_work(verb, output, folder, capsys):
         (["stylize", "mesh.obj", "-o", "a.obj", "--style", "cube", "--strength", "7"], "strength"),
         (["stylize", "mesh.obj", "-o", "a.obj", "--normals", "none.txt"], "none.txt"),
         (["stylize", "mesh.obj", "-o", "a.obj", "--style", "cube", "--style-turn", "z", "9"], "--style-turn"),
+        (["stylize", "mesh.obj", "-o", "a.obj", "--style", "cube", "--up", "0,0,0"], "--up"),
+        (["stylize", "mesh.obj", "-o", "a.obj", "--style", "cube", "--up", "y"], "--up"),
         (["grid", "mesh.obj", "-o", "a.npz", "--resolution", "0"], "resolution"),
         (["warp", "mesh.obj", "mesh.obj", "-o", "a.obj"], "mesh.obj"),
     ],

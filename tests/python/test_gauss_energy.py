@@ -65,8 +65,9 @@ def test_bad_preferences_are_named():
     for preferred, message in cases:
         with pytest.raises(af.InvalidInput, match=message):
             af.gauss_preference(cube, preferred)
-    with pytest.raises(af.InvalidInput, match="sharpness"):
-        af.gauss_preference(cube, cube, sharpness=0.0)
+    for sharpness in (-1.0, 101.0, np.nan):
+        with pytest.raises(af.InvalidInput, match="sharpness"):
+            af.gauss_preference(cube, cube, sharpness=sharpness)
 
 
 @pytest.mark.parametrize("name", ["cube", "dodecahedron", "cone", "plane pair"])

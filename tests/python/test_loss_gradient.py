@@ -15,8 +15,9 @@ TERMS = {
     "bend": dict(bending=0.05),
     "gauss": dict(bending=0.01, preferred=STYLE, gauss=2.0),
     "barrier": dict(barrier=3.0),
+    "stance": dict(keep_stance=2.0),
     "exact handles": dict(bending=0.05, margin=0.4),
-    "everything": dict(bending=0.01, preferred=STYLE, gauss=2.0, barrier=3.0, margin=0.4),
+    "everything": dict(bending=0.01, preferred=STYLE, gauss=2.0, barrier=3.0, margin=0.4, keep_stance=2.0),
 }
 
 

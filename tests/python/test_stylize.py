@@ -27,7 +27,7 @@ def moved_normals(field, samples):
     return normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
-def mean_preference(field, samples, preferred, sharpness=5.0):
+def mean_preference(field, samples, preferred, sharpness=0.0):
     return af.gauss_preference(moved_normals(field, samples), preferred, sharpness=sharpness).mean()
 
 

@@ -89,6 +89,17 @@ def pose(matrix):
     return result
 
 
+def upright(turn):
+    """(3, 3) axes, as columns, upright in the world; they head where an object with this (3, 3) turn does.
+
+    z is the world's up, whichever of the object's axes points there; x lies level along the object's x, or
+    along its y where x stands on end.
+    """
+    heading = turn[:, 1 if np.abs(turn[2]).argmax() == 0 else 0] * [1.0, 1.0, 0.0]
+    x = heading / np.linalg.norm(heading)
+    return np.stack([x, np.cross([0.0, 0.0, 1.0], x), [0.0, 0.0, 1.0]], axis=1)
+
+
 def rigid_motion(rest, target):
     """The proper rigid motion that takes the pose of one matrix to that of the other; scale is ignored."""
     motion = pose(target) @ inverse(pose(rest))

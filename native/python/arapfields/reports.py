@@ -178,6 +178,15 @@ class ExtractionReport(Report):
     open: bool
     """Whether the surface leaves the cube, so that the mesh has a boundary."""
     seconds: float
+    pieces: int
+    """Parts of the mesh that share no vertex."""
+    thin_cells: int
+    """Cells at parts thinner than two cells."""
+    refinement: int
+    """Steps into which an edge of these was cut; 1 where none was."""
+    holding_resolution: int
+    """One that holds what came apart in fewer pieces; 0 where none was found or nothing did."""
+    notes: tuple[str, ...]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -122,6 +122,17 @@ def rotation(value):
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
+def turn_upright(up):
+    """(3, 3) the smallest rotation that takes z to the direction (3,)."""
+    length = np.linalg.norm(up)
+    if not 0 < length < np.inf:
+        raise ValueError("a direction is zero or not finite")
+    axis = np.array([-up[1], up[0], 0.0])
+    if not axis.any():
+        axis = np.array([1.0, 0.0, 0.0])
+    return rotation({"axis": axis, "degrees": np.degrees(np.arccos(np.clip(up[2] / length, -1, 1)))})
+
+
 def _numbers(value, shape):
     array = np.asarray(value, float)
     if array.shape != shape or not np.isfinite(array).all():

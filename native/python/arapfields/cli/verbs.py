@@ -11,7 +11,7 @@ import arapfields as af
 from .. import grids
 from .._files import existing_file, json_text
 from . import files
-from .handles import build_handles, read_handles, rotation, triple
+from .handles import build_handles, read_handles, rotation, triple, turn_upright
 from .options import given, given_options
 from .running import Outputs, with_progress
 
@@ -60,6 +60,13 @@ def stylize(args):
             f"--style: unknown style {args.style!r}; known are {', '.join(af.style_names())}"
         )
     normals = af.preferred_normals(args.style) if args.style else files.read_normals(args.normals)
+    up = None
+    if args.up:
+        try:
+            up = np.array(triple(args.up))
+            normals = normals @ turn_upright(up).T
+        except (ValueError, argparse.ArgumentTypeError) as error:
+            raise af.InvalidInput(f"--up: expected a direction as x,y,z ({error})") from error
     if args.style_turn:
         try:
             turn = {"axis": triple(args.style_turn[0]), "degrees": float(args.style_turn[1])}
@@ -68,7 +75,7 @@ def stylize(args):
             raise af.InvalidInput(f"--style-turn: expected AXIS as x,y,z and DEGREES ({error})") from error
 
     def solve(samples, handles, task):
-        return af.stylize(samples, normals, options, handles=handles, task=task)
+        return af.stylize(samples, normals, options, handles=handles, up=up, task=task)
 
     _solve(args, solve, options.seed, needs_handles=False)
 
@@ -139,13 +146,16 @@ def _samples(source, count, seed, args):
 def _extracted(sdf, args, field=None):
     """The surface at rest, or deformed by a field in the way --through says."""
     through = field is not None and args.through == "inverse"
+    settings = {"resolution": args.resolution, "refine_thin": args.refine_thin}
 
     def extract(task):
         if through:
-            return af.extract_deformed(sdf, field, resolution=args.resolution, task=task)
-        return af.extract_surface(sdf, resolution=args.resolution, task=task)
+            return af.extract_deformed(sdf, field, **settings, task=task)
+        return af.extract_surface(sdf, **settings, task=task)
 
-    vertices, triangles = with_progress("extract", extract, args.quiet)
+    extraction = with_progress("extract", extract, args.quiet)
+    _print_notes(args, extraction.report)
+    vertices, triangles = extraction
     return (vertices if through or field is None else field(vertices)), triangles
 
 
@@ -196,11 +206,15 @@ def _write_report(outputs, place, report):
         outputs.write(place, lambda path: path.write_text(json_text(report.to_dict(), indent=2) + "\n"))
 
 
+def _print_notes(args, report):
+    for note in () if args.quiet else getattr(report, "notes", ()):
+        print(f"note: {note}", file=sys.stderr)
+
+
 def _summary(args, text, report=None):
     if args.quiet:
         return
-    for note in getattr(report, "notes", ()):
-        print(f"note: {note}", file=sys.stderr)
+    _print_notes(args, report)
     numbers = {
         k: v
         for k, v in (report.to_dict() if report else {}).items()

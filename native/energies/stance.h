@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/jets.h"
+
+namespace arapfields {
+
+/// How a figure stands: which way is up, and where it touches the ground.
+struct ARAPFIELDS_EXPORT Stance {
+  Vec3 up = Vec3::UnitZ();
+  double scale = 1.0;  ///< one over its squared radius of gyration
+  Vector ground;       ///< (n) weights of the samples on the ground, above 0 within 5 % of the height
+
+  /// Of samples (n,3). Throws InvalidInput for a zero or non-finite direction.
+  static Stance of(PointsIn points, const Vec3& upwards);
+  /// Of some of the samples.
+  Stance at(const std::vector<Index>& rows) const;
+};
+
+/// scale · (mean ‖d − d̄‖² + mean ground ((d − d̂)·up)²) with d = f(x) − x the ways of samples x (n,3), d̄ their
+/// mean and d̂ their mean over the ground: how far a surface moves other than by a translation, and how uneven
+/// its ground becomes. Rigidity minds neither: it turns a leg, or the whole, for nothing. Adds weight times
+/// its cotangents on the value column (data may be null).
+template <class Scalar>
+ARAPFIELDS_EXPORT double stance_energy(JetView<const Scalar> jets, ConstPointsRef<Scalar> rest,
+                                       const Stance& stance, double weight, JetView<Scalar> cotangents);
+
+}  // namespace arapfields

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "options/deform.h"
+#include "options/stylize.h"
+
+namespace arapfields {
+
+/// What represents the motion: `field`, and where that is left to us, a network if any option that only
+/// networks have is not at its default, else radial functions.
+FieldKind chosen_field(const DeformOptions& options);
+FieldKind chosen_field(const StylizeOptions& options);
+
+}  // namespace arapfields

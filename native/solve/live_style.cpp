@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the live solver knows of styles, and of the stance that a styled figure keeps.
+#include <string>
+
+#include "core/errors.h"
+#include "solve/live_setup.h"
+#include "solve/live_state.h"
+
+namespace arapfields {
+
+void LiveSolver::State::set_style(PointsIn preferred, double strength, double sharpness,
+                                  const Vector& weights, const Vec3& up) {
+  require_range("strength", strength, 0, 1e6);
+  require(
+      weights.size() == 0 ||
+          (weights.size() == surface_.rows() && weights.allFinite() && weights.minCoeff() >= 0),
+      "weights", std::to_string(weights.size()) + " numbers, or negative or non-finite ones",
+      "one weight ≥ 0 for each of the " + std::to_string(surface_.rows()) + " samples, or none, is needed");
+  if (strength == 0.0) return clear_style();
+  require(surface_normals_.rows() == surface_.rows(), "samples", "they have no normals",
+          "a style needs samples with normals");
+  const GaussPreference preference = gauss_preference(preferred, sharpness);
+  require(up.allFinite() && up.norm() > 0.0, "up", "zero, NaN or infinite", "a finite direction is needed");
+  const bool other_way_up = up != up_, first = !style_;
+  up_ = up;
+  style_ = LiveStyle{preference,
+                     rows_of(surface_normals_, chosen_),
+                     {},
+                     strength * options_.gauss_weight * preference.balance};
+  style_->sample_weights = preference.reach(style_->normals);
+  if (weights.size() > 0)
+    for (std::size_t i = 0; i < chosen_.size(); ++i)
+      style_->sample_weights[static_cast<Index>(i)] *= weights[chosen_[i]];
+  for_each_precision([&](auto& precision) { precision.objective->set_style(style_); });
+  optimizer_.forget();
+  if (handles_.empty() && (first || other_way_up)) stand_otherwise();
+}
+
+void LiveSolver::State::clear_style() {
+  const bool stood = stance_.has_value();
+  style_.reset();
+  for_each_precision([&](auto& precision) { precision.objective->set_style(style_); });
+  optimizer_.forget();
+  if (stood) stand_otherwise();
+}
+
+/// What is held of a figure without handles has changed; the next solve makes up for it.
+void LiveSolver::State::stand_otherwise() {
+  choose_pairs();
+  choose_stance();
+  inverse_factor_.resize(0, 0);
+}
+
+/// Without handles, a style's figure keeps its stance.
+void LiveSolver::State::choose_stance() {
+  stance_.reset();
+  if (style_ && handles_.empty() && options_.keep_stance > 0.0)
+    stance_ =
+        LiveStance{Stance::of(surface_, up_).at(chosen_), rows_of(surface_, chosen_), options_.keep_stance};
+}
+
+}  // namespace arapfields
