@@ -232,9 +232,8 @@ def unbound(rng):
     """A method of a class, called on something that is no good instance of it."""
     native = [v for v in vars(af._native).values() if isinstance(v, type)]
     chosen = rng.choice([v for v in native if not issubclass(v, BaseException)])
-    names = [
-        n for n in dir(chosen) if not n.startswith("__") or n in ("__call__", "__len__", "__repr__", "__eq__")
-    ]
+    called = ("__call__", "__len__", "__repr__", "__eq__")
+    names = [n for n in dir(chosen) if not n.startswith("__") or n in called]
     member = getattr(chosen, names[rng.integers(len(names))])
     call = member.fget if isinstance(member, property) else member
     return call, [chosen.__new__(chosen), *[ROWS] * int(rng.integers(2))]

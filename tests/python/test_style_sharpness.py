@@ -65,7 +65,9 @@ def test_no_sharpness_means_this_one(name):
     preferred = af.preferred_normals(name)
     normals = meshes.sphere(1.0)[0]
     automatic = af.gauss_preference(normals, preferred)
-    assert np.array_equal(automatic, af.gauss_preference(normals, preferred, af.style_sharpness(preferred)))
+    assert np.array_equal(
+        automatic, af.gauss_preference(normals, preferred, sharpness=af.style_sharpness(preferred))
+    )
     assert np.abs(af.gauss_preference(preferred, preferred) - 1).max() < GAUSS_WEIGHTS
 
 
@@ -80,7 +82,8 @@ def test_strength_means_the_same_for_all_styles():
     def closed(style, **options):
         how = af.StylizeOptions(field="radial", iterations=60, strength=0.5, **options)
         sharpness = options.get("sharpness", 0.0)
-        before = af.gauss_preference(samples.normals, af.preferred_normals(style), sharpness).mean()
+        preferred = af.preferred_normals(style)
+        before = af.gauss_preference(samples.normals, preferred, sharpness=sharpness).mean()
         return (af.stylize(samples, style, how).report["preference"] - before) / (1 - before)
 
     solids = ["cube", "octahedron", "dodecahedron", "icosahedron", "hexagonal prism"]

@@ -69,7 +69,7 @@ class FitReport(Report):
 
 
 @dataclass(frozen=True, kw_only=True)
-class HandleError:
+class HandleError(Report):
     """How far one handle's samples are from where they are asked to be, in mesh units."""
 
     error_mean: float
