@@ -37,8 +37,8 @@ CALLS = {
     "deform_radial": (deformed, {"field": "radial", "barrier": 0.0}, SURFACE - {"barrier"}),
     "deform_invertible": (deformed, {"invertibility": 1.0}, SURFACE | {"invertibility"}),
     "deform_stiff": (deformed, {"bending": 0.0, "barrier": 0.0}, {"stretch", "handles"}),
-    "stylize": (stylized, {}, SURFACE | {"style"}),
-    "stylize_radial": (stylized, {"field": "radial", "rigidity": 2.0}, SURFACE | {"style"}),
+    "stylize": (stylized, {}, SURFACE | {"style", "stance"}),
+    "stylize_radial": (stylized, {"field": "radial", "rigidity": 2.0}, SURFACE | {"style", "stance"}),
 }
 every_call = pytest.mark.parametrize("name", CALLS)
 
