@@ -33,13 +33,13 @@ at::Tensor InvertibleObjective::accumulate(TrainableField& field, Random& random
   inverse_.pull_back(inverse_cotangents);
   const double done = static_cast<double>(done_) / std::max(1, options_.training.iterations);
   optimizer_.step(options_.schedule.share(done_++, done));
-  cycle_ = scale * residual.square().sum();
-  return inner + cycle_;
+  cycle_ = std::make_shared<at::Tensor>(scale * residual.square().sum());
+  return inner + *cycle_;
 }
 
 std::vector<LossTerm> InvertibleObjective::terms() const {
   std::vector<LossTerm> terms = inner_.terms();
-  terms.push_back({"invertibility", cycle_.item<double>()});
+  terms.push_back({"invertibility", cycle_->item<double>()});
   return terms;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <memory>
 #include <string>
 
 #include "fields/neural_field.h"
@@ -27,7 +28,7 @@ class InvertibleObjective final : public Objective {
   int done_ = 0;
   NeuralField inverse_;
   Optimizer optimizer_;
-  at::Tensor cycle_;  // the last estimate of the weighted term
+  std::shared_ptr<at::Tensor> cycle_;  // the last estimate of the weighted term
 };
 
 }  // namespace arapfields

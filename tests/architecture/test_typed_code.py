@@ -73,7 +73,7 @@ REVEALED = {
     "mesh[0]": ARRAY,
     "mesh.report": "arapfields.reports.ExtractionReport",
     "af.extract_deformed(sdf, field).report": "arapfields.reports.DeformedExtractionReport",
-    "options.field": "Literal['neural', 'radial']",
+    "options.field": "Literal['auto', 'radial', 'neural']",
     "options.optimizer": "Literal['muon', 'adam']",
     "options.bending": "float",
     "options.iterations": "int",
