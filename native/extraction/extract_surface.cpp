@@ -61,11 +61,11 @@ bool drop_jumps(EvaluationCounter& function, double most, TriangleMesh& mesh) {
 /// cells there up.
 void hold_together(const SparseGrid& grid, const TricubicSurrogate* model, bool refine, TriangleMesh& mesh,
                    ExtractionReport& report, EvaluationCounter& function) {
-  const std::set<Place> thin = thin_cells(grid);
+  const ThinCells thin = thin_cells(grid);
   report.pieces = piece_count(mesh);
-  report.thin_cells = static_cast<Index>(thin.size());
+  report.thin_cells = static_cast<Index>(thin.cells.size());
   const bool cheap = points_a_thin_cell * report.thin_cells <= function.value_count();
-  if (thin.empty() || !(refine || (report.pieces > 1 && cheap))) return;
+  if (thin.cells.empty() || !(refine || (report.pieces > 1 && cheap))) return;
   const std::optional<double> known = function.gradient_bound();
   const double slope = model != nullptr ? model->lipschitz() : known ? *known : measure_lipschitz(function);
   std::optional<HeldParts> held = hold_thin_parts(

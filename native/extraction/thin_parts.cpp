@@ -42,12 +42,33 @@ bool passes_unseen(const SparseGrid::Window& window, int i, int j, int k, double
   return true;
 }
 
+void add_cells_at(const Place& point, int last, std::set<Place>& cells) {
+  for (int n = 0; n < 8; ++n) {
+    const Place cell{point[0] - (n >> 2), point[1] - ((n >> 1) & 1), point[2] - (n & 1)};
+    const auto [low, high] = std::minmax({cell[0], cell[1], cell[2]});
+    if (low >= 0 && high <= last) cells.insert(cell);
+  }
+}
+
+/// What is to be cut up next: into what the thin parts go on.
+std::set<Place> further_cells(const FineGrid& fine, const ThinCells& thin) {
+  std::set<Place> cells = cells_to_cut(fine), at_ends;
+  for (const Place& cell : fine.cells())
+    for (int c = 0; c < 8; ++c) {
+      const Place corner{cell[0] + (c >> 2), cell[1] + ((c >> 1) & 1), cell[2] + (c & 1)};
+      if (thin.ends.contains(corner)) add_cells_at(corner, fine.coarse().resolution() - 2, at_ends);
+    }
+  for (const Place& cell : at_ends)
+    if (!fine.cut(cell)) cells.insert(cell);
+  return cells;
+}
+
 }  // namespace
 
-std::set<Place> thin_cells(const SparseGrid& grid) {
+ThinCells thin_cells(const SparseGrid& grid) {
   constexpr int side = SparseGrid::side;
   const double step = grid.coordinate(1) - grid.coordinate(0);
-  std::set<Place> cells;
+  ThinCells result;
   for (const SparseGrid::Block& block : grid.blocks()) {
     SparseGrid::Window window;
     grid.look(block, window);
@@ -55,17 +76,14 @@ std::set<Place> thin_cells(const SparseGrid& grid) {
       const int i = at / (side * side), j = at / side % side, k = at % side;
       const Place place{block.place[0] * side + i, block.place[1] * side + j, block.place[2] * side + k};
       const bool inside = block.value[at] < 0.0f;
-      if (!(inside ? lies_alone(window, i, j, k) && !lies_deep(grid, place)
-                   : passes_unseen(window, i, j, k, step)))
-        continue;
-      for (int n = 0; n < 8; ++n) {
-        const Place cell{place[0] - (n >> 2), place[1] - ((n >> 1) & 1), place[2] - (n & 1)};
-        const auto [low, high] = std::minmax({cell[0], cell[1], cell[2]});
-        if (low >= 0 && high <= grid.resolution() - 2) cells.insert(cell);
-      }
+      if (!(inside ? lies_alone(window, i, j, k) : passes_unseen(window, i, j, k, step))) continue;
+      if (inside && lies_deep(grid, place))
+        result.ends.insert(place);
+      else
+        add_cells_at(place, grid.resolution() - 2, result.cells);
     }
   }
-  return cells;
+  return result;
 }
 
 Index piece_count(const TriangleMesh& mesh) {
@@ -90,14 +108,14 @@ Index piece_count(const TriangleMesh& mesh) {
   return pieces;
 }
 
-std::optional<HeldParts> hold_thin_parts(const SparseGrid& grid, const std::set<Place>& thin, Index pieces,
+std::optional<HeldParts> hold_thin_parts(const SparseGrid& grid, const ThinCells& thin, Index pieces,
                                          int most, double slope, EvaluationCounter& function) {
   std::optional<HeldParts> held;
   int unchanged = 0;
   for (const int factor : factors) {
     if ((grid.resolution() - 1) * factor + 1 > most) break;
     FineGrid fine(grid, factor);
-    for (std::set<Place> cells = thin; !cells.empty(); cells = cells_to_cut(fine)) {
+    for (std::set<Place> cells = thin.cells; !cells.empty(); cells = further_cells(fine, thin)) {
       function.progress().check();
       fine.cut(cells, slope, function);
     }

@@ -9,10 +9,16 @@
 
 namespace arapfields {
 
-/// Cells at parts that are thinner than two cells: at points alone between two that are outside, with no
-/// point two steps around that lies a cell deep; and at points outside to which, as |Φ| is nearly a distance,
-/// the surface comes nearer than half a step, though no point around is inside.
-std::set<Place> thin_cells(const SparseGrid& grid);
+/// Where parts are thinner than two cells.
+struct ThinCells {
+  /// Those at points alone between two that are outside, with no point two steps around that lies a cell
+  /// deep; and at points outside to which, as |Φ| is nearly a distance, the surface comes nearer than half a
+  /// step, though no point around is inside.
+  std::set<Place> cells;
+  /// Other points alone between two that are outside: where thin parts end in thick ones, or a mere edge.
+  std::set<Place> ends;
+};
+ThinCells thin_cells(const SparseGrid& grid);
 
 /// Parts of a mesh that share no vertex.
 Index piece_count(const TriangleMesh& mesh);
@@ -27,7 +33,7 @@ struct HeldParts {
 /// Cuts the cells up, and those that the thin parts go on into, more and more finely until the surface is one
 /// piece, or three factors in a row change nothing, or a grid as fine would have more than `most` points a
 /// side. The coarsest that gives the number of pieces found; nothing where not even a factor of 2 is allowed.
-std::optional<HeldParts> hold_thin_parts(const SparseGrid& grid, const std::set<Place>& thin, Index pieces,
+std::optional<HeldParts> hold_thin_parts(const SparseGrid& grid, const ThinCells& thin, Index pieces,
                                          int most, double slope, EvaluationCounter& function);
 
 }  // namespace arapfields
