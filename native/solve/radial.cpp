@@ -16,6 +16,7 @@ constexpr int steps_at_once = 10;
 /// From so many centers on, few centers make a first result, in so many steps at most.
 constexpr int worth_a_first = 600, first_steps = 12;
 constexpr int samples_a_center = 8;
+constexpr Index least_centers = 50;
 
 template <class Options>
 LiveOptions live_options(const Options& options) {
@@ -82,12 +83,15 @@ Solution deform_radial(const SurfaceSamples& samples, const std::vector<Handle>&
                        const DeformOptions& options, const Progress& progress, const SolveHooks& hooks) {
   require(options.handles.handle_weight > 0.0, "handle_weight", "0", "must be positive for 'radial'");
   LiveOptions fine = live_options(options);
-  fine.samples = std::max(fine.samples, samples_a_center * options.centers);
-  fine.coarse_centers = options.centers / 5;
-  fine.fine_centers = options.centers;
+  // More centers than the samples can tell apart would fit these and fold between them.
+  const Index carried = samples.size() / samples_a_center;
+  const int centers = static_cast<int>(std::min<Index>(options.centers, std::max(least_centers, carried)));
+  fine.samples = std::max(fine.samples, samples_a_center * centers);
+  fine.coarse_centers = centers / 5;
+  fine.fine_centers = centers;
   fine.handle_weight = options.handles.handle_weight;
   std::shared_ptr<RadialField> first;
-  if (options.centers >= worth_a_first) {
+  if (centers >= worth_a_first) {
     LiveOptions few = live_options(options);
     few.handle_weight = fine.handle_weight;
     few.tolerance = LiveOptions().tolerance;
