@@ -70,7 +70,7 @@ def test_a_dog_stands(style):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["dog", "dinosaur", "lizard", "octopus", "chapel"])
+@pytest.mark.parametrize("name", ["dog", "dinosaur"])  # what stands on feet
 @pytest.mark.parametrize("style", af.style_names())
 def test_every_style_of_every_figure_stands(name, style):
     share = looks_right(*styled(name, style), style)
