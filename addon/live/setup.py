@@ -16,7 +16,8 @@ def energy_weights(settings, kind):
     weights["handle_weight"] = settings.deform.handle_weight
     if kind == "STYLIZE":
         weights["rigidity"], weights["keep_stance"] = group.rigidity, group.keep_stance
-    return {name: from_single_precision(value) for name, value in weights.items()}
+    weights = {name: from_single_precision(value) for name, value in weights.items()}
+    return weights | {"bending_unit": group.bending_unit.lower()}
 
 
 def uses_handles(settings, kind):

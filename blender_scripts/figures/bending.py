@@ -27,7 +27,7 @@ def render(output):
         if weight is None:
             moved = bar
         else:
-            field, moved = deformed(bar, BOXES, samples, bending=weight)
+            field, moved = deformed(bar, BOXES, samples, bending=100 * weight, bending_unit="cube")
             stretch, bend = af.arap_energy(field, samples.points)
             results[f"{weight:g}"] = {**measured(field), "stretch": round(stretch, 5), "bend": round(bend, 4)}
         shown.append(add(moved, f"bar {weight}", place))

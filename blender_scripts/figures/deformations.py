@@ -62,7 +62,7 @@ CASES = {
 FINER = {
     "frequency": 4.0,
     "octaves": 6,
-    "bending": 1e-3,
+    "bending": 0.1,
     "learning_rate": 0.02,
     "width": 128,
     "iterations": 200,

@@ -22,7 +22,7 @@ STILL, FAR = np.array((0.62, 0.60, 0.56)), np.array((0.85, 0.06, 0.03))
 FULL = 0.3  # distance at which the colour is full
 OPTIONS = {  # fingers are a quarter of the cube apart: the second sees details of that size
     "default network": {},
-    "finer encoding": {"frequency": 4.0, "octaves": 6, "bending": 1e-3, "learning_rate": 0.02},
+    "finer encoding": {"frequency": 4.0, "octaves": 6, "bending": 0.1, "learning_rate": 0.02},
 }
 ITERATIONS = 80 if stage.DRAFT else 400
 SPACING, RESOLUTION = 1.15, 64 if stage.DRAFT else 144
@@ -49,7 +49,7 @@ def render(output):
         field = af.deform(samples, handles(GOAL), af.DeformOptions(iterations=ITERATIONS, **further))
         columns.append((name, field(vertices)))
         results[name] = {**measured(field), "shares": shares(vertices, columns[-1][1])}
-    live = af.LiveDeformer(samples, handles(TIP), af.LiveOptions(bending=0.01))
+    live = af.LiveDeformer(samples, handles(TIP), af.LiveOptions())
     columns.append(("radial field", live.solve([np.array(PALM.target), GOAL])(vertices)))
     results[columns[-1][0]] = {"shares": shares(vertices, columns[-1][1])}
     stage.clear()

@@ -16,7 +16,7 @@ OPTIONS = {
     "samples": 3000,
     "coarse_centers": 150,
     "fine_centers": 800,
-    "bending": 1e-3,
+    "bending": 0.1,
     "iterations": 40,
     "tolerance": 3e-4,
     "interior": False,  # a style acts everywhere alike: nothing is to be held apart

@@ -22,7 +22,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 import cases  # noqa: E402
 
 WEIGHTS = [0.0, 1e-3, 1e-2, 1e-1]
-THIN_PARTS = dict(frequency=4.0, octaves=6, bending=1e-3, learning_rate=0.02, iterations=600)
+THIN_PARTS = dict(frequency=4.0, octaves=6, bending=0.1, bending_unit="cube", learning_rate=0.02, iterations=600)
 
 
 def solved(samples, handles, **options):
@@ -31,7 +31,7 @@ def solved(samples, handles, **options):
 
 def trade(samples, handles):
     """(4, 2): mean stretch and mean bend for each weight of the bend."""
-    fields = [solved(samples, handles, bending=weight) for weight in WEIGHTS]
+    fields = [solved(samples, handles, bending=100 * weight, bending_unit="cube") for weight in WEIGHTS]
     return np.array([af.arap_energy(field, samples.points) for field in fields])
 
 

@@ -105,10 +105,22 @@ void bind_testing(py::module_& module) {
         JetArray<Scalar> cotangents = zeros_like(jets);
         const auto energy = aten ? &probe_arap<Scalar> : &arap_energy<Scalar>;
         const ArapValue value =
-            energy(jet_view<const Scalar>(jets), bending, weight, jet_view<Scalar>(cotangents));
+            energy(jet_view<const Scalar>(jets), bending, weight, jet_view<Scalar>(cotangents), {});
         return py::make_tuple(value.stretch, value.bend, cotangents);
       },
       "jets"_a.noconvert(), "bending"_a, "weight"_a = 1.0, "aten"_a = false);
+  module.def(
+      "arap_energy_by_points",
+      [](JetArray<Scalar> jets, double bending, const Eigen::VectorX<Scalar>& weights,
+         const Eigen::VectorX<Scalar>& bending_factors, bool aten) {
+        JetArray<Scalar> cotangents = zeros_like(jets);
+        const auto energy = aten ? &probe_arap<Scalar> : &arap_energy<Scalar>;
+        const ArapValue value =
+            energy(jet_view<const Scalar>(jets), bending, 1.0, jet_view<Scalar>(cotangents),
+                   {weights.data(), bending_factors.data()});
+        return py::make_tuple(value.energy, cotangents);
+      },
+      "jets"_a.noconvert(), "bending"_a, "weights"_a, "bending_factors"_a, "aten"_a = false);
   module.def(
       "closest_rotations",
       [](JetArray<Scalar> jacobians) {

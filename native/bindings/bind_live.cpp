@@ -25,7 +25,7 @@ std::vector<Handle> moved_handles(const LiveSolver& live, const py::sequence& ta
 
 py::dict report_dict(const LiveReport& report) {
   py::dict result(
-      "stretch"_a = report.arap.stretch, "bend"_a = report.arap.bend, "energy"_a = report.energy,
+      "stretch"_a = report.arap.stretch, "bend"_a = report.arap.bend, "energy"_a = report.arap.energy,
       "value"_a = report.value, "handle_error_mean"_a = report.handle_mean,
       "handle_error_max"_a = report.handle_max, "min_determinant"_a = report.distortion.min_determinant,
       "flipped_share"_a = report.distortion.flipped_share, "max_stretch"_a = report.distortion.max_stretch,

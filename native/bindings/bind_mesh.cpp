@@ -20,7 +20,7 @@ SurfaceSamples checked_samples(const py::object& points, const py::object& norma
             "normal " + std::to_string(i) + " is zero or not finite", "each must have a direction");
     n.row(i) /= length;
   }
-  const Frame used = frame ? *frame : Frame::around(p);
+  const Frame used = frame ? *frame : Frame::balanced(p, Vector::Ones(p.rows()));
   return {used.to_cube(p), n, used, {}};
 }
 
@@ -40,7 +40,8 @@ void bind_mesh(py::module_& module) {
       "and energies live, and fields solved on the samples inherit it.")
       .def(py::init(&checked_samples), "points"_a, "normals"_a, "frame"_a = py::none(),
            "points (n,3), normals (n,3), both in mesh coordinates; normals are brought to unit length.\n"
-           "Without a frame, the points' bounding box is centred and scaled to half-extent 0.75.\n"
+           "Without a frame, the points' centroid is the centre and their radius of gyration 0.6 of the "
+           "cube's half.\n"
            "InvalidInput for unequal counts, numbers that are not finite, or normals without direction.")
       .def_property_readonly(
           "points", [](const SurfaceSamples& s) { return s.frame.to_mesh(s.points); },
@@ -62,9 +63,9 @@ void bind_mesh(py::module_& module) {
       },
       "vertices"_a, "triangles"_a, "count"_a = SampleOptions().count, "seed"_a = SampleOptions().seed,
       "Independent samples of a mesh, uniform by area, with the triangles' unit normals.\n\n"
-      "vertices (n,3), triangles (m,3) counter-clockwise seen from outside. The frame centres the bounding "
-      "box\n"
-      "of the vertices in use and scales it to half-extent 0.75. Sample i depends on the seed and i alone.\n"
+      "vertices (n,3), triangles (m,3) counter-clockwise seen from outside. The frame is centred at the\n"
+      "centroid of the area, and scaled so that its radius of gyration is 0.6: it turns, moves and scales\n"
+      "with the mesh. Sample i depends on the seed and i alone.\n"
       "InvalidInput for a broken mesh, one without area, or a count below 1.");
 }
 

@@ -20,7 +20,7 @@ py::dict report_dict(const SolveReport& report, double scale) {
     return values.empty() ? 0.0 : *std::max_element(values.begin(), values.end());
   };
   py::dict result(
-      "stretch"_a = report.arap.stretch, "bend"_a = report.arap.bend, "energy"_a = report.energy,
+      "stretch"_a = report.arap.stretch, "bend"_a = report.arap.bend, "energy"_a = report.arap.energy,
       "handle_error_mean"_a = mean_of(report.handle_mean), "handle_error_max"_a = max_of(report.handle_max),
       "handles"_a = py::list(), "min_determinant"_a = report.distortion.min_determinant,
       "flipped_share"_a = report.distortion.flipped_share, "max_stretch"_a = report.distortion.max_stretch,

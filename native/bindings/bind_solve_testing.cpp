@@ -2,11 +2,16 @@
 #include "bindings/bind.h"
 #include "bindings/jet_arrays.h"
 #include "core/aten_path.h"
+#include "options/deform.h"
 #include "solve/loss_probe.h"
 
 namespace arapfields::python {
 void bind_solve_testing(py::module_& module) {
   py::module_ testing = testing_module(module);
+  testing.def("thickness", &probe_thickness, "samples"_a);
+  testing.def(
+      "bending", [](const SurfaceSamples& s, const DeformOptions& o) { return probe_bending(s, o.surface); },
+      "samples"_a, "options"_a);
   py::class_<LossProbe>(testing, "LossProbe")
       .def(py::init<const SurfaceSamples&, const std::vector<Handle>&, int, double, const Points&, double,
                     double, double, double>(),

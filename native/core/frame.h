@@ -5,6 +5,9 @@
 
 namespace arapfields {
 
+/// Radius of gyration of a surface in its cube: that of an animal whose half-extent is about 0.75.
+constexpr double gyration_in_cube = 0.6;
+
 /// Mesh coordinates ↔ the unit cube [-1,1]³ in which networks live: x_cube = (x_mesh − center) / scale.
 struct ARAPFIELDS_EXPORT Frame {
   Vec3 center = Vec3::Zero();
@@ -13,6 +16,14 @@ struct ARAPFIELDS_EXPORT Frame {
   /// Centres the points' bounding box and scales its largest half-extent to `half_extent`.
   /// Throws InvalidInput for no points, non-finite ones, or all of them equal.
   static Frame around(PointsIn points, double half_extent = 0.75);
+
+  /// Centres patches of a surface, given by their centroids (n,3), areas (n, none negative) and mean squared
+  /// distances to their centroids (n), at the centroid of the area, and scales its radius of gyration to
+  /// `gyration_radius`. Neither depends on axes, and what is small and far away hardly moves them: patches
+  /// beyond three radii count as if they were at that distance (Huber's M-estimate).
+  /// Throws InvalidInput for no patches, non-finite numbers, no area, or all of it in one point.
+  static Frame balanced(PointsIn centroids, const Vector& areas, const Vector& spreads = {},
+                        double gyration_radius = gyration_in_cube);
 
   Points to_cube(PointsIn points) const;
   Points to_mesh(PointsIn points) const;

@@ -11,7 +11,8 @@
 namespace arapfields {
 
 template <class Scalar>
-ArapValue arap_energy(JetView<const Scalar> jets, double bending, double weight, JetView<Scalar> cotangents) {
+ArapValue arap_energy(JetView<const Scalar> jets, double bending, double weight, JetView<Scalar> cotangents,
+                      ArapFactors<Scalar> factors) {
   require(jets.order != JetOrder::value && (jets.order == JetOrder::second || bending == 0.0), "jets",
           std::to_string(columns(jets.order)) + " columns",
           "the energy needs first derivatives, and second ones where bending is not 0");
@@ -30,11 +31,14 @@ ArapValue arap_energy(JetView<const Scalar> jets, double bending, double weight,
                                 jets.order == JetOrder::second,
                                 second_cotangents,
                                 static_cast<Scalar>(weight / n),
-                                static_cast<Scalar>(weight * bending / n)};
-  const auto sums = sum_over_ranges<2>(jets.count, [&](Index begin, Index end, double* out) {
+                                static_cast<Scalar>(weight * bending / n),
+                                static_cast<Scalar>(bending),
+                                factors.weights,
+                                factors.bending};
+  const auto sums = sum_over_ranges<3>(jets.count, [&](Index begin, Index end, double* out) {
     ARAPFIELDS_DISPATCH(arap_range(block, begin, end, out));
   });
-  return {sums[0] / n, sums[1] / n};
+  return {sums[0] / n, sums[1] / n, sums[2] / n};
 }
 
 template <class Scalar>
@@ -50,8 +54,10 @@ Mat3 closest_rotation(const Mat3& jacobian) {
   return result;
 }
 
-template ArapValue arap_energy<float>(JetView<const float>, double, double, JetView<float>);
-template ArapValue arap_energy<double>(JetView<const double>, double, double, JetView<double>);
+template ArapValue arap_energy<float>(JetView<const float>, double, double, JetView<float>,
+                                      ArapFactors<float>);
+template ArapValue arap_energy<double>(JetView<const double>, double, double, JetView<double>,
+                                       ArapFactors<double>);
 template void closest_rotations<float>(const float*, Index, float*);
 template void closest_rotations<double>(const double*, Index, double*);
 

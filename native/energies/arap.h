@@ -9,16 +9,24 @@ namespace arapfields {
 struct ArapValue {
   double stretch = 0.0;  ///< mean ‖J − R‖²_F
   double bend = 0.0;     ///< mean Σ_k ⟨∂_k R, ∂_k R Y⟩; 0 where the jets have no second derivatives
+  double energy = 0.0;   ///< mean w (‖J − R‖² + bending·l·bend), with the points' own factors w and l
+};
+
+/// What single points count: a factor on each point's energy, and one on its bending. Null: all 1.
+template <class Scalar>
+struct ArapFactors {
+  const Scalar* weights = nullptr;  ///< (n) w
+  const Scalar* bending = nullptr;  ///< (n) l
 };
 
 /// The as-rigid-as-possible energy of the jets at points of the rest surface (first order suffices when
 /// `bending` is 0). R is the rotation closest to J, Y = RᵀJ; with D_k = ∂_k J, w_k = K⁻¹ axl(Rᵀ D_k),
-/// K = tr(Y) I − Y, the bend is Σ_k axl(Rᵀ D_k)·w_k. Adds the cotangents of weight·(stretch + bending·bend)
-/// to `cotangents` (same count; its data may be null: values alone). K's eigenvalues are kept above 0.01, so
-/// that reflected and collapsed Jacobians have finite values and cotangents. The paper's stretch is meant:
-/// the authors' package divides it by 3.
+/// K = tr(Y) I − Y, the bend is Σ_k axl(Rᵀ D_k)·w_k. Adds the cotangents of weight·energy to `cotangents`
+/// (same count; its data may be null: values alone); without factors the energy is stretch + bending·bend.
+/// K's eigenvalues are kept above 0.01, so that reflected and collapsed Jacobians have finite values and
+/// cotangents. The paper's stretch is meant: the authors' package divides it by 3.
 template <class Scalar>
 ARAPFIELDS_EXPORT ArapValue arap_energy(JetView<const Scalar> jets, double bending, double weight,
-                                        JetView<Scalar> cotangents);
+                                        JetView<Scalar> cotangents, ArapFactors<Scalar> factors = {});
 
 }  // namespace arapfields

@@ -80,10 +80,11 @@ inline void evaluate_bend(const ArapBlock<Scalar>& block, std::int64_t point, st
 /// ∂b/∂D_k = 2 R[w_k]×, collected by columns.
 template <class Scalar>
 inline void add_second_cotangents(const ArapBlock<Scalar>& block, std::int64_t point, std::int64_t valid,
-                                  const RotationPack<Scalar>& polar, const Bend<Scalar>& bend) {
+                                  const RotationPack<Scalar>& polar, const Bend<Scalar>& bend,
+                                  Pack<Scalar> bend_weight) {
   Pack33<Scalar> by_slice[3];
   for (int k = 0; k < 3; ++k) rotation_times_cross<Scalar>(polar.rotation, bend.w[k], by_slice[k]);
-  const Scalar weight = Scalar(2) * block.bend_weight;
+  const Pack<Scalar> weight = Scalar(2) * bend_weight;
   for (int j = 0; j < 3; ++j)
     for (int k = j; k < 3; ++k) {
       Pack3<Scalar> column;
@@ -96,7 +97,7 @@ inline void add_second_cotangents(const ArapBlock<Scalar>& block, std::int64_t p
 /// ∂b/∂J = R([z]× − B) with B = Σ(|w_k|² I − w_k w_kᵀ), M = BY − 2 Σ [w_k]× A_kᵀ, z = K⁻¹ axl(M).
 template <class Scalar>
 inline void add_bend_by_jacobian(const Pack33<Scalar>& jacobian, const RotationPack<Scalar>& polar,
-                                 const Bend<Scalar>& bend, Scalar weight, Pack33<Scalar>& gradient) {
+                                 const Bend<Scalar>& bend, Pack<Scalar> weight, Pack33<Scalar>& gradient) {
   using P = Pack<Scalar>;
   Pack33<Scalar> b, y, m, turned;
   for (int i = 0; i < 3; ++i)
@@ -135,6 +136,15 @@ inline double sum_of_valid(Pack<Scalar> values, std::int64_t valid) {
   return sum;
 }
 
+/// The points' factors; ones where there are none, and beyond the last point.
+template <class Scalar>
+inline Pack<Scalar> load_factors(const Scalar* factors, std::int64_t point, std::int64_t valid) {
+  Pack<Scalar> result = broadcast(Scalar(1));
+  if (factors == nullptr) return result;
+  for (int i = 0; i < lanes<Scalar> && i < valid; ++i) result[i] = factors[point + i];
+  return result;
+}
+
 template <class Scalar>
 void run(const ArapBlock<Scalar>& block, std::int64_t begin, std::int64_t end, double* sums) {
   for (std::int64_t point = begin; point < end; point += lanes<Scalar>) {
@@ -147,21 +157,26 @@ void run(const ArapBlock<Scalar>& block, std::int64_t begin, std::int64_t end, d
     }
     RotationPack<Scalar> polar;
     closest_rotation<Scalar>(jacobian, polar);
+    const Pack<Scalar> factor = load_factors(block.factors, point, valid);
+    const Pack<Scalar> bending = factor * load_factors(block.bending_factors, point, valid);
     Pack<Scalar> stretch = {};
     for (int i = 0; i < 3; ++i)
       for (int k = 0; k < 3; ++k) {
         const Pack<Scalar> difference = jacobian[i][k] - polar.rotation[i][k];
         stretch += difference * difference;
-        gradient[i][k] = Scalar(2) * block.stretch_weight * difference;
+        gradient[i][k] = (Scalar(2) * block.stretch_weight * factor) * difference;
       }
     sums[0] += sum_of_valid<Scalar>(stretch, valid);
+    sums[2] += sum_of_valid<Scalar>(factor * stretch, valid);
     if (block.has_second) {
       Bend<Scalar> bend;
       evaluate_bend(block, point, valid, polar, bend);
       sums[1] += sum_of_valid<Scalar>(bend.value, valid);
+      sums[2] += sum_of_valid<Scalar>(block.bending * bending * bend.value, valid);
       if (block.cotangents != nullptr && block.second_cotangents) {
-        add_second_cotangents(block, point, valid, polar, bend);
-        add_bend_by_jacobian<Scalar>(jacobian, polar, bend, block.bend_weight, gradient);
+        const Pack<Scalar> weight = block.bend_weight * bending;
+        add_second_cotangents(block, point, valid, polar, bend, weight);
+        add_bend_by_jacobian<Scalar>(jacobian, polar, bend, weight, gradient);
       }
     }
     if (block.cotangents == nullptr) continue;

@@ -118,16 +118,22 @@ AtenPolar aten_polar(const at::Tensor& jacobians, const EnergyTables& tables) {
 }
 
 at::Tensor aten_arap(const at::Tensor& jets, double bending, double weight, const EnergyTables& tables,
-                     at::Tensor cotangents) {
+                     at::Tensor cotangents, const AtenFactors& factors) {
   const int64_t n = jets.size(1);
   const double share = 1.0 / static_cast<double>(std::max<int64_t>(n, 1));
   const at::Tensor jacobian = jets.slice(0, 1, 4).permute({1, 2, 0}).contiguous();
   const AtenPolar polar = aten_polar(jacobian, tables);
   const at::Tensor &r = polar.rotation, rt = r.transpose(1, 2);
   const at::Tensor difference = jacobian - r;
-  const at::Tensor stretch = (difference * difference).sum() * share;
-  at::Tensor gradient = difference * (2.0 * weight * share);
+  // Factors as (n, 1, 1): on the energy, and on the bending, which the energy's one holds for too.
+  const at::Tensor one = at::ones({1, 1, 1}, jets.options());
+  const at::Tensor factor = factors.weights.defined() ? factors.weights.view({n, 1, 1}) : one;
+  const at::Tensor stiffness = factors.bending.defined() ? factor * factors.bending.view({n, 1, 1}) : factor;
+  const at::Tensor squares = difference * difference;
+  const at::Tensor stretch = squares.sum() * share;
+  at::Tensor gradient = difference * (factor * (2.0 * weight * share));
   at::Tensor bend = at::zeros_like(stretch);
+  at::Tensor energy = (squares * factor).sum() * share;
   if (jets.size(0) == 10) {
     const at::Tensor inverse = at::clamp_min(polar.sums, smallest_sum).reciprocal();
     const at::Tensor k_inverse = at::bmm(polar.axes * inverse.unsqueeze(1), polar.axes.transpose(1, 2));
@@ -136,21 +142,23 @@ at::Tensor aten_arap(const at::Tensor& jets, double bending, double weight, cons
     const at::Tensor a = at::bmm(rt, slices.permute({2, 3, 1, 0}).reshape({n, 3, 9}));
     const at::Tensor axis = axial_of(a.view({n, 3, 3, 3}).transpose(1, 2), tables).view({n, 3, 3});
     const at::Tensor w = at::bmm(axis, k_inverse);  // rows w_k
-    bend = (axis * w).sum() * share;
+    const at::Tensor speeds = axis * w;
+    bend = speeds.sum() * share;
+    energy += (speeds * stiffness).sum() * (bending * share);
     if (cotangents.defined() && bending != 0.0) {
       const double bend_weight = weight * bending * share;
       const at::Tensor cross = cross_of(w, tables).view({n, 3, 3, 3}).transpose(1, 2).reshape({n, 3, 9});
-      const at::Tensor turned = at::bmm(r, cross).permute({2, 0, 1}).reshape({9, 3 * n});
+      const at::Tensor turned = (at::bmm(r, cross) * stiffness).permute({2, 0, 1}).reshape({9, 3 * n});
       cotangents.slice(0, 4, 10).view({6, 3 * n}).addmm_(tables.pairs, turned, 1.0, 2.0 * bend_weight);
       const at::Tensor trace = (w * w).sum({1, 2}, true);
       const at::Tensor b = trace * tables.identity - at::bmm(w.transpose(1, 2), w);
       const at::Tensor m = at::bmm(b, at::bmm(rt, jacobian)) - 2.0 * at::bmm(cross, a.transpose(1, 2));
       const at::Tensor z = at::bmm(axial_of(m, tables).unsqueeze(1), k_inverse);
-      gradient += bend_weight * at::bmm(r, cross_of(z, tables).view({n, 3, 3}) - b);
+      gradient += (bend_weight * stiffness) * at::bmm(r, cross_of(z, tables).view({n, 3, 3}) - b);
     }
   }
   if (cotangents.defined()) cotangents.slice(0, 1, 4).add_(gradient.permute({2, 0, 1}));
-  return at::stack({stretch, bend});
+  return at::stack({stretch, bend, energy});
 }
 
 }  // namespace arapfields

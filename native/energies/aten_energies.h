@@ -32,9 +32,14 @@ struct AtenPolar {
 };
 AtenPolar aten_polar(const at::Tensor& jacobians, const EnergyTables& tables);
 
-/// (2): stretch and bend; the bend is 0 where the jets have no second derivatives.
+/// Factors (n) of single points, on their energy and on their bending; undefined: ones.
+struct AtenFactors {
+  at::Tensor weights, bending;
+};
+
+/// (3): stretch, bend and energy; the bend is 0 where the jets have no second derivatives.
 at::Tensor aten_arap(const at::Tensor& jets, double bending, double weight, const EnergyTables& tables,
-                     at::Tensor cotangents);
+                     at::Tensor cotangents, const AtenFactors& factors = {});
 /// Normals (n,3), weights (n) or undefined, the preference as rows (normal, weight) (k,4).
 at::Tensor aten_gauss(const at::Tensor& jets, const at::Tensor& normals, const at::Tensor& sample_weights,
                       const at::Tensor& preferred, double sharpness, double weight,

@@ -6,11 +6,17 @@
 
 namespace arapfields {
 template <class Scalar>
-ArapValue probe_arap(JetView<const Scalar> jets, double bending, double weight, JetView<Scalar> cotangents) {
+ArapValue probe_arap(JetView<const Scalar> jets, double bending, double weight, JetView<Scalar> cotangents,
+                     ArapFactors<Scalar> factors) {
   const at::Tensor given = tensor_view(jets);
+  const auto per_point = [&](const Scalar* numbers) {
+    if (numbers == nullptr) return at::Tensor();
+    return tensor_view(numbers, {jets.count});
+  };
+  const AtenFactors own{per_point(factors.weights), per_point(factors.bending)};
   const at::Tensor values =
-      aten_arap(given, bending, weight, EnergyTables(given), tensor_view(cotangents)).to(at::kDouble);
-  return {values[0].item<double>(), values[1].item<double>()};
+      aten_arap(given, bending, weight, EnergyTables(given), tensor_view(cotangents), own).to(at::kDouble);
+  return {values[0].item<double>(), values[1].item<double>(), values[2].item<double>()};
 }
 
 template <class Scalar>
@@ -54,7 +60,8 @@ double probe_stance(JetView<const Scalar> jets, ConstPointsRef<Scalar> rest, con
 }
 
 #define ARAPFIELDS_PROBES(Scalar)                                                                            \
-  template ArapValue probe_arap<Scalar>(JetView<const Scalar>, double, double, JetView<Scalar>);             \
+  template ArapValue probe_arap<Scalar>(JetView<const Scalar>, double, double, JetView<Scalar>,              \
+                                        ArapFactors<Scalar>);                                                \
   template double probe_gauss<Scalar>(JetView<const Scalar>, ConstPointsRef<Scalar>,                         \
                                       const Eigen::Ref<const Eigen::VectorX<Scalar>>&,                       \
                                       const GaussPreference&, double, JetView<Scalar>);                      \

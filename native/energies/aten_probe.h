@@ -11,7 +11,7 @@ namespace arapfields {
 
 template <class Scalar>
 ARAPFIELDS_EXPORT_TO_TESTS ArapValue probe_arap(JetView<const Scalar> jets, double bending, double weight,
-                                                JetView<Scalar> cotangents);
+                                                JetView<Scalar> cotangents, ArapFactors<Scalar> factors);
 template <class Scalar>
 ARAPFIELDS_EXPORT_TO_TESTS double probe_gauss(JetView<const Scalar> jets, ConstPointsRef<Scalar> normals,
                                               const Eigen::Ref<const Eigen::VectorX<Scalar>>& sample_weights,

@@ -8,15 +8,18 @@
 
 namespace arapfields {
 
-/// Columns of `jets` and `cotangents` (null: values alone) are count·3 apart. Sums, not means, are added to
-/// sums[0] (stretch) and sums[1] (bend).
+/// Columns of `jets` and `cotangents` (null: values alone) are count·3 apart. Factors (count; null: ones) are
+/// the points' own. Sums, not means, are added to sums[0] (stretch), sums[1] (bend) and sums[2] (stretch +
+/// bending·bend, with the factors).
 template <class Scalar>
 struct ArapBlock {
   const Scalar* jets;
   Scalar* cotangents;
   std::int64_t count;
   bool has_second, second_cotangents;
-  Scalar stretch_weight, bend_weight;
+  Scalar stretch_weight, bend_weight, bending;
+  const Scalar* factors;          // on the energy
+  const Scalar* bending_factors;  // on the bending
 };
 
 /// Same blocks, with rest normals (count,3), per-sample weights (count; null: ones), and the preference as k

@@ -8,6 +8,7 @@
 #include <queue>
 
 #include "core/parallel.h"
+#include "sampling/inner_balls.h"
 
 namespace arapfields {
 namespace {
@@ -20,29 +21,11 @@ constexpr double sheet_spacings = 2.5, sheet_cosine = 0.3;
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
-/// Radii of the inner balls; `most` where nothing bounds one.
-Vector inner_radii(PointsIn nodes, PointsIn normals, double most) {
-  Vector radii(nodes.rows());
-  parallel_for(0, nodes.rows(), 32, [&](Index first, Index last) {
-    for (Index i = first; i < last; ++i) {
-      const Vec3 x = nodes.row(i), n = normals.row(i);
-      double curvature = 1.0 / most;  // of the ball: a larger one means a smaller ball
-      for (Index j = 0; j < nodes.rows(); ++j) {
-        const double a = nodes(j, 0) - x[0], b = nodes(j, 1) - x[1], c = nodes(j, 2) - x[2];
-        const double square = a * a + b * b + c * c, depth = -(a * n[0] + b * n[1] + c * n[2]);
-        if (2.0 * depth > curvature * square && square > 0.0) curvature = 2.0 * depth / square;
-      }
-      radii[i] = 1.0 / curvature;
-    }
-  });
-  return radii;
-}
-
 }  // namespace
 
 InteriorGraph::InteriorGraph(PointsIn nodes, PointsIn normals, double spacing) : edges_(at(nodes.rows())) {
   const double extent = (nodes.colwise().maxCoeff() - nodes.colwise().minCoeff()).maxCoeff();
-  const Vector radii = inner_radii(nodes, normals, extent);
+  const Vector radii = inner_radii(nodes, normals, nodes, normals, {.most = extent});
   const Points centers = nodes - radii.asDiagonal() * normals;
   const double near = sheet_spacings * spacing;
   parallel_for(0, nodes.rows(), 32, [&](Index first, Index last) {

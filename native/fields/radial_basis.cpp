@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/errors.h"
+#include "core/frame.h"
 #include "fields/radial_kernel.h"
 
 namespace arapfields {
@@ -24,6 +25,18 @@ void validate(const InteriorEmbedding& given) {
   require_positive("embedding.width", given.width);
 }
 
+/// The point farthest from the middle, without looking at what lies far outside.
+Index first_center(PointsIn points) {
+  constexpr double far = 3.0;
+  if ((points.rowwise() - points.row(0)).cwiseAbs().maxCoeff() == 0.0) return 0;
+  const Frame frame = Frame::balanced(points, Vector::Ones(points.rows()), {}, 1.0);
+  Vector squares = frame.to_cube(points).rowwise().squaredNorm();
+  squares = (squares.array() > far * far).select(0.0, squares);
+  Index first = 0;
+  squares.maxCoeff(&first);
+  return first;
+}
+
 }  // namespace
 
 RowMatrix<double> RadialBasis::identity() const {
@@ -39,24 +52,24 @@ void RadialBasis::set_embedding(std::shared_ptr<const InteriorEmbedding> other) 
   if (embedding) embedding->evaluate(centers, {embedded.data(), center_count(), JetOrder::value});
 }
 
-FarthestPoints farthest_points(PointsIn points, Index count) {
+FarthestPoints farthest_points(PointsIn points, Index count, const Vector& sizes) {
   require(points.rows() > 0 && points.allFinite(), "points", "none, or NaN or infinite ones",
           "finite points are needed");
   const Index n = points.rows(), stride = (n + 15) / 16 * 16;
   std::vector<double> columns(static_cast<std::size_t>(3 * stride)),
-      distance(static_cast<std::size_t>(stride), 1e300);
+      distance(static_cast<std::size_t>(stride), 1e300), weights(static_cast<std::size_t>(stride), 1.0);
   for (Index i = 0; i < stride; ++i)
     for (int k = 0; k < 3; ++k)
       columns[static_cast<std::size_t>(k * stride + i)] = points(std::min(i, n - 1), k);
-  const Eigen::RowVector3d middle = points.colwise().mean();
-  Index next = 0;
-  (points.rowwise() - middle).rowwise().squaredNorm().maxCoeff(&next);
+  for (Index i = 0; i < stride && sizes.size() > 0; ++i)
+    weights[static_cast<std::size_t>(i)] = 1.0 / (sizes[std::min(i, n - 1)] * sizes[std::min(i, n - 1)]);
+  Index next = first_center(points);
   FarthestPoints result;
   while (static_cast<Index>(result.indices.size()) < count) {
     result.indices.push_back(next);
     const Vec3 from = points.row(next);
-    const double worst =
-        ARAPFIELDS_DISPATCH(farthest_update(columns.data(), stride, stride, from.data(), distance.data()));
+    const double worst = ARAPFIELDS_DISPATCH(
+        farthest_update(columns.data(), weights.data(), stride, from.data(), distance.data()));
     result.fill_distance = std::sqrt(worst);
     if (!(worst > 0.0)) break;
     next = std::min<Index>(std::find(distance.begin(), distance.end(), worst) - distance.begin(), n - 1);
@@ -64,27 +77,36 @@ FarthestPoints farthest_points(PointsIn points, Index count) {
   return result;
 }
 
-RadialBasis radial_basis(PointsIn points, const std::vector<RadialScale>& scales) {
+RadialBasis radial_basis(PointsIn points, const std::vector<RadialScale>& scales,
+                         const RadialLayout& layout) {
   require(!scales.empty(), "scales", "none were given", "at least one is needed");
-  std::vector<Index> centers;
+  std::vector<Vec3> centers;
   std::vector<double> radii;
   for (const RadialScale& scale : scales) {
     require(scale.count > 0, "scales.count", std::to_string(scale.count), "must be positive");
     require(scale.radius_factor > 0.0 && std::isfinite(scale.radius_factor), "scales.radius_factor",
             std::to_string(scale.radius_factor), "must be positive");
-    const FarthestPoints chosen = farthest_points(points, scale.count);
+    const bool two_layers = scale.two_layers && layout.inner.rows() == points.rows();
+    const Index sites = two_layers ? (scale.count + 1) / 2 : scale.count;
+    const FarthestPoints chosen = farthest_points(points, sites, layout.sizes);
     const double extent = (points.colwise().maxCoeff() - points.colwise().minCoeff()).maxCoeff();
     // All points covered exactly (few points, or one): the radius falls back on the extent.
     const double fill = chosen.fill_distance > 0.0 ? chosen.fill_distance : std::max(extent, 1e-3);
-    centers.insert(centers.end(), chosen.indices.begin(), chosen.indices.end());
-    radii.insert(radii.end(), chosen.indices.size(), scale.radius_factor * fill);
+    const auto add = [&](Index i, const Vec3& place) {
+      centers.push_back(place);
+      radii.push_back(scale.radius_factor * fill * (layout.sizes.size() > 0 ? layout.sizes[i] : 1.0));
+    };
+    for (const Index i : chosen.indices) add(i, points.row(i));
+    const Index below =
+        two_layers ? std::min<Index>(scale.count / 2, static_cast<Index>(chosen.indices.size())) : 0;
+    for (Index k = 0; k < below; ++k) {
+      const Index i = chosen.indices[static_cast<std::size_t>(k)];
+      add(i, layout.inner.row(i));
+    }
   }
-  RadialBasis basis{Points(static_cast<Index>(centers.size()), 3),
-                    Eigen::Map<const Vector>(radii.data(), static_cast<Index>(radii.size())),
-                    nullptr,
-                    {}};
-  for (std::size_t m = 0; m < centers.size(); ++m)
-    basis.centers.row(static_cast<Index>(m)) = points.row(centers[m]);
+  const Index count = static_cast<Index>(centers.size());
+  RadialBasis basis{Points(count, 3), Eigen::Map<const Vector>(radii.data(), count), nullptr, {}};
+  for (Index m = 0; m < count; ++m) basis.centers.row(m) = centers[static_cast<std::size_t>(m)].transpose();
   return basis;
 }
 

@@ -13,6 +13,14 @@ namespace arapfields {
 struct RadialScale {
   Index count = 300;           ///< centers
   double radius_factor = 4.0;  ///< radius as a multiple of the distance within which every sample has a bump
+  bool two_layers = false;     ///< every other center stands below its neighbour, inside the shape
+};
+
+/// How centers are spread over points (n,3) of a surface.
+struct RadialLayout {
+  Vector sizes =
+      {};  ///< (n, positive; empty: all 1) how far apart centers are there, and how large: relative
+  Points inner = {};  ///< (n,3; empty: scales have one layer) the point inside the shape below each
 };
 
 /// The space of maps f(x) = Σ_m c_m φ(|x − p_m|² / r_m²) + (1, x)·c_affine, φ(s) = (1 − s/κ)₊^κ: the Gaussian
@@ -34,15 +42,18 @@ struct ARAPFIELDS_EXPORT RadialBasis {
 };
 
 /// Centers at farthest-point samples of the points, scale by scale (a scale with as many centers as there are
-/// distinct points or more is cut there). Throws InvalidInput for no points or scales without centers or
-/// radius_factor.
-ARAPFIELDS_EXPORT RadialBasis radial_basis(PointsIn points, const std::vector<RadialScale>& scales);
+/// distinct points or more is cut there). Centers on the surface alone have no slope across it: a second
+/// layer lets the motion differ between skin and core. Throws InvalidInput for no points or scales without
+/// centers or radius_factor.
+ARAPFIELDS_EXPORT RadialBasis radial_basis(PointsIn points, const std::vector<RadialScale>& scales,
+                                           const RadialLayout& layout = {});
 
-/// Indices of `count` farthest-point samples, and the largest distance of a point to them.
+/// Indices of `count` farthest-point samples, and the largest distance of a point to them; distances are
+/// divided by the sizes (n; empty: all 1) of the points that they are measured from.
 struct FarthestPoints {
   std::vector<Index> indices;
   double fill_distance = 0.0;
 };
-ARAPFIELDS_EXPORT FarthestPoints farthest_points(PointsIn points, Index count);
+ARAPFIELDS_EXPORT FarthestPoints farthest_points(PointsIn points, Index count, const Vector& sizes = {});
 
 }  // namespace arapfields

@@ -29,10 +29,11 @@ class RadialEvaluator {
   template <class Body>
   void for_blocks(Body&& body) const;
   Index center_count() const { return center_count_; }
+  Index blocks() const { return (count_ + 15) / 16; }
+  /// Points 16 b to 16 b + 15, the last of all repeated.
+  RadialBlock<Scalar> block(Index b) const;
 
  private:
-  Index blocks() const { return (count_ + 15) / 16; }
-  RadialBlock<Scalar> block(Index b) const;
   void pack_embedding(const JetBlock<double>& jets);
   void require_order(JetOrder order) const;
 

@@ -185,14 +185,14 @@ std::int64_t radial_active(const double* center, const double* ball_radius, cons
   return found;
 }
 
-double farthest_update(const double* points, std::int64_t stride, std::int64_t count, const double* from,
+double farthest_update(const double* points, const double* weights, std::int64_t count, const double* from,
                        double* distance) {
   using P = Pack<double>;
   P worst = {};
   for (std::int64_t i = 0; i < count; i += lanes<double>) {
-    const P x = load(points + i) - from[0], y = load(points + stride + i) - from[1],
-            z = load(points + 2 * stride + i) - from[2];
-    const P square = x * x + y * y + z * z, before = load(distance + i);
+    const P x = load(points + i) - from[0], y = load(points + count + i) - from[1],
+            z = load(points + 2 * count + i) - from[2];
+    const P square = load(weights + i) * (x * x + y * y + z * z), before = load(distance + i);
     const P now = square < before ? square : before;
     store(distance + i, now);
     worst = now > worst ? now : worst;

@@ -64,7 +64,35 @@ Frame mesh_frame(PointsIn vertices, TrianglesIn triangles) {
           "a mesh must have an extent");
   require(extent.allFinite(), "vertices", "their bounding box is too large for floating point",
           "its sides must be finite");
-  return Frame::around(used);
+  // Squares of sides must neither overflow nor vanish.
+  const Vec3 origin = 0.5 * used.colwise().minCoeff() + 0.5 * used.colwise().maxCoeff();
+  const double unit = extent.maxCoeff();
+  const Points placed = (vertices.rowwise() - origin.transpose()) / unit;
+  Points centroids(triangles.rows(), 3);
+  Vector areas(triangles.rows()), spreads(triangles.rows());
+  for (Index t = 0; t < triangles.rows(); ++t) {
+    Mat3 corners;
+    for (int k = 0; k < 3; ++k) corners.col(k) = placed.row(triangles(t, k)).transpose();
+    const Vec3 middle = corners.rowwise().mean();
+    centroids.row(t) = middle.transpose();
+    areas[t] = (corners.col(1) - corners.col(0)).cross(corners.col(2) - corners.col(0)).norm();
+    spreads[t] = (corners.colwise() - middle).squaredNorm() / 12.0;
+  }
+  require(areas.sum() > 0.0, "triangles", "their total area is 0",
+          "points can be drawn only from a finite area above zero");
+  const Frame frame = Frame::balanced(centroids, areas, spreads);
+  return {origin + unit * frame.center, unit * frame.scale};
+}
+
+Frame enclosing_frame(PointsIn vertices, TrianglesIn triangles) {
+  constexpr double largest_radius = 0.93;
+  Frame frame = mesh_frame(vertices, triangles);
+  const double radius = (used_vertices(vertices, triangles).rowwise() - frame.center.transpose())
+                            .rowwise()
+                            .stableNorm()
+                            .maxCoeff();
+  frame.scale = std::max(frame.scale, radius / largest_radius);
+  return frame;
 }
 
 SurfaceSamples sample_mesh(PointsIn vertices, TrianglesIn triangles, Index count, std::uint64_t seed) {

@@ -41,7 +41,9 @@ ObjectiveTerms terms_of(const SurfaceSamples& samples, const std::vector<Handle>
   ObjectiveTerms terms;
   terms.batch = options.training.batch;
   terms.fresh = std::min(options.fresh_samples, options.training.batch);
-  terms.surface = options.surface;
+  terms.stiffness = SurfaceStiffness(samples, options.surface);
+  terms.barrier = options.surface.barrier;
+  terms.barrier_threshold = options.surface.barrier_threshold;
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
   terms.pull = options.handles;
   if (options.exact_handles) terms.pull.handle_weight = 0.0;

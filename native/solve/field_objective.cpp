@@ -46,13 +46,17 @@ struct FieldObjective::Constants {
 };
 
 FieldObjective::FieldObjective(const SurfaceSamples& samples, ObjectiveTerms terms)
-    : samples_(samples), terms_(std::move(terms)), order_(morton_order(samples.points)) {}
+    : samples_(samples),
+      terms_(std::move(terms)),
+      order_(morton_order(samples.points)),
+      bending_(terms_.stiffness.bending(samples.points)) {}
 
 FieldObjective::~FieldObjective() = default;
 
 Index FieldObjective::next_fresh(Random& random) {
   if (used_ == pool_.size()) {
     pool_ = samples_.redraw(samples_.size(), random.bits() >> 1);
+    pool_bending_ = terms_.stiffness.bending(pool_.points);
     used_ = 0;
   }
   return used_++;
@@ -60,24 +64,32 @@ Index FieldObjective::next_fresh(Random& random) {
 
 FieldObjective::Batch FieldObjective::draw(Random& random) {
   const Index available = samples_.size(), count = std::min(terms_.batch, available);
-  Batch batch{Points(count, 3), Points(styled() ? count : 0, 3),
-              Vector(styled() && terms_.preference_weights.size() > 0 ? count : 0), terms_.stance};
+  Batch batch{Points(count, 3),
+              Points(styled() ? count : 0, 3),
+              Vector(count),
+              Vector(terms_.weights.size() > 0 ? count : 0),
+              Vector(styled() && terms_.preference_weights.size() > 0 ? count : 0),
+              terms_.stance};
   batch.stance.ground.setZero(stands() ? count : 0);
   // Fresh samples stand evenly among the others: stretch b has one where b·fresh/count steps up.
   for (Index b = 0; b < count; ++b) {
     if (terms_.fresh > 0 && b * terms_.fresh / count != (b + 1) * terms_.fresh / count) {
       const Index i = next_fresh(random);
       batch.points.row(b) = pool_.points.row(i);
+      batch.bending[b] = pool_bending_[i];
       if (styled()) batch.normals.row(b) = pool_.normals.row(i);
       if (batch.weights.size() > 0) batch.weights[b] = 1.0;
+      if (batch.preference_weights.size() > 0) batch.preference_weights[b] = 1.0;
       continue;
     }
     const double place = (static_cast<double>(b) + random.uniform()) * static_cast<double>(available) /
                          static_cast<double>(count);
     const Index i = order_[static_cast<std::size_t>(std::min(available - 1, static_cast<Index>(place)))];
     batch.points.row(b) = samples_.points.row(i);
+    batch.bending[b] = bending_[i];
     if (styled()) batch.normals.row(b) = samples_.normals.row(i);
-    if (batch.weights.size() > 0) batch.weights[b] = terms_.preference_weights[i];
+    if (batch.weights.size() > 0) batch.weights[b] = terms_.weights[i];
+    if (batch.preference_weights.size() > 0) batch.preference_weights[b] = terms_.preference_weights[i];
     if (stands()) batch.stance.ground[b] = terms_.stance.ground[i];
   }
   return batch;
@@ -94,20 +106,22 @@ template <class Scalar>
 double FieldObjective::by_kernels(TrainableField& field, Random& random) {
   const Batch batch = draw(random);
   HostJets<Scalar> jets(field, batch.points.cast<Scalar>(), order_of_terms());
-  const ArapValue arap =
-      arap_energy<Scalar>(jets.view(), terms_.surface.bending, terms_.rigidity, jets.cotangent_view());
-  double value = terms_.rigidity * (arap.stretch + terms_.surface.bending * arap.bend);
+  const Eigen::VectorX<Scalar> bending = batch.bending.cast<Scalar>(), weights = batch.weights.cast<Scalar>();
+  const ArapValue arap = arap_energy<Scalar>(jets.view(), terms_.stiffness.bends() ? 1.0 : 0.0,
+                                             terms_.rigidity, jets.cotangent_view(),
+                                             {weights.size() > 0 ? weights.data() : nullptr, bending.data()});
+  double value = terms_.rigidity * arap.energy;
   if (styled())
     value += terms_.gauss * gauss_energy<Scalar>(jets.view(), batch.normals.cast<Scalar>(),
-                                                 batch.weights.cast<Scalar>(), *terms_.preference,
+                                                 batch.preference_weights.cast<Scalar>(), *terms_.preference,
                                                  terms_.gauss, jets.cotangent_view());
   if (stands())
     value +=
         terms_.keep_stance * stance_energy<Scalar>(jets.view(), batch.points.cast<Scalar>(), batch.stance,
                                                    terms_.keep_stance, jets.cotangent_view());
-  if (terms_.surface.barrier > 0.0)
-    value += terms_.surface.barrier * fold_barrier<Scalar>(jets.view(), terms_.surface.barrier_threshold,
-                                                           terms_.surface.barrier, jets.cotangent_view());
+  if (terms_.barrier > 0.0)
+    value += terms_.barrier * fold_barrier<Scalar>(jets.view(), terms_.barrier_threshold, terms_.barrier,
+                                                   jets.cotangent_view());
   jets.pull_back();
   if (!pulled()) return value;
   const HandleBatch<Scalar> pairs = terms_.handles.batch<Scalar>(terms_.pull.handle_batch, random);
@@ -125,23 +139,27 @@ at::Tensor FieldObjective::by_compositions(TrainableField& field, Random& random
   const Batch batch = draw(random);
   const at::Tensor jets = field.forward_at(batch.points, order_of_terms());
   const at::Tensor cotangents = at::zeros_like(jets);
-  const at::Tensor arap = aten_arap(jets, terms_.surface.bending, terms_.rigidity, tables, cotangents);
-  at::Tensor value = terms_.rigidity * (arap[0] + terms_.surface.bending * arap[1]);
+  const at::Tensor none;
+  const AtenFactors factors{batch.weights.size() > 0 ? tensor_like(batch.weights, like) : none,
+                            tensor_like(batch.bending, like)};
+  const at::Tensor arap =
+      aten_arap(jets, terms_.stiffness.bends() ? 1.0 : 0.0, terms_.rigidity, tables, cotangents, factors);
+  at::Tensor value = terms_.rigidity * arap[2];
   if (styled())
     value +=
-        terms_.gauss * aten_gauss(jets, tensor_like(batch.normals, like),
-                                  batch.weights.size() > 0 ? tensor_like(batch.weights, like) : at::Tensor(),
-                                  constants_->preferred, terms_.preference->sharpness, terms_.gauss, tables,
-                                  cotangents);
+        terms_.gauss *
+        aten_gauss(jets, tensor_like(batch.normals, like),
+                   batch.preference_weights.size() > 0 ? tensor_like(batch.preference_weights, like) : none,
+                   constants_->preferred, terms_.preference->sharpness, terms_.gauss, tables, cotangents);
   if (stands()) {
     const double weight = terms_.keep_stance * batch.stance.scale;
     value += weight * aten_stance(jets, tensor_like(batch.points, like),
                                   tensor_like(Vector(batch.stance.up), like),
                                   tensor_like(batch.stance.ground, like), weight, cotangents);
   }
-  if (terms_.surface.barrier > 0.0)
-    value += terms_.surface.barrier *
-             aten_barrier(jets, terms_.surface.barrier_threshold, terms_.surface.barrier, tables, cotangents);
+  if (terms_.barrier > 0.0)
+    value +=
+        terms_.barrier * aten_barrier(jets, terms_.barrier_threshold, terms_.barrier, tables, cotangents);
   field.pull_back(cotangents);
   if (!pulled()) return value;
   const HandleBatch<double> pairs = terms_.handles.batch<double>(terms_.pull.handle_batch, random);

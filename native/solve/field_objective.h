@@ -9,19 +9,21 @@
 #include "energies/stance.h"
 #include "mesh/surface_samples.h"
 #include "options/handles.h"
-#include "options/surface.h"
 #include "solve/objective.h"
+#include "solve/surface_stiffness.h"
 
 namespace arapfields {
 
 /// What a deformation is asked for, as weights of the terms:
-///   rigidity·(stretch + bending·bend) + gauss·mean(1 − g) + keep_stance·stance + barrier·fold_barrier +
+///   rigidity·mean w(stretch + λ·bend) + gauss·mean(1 − g) + keep_stance·stance + barrier·fold_barrier +
 ///   handles.
 struct ObjectiveTerms {
   Index batch = 0;  ///< samples an iteration
   Index fresh = 0;  ///< of the batch, samples that the surface is asked for anew; needs samples.redraw
   double rigidity = 1.0;
-  SurfaceOptions surface;
+  SurfaceStiffness stiffness;  ///< λ
+  Vector weights;              ///< w, one a sample; empty: all 1
+  double barrier = 0.0, barrier_threshold = 0.1;
   std::optional<GaussPreference> preference;
   double gauss = 0.0;
   Vector preference_weights;  ///< a weight a sample; empty: all 1
@@ -43,10 +45,10 @@ class FieldObjective final : public Objective {
   const ObjectiveTerms& terms() const { return terms_; }
 
  private:
-  /// Samples of one iteration; normals and weights where the terms use them.
+  /// Samples of one iteration: λ and w, and normals and the preference's weights where the terms use them.
   struct Batch {
     Points points, normals;
-    Vector weights;
+    Vector bending, weights, preference_weights;
     Stance stance;
   };
   /// What the terms need on a device, beside each batch.
@@ -56,9 +58,7 @@ class FieldObjective final : public Objective {
   bool styled() const { return terms_.preference && terms_.gauss > 0.0; }
   bool stands() const { return terms_.keep_stance > 0.0; }
   bool pulled() const { return terms_.handles.count() > 0 && terms_.pull.handle_weight != 0.0; }
-  JetOrder order_of_terms() const {
-    return terms_.surface.bending > 0.0 ? JetOrder::second : JetOrder::first;
-  }
+  JetOrder order_of_terms() const { return terms_.stiffness.bends() ? JetOrder::second : JetOrder::first; }
   template <class Scalar>
   double by_kernels(TrainableField& field, Random& random);
   at::Tensor by_compositions(TrainableField& field, Random& random);
@@ -69,7 +69,9 @@ class FieldObjective final : public Objective {
   const SurfaceSamples& samples_;
   ObjectiveTerms terms_;
   std::vector<std::uint32_t> order_;
+  Vector bending_;  // λ of the samples
   SurfaceSamples pool_;
+  Vector pool_bending_;
   Index used_ = 0;
   std::unique_ptr<Constants> constants_;
 };

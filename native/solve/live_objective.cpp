@@ -13,12 +13,12 @@ constexpr double coefficient_weight = 1e-10;
 }  // namespace
 
 template <class Scalar>
-LiveObjective<Scalar>::LiveObjective(const RadialBasis& basis, PointsIn samples, double bending,
+LiveObjective<Scalar>::LiveObjective(const RadialBasis& basis, PointsIn samples, const Vector& bending,
                                      double handle_weight)
     : center_count_(basis.center_count()),
-      bending_(bending),
       handle_weight_(handle_weight),
-      samples_(basis, samples) {}
+      samples_(basis, samples),
+      bending_(bending.cast<Scalar>()) {}
 
 template <class Scalar>
 void LiveObjective<Scalar>::set_barrier(double weight, double threshold) {
@@ -72,7 +72,7 @@ LiveTerms LiveObjective<Scalar>::evaluate(const Measurements& u, Measurements* c
   Scalar* out = cotangents != nullptr ? cotangents->data() : nullptr;
   const JetView<Scalar> jet_cotangents{out, samples_.size(), JetOrder::second};
   LiveTerms terms;
-  terms.arap = arap_energy<Scalar>(jets(u), bending_, 1.0, jet_cotangents);
+  terms.arap = arap_energy<Scalar>(jets(u), 1.0, 1.0, jet_cotangents, {nullptr, bending_.data()});
   const Index pairs = pairs_.sources.rows();
   terms.handles =
       handle_energy<Scalar>({u.data() + handle_offset(), pairs, JetOrder::value}, pairs_, handle_weight_,
@@ -93,8 +93,8 @@ double LiveObjective<Scalar>::value(const Measurements& u, Measurements* cotange
   const LiveTerms terms = evaluate(u, cotangents);
   const auto centers = u.tail(3 * center_count_);
   if (cotangents != nullptr) cotangents->tail(3 * center_count_) = Scalar(2.0 * coefficient_weight) * centers;
-  return terms.arap.stretch + bending_ * terms.arap.bend + handle_weight_ * terms.handles +
-         (style_ ? style_->weight * terms.gauss : 0.0) + (stance_ ? stance_->weight * terms.stance : 0.0) +
+  return terms.arap.energy + handle_weight_ * terms.handles + (style_ ? style_->weight * terms.gauss : 0.0) +
+         (stance_ ? stance_->weight * terms.stance : 0.0) +
          barrier_ * terms.barrier + coefficient_weight * static_cast<double>(centers.squaredNorm());
 }
 

@@ -37,7 +37,7 @@ struct LiveTerms {
   double stance = 0.0;   ///< energies/stance.h
 };
 
-/// stretch + λ_bend·bend + weight·handles + λ_Gauss·gauss + stance + barrier + a vanishing pull of all
+/// mean (stretch + λ·bend) + weight·handles + λ_Gauss·gauss + stance + barrier + a vanishing pull of all
 /// centers towards zero, of the fields of one radial basis. Measurements: jets at the samples, values at the
 /// handles' sources, centers. In single precision a step costs half, and the value is good to some 1e-6 of
 /// itself.
@@ -46,7 +46,8 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
  public:
   using Measurements = Eigen::VectorX<Scalar>;
 
-  LiveObjective(const RadialBasis& basis, PointsIn samples, double bending, double handle_weight);
+  /// `bending` (n): λ of each sample.
+  LiveObjective(const RadialBasis& basis, PointsIn samples, const Vector& bending, double handle_weight);
   /// A barrier against folds with this weight and threshold; 0: none.
   void set_barrier(double weight, double threshold);
   /// Other handles (cube coordinates), with the factor of the preconditioner that goes with them.
@@ -77,8 +78,9 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
   Index center_offset() const { return handle_offset() + 3 * pairs_.sources.rows(); }
 
   Index center_count_;
-  double bending_, handle_weight_, barrier_ = 0.0, barrier_threshold_ = 0.1;
+  double handle_weight_, barrier_ = 0.0, barrier_threshold_ = 0.1;
   RadialEvaluator<Scalar> samples_;
+  Eigen::VectorX<Scalar> bending_;
   HandleBatch<Scalar> pairs_;
   TallMatrix<Scalar> handle_basis_;   // (pairs, size)
   TallMatrix<float> inverse_factor_;  // L⁻¹ of the preconditioner's matrix L Lᵀ

@@ -11,11 +11,11 @@
 
 namespace arapfields {
 
-/// What a solve reached, measured at its own samples; energies in the unit cube, lengths in mesh units.
+/// What a solve reached, measured at its own samples. The stretch and the energy are pure numbers, the bend
+/// is in 1/cube units², lengths are in mesh units.
 struct LiveReport {
-  ArapValue arap;
-  double energy = 0.0;  ///< stretch + bending · bend
-  double value = 0.0;   ///< all that is minimised
+  ArapValue arap;      ///< arap.energy with the samples' own stiffness
+  double value = 0.0;  ///< all that is minimised
   double handle_mean = 0.0, handle_max = 0.0;
   std::optional<double> preference;  ///< mean g of the deformed normals, where there is a style
   Distortion distortion;

@@ -7,17 +7,21 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "distance/morton.h"
+#include "sampling/canonical_order.h"
+#include "sampling/local_thickness.h"
 #include "solve/live_setup.h"
 #include "solve/live_stiffness.h"
 #include "solve/notes.h"
 #include "solve/setup.h"
+#include "solve/surface_stiffness.h"
 
 namespace arapfields {
 namespace {
 
 /// Samples that the centers' centers are chosen from.
 constexpr Index center_candidates = 6000;
+/// Centers stand as densely as the root of the thickness asks, down to this share of its median.
+constexpr double least_size = 0.1;
 /// Weight, against the surface's energy, with which a style without handles holds the lowest sample in place.
 constexpr double anchor_weight = 1.0;
 
@@ -44,19 +48,25 @@ LiveSolver::State::State(const SurfaceSamples& samples, const std::vector<Handle
   const Stopwatch watch;
   const ThreadScope threads(options.threads);
   Random random(static_cast<std::uint64_t>(options.seed));
-  const std::vector<std::uint32_t> order = morton_order(surface_);
+  const std::vector<std::uint32_t> order = canonical_order(surface_);
+  const LocalThickness thickness(surface_, surface_normals_, order);
   chosen_ = stratified(order, options.samples, random);
   const std::vector<Index> candidates = stratified(order, center_candidates, random);
   std::vector<RadialScale> scales;
   if (options.coarse_centers > 0) scales.push_back({options.coarse_centers, options.coarse_radius_factor});
-  scales.push_back({options.fine_centers, options.fine_radius_factor});
+  scales.push_back({options.fine_centers, options.fine_radius_factor, true});
   const Points spread = rows_of(surface_, candidates);
-  basis_ = radial_basis(spread, scales);
-  if (options.interior && surface_normals_.rows() == surface_.rows())
-    basis_.set_embedding(interior_embedding(spread, rows_of(surface_normals_, candidates)));
+  const Vector thick = thickness.at(spread);
+  const bool oriented = surface_normals_.rows() == surface_.rows();
+  const Points spread_normals = oriented ? rows_of(surface_normals_, candidates) : Points();
+  RadialLayout layout{.sizes = (thick / thickness.median()).cwiseMax(least_size).cwiseSqrt(), .inner = {}};
+  if (oriented) layout.inner = spread - thick.asDiagonal() * spread_normals;
+  basis_ = radial_basis(spread, scales, layout);
+  if (options.interior && oriented) basis_.set_embedding(interior_embedding(spread, spread_normals));
   coefficients_ = basis_.identity();
   progress.report(0.2, "centers placed");
-  stiffness_ = surface_stiffness(basis_, rows_of(surface_, chosen_), options.surface.bending);
+  bending_ = SurfaceStiffness(samples, options.surface, order).bending(rows_of(surface_, chosen_));
+  stiffness_ = stiffness_matrix(basis_, rows_of(surface_, chosen_), bending_);
   progress.report(0.8, "stiffness");
   prepare(fast_);
   set_handles(handles);
@@ -65,8 +75,8 @@ LiveSolver::State::State(const SurfaceSamples& samples, const std::vector<Handle
 
 template <class Scalar>
 void LiveSolver::State::prepare(Precision<Scalar>& precision) {
-  precision.objective = std::make_unique<LiveObjective<Scalar>>(
-      basis_, rows_of(surface_, chosen_), options_.surface.bending, options_.handle_weight);
+  precision.objective = std::make_unique<LiveObjective<Scalar>>(basis_, rows_of(surface_, chosen_), bending_,
+                                                                options_.handle_weight);
   precision.objective->set_barrier(options_.surface.barrier, options_.surface.barrier_threshold);
   if (inverse_factor_.size() > 0) precision.objective->set_handles(pairs_, pair_values_, inverse_factor_);
   precision.objective->set_style(style_);
@@ -289,7 +299,6 @@ void LiveSolver::State::measure(Precision<Scalar>& precision) {
   if (precision.u.size() == 0) objective.measure(coefficients_, precision.u);
   const LiveTerms terms = objective.terms(precision.u);
   report_.arap = terms.arap;
-  report_.energy = terms.arap.stretch + options_.surface.bending * terms.arap.bend;
   report_.preference.reset();
   if (style_) report_.preference = 1.0 - terms.gauss;
   report_.distortion = distortion<Scalar>(objective.jets(precision.u));

@@ -56,6 +56,7 @@ class LiveSolver::State {
   Frame frame_;
   Points surface_, surface_normals_;  // all samples, cube coordinates
   std::vector<Index> chosen_;         // those that the energy sees
+  Vector bending_;                    // λ of these
   std::vector<Handle> handles_;
   BoundHandles bound_;
   std::vector<Index> pair_rows_;  // rows of bound_ that pull

@@ -8,9 +8,9 @@
 
 namespace arapfields {
 
-/// mean ‖J‖² + bending · mean ‖D‖² over (at most a thousand of) the samples, as a matrix of the basis: what
-/// of the energy's Hessian depends on the rest surface alone.
-RowMatrix<double> surface_stiffness(const RadialBasis& basis, PointsIn samples, double bending);
+/// mean (‖J‖² + λ‖D‖²) over (some of) the samples, with each one's λ, as a matrix of the basis:
+/// what of the energy's Hessian depends on the rest surface alone.
+RowMatrix<double> stiffness_matrix(const RadialBasis& basis, PointsIn samples, const Vector& bending);
 
 /// Rows (n, size) of values at the samples and weights (n) with which Σ_p weights_p values_pᵀ values_p is the
 /// Hessian of half the stance's energy, its upward part spread over all directions: for at most a thousand of

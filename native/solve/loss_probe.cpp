@@ -4,6 +4,7 @@
 #include "core/parallel.h"
 #include "core/tensors.h"
 #include "fields/neural_field.h"
+#include "sampling/canonical_order.h"
 #include "solve/field_objective.h"
 
 namespace arapfields {
@@ -34,13 +35,13 @@ LossProbe::LossProbe(const SurfaceSamples& samples, const std::vector<Handle>& h
                      double keep_stance) {
   ObjectiveTerms terms;
   terms.batch = 20;
-  terms.surface.bending = bending;
+  terms.stiffness = SurfaceStiffness(bending);
   if (preferred.rows() > 0) terms.preference = gauss_preference(preferred, 5.0);
   terms.gauss = gauss;
   terms.keep_stance = keep_stance;
   terms.stance = Stance::of(samples.points, Vec3(0.1, 0.2, 1.0));
-  terms.surface.barrier = barrier;
-  terms.surface.barrier_threshold = 0.9;
+  terms.barrier = barrier;
+  terms.barrier_threshold = 0.9;
   terms.handles = BoundHandles(handles, samples.points);
   terms.pull.handle_batch = 8;
   state_ = std::make_unique<State>(samples, width, std::move(terms));
@@ -76,7 +77,7 @@ struct EnergyTrial::State {
 EnergyTrial::EnergyTrial(const SurfaceSamples& samples, Index batch, double bending) {
   ObjectiveTerms terms;
   terms.batch = batch;
-  terms.surface.bending = bending;
+  terms.stiffness = SurfaceStiffness(bending);
   state_ = std::make_unique<State>(samples, std::move(terms));
   state_->field.network()->weight(state_->field.shape().layers).fill_(0.01);
 }
@@ -87,6 +88,15 @@ double EnergyTrial::run() {
   const ThreadScope scope;
   state_->field.gradient().zero_();
   return state_->objective.accumulate(state_->field, state_->random).item<double>();
+}
+
+Vector probe_thickness(const SurfaceSamples& samples) {
+  const LocalThickness thickness(samples.points, samples.normals, canonical_order(samples.points));
+  return thickness.at(samples.points) * samples.frame.scale;
+}
+
+Vector probe_bending(const SurfaceSamples& samples, const SurfaceOptions& options) {
+  return SurfaceStiffness(samples, options).bending(samples.points);
 }
 
 }  // namespace arapfields

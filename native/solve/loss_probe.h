@@ -7,6 +7,7 @@
 #include "core/random.h"
 #include "energies/handles.h"
 #include "mesh/surface_samples.h"
+#include "options/surface.h"
 
 namespace arapfields {
 
@@ -45,5 +46,9 @@ class ARAPFIELDS_EXPORT_TO_TESTS EnergyTrial {
   struct State;
   std::unique_ptr<State> state_;
 };
+
+/// Local thickness at the samples, in mesh units; λ there, in the samples' cube.
+ARAPFIELDS_EXPORT_TO_TESTS Vector probe_thickness(const SurfaceSamples& samples);
+ARAPFIELDS_EXPORT_TO_TESTS Vector probe_bending(const SurfaceSamples& samples, const SurfaceOptions& options);
 
 }  // namespace arapfields

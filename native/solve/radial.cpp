@@ -65,7 +65,7 @@ Solution deform_radial(const SurfaceSamples& samples, const std::vector<Handle>&
   LiveSolver solver(samples, handles, live, progress.part(0.0, 0.3));
   const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95));
   ObjectiveTerms terms;
-  terms.surface = options.surface;
+  terms.stiffness = SurfaceStiffness(samples, options.surface);
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
   return finish(solver, samples, terms, loop, progress);
 }
@@ -99,7 +99,7 @@ Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const
   const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95));
   ObjectiveTerms terms;
   terms.rigidity = options.rigidity;
-  terms.surface = options.surface;
+  terms.stiffness = SurfaceStiffness(samples, options.surface);
   terms.preference = gauss_preference(preferred, options.sharpness);
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
   return finish(solver, samples, terms, loop, progress);

@@ -38,9 +38,11 @@ SolveReport measure(const DeformationField& field, const SurfaceSamples& samples
                     Index max_samples) {
   const Index count = std::min(samples.size(), max_samples);
   Points points(count, 3), normals(terms.preference ? count : 0, 3);
+  Vector weights(terms.weights.size() > 0 ? count : 0);
   for (Index i = 0; i < count; ++i) {
     const Index pick = i * samples.size() / count;
     points.row(i) = samples.points.row(pick);
+    if (weights.size() > 0) weights[i] = terms.weights[pick];
     if (terms.preference) normals.row(i) = samples.normals.row(pick);
   }
   SolveReport report;
@@ -52,9 +54,12 @@ SolveReport measure(const DeformationField& field, const SurfaceSamples& samples
     JetBlock<double> block(rows, JetOrder::second);
     field.evaluate(points.middleRows(begin, rows), block.view());
     const JetView<const double> jets = block.view();
-    const ArapValue arap = arap_energy<double>(jets, terms.surface.bending, 0.0, {});
+    const Vector bending = terms.stiffness.bending(points.middleRows(begin, rows));
+    const ArapValue arap = arap_energy<double>(
+        jets, 1.0, 0.0, {}, {weights.size() > 0 ? weights.data() + begin : nullptr, bending.data()});
     report.arap.stretch += share * arap.stretch;
     report.arap.bend += share * arap.bend;
+    report.arap.energy += share * arap.energy;
     Distortion part = distortion<double>(jets);
     part.flipped_share = report.distortion.flipped_share + share * part.flipped_share;
     if (!first) merge(part, report.distortion);
@@ -65,7 +70,6 @@ SolveReport measure(const DeformationField& field, const SurfaceSamples& samples
       preference += share * (1.0 - gauss_energy<double>(jets, rest, Vector(), *terms.preference, 0.0, {}));
     }
   }
-  report.energy = report.arap.stretch + terms.surface.bending * report.arap.bend;
   if (terms.preference) report.preference = preference;
   measure_handles(field, terms.handles, samples.frame.scale, report);
   return report;

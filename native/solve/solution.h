@@ -15,10 +15,9 @@
 namespace arapfields {
 
 /// How well a solved field does what it was asked for, measured at surface samples after the solve.
-/// Energies are those of the unit cube, lengths are in mesh units.
+/// The stretch and the energy are pure numbers, the bend is in 1/cube units², lengths are in mesh units.
 struct SolveReport {
-  ArapValue arap;
-  double energy = 0.0;                          ///< stretch + bending · bend
+  ArapValue arap;                               ///< arap.energy with the samples' own stiffness
   std::vector<double> handle_mean, handle_max;  ///< distances ‖f(x) − C x‖ of each handle
   std::optional<double> far_target;  ///< sizes of the shape to the farthest target, where that is far
   std::optional<double> preference;  ///< mean g of the deformed normals

@@ -52,7 +52,9 @@ Solution stylize(const SurfaceSamples& samples, PointsIn preferred, const Styliz
   ObjectiveTerms terms;
   terms.batch = options.training.batch;
   terms.rigidity = options.rigidity;
-  terms.surface = options.surface;
+  terms.stiffness = SurfaceStiffness(samples, options.surface);
+  terms.barrier = options.surface.barrier;
+  terms.barrier_threshold = options.surface.barrier_threshold;
   terms.preference = gauss_preference(preferred, options.sharpness);
   terms.gauss = options.strength * options.gauss_weight * terms.preference->balance;
   terms.preference_weights = terms.preference->reach(samples.normals);

@@ -87,7 +87,7 @@ def style_row(aim, options, most=60):
     """Time from samples to spot in the cube style at this mean preference, set-up included."""
     surface = samples("spot")
     with Clock() as clock:
-        live = af.LiveDeformer(surface, options=af.LiveOptions(bending=1e-4, barrier=1.0, **options))
+        live = af.LiveDeformer(surface, options=af.LiveOptions(bending=0.01, barrier=1.0, **options))
         live.set_style("cube")
         steps = 0
         while steps < most:
@@ -111,7 +111,7 @@ def slider_row(updates=30):
     live = af.LiveDeformer(
         samples("spot"),
         options=af.LiveOptions(
-            coarse_centers=100, fine_centers=500, bending=1e-3, barrier=1.0, gauss_weight=4.0
+            coarse_centers=100, fine_centers=500, bending=0.1, barrier=1.0, gauss_weight=4.0
         ),
     )
     live.set_style("cube", strength=0.3)

@@ -56,6 +56,9 @@ BOOST_AUTO_TEST_CASE(frame_round_trip_and_motions) {
   const Points cube = frame.to_cube(points);
   BOOST_TEST(cube.cwiseAbs().maxCoeff() <= 0.75 + 1e-12);
   BOOST_TEST((frame.to_mesh(cube) - points).norm() < 1e-12);
+  const Points balanced = Frame::balanced(points, Vector::Ones(20)).to_cube(points);
+  BOOST_TEST(balanced.colwise().mean().norm() < 1e-12);
+  BOOST_TEST(std::abs(balanced.squaredNorm() / 20 - gyration_in_cube * gyration_in_cube) < 1e-10);
   Mat4 motion = Mat4::Identity();
   motion.topLeftCorner<3, 3>() = Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()).toRotationMatrix();
   motion.topRightCorner<3, 1>() << 1, 2, 3;

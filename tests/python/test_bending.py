@@ -7,7 +7,7 @@ import pytest
 
 import arapfields as af
 
-WEIGHTS = [0.0, 1e-3, 1e-2, 1e-1]
+WEIGHTS = [0.0, 0.1, 1.0, 10.0]
 
 
 def check_trade(samples, handles, **options):

@@ -9,7 +9,7 @@ import arapfields as af
 
 # Fingers are a quarter of the cube apart: octaves from 4 to 128, whose bending a smaller weight must leave
 # room for, at a smaller rate.
-THIN_PARTS = dict(frequency=4.0, octaves=6, bending=1e-3, learning_rate=0.02)
+THIN_PARTS = dict(frequency=4.0, octaves=6, bending=0.1, bending_unit="cube", learning_rate=0.02)
 
 
 @pytest.mark.slow

@@ -172,7 +172,7 @@ def test_many_bumps_stay_well_conditioned(samples):
 
 def test_style_and_handles_together(samples):
     """A bar asked to turn its faces by 20° about its axis; taking the style away gives the bar back."""
-    live = deformer(samples, gauss_weight=2.0, bending=1e-3)
+    live = deformer(samples, gauss_weight=2.0, bending=0.1)
     cube = af.preferred_normals("cube") @ turned(20, 0)[:3, :3].T
     before = af.gauss_preference(samples.normals, cube).mean()
     live.set_style(cube)
@@ -184,7 +184,7 @@ def test_style_and_handles_together(samples):
 
 
 def test_style_without_handles_holds_the_lowest_sample(samples):
-    live = af.LiveDeformer(samples, options=af.LiveOptions(**QUICK, bending=1e-3))
+    live = af.LiveDeformer(samples, options=af.LiveOptions(**QUICK, bending=0.1))
     live.set_style(af.preferred_normals("hexagonal prism"), strength=0.5, sharpness=6.0)
     field = live.solve(iterations=30)
     lowest = samples.points[[samples.points[:, 2].argmin()]]

@@ -65,7 +65,7 @@ def test_refined_by_a_style_and_handles_at_once():
     live = af.LiveDeformer(
         samples,
         [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)],
-        af.LiveOptions(samples=800, coarse_centers=30, fine_centers=120, bending=1e-3, gauss_weight=2.0),
+        af.LiveOptions(samples=800, coarse_centers=30, fine_centers=120, bending=0.1, gauss_weight=2.0),
     )
     cube = af.preferred_normals("cube")
     for i in range(1, 6):

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Samples straight from triangles, and samples that a caller brings."""
 
+import cases
 import meshes
 import numpy as np
 import pytest
 
 import arapfields as af
+
+GYRATION = 0.6  # of a surface in its cube
 
 
 def test_samples_lie_on_the_triangles_with_their_normals():
@@ -21,13 +24,41 @@ def test_samples_lie_on_the_triangles_with_their_normals():
     assert (af.signed_distance(v, f, samples.points - step * samples.normals) < 0).all()
 
 
-def test_the_frame_fits_the_vertices_in_use():
+def gyration(half):
+    """Radius of gyration of the surface of a box with these half-extents."""
+    x, y, z = np.square(half)
+    areas = np.array([half[1] * half[2], half[0] * half[2], half[0] * half[1]])
+    squares = np.array([x + (y + z) / 3, y + (x + z) / 3, z + (x + y) / 3])
+    return np.sqrt(areas @ squares / areas.sum())
+
+
+def test_the_frame_is_the_area_s():
+    """Its centroid and its radius of gyration, whatever vertices are not in use."""
     v, f = meshes.box((4.0, 2.0, 1.0))
     stray = np.concatenate([v + np.array([1.0, 2.0, 3.0]), [[1e3, 0, 0]]])
     samples = af.sample_mesh(stray, f, count=10)
     assert np.allclose(samples.frame.center, [1, 2, 3])
-    assert np.isclose(samples.frame.scale, 4.0 / 0.75)
+    assert np.isclose(samples.frame.scale, gyration((4.0, 2.0, 1.0)) / GYRATION)
     assert "10 points" in repr(samples)
+
+
+def test_the_frame_turns_and_scales_with_the_mesh():
+    v, f = meshes.box((4.0, 2.0, 1.0))
+    motion = cases.turn([1, 2, 3], 37, (1.0, 0, 0))
+    rest = af.sample_mesh(v + [5.0, 0, 0], f, count=10).frame
+    moved = af.sample_mesh(3e4 * ((v + [5.0, 0, 0]) @ motion[:3, :3].T + motion[:3, 3]), f, count=10).frame
+    assert np.isclose(moved.scale, 3e4 * rest.scale, rtol=1e-9)
+    assert np.allclose(moved.center, 3e4 * (motion[:3, :3] @ rest.center + motion[:3, 3]), rtol=1e-9)
+
+
+def test_what_is_small_and_far_hardly_moves_the_frame():
+    """A thousandth of the length, a hundred lengths away: a part in ten thousand of the frame."""
+    v, f = meshes.sphere()
+    rest = af.sample_mesh(v, f, count=10).frame
+    both = np.concatenate([v, 1e-3 * v + [100.0, 30.0, 0.0]])
+    far = af.sample_mesh(both, np.concatenate([f, f + len(v)]), count=10).frame
+    assert abs(far.scale / rest.scale - 1) < 1e-4
+    assert np.linalg.norm(far.center - rest.center) < 1e-4 * rest.scale
 
 
 def test_counts_follow_areas():
@@ -74,8 +105,8 @@ def test_samples_from_arrays():
     samples = af.SurfaceSamples(points, normals)
     assert np.allclose(samples.points, points)
     assert np.allclose(samples.normals, normals / np.linalg.norm(normals, axis=1, keepdims=True))
-    half = 0.5 * (points.max(0) - points.min(0)).max()
-    assert np.isclose(samples.frame.scale, half / 0.75)
+    assert np.allclose(samples.frame.center, points.mean(0))
+    assert np.isclose(samples.frame.scale, np.sqrt(points.var(axis=0).sum()) / GYRATION)
     frame = af.Frame([1.0, 2.0, 3.0], 4.0)
     assert af.SurfaceSamples(points, normals, frame).frame == frame
     for bad in (np.zeros((0, 3)), points[:, :2], np.full((50, 3), np.nan), points[:49], "x"):

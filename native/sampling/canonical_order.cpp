@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sampling/canonical_order.h"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+#include "core/frame.h"
+#include "distance/morton.h"
+
+namespace arapfields {
+namespace {
+
+/// Radii of gyration beyond which a point counts as if it were at that distance.
+constexpr double far = 3.0;
+
+}  // namespace
+
+std::vector<std::uint32_t> canonical_order(PointsIn points) {
+  const Index n = points.rows();
+  if (n < 2 || (points.rowwise() - points.row(0)).cwiseAbs().maxCoeff() == 0.0) return morton_order(points);
+  const Frame frame = Frame::balanced(points, Vector::Ones(n), {}, 1.0);
+  Points placed = frame.to_cube(points);
+  for (Index i = 0; i < n; ++i) placed.row(i) *= std::min(1.0, far / std::max(placed.row(i).norm(), 1e-300));
+  const Eigen::SelfAdjointEigenSolver<Mat3> axes(Mat3(placed.transpose() * placed));
+  placed = (placed * axes.eigenvectors()).eval();
+  for (int k = 0; k < 3; ++k)  // an axis points to where the shape reaches further out
+    if (placed.col(k).array().cube().sum() < 0.0) placed.col(k) *= -1.0;
+  return morton_order(placed);
+}
+
+std::vector<Index> evenly(const std::vector<std::uint32_t>& list, Index count) {
+  const Index n = static_cast<Index>(list.size()), taken = std::min(n, count);
+  std::vector<Index> result;
+  for (Index i = 0; i < taken; ++i)
+    result.push_back(list[static_cast<std::size_t>((2 * i + 1) * n / (2 * taken))]);
+  return result;
+}
+
+}  // namespace arapfields

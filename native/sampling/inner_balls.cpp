@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sampling/inner_balls.h"
+
+#include <cmath>
+
+#include "core/parallel.h"
+
+namespace arapfields {
+namespace {
+
+/// Cosine of two normals below which they face each other.
+constexpr double facing = -0.5;
+
+}  // namespace
+
+Vector inner_radii(PointsIn points, PointsIn normals, PointsIn witnesses, PointsIn witness_normals,
+                   const InnerBallRules& rules) {
+  Vector radii(points.rows());
+  const double steep = rules.least_cosine * rules.least_cosine, near = rules.near * rules.near;
+  parallel_for(0, points.rows(), 32, [&](Index first, Index last) {
+    for (Index i = first; i < last; ++i) {
+      const Vec3 x = points.row(i), n = normals.row(i);
+      double curvature = 1.0 / rules.most;  // of the ball: a larger one means a smaller ball
+      for (Index j = 0; j < witnesses.rows(); ++j) {
+        const double a = witnesses(j, 0) - x[0], b = witnesses(j, 1) - x[1], c = witnesses(j, 2) - x[2];
+        const double square = a * a + b * b + c * c, depth = -(a * n[0] + b * n[1] + c * n[2]);
+        if (!(depth > 0.0) || depth * depth < steep * square) continue;
+        if (2.0 * depth > curvature * square && square > 0.0) curvature = 2.0 * depth / square;
+        if (square > near) continue;
+        const Vec3 other = witness_normals.row(j);
+        const double cosine = n.dot(other), gap = a * other[0] + b * other[1] + c * other[2];
+        if (cosine < facing && gap > 0.0 && (1.0 - cosine) > curvature * gap)
+          curvature = (1.0 - cosine) / gap;
+      }
+      radii[i] = 1.0 / curvature;
+    }
+  });
+  return radii;
+}
+
+}  // namespace arapfields

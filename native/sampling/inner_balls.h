@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/types.h"
+
+namespace arapfields {
+
+/// Which witnesses bound a ball.
+struct InnerBallRules {
+  double most = 1.0;          ///< radius where nothing bounds a ball
+  double least_cosine = 0.0;  ///< of the angle between the inward normal and the way to a witness: those
+                              ///< flatter are taken for the surface's own roughness
+  double near = 0.0;          ///< witnesses that face the other way count as planes within this distance: the
+                              ///< opposite side of a sheet that is thinner than witnesses are apart
+};
+
+/// Radii (n) of the largest balls that touch the surface at points (n,3) with outward unit normals (n,3) from
+/// inside and hold none of the witnesses (m,3), samples of the surface with their normals.
+Vector inner_radii(PointsIn points, PointsIn normals, PointsIn witnesses, PointsIn witness_normals,
+                   const InnerBallRules& rules);
+
+}  // namespace arapfields

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sampling/local_thickness.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/frame.h"
+#include "core/parallel.h"
+#include "sampling/canonical_order.h"
+#include "sampling/inner_balls.h"
+
+namespace arapfields {
+namespace {
+
+constexpr Index most_nodes = 1500, most_witnesses = 6000;
+/// Of the radius of gyration.
+constexpr double most_share = 0.6, least_share = 0.02;
+/// Share of a ball's radius by which a point may lie outside it.
+constexpr double reach_share = 0.25;
+/// Inner balls: how flat a witness may be, and within how many spacings of witnesses sides face each other.
+constexpr double least_cosine = 0.2, facing_spacings = 3.0;
+/// Values are averaged within so many thicknesses, and blended between nodes within so many spacings.
+constexpr double smooth_share = 0.5, blend_spacings = 1.0;
+
+}  // namespace
+
+LocalThickness::LocalThickness(PointsIn samples, PointsIn normals, const std::vector<std::uint32_t>& order) {
+  const bool extended = (samples.rowwise() - samples.row(0)).cwiseAbs().maxCoeff() > 0.0;
+  const double gyration =
+      extended ? Frame::balanced(samples, Vector::Ones(samples.rows()), {}, 1.0).scale : 1.0;
+  most_ = median_ = most_share * gyration;
+  if (!extended || normals.rows() != samples.rows()) return;
+  const std::vector<Index> chosen = evenly(order, most_nodes), seen = evenly(order, most_witnesses);
+  nodes_ = samples(chosen, Eigen::all);
+  const Points node_normals = normals(chosen, Eigen::all);
+  const Points witnesses = samples(seen, Eigen::all), witness_normals = normals(seen, Eigen::all);
+  // A sphere's area by its radius of gyration: spacings need no more than its order of magnitude.
+  const double side = 3.5 * gyration;
+  spacing_ = side / std::sqrt(static_cast<double>(nodes_.rows()));
+  const double apart = side / std::sqrt(static_cast<double>(witnesses.rows()));
+  const Vector radii =
+      inner_radii(nodes_, node_normals, witnesses, witness_normals,
+                  {.most = most_, .least_cosine = least_cosine, .near = facing_spacings * apart});
+  const Points centers = nodes_ - radii.asDiagonal() * node_normals;
+  const Index n = nodes_.rows();
+  Vector held(n);
+  const double least = least_share * gyration;
+  parallel_for(0, n, 32, [&](Index first, Index last) {
+    for (Index i = first; i < last; ++i) {
+      double largest = std::max(least, radii[i]);
+      for (Index j = 0; j < n; ++j) {
+        const double reach = (1.0 + reach_share) * radii[j];
+        if (radii[j] > largest && (centers.row(j) - nodes_.row(i)).squaredNorm() <= reach * reach)
+          largest = radii[j];
+      }
+      held[i] = largest;
+    }
+  });
+  values_.resize(n);
+  parallel_for(0, n, 32, [&](Index first, Index last) {
+    for (Index i = first; i < last; ++i) {
+      const double width = std::max(smooth_share * held[i], spacing_);
+      double sum = 0.0, total = 0.0;
+      for (Index j = 0; j < n; ++j) {
+        const double share = 1.0 - (nodes_.row(j) - nodes_.row(i)).squaredNorm() / (width * width);
+        if (share > 0.0) sum += share * held[j], total += share;
+      }
+      values_[i] = sum / total;
+    }
+  });
+  std::vector<double> sorted(values_.begin(), values_.end());
+  std::nth_element(sorted.begin(), sorted.begin() + n / 2, sorted.end());
+  median_ = sorted[static_cast<std::size_t>(n / 2)];
+}
+
+Vector LocalThickness::at(PointsIn points) const {
+  Vector result = Vector::Constant(points.rows(), most_);
+  const Index n = nodes_.rows();
+  if (n == 0) return result;
+  const double width = blend_spacings * spacing_;
+  parallel_for(0, points.rows(), 64, [&](Index first, Index last) {
+    Vector squares(n);
+    for (Index i = first; i < last; ++i) {
+      squares = (nodes_.col(0).array() - points(i, 0)).square() +
+                (nodes_.col(1).array() - points(i, 1)).square() +
+                (nodes_.col(2).array() - points(i, 2)).square();
+      const double nearest = squares.minCoeff(), farthest = nearest + width * width;
+      double sum = 0.0, total = 0.0;
+      for (Index j = 0; j < n; ++j)
+        if (squares[j] < farthest) {
+          const double share = 1.0 - (squares[j] - nearest) / (width * width);
+          sum += share * values_[j], total += share;
+        }
+      result[i] = sum / total;
+    }
+  });
+  return result;
+}
+
+}  // namespace arapfields

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/types.h"
+
+namespace arapfields {
+
+/// How thick a shape is about each point of its surface: the radius of the largest ball inside the shape that
+/// holds the point, or nearly (Hildebrand and Rüegsegger's local thickness, halved), evened out over
+/// neighbours. Where no opposite side bounds a ball, as on open sheets and where normals point inwards, and
+/// at most, it is 0.6 of the radius of gyration; at least 0.02 of it. In units of the points.
+class LocalThickness {
+ public:
+  /// From samples (n,3) of a surface and their outward unit normals (n,3); without normals it is the largest
+  /// value everywhere. `order` lists the samples so that neighbours follow each other.
+  LocalThickness(PointsIn samples, PointsIn normals, const std::vector<std::uint32_t>& order);
+
+  /// At points (m,3) of the surface.
+  Vector at(PointsIn points) const;
+  /// Half of the surface is thinner.
+  double median() const { return median_; }
+
+ private:
+  Points nodes_;
+  Vector values_;  // at nodes
+  double spacing_ = 0.0, most_ = 0.0, median_ = 0.0;
+};
+
+}  // namespace arapfields

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <memory>
+
+#include "mesh/surface_samples.h"
+#include "options/surface.h"
+#include "sampling/local_thickness.h"
+
+namespace arapfields {
+
+/// λ of the energy mean w (‖J − R‖² + λ·bend) at each point of a rest surface: (0.345 t)² times the options'
+/// factor, t the local thickness, or the same number everywhere. In the samples' cube.
+class SurfaceStiffness {
+ public:
+  SurfaceStiffness() = default;
+  explicit SurfaceStiffness(double bending) : bending_(bending) {}
+  /// `order` as LocalThickness takes it.
+  SurfaceStiffness(const SurfaceSamples& samples, const SurfaceOptions& options,
+                   const std::vector<std::uint32_t>& order);
+  SurfaceStiffness(const SurfaceSamples& samples, const SurfaceOptions& options);
+
+  /// Whether any point resists bending.
+  bool bends() const { return bending_ > 0.0; }
+  /// λ at points (n,3) of the surface.
+  Vector bending(PointsIn points) const;
+
+ private:
+  double bending_ = 0.0;  // λ, or with a thickness the factor on its square
+  std::shared_ptr<const LocalThickness> thickness_;
+};
+
+}  // namespace arapfields
