@@ -22,7 +22,9 @@ sys.path.insert(0, str(ROOT / "tests"))
 import cases  # noqa: E402
 
 WEIGHTS = [0.0, 1e-3, 1e-2, 1e-1]
-THIN_PARTS = dict(frequency=4.0, octaves=6, bending=0.1, bending_unit="cube", learning_rate=0.02, iterations=600)
+THIN_PARTS = dict(
+    frequency=4.0, octaves=6, bending=0.1, bending_unit="cube", learning_rate=0.02, iterations=600
+)
 
 
 def solved(samples, handles, **options):

@@ -56,7 +56,7 @@ Vec3 AreaSampler::unit_normal(Index triangle) const {
       .stableNormalized();
 }
 
-Frame mesh_frame(PointsIn vertices, TrianglesIn triangles) {
+Frame area_frame(PointsIn vertices, TrianglesIn triangles) {
   validate(vertices, triangles);
   const Points used = used_vertices(vertices, triangles);
   const Vec3 extent = used.colwise().maxCoeff() - used.colwise().minCoeff();
@@ -84,9 +84,9 @@ Frame mesh_frame(PointsIn vertices, TrianglesIn triangles) {
   return {origin + unit * frame.center, unit * frame.scale};
 }
 
-Frame enclosing_frame(PointsIn vertices, TrianglesIn triangles) {
+Frame mesh_frame(PointsIn vertices, TrianglesIn triangles) {
   constexpr double largest_radius = 0.93;
-  Frame frame = mesh_frame(vertices, triangles);
+  Frame frame = area_frame(vertices, triangles);
   const double radius = (used_vertices(vertices, triangles).rowwise() - frame.center.transpose())
                             .rowwise()
                             .stableNorm()
@@ -99,7 +99,7 @@ SurfaceSamples sample_mesh(PointsIn vertices, TrianglesIn triangles, Index count
   require(count > 0, "count", std::to_string(count), "at least 1 is needed");
   require_memory("count", 6.0 * sizeof(double) * static_cast<double>(count));
   SurfaceSamples samples;
-  samples.frame = mesh_frame(vertices, triangles);
+  samples.frame = area_frame(vertices, triangles);
   samples.redraw = [v = Points(vertices), t = Triangles(triangles)](Index again, std::uint64_t other) {
     return sample_mesh(v, t, again, other);
   };

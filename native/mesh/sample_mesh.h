@@ -29,16 +29,16 @@ class ARAPFIELDS_EXPORT AreaSampler {
   std::vector<double> cumulative_;  // area of triangles 0..t
 };
 
-/// The frame of a mesh: the centroid of its area, and its radius of gyration (core/frame.h). Long shapes
+/// The frame of a surface: the centroid of its area and its radius of gyration (core/frame.h). Long shapes
 /// leave the unit cube.
+ARAPFIELDS_EXPORT Frame area_frame(PointsIn vertices, TrianglesIn triangles);
+
+/// area_frame(), enlarged where the mesh would not lie in the unit ball with some room around it: for
+/// functions that are known in the cube alone.
 ARAPFIELDS_EXPORT Frame mesh_frame(PointsIn vertices, TrianglesIn triangles);
 
-/// mesh_frame(), enlarged where the mesh would not lie in the unit ball with some room around it: for
-/// functions that are known in the cube alone.
-ARAPFIELDS_EXPORT Frame enclosing_frame(PointsIn vertices, TrianglesIn triangles);
-
 /// `count` independent points, uniform by area, with their triangles' unit normals, in cube coordinates of
-/// mesh_frame(). Sample i depends on the seed and i alone. Throws InvalidInput as AreaSampler does.
+/// area_frame(). Sample i depends on the seed and i alone. Throws InvalidInput as AreaSampler does.
 ARAPFIELDS_EXPORT SurfaceSamples sample_mesh(PointsIn vertices, TrianglesIn triangles, Index count,
                                              std::uint64_t seed);
 

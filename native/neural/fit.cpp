@@ -122,7 +122,7 @@ FitResult fit_sdf(PointsIn vertices, TrianglesIn triangles, const FitOptions& op
   const ThreadScope scope(options.machine.threads);
   const TriangleMesh mesh{vertices, triangles};
   validate(mesh);
-  const Frame frame = enclosing_frame(vertices, triangles);
+  const Frame frame = mesh_frame(vertices, triangles);
   FitReport report;
   report.device = resolve_device(options.machine.device);
   report.scale = frame.scale;

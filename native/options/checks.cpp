@@ -8,7 +8,6 @@ namespace arapfields {
 void check_together(const DeformOptions& o) {
   if (o.field != FieldKind::radial) return;
   const std::string with = " with field='radial'", allowed = "it needs field='neural'";
-  require(!o.exact_handles, "exact_handles", "True" + with, allowed);
   require(o.surface.barrier == 0.0, "barrier", number_text(o.surface.barrier) + with, allowed);
   require(o.invertibility == 0.0, "invertibility", number_text(o.invertibility) + with, allowed);
 }

@@ -50,6 +50,31 @@ ObjectiveTerms terms_of(const SurfaceSamples& samples, const std::vector<Handle>
   return terms;
 }
 
+/// The radial field that follows the handles closely, blended with their motions in the margins: what is left
+/// for the blend to bend is a hundredth of what soft handles leave. The blend is a neural field's; its
+/// network is zero.
+Solution exact_radial(const SurfaceSamples& samples, const std::vector<Handle>& handles,
+                      DeformOptions options, const Progress& progress) {
+  constexpr double closer = 100.0, heaviest = 1e9;
+  const ObjectiveTerms terms = terms_of(samples, handles, options);
+  std::vector<std::string> notes;
+  const auto blend = exact_blend(terms.handles, options.margin, notes);
+  options.exact_handles = false;
+  options.handles.handle_weight = std::min(closer * options.handles.handle_weight, heaviest);
+  const Solution soft = deform_radial(samples, handles, options, progress.part(0.0, 0.95));
+  MlpShape shape{options.network, 3};
+  shape.width = shape.layers = shape.octaves = 1;
+  auto field = std::make_shared<NeuralField>(shape, 0);
+  field->set_base(soft.field);
+  field->set_handles(blend);
+  field->set_frame(samples.frame);
+  field->set_rest_points(soft.field->rest_points());
+  progress.report(0.95, "measuring the result");
+  Solution solution = measured(field, samples, terms, soft.report.loop);
+  solution.report.notes.insert(solution.report.notes.begin(), notes.begin(), notes.end());
+  return solution;
+}
+
 }  // namespace
 
 Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handles,
@@ -60,7 +85,9 @@ Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handle
   require(options.fresh_samples == 0 || samples.redraw, "options.fresh_samples",
           "the samples are a plain list of points",
           "samples of sample_mesh or sample_surface are needed, which know their surface");
-  if (options.field == FieldKind::radial) return deform_radial(samples, handles, options, progress);
+  if (options.field == FieldKind::radial)
+    return options.exact_handles ? exact_radial(samples, handles, options, progress)
+                                 : deform_radial(samples, handles, options, progress);
   const ThreadScope threads(options.machine.threads);
   ObjectiveTerms terms = terms_of(samples, handles, options);
 

@@ -89,6 +89,24 @@ LiveTerms LiveObjective<Scalar>::evaluate(const Measurements& u, Measurements* c
 }
 
 template <class Scalar>
+Eigen::VectorX<Scalar> LiveObjective<Scalar>::weighted(const Measurements& u) const {
+  Measurements result = Measurements::Zero(u.size());
+  const Index n = samples_.size(), pairs = pairs_.sources.rows();
+  for (int c = 1; c < 10; ++c) {
+    const Eigen::Map<const PointsOf<Scalar>> from(u.data() + 3 * c * n, n, 3);
+    Eigen::Map<PointsOf<Scalar>> to(result.data() + 3 * c * n, n, 3);
+    const Scalar share = Scalar(c < 7 ? 2.0 : 4.0) / static_cast<Scalar>(n);
+    if (c < 4)
+      to = share * from;
+    else
+      to = share * (bending_.asDiagonal() * from);
+  }
+  Eigen::Map<PointsOf<Scalar>>(result.data() + handle_offset(), pairs, 3) =
+      Scalar(2.0 * handle_weight_) * (pairs_.weights.asDiagonal() * handle_values(u));
+  return result;
+}
+
+template <class Scalar>
 double LiveObjective<Scalar>::value(const Measurements& u, Measurements* cotangents) const {
   const LiveTerms terms = evaluate(u, cotangents);
   const auto centers = u.tail(3 * center_count_);

@@ -67,6 +67,10 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
     return {u.data() + handle_offset(), pairs_.sources.rows(), 3};
   }
 
+  /// Twice the weights of the surrogate mean (‖J‖² + λ‖D‖²) + weight·handles, whose inverse precondition()
+  /// has, times measurements.
+  Measurements weighted(const Measurements& u) const;
+
   void measure(const RowMatrix<double>& c, Measurements& u) const override;
   double value(const Measurements& u, Measurements* cotangents) const override;
   RowMatrix<double> pull_back(const Measurements& cotangents) const override;

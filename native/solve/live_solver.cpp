@@ -30,6 +30,8 @@ std::shared_ptr<RadialField> LiveSolver::solve(Index iterations, double toleranc
 
 void LiveSolver::reset() { state_->reset(); }
 
+void LiveSolver::adopt(const DeformationField& field) { state_->adopt(field); }
+
 void LiveSolver::track(PointsIn points) { state_->track(points); }
 
 PointsF LiveSolver::tracked() const { return state_->tracked(); }

@@ -38,6 +38,9 @@ class ARAPFIELDS_EXPORT LiveSolver {
                                      const Progress& progress = {});
   /// Back to the identity, and the handles' targets to rest.
   void reset();
+  /// Takes another field's shape, as well as its own centers can, as the start of the next solve. In the
+  /// samples' frame.
+  void adopt(const DeformationField& field);
 
   /// Points (n,3) of mesh coordinates whose places tracked() tells cheaply.
   void track(PointsIn points);

@@ -326,6 +326,32 @@ void LiveSolver::State::reset() {
   report_.setup_seconds = setup;
 }
 
+/// The projection in the surrogate's norm; its factor is that of fewer samples, so it takes some rounds.
+void LiveSolver::State::adopt(const DeformationField& field) {
+  constexpr int rounds = 3;
+  const ThreadScope threads(options_.threads);
+  const LiveObjective<float>& objective = *fast_.objective;
+  const Points places = rows_of(surface_, chosen_);
+  JetBlock<double> jets(places.rows(), JetOrder::second);
+  field.evaluate(places, jets.view());
+  Points ends(pairs_.sources.rows(), 3);
+  field.evaluate(pairs_.sources, {ends.data(), ends.rows(), JetOrder::value});
+  VectorF wanted = VectorF::Zero(30 * places.rows() + 3 * ends.rows() + 3 * basis_.center_count());
+  wanted.head(30 * places.rows()) =
+      Eigen::Map<const Vector>(jets.view().data, 30 * places.rows()).cast<float>();
+  wanted.segment(30 * places.rows(), 3 * ends.rows()) =
+      Eigen::Map<const Vector>(ends.data(), 3 * ends.rows()).cast<float>();
+  VectorF u;
+  for (int round = 0; round < rounds; ++round) {
+    objective.measure(coefficients_, u);
+    coefficients_ += objective.precondition(objective.pull_back(objective.weighted(wanted - u)));
+  }
+  fast_.u.resize(0);
+  exact_.u.resize(0);
+  u_before_.resize(0);
+  optimizer_.forget();
+}
+
 std::shared_ptr<RadialField> LiveSolver::State::field() const {
   auto result = std::make_shared<RadialField>(basis_, coefficients_);
   result->set_frame(frame_);

@@ -21,6 +21,7 @@ class LiveSolver::State {
   void set_targets(const std::vector<Handle>& moved);
   std::shared_ptr<RadialField> solve(Index iterations, double tolerance, const Progress& progress);
   void reset();
+  void adopt(const DeformationField& field);
   void track(PointsIn points) { tracked_ = TrackedPoints(basis_, frame_, points); }
   PointsF tracked() const { return tracked_.moved(coefficients_); }
   std::shared_ptr<RadialField> field() const;

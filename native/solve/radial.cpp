@@ -12,6 +12,9 @@ namespace {
 
 /// Steps between two looks at the clock.
 constexpr int steps_at_once = 10;
+/// From so many centers on, few centers make a first result, in so many steps at most.
+constexpr int worth_a_first = 600, first_steps = 12;
+constexpr int samples_a_center = 8;
 
 template <class Options>
 LiveOptions live_options(const Options& options) {
@@ -20,7 +23,7 @@ LiveOptions live_options(const Options& options) {
   live.handle_samples = options.handles.handle_batch;
   live.threads = options.machine.threads;
   live.seed = options.training.seed;
-  live.tolerance = 1e-6;
+  live.tolerance = 1e-5;
   return live;
 }
 
@@ -57,13 +60,24 @@ Solution finish(const LiveSolver& live, const SurfaceSamples& samples, const Obj
 Solution deform_radial(const SurfaceSamples& samples, const std::vector<Handle>& handles,
                        const DeformOptions& options, const Progress& progress) {
   require(options.handles.handle_weight > 0.0, "handle_weight", "0", "must be positive for 'radial'");
-  LiveOptions live = live_options(options);
-  live.samples = std::max(live.samples, 8 * options.centers);
-  live.coarse_centers = options.centers / 5;
-  live.fine_centers = options.centers;
-  live.handle_weight = options.handles.handle_weight;
-  LiveSolver solver(samples, handles, live, progress.part(0.0, 0.3));
-  const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95));
+  LiveOptions fine = live_options(options);
+  fine.samples = std::max(fine.samples, samples_a_center * options.centers);
+  fine.coarse_centers = options.centers / 5;
+  fine.fine_centers = options.centers;
+  fine.handle_weight = options.handles.handle_weight;
+  std::shared_ptr<RadialField> first;
+  if (options.centers >= worth_a_first) {
+    LiveOptions few = live_options(options);
+    few.handle_weight = fine.handle_weight;
+    few.tolerance = LiveOptions().tolerance;
+    LiveSolver solver(samples, handles, few, progress.part(0.0, 0.1));
+    first = solver.solve(std::min(first_steps, options.training.iterations), 0.0, progress.part(0.1, 0.15));
+    progress.look([&](PointsIn points) { return first->at(points); });
+  }
+  const double done = first ? 0.15 : 0.0;
+  LiveSolver solver(samples, handles, fine, progress.part(done, 0.4));
+  if (first) solver.adopt(*first);
+  const LoopResult loop = run(solver, options.training, progress.part(0.4, 0.95));
   ObjectiveTerms terms;
   terms.stiffness = SurfaceStiffness(samples, options.surface);
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
@@ -74,6 +88,9 @@ std::shared_ptr<const DeformationField> radial_start(const SurfaceSamples& sampl
                                                      const std::vector<Handle>& handles,
                                                      DeformOptions options, const Progress& progress) {
   constexpr int start_steps = 30;
+  constexpr double closer = 100.0, heaviest = 1e9;  // under exact handles, which the blend then hardly bends
+  if (options.exact_handles)
+    options.handles.handle_weight = std::min(closer * options.handles.handle_weight, heaviest);
   options.exact_handles = false;
   options.invertibility = 0.0;
   options.training.iterations = start_steps;

@@ -133,7 +133,7 @@ def test_ranges_stand_in_the_table_alone():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (("default = 0.001, sentence", "default = 0.01, sentence"), "the same as declared"),
+        (("bending = { default = 0.1", "bending = { default = 1.0"), "the same as declared"),
         (("soft = [8, 512]", "soft = [8, 512]\ncolour = 1"), "unknown key 'colour'"),
         (("[1, 8192]", "[300, 8192]"), "default 256 is not within 300 to 8192"),
         (('default = "muon"', 'default = "newton"'), "'newton' is no choice"),

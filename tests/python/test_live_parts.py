@@ -10,6 +10,9 @@ from fork import BOTTOM, LEGS, TIP, fork_samples
 
 import arapfields as af
 
+# Single precision, of coefficients that nearly cancel between the layers of centers.
+SINGLE = 1e-4
+
 
 @pytest.fixture(scope="module")
 def samples():
@@ -51,7 +54,7 @@ def test_derivatives_and_files_of_such_a_field(samples, tmp_path):
     assert np.array_equal(again(points), field(points))
     assert np.array_equal(again.hessian(points), field.hessian(points))
     live.track(points)
-    assert np.abs(live.tracked() - field(points)).max() < 1e-5
+    assert np.abs(live.tracked() - field(points)).max() < SINGLE
     live.reset()
     assert np.abs(live.field(points) - points).max() < 1e-8
 

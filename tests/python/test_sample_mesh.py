@@ -44,9 +44,10 @@ def test_the_frame_is_the_area_s():
 
 def test_the_frame_turns_and_scales_with_the_mesh():
     v, f = meshes.box((4.0, 2.0, 1.0))
+    v = v + np.array([5.0, 0, 0])
     motion = cases.turn([1, 2, 3], 37, (1.0, 0, 0))
-    rest = af.sample_mesh(v + [5.0, 0, 0], f, count=10).frame
-    moved = af.sample_mesh(3e4 * ((v + [5.0, 0, 0]) @ motion[:3, :3].T + motion[:3, 3]), f, count=10).frame
+    rest = af.sample_mesh(v, f, count=10).frame
+    moved = af.sample_mesh(3e4 * (v @ motion[:3, :3].T + motion[:3, 3]), f, count=10).frame
     assert np.isclose(moved.scale, 3e4 * rest.scale, rtol=1e-9)
     assert np.allclose(moved.center, 3e4 * (motion[:3, :3] @ rest.center + motion[:3, 3]), rtol=1e-9)
 

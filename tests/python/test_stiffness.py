@@ -43,14 +43,14 @@ def test_an_open_sheet_has_a_robust_size():
 
 
 def test_parts_have_their_own_thickness():
-    """A ball with a thin rod: each is as thick as if it were alone."""
+    """A ball with a thin square rod: each is as thick as if it were alone, the rod less at its edges."""
     v, f = meshes.sphere()
     rod, g = meshes.box((2.0, 0.1, 0.1))
-    both = np.concatenate([v, rod + [2.9, 0, 0]])
+    both = np.concatenate([v, rod + np.array([2.9, 0, 0])])
     samples = samples_of(both, np.concatenate([f, g + len(v)]), 20000)
     thickness = testing.thickness(samples)
     out = samples.points[:, 0] > 1.6
-    assert np.abs(np.median(thickness[out]) / 0.1 - 1) < SAMPLED
+    assert 0.07 < np.median(thickness[out]) < 0.1 * (1 + SAMPLED)
     assert np.median(thickness[samples.points[:, 0] < 0.5]) > 0.5
 
 
