@@ -17,6 +17,8 @@ constexpr double ridge = 1e-9;
 /// Samples a center, and at least: a sample has nine derivatives.
 constexpr double samples_a_center = 1.5;
 constexpr Index least_samples = 1000;
+/// Samples that a stance is held at.
+constexpr Index stance_samples = 1000;
 /// Parts that are summed on their own: the result does not depend on the number of threads.
 constexpr Index parts = 4;
 
@@ -76,7 +78,7 @@ RowMatrix<double> stiffness_matrix(const RadialBasis& basis, PointsIn samples, c
 
 std::pair<RowMatrix<double>, Vector> stance_rows(const RadialBasis& basis, PointsIn samples,
                                                  const Stance& stance) {
-  const Index taken = std::min<Index>(samples.rows(), most_samples);
+  const Index taken = std::min<Index>(samples.rows(), stance_samples);
   Points some(taken, 3);
   Vector weights(taken);
   for (Index i = 0; i < taken; ++i) {
