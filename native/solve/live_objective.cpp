@@ -112,8 +112,8 @@ double LiveObjective<Scalar>::value(const Measurements& u, Measurements* cotange
   const auto centers = u.tail(3 * center_count_);
   if (cotangents != nullptr) cotangents->tail(3 * center_count_) = Scalar(2.0 * coefficient_weight) * centers;
   return terms.arap.energy + handle_weight_ * terms.handles + (style_ ? style_->weight * terms.gauss : 0.0) +
-         (stance_ ? stance_->weight * terms.stance : 0.0) +
-         barrier_ * terms.barrier + coefficient_weight * static_cast<double>(centers.squaredNorm());
+         (stance_ ? stance_->weight * terms.stance : 0.0) + barrier_ * terms.barrier +
+         coefficient_weight * static_cast<double>(centers.squaredNorm());
 }
 
 template <class Scalar>

@@ -131,9 +131,7 @@ def test_live_styles_keep_it_too_and_handles_take_its_place():
     samples = stool()
     ways = {}
     for keep in (0.0, 8.0):
-        live = af.LiveDeformer(
-            samples, options=af.LiveOptions(keep_stance=keep, bending=0.1, interior=False)
-        )
+        live = af.LiveDeformer(samples, options=af.LiveOptions(keep_stance=keep, bending=0.1, interior=False))
         live.set_style("octahedron")
         ways[keep] = way(live.solve(iterations=60), samples)
         live.set_style(None)
