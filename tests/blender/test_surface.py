@@ -54,6 +54,7 @@ def test_a_fit_that_cannot_be_kept_is_used_and_said():
     from addon.core.runtime import jobs
 
     bar = scenes.bar()
+    before = user_preferences.cache_folder
     user_preferences.cache_folder = lambda: __file__  # a file, where no folder can be made
     for name, value in FIT.items():
         setattr(bar.arapfields.fit, name, value)
@@ -64,6 +65,7 @@ def test_a_fit_that_cannot_be_kept_is_used_and_said():
     assert "Bar_implicit" in done
     assert bpy.ops.arapfields.fit() == {"FINISHED"}
     assert bar.arapfields.fit_key == ""
+    user_preferences.cache_folder = before
 
 
 @in_blender
