@@ -6,13 +6,13 @@ import sys
 from pathlib import Path, PurePath
 
 from ..core.settings.fitting import QUALITIES
-from ..core.settings.parameters import DEFORM
+from ..core.settings.parameters import DEFORM, EXTRACTION
 from ..core.settings.styles import STYLES, STYLIZE
 
 FORMATS = ("ply", "obj", "stl", "blend")
 PARAMETERS = {"deform": DEFORM, "stylize": STYLIZE}
 FLAGS = {"deform": ("handles",), "stylize": ("style", "frame")}  # of one verb, beside its parameters
-SHARED = ("result", "surface", "resolution", "quality")
+SHARED = ("result", "surface", "resolution", "refine_thin", "quality")
 LONGEST = 1e7  # seconds; a wait cannot be much longer
 FILE = "file: .ply, .obj, .stl, or a .blend, in which each object's own settings and handles count"
 
@@ -120,6 +120,9 @@ def add_solve_flags(one, verbs):
     )
     group.add_argument("--surface", choices=("exact", "fit"), help="the triangles, or a fit of them")
     group.add_argument("--resolution", type=count, metavar="N", help="cells of a new mesh's grid")
+    for parameter in EXTRACTION:
+        if parameter.name != "resolution":
+            add_parameter(group, parameter)
     group.add_argument("--quality", choices=[name.lower() for name in QUALITIES], help="of a fit")
     done = set()
     for verb in verbs:

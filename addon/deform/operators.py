@@ -10,7 +10,7 @@ from ..core.settings.parameters import DEFORM
 from ..handles import empties
 from ..handles.native_handles import native_handles
 from ..names import Op
-from ..properties.item import output, resolution, surface, target
+from ..properties.item import output, refine_thin, resolution, surface, target
 from ..surface.source_surface import build_options
 from .solve_job import SolveOperator, plan_solve_job
 
@@ -29,6 +29,7 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
         "surface": surface(options={"SKIP_SAVE"}),
         "target": target(options={"SKIP_SAVE"}),
         "resolution": resolution(options={"SKIP_SAVE"}),
+        "refine_thin": refine_thin(options={"SKIP_SAVE"}),
     }
 
     @classmethod

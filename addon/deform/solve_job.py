@@ -39,6 +39,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
         raise reason
     surface = read_surface(context, source, in_place=placement.in_place(output, target))
     surface.exact = effective_value("surface", settings, operator) == "EXACT"
+    surface.refine_thin = effective_value("refine_thin", settings, operator)
 
     preview = Preview(surface) if operator.in_window else None
 

@@ -38,6 +38,10 @@ def resolution(**extra):
     return annotations(EXTRACTION, **extra).get("resolution")
 
 
+def refine_thin(**extra):
+    return annotations(EXTRACTION, **extra).get("refine_thin")
+
+
 class ARAPFIELDS_PG_result(bpy.types.PropertyGroup):
     item: bpy.props.PointerProperty(type=bpy.types.Object, name="Object", description="The result object")
     kind: bpy.props.StringProperty(name="Kind", description="DEFORM, STYLIZE or EXTRACT")
@@ -73,6 +77,7 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     surface: surface()
     target: target()
     resolution: resolution()
+    refine_thin: refine_thin()
     normals: bpy.props.EnumProperty(
         items=NORMALS, name="Normals", description="How meshes of the implicit surface are shaded"
     )

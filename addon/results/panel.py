@@ -15,6 +15,7 @@ class ARAPFIELDS_PT_result(Section, bpy.types.Panel):
     def fill(self, context, source, settings):
         layout = self.layout
         layout.prop(settings, "resolution")
+        layout.prop(settings, "refine_thin")
         layout.prop(settings, "normals")
         layout.operator(Op.EXTRACT, icon="OUTLINER_OB_SURFACE")
         modifier = modifier_stack.find(source)

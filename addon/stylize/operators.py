@@ -13,7 +13,7 @@ from ..deform.solve_job import SolveOperator, plan_solve_job
 from ..handles import empties
 from ..handles.native_handles import native_handles
 from ..names import Op
-from ..properties.item import output, resolution, surface, target
+from ..properties.item import output, refine_thin, resolution, surface, target
 from ..properties.settings import frame, style
 from ..surface.source_surface import build_options
 from . import preference
@@ -35,6 +35,7 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
         "surface": surface(options={"SKIP_SAVE"}),
         "target": target(options={"SKIP_SAVE"}),
         "resolution": resolution(options={"SKIP_SAVE"}),
+        "refine_thin": refine_thin(options={"SKIP_SAVE"}),
     }
 
     def groups_of(self, source):

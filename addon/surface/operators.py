@@ -12,7 +12,7 @@ from ..core.runtime.jobs import Item
 from ..core.settings.fitting import FIT
 from ..jobs.job_operator import JobOperator, busy
 from ..names import Op
-from ..properties.item import resolution
+from ..properties.item import refine_thin, resolution
 from ..properties.item import surface as surface_choice
 from ..properties.settings import quality
 from ..results import result_objects
@@ -64,12 +64,14 @@ class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):
     title = "Extract"
 
     resolution: resolution(options={"SKIP_SAVE"})
+    refine_thin: refine_thin(options={"SKIP_SAVE"})
     surface: surface_choice(options={"SKIP_SAVE"})
 
     def plan(self, context, source, _):
         surface = read_surface(context, source)
         surface.exact = effective_value("surface", settings_of(source), self) == "EXACT"
         cells = effective_value("resolution", settings_of(source), self)
+        surface.refine_thin = effective_value("refine_thin", settings_of(source), self)
 
         def work(tracker):
             vertices, topology = surface.extract(tracker, cells, 0.8)

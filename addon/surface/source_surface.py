@@ -35,6 +35,7 @@ class SourceSurface:
     in_place: bool = False  # the shape at the place of the field's modifier, not all that is shown
     has_free_normals: bool = False
     exact: bool = True  # whether the implicit surface is the triangles', or a fit of them
+    refine_thin: bool = False  # whether extraction cuts its cells up at thin parts
     _sdf: object = None  # the fitted surface, once it was asked for
     _triangles: object = None  # the exact one
 
@@ -90,17 +91,36 @@ class SourceSurface:
 
     def extract(self, tracker, resolution, weight):
         """(k, 3) vertices and the topology of the implicit surface, in solve space."""
-        af = native.library()
-        sdf = self.implicit(tracker, weight)
-        task = tracker.start("Extracting", 1.0)
-        return checked_mesh(*af.extract_surface(sdf, resolution=resolution, task=task))
+        af, sdf = native.library(), self.implicit(tracker, weight)
+        settings, report = self.extraction(tracker, resolution)
+        mesh = af.extract_surface(sdf, **settings, report=report)
+        warn_of_pieces(tracker, report)
+        return checked_mesh(*mesh)
 
     def extract_moved(self, tracker, field, resolution):
         """The same of the surface where the field moves it, by marching cubes there; and a report."""
-        sdf, report = self.implicit(tracker, 0.0), {}
-        task = tracker.start("Extracting", 1.0)
-        mesh = native.library().extract_deformed(sdf, field, resolution, task=task, report=report)
+        af, sdf = native.library(), self.implicit(tracker, 0.0)
+        settings, report = self.extraction(tracker, resolution)
+        mesh = af.extract_deformed(sdf, field, **settings, report=report)
+        warn_of_pieces(tracker, report)
         return *checked_mesh(*mesh), {name: report[name] for name in ("inverted", "failures")}
+
+    def extraction(self, tracker, resolution):
+        """Arguments of an extraction, and a dict for its report."""
+        task = tracker.start("Extracting", 1.0)
+        return {"resolution": resolution, "refine_thin": self.refine_thin, "task": task}, {}
+
+
+def warn_of_pieces(tracker, report):
+    if report["holding_resolution"]:
+        figures = {"pieces": report["pieces"], "resolution": report["holding_resolution"]}
+        tracker.warnings.append(
+            UserError(
+                "thin parts came apart into {pieces} pieces; resolution {resolution} or Refine Thin Parts "
+                "holds them together",
+                **figures,
+            )
+        )
 
 
 def checked_mesh(vertices, corners):

@@ -16,10 +16,11 @@ constexpr double share_at_rest = 0.15;  // of the work
 }  // namespace
 
 TriangleMesh extract_deformed(const ImplicitFunction& rest, const DeformationField& field,
-                              const DeformationField* inverse, int resolution, const Progress& progress,
-                              DeformedReport* report) {
-  ExtractionOptions{.resolution = resolution}.validate();
-  const TriangleMesh mesh = extract_surface(rest, resolution, progress.part(0.0, share_at_rest));
+                              const DeformationField* inverse, const ExtractionOptions& options,
+                              const Progress& progress, DeformedReport* report) {
+  options.validate();
+  const int resolution = options.resolution;
+  const TriangleMesh mesh = extract_surface(rest, options, progress.part(0.0, share_at_rest));
   Points moved = values_at(field, field.frame().to_cube(mesh.vertices), progress);
   require(moved.allFinite(), "field", "its values are NaN or infinite on the surface",
           "a finite deformation is needed");
@@ -35,7 +36,7 @@ TriangleMesh extract_deformed(const ImplicitFunction& rest, const DeformationFie
   progress.report(share_at_rest, "inverting the field");
   const DeformedFunction function(shape, frame, progress);
   ExtractionReport done;
-  TriangleMesh result = extract_surface(function, resolution, progress.part(share_at_rest, 1.0), &done);
+  TriangleMesh result = extract_surface(function, options, progress.part(share_at_rest, 1.0), &done);
   if (report != nullptr) {
     static_cast<ExtractionReport&>(*report) = done;
     report->inverted = function.inverted();

@@ -18,9 +18,16 @@ struct DeformedReport : ExtractionReport {
 /// the deformed surface alone, known from a mesh that is extracted at rest and moved (see DeformedFunction).
 /// Throws InvalidInput as extract_surface does, and where the field is not finite.
 ARAPFIELDS_EXPORT TriangleMesh extract_deformed(const ImplicitFunction& rest, const DeformationField& field,
-                                                const DeformationField* inverse = nullptr,
-                                                int resolution = ExtractionOptions().resolution,
+                                                const DeformationField* inverse,
+                                                const ExtractionOptions& options,
                                                 const Progress& progress = {},
                                                 DeformedReport* report = nullptr);
+inline TriangleMesh extract_deformed(const ImplicitFunction& rest, const DeformationField& field,
+                                     const DeformationField* inverse = nullptr,
+                                     int resolution = ExtractionOptions().resolution,
+                                     const Progress& progress = {}, DeformedReport* report = nullptr) {
+  return extract_deformed(rest, field, inverse, ExtractionOptions{.resolution = resolution}, progress,
+                          report);
+}
 
 }  // namespace arapfields

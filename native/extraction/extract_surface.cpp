@@ -7,6 +7,7 @@
 
 #include "core/errors.h"
 #include "extraction/marching_cubes.h"
+#include "extraction/thin_parts.h"
 
 namespace arapfields {
 namespace {
@@ -15,6 +16,9 @@ constexpr int smallest_with_model = 32;  // below, the model would cost more tha
 constexpr int grid_steps_a_cell = 3;
 constexpr int grid_steps_a_sure_cell = 2;  // where Φ's own bound on |∇Φ| makes interpolation needless
 constexpr int fewest_coarse_cells = 8;     // a side
+constexpr int finest_resolution = 512;     // that can be asked for …
+constexpr int finest_refined = 2048;       // … and to which thin parts are refined
+constexpr Index points_a_thin_cell = 30;   // about, that cutting its edges in three takes
 
 /// Cells of about the same number of grid steps at every resolution.
 TricubicSurrogateOptions model_options(int resolution, bool sure) {
@@ -53,11 +57,40 @@ bool drop_jumps(EvaluationCounter& function, double most, TriangleMesh& mesh) {
   return true;
 }
 
+/// Looks for thin parts and, where they are to be refined, or have come apart and the look is cheap, cuts the
+/// cells there up.
+void hold_together(const SparseGrid& grid, const TricubicSurrogate* model, bool refine, TriangleMesh& mesh,
+                   ExtractionReport& report, EvaluationCounter& function) {
+  const ThinCells thin = thin_cells(grid);
+  report.pieces = piece_count(mesh);
+  report.thin_cells = static_cast<Index>(thin.cells.size());
+  const bool cheap = points_a_thin_cell * report.thin_cells <= function.value_count();
+  if (thin.cells.empty() || !(refine || (report.pieces > 1 && cheap))) return;
+  const std::optional<double> known = function.gradient_bound();
+  const double slope = model != nullptr ? model->lipschitz() : known ? *known : measure_lipschitz(function);
+  std::optional<HeldParts> held = hold_thin_parts(
+      grid, thin, report.pieces, refine ? finest_refined : finest_resolution, slope, function);
+  if (!held) return;
+  const int resolution = held->factor * (grid.resolution() - 1) + 1;
+  if (refine) {
+    report.pieces = held->pieces;
+    report.refinement = held->factor;
+    mesh = std::move(held->mesh);
+  } else if (held->pieces < report.pieces) {
+    report.holding_resolution = resolution;
+    report.notes.push_back("parts are thinner than two cells of the grid: the surface came apart into " +
+                           std::to_string(report.pieces) + " pieces; resolution " +
+                           std::to_string(resolution) + ", or refine_thin at this one, holds it in " +
+                           std::to_string(held->pieces));
+  }
+}
+
 }  // namespace
 
-TriangleMesh extract_surface(const ImplicitFunction& implicit, int resolution, const Progress& progress,
-                             ExtractionReport* report) {
-  ExtractionOptions{.resolution = resolution}.validate();
+TriangleMesh extract_surface(const ImplicitFunction& implicit, const ExtractionOptions& options,
+                             const Progress& progress, ExtractionReport* report) {
+  options.validate();
+  const int resolution = options.resolution;
   const auto start = std::chrono::steady_clock::now();
   progress.report(0.0, "finding the surface");
   EvaluationCounter function(implicit, progress);
@@ -72,19 +105,23 @@ TriangleMesh extract_surface(const ImplicitFunction& implicit, int resolution, c
   require(mesh.triangles.rows() > 0, "sdf",
           "its values have one sign on the whole grid of " + std::to_string(resolution) + " points a side",
           "a function with a zero surface inside the cube [-1, 1]^3 is needed");
-  bool open = (mesh.vertices.array().abs() == 1.0).any();
-  if (!implicit.continuous()) {
+  ExtractionReport done;
+  if (implicit.continuous()) {
+    hold_together(grid, model ? &*model : nullptr, options.refine_thin, mesh, done, function);
+    done.open = (mesh.vertices.array().abs() == 1.0).any();
+  } else {
+    done.open = (mesh.vertices.array().abs() == 1.0).any();
     const double bound = model ? model->lipschitz() : implicit.gradient_bound().value_or(1.0);
-    open = drop_jumps(function, 0.5 * bound * 2.0 / (resolution - 1), mesh) || open;
+    done.open = drop_jumps(function, 0.5 * bound * 2.0 / (resolution - 1), mesh) || done.open;
     require(mesh.triangles.rows() > 0, "sdf", "its sign changes by jumps alone",
             "a function with a zero surface inside the cube [-1, 1]^3 is needed");
+    done.pieces = piece_count(mesh);
   }
   mesh.vertices = implicit.frame().to_mesh(mesh.vertices);
-  if (report != nullptr)
-    *report = {.evaluations = function.value_count() + function.gradient_count(),
-               .dense_evaluations = static_cast<Index>(resolution) * resolution * resolution,
-               .open = open,
-               .seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()};
+  done.evaluations = function.value_count() + function.gradient_count();
+  done.dense_evaluations = static_cast<Index>(resolution) * resolution * resolution;
+  done.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (report != nullptr) *report = std::move(done);
   progress.report(1.0, "extracted the surface");
   return mesh;
 }

@@ -3,13 +3,13 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <functional>
 #include <numeric>
 
 #include "core/errors.h"
 #include "core/parallel.h"
+#include "extraction/cell.h"
 #include "extraction/cell_table.h"
 
 namespace arapfields {
@@ -32,67 +32,9 @@ struct Numbers {
   Index count() const { return edges + static_cast<Index>(centres.size()); }
 };
 
-/// Whether a plane across an axis cuts the cell so that two opposite corners of the cut are negative, the
-/// others positive, and the bilinear interpolant between them joins the negative ones.
-bool joined_across(const double (&corner)[8], int axis) {
-  const int u = 1 << (2 - (axis + 1) % 3), v = 1 << (2 - (axis + 2) % 3), w = 1 << (2 - axis);
-  for (const bool other : {false, true}) {
-    const int lines[4] = {other ? u : 0, other ? v : u | v, other ? 0 : u, other ? u | v : v};
-    double from = 0.0, to = 1.0;  // where lines 0, 1 are negative and 2, 3 positive
-    double low[4], rate[4];
-    for (int i = 0; i < 4; ++i) {
-      low[i] = corner[lines[i]];
-      rate[i] = corner[lines[i] | w] - low[i];
-      const double value = i < 2 ? low[i] : -low[i], slope = i < 2 ? rate[i] : -rate[i];
-      if (slope > 0.0) to = std::min(to, -value / slope);
-      if (slope < 0.0) from = std::max(from, -value / slope);
-      if (slope == 0.0 && value >= 0.0) to = -1.0;
-    }
-    // (line 0)(line 1) − (line 2)(line 3) = a t² + b t + c; not positive at either end of the range.
-    const double a = rate[0] * rate[1] - rate[2] * rate[3];
-    const double b = low[0] * rate[1] + low[1] * rate[0] - low[2] * rate[3] - low[3] * rate[2];
-    const double c = low[0] * low[1] - low[2] * low[3], t = -0.5 * b / a;
-    if (from < to && a < 0.0 && t > from && t < to && (a * t + b) * t + c > 0.0) return true;
-  }
-  return false;
+Cell cell_at(const Window& window, int i, int j, int k) {
+  return Cell([&](int x, int y, int z) { return window.value[Window::at(i + x, j + y, k + z)]; });
 }
-
-/// A cell's corner values and what its table entry says.
-struct Cell {
-  float corner[8];
-  unsigned pattern = 0, joined = 0;
-  bool complete = true;  // all corners are grid points
-
-  Cell(const Window& window, int i, int j, int k) {
-    for (unsigned c = 0; c < 8; ++c) {
-      corner[c] = window.value[Window::at(i + static_cast<int>(c >> 2), j + static_cast<int>((c >> 1) & 1),
-                                          k + static_cast<int>(c & 1))];
-      complete = complete && !std::isnan(corner[c]);
-      pattern |= (corner[c] < 0.0f ? 1u : 0u) << c;
-    }
-  }
-  bool crossed() const { return complete && pattern != 0 && pattern != 255; }
-  const std::vector<std::array<std::uint8_t, 3>>& triangles() {
-    const CellTable& table = CellTable::get();
-    const unsigned faces = table.ambiguous(pattern);
-    for (int face = 0; faces != 0 && face < 6; ++face) {
-      if (!((faces >> face) & 1u)) continue;
-      // The saddle's value has the sign of (product of the outside corners) − (product of the inside ones).
-      double inside = 1.0, outside = 1.0;
-      for (const int c : CellTable::face_corners(face)) (corner[c] < 0.0f ? inside : outside) *= corner[c];
-      if (outside < inside) joined |= 1u << face;
-    }
-    const auto& tunnel = table.tunnel(pattern);
-    const bool many_inside = std::popcount(pattern) > 4;  // then the outside corners are the ones to connect
-    if (!tunnel.empty() && (joined != 0) == many_inside) {
-      double signed_corner[8];
-      for (int c = 0; c < 8; ++c) signed_corner[c] = many_inside ? -corner[c] : corner[c];
-      for (int axis = 0; axis < 3; ++axis)
-        if (joined_across(signed_corner, axis)) return tunnel;
-    }
-    return table.triangles(pattern, joined);
-  }
-};
 
 using EachCell = std::function<void(int, int, int)>;
 
@@ -125,7 +67,7 @@ Numbers number(const SparseGrid& grid, const SparseGrid::Block& block) {
       numbers.slots[static_cast<std::size_t>(3 * SparseGrid::local(i, j, k) + axis)] =
           static_cast<std::int16_t>(numbers.edges++);
     }
-    Cell cell(window, i, j, k);
+    const Cell cell = cell_at(window, i, j, k);
     if (!cell.crossed()) return;
     const auto& triangles = cell.triangles();
     if (triangles.front()[2] == CellTable::centre || triangles.back()[2] == CellTable::centre)
@@ -173,7 +115,7 @@ class Tile {
   void triangles(Points& vertices, std::vector<std::array<std::int32_t, 3>>& out) const {
     std::size_t centre = 0;
     for_each_point([&](int i, int j, int k) {
-      Cell cell(window_, i, j, k);
+      const Cell cell = cell_at(window_, i, j, k);
       if (!cell.crossed()) return;
       const auto& list = cell.triangles();
       Index own_vertex = -1;

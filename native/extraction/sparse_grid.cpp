@@ -64,6 +64,18 @@ Index SparseGrid::find(int i, int j, int k) const {
   return std::max(-1, table_[static_cast<std::size_t>(entry(i, j, k))]);
 }
 
+float SparseGrid::value(int i, int j, int k) const {
+  const std::int32_t found = table_[static_cast<std::size_t>(entry(i / side, j / side, k / side))];
+  if (found < 0) return found == -2 ? -far : far;
+  return blocks_[static_cast<std::size_t>(found)].value[local(i % side, j % side, k % side)];
+}
+
+bool SparseGrid::exact(int i, int j, int k) const {
+  const Index found = find(i / side, j / side, k / side);
+  return found >= 0 &&
+         blocks_[static_cast<std::size_t>(found)].exact[local(i % side, j % side, k % side)] != 0;
+}
+
 void SparseGrid::keep(Index entry) {
   blocks_.emplace_back();
   Block& block = blocks_.back();

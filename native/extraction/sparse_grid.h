@@ -41,6 +41,9 @@ class SparseGrid {
   /// Coordinate of the i-th grid point along an axis.
   double coordinate(int i) const { return i + 1 == resolution_ ? 1.0 : i * spacing_ - 1.0; }
   const std::vector<Block>& blocks() const { return blocks_; }
+  /// Φ at a grid point as a block has it; ±1e30 outside of the blocks that are kept.
+  float value(int i, int j, int k) const;
+  bool exact(int i, int j, int k) const;
   /// Index into blocks(), or −1.
   Index find(int i, int j, int k) const;
   /// Point of a block in its arrays, from coordinates within it.

@@ -26,7 +26,7 @@ CHANGES = [
     ("deform", "centers", "default = 300\nrange = [5, 3000]", "default = 345\nrange = [5, 3000]"),
     ("stylize", "bending", "bending = { default = 0.001", "bending = { default = 0.0625"),
     ("fit", "optimizer", 'default = "muon"', 'default = "adam"'),
-    ("deform", "exact_handles", "default = false", "default = true"),
+    ("deform", "exact_handles", 'default = false\nlabel = "Exact', 'default = true\nlabel = "Exact'),
     ("deform", "seed", 'type = "seed"\ndefault = 0', 'type = "seed"\ndefault = 77'),
 ]
 

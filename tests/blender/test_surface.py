@@ -131,7 +131,7 @@ def test_exact_surfaces_need_no_fit():
     fit_cache().clear()
     bar, _, moving = scenes.bar_with_handles()
     assert bar.arapfields.surface == "EXACT"
-    assert bpy.ops.arapfields.extract(resolution=48) == {"FINISHED"}
+    assert bpy.ops.arapfields.extract(resolution=48, refine_thin=True) == {"FINISHED"}
     from mathutils.bvhtree import BVHTree
 
     graph = bpy.context.evaluated_depsgraph_get()

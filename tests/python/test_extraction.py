@@ -52,6 +52,32 @@ def test_equals_scikit_image_from_few_evaluations(data_dir, name):
     assert not report["open"]
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "n"),
+    [("spot", 71), ("shiba", 85), ("shiba", 100), ("shiba", 107), ("shiba", 114), ("shiba", 121)],
+)
+def test_grid_points_beside_thin_sheets_are_not_passed_over(data_dir, name, n):
+    sdf = published(data_dir, name)
+    check_same_vertices(af.extract_surface(sdf, n)[0], dense_surface(sdf, n))
+
+
+def test_a_thin_animal_is_named_and_held_together(data_dir):
+    """The published gecko, whose toes and tail are thinner than two cells of 128 a side."""
+    sdf, plain, refined, finer = published(data_dir, "geko"), {}, {}, {}
+    V, F = af.extract_surface(sdf, 128, report=plain)
+    check_closed(V, F)
+    assert plain["pieces"] == 11 and plain["thin_cells"] > 0
+    (note,) = plain["notes"]
+    assert "11 pieces" in note and str(plain["holding_resolution"]) in note
+    V, F = af.extract_surface(sdf, 128, refine_thin=True, report=refined)
+    check_closed(V, F)
+    assert refined["pieces"] == 1 and refined["notes"] == []
+    af.extract_surface(sdf, plain["holding_resolution"], report=finer)
+    assert finer["pieces"] == 1
+    assert refined["evaluations"] < 0.5 * finer["evaluations"]
+
+
 def test_bad_arguments_and_cancel(data_dir):
     sdf = published(data_dir, "bunny")
     for resolution in (0, 7, 513):

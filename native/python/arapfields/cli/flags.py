@@ -15,7 +15,7 @@ def solve_flags(parser):
     outputs.add_argument("--surface", metavar="FILE", help="the implicit surface, deformed (see --through)")
     outputs.add_argument("--save-field", metavar="FILE", help=".safetensors with the deformation field")
     report_flag(outputs)
-    add_option_flag(parser, "extraction", "resolution")
+    extraction_flags(parser)
     inverse_flag(parser)
     sdf_flag(parser)
     handles = parser.add_argument_group(
@@ -60,6 +60,11 @@ def solve_flags(parser):
         **settings,
         help="one point of the surface goes there",
     )
+
+
+def extraction_flags(parser):
+    for name in ("resolution", "refine_thin"):
+        add_option_flag(parser, "extraction", name)
 
 
 def inverse_flag(parser):

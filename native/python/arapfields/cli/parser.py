@@ -8,7 +8,7 @@ import sys
 import arapfields as af
 
 from . import verbs
-from .flags import MESH, SOURCE, inverse_flag, report_flag, sdf_flag, solve_flags
+from .flags import MESH, SOURCE, extraction_flags, inverse_flag, report_flag, sdf_flag, solve_flags
 from .options import add_option_flag, add_option_flags
 
 
@@ -161,7 +161,7 @@ def _extract(added):
     parser.add_argument("--deformed-by", metavar="FIELD", help="move the surface by a saved field")
     inverse_flag(parser)
     sdf_flag(parser)
-    add_option_flag(parser, "extraction", "resolution")
+    extraction_flags(parser)
     return parser
 
 

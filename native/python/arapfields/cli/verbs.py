@@ -146,13 +146,15 @@ def _samples(source, count, seed, args):
 def _extracted(sdf, args, field=None):
     """The surface at rest, or deformed by a field in the way --through says."""
     through = field is not None and args.through == "inverse"
+    settings = {"resolution": args.resolution, "refine_thin": args.refine_thin, "report": {}}
 
     def extract(task):
         if through:
-            return af.extract_deformed(sdf, field, resolution=args.resolution, task=task)
-        return af.extract_surface(sdf, resolution=args.resolution, task=task)
+            return af.extract_deformed(sdf, field, **settings, task=task)
+        return af.extract_surface(sdf, **settings, task=task)
 
     vertices, triangles = with_progress("extract", extract, args.quiet)
+    _print_notes(args, settings["report"])
     return (vertices if through or field is None else field(vertices)), triangles
 
 
@@ -203,11 +205,15 @@ def _write_report(outputs, place, report):
         outputs.write(place, lambda path: path.write_text(json_text(report, indent=2) + "\n"))
 
 
+def _print_notes(args, report):
+    for note in () if args.quiet else report.get("notes", ()):
+        print(f"note: {note}", file=sys.stderr)
+
+
 def _summary(args, text, report=None):
     if args.quiet:
         return
-    for note in (report or {}).get("notes", ()):
-        print(f"note: {note}", file=sys.stderr)
+    _print_notes(args, report or {})
     numbers = {
         k: v for k, v in (report or {}).items() if isinstance(v, (int, float)) and not isinstance(v, bool)
     }
