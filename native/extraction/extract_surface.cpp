@@ -13,7 +13,7 @@ namespace arapfields {
 namespace {
 
 constexpr int smallest_with_model = 32;  // below, the model would cost more than the grid
-constexpr int grid_steps_a_cell = 3;
+constexpr int grid_steps_a_cell = 4;
 constexpr int grid_steps_a_sure_cell = 2;  // where Φ's own bound on |∇Φ| makes interpolation needless
 constexpr int fewest_coarse_cells = 8;     // a side
 constexpr int finest_resolution = 512;     // that can be asked for …
