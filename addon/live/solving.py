@@ -42,10 +42,10 @@ class Solving:
         options = {**self.energy}
         if self.kind == "STYLIZE":
             options |= STYLE[2]
-            # The live energy has stretch with weight 1: all others are relative to it.
+            # The live energy has stretch and bend with weight 1: all others are relative to it.
             rigidity = max(options.pop("rigidity"), LEAST_RIGIDITY)
             options["gauss_weight"] = af.LiveOptions().gauss_weight
-            for name in ("bending", "barrier", "gauss_weight", "keep_stance", "handle_weight"):
+            for name in ("barrier", "gauss_weight", "keep_stance", "handle_weight"):
                 options[name] /= rigidity
             if self.weights is not None:
                 self.weights = vertex_groups.at_points(surface.vertices, self.weights, self.samples.points)
