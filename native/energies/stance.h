@@ -6,7 +6,7 @@
 namespace arapfields {
 
 /// How a figure stands: which way is up, and where it touches the ground.
-struct ARAPFIELDS_EXPORT Stance {
+struct ARAPFIELDS_EXPORT_TO_TESTS Stance {
   Vec3 up = Vec3::UnitZ();
   double scale = 1.0;  ///< one over its squared radius of gyration
   Vector ground;       ///< (n) weights of the samples on the ground, above 0 within 5 % of the height
@@ -22,7 +22,8 @@ struct ARAPFIELDS_EXPORT Stance {
 /// its ground becomes. Rigidity minds neither: it turns a leg, or the whole, for nothing. Adds weight times
 /// its cotangents on the value column (data may be null).
 template <class Scalar>
-ARAPFIELDS_EXPORT double stance_energy(JetView<const Scalar> jets, ConstPointsRef<Scalar> rest,
-                                       const Stance& stance, double weight, JetView<Scalar> cotangents);
+ARAPFIELDS_EXPORT_TO_TESTS double stance_energy(JetView<const Scalar> jets, ConstPointsRef<Scalar> rest,
+                                                const Stance& stance, double weight,
+                                                JetView<Scalar> cotangents);
 
 }  // namespace arapfields
