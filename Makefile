@@ -9,6 +9,8 @@ PY := $(VENV)/bin/python
 SOURCES := $(shell find native cmake -type f) CMakeLists.txt pyproject.toml
 PIP := $(PY) -m pip install --disable-pip-version-check
 PYTEST := $(PY) -m pytest
+# Files of tests are dealt out to as many processes as there are processors; each needs some memory.
+ALL_TESTS := $(PYTEST) -n logical --maxprocesses 4 --dist loadfile
 NATIVE_TESTS := build/wheel/tests/native_tests
 
 .PHONY: help setup build demo test test-slow fuzz bench sanitize format lint extension repository blenders gallery docs clean
@@ -55,10 +57,10 @@ demo: build  ## the main job on Suzanne: out/demo.blend and out/demo.png
 	$(PY) blender_scripts/demo.py --output out
 
 test: build $(NATIVE_TESTS)  ## all tests but the slow ones
-	$(PYTEST) -m "not slow" tests
+	$(ALL_TESTS) -m "not slow" tests
 
 test-slow: build $(NATIVE_TESTS)  ## every test
-	$(PYTEST) tests
+	$(ALL_TESTS) tests
 
 fuzz: build $(VENV)/.tools  ## the nets, long: 20,000 odd calls and 20,000 damaged files of every kind
 	$(PY) -m tests.fuzz

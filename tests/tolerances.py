@@ -33,6 +33,8 @@ FIT_REPORT = 0.15
 LIVE_IDENTITY = 1e-8
 # A pose solved again after others, as a share of the shape's length: what the last steps still gain.
 LIVE_DRIFT = 1e-4
+# Share of the minimised value by which rounding may raise it: the first steps are taken in single precision.
+LIVE_ROUNDING = 1e-5
 # Single-precision fields against differences of fourth order with step 2e-3: rounding over the step, and
 # truncation where the encoding's highest octave bends most.
 FLOAT_FIELD_DIFFERENCES = 1e-3
