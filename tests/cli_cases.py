@@ -83,6 +83,7 @@ def bad_meshes(folder, mesh_file):
         "garbage.ply": bytes(range(256)) * 3,
         "lines.obj": "v 0\nv 1\nv 2\nf 1 2 3\n",
         "short_row.obj": TRIANGLE + "v 1\nf 1 2 4\n",
+        "no_columns.obj": b"v -\xe6\x0b\x1e\xe9\nf 1 1 1",  # one vertex of no numbers, as trimesh reads it
         "flat.obj": "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n",
         "mesh.fbx": TRIANGLE + "f 1 2 3\n",
         "extensionless": TRIANGLE + "f 1 2 3\n",

@@ -109,7 +109,8 @@ def measured(field):
         "flipped_share",
         "preference",
     )
-    return {name: round(float(report[name]), 5) for name in names if name in report}
+    found = {name: report[name] for name in names if name in report}
+    return {name: round(float(value), 5) for name, value in found.items() if value is not None}
 
 
 def stack(paths, target, gap=6, horizontal=False):

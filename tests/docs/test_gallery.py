@@ -33,6 +33,14 @@ def test_every_committed_figure_has_its_pictures_and_figures():
         assert all((pages.ROOT / "docs" / "gallery" / file).is_file() for file in entry["files"])
 
 
+def test_what_a_solve_did_not_measure_is_left_out():
+    from figures.common import measured
+
+    report = {"energy": 0.1234567, "handle_error_mean": 0.0, "preference": None}
+    field = type("Field", (), {"report": report})()
+    assert measured(field) == {"energy": 0.12346, "handle_error_mean": 0.0}
+
+
 @pytest.fixture
 def rendered(monkeypatch):
     """Names of the figures that would have been rendered; rendering itself is refused."""

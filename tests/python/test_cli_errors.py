@@ -110,6 +110,7 @@ def test_bad_arguments_are_named(arguments, culprit, folder, capsys):
         ("{", "not JSON"),
         ("7", "handles"),
         ('{"handles": [3]}', "handles"),
+        ('{"handles": []}', "lists no handle"),
         ('[{"type": "sphere"}]', "handles[0]: type is 'sphere'"),
         ('[{"type": "point", "rest": [0, 0, 0]}]', "handles[0]: 'target' is missing"),
         ('[{"type": "point", "rest": [0, 0], "target": [0, 0, 0]}]', "handles[0]"),

@@ -59,7 +59,7 @@ def read_mesh(path):
         mesh = trimesh.load(path, force="mesh", process=False, maintain_order=True, skip_materials=True)
         vertices, triangles = np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
     for name, rows in (("vertices", vertices), ("faces", triangles)):
-        if rows.size and (rows.ndim != 2 or rows.shape[1] != 3):
+        if len(rows) and (rows.ndim != 2 or rows.shape[1] != 3):
             raise InvalidInput(
                 f"{path}: {name} are rows of shape {rows.shape[1:]}; three numbers each are needed"
             )

@@ -26,6 +26,8 @@ def read_handles(path):
         content = content["handles"]
     if not isinstance(content, list) or not all(isinstance(item, dict) for item in content):
         raise InvalidInput(f'{path}: expected {{"handles": [...]}} with an object for each handle')
+    if not content:
+        raise InvalidInput(f"{path}: lists no handle; at least one is needed")
     return [(f"{path}: handles[{i}]", item) for i, item in enumerate(content)]
 
 
