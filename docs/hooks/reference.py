@@ -82,6 +82,8 @@ def members(owner, name):
         if key.startswith("_") and key not in {"__init__", "__call__"}:
             continue
         if isinstance(member, property):
+            if defaults and key not in defaults:
+                continue  # an older name of an option
             given = f"| `{defaults[key]!r}` " if defaults else ""
             rows.append(f"| `{key}` {given}| {one_line(inspect.getdoc(member))} |")
         elif callable(member) or isinstance(member, staticmethod | classmethod):
