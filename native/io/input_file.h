@@ -4,10 +4,12 @@
 #include <cstddef>
 #include <string>
 
+#include "core/export.h"
+
 namespace arapfields {
 
 /// A regular file opened for reading; its size is known before anything is allocated for its content.
-class InputFile {
+class ARAPFIELDS_EXPORT_TO_TESTS InputFile {
  public:
   /// Throws FileError where the system refuses, InvalidInput for what is not a regular file.
   explicit InputFile(const std::string& path);

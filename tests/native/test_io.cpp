@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <sys/stat.h>
 
+#include <array>
 #include <boost/test/unit_test.hpp>
 #include <filesystem>
 #include <fstream>
@@ -10,6 +11,7 @@
 #include "fields/neural_field.h"
 #include "fields/radial_field.h"
 #include "io/files.h"
+#include "io/input_file.h"
 #include "io/output_file.h"
 
 using namespace arapfields;
@@ -122,6 +124,17 @@ BOOST_AUTO_TEST_CASE(what_cannot_be_read_or_written_is_named) {
   BOOST_TEST(refusal([&] { load_sdf(folder / "pipe"); }).find("regular") != std::string::npos);
   BOOST_TEST(refusal([&] { OutputFile file(folder / "pipe"); }).find("regular") != std::string::npos);
   BOOST_TEST(folder.size() == 2u);
+}
+
+BOOST_AUTO_TEST_CASE(a_file_cut_while_it_is_read_is_refused) {
+  const Folder folder;
+  std::ofstream(folder / "growing") << "four";
+  const InputFile file(folder / "growing");
+  fs::resize_file(folder / "growing", 2);
+  std::array<char, 4> content{};
+  file.read(0, content.data(), 2);
+  BOOST_TEST(refusal([&] { file.read(0, content.data(), file.size()); }).find("shorter") !=
+             std::string::npos);
 }
 
 BOOST_AUTO_TEST_CASE(embeddings_that_do_not_fit_together_are_refused) {
