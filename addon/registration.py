@@ -15,7 +15,7 @@ CONTENTS = [  # modules with CLASSES
     *("handles.properties", "properties.settings", "properties.item"),
     # features
     *("surface.operators", "surface.panel"),
-    *("handles.operators", "handles.panel"),
+    *("handles.operators", "handles.resizing", "handles.panel"),
     *("deform.operators", "deform.panel"),
     *("stylize.operators", "stylize.panel"),
     *("live.operators", "animation.operators"),
@@ -47,5 +47,5 @@ def unregister():
     lifecycle.unregister()
     item.detach()
     for cls in reversed(CLASSES):
-        if cls.is_registered:
+        if "bl_rna" in vars(cls):  # is registered; gizmo groups have no other way to tell
             bpy.utils.unregister_class(cls)

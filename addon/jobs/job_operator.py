@@ -5,7 +5,7 @@ import types
 
 import bpy
 
-from ..blender import vertex_groups
+from ..blender import mesh_arrays, vertex_groups
 from ..blender.language import translated
 from ..blender.object_references import ObjectReference, owner_of, refusal, source_of
 from ..core.errors import UserError
@@ -33,7 +33,8 @@ class JobOperator(ModalRun):
     @classmethod
     def poll(cls, context):
         source = source_of(context)
-        reason = native.problem() or refusal(source) or busy() or cls.refuses(source)
+        reason = native.problem() or refusal(source) or busy() or mesh_arrays.refusal(source)
+        reason = reason or cls.refuses(source)
         if reason:
             cls.poll_message_set(translated(reason))
         return not reason

@@ -25,7 +25,7 @@ def draw_progress(layout, job):
 class ARAPFIELDS_PT_status(Section, bpy.types.Panel):
     bl_label = "Status"
     bl_idname = "ARAPFIELDS_PT_status"
-    bl_order = 6
+    bl_order = 4
     needs_source = False
 
     def fill(self, context, source, settings):

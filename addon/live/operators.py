@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
+from ..blender import mesh_arrays
 from ..blender.language import translated
 from ..blender.object_references import refusal, source_of
 from ..core.errors import UserError
@@ -27,7 +28,7 @@ class ARAPFIELDS_OT_live(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         source = source_of(context)
-        reason = native.problem() or refusal(source) or busy()
+        reason = native.problem() or refusal(source) or busy() or mesh_arrays.refusal(source)
         if not reason and not sessions.is_live(source):
             reason = placement_refusal(source)
         if reason:

@@ -2,6 +2,7 @@
 import bpy
 
 from ..blender import vertex_groups
+from ..blender.host import has_window
 from ..blender.language import translated
 from ..blender.object_references import refusal, settings_of, source_of
 from ..blender.presets import preset_classes
@@ -37,6 +38,11 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
         "resolution": resolution(options={"SKIP_SAVE"}),
         "refine_thin": refine_thin(options={"SKIP_SAVE"}),
     }
+
+    @classmethod
+    def refuses(cls, source):
+        """As the settings ask; a script may ask for another style."""
+        return super().refuses(source) or (preference.refusal(source) if has_window() else None)
 
     def groups_of(self, source):
         return preference.group_names(source, settings_of(source).stylize)

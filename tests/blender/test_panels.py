@@ -201,7 +201,7 @@ def test_the_panel_draws(state):
     elif state in ("nothing", "a camera"):
         assert shown == ["ARAPFIELDS_PT_source", "ARAPFIELDS_PT_status"]
     else:
-        assert len(shown) == 7
+        assert len(shown) == 10
     if state in EXPECTED:
         section, text = EXPECTED[state]
         assert text in " ".join(found[section]), found[section]  # long texts take several labels
