@@ -6,7 +6,7 @@ import contextlib
 import bpy
 from bpy.app.handlers import persistent
 
-from . import commands, install_check, menus
+from . import commands, first_run, install_check, menus
 from .blender import icons, library_loading, modifier_stack, timers, translations
 from .blender.host import has_window
 from .core.runtime import jobs
@@ -81,7 +81,8 @@ PARTS = (  # what begins with the extension, and how it ends
     (icons.load, icons.clear),
     (translations.load, translations.clear),
     (commands.register, commands.unregister),
-    (menus.register, menus.unregister),
+    (menus.begin, menus.end),
+    (first_run.start, None),
     (library_loading.start, None),
     (install_check.start, None),
 )

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
+from ..blender.guide import Guided
 from ..blender.language import translated
 from ..blender.object_references import refusal, settings_of, source_of
 from ..blender.selection import select_alone
@@ -12,10 +13,11 @@ from ..names import Op
 from . import counts, empties, naming
 
 
-class HandleOperator:
+class HandleOperator(Guided):
     """Mixin: works on the handles of the panel's source."""
 
     bl_options = {"REGISTER", "UNDO"}
+    guide = "handles"
     needs_handle = True
     in_edit_mode = False
     counts_points = False  # whether it counts what the handles hold

@@ -3,7 +3,7 @@ import bpy
 
 from ..blender.language import translated
 from ..blender.object_references import in_scene, source_of
-from ..blender.section import Section
+from ..blender.section import Section, wrapped
 from ..names import Op
 from . import empties
 
@@ -76,6 +76,10 @@ class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
         column.operator(Op.REMOVE_HANDLE, icon="REMOVE", text="")
         column.separator()
         column.menu("ARAPFIELDS_MT_more_handle", icon="DOWNARROW_HLT", text="")
+        if not settings.handles:
+            hint = translated("Press + to place a box around a part, then move it and press Live")
+            wrapped(layout, hint, icon="INFO")
+            return
         row = layout.row(align=True)
         row.operator(Op.SET_REST, icon="PINNED")
         row.operator(Op.RESET_HANDLE, icon="LOOP_BACK")

@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
+from ..blender.guide import Guided
 from ..blender.language import translated
 from ..blender.object_references import owner_of, refusal, settings_of
 from ..core.errors import UserError
@@ -39,11 +40,12 @@ def resize(source, entry, box, rest, change):
     entry.rest = (rest @ change).ravel()
 
 
-class ARAPFIELDS_OT_resize_handle(bpy.types.Operator):
+class ARAPFIELDS_OT_resize_handle(Guided, bpy.types.Operator):
     """Move a face of the handle's box: what it holds at rest changes, where it has been moved stays"""
 
     bl_idname = Op.RESIZE_HANDLE
     bl_label = "Resize Box"
+    guide = "handles"
     bl_options = {"REGISTER", "UNDO"}
 
     axis: bpy.props.IntProperty(name="Axis", description="0, 1 or 2: X, Y or Z of the Empty", min=0, max=2)

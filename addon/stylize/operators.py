@@ -2,6 +2,7 @@
 import bpy
 
 from ..blender import vertex_groups
+from ..blender.guide import Guided
 from ..blender.host import has_window
 from ..blender.language import translated
 from ..blender.object_references import refusal, settings_of, source_of
@@ -27,6 +28,7 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
     bl_label = "Stylize"
     bl_options = {"UNDO"}
     title = "Stylize"
+    guide = "stylize"
 
     __annotations__ = {
         **annotations(STYLIZE, options={"SKIP_SAVE"}),
@@ -75,11 +77,12 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
         return plan_solve_job(context, self, source, "STYLIZE", values["samples"], values["seed"], solve)
 
 
-class ARAPFIELDS_OT_set_style(bpy.types.Operator):
+class ARAPFIELDS_OT_set_style(Guided, bpy.types.Operator):
     """Choose this style for the object"""
 
     bl_idname = Op.SET_STYLE
     bl_label = "Choose Style"
+    guide = "stylize"
     bl_options = {"INTERNAL", "UNDO"}
 
     style: style()

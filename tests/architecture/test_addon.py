@@ -27,6 +27,7 @@ TOP = {
     "registration",
     "lifecycle",
     "preferences",
+    "first_run",
     "install_check",
     "menus",
     "names",
