@@ -28,6 +28,10 @@ class ARAPFIELDS_PT_status(Section, bpy.types.Panel):
     bl_order = 4
     needs_source = False
 
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and (jobs.running() is not None or bool(jobs.messages()))
+
     def fill(self, context, source, settings):
         layout = self.layout
         job = jobs.running()
@@ -37,8 +41,6 @@ class ARAPFIELDS_PT_status(Section, bpy.types.Panel):
             )
         for level, text in jobs.messages():
             wrapped(layout, text, icon=ICONS[level])
-        if job is None and not jobs.messages():
-            layout.label(text="Ready")
 
 
 CLASSES = [ARAPFIELDS_PT_status]

@@ -5,6 +5,7 @@ import bpy
 import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
+from mathutils import Matrix
 
 from ..blender import user_preferences
 from ..blender.object_references import in_scene, settings_of, source_of
@@ -15,6 +16,8 @@ EDGES = [(a, b) for a in range(8) for b in range(a) if (CORNERS[a] != CORNERS[b]
 THIN, THICK, CHOSEN = 1.5, 2.5, 4.0  # widths of lines in pixels: at rest, now, of a selected handle
 HALO, HALO_ALPHA = 2.0, 0.55  # dark pixels around a line in all, which set it off from any mesh
 BEHIND = 0.3  # how much of a line is left behind what hides it
+NEARER = Matrix.Identity(4)  # a little towards the viewer, before the Empty's own lines
+NEARER[2][3] = -2e-4
 
 
 def box_lines(matrix):
@@ -40,6 +43,16 @@ def segments(source):
     return lines
 
 
+def draw_lines(shader, colour, width, batch):
+    """Lines with their halo, bright before what is shown and faint behind it."""
+    for test, alpha in (("GREATER", BEHIND), ("LESS_EQUAL", 1.0)):
+        gpu.state.depth_test_set(test)
+        for shade, wide in (((0, 0, 0, HALO_ALPHA * alpha), width + HALO), ((*colour, alpha), width)):
+            shader.uniform_float("color", shade)
+            shader.uniform_float("lineWidth", wide)
+            batch.draw(shader)
+
+
 def draw():
     context = bpy.context
     source = source_of(context)
@@ -47,14 +60,11 @@ def draw():
         return
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     gpu.state.blend_set("ALPHA")
+    gpu.state.depth_mask_set(False)
     shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
-    for colour, width, ends in segments(source):
-        batch = batch_for_shader(shader, "LINES", {"pos": ends})
-        for test, alpha in (("GREATER", BEHIND), ("LESS_EQUAL", 1.0)):
-            gpu.state.depth_test_set(test)
-            for shade, wide in (((0, 0, 0, HALO_ALPHA * alpha), width + HALO), ((*colour, alpha), width)):
-                shader.uniform_float("color", shade)
-                shader.uniform_float("lineWidth", wide)
-                batch.draw(shader)
+    with gpu.matrix.push_pop_projection():
+        gpu.matrix.load_projection_matrix(NEARER @ gpu.matrix.get_projection_matrix())
+        for colour, width, ends in segments(source):
+            draw_lines(shader, colour, width, batch_for_shader(shader, "LINES", {"pos": ends}))
     gpu.state.depth_test_set("NONE")
     gpu.state.blend_set("NONE")

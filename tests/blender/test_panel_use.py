@@ -10,8 +10,12 @@ def test_everyday_sections_come_first_and_numbers_are_under_advanced():
     import bpy
     from test_panels import drawn, prepared
 
+    from addon.core.runtime import jobs
+
     prepared("handles")
+    jobs.add_message("INFO", "Bar: done")
     found = drawn()
+    jobs.board.messages.clear()
     panels = {name: getattr(bpy.types, name) for name in found if "_PT_" in name}
     first = {n: cls.bl_order for n, cls in panels.items() if not hasattr(cls, "bl_parent_id")}
     order = ["source", "handles", "deform", "stylize", "status", "advanced"]
