@@ -4,9 +4,11 @@
 import bpy
 import stage
 
-SECTIONS = ("source", "surface", "handles", "deform", "stylize", "result", "status")
+EVERYDAY = ("source", "handles", "deform", "stylize")
+WITHIN = ("surface", "deform-settings", "stylize-settings", "result")  # within Advanced
 HEADER, STEP = (1120, 97), 28.4  # the sidebar's first header, and from one closed section to the next
-STYLES = (1150, 217)  # the menu of styles below the header of its section
+INNER = 28.4  # from one closed section within Advanced to the next
+STYLES = (1150, 127)  # the menu of styles below the header of its section, were that the first
 SIDEBAR = (1028, 84, 258, 820)  # left, top, width, height
 
 
@@ -27,24 +29,42 @@ def checks(found, folder):
         view.language = "en_US"
         yield 1.0
     yield from preferences(folder, "preferences")
-    yield from open_alone({"source", "surface", "handles", "deform"})
+    yield from open_alone({"source", "handles", "deform", "stylize"})
     bar.modifiers.clear()
-    found["sections"] = len(SECTIONS)
+    found["sections"] = len(EVERYDAY) + len(WITHIN)
+
+
+def rows():
+    """The sections that are always there, top to bottom; the status where there is something to say."""
+    from addon.core.runtime import jobs
+
+    said = ("status",) if jobs.messages() or jobs.running() else ()
+    return (*EVERYDAY, *said, "advanced")
 
 
 def sections(folder, name):
     yield from open_alone(set())
     stage.picture(folder, f"{name}-closed", SIDEBAR)
-    for row, section in enumerate(SECTIONS):
+    for row, section in enumerate(rows()):
         yield from press(row)
         stage.picture(folder, f"{name}-{section}", SIDEBAR)
         if section == "stylize":
-            stage.tool("mousemove", STYLES[0], STYLES[1] + STEP * row, "click", 1)
+            stage.tool("mousemove", STYLES[0], round(STYLES[1] + STEP * row), "click", 1)
             yield 1.0
             stage.picture(folder, f"{name}-styles")
             stage.tool("key", "Escape")
             yield 0.5
+        elif section == "advanced":
+            yield from within(folder, name, row)
         yield from press(row)
+
+
+def within(folder, name, row):
+    """The sections in Advanced, which is open at that row, one by one."""
+    for number, section in enumerate(WITHIN):
+        yield from press(row + 1, number)
+        stage.picture(folder, f"{name}-{section}", SIDEBAR)
+        yield from press(row + 1, number)
 
 
 def open_alone(names):
@@ -53,13 +73,13 @@ def open_alone(names):
         stage.tool(*words)
         yield 0.7
     yield from press(0)
-    for row in reversed(range(len(SECTIONS))):
-        if SECTIONS[row] in names:
+    for row, section in reversed(list(enumerate(rows()))):
+        if section in names:
             yield from press(row)
 
 
-def press(row):
-    stage.tool("mousemove", HEADER[0], HEADER[1] + STEP * row, "click", 1)
+def press(row, inner=0):
+    stage.tool("mousemove", HEADER[0], round(HEADER[1] + STEP * row + INNER * inner), "click", 1)
     yield 1.0
 
 
