@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panel by use: what is in view at first, what a button would refuse, what a fit and a job tell."""
 
+import json
+
 import pytest
 from inside import in_blender
 
@@ -116,15 +118,12 @@ def test_a_menu_offers_what_the_mesh_has():
 
 @in_blender
 def test_a_fit_tells_its_errors():
-    import json
-
+    import bpy
     from test_panels import drawn, prepared
 
     prepared("fitted")
     texts = drawn()["ARAPFIELDS_PT_surface"]
     told = [text for text in texts if "error at the surface" in text]
-    import bpy
-
     report = json.loads(bpy.data.objects["Bar"].arapfields.fit_report)
     assert told == [
         f"Mean error at the surface: {report['near_mean']:.2g}",
@@ -153,3 +152,19 @@ def test_the_status_bar_shows_the_job_and_its_cancel():
         undo()
     assert texts() == []
     assert status_bar.draw in bpy.types.STATUSBAR_HT_header.draw._draw_funcs
+
+
+@pytest.mark.parametrize("field", ["auto", "radial", "neural"])
+@in_blender
+def test_the_fold_barrier_acts_on_every_field(field):
+    import bpy
+    import scenes
+
+    _, _, moving = scenes.bar_with_handles()
+    moving.location.x -= 1.2  # the bar is pressed together
+    bpy.context.view_layer.update()
+    shapes = []
+    for barrier in (0.0, 50.0):
+        assert bpy.ops.arapfields.deform(**scenes.QUICK, field=field, barrier=barrier) == {"FINISHED"}
+        shapes.append(scenes.world_points(bpy.data.objects["Bar"]))
+    assert abs(shapes[1] - shapes[0]).max() > 1e-3

@@ -9,6 +9,9 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d, region_2d_to_origi
 from mathutils import Vector
 
 PICKS = 10
+BESIDE = 20.0  # pixels from an Empty's line at which a click can only mean what is behind it
+CORNERS = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+EDGES = [(a, b) for a in range(8) for b in range(a) if bin(a ^ b).count("1") == 1]
 
 
 def checks(found, folder):
@@ -26,7 +29,25 @@ def pixel(point):
     return round(region.x + seen.x), round(window.height - region.y - seen.y)
 
 
-def visible_vertices(item, count):
+def corners(empty):
+    """(8, 2) pixels of the corners of the Empty's cube, in the order of CORNERS."""
+    return np.array([pixel(empty.matrix_world @ Vector(corner)) for corner in CORNERS], dtype=float)
+
+
+def is_clear(point, empties):
+    """Whether a point of the world is seen well beside every edge of these Empties' cubes."""
+    at = np.array(pixel(point), dtype=float)
+    for empty in empties:
+        ends = corners(empty)
+        for a, b in EDGES:
+            way = ends[b] - ends[a]
+            share = np.clip((at - ends[a]) @ way / max(way @ way, 1.0), 0.0, 1.0)
+            if np.linalg.norm(ends[a] + share * way - at) < BESIDE:
+                return False
+    return True
+
+
+def visible_vertices(item, count, empties):
     """Vertices of what is shown of an object that nothing hides from the viewer, far from one another."""
     _, area, region = stage.view()
     depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -38,6 +59,8 @@ def visible_vertices(item, count):
             continue
         origin = region_2d_to_origin_3d(region, eye, flat)
         way = Vector(point) - origin
+        if not is_clear(point, empties):
+            continue
         hit, where, *_ = bpy.context.scene.ray_cast(depsgraph, origin, way.normalized())
         if hit and (where - Vector(point)).length < 0.02:
             found.append(point)
@@ -64,7 +87,7 @@ def picks(found, folder, target):
     yield 1.0
     meshes = [o for o in bpy.context.scene.objects if o.type == "MESH" and o.visible_get()]
     found[f"overlapping_{target}"] = len(meshes) - 1
-    wanted = [(meshes[0], point) for point in visible_vertices(meshes[0], PICKS - 6)]
+    wanted = [(meshes[0], point) for point in visible_vertices(meshes[0], PICKS - 6, (fixed, moving))]
     wanted += [(empty, point) for empty in (fixed, moving) for point in edge_points(empty, 3)]
     hits, missed = 0, []
     for item, point in wanted:
