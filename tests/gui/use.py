@@ -9,6 +9,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d, region_2d_to_origi
 from mathutils import Vector
 
 PICKS = 10
+CANCEL = (45, 12)  # pixels from the window's lower right corner to the middle of the status bar's button
 BESIDE = 20.0  # pixels from an Empty's line at which a click can only mean what is behind it
 CORNERS = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
 EDGES = [(a, b) for a in range(8) for b in range(a) if bin(a ^ b).count("1") == 1]
@@ -152,9 +153,9 @@ def search(found, folder):
         yield 0.5
         with stage.override():
             bpy.ops.wm.search_menu("INVOKE_DEFAULT")
-        yield 1.0
+        yield 4.0
         stage.tool("type", words)
-        yield 2.0
+        yield 3.0
         stage.picture(folder, f"search-{words}")
         stage.tool("key", "Escape")
         yield 0.7
@@ -173,12 +174,8 @@ def cancel(found, folder):
     yield 4.0
     stage.picture(folder, "status-bar")
     running = jobs.running() is not None
-    stage.tool("mousemove", *CANCEL(window), "click", 1)
+    stage.tool("mousemove", window.width - CANCEL[0], window.height - CANCEL[1], "click", 1)
     yield from window_jobs.until_idle(20)
     found["cancelled_in_the_status_bar"] = running and jobs.running() is None
     area.spaces.active.show_region_ui = True
     yield 1.0
-
-
-def CANCEL(window):
-    return window.width - 100, window.height - 10
