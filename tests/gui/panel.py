@@ -7,7 +7,7 @@ import stage
 EVERYDAY = ("source", "handles", "deform", "stylize")
 WITHIN = ("surface", "deform-settings", "stylize-settings", "result")  # within Advanced
 HEADER, STEP = (1120, 97), 28.4  # the sidebar's first header, and from one closed section to the next
-INNER = 28.4  # from one closed section within Advanced to the next
+INNER = 26.0  # from one closed section within Advanced to the next
 STYLES = (1150, 127)  # the menu of styles below the header of its section, were that the first
 SIDEBAR = (1028, 84, 258, 820)  # left, top, width, height
 
