@@ -48,7 +48,7 @@ def steps():
         suzanne = bpy.context.object
         suzanne.modifiers.new("Subdivision", "SUBSURF").levels = 2
         bpy.ops.object.shade_smooth()
-        jaw, ear = scenes.cube_empty(*JAW, "Jaw"), scenes.cube_empty(*EAR, "Ear")
+        jaw, ear = scenes.cube_empty(*JAW, "Empty"), scenes.cube_empty(*EAR, "Empty.001")
         bpy.context.view_layer.update()
         scenes.activate(jaw, ear, suzanne)
         bpy.ops.arapfields.add_handle()
