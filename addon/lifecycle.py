@@ -6,12 +6,12 @@ import contextlib
 import bpy
 from bpy.app.handlers import persistent
 
-from . import commands, install_check
+from . import commands, first_run, install_check, menus
 from .blender import icons, library_loading, modifier_stack, timers, translations
 from .blender.host import has_window
 from .core.runtime import jobs
 from .field_modifier import motion
-from .handles import counts
+from .handles import counts, rows
 from .jobs.display import display
 from .live import sessions
 from .surface import staleness
@@ -21,7 +21,7 @@ from .viewport import handle_boxes, previews
 @persistent
 def before_load(*_):
     """The file is about to go: whatever works on it ends, and nothing of it is applied."""
-    for state in (jobs.board, counts.pending, staleness.changed):
+    for state in (jobs.board, counts.pending, staleness.changed, rows.seen):
         state.clear()
     sessions.stop_all()
 
@@ -43,6 +43,8 @@ def after_update(scene, depsgraph):
         staleness.watch(depsgraph)
         sessions.watch(depsgraph)
         motion.written.clear()
+        if not sessions.live.is_rendering:
+            rows.follow(bpy.context)
 
 
 @persistent
@@ -79,13 +81,15 @@ PARTS = (  # what begins with the extension, and how it ends
     (icons.load, icons.clear),
     (translations.load, translations.clear),
     (commands.register, commands.unregister),
+    (menus.begin, menus.end),
+    (first_run.start, None),
     (library_loading.start, None),
     (install_check.start, None),
 )
 # What may be there when the extension is disabled, in the order in which it ends; each has clear().
 # Timers are started by blender/timers.py, threads by core/runtime/threads.py.
 STATE = (jobs.board, display, sessions.live, counts.pending, staleness.changed, motion.written)
-STATE += (previews.shown, timers)
+STATE += (previews.shown, rows.seen, timers)
 
 _begun, _drawn = [], []
 

@@ -20,7 +20,6 @@ RESULT_SUFFIX = {
     "LIVE": "_live",
     "BAKE": "_baked",
 }
-HANDLE_SUFFIX = "_handle"
 HELPER_SUFFIX = "_offsets"  # of the mesh that carries offsets where the source cannot
 
 
@@ -32,6 +31,7 @@ class Op(StrEnum):
     SET_REST = "arapfields.set_rest"
     RESET_HANDLE = "arapfields.reset_handle"
     REMOVE_HANDLE = "arapfields.remove_handle"
+    RESIZE_HANDLE = "arapfields.resize_handle"
     DEFORM = "arapfields.deform"
     EXTRACT = "arapfields.extract"
     STYLIZE = "arapfields.stylize"

@@ -2,6 +2,7 @@
 import bpy
 
 from .blender import user_preferences
+from .blender.guide import Guided
 from .blender.language import translated
 from .blender.property_definitions import annotations
 from .core.runtime import native
@@ -31,6 +32,10 @@ class ARAPFIELDS_AP_preferences(bpy.types.AddonPreferences):
         default=True,
     )
 
+    was_welcomed: bpy.props.BoolProperty(
+        name="Welcomed", description="Whether it was said where the extension is", options={"HIDDEN"}
+    )
+
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
@@ -54,11 +59,12 @@ class ARAPFIELDS_AP_preferences(bpy.types.AddonPreferences):
         box.operator(Op.COPY_REPORT, icon="COPYDOWN")
 
 
-class ARAPFIELDS_OT_copy_report(bpy.types.Operator):
+class ARAPFIELDS_OT_copy_report(Guided, bpy.types.Operator):
     """Copy what is known about the native library and this machine, for a bug report"""
 
     bl_idname = Op.COPY_REPORT
     bl_label = "Copy Report"
+    guide = "jobs"
 
     def execute(self, context):
         lines = [f"Blender {bpy.app.version_string}", *native.report()]

@@ -7,7 +7,7 @@ import importlib
 import bpy
 
 from . import lifecycle
-from .blender import host
+from .blender import guide, host
 from .properties import item
 
 CONTENTS = [  # modules with CLASSES
@@ -15,12 +15,12 @@ CONTENTS = [  # modules with CLASSES
     *("handles.properties", "properties.settings", "properties.item"),
     # features
     *("surface.operators", "surface.panel"),
-    *("handles.operators", "handles.panel"),
+    *("handles.operators", "handles.resizing", "handles.panel"),
     *("deform.operators", "deform.panel"),
     *("stylize.operators", "stylize.panel"),
     *("live.operators", "animation.operators"),
     *("results.operators", "results.panel", "jobs.operators", "jobs.panel"),
-    "preferences",
+    *("menus", "preferences"),
 ]
 MODULES = [importlib.import_module(f".{name}", __package__) for name in CONTENTS]
 CLASSES = [cls for module in MODULES for cls in module.CLASSES]
@@ -31,6 +31,7 @@ def register():
         for cls in CLASSES:
             bpy.utils.register_class(cls)
         item.attach()
+        guide.begin(CLASSES)
         lifecycle.register()
     except Exception:
         unregister()
@@ -45,7 +46,8 @@ def unregister():
     """Undoes register(), or what it did before it failed; once: Blender calls it too when it ends."""
     atexit.unregister(unregister)
     lifecycle.unregister()
+    guide.end()
     item.detach()
     for cls in reversed(CLASSES):
-        if cls.is_registered:
+        if "bl_rna" in vars(cls):  # is registered; gizmo groups have no other way to tell
             bpy.utils.unregister_class(cls)

@@ -13,7 +13,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "blender_scripts"))
 
-from extension import archive, bindings, check, dependencies, libraries, wheel  # noqa: E402
+from extension import archive, bindings, check, dependencies, guide, libraries, wheel  # noqa: E402
 from extension.blender import extension_tool  # noqa: E402
 
 WHEEL_TAG = "py3-none-linux_x86_64"
@@ -103,7 +103,8 @@ def build(options):
     wheels += dependencies.dependency_wheels((ROOT / "requirements.txt").read_text(), folder)
     path = options.output / f"arapfields-{version}-linux-x64.zip"
     options_table = options.build / "python/arapfields/options.json"
-    archive.write_extension(addon, options_table, wheels, (ROOT / "LICENSE").read_text(), path)
+    licence, pages = (ROOT / "LICENSE").read_text(), guide.guide_files(ROOT / "docs")
+    archive.write_extension(addon, options_table, wheels, licence, pages, path)
     check.check_zip(path, headers)
     extension_tool("validate", path)
     print(f"{path} ({path.stat().st_size / 1e6:.0f} MB)")

@@ -23,6 +23,7 @@ class ARAPFIELDS_OT_bake(JobOperator, bpy.types.Operator):
     bl_label = "Bake Animation"
     bl_options = {"UNDO"}
     title = "Bake"
+    guide = "deform"
     refuses = staticmethod(require_handles)
 
     start: bpy.props.IntProperty(

@@ -63,12 +63,27 @@ def triangles(mesh):
     return corners[flat].reshape(-1, 3)
 
 
+def refusal(source):
+    """Why there is nothing to work on, as a UserError, as far as it is seen without reading; else None."""
+    if source.modifiers or source.mode == "EDIT":
+        return None
+    return nothing_in(source.name, len(source.data.vertices), len(source.data.polygons))
+
+
+def nothing_in(name, vertices, faces):
+    """The UserError for a mesh of so many vertices and faces; None where it has some."""
+    if not vertices:
+        return UserError("{name}: the mesh is empty", name=name)
+    return None if faces else UserError("{name}: the mesh has no faces", name=name)
+
+
 def read(context, source, in_place=False):
     """What there is to work on of an object; UserError that names it when there is nothing."""
     with modifier_stack.evaluated_mesh(context, source, in_place) as mesh:
         arrays = MeshArrays(positions(mesh), triangles(mesh), bool(modifier_stack.free_normals(mesh)))
-    if not len(arrays.vertices):
-        raise UserError("{name}: the mesh is empty", name=source.name)
+    reason = nothing_in(source.name, len(arrays.vertices), len(arrays.triangles))
+    if reason is not None:
+        raise reason
     if not np.isfinite(arrays.vertices).all():
         broken = np.flatnonzero(~np.isfinite(arrays.vertices).all(axis=1))
         raise UserError(
@@ -77,8 +92,6 @@ def read(context, source, in_place=False):
             count=len(broken),
             first=broken[0],
         )
-    if not len(arrays.triangles):
-        raise UserError("{name}: the mesh has no faces", name=source.name)
     return arrays
 
 

@@ -6,6 +6,7 @@ import bpy
 from ..core.runtime import native
 from ..names import CATEGORY
 from . import object_references
+from .language import translated
 
 
 class Section:
@@ -29,19 +30,26 @@ class Section:
         self.fill(context, source, object_references.settings_of(source) if source else None)
 
 
-def settings_column(layout, group, parameters, skip=()):
-    """The everyday parameters, and under them the advanced ones in a closed drawer."""
+class Advanced(Section):
+    """Mixin of the sections within Advanced, closed at first."""
+
+    bl_parent_id = "ARAPFIELDS_PT_advanced"
+    bl_options = {"DEFAULT_CLOSED"}
+
+
+def settings_column(layout, group, parameters, advanced):
+    """The everyday parameters, or the advanced ones."""
     column = layout.column()
     for parameter in parameters:
-        if not parameter.advanced and parameter.name not in skip:
+        if parameter.advanced == advanced:
             column.prop(group, parameter.name)
-    further = [p for p in parameters if p.advanced and p.name not in skip]
-    if further:
-        header, body = layout.panel(f"arapfields_{type(group).__name__}", default_closed=True)
-        header.label(text="Advanced")
-        if body:
-            for parameter in further:
-                body.prop(group, parameter.name)
+
+
+def note(layout, *reasons):
+    """Says before a button is pressed why it would refuse: the first of these errors that is one."""
+    reason = next(filter(None, reasons), None)
+    if reason is not None:
+        wrapped(layout, translated(reason), icon="INFO")
 
 
 def job_button(layout, operator, icon):

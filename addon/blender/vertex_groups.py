@@ -13,12 +13,17 @@ from .object_references import ObjectReference
 BLOCK = 4000  # vertices that are read at once, some milliseconds
 
 
+def missing(source, names):
+    """Why a source lacks one of these groups, as a UserError; None where it has them."""
+    name = next((name for name in names if name not in source.vertex_groups), None)
+    return name and UserError("{name} has no vertex group {group}", name=source.name, group=name)
+
+
 def read_weights(context, source, names, in_place=False):
     """Coroutine that reads the vertex groups with these names: {name: (n,) weights of the vertices}."""
     names = list(dict.fromkeys(names))
-    for name in names:
-        if name not in source.vertex_groups:
-            raise UserError("{name} has no vertex group {group}", name=source.name, group=name)
+    if missing(source, names):
+        raise missing(source, names)
     if not names:
         return {}
     reference, shown = ObjectReference(source), None

@@ -22,6 +22,7 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
     bl_label = "Deform"
     bl_options = {"UNDO"}
     title = "Deform"
+    guide = "deform"
 
     __annotations__ = {
         **annotations(DEFORM, options={"SKIP_SAVE"}),

@@ -1,28 +1,40 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..blender.section import Section, job_button, presets, settings_column
+from ..blender.section import Advanced, Section, job_button, note, presets, settings_column
+from ..core.geometry.handles import nothing_held
 from ..core.settings.parameters import DEFORM
+from ..handles import empties
 from ..live.panel import live_buttons
 from ..names import Op
+from .solve_job import placement_refusal
 
 
 class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
     bl_label = "Deform"
     bl_idname = "ARAPFIELDS_PT_deform"
-    bl_order = 3
+    bl_order = 2
 
     def draw_header_preset(self, context):
         presets(self.layout, "deform")
 
     def fill(self, context, source, settings):
         layout = self.layout
-        layout.prop(settings, "output")
-        layout.prop(settings, "target")
-        settings_column(layout, settings.deform, DEFORM)
+        live_buttons(layout, source, "DEFORM", empties.require_handles(source))
         job_button(layout, Op.DEFORM, "MOD_SIMPLEDEFORM")
-        live_buttons(layout, source, "DEFORM")
-        layout.operator(Op.BAKE, icon="REC")
+        settings_column(layout, settings.deform, DEFORM, advanced=False)
+        note(layout, empties.require_handles(source), placement_refusal(source))
+        if empties.holding_nothing(source):
+            note(layout, nothing_held(empties.holding_nothing(source)))
 
 
-CLASSES = [ARAPFIELDS_PT_deform]
+class ARAPFIELDS_PT_deform_settings(Advanced, bpy.types.Panel):
+    bl_label = "Deform Settings"
+    bl_idname = "ARAPFIELDS_PT_deform_settings"
+    bl_order = 1
+
+    def fill(self, context, source, settings):
+        settings_column(self.layout, settings.deform, DEFORM, advanced=True)
+
+
+CLASSES = [ARAPFIELDS_PT_deform, ARAPFIELDS_PT_deform_settings]

@@ -7,11 +7,13 @@ from mathutils import Matrix, Vector
 
 from ..blender import mesh_arrays, modifier_stack, vertex_groups
 from ..blender.object_references import in_scene, settings_of
+from ..blender.selection import choose_row
 from ..core.errors import UserError
 from ..core.geometry.handles import box_matrix, solve_handle
 from ..core.geometry.spaces import transform
 from ..core.runtime.coroutines import run_to_completion
-from ..names import HANDLE_SUFFIX
+from . import naming
+from .palette import free_colour
 
 
 def matrix_of(item):
@@ -40,8 +42,15 @@ def used(source):
 
 
 def require_handles(source):
-    """Why a source without a handle is refused, as a UserError; None where it has one."""
-    return None if used(source) else UserError("Add a handle first")
+    """Why a source's handles cannot be followed, as a UserError; None where they can."""
+    if not used(source):
+        return UserError("Add a handle first")
+    return vertex_groups.missing(source, group_names(source))
+
+
+def holding_nothing(source):
+    """Names of the handles that held no part of the surface when their rest poses were stored."""
+    return [entry.empty.name for entry in used(source) if entry.inside == 0]
 
 
 def find(source, empty):
@@ -72,7 +81,6 @@ def solve_handles(source, space, weights=None, where=matrix_of):
     return handles
 
 
-PALETTE = [(0.27, 0.55, 1.0), (1.0, 0.42, 0.30), (0.35, 0.80, 0.40), (0.85, 0.45, 0.90), (1.0, 0.80, 0.25)]
 SHAPES = {"CUBE": "CUBE", "POINT": "SPHERE", "GROUP": "ARROWS"}
 
 
@@ -88,21 +96,20 @@ def add(source, empty, kind="CUBE"):
         remove(owner, find(owner, empty))
     index = find(source, empty)
     if index < 0:
-        index = len(settings.handles)
-        settings.handles.add()
+        index, colour = len(settings.handles), free_colour(settings.handles)
+        settings.handles.add().colour = colour
     entry = settings.handles[index]
     entry.empty, entry.kind = empty, kind
-    entry.colour = PALETTE[index % len(PALETTE)]
     settings_of(empty).handle_of = source
     empty.empty_display_type = SHAPES[kind]
     store_rest(source, entry)
-    settings.active_handle = index
+    choose_row(settings, index)
     return entry
 
 
-def make_empty(context, source, matrix, size):
+def make_empty(context, source, matrix, size, name):
     """A new cube Empty beside the source in its collection."""
-    empty = bpy.data.objects.new(f"{source.name}{HANDLE_SUFFIX}", None)
+    empty = bpy.data.objects.new(name, None)
     empty.empty_display_type, empty.empty_display_size = "CUBE", size
     home = next((c for c in source.users_collection if c in editable(context)), context.collection)
     home.objects.link(empty)
@@ -115,12 +122,21 @@ def editable(context):
     return [context.scene.collection, *context.scene.collection.children_recursive]
 
 
+def can_place(source, kind, place):
+    """Whether the source has what such a handle is made around, as far as that is known at once."""
+    if source is None or (kind == "GROUP" and not source.vertex_groups):
+        return False
+    return place != "SELECTION" or source.mode != "EDIT" or source.data.total_vert_sel > 0
+
+
 def new_empty(context, source, kind, group, place):
     """A new Empty: about the selected vertices, amid the vertex group, or at the 3D cursor."""
     corners = transform(matrix_of(source), np.array(source.bound_box))
     size = float(np.ptp(corners, axis=0).max()) / 6 or 1.0
     if place == "SELECTION":
-        return make_empty(context, source, Matrix(selection_box(source, size).tolist()), 1.0)
+        matrix = Matrix(selection_box(source, size).tolist())
+        name = naming.name_for(source, matrix.translation, kind)
+        return make_empty(context, source, matrix, 1.0, name)
     where = context.scene.cursor.location
     if kind == "GROUP":
         in_place = settings_of(source).in_place
@@ -128,7 +144,8 @@ def new_empty(context, source, kind, group, place):
         with modifier_stack.evaluated_mesh(context, source, in_place) as mesh:
             middle = np.average(mesh_arrays.positions(mesh), axis=0, weights=weights)
         where = source.matrix_world @ Vector(middle)
-    return make_empty(context, source, Matrix.Translation(where), size)
+    name = naming.name_of_group(group) if kind == "GROUP" else naming.name_for(source, where, kind)
+    return make_empty(context, source, Matrix.Translation(where), size, name)
 
 
 def selection_box(source, size):
@@ -164,8 +181,8 @@ def mirror(context, source, entry, axis):
     name, size = entry.empty.name, entry.empty.empty_display_size
     flipped = bpy.utils.flip_name(name)
     weight, kind = entry.weight, entry.kind
-    empty = make_empty(context, source, Matrix((world @ current).tolist()), size)
-    empty.name = flipped if flipped != name else f"{name}_mirrored"
+    new_name = flipped if flipped != name else f"{name}_mirrored"
+    empty = make_empty(context, source, Matrix((world @ current).tolist()), size, new_name)
     mirrored = add(source, empty, kind)
     mirrored.rest, mirrored.group, mirrored.weight = rest.ravel(), group, weight
     return mirrored
@@ -185,4 +202,4 @@ def remove(source, index):
     if empty is not None:
         settings_of(empty).handle_of = None
     settings.handles.remove(index)
-    settings.active_handle = max(0, min(settings.active_handle, len(settings.handles) - 1))
+    choose_row(settings, max(0, min(settings.active_handle, len(settings.handles) - 1)))

@@ -1,19 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
+from ..blender.guide import Guided
 from ..blender.language import translated
 from ..blender.object_references import refusal, settings_of, source_of
+from ..blender.selection import select_alone
 from ..core.errors import UserError
+from ..core.geometry.handles import nothing_held
 from ..core.runtime import native
 from ..core.settings.choices import HANDLE_KINDS, HANDLE_PLACES
 from ..names import Op
-from . import counts, empties
+from . import counts, empties, naming
 
 
-class HandleOperator:
+class HandleOperator(Guided):
     """Mixin: works on the handles of the panel's source."""
 
     bl_options = {"REGISTER", "UNDO"}
+    guide = "handles"
     needs_handle = True
     in_edit_mode = False
     counts_points = False  # whether it counts what the handles hold
@@ -24,9 +28,15 @@ class HandleOperator:
         reason = native.problem() or refusal(source, cls.in_edit_mode)
         if not reason and cls.needs_handle and not settings_of(source).handles:
             reason = "The object has no handle"
+        reason = reason or cls.refuses(source)
         if reason:
             cls.poll_message_set(translated(reason))
         return not reason
+
+    @classmethod
+    def refuses(cls, source):
+        """Why this operator cannot work on a source that others can, as a UserError; else None."""
+        return None
 
     def execute(self, context):
         context.view_layer.update()
@@ -41,12 +51,9 @@ class HandleOperator:
 
     def warn_of_empty(self, source):
         """Says which handles hold nothing; a solve would refuse them."""
-        names = [entry.empty.name for entry in empties.used(source) if entry.inside == 0]
+        names = empties.holding_nothing(source)
         if self.counts_points and names:
-            error = UserError(
-                "no part of the surface lies in the rest region of {names}", names=", ".join(names)
-            )
-            self.report({"WARNING"}, translated(error))
+            self.report({"WARNING"}, translated(nothing_held(names)))
 
 
 def chosen_entries(context, source):
@@ -82,21 +89,30 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
         name="Vertex Group", description="The group to hold, for that kind; empty for the object's active one"
     )
 
-    def change(self, context, source):
+    @classmethod
+    def refuses(cls, source):
         if source.library is not None:
-            raise UserError(
+            return UserError(
                 "{name} is linked from another file; make it local to give it handles", name=source.name
             )
+        return None
+
+    def change(self, context, source):
         group = self.group or (source.vertex_groups.active.name if source.vertex_groups else "")
         if self.kind == "GROUP" and not group:
             raise UserError("{name} has no vertex group", name=source.name)
         selected = [item for item in context.selected_objects if item.type == "EMPTY"]
-        if not selected or self.place != "AUTO" or source.mode == "EDIT":
+        made = not selected or self.place != "AUTO" or source.mode == "EDIT"
+        if made:
             selected = [empties.new_empty(context, source, self.kind, group, self.place)]
         others = {settings_of(empty).handle_of for empty in selected} - {None, source}
         for empty in selected:
+            if naming.is_blenders_own(empty):
+                empty.name = naming.name_for(source, empty.matrix_world.translation, self.kind)
             entry = empties.add(source, empty, self.kind)
             entry.group = group if self.kind == "GROUP" else ""
+        if made:
+            select_alone(context, selected[0])  # to be moved at once
         counts.count_inside(context, source)
         for other in sorted(item.name for item in others):
             text = translated("handles of {other} were taken over by {name}", other=other, name=source.name)

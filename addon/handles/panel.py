@@ -2,9 +2,10 @@
 import bpy
 
 from ..blender.language import translated
-from ..blender.object_references import in_scene
-from ..blender.section import Section
+from ..blender.object_references import in_scene, source_of
+from ..blender.section import Section, wrapped
 from ..names import Op
+from . import empties
 
 ICONS = {"CUBE": "CUBE", "POINT": "DOT", "GROUP": "GROUP_VERTEX"}
 
@@ -41,7 +42,9 @@ class ARAPFIELDS_MT_add_handle(bpy.types.Menu):
             ("POINT", "CURSOR", "Point at 3D Cursor", "DOT"),
             ("GROUP", "AUTO", "From Active Vertex Group", "GROUP_VERTEX"),
         ):
-            operator = layout.operator(Op.ADD_HANDLE, text=text, icon=icon)
+            row = layout.row()
+            row.enabled = empties.can_place(source_of(context), kind, place)
+            operator = row.operator(Op.ADD_HANDLE, text=text, icon=icon)
             operator.kind, operator.place = kind, place
 
 
@@ -62,7 +65,7 @@ class ARAPFIELDS_MT_more_handle(bpy.types.Menu):
 class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
     bl_label = "Handles"
     bl_idname = "ARAPFIELDS_PT_handles"
-    bl_order = 2
+    bl_order = 1
 
     def fill(self, context, source, settings):
         layout = self.layout
@@ -73,6 +76,10 @@ class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
         column.operator(Op.REMOVE_HANDLE, icon="REMOVE", text="")
         column.separator()
         column.menu("ARAPFIELDS_MT_more_handle", icon="DOWNARROW_HLT", text="")
+        if not settings.handles:
+            hint = translated("Press + to place a box around a part, then move it and press Live")
+            wrapped(layout, hint, icon="INFO")
+            return
         row = layout.row(align=True)
         row.operator(Op.SET_REST, icon="PINNED")
         row.operator(Op.RESET_HANDLE, icon="LOOP_BACK")

@@ -5,7 +5,8 @@ import types
 
 import bpy
 
-from ..blender import vertex_groups
+from ..blender import mesh_arrays, vertex_groups
+from ..blender.guide import Guided
 from ..blender.language import translated
 from ..blender.object_references import ObjectReference, owner_of, refusal, source_of
 from ..core.errors import UserError
@@ -16,7 +17,7 @@ from ..core.settings.choices import SCOPES
 from .modal import ModalRun
 
 
-class JobOperator(ModalRun):
+class JobOperator(ModalRun, Guided):
     """Mixin of operators whose work runs on the worker thread.
 
     A subclass has `title` and `plan(context, source, weights)`, which reads what the worker needs and returns
@@ -33,7 +34,8 @@ class JobOperator(ModalRun):
     @classmethod
     def poll(cls, context):
         source = source_of(context)
-        reason = native.problem() or refusal(source) or busy() or cls.refuses(source)
+        reason = native.problem() or refusal(source) or busy() or mesh_arrays.refusal(source)
+        reason = reason or cls.refuses(source)
         if reason:
             cls.poll_message_set(translated(reason))
         return not reason

@@ -25,8 +25,12 @@ def draw_progress(layout, job):
 class ARAPFIELDS_PT_status(Section, bpy.types.Panel):
     bl_label = "Status"
     bl_idname = "ARAPFIELDS_PT_status"
-    bl_order = 6
+    bl_order = 4
     needs_source = False
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and (jobs.running() is not None or bool(jobs.messages()))
 
     def fill(self, context, source, settings):
         layout = self.layout
@@ -37,8 +41,6 @@ class ARAPFIELDS_PT_status(Section, bpy.types.Panel):
             )
         for level, text in jobs.messages():
             wrapped(layout, text, icon=ICONS[level])
-        if job is None and not jobs.messages():
-            layout.label(text="Ready")
 
 
 CLASSES = [ARAPFIELDS_PT_status]

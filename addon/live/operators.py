@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
+from ..blender import mesh_arrays
+from ..blender.guide import Guided
 from ..blender.language import translated
 from ..blender.object_references import refusal, source_of
 from ..core.errors import UserError
@@ -13,11 +15,12 @@ from ..names import Op
 from . import sessions
 
 
-class ARAPFIELDS_OT_live(bpy.types.Operator):
+class ARAPFIELDS_OT_live(Guided, bpy.types.Operator):
     """Let the shape follow handles or style while these change; again to stop, which takes that back"""
 
     bl_idname = Op.LIVE
     bl_label = "Live"
+    guide = "deform"
     bl_options = {"UNDO"}
 
     kind: bpy.props.EnumProperty(
@@ -27,7 +30,7 @@ class ARAPFIELDS_OT_live(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         source = source_of(context)
-        reason = native.problem() or refusal(source) or busy()
+        reason = native.problem() or refusal(source) or busy() or mesh_arrays.refusal(source)
         if not reason and not sessions.is_live(source):
             reason = placement_refusal(source)
         if reason:
@@ -64,11 +67,12 @@ class ARAPFIELDS_OT_live(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ARAPFIELDS_OT_live_keep(bpy.types.Operator):
+class ARAPFIELDS_OT_live_keep(Guided, bpy.types.Operator):
     """End live mode and keep the shape as the result"""
 
     bl_idname = Op.LIVE_KEEP
     bl_label = "Keep Shape"
+    guide = "deform"
     bl_options = {"UNDO"}
 
     @classmethod

@@ -5,10 +5,13 @@ from ..names import Op
 from . import sessions
 
 
-def live_buttons(layout, source, kind):
-    """Live on and off, and while it is on a way to keep the shape."""
+def live_buttons(layout, source, kind, refusal):
+    """Live on and off, and while it is on a way to keep the shape; grey where there is a refusal."""
     on = sessions.is_live(source, kind)
     row = layout.row(align=True)
-    row.operator(Op.LIVE, icon="PAUSE" if on else "PLAY", depress=on).kind = kind
+    row.scale_y = 1.4
+    start = row.row(align=True)
+    start.enabled = on or refusal is None
+    start.operator(Op.LIVE, icon="PAUSE" if on else "PLAY", depress=on).kind = kind
     if on:
         row.operator(Op.LIVE_KEEP, icon="CHECKMARK")

@@ -5,6 +5,7 @@ import bpy
 
 from ..blender.object_references import owner_of, settings_of
 from ..blender.property_definitions import annotations
+from ..blender.selection import row_chosen
 from ..core.settings.choices import NORMALS, OUTPUTS, PLACEMENT_NUMBERS, PLACEMENTS, SURFACES
 from ..core.settings.parameters import EXTRACTION
 from ..handles.properties import ARAPFIELDS_PG_handle
@@ -62,7 +63,7 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
         description="Empties that hold and move parts of the object",
     )
     active_handle: bpy.props.IntProperty(
-        name="Active Handle", description="Row chosen in the list of handles"
+        name="Active Handle", description="Row chosen in the list of handles", update=row_chosen
     )
     handle_of: bpy.props.PointerProperty(
         type=bpy.types.Object, name="Handle Of", description="The object that this Empty is a handle of"

@@ -2,6 +2,7 @@
 import bpy
 
 from ..blender import mesh_arrays, modifier_stack
+from ..blender.guide import Guided
 from ..blender.language import translated
 from ..blender.object_references import refusal, settings_of, source_of
 from ..core.errors import UserError
@@ -10,10 +11,11 @@ from ..names import Op
 from . import placement, result_objects
 
 
-class FieldOperator:
+class FieldOperator(Guided):
     """Mixin: works on the field's modifier of the panel's source."""
 
     bl_options = {"REGISTER", "UNDO"}
+    guide = "results"
 
     @classmethod
     def poll(cls, context):

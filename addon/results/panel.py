@@ -3,17 +3,20 @@ import bpy
 
 from ..blender import modifier_stack
 from ..blender.object_references import in_scene
-from ..blender.section import Section
+from ..blender.section import Advanced
 from ..names import Op
 
 
-class ARAPFIELDS_PT_result(Section, bpy.types.Panel):
+class ARAPFIELDS_PT_result(Advanced, bpy.types.Panel):
     bl_label = "Result"
     bl_idname = "ARAPFIELDS_PT_result"
-    bl_order = 5
+    bl_order = 3
 
     def fill(self, context, source, settings):
         layout = self.layout
+        layout.prop(settings, "output")
+        layout.prop(settings, "target")
+        layout.operator(Op.BAKE, icon="REC")
         layout.prop(settings, "resolution")
         layout.prop(settings, "refine_thin")
         layout.prop(settings, "normals")

@@ -2,6 +2,8 @@
 import bpy
 
 from ..blender import vertex_groups
+from ..blender.guide import Guided
+from ..blender.host import has_window
 from ..blender.language import translated
 from ..blender.object_references import refusal, settings_of, source_of
 from ..blender.presets import preset_classes
@@ -26,6 +28,7 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
     bl_label = "Stylize"
     bl_options = {"UNDO"}
     title = "Stylize"
+    guide = "stylize"
 
     __annotations__ = {
         **annotations(STYLIZE, options={"SKIP_SAVE"}),
@@ -37,6 +40,11 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
         "resolution": resolution(options={"SKIP_SAVE"}),
         "refine_thin": refine_thin(options={"SKIP_SAVE"}),
     }
+
+    @classmethod
+    def refuses(cls, source):
+        """As the settings ask; a script may ask for another style."""
+        return super().refuses(source) or (preference.refusal(source) if has_window() else None)
 
     def groups_of(self, source):
         return preference.group_names(source, settings_of(source).stylize)
@@ -69,11 +77,12 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
         return plan_solve_job(context, self, source, "STYLIZE", values["samples"], values["seed"], solve)
 
 
-class ARAPFIELDS_OT_set_style(bpy.types.Operator):
+class ARAPFIELDS_OT_set_style(Guided, bpy.types.Operator):
     """Choose this style for the object"""
 
     bl_idname = Op.SET_STYLE
     bl_label = "Choose Style"
+    guide = "stylize"
     bl_options = {"INTERNAL", "UNDO"}
 
     style: style()

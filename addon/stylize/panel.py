@@ -2,11 +2,13 @@
 import bpy
 
 from ..blender.icons import icon
-from ..blender.section import Section, job_button, presets, settings_column
+from ..blender.section import Advanced, Section, job_button, note, presets, settings_column
 from ..core.settings.styles import CUSTOM, STYLIZE
+from ..deform.solve_job import placement_refusal
 from ..live.panel import live_buttons
 from ..names import Op
 from ..properties.settings import STYLE_ITEMS
+from . import preference
 
 
 class ARAPFIELDS_MT_styles(bpy.types.Menu):
@@ -26,8 +28,7 @@ class ARAPFIELDS_MT_styles(bpy.types.Menu):
 class ARAPFIELDS_PT_stylize(Section, bpy.types.Panel):
     bl_label = "Stylize"
     bl_idname = "ARAPFIELDS_PT_stylize"
-    bl_order = 4
-    bl_options = {"DEFAULT_CLOSED"}
+    bl_order = 3
 
     def draw_header_preset(self, context):
         presets(self.layout, "stylize")
@@ -35,25 +36,32 @@ class ARAPFIELDS_PT_stylize(Section, bpy.types.Panel):
     def fill(self, context, source, settings):
         layout, style = self.layout, settings.stylize
         label = next(label for identifier, label, _ in STYLE_ITEMS if identifier == style.style)
-        if icon(style.style):
-            row = layout.row()
-            row.alignment = "CENTER"
-            row.template_icon(icon(style.style), scale=4.0)
-        layout.menu("ARAPFIELDS_MT_styles", text=label)
+        picture = {"icon_value": icon(style.style)} if icon(style.style) else {"icon": "EMPTY_AXIS"}
+        layout.menu("ARAPFIELDS_MT_styles", text=label, **picture)
         if style.style in CUSTOM:
             layout.prop(style, "style_object")
-        else:
+        settings_column(layout, style, STYLIZE, advanced=False)
+        reason = preference.refusal(source)
+        live_buttons(layout, source, "STYLIZE", reason)
+        job_button(layout, Op.STYLIZE, "MOD_EDGESPLIT")
+        note(layout, reason, placement_refusal(source))
+
+
+class ARAPFIELDS_PT_stylize_settings(Advanced, bpy.types.Panel):
+    bl_label = "Stylize Settings"
+    bl_idname = "ARAPFIELDS_PT_stylize_settings"
+    bl_order = 2
+
+    def fill(self, context, source, settings):
+        layout, style = self.layout, settings.stylize
+        if style.style not in CUSTOM:
             layout.prop(style, "frame")
             if style.frame == "EMPTY":
                 layout.prop(style, "frame_object")
         layout.prop_search(style, "region", source, "vertex_groups")
         layout.prop(style, "region_material")
         layout.prop(style, "use_handles")
-        settings_column(layout, style, STYLIZE)
-        layout.prop(settings, "output")
-        layout.prop(settings, "target")
-        job_button(layout, Op.STYLIZE, "MOD_EDGESPLIT")
-        live_buttons(layout, source, "STYLIZE")
+        settings_column(layout, style, STYLIZE, advanced=True)
 
 
-CLASSES = [ARAPFIELDS_MT_styles, ARAPFIELDS_PT_stylize]
+CLASSES = [ARAPFIELDS_MT_styles, ARAPFIELDS_PT_stylize, ARAPFIELDS_PT_stylize_settings]

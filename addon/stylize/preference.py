@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..blender import modifier_stack
+from ..blender import modifier_stack, vertex_groups
+from ..blender.object_references import settings_of
 from ..blender.property_definitions import effective_value
 from ..core.errors import UserError
 from ..core.geometry.spaces import pose, upright
@@ -35,6 +36,25 @@ class Style:
         return normals, self.turn.tobytes(), self.up.tobytes()
 
 
+def refusal(source):
+    """Why the style that an object's settings ask for cannot be had, as a UserError; None where it can."""
+    settings = settings_of(source)
+    style = settings.stylize
+    held = empties.require_handles(source) if style.use_handles else None
+    reason = held or missing_object(style.style, style.frame, style)
+    return reason or vertex_groups.missing(source, group_names(source, style))
+
+
+def missing_object(which, frame, settings):
+    """The UserError of a style, or of axes, for which no object is chosen; None where there is one."""
+    if which in CUSTOM:
+        if settings.style_object is None:
+            return UserError("choose the object that gives the style its normals")
+    elif frame == "EMPTY" and settings.frame_object is None:
+        return UserError("choose the object along whose axes the style stands")
+    return None
+
+
 def requested_style(settings, space, operator=None, where=matrix_of):
     """The style of an object's settings (and the operator's arguments, where given)."""
 
@@ -42,13 +62,13 @@ def requested_style(settings, space, operator=None, where=matrix_of):
         return effective_value(name, settings, operator) if operator is not None else getattr(settings, name)
 
     which = setting("style")
+    reason = missing_object(which, setting("frame"), settings)
+    if reason is not None:
+        raise reason
     to_solve = pose(space.world_to_solve)[:3, :3]
     up = to_solve[:, 2]
     if which in CUSTOM:
-        item = settings.style_object
-        if item is None:
-            raise UserError("choose the object that gives the style its normals")
-        normals, turn = custom(which, item, where)
+        normals, turn = custom(which, settings.style_object, where)
         return Style(normals, to_solve @ turn, up)
     if setting("frame") == "OBJECT":
         return Style(style_name(which), np.eye(3), up)
@@ -62,8 +82,6 @@ def axes(which, space, item, where=matrix_of):
         return upright(pose(space.solve_to_world)[:3, :3])
     if which == "WORLD":
         return np.eye(3)
-    if item is None:
-        raise UserError("choose the object along whose axes the style stands")
     return pose(where(item))[:3, :3]
 
 

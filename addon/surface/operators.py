@@ -3,6 +3,7 @@ import json
 
 import bpy
 
+from ..blender.guide import Guided
 from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..blender.presets import preset_classes
@@ -27,6 +28,7 @@ class ARAPFIELDS_OT_fit(JobOperator, bpy.types.Operator):
     bl_label = "Fit Surface"
     bl_options = {"UNDO"}
     title = "Fit"
+    guide = "surface"
 
     __annotations__ = {
         **annotations(FIT, options={"SKIP_SAVE"}),
@@ -62,6 +64,7 @@ class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):
     bl_label = "Extract Surface"
     bl_options = {"UNDO"}
     title = "Extract"
+    guide = "results"
 
     resolution: resolution(options={"SKIP_SAVE"})
     refine_thin: refine_thin(options={"SKIP_SAVE"})
@@ -89,11 +92,12 @@ class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):
         return Item(source.name, work, apply)
 
 
-class ARAPFIELDS_OT_clear_cache(bpy.types.Operator):
+class ARAPFIELDS_OT_clear_cache(Guided, bpy.types.Operator):
     """Delete every fitted surface from disk; they are fitted again when needed"""
 
     bl_idname = Op.CLEAR_CACHE
     bl_label = "Clear Fits"
+    guide = "jobs"
 
     @classmethod
     def poll(cls, context):

@@ -3,9 +3,9 @@ import json
 
 import bpy
 
-from ..blender import modifier_stack, object_references
+from ..blender import mesh_arrays, modifier_stack, object_references
 from ..blender.language import translated
-from ..blender.section import Section, job_button, presets, settings_column, wrapped
+from ..blender.section import Advanced, Section, job_button, presets, settings_column, wrapped
 from ..blender.user_preferences import fit_cache
 from ..core.runtime import jobs, native
 from ..core.settings.fitting import FIT
@@ -34,12 +34,13 @@ class ARAPFIELDS_PT_source(Section, bpy.types.Panel):
         if source is None:
             layout.label(text="Select a mesh object", icon="INFO")
             return
-        layout.label(text=source.name, icon="MESH_DATA", translate=False)
         mesh = source.data
         counts = {"vertices": f"{len(mesh.vertices):,}", "faces": f"{len(mesh.polygons):,}"}
-        layout.label(text=translated("{vertices} vertices, {faces} faces", **counts), icon="BLANK1")
-        if object_references.refusal(source):
-            wrapped(layout, translated(object_references.refusal(source)), icon="ERROR")
+        text = f"{source.name}: {translated('{vertices} vertices, {faces} faces', **counts)}"
+        layout.label(text=text, icon="MESH_DATA", translate=False)
+        reason = object_references.refusal(source) or mesh_arrays.refusal(source)
+        if reason:
+            wrapped(layout, translated(reason), icon="ERROR")
         for text in remarks(source):
             wrapped(layout, text, icon="INFO")
 
@@ -55,14 +56,22 @@ def remarks(source):
         yield translated("Read before {names}, which follow it", names=", ".join(after))
     if source.data.shape_keys:
         yield translated("Read with its shape keys as they are set")
-    if not len(source.data.polygons) and not shown:
-        yield translated("The mesh has no faces")
 
 
-class ARAPFIELDS_PT_surface(Section, bpy.types.Panel):
+class ARAPFIELDS_PT_advanced(Section, bpy.types.Panel):
+    bl_label = "Advanced"
+    bl_idname = "ARAPFIELDS_PT_advanced"
+    bl_order = 5
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def fill(self, context, source, settings):
+        pass
+
+
+class ARAPFIELDS_PT_surface(Advanced, bpy.types.Panel):
     bl_label = "Implicit Surface"
     bl_idname = "ARAPFIELDS_PT_surface"
-    bl_order = 1
+    bl_order = 0
 
     def draw_header_preset(self, context):
         presets(self.layout, "fit")
@@ -73,8 +82,8 @@ class ARAPFIELDS_PT_surface(Section, bpy.types.Panel):
         if settings.surface == "EXACT":
             return
         layout.prop(settings.fit, "quality")
-        settings_column(layout, settings.fit, FIT)
         job_button(layout, Op.FIT, "MOD_REMESH")
+        settings_column(layout, settings.fit, FIT, advanced=True)
         if not settings.fit_key:
             layout.label(text="Not fitted yet", icon="INFO")
             return
@@ -84,9 +93,16 @@ class ARAPFIELDS_PT_surface(Section, bpy.types.Panel):
             text=(stale or "Fit in the cache") if kept else "Fit was cleared",
             icon="CHECKMARK" if kept and not stale else "ERROR",
         )
-        for name, value in json.loads(settings.fit_report or "{}").items():
-            if isinstance(value, float) and "error" in name:
-                layout.label(text=f"{name.replace('_', ' ')}: {value:.3g}")
+        for text in errors(json.loads(settings.fit_report or "{}")):
+            layout.label(text=text, icon="BLANK1", translate=False)
 
 
-CLASSES = [ARAPFIELDS_PT_source, ARAPFIELDS_PT_surface]
+def errors(report):
+    """How far a fit is off, from the figures that its report has."""
+    if "near_mean" in report:
+        yield translated("Mean error at the surface: {value}", value=f"{report['near_mean']:.2g}")
+    if "near_max" in report:
+        yield translated("Largest error at the surface: {value}", value=f"{report['near_max']:.2g}")
+
+
+CLASSES = [ARAPFIELDS_PT_source, ARAPFIELDS_PT_advanced, ARAPFIELDS_PT_surface]

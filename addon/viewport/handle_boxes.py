@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Handles in the viewport: the rest box of each, faint, and where it is now, bright."""
+"""Handles in the viewport: the rest box of each, thin, and where it is now, thick; faint behind the mesh."""
 
 import bpy
 import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
+from mathutils import Matrix
 
 from ..blender import user_preferences
 from ..blender.object_references import in_scene, settings_of, source_of
@@ -12,7 +13,11 @@ from ..handles import empties
 
 CORNERS = np.array([(x, y, z, 1.0) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 EDGES = [(a, b) for a in range(8) for b in range(a) if (CORNERS[a] != CORNERS[b]).sum() == 1]
-REST_ALPHA, NOW_ALPHA = 0.35, 0.95
+THIN, THICK, CHOSEN = 1.5, 2.5, 4.0  # widths of lines in pixels: at rest, now, of a selected handle
+HALO, HALO_ALPHA = 2.0, 0.55  # dark pixels around a line in all, which set it off from any mesh
+BEHIND = 0.3  # how much of a line is left behind what hides it
+NEARER = Matrix.Identity(4)  # a little towards the viewer, before the Empty's own lines
+NEARER[2][3] = -2e-4
 
 
 def box_lines(matrix):
@@ -22,17 +27,30 @@ def box_lines(matrix):
 
 
 def segments(source):
-    """((r, g, b, alpha), line ends in world space) of all handles of a source."""
+    """((r, g, b), width, line ends in world space) of all handles of a source."""
     lines = []
     for entry in settings_of(source).handles:
         if not in_scene(entry.empty) or not entry.empty.visible_get():
             continue
         rest, now = empties.rest_box(source, entry), empties.current_box(entry.empty)
-        lines.append(((*entry.colour, REST_ALPHA), box_lines(rest)))
-        if not np.allclose(rest, now, atol=1e-6):
-            lines.append(((*entry.colour, NOW_ALPHA), box_lines(now)))
-            lines.append(((*entry.colour, NOW_ALPHA), [rest[:3, 3].tolist(), now[:3, 3].tolist()]))
+        thick = CHOSEN if entry.empty.select_get() else THICK
+        if np.allclose(rest, now, atol=1e-6):
+            lines.append((tuple(entry.colour), thick, box_lines(rest)))
+            continue
+        lines.append((tuple(entry.colour), THIN, box_lines(rest)))
+        way = [rest[:3, 3].tolist(), now[:3, 3].tolist()]
+        lines.append((tuple(entry.colour), thick, box_lines(now) + way))
     return lines
+
+
+def draw_lines(shader, colour, width, batch):
+    """Lines with their halo, bright before what is shown and faint behind it."""
+    for test, alpha in (("GREATER", BEHIND), ("LESS_EQUAL", 1.0)):
+        gpu.state.depth_test_set(test)
+        for shade, wide in (((0, 0, 0, HALO_ALPHA * alpha), width + HALO), ((*colour, alpha), width)):
+            shader.uniform_float("color", shade)
+            shader.uniform_float("lineWidth", wide)
+            batch.draw(shader)
 
 
 def draw():
@@ -42,10 +60,11 @@ def draw():
         return
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     gpu.state.blend_set("ALPHA")
-    gpu.state.depth_test_set("NONE")
+    gpu.state.depth_mask_set(False)
     shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
-    shader.uniform_float("lineWidth", 2.0)
-    for shade, ends in segments(source):
-        shader.uniform_float("color", shade)
-        batch_for_shader(shader, "LINES", {"pos": ends}).draw(shader)
+    with gpu.matrix.push_pop_projection():
+        gpu.matrix.load_projection_matrix(NEARER @ gpu.matrix.get_projection_matrix())
+        for colour, width, ends in segments(source):
+            draw_lines(shader, colour, width, batch_for_shader(shader, "LINES", {"pos": ends}))
+    gpu.state.depth_test_set("NONE")
     gpu.state.blend_set("NONE")

@@ -21,8 +21,9 @@ def addon_files(addon):
     return names
 
 
-def write_extension(addon, options, wheels, licence, path):
-    """Writes the extension's zip to `path`; `options` is the library's options.json, which makes the panel.
+def write_extension(addon, options, wheels, licence, guide, path):
+    """Writes the extension's zip to `path`; `options` is the library's options.json, which makes the panel;
+    `guide` the user's guide, archive name → bytes.
 
     Wheels, compressed already, are stored.
     """
@@ -38,6 +39,8 @@ def write_extension(addon, options, wheels, licence, path):
         for name, source in addon_files(addon).items():
             archive.writestr(entry(name), source.read_bytes())
         archive.writestr(entry(OPTIONS), options.read_bytes())
+        for name, content in guide.items():
+            archive.writestr(entry(name), content)
         for wheel in wheels:
             archive.writestr(entry(f"wheels/{wheel.name}", method=zipfile.ZIP_STORED), wheel.read_bytes())
     partial.replace(path)

@@ -30,7 +30,7 @@ def check_zip(path, pythons):
         raise RuntimeError(f"{path} has {size / 1e6:.0f} MB; the limit is {LIMIT / 1e6:.0f}")
     with zipfile.ZipFile(path) as archive:
         names = set(archive.namelist())
-        missing = {"blender_manifest.toml", "__init__.py", "LICENSE", OPTIONS} - names
+        missing = {"blender_manifest.toml", "__init__.py", "LICENSE", OPTIONS, "guide/index.html"} - names
         if missing:
             raise RuntimeError(f"{path.name} lacks {', '.join(sorted(missing))}")
         manifest = tomllib.loads(archive.read("blender_manifest.toml").decode())

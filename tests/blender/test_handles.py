@@ -32,7 +32,7 @@ def test_without_empties_one_is_made_at_the_cursor():
     bpy.context.scene.cursor.location = (0.5, 0, 0)
     bpy.ops.arapfields.add_handle()
     (entry,) = bar.arapfields.handles
-    assert entry.empty.name == "Bar_handle" and tuple(entry.empty.location) == (0.5, 0, 0)
+    assert entry.empty.name == "Handle 1" and tuple(entry.empty.location) == (0.5, 0, 0)
     assert entry.empty.users_collection == bar.users_collection and entry.inside > 0
 
 

@@ -2,6 +2,7 @@
 """What the checks in Blender's window share: where to act, pictures, meters of time."""
 
 import contextlib
+import os
 import subprocess
 import time
 import traceback
@@ -10,6 +11,7 @@ import bpy
 import numpy as np
 import scenes
 
+PATIENCE = float(os.environ.get("ARAPFIELDS_PATIENCE", "1"))  # times the pauses, for a busy machine
 TAB = (1299, 340)  # where the sidebar's last tab lies in a window of 1600 × 1000
 
 
@@ -28,7 +30,7 @@ def start(steps, ended, folder):
     def drive():
         error = None
         try:
-            return next(sequence)
+            return PATIENCE * next(sequence)
         except StopIteration:
             pass
         except Exception:

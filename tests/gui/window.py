@@ -2,9 +2,9 @@
 """Run by a real Blender with a window: jobs, live mode, the panel. docs/development.md says how.
 
 blender --factory-startup --python tests/gui/window.py -- OUTPUT_FOLDER [PART ...]
-Parts are panel, jobs, stalls, live and endings; all where none is named. Writes checks.json, and pictures
-where ImageMagick's `import` is at hand; xdotool moves the mouse. Ends with a job running, which must not
-hold it.
+Parts are panel, use, jobs, stalls, live and endings; all where none is named. Writes checks.json, and
+pictures where ImageMagick's `import` is at hand; xdotool moves the mouse. Ends with a job running, which must
+not hold it.
 """
 
 import json
@@ -24,6 +24,7 @@ import panel  # noqa: E402
 import scenes  # noqa: E402
 import stage  # noqa: E402
 import stalls  # noqa: E402
+import use  # noqa: E402
 
 import addon  # noqa: E402
 
@@ -34,6 +35,7 @@ def steps():
     """Yields seconds to wait; between them Blender's event loop runs."""
     parts = {
         "panel": lambda: panel.checks(FOUND, OUTPUT),
+        "use": lambda: use.checks(FOUND, OUTPUT),
         "jobs": lambda: jobs.checks(FOUND, OUTPUT),
         "stalls": lambda: stalls.checks(FOUND, OUTPUT),
         "live": lambda: live.checks(FOUND, OUTPUT),

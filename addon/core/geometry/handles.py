@@ -61,4 +61,9 @@ def require_held(counts):
     """`counts`: samples by handle name. UserError that names the handles that hold none."""
     empty = [name for name, count in counts.items() if count == 0]
     if empty:
-        raise UserError("no part of the surface lies in the rest region of {names}", names=", ".join(empty))
+        raise nothing_held(empty)
+
+
+def nothing_held(names):
+    """The UserError that names handles which hold nothing."""
+    return UserError("no part of the surface lies in the rest region of {names}", names=", ".join(names))

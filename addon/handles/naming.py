@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Names of handles by what they hold: "head" where that vertex group is, else "Handle 3"."""
+
+import re
+
+import bpy
+import numpy as np
+
+from ..blender import mesh_arrays, modifier_stack
+from ..blender.language import translated
+from ..blender.object_references import settings_of
+from ..core.errors import UserError
+
+RIG_PREFIX = re.compile(r"^(DEF|ORG|MCH)-")  # by which rigs tell their bones' purposes
+BLENDERS_OWN = re.compile(r"(\.\d{3,})?$")  # what Blender appends to a name that is taken
+
+
+def name_for(obj, point_world, kind) -> str:
+    """A name for a handle of `obj` at a point: its strongest vertex group there, else its kind and a number.
+
+    `obj` is the mesh object, `point_world` (3,) in world space, `kind` CUBE, POINT, GROUP or PIN.
+    """
+    group = group_at(obj, point_world) if obj.vertex_groups else ""
+    return name_of_group(group) or numbered(obj, kind)
+
+
+def name_of_group(group):
+    """A vertex group's name without what rigs put before it."""
+    return RIG_PREFIX.sub("", group)
+
+
+def group_at(obj, point_world):
+    """The vertex group that is strongest at the vertex nearest to a point of the world; "" for none."""
+    try:
+        with modifier_stack.evaluated_mesh(bpy.context, obj, settings_of(obj).in_place) as mesh:
+            index = nearest(mesh, obj, point_world)
+            weights = [] if index is None else [(e.weight, e.group) for e in mesh.vertices[index].groups]
+    except UserError:  # there is no mesh to look at
+        return ""
+    weights = [entry for entry in weights if entry[0] > 0]
+    return obj.vertex_groups[max(weights)[1]].name if weights else ""
+
+
+def nearest(mesh, obj, point_world):
+    """Number of the vertex nearest to a point of the world; None where there is none."""
+    points = mesh_arrays.positions(mesh)
+    if not len(points):
+        return None
+    matrix = np.array(obj.matrix_world, dtype=np.float64)
+    return int(np.linalg.norm(points @ matrix[:3, :3].T + matrix[:3, 3] - point_world, axis=1).argmin())
+
+
+def numbered(obj, kind):
+    """ "Handle 3" for the third handle of the object, or the next number that no object has."""
+    word = translated("Pin") if kind == "PIN" else translated("Handle")
+    number = len(settings_of(obj).handles) + 1
+    while f"{word} {number}" in bpy.data.objects:
+        number += 1
+    return f"{word} {number}"
+
+
+def is_blenders_own(empty):
+    """Whether Blender named an Empty, rather than the user."""
+    plain = BLENDERS_OWN.sub("", empty.name)
+    return plain in ("Empty", bpy.app.translations.pgettext_data("Empty"))

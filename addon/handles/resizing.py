@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A handle's box is resized by its faces: what it holds at rest changes, its motion stays."""
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+
+from ..blender.guide import Guided
+from ..blender.language import translated
+from ..blender.object_references import owner_of, refusal, settings_of
+from ..core.errors import UserError
+from ..names import Op
+from . import counts, empties
+
+LEAST = 0.05  # of a box's size that one drag leaves of it
+FACES = [(axis, side) for axis in range(3) for side in (-1, 1)]
+
+
+def boxed(empty):
+    """(source, entry) of the Empty of a box; UserError where it is none."""
+    source = owner_of(empty) if empty is not None and empty.type == "EMPTY" else None
+    index = empties.find(source, empty) if source is not None else -1
+    if index < 0 or settings_of(source).handles[index].kind != "CUBE":
+        raise UserError("Select the Empty of a box")
+    return source, settings_of(source).handles[index]
+
+
+def stretch(axis, side, share):
+    """(4, 4) the map of the cube [-1, 1]³ that moves one face outwards by that share of the box's size."""
+    share = max(share, LEAST - 1.0)
+    moved = np.eye(4)
+    moved[axis, axis], moved[axis, 3] = 1.0 + share, side * share
+    return moved
+
+
+def resize(source, entry, box, rest, change):
+    """Gives a handle the box, (4, 4) cube → world, and the rest box, changed alike."""
+    size = entry.empty.empty_display_size
+    entry.empty.matrix_world = Matrix((box @ change @ np.diag([1 / size, 1 / size, 1 / size, 1])).tolist())
+    entry.rest = (rest @ change).ravel()
+
+
+class ARAPFIELDS_OT_resize_handle(Guided, bpy.types.Operator):
+    """Move a face of the handle's box: what it holds at rest changes, where it has been moved stays"""
+
+    bl_idname = Op.RESIZE_HANDLE
+    bl_label = "Resize Box"
+    guide = "handles"
+    bl_options = {"REGISTER", "UNDO"}
+
+    axis: bpy.props.IntProperty(name="Axis", description="0, 1 or 2: X, Y or Z of the Empty", min=0, max=2)
+    side: bpy.props.IntProperty(
+        name="Side", description="-1 or 1: which of the two faces", min=-1, max=1, default=1
+    )
+    share: bpy.props.FloatProperty(
+        name="Share", description="How far the face moves outwards, of the box's size", options={"SKIP_SAVE"}
+    )
+
+    @classmethod
+    def poll(cls, context):
+        active = context.view_layer.objects.active if context.view_layer else None
+        try:
+            reason = refusal(boxed(active)[0])
+        except UserError as error:
+            reason = error
+        if reason:
+            cls.poll_message_set(translated(reason))
+        return not reason
+
+    def begin(self, context):
+        source, entry = boxed(context.view_layer.objects.active)
+        rest = np.array(entry.rest, dtype=np.float64).reshape(4, 4)
+        self._before = empties.current_box(entry.empty), rest, entry.empty.matrix_world.copy()
+        return source, entry
+
+    def change(self, context):
+        source, entry = boxed(context.view_layer.objects.active)
+        resize(source, entry, *self._before[:2], stretch(self.axis, self.side or 1, self.share))
+
+    def execute(self, context):
+        source, _ = self.begin(context)
+        self.change(context)
+        context.view_layer.update()
+        counts.count_inside(context, source)
+        return {"FINISHED"}
+
+    def invoke(self, context, event):
+        self.begin(context)
+        self._pixels = self.pixels_of_the_box(context)
+        if self._pixels is None:
+            return {"CANCELLED"}
+        self._mouse = Vector((event.mouse_x, event.mouse_y))
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def pixels_of_the_box(self, context):
+        """(2,) pixels from one face to the other on the screen, outwards; None where they hide each other."""
+        from bpy_extras.view3d_utils import location_3d_to_region_2d
+
+        box = self._before[0]
+        ends = [box[:3, 3] + box[:3, self.axis] * way * self.side for way in (-1, 1)]
+        seen = [location_3d_to_region_2d(context.region, context.region_data, Vector(end)) for end in ends]
+        if None in seen or (seen[1] - seen[0]).length < 2.0:
+            return None
+        return seen[1] - seen[0]
+
+    def modal(self, context, event):
+        if event.type == "MOUSEMOVE":
+            moved = Vector((event.mouse_x, event.mouse_y)) - self._mouse
+            self.share = moved.dot(self._pixels) / self._pixels.length_squared
+            self.change(context)
+        elif event.type in ("ESC", "RIGHTMOUSE"):
+            _, entry = boxed(context.view_layer.objects.active)
+            entry.empty.matrix_world, entry.rest = self._before[2], self._before[1].ravel()
+            return {"CANCELLED"}
+        elif event.type in ("LEFTMOUSE", "RET", "NUMPAD_ENTER") and event.value in ("RELEASE", "PRESS"):
+            source, _ = boxed(context.view_layer.objects.active)
+            context.view_layer.update()
+            counts.count_inside(context, source)
+            return {"FINISHED"}
+        return {"RUNNING_MODAL"}
+
+
+class ARAPFIELDS_GGT_box(bpy.types.GizmoGroup):
+    """An arrow at each face of the active handle's box"""
+
+    bl_label = "Box of a Handle"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "WINDOW"
+    bl_options = {"3D", "PERSISTENT"}
+
+    @classmethod
+    def poll(cls, context):
+        return ARAPFIELDS_OT_resize_handle.poll(context) and context.mode == "OBJECT"
+
+    def setup(self, context):
+        self.arrows = []
+        for axis, side in FACES:
+            arrow = self.gizmos.new("GIZMO_GT_arrow_3d")
+            operator = arrow.target_set_operator(Op.RESIZE_HANDLE)
+            operator.axis, operator.side = axis, side
+            arrow.draw_style, arrow.length, arrow.use_draw_modal = "BOX", 0.0, True
+            arrow.scale_basis, arrow.alpha, arrow.alpha_highlight = 0.8, 0.7, 1.0
+            arrow.color_highlight = 1.0, 1.0, 1.0
+            self.arrows.append(arrow)
+        self.refresh(context)
+
+    def refresh(self, context):
+        try:
+            _, entry = boxed(context.view_layer.objects.active)
+        except UserError:
+            return
+        box = empties.current_box(entry.empty)
+        for arrow, (axis, side) in zip(self.arrows, FACES, strict=True):
+            arrow.color = entry.colour
+            out = Vector(side * box[:3, axis])
+            turn = out.to_track_quat("Z", "Y").to_matrix().to_4x4()
+            arrow.matrix_basis = Matrix.Translation(Vector(box[:3, 3]) + out) @ turn
+
+    def draw_prepare(self, context):
+        self.refresh(context)
+
+
+CLASSES = [ARAPFIELDS_OT_resize_handle, ARAPFIELDS_GGT_box]

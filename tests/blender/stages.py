@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An object at each stage of its use, idle, in a job, live, in a bake, and what users do to it meanwhile."""
+
+import contextlib
+import tempfile
+
+import bpy
+import scenes
+
+from addon import lifecycle
+from addon.core.runtime import jobs
+from addon.core.runtime.coroutines import Pause
+from addon.live import sessions
+
+LIFT = 0.4  # of the moving handle, in the height of the world
+WAIT = 30  # seconds for a live shape
+
+
+@contextlib.contextmanager
+def watched():
+    """A list of the errors that our handlers of Blender's raise, which Blender itself only prints."""
+    errors, kept = [], {}
+
+    def noting(function):
+        def called(*given):
+            try:
+                function(*given)
+            except Exception as error:
+                errors.append(error)
+
+        return bpy.app.handlers.persistent(called)
+
+    for name, function in lifecycle.HANDLERS.items():
+        functions = getattr(bpy.app.handlers, name)
+        kept[name] = noting(function)
+        functions[functions.index(function)] = kept[name]
+    try:
+        yield errors
+    finally:
+        for name, function in lifecycle.HANDLERS.items():
+            functions = getattr(bpy.app.handlers, name)
+            functions[functions.index(kept[name])] = function
+
+
+class Operator:
+    """A job's operator, stepped as a window steps it; `said` is what it reports."""
+
+    def __init__(self, cls, **values):
+        self.__dict__.update(vars(type("Values", (), values)))
+        self.__dict__.update(values, said=[], in_window=False, scope="ACTIVE")
+        self.cls = cls
+        self.properties = type("Given", (), {"is_property_set": staticmethod(values.__contains__)})
+
+    def __getattr__(self, name):
+        found = getattr(self.cls, name)
+        return found.__get__(self) if hasattr(found, "__get__") else found
+
+    def add_message(self, level, text):
+        self.said.append(text)
+
+
+class Stage:
+    """One stage of the bar's use: `begin` enters it, `end` sees it through and tells what was said."""
+
+    def __init__(self, name):
+        self.name = name
+
+    def begin(self):
+        bar, _, moving = scenes.bar_with_handles()
+        for name, value in scenes.QUICK.items():
+            setattr(bar.arapfields.deform, name, value)
+        moving.location.z += LIFT
+        if self.name == "bake":
+            moving.keyframe_insert("location", frame=1)
+        bpy.context.view_layer.update()
+        bpy.ops.ed.undo_push(message="before")
+        if self.name == "live":
+            bpy.ops.arapfields.live()
+            bpy.ops.ed.undo_push(message="live")
+        bar["mark"] = 1
+        bpy.ops.ed.undo_push(message="mark")
+        if self.name in ("job", "bake"):
+            self.start(self.operator())
+        return bpy.data.objects["Bar"], bpy.data.objects["Moving"]
+
+    def operator(self):
+        from addon.animation.operators import ARAPFIELDS_OT_bake
+        from addon.deform.operators import ARAPFIELDS_OT_deform
+
+        if self.name == "bake":
+            return Operator(ARAPFIELDS_OT_bake, start=1, end=3, step=1)
+        return Operator(ARAPFIELDS_OT_deform, **scenes.QUICK)
+
+    def start(self, operator):
+        """Runs the job until its worker has set out."""
+        self.running, self.coroutine = operator, operator.coroutine(bpy.context)
+        while next(self.coroutine) is not Pause.WORKER:
+            pass
+
+    def end(self):
+        """What was said, in one text."""
+        bpy.context.view_layer.update()
+        if self.name == "live":
+            for _ in range(3):
+                sessions.update(bpy.context, wait=WAIT)
+            return " ".join(text for _, text in jobs.messages())
+        if self.name == "idle":
+            return ""
+        if jobs.running() is None:  # ended from outside, as the window's operator then sees
+            self.coroutine.close()
+            return "ended"
+        try:
+            while True:
+                next(self.coroutine)
+        except StopIteration:
+            pass
+        finally:
+            jobs.stop()
+        return " ".join(self.running.said)
+
+
+def deleted(item):
+    """As the user does it: unlinked, while pointers keep the data alive."""
+    for home in item.users_collection:
+        home.objects.unlink(item)
+
+
+def duplicated(item):
+    copied = item.copy()
+    copied.data = item.data.copy() if item.data else None
+    bpy.context.collection.objects.link(copied)
+
+
+def renamed(item):
+    item.name = "Other Name"
+
+
+def hidden(item):
+    item.hide_set(True)
+    item.hide_render = True
+
+
+def linked(item):
+    """Its data in a second object, and itself in a second scene."""
+    bpy.context.collection.objects.link(bpy.data.objects.new("Second", item.data))
+    bpy.data.scenes.new("Another").collection.objects.link(item)
+
+
+def overridden(item):
+    """Replaced by a library override of itself from another file."""
+    path, name = tempfile.mktemp(suffix=".blend"), item.name
+    bpy.data.libraries.write(path, {item}, fake_user=True)
+    deleted(item)
+    with bpy.data.libraries.load(path, link=True) as (_, into):
+        into.objects = [name]
+    bpy.context.collection.objects.link(into.objects[0])
+    into.objects[0].override_create(remap_local_usages=False)
+
+
+def undone(_):
+    bpy.ops.ed.undo()
+
+
+def redone(_):
+    bpy.ops.ed.undo()
+    bpy.ops.ed.redo()
+
+
+def reloaded(_):
+    path = tempfile.mktemp(suffix=".blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+
+
+ACTIONS = {
+    function.__name__: function
+    for function in (
+        *(deleted, duplicated, renamed, hidden, linked),
+        *(overridden, undone, redone, reloaded),
+    )
+}

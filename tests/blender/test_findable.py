@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where users look for things: Blender's menus, tooltips, manual pages, a word at the first start."""
+
+from inside import in_blender
+
+OURS = ("ADD_HANDLE", "SET_REST", "RESET_HANDLE", "DEFORM", "LIVE", "STYLIZE", "LIVE_KEEP", "BAKE", "FIT")
+
+
+@in_blender
+def test_the_object_menu_has_all_that_the_panel_does():
+    import bpy
+    from test_findable import OURS
+    from test_panels import Layout
+
+    from addon import menus
+    from addon.names import Op
+
+    asked = []
+
+    class Noting(Layout):
+        def operator(self, name, **options):
+            asked.append(name)
+            return super().operator(name, **options)
+
+    stand_in = type("Menu", (), {"layout": Noting([])})()
+    menus.ARAPFIELDS_MT_object.draw(stand_in, bpy.context)
+    assert {getattr(Op, name) for name in OURS} <= {*asked}
+    for name, draw in menus.PLACES.items():
+        assert getattr(bpy.types, name).draw._draw_funcs.count(draw) == 1
+        draw(stand_in, bpy.context)
+
+
+@in_blender
+def test_an_empty_added_as_a_handle_is_one():
+    import bpy
+    import scenes
+
+    from addon import menus
+
+    bar = scenes.bar()
+    asked = {}
+
+    class Noting:
+        def separator(self):
+            pass
+
+        def operator(self, name, **_):
+            asked["name"] = name
+            asked["properties"] = properties = type("Properties", (), {})()
+            return properties
+
+    menus.draw_in_empties(type("Menu", (), {"layout": Noting()})(), bpy.context)
+    group, name = asked["name"].split(".")
+    getattr(getattr(bpy.ops, group), name)(**vars(asked["properties"]))
+    assert len(bar.arapfields.handles) == 1
+
+
+@in_blender
+def test_every_operator_names_its_page_and_every_page_exists():
+    import fnmatch
+    from pathlib import Path
+    from urllib.parse import urlparse
+
+    import bpy
+
+    import addon.registration as registration
+    from addon.blender import guide
+
+    address, patterns = guide.manual_map()
+    folder = Path(urlparse(address).path)
+    assert all((folder / page).is_file() for _, page in patterns)
+
+    def page(name):
+        return next((page for pattern, page in patterns if fnmatch.fnmatchcase(name.lower(), pattern)), None)
+
+    own = [cls for cls in registration.CLASSES if issubclass(cls, bpy.types.Operator)]
+    own = [cls for cls in own if not cls.bl_idname.endswith("_preset")]
+    assert len(own) > 15
+    for cls in own:
+        told = cls.description(bpy.context, None)
+        assert told.startswith(cls.__doc__) and f"Guide: {guide.LABELS[cls.guide]}" in told, cls
+        assert page(f"bpy.ops.{cls.bl_idname}").startswith(cls.guide)
+    assert page("bpy.types.ARAPFIELDS_PG_deform.bending").startswith("deform")
+    assert page("bpy.types.ARAPFIELDS_PG_object.target").startswith("results")
+    assert page("bpy.ops.object.delete") is None
+    assert bpy.utils.manual_map is not None and guide.manual_map in bpy.utils._manual_map
+    guide.end()
+    assert guide.manual_map not in bpy.utils._manual_map
+    guide.begin(registration.CLASSES)
+
+
+@in_blender
+def test_the_first_start_says_where_the_extension_is_and_only_the_first():
+    import bpy
+
+    from addon import first_run
+
+    class Manager:
+        shown = 0
+
+        def popup_menu(self, draw, title, icon):
+            lines = []
+            label = type("Layout", (), {"label": lambda self, text: lines.append(text)})()
+            draw(type("Menu", (), {"layout": label})(), None)
+            assert "press N" in lines[0] and "F3" in lines[1]
+            Manager.shown += 1
+
+    stored = type("Preferences", (), {"was_welcomed": False})()
+    kept = first_run.bpy, first_run.preferences
+    first_run.bpy = type("Bpy", (), {"context": type("C", (), {"window_manager": Manager()})})
+    first_run.preferences = lambda: stored
+    try:
+        first_run.show()
+        first_run.show()
+    finally:
+        first_run.bpy, first_run.preferences = kept
+    assert Manager.shown == 1 and stored.was_welcomed
+    assert bpy.app.background

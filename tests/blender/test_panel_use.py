@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel by use: what is in view at first, what a button would refuse, what a fit and a job tell."""
+
+import json
+
+import pytest
+from inside import in_blender
+
+
+@in_blender
+def test_everyday_sections_come_first_and_numbers_are_under_advanced():
+    import bpy
+    from test_panels import drawn, prepared
+
+    from addon.core.runtime import jobs
+
+    prepared("handles")
+    jobs.add_message("INFO", "Bar: done")
+    found = drawn()
+    jobs.board.messages.clear()
+    panels = {name: getattr(bpy.types, name) for name in found if "_PT_" in name}
+    first = {n: cls.bl_order for n, cls in panels.items() if not hasattr(cls, "bl_parent_id")}
+    order = ["source", "handles", "deform", "stylize", "status", "advanced"]
+    assert sorted(first, key=first.get) == [f"ARAPFIELDS_PT_{name}" for name in order]
+    closed = {name for name, cls in panels.items() if "DEFAULT_CLOSED" in getattr(cls, "bl_options", ())}
+    assert closed == {*panels} - {*first} | {"ARAPFIELDS_PT_advanced"}
+    jargon = {"Samples", "Iterations", "Network Width", "Handle Weight", "Output", "Resolution", "Time Limit"}
+    for name, texts in found.items():
+        if name in first:
+            assert not jargon & {*texts}, name
+    assert jargon <= {text for texts in found.values() for text in texts}
+
+
+REFUSED = {
+    "no handle": ("ARAPFIELDS_PT_deform", "Add a handle first"),
+    "no group": ("ARAPFIELDS_PT_deform", "Bar has no vertex group gone"),
+    "holds nothing": ("ARAPFIELDS_PT_deform", "no part of the surface lies in the rest region of Far"),
+    "no style object": ("ARAPFIELDS_PT_stylize", "choose the object that gives the style its normals"),
+    "no axes": ("ARAPFIELDS_PT_stylize", "choose the object along whose axes the style stands"),
+    "no region": ("ARAPFIELDS_PT_stylize", "Bar has no vertex group gone"),
+    "follows no handle": ("ARAPFIELDS_PT_stylize", "Add a handle first"),
+    "no faces": ("ARAPFIELDS_PT_source", "Bar: the mesh has no faces"),
+    "empty": ("ARAPFIELDS_PT_source", "Bar: the mesh is empty"),
+    "a key of a surface": ("ARAPFIELDS_PT_stylize", "a shape key keeps the mesh"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+@in_blender
+def test_what_a_button_would_refuse_is_said_before(case):
+    import bpy
+    import scenes
+    from test_panel_use import REFUSED
+    from test_panels import drawn
+
+    bar = scenes.bar()
+    ours = bar.arapfields
+    if case == "no group":
+        bar.vertex_groups.new(name="gone").add([0, 1], 1.0, "REPLACE")
+        bpy.ops.arapfields.add_handle(kind="GROUP", group="gone")
+        bar.vertex_groups.clear()
+    elif case == "holds nothing":
+        scenes.activate(scenes.cube_empty((30, 0, 0), (1, 1, 1), "Far"), bar)
+        bpy.context.view_layer.update()
+        bpy.ops.arapfields.add_handle()
+    elif case == "no style object":
+        ours.stylize.style = "FACES"
+    elif case == "no axes":
+        ours.stylize.frame = "EMPTY"
+    elif case == "no region":
+        ours.stylize.region = "gone"
+    elif case == "follows no handle":
+        ours.stylize.use_handles = True
+    elif case in ("no faces", "empty"):
+        points = [] if case == "empty" else [vertex.co for vertex in bar.data.vertices]
+        bar.data.clear_geometry()
+        bar.data.from_pydata(points, [], [])
+    elif case == "a key of a surface":
+        ours.output, ours.target = "SURFACE", "KEY"
+    section, text = REFUSED[case]
+    assert text in " ".join(drawn()[section])
+
+
+@in_blender
+def test_what_the_panel_refuses_the_operators_refuse_too():
+    import bpy
+    import pytest
+    import scenes
+
+    bar = scenes.bar()
+    points = [vertex.co for vertex in bar.data.vertices]
+    bar.data.clear_geometry()
+    bar.data.from_pydata(points, [], [])
+    for operator in ("deform", "stylize", "fit", "extract", "bake", "live"):
+        with pytest.raises(RuntimeError, match="Bar: the mesh has no faces"):
+            getattr(bpy.ops.arapfields, operator)()
+        assert not getattr(bpy.ops.arapfields, operator).poll()
+
+
+@in_blender
+def test_a_menu_offers_what_the_mesh_has():
+    import bpy
+    import scenes
+
+    from addon.handles import empties
+
+    bar = scenes.bar()
+    assert not empties.can_place(None, "CUBE", "CURSOR")
+    assert empties.can_place(bar, "CUBE", "CURSOR") and not empties.can_place(bar, "GROUP", "AUTO")
+    bar.vertex_groups.new(name="one")
+    assert empties.can_place(bar, "GROUP", "AUTO")
+    bpy.ops.object.mode_set(mode="EDIT")
+    for action in ("SELECT", "DESELECT"):
+        bpy.ops.mesh.select_all(action=action)
+        assert empties.can_place(bar, "CUBE", "SELECTION") == (action == "SELECT")
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+@in_blender
+def test_a_fit_tells_its_errors():
+    import bpy
+    from test_panels import drawn, prepared
+
+    prepared("fitted")
+    texts = drawn()["ARAPFIELDS_PT_surface"]
+    told = [text for text in texts if "error at the surface" in text]
+    report = json.loads(bpy.data.objects["Bar"].arapfields.fit_report)
+    assert told == [
+        f"Mean error at the surface: {report['near_mean']:.2g}",
+        f"Largest error at the surface: {report['near_max']:.2g}",
+    ]
+    assert 0 < report["near_mean"] < report["near_max"]
+
+
+@in_blender
+def test_the_status_bar_shows_the_job_and_its_cancel():
+    import bpy
+    from test_panels import Layout, prepared
+
+    from addon.jobs import status_bar
+
+    def texts():
+        found = []
+        status_bar.draw(type("Header", (), {"layout": Layout(found)})(), bpy.context)
+        return found
+
+    assert texts() == []
+    undo = prepared("running")
+    try:
+        assert texts() == ["Deform 0%", "Cancel"]
+    finally:
+        undo()
+    assert texts() == []
+    assert status_bar.draw in bpy.types.STATUSBAR_HT_header.draw._draw_funcs
+
+
+@pytest.mark.parametrize("field", ["auto", "radial", "neural"])
+@in_blender
+def test_the_fold_barrier_acts_on_every_field(field):
+    import bpy
+    import scenes
+
+    _, _, moving = scenes.bar_with_handles()
+    moving.location.x -= 1.2  # the bar is pressed together
+    bpy.context.view_layer.update()
+    shapes = []
+    for barrier in (0.0, 50.0):
+        assert bpy.ops.arapfields.deform(**scenes.QUICK, field=field, barrier=barrier) == {"FINISHED"}
+        shapes.append(scenes.world_points(bpy.data.objects["Bar"]))
+    assert abs(shapes[1] - shapes[0]).max() > 1e-3
