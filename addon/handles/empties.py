@@ -8,10 +8,11 @@ from mathutils import Matrix, Vector
 from ..blender import mesh_arrays, modifier_stack, vertex_groups
 from ..blender.object_references import in_scene, settings_of
 from ..core.errors import UserError
-from ..core.geometry.handles import box_matrix, solve_handle
+from ..core.geometry.handles import box_matrix, far_handle, solve_handle
 from ..core.geometry.spaces import transform
 from ..core.runtime.coroutines import run_to_completion
 from ..names import HANDLE_SUFFIX
+from .colours import next_colour
 
 
 def matrix_of(item):
@@ -69,11 +70,16 @@ def solve_handles(source, space, weights=None, where=matrix_of):
         handles.append(solve_handle(entry.empty.name, entry.kind, *boxes, space, **options))
     if not handles:
         raise UserError("{name} has no handle; add one in the panel's Handles section", name=source.name)
-    return handles
+    return [*handles, far_handle()] if holds_far(source) else handles
 
 
-PALETTE = [(0.27, 0.55, 1.0), (1.0, 0.42, 0.30), (0.35, 0.80, 0.40), (0.85, 0.45, 0.90), (1.0, 0.80, 0.25)]
-SHAPES = {"CUBE": "CUBE", "POINT": "SPHERE", "GROUP": "ARROWS"}
+def holds_far(source):
+    """Whether what is far from all pins holds its place by itself: pins alone, none of them an anchor."""
+    entries = used(source)
+    return settings_of(source).hold_far and all(e.kind == "PIN" and not e.anchor for e in entries)
+
+
+SHAPES = {"CUBE": "CUBE", "POINT": "SPHERE", "GROUP": "ARROWS", "PIN": "SPHERE"}
 
 
 def add(source, empty, kind="CUBE"):
@@ -92,7 +98,7 @@ def add(source, empty, kind="CUBE"):
         settings.handles.add()
     entry = settings.handles[index]
     entry.empty, entry.kind = empty, kind
-    entry.colour = PALETTE[index % len(PALETTE)]
+    entry.colour = next_colour([tuple(other.colour) for other in settings.handles[:index]])
     settings_of(empty).handle_of = source
     empty.empty_display_type = SHAPES[kind]
     store_rest(source, entry)

@@ -6,7 +6,7 @@ from ..blender.object_references import in_scene
 from ..blender.section import Section
 from ..names import Op
 
-ICONS = {"CUBE": "CUBE", "POINT": "DOT", "GROUP": "GROUP_VERTEX"}
+ICONS = {"CUBE": "CUBE", "POINT": "DOT", "GROUP": "GROUP_VERTEX", "PIN": "PINNED"}
 
 
 class ARAPFIELDS_UL_handles(bpy.types.UIList):

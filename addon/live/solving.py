@@ -49,7 +49,8 @@ class Solving:
                 options[name] /= rigidity
             if self.weights is not None:
                 self.weights = vertex_groups.at_points(surface.vertices, self.weights, self.samples.points)
-        handles = native_handles(af, self.handles, surface, self.samples)
+        self.bound = self.handles
+        handles = native_handles(af, self.bound, surface, self.samples)
         options["interior"] = bool(handles)  # a style alone acts everywhere alike
         options |= supported_options(af.LiveOptions, machine_options())
         self.solver = af.LiveDeformer(self.samples, handles, af.LiveOptions(**options))
@@ -71,13 +72,17 @@ class Solving:
         return self.shape(self.solver.tracked())
 
     def solve(self, request, **further):
-        targets, style, points = request
+        targets, style, points, handles = request
         self.follow_points(points)
+        if handles is not self.bound:
+            af = native.library()
+            self.solver.set_handles(native_handles(af, handles, self.surface, self.samples))
+            self.bound = handles
         if style is not None and style[0] != self.style_set:
             directions, strength, sharpness, up = style[1:]
             self.solver.set_style(directions, strength, sharpness=sharpness, weights=self.weights, up=up)
             self.style_set = style[0]
-        self.solver.solve(targets if self.handles else None, **further)
+        self.solver.solve(targets if handles else None, **further)
 
     def refined(self, request, token):
         """Better and better shapes, until the energy falls no more; on the worker."""
