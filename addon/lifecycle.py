@@ -14,6 +14,7 @@ from .field_modifier import motion
 from .handles import counts
 from .jobs.display import display
 from .live import sessions
+from .live.warm import warm
 from .pin_tool import drawing as pin_drawing
 from .pin_tool import tool
 from .pin_tool.hover import hover
@@ -24,7 +25,7 @@ from .viewport import handle_boxes, previews
 @persistent
 def before_load(*_):
     """The file is about to go: whatever works on it ends, and nothing of it is applied."""
-    for state in (jobs.board, counts.pending, staleness.changed):
+    for state in (jobs.board, counts.pending, staleness.changed, warm):
         state.clear()
     sessions.stop_all()
 
@@ -90,7 +91,7 @@ PARTS = (  # what begins with the extension, and how it ends
 # What may be there when the extension is disabled, in the order in which it ends; each has clear().
 # Timers are started by blender/timers.py, threads by core/runtime/threads.py.
 STATE = (jobs.board, display, sessions.live, counts.pending, staleness.changed, motion.written)
-STATE += (hover, previews.shown, timers)
+STATE += (hover, warm, previews.shown, timers)
 
 _begun, _drawn = [], []
 

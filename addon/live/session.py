@@ -24,6 +24,7 @@ from .live_modifier import PAUSING, LiveModifier
 from .live_object import LiveObject
 from .setup import differ_in_handles, energy_weights, layout_of, same
 from .solving import Solving
+from .warm import warm
 
 PREVIEW_CELLS = 96  # at most, of the implicit surface that is shown while it moves
 
@@ -65,6 +66,11 @@ class Session(Solving):
             self.show_on(context, source, in_place)
             settings.live_kind = kind
         self.reading = self.read(context, follow)
+
+    def ready_solver(self):
+        return (
+            warm.take(self.surface, self.energy) if self.kind == "DEFORM" and self.surface.in_place else None
+        )
 
     def show_on(self, context, source, in_place):
         """Shows the shape where that belongs; what a session before made is used again, or goes."""

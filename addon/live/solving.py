@@ -37,6 +37,11 @@ class Solving:
     def prepare(self):
         """Sets the solver up; on the worker."""
         af, surface = native.library(), self.surface
+        ready = self.ready_solver()
+        if ready is not None:
+            self.samples, self.solver = ready
+            self.bound, self.points, self.rest = (), surface.local, surface.vertices
+            return
         own_triangles = surface.exact and self.output == "WARP"
         self.samples = surface.samples(ProgressTracker(af.Task), SAMPLES, 0, own_triangles)
         options = {**self.energy}
@@ -59,6 +64,10 @@ class Solving:
             self.solver.track(self.rest)
         else:
             self.follow_points(surface.local)
+
+    def ready_solver(self):
+        """(samples, solver) of this surface without handles, where one is set up; or None."""
+        return None
 
     def follow_points(self, points):
         """Has the solver move these (n, 3) points of the source, in local coordinates; on the worker."""

@@ -41,17 +41,18 @@ class Dragging(PinOperator):
     def start(self, context, view, dragged, kind):
         self.drag, self.kind, self.timer = dragged, kind, None
         hover.drag = dragged
-        self.anew(view)
+        self.take(view, view.pixel)
         context.window_manager.modal_handler_add(self)
         redraw(context, "WINDOW", "UI")
         return {"RUNNING_MODAL"}
 
-    def anew(self, view):
-        """The handle is taken where it is now, as the view is now."""
+    def take(self, view, pixel):
+        """The handle is taken where it is now, by that pixel, as the view is now."""
         matrix = self.drag.empty.get().matrix_world
         spot = view.pixel_of(matrix.translation)
-        self.taken, self.deep = np.subtract(spot, view.pixel), matrix.translation.copy()
-        self.drag.start, self.pressed, self.center = matrix.copy(), view.pixel, spot
+        self.taken, self.deep = np.subtract(spot, pixel), matrix.translation.copy()
+        self.drag.start, self.pressed, self.center = matrix.copy(), pixel, spot
+        self.last = pixel
 
     def modal(self, context, event):
         if hover.drag is not self.drag:  # taken away from outside: a file is loaded, a step undone
@@ -83,10 +84,11 @@ class Dragging(PinOperator):
 
     def moved(self, context, view):
         if self.turned:
-            self.anew(view)
+            self.take(view, self.last)
             self.turned = False
-        if view.pixel == self.pressed:
+        if view.pixel == self.last:
             return
+        self.last = view.pixel
         if self.kind == "TURN":
             angle = screen.turn_between(self.center, self.pressed, view.pixel)
             self.drag.turn(context, view.towards, angle)

@@ -6,6 +6,7 @@ from ..blender.object_references import owner_of, source_of
 from ..blender.redraw import redraw
 from ..core.errors import UserError
 from ..live import sessions
+from ..live.warm import warm
 from ..names import TOOL, Op
 from . import drag, pins
 from .hover import View, hover, under
@@ -37,6 +38,9 @@ class ARAPFIELDS_OT_pin_hover(PinOperator, bpy.types.Operator):
             before, hover.target = hover.target, under(context, View(context, event))
             if before is not None or hover.target is not None:
                 context.region.tag_redraw()
+            source = hover.target.source.find() if hover.target is not None else None
+            if source is not None and not sessions.is_live(source):
+                warm.prepare(context, source)
         return {"PASS_THROUGH"}
 
 

@@ -5,7 +5,7 @@ import pytest
 from inside import in_blender
 
 ROUNDS = 20
-STATES = ["idle", "live", "job", "counting", "drag"]
+STATES = ["idle", "live", "job", "counting", "drag", "warm"]
 
 
 def remains():
@@ -74,9 +74,12 @@ def is_busy(state):
     """Whether one of lifecycle.STATE holds anything."""
     from addon.core.runtime import jobs
     from addon.jobs.display import display
+    from addon.live.warm import warm
     from addon.pin_tool.hover import hover
     from addon.viewport import previews
 
+    if state is warm:
+        return state._thread is not None
     if state is hover:
         return state.target is not None or state.drag is not None
     if state is jobs.board:
@@ -101,6 +104,10 @@ def enter(state):
     bar, *_ = scenes.bar_with_handles()
     if state == "live":
         assert bpy.ops.arapfields.live() == {"FINISHED"}
+    elif state == "warm":
+        from addon.live.warm import warm
+
+        warm.prepare(bpy.context, bar)
     elif state == "drag":
         from addon.pin_tool import drag, hover
 

@@ -189,3 +189,31 @@ def test_what_cannot_be_pinned_is_named():
         bpy.ops.arapfields.pin_add(location=(1, 0, 0.25))
     bar.arapfields.target = "MODIFIER"
     assert bpy.ops.arapfields.pin_add(location=(1, 0, 0.25), radius=0.2) == {"FINISHED"}
+
+
+@in_blender
+def test_a_solver_set_up_beforehand_gives_the_same_shape():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_pins import follow, pin
+
+    from addon.live import sessions
+    from addon.live.warm import warm
+
+    shapes = []
+    for is_warm, moved_on in ((False, False), (True, False), (True, True)):
+        bar = scenes.bar()
+        if is_warm:
+            warm.prepare(bpy.context, bar)
+        if moved_on:  # another mesh than that which was read
+            bar.data.vertices[0].co.x += 0.01
+            bar.data.update()
+        pin(bar, (1.0, 0.0, 0.25), target=(1.0, 0.0, 0.6))
+        follow(refined=True)
+        assert warm.take(sessions.live[bar.session_uid].surface, {}) is None
+        shapes.append(scenes.world_points(bar))
+        bpy.data.objects.remove(bar.arapfields.handles[0].empty)
+        bpy.data.objects.remove(bar)
+    assert np.abs(shapes[1] - shapes[0]).max() < 1e-3
+    assert 0 < np.abs(shapes[2] - shapes[0]).max() < 0.05
