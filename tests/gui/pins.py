@@ -177,9 +177,12 @@ def first_and_rate(found, folder):
     from addon.pin_tool import hover as hovering
 
     bar = set_stage(dense=True)
+    _, area, _ = stage.view()
+    area.spaces.active.overlay.show_overlays = False
+    bpy.context.preferences.system.viewport_aa = "OFF"
     yield 2.0
     found["pins_vertices"] = len(bar.data.vertices)
-    spot = pixel(END)
+    spot = pixel((0.6, -0.25, -0.1))
     looks, begins = stage.Meter().watch(hovering, "surface"), stage.Meter().watch(dragging, "of_new_pin")
     yield from hover(spot)
     shown = []
@@ -214,6 +217,7 @@ def first_and_rate(found, folder):
     stage.tool("mouseup", 1)
     yield 2.0
     stage.picture(folder, "pins-dense")
+    area.spaces.active.overlay.show_overlays = True
     empty = bar.arapfields.handles[0].empty
     own = time.process_time()
     found["pins_without_drawing"] = live.without_drawing(empty, sessions)

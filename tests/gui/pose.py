@@ -84,8 +84,11 @@ def steps(folder, path, found):
             now = scenes.world_points(dog)[np.linalg.norm(rest - where, axis=1).argmin()]
             if kind == "anchor":
                 yield from mouse.hover(mouse.pixel(now))
-                stage.tool("keydown", "shift", "click", 1, "keyup", "shift")
+                stage.tool("keydown", "shift")
+                yield 0.2
+                stage.tool("click", 1)
                 yield from mouse.until(lambda count=number: len(dog.arapfields.handles) == count, 5.0)
+                stage.tool("keyup", "shift")
             else:
                 yield from mouse.drag(mouse.pixel(now), mouse.pixel(np.add(now, (0, *by))))
         yield 0.3
