@@ -111,8 +111,9 @@ class Drag:
 
 def stay(context, uid):
     """Has the live shape of that source stay as it is until a handle moves."""
-    sessions.live[uid].restored()
-    sessions.update(context)
+    if uid in sessions.live:  # else it ended with an error, which the panel tells
+        sessions.live[uid].restored()
+        sessions.update(context)
 
 
 def keep_frame(context, empty):

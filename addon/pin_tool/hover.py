@@ -20,7 +20,7 @@ RING, RING_REACH = (
 
 @dataclass(frozen=True)
 class Target:
-    """`kind` is HANDLE, RING or SURFACE."""
+    """`kind` is HANDLE, RING, SURFACE, or REFUSED for a mesh that cannot be pinned."""
 
     kind: str
     source: ObjectReference
@@ -96,12 +96,14 @@ def under(context, view):
 
 
 def surface(context, view):
-    """The Target of the first surface along the line of sight, or None where that cannot be pinned."""
+    """The Target of the first surface along the line of sight; None where that is no mesh to pin."""
     depsgraph = context.evaluated_depsgraph_get()
     met, location, normal, face, item, matrix = context.scene.ray_cast(depsgraph, *view.ray())
-    if not met or not pins.is_pinnable(item.original) or matrix != item.original.matrix_world:
+    if not met or not pins.is_mesh(item.original) or matrix != item.original.matrix_world:
         return None
     source, location = item.original, np.array(location)
+    if pins.refusal(source) is not None:
+        return Target("REFUSED", ObjectReference(source))
     radius = context.scene.arapfields.pin_radius * screen.pixel_size(view.perspective, view.size, location)
     mesh = source.evaluated_get(depsgraph).data
     return Target(

@@ -62,6 +62,9 @@ class Dragging(PinOperator):
         except (UserError, ReferenceError) as error:
             self.leave(context, None)
             return self.refuse(error)
+        except Exception:
+            self.leave(context, None)
+            raise
 
     def follow(self, context, event):
         if event.type in ("ESC", "RIGHTMOUSE") and event.value == "PRESS":

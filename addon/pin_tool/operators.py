@@ -39,7 +39,7 @@ class ARAPFIELDS_OT_pin_hover(PinOperator, bpy.types.Operator):
             if before is not None or hover.target is not None:
                 context.region.tag_redraw()
             source = hover.target.source.find() if hover.target is not None else None
-            if source is not None and not sessions.is_live(source):
+            if source is not None and hover.target.kind == "SURFACE" and not sessions.is_live(source):
                 warm.prepare(context, source)
         return {"PASS_THROUGH"}
 
@@ -57,6 +57,8 @@ class ARAPFIELDS_OT_pin_drag(Dragging, bpy.types.Operator):
             return {"PASS_THROUGH"}
         try:
             source = target.source.get()
+            if target.kind == "REFUSED":
+                raise pins.refusal(source)
             if target.kind == "SURFACE":
                 where = {"face": target.face, "face_count": target.face_count}
                 dragged = drag.of_new_pin(context, source, target.location, target.radius, **where)
@@ -83,6 +85,8 @@ class ARAPFIELDS_OT_pin_anchor(PinOperator, bpy.types.Operator):
             return {"PASS_THROUGH"}
         try:
             source = target.source.get()
+            if target.kind == "REFUSED":
+                raise pins.refusal(source)
             if target.kind == "SURFACE":
                 where = {"face": target.face, "face_count": target.face_count, "anchor": True}
                 drag.of_new_pin(context, source, target.location, target.radius, **where).end(context)

@@ -37,8 +37,9 @@ def refusal(item):
     return error
 
 
-def is_pinnable(item):
-    return item is not None and item.type == "MESH" and owner_of(item) is None and refusal(item) is None
+def is_mesh(item):
+    """Whether it is a mesh of the user's own, no result of ours."""
+    return item is not None and item.type == "MESH" and owner_of(item) is None
 
 
 def handles_in_view(context):
