@@ -53,6 +53,10 @@ class Warm:
         except (ValueError, UserError):  # the session that asks for it will tell
             self._made = None
 
+    def is_ready(self):
+        """Whether a solver is set up."""
+        return self._made is not None
+
     def take(self, surface, energy):
         """(samples, solver) of the same surface and weights, now the caller's; or None. On a worker."""
         thread = self._thread

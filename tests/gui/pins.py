@@ -168,11 +168,15 @@ def undo(found):
 
 
 def first_and_rate(found, folder):
-    """On 50,000 vertices: from the press to a shape that follows, and shapes a second in a drag."""
+    """On 50,000 vertices: from the press to a shape that follows, and shapes a second in a drag.
+
+    The solver has been set up while the cursor lay on the mesh.
+    """
     import live
 
     from addon.field_modifier import motion
     from addon.live import sessions
+    from addon.live.warm import warm
     from addon.pin_tool import drag as dragging
     from addon.pin_tool import hover as hovering
 
@@ -185,21 +189,24 @@ def first_and_rate(found, folder):
     spot = pixel((0.6, -0.25, -0.1))
     looks, begins = stage.Meter().watch(hovering, "surface"), stage.Meter().watch(dragging, "of_new_pin")
     yield from hover(spot)
-    shown = []
+    yield from until(lambda: warm.is_ready())
+    shown, given = [], ["sleep", 0.02, "mousemove", spot[0], spot[1] - 6]
     original, motion.write = (
         motion.write,
         lambda *given: (shown.append(time.perf_counter()), original(*given)),
     )
     begin = time.perf_counter()
-    subprocess.Popen(["xdotool", "mousedown", "1", "mousemove_relative", "--", "0", "-6"])
+    subprocess.Popen(["xdotool", "mousedown", "1", *map(str, given)])
     while not shown and time.perf_counter() - begin < 10:
         yield 0.005
+    stage.picture(folder, "pins-first")
     found["pins_first_shape_s"] = round(shown[0] - begin, 3)
     yield 1.0
     times, stop = stage.draws()
     del shown[:]
-    moves = [f"mousemove_relative -- 0 {-1 if step % 200 < 100 else 1} sleep 0.008" for step in range(2000)]
-    moving = subprocess.Popen(["xdotool", *" ".join(moves).split()])
+    heights = [spot[1] - 6 - abs(50 - step % 100) for step in range(2000)]
+    moves = " ".join(f"mousemove {spot[0]} {height} sleep 0.008" for height in heights)
+    moving = subprocess.Popen(["xdotool", *moves.split()])
     begin, own = time.perf_counter(), time.process_time()
     yield SECONDS
     took, own = time.perf_counter() - begin, time.process_time() - own
