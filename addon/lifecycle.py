@@ -14,6 +14,10 @@ from .field_modifier import motion
 from .handles import counts, rows
 from .jobs.display import display
 from .live import sessions
+from .live.warm import warm
+from .pin_tool import drawing as pin_drawing
+from .pin_tool import tool
+from .pin_tool.hover import hover
 from .surface import staleness
 from .viewport import handle_boxes, previews
 
@@ -21,7 +25,7 @@ from .viewport import handle_boxes, previews
 @persistent
 def before_load(*_):
     """The file is about to go: whatever works on it ends, and nothing of it is applied."""
-    for state in (jobs.board, counts.pending, staleness.changed, rows.seen):
+    for state in (jobs.board, counts.pending, staleness.changed, rows.seen, warm):
         state.clear()
     sessions.stop_all()
 
@@ -34,6 +38,7 @@ def before_undo(*_):
 @persistent
 def after_restore(*_):
     """A file was loaded, or a step undone or redone."""
+    hover.clear()
     sessions.recover()
 
 
@@ -76,7 +81,7 @@ HANDLERS = {  # of bpy.app.handlers
     "render_cancel": after_render,
     "frame_change_post": after_frame,
 }
-DRAWINGS = (previews.draw, handle_boxes.draw)  # over every 3D viewport
+DRAWINGS = (previews.draw, handle_boxes.draw, pin_drawing.draw)  # over every 3D viewport
 PARTS = (  # what begins with the extension, and how it ends
     (icons.load, icons.clear),
     (translations.load, translations.clear),
@@ -85,11 +90,12 @@ PARTS = (  # what begins with the extension, and how it ends
     (first_run.start, None),
     (library_loading.start, None),
     (install_check.start, None),
+    (tool.register, tool.unregister),
 )
 # What may be there when the extension is disabled, in the order in which it ends; each has clear().
 # Timers are started by blender/timers.py, threads by core/runtime/threads.py.
 STATE = (jobs.board, display, sessions.live, counts.pending, staleness.changed, motion.written)
-STATE += (previews.shown, rows.seen, timers)
+STATE += (hover, warm, previews.shown, rows.seen, timers)
 
 _begun, _drawn = [], []
 

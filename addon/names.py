@@ -4,6 +4,7 @@
 from enum import StrEnum
 
 PACKAGE = __package__
+TOOL = "arapfields.pin"  # in the toolbar
 CATEGORY = "ARAP Fields"  # tab of the sidebar
 RESULTS = "ARAP Fields"  # collection that holds results
 PROPERTY = "arapfields"  # object.arapfields
@@ -42,6 +43,13 @@ class Op(StrEnum):
     REMOVE_FIELD = "arapfields.remove_field"
     MIRROR_HANDLE = "arapfields.mirror_handle"
     BAKE = "arapfields.bake"
+    PIN_TOOL = "arapfields.pin_tool"
+    PIN_HOVER = "arapfields.pin_hover"
+    PIN_DRAG = "arapfields.pin_drag"
+    PIN_ANCHOR = "arapfields.pin_anchor"
+    PIN_ADD = "arapfields.pin_add"
+    PIN_DELETE = "arapfields.pin_delete"
+    PIN_TURN = "arapfields.pin_turn"
     CANCEL = "arapfields.cancel"
     CLEAR_CACHE = "arapfields.clear_cache"
     COPY_REPORT = "arapfields.copy_report"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The one way to poll: functions that Blender calls between events until they return None."""
+"""The one way to be called again: functions that Blender calls between events until they return None."""
 
 import bpy
 
@@ -23,3 +23,12 @@ def clear():
     for function in running():
         bpy.app.timers.unregister(function)
     _started.clear()
+
+
+def start_events(context, seconds):
+    """A timer whose events reach the window's modal operators, so many seconds apart."""
+    return context.window_manager.event_timer_add(seconds, window=context.window)
+
+
+def stop_events(timer):
+    bpy.context.window_manager.event_timer_remove(timer)

@@ -66,16 +66,19 @@ def counting(context, source):
 
 
 def points_inside(mesh, regions, weights):
-    """{session_uid of the Empty: points that the handle holds, -1 where it is a point}; on the worker."""
+    """{session_uid of the Empty: points that it holds, -1 for a point or a pin}; on the worker."""
     points = native.library().sample_mesh(mesh.vertices, mesh.triangles, count=COUNTED, seed=0).points
     counts = {}
     for uid, kind, group, rest in regions:
+        if kind in ("POINT", "PIN"):  # both always hold something
+            counts[uid] = -1
+            continue
         if kind == "GROUP":
             held = vertex_groups.at_points(mesh.vertices, weights[group], points) >= HELD
         else:
             box = rest.reshape(4, 4)
             held = (np.abs((points - box[:3, 3]) @ np.linalg.inv(box[:3, :3]).T) <= 1).all(axis=1)
-        counts[uid] = -1 if kind == "POINT" else int(held.sum())
+        counts[uid] = int(held.sum())
     return counts
 
 

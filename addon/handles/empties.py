@@ -9,7 +9,7 @@ from ..blender import mesh_arrays, modifier_stack, vertex_groups
 from ..blender.object_references import in_scene, settings_of
 from ..blender.selection import choose_row
 from ..core.errors import UserError
-from ..core.geometry.handles import box_matrix, solve_handle
+from ..core.geometry.handles import box_matrix, far_handle, solve_handle
 from ..core.geometry.spaces import transform
 from ..core.runtime.coroutines import run_to_completion
 from . import naming
@@ -78,10 +78,16 @@ def solve_handles(source, space, weights=None, where=matrix_of):
         handles.append(solve_handle(entry.empty.name, entry.kind, *boxes, space, **options))
     if not handles:
         raise UserError("{name} has no handle; add one in the panel's Handles section", name=source.name)
-    return handles
+    return [*handles, far_handle()] if holds_far(source) else handles
 
 
-SHAPES = {"CUBE": "CUBE", "POINT": "SPHERE", "GROUP": "ARROWS"}
+def holds_far(source):
+    """Whether what is far from all pins holds its place by itself: pins alone, none of them an anchor."""
+    entries = used(source)
+    return settings_of(source).hold_far and all(e.kind == "PIN" and not e.anchor for e in entries)
+
+
+SHAPES = {"CUBE": "CUBE", "POINT": "SPHERE", "GROUP": "ARROWS", "PIN": "SPHERE"}
 
 
 def add(source, empty, kind="CUBE"):

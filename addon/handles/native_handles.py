@@ -4,7 +4,7 @@
 import numpy as np
 
 from ..blender.vertex_groups import at_points
-from ..core.geometry.handles import require_held
+from ..core.geometry.handles import far_from, require_held
 
 HELD = 0.5  # weight from which a vertex group's handle holds a sample
 
@@ -21,9 +21,17 @@ def native_handles(af, handles, rest, samples):
         elif handle.kind == "GROUP":
             held = np.flatnonzero(at_points(rest.vertices, handle.weights, samples.points) >= HELD)
             counts[handle.name] = len(held)
-            natives.append(af.Region(held.tolist(), handle.rest, handle.target, weight=handle.weight))
+            natives.append(region(af, handle, held))
+        elif handle.kind == "PIN":
+            natives.append(region(af, handle, handle.pinned(samples.points)))
+        elif handle.kind == "FAR":
+            natives.append(region(af, handle, far_from(handles, samples.points)))
         else:
             counts[handle.name] = int(handle.inside(samples.points).sum())
             natives.append(af.Cuboid(handle.rest, handle.target, weight=handle.weight))
     require_held(counts)
     return natives
+
+
+def region(af, handle, held):
+    return af.Region(held.tolist(), handle.rest, handle.target, weight=handle.weight)

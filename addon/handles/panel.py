@@ -7,7 +7,7 @@ from ..blender.section import Section, wrapped
 from ..names import Op
 from . import empties
 
-ICONS = {"CUBE": "CUBE", "POINT": "DOT", "GROUP": "GROUP_VERTEX"}
+ICONS = {"CUBE": "CUBE", "POINT": "DOT", "GROUP": "GROUP_VERTEX", "PIN": "PINNED"}
 
 
 class ARAPFIELDS_UL_handles(bpy.types.UIList):

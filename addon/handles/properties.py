@@ -21,6 +21,10 @@ class ARAPFIELDS_PG_handle(bpy.types.PropertyGroup):
         min=0.0,
         soft_max=10.0,
     )
+    anchor: bpy.props.BoolProperty(
+        name="Anchor",
+        description="The pin tool does not drag it; while there is one, nothing else is held by itself",
+    )
     colour: bpy.props.FloatVectorProperty(
         name="Colour",
         description="Colour of the handle's boxes in the viewport",

@@ -5,7 +5,7 @@ import time
 
 import bpy
 
-from ..blender import user_preferences
+from ..blender import timers, user_preferences
 from ..blender.language import translated
 from ..blender.redraw import redraw
 from ..core.runtime.redraw_throttle import RedrawThrottle
@@ -21,7 +21,7 @@ class Display:
         self._words, self._count, self._left = "", 0, 0.0
 
     def begin(self, context):
-        self._timer = context.window_manager.event_timer_add(TICK, window=context.window)
+        self._timer = timers.start_events(context, TICK)
         self._words, self._count, self._left = "", 0, time.monotonic()
         self._progress_throttle, self._preview_throttle = RedrawThrottle(0.25), RedrawThrottle(0.4)
 
@@ -56,7 +56,7 @@ class Display:
         if self._preview is not None:
             self._preview.clear()
         if self._timer is not None:
-            bpy.context.window_manager.event_timer_remove(self._timer)
+            timers.stop_events(self._timer)
             for workspace in bpy.data.workspaces:
                 workspace.status_text_set(None)
             redraw(bpy.context, "UI", "WINDOW")

@@ -15,14 +15,16 @@ from ..core.geometry.spaces import space_of
 from ..core.runtime import native
 from ..core.runtime.coroutines import run_to_completion, step_for
 from ..core.runtime.latest_request_worker import LatestRequestWorker
+from ..field_modifier import motion
 from ..handles import empties
 from ..results import placement
 from ..stylize import preference
 from ..surface.source_surface import read_surface
 from .live_modifier import PAUSING, LiveModifier
 from .live_object import LiveObject
-from .setup import energy_weights, layout_of, same
+from .setup import differ_in_handles, energy_weights, layout_of, same
 from .solving import Solving
+from .warm import warm
 
 PREVIEW_CELLS = 96  # at most, of the implicit surface that is shown while it moves
 
@@ -35,9 +37,11 @@ class Session(Solving):
     """Reads its source when made, on the main thread; everything that takes time is done by the worker.
 
     `shown`: whether there is something to be seen of it; `display` is that of a session before it.
+    `keeps`: what it shows is the user's work, which stays: bit for bit until a handle moves, and at the end.
     """
 
-    def __init__(self, context, source, kind="DEFORM", shown=True, follow=True, display=None):
+    def __init__(self, context, source, kind="DEFORM", shown=True, follow=True, display=None, keeps=False):
+        self.keeps, self.quiet, self.is_restored = keeps, False, False
         settings = settings_of(source)
         self.source, self.kind, self.layout = ObjectReference(source), kind, layout_of(source, kind)
         self.output = settings.output
@@ -62,6 +66,11 @@ class Session(Solving):
             self.show_on(context, source, in_place)
             settings.live_kind = kind
         self.reading = self.read(context, follow)
+
+    def ready_solver(self):
+        return (
+            warm.take(self.surface, self.energy) if self.kind == "DEFORM" and self.surface.in_place else None
+        )
 
     def show_on(self, context, source, in_place):
         """Shows the shape where that belongs; what a session before made is used again, or goes."""
@@ -117,14 +126,34 @@ class Session(Solving):
         if source.mode in PAUSING:  # it goes on from what the user leaves
             self.may_be_edited = True
             return
-        if layout_of(source, self.kind) != self.layout or self.is_edited(source):
+        if self.is_restored:
+            context.view_layer.update()
+        layout = layout_of(source, self.kind)
+        if layout != self.layout:
+            if not differ_in_handles(layout, self.layout):
+                raise Changed
+            self.layout, self.handles = layout, empties.solve_handles(source, self.surface.space)
+        if self.is_edited(source):
             raise Changed
         if self.may_have_moved:
             self.read_points(context, source)
         request = self.current_request(context, source)
         if self.requested is None or not same(request, self.requested):
-            self.requested = request
+            self.requested, self.quiet = request, self.is_restored
             self.worker.request(request)
+        if self.is_restored:
+            self.is_restored, self.quiet = False, True
+            self.display.before = motion.snapshot(source)
+
+    def restored(self):
+        """What the source and its handles are now came from elsewhere: an undone step, a cancelled drag.
+
+        The solver goes there too, but shows nothing until a handle moves.
+        """
+        if self.keeps:
+            self.is_restored = self.quiet = True
+        else:
+            self.requested = None
 
     def read_points(self, context, source):
         """Where the modifiers before have the points now: the field is evaluated there."""
@@ -144,7 +173,8 @@ class Session(Solving):
         return mesh_arrays.fingerprint(source.data) != self.fingerprint
 
     def current_request(self, context, source, where=empties.matrix_of, seen=None):
-        """(targets of the handles, (key, directions, strength, sharpness, up) of the style or None, points).
+        """(targets of the handles, (key, directions, strength, sharpness, up) of the style or None, points,
+        handles).
 
         `where(object)` is the world matrix of one, and `seen` the source, as a render has them for instance.
         """
@@ -154,7 +184,7 @@ class Session(Solving):
             current = empties.solve_handles(source, space, where=where)
             targets = [h.target[:3, 3] if h.kind == "POINT" else h.target for h in current]
         if self.kind != "STYLIZE":
-            return targets, None, self.placed
+            return targets, None, self.placed, self.handles
         style = preference.requested_style(settings, space, where=where)
         strength, sharpness = (
             from_single_precision(settings.strength),
@@ -162,14 +192,14 @@ class Session(Solving):
         )
         directions = style.directions(native.library())
         key = (*style.key(), strength, sharpness)
-        return targets, (key, directions, strength, sharpness, style.up), self.placed
+        return targets, (key, directions, strength, sharpness, style.up), self.placed, self.handles
 
     def show(self):
         """Shows the newest shape; True when there was one."""
         shape, error = self.worker.poll() if self.worker is not None else (None, "")
         if error:
             raise UserError(error)
-        if shape is None:
+        if shape is None or self.quiet:
             return False
         return self.display.show(self.source.get(), shape)
 

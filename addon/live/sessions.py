@@ -48,14 +48,17 @@ def is_live(source, kind=None):
     return session is not None and kind in (None, session.kind)
 
 
-def begin(context, source, kind="DEFORM"):
-    """Makes the source live; UserError when that cannot be. The shape appears when the worker has it."""
+def begin(context, source, kind="DEFORM", keeps=False):
+    """Makes the source live; UserError when that cannot be. The shape appears when the worker has it.
+
+    `keeps`: what is shown stays when live mode ends.
+    """
     earlier = live.pop(source.session_uid, None)
     if earlier is not None:
         earlier.stop()
     session = None
     try:
-        session = Session(context, source, kind, display=earlier.display if earlier else None)
+        session = Session(context, source, kind, display=earlier.display if earlier else None, keeps=keeps)
         session.advance()  # a small mesh is read at once
     except UserError:
         if session or earlier:
@@ -140,7 +143,7 @@ def restart(context, uid, session):
     """The source or its handles changed: the solver is set up anew, the shape stays where it is."""
     source = session.source.get()
     try:
-        begin(context, source, session.kind)
+        begin(context, source, session.kind, session.keeps)
     except UserError as error:
         jobs.add_message("ERROR", f"{source.name}: {translated(error)}")
 
@@ -205,7 +208,7 @@ def recover():
             if not session.display.in_place:
                 take_away(session)
         else:
-            session.requested = None  # what it wrote may have been undone
+            session.restored()  # what it wrote may have been undone
     for source in bpy.data.objects:
         if settings_of(source).live_kind and not is_live(source):
             with contextlib.suppress(UserError, RuntimeError, AttributeError):

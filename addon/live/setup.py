@@ -20,6 +20,11 @@ def energy_weights(settings, kind):
     return weights | {"bending_unit": group.bending_unit.lower()}
 
 
+def differ_in_handles(a, b):
+    """Whether two layouts differ in handles alone, and the solver can take those of `a` as it stands."""
+    return a[2:] == b[2:] and bool(a[0]) and all(kind != "GROUP" for _, kind, *_ in a[0])
+
+
 def uses_handles(settings, kind):
     return kind == "DEFORM" or settings.stylize.use_handles
 
@@ -32,7 +37,8 @@ def layout_of(source, kind):
     further = (*energy_weights(settings, kind).items(), settings.output, settings.target, settings.surface)
     if kind == "STYLIZE":
         further += (*style, settings.stylize.use_handles)
-    return (held if uses_handles(settings, kind) else [], further, stack_of(source))
+    used = uses_handles(settings, kind)
+    return (held if used else [], used and empties.holds_far(source), further, stack_of(source))
 
 
 def stack_of(source):
@@ -46,4 +52,6 @@ def same(a, b):
     """Whether two requests ask for the same."""
     if (a[1] and a[1][0]) != (b[1] and b[1][0]):
         return False
-    return a[2] is b[2] and all(np.array_equal(x, y) for x, y in zip(a[0], b[0], strict=True))
+    return (
+        a[2] is b[2] and a[3] is b[3] and all(np.array_equal(x, y) for x, y in zip(a[0], b[0], strict=True))
+    )

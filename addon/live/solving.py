@@ -37,6 +37,11 @@ class Solving:
     def prepare(self):
         """Sets the solver up; on the worker."""
         af, surface = native.library(), self.surface
+        ready = self.ready_solver()
+        if ready is not None:
+            self.samples, self.solver = ready
+            self.bound, self.points, self.rest = (), surface.local, surface.vertices
+            return
         own_triangles = surface.exact and self.output == "WARP"
         self.samples = surface.samples(ProgressTracker(af.Task), SAMPLES, 0, own_triangles)
         options = {**self.energy}
@@ -49,7 +54,8 @@ class Solving:
                 options[name] /= rigidity
             if self.weights is not None:
                 self.weights = vertex_groups.at_points(surface.vertices, self.weights, self.samples.points)
-        handles = native_handles(af, self.handles, surface, self.samples)
+        self.bound = self.handles
+        handles = native_handles(af, self.bound, surface, self.samples)
         options["interior"] = bool(handles)  # a style alone acts everywhere alike
         options |= supported_options(af.LiveOptions, machine_options())
         self.solver = af.LiveDeformer(self.samples, handles, af.LiveOptions(**options))
@@ -58,6 +64,10 @@ class Solving:
             self.solver.track(self.rest)
         else:
             self.follow_points(surface.local)
+
+    def ready_solver(self):
+        """(samples, solver) of this surface without handles, where one is set up; or None."""
+        return None
 
     def follow_points(self, points):
         """Has the solver move these (n, 3) points of the source, in local coordinates; on the worker."""
@@ -71,13 +81,17 @@ class Solving:
         return self.shape(self.solver.tracked())
 
     def solve(self, request, **further):
-        targets, style, points = request
+        targets, style, points, handles = request
         self.follow_points(points)
+        if handles is not self.bound:
+            af = native.library()
+            self.solver.set_handles(native_handles(af, handles, self.surface, self.samples))
+            self.bound = handles
         if style is not None and style[0] != self.style_set:
             directions, strength, sharpness, up = style[1:]
             self.solver.set_style(directions, strength, sharpness=sharpness, weights=self.weights, up=up)
             self.style_set = style[0]
-        self.solver.solve(targets if self.handles else None, **further)
+        self.solver.solve(targets if handles else None, **further)
 
     def refined(self, request, token):
         """Better and better shapes, until the energy falls no more; on the worker."""

@@ -10,6 +10,7 @@ from ..core.settings.choices import NORMALS, OUTPUTS, PLACEMENT_NUMBERS, PLACEME
 from ..core.settings.parameters import EXTRACTION
 from ..handles.properties import ARAPFIELDS_PG_handle
 from ..names import PROPERTY
+from ..pin_tool.properties import ARAPFIELDS_PG_scene
 from .settings import ARAPFIELDS_PG_deform, ARAPFIELDS_PG_fit, ARAPFIELDS_PG_stylize
 
 
@@ -61,6 +62,11 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
         type=ARAPFIELDS_PG_handle,
         name="Handles",
         description="Empties that hold and move parts of the object",
+    )
+    hold_far: bpy.props.BoolProperty(
+        name="Hold What Is Far",
+        description="While all handles are pins and none is an anchor, what is far from them holds its place "
+        "by itself, weakly",
     )
     active_handle: bpy.props.IntProperty(
         name="Active Handle", description="Row chosen in the list of handles", update=row_chosen
@@ -114,8 +120,12 @@ def attach():
     setattr(
         bpy.types.Object, PROPERTY, bpy.props.PointerProperty(type=ARAPFIELDS_PG_object, name="ARAP Fields")
     )
+    setattr(
+        bpy.types.Scene, PROPERTY, bpy.props.PointerProperty(type=ARAPFIELDS_PG_scene, name="ARAP Fields")
+    )
 
 
 def detach():
-    if hasattr(bpy.types.Object, PROPERTY):
-        delattr(bpy.types.Object, PROPERTY)
+    for owner in (bpy.types.Object, bpy.types.Scene):
+        if hasattr(owner, PROPERTY):
+            delattr(owner, PROPERTY)

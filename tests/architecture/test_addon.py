@@ -20,6 +20,7 @@ ORDER = [
     "deform",
     "stylize",
     "live",
+    "pin_tool",
 ]
 ORDER += ["animation", "commands"]
 TOP = {
@@ -38,7 +39,7 @@ LEAVES = ("operators", "panel")
 ALONE = {  # text of a call → the one module that makes it
     "Thread(": "core/runtime/threads.py",
     "app.timers.register": "blender/timers.py",
-    "event_timer_add": "jobs/display.py",
+    "event_timer_add": "blender/timers.py",
     "draw_handler_add": "lifecycle.py",
     "bpy.app.handlers,": "lifecycle.py",
     "from bpy.app.handlers": "lifecycle.py",

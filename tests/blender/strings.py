@@ -87,6 +87,7 @@ def literal(node):
 
 def every():
     import addon.registration as registration
+    from addon.pin_tool.tool import ARAPFIELDS_TOOL_pin as tool
 
-    found = {*of_classes(registration.MODULES), *of_source()}
+    found = {*of_classes(registration.MODULES), *of_source(), tool.bl_label, tool.bl_description}
     return sorted(found - UNTRANSLATED)

@@ -5,7 +5,7 @@ import pytest
 from inside import in_blender
 
 ROUNDS = 20
-STATES = ["idle", "live", "job", "counting"]
+STATES = ["idle", "live", "job", "counting", "drag", "warm"]
 
 
 def remains():
@@ -39,7 +39,8 @@ def remains():
     return found | {
         "types": types + subclasses,
         "operators": dir(bpy.ops.arapfields),
-        "property": [name for name in ("arapfields",) if hasattr(bpy.types.Object, name)],
+        "property": [o for o in (bpy.types.Object, bpy.types.Scene) if hasattr(o, "arapfields")],
+        "tools": pin_tools(),
         "timers": timers.running(),
         "threads": threads.own_threads(),
         "drawings": lifecycle._drawn,
@@ -61,12 +62,26 @@ def remains():
     }
 
 
+def pin_tools():
+    """The extension's tools in Object Mode's toolbar."""
+    from bl_ui.space_toolsystem_toolbar import VIEW3D_PT_tools_active as toolbar
+
+    flat = toolbar._tools_flatten(toolbar._tools["OBJECT"])
+    return [tool.idname for tool in flat if tool and tool.idname.startswith("arapfields")]
+
+
 def is_busy(state):
     """Whether one of lifecycle.STATE holds anything."""
     from addon.core.runtime import jobs
     from addon.jobs.display import display
+    from addon.live.warm import warm
+    from addon.pin_tool.hover import hover
     from addon.viewport import previews
 
+    if state is warm:
+        return state._thread is not None
+    if state is hover:
+        return state.target is not None or state.drag is not None
     if state is jobs.board:
         return state.job is not None
     if state is display:
@@ -89,6 +104,16 @@ def enter(state):
     bar, *_ = scenes.bar_with_handles()
     if state == "live":
         assert bpy.ops.arapfields.live() == {"FINISHED"}
+    elif state == "warm":
+        from addon.live.warm import warm
+
+        warm.prepare(bpy.context, bar)
+    elif state == "drag":
+        from addon.pin_tool import drag, hover
+
+        before = drag.Before(bpy.context, bar)
+        hover.hover.drag = drag.Drag(bpy.context, before, bpy.data.objects["Moving"])
+        hover.hover.drag.move(bpy.context, (1.0, 0.0, 0.3))
     elif state == "job":
 
         def work(tracker):
@@ -137,6 +162,7 @@ def test_in_a_window_drawing_and_timers_end_too():
     import addon
     from addon import lifecycle
     from addon.blender import host, library_loading
+    from addon.pin_tool import tool
 
     addon.unregister()
     there, kept = [], (lifecycle.has_window, library_loading.has_window, bpy.types.SpaceView3D)
@@ -156,17 +182,21 @@ def test_in_a_window_drawing_and_timers_end_too():
             return SpaceView3D if name == "SpaceView3D" else getattr(types, name)
 
     types = bpy.types
-    lifecycle.has_window = library_loading.has_window = lambda: True
+    lifecycle.has_window = library_loading.has_window = tool.has_window = lambda: True
     try:
         lifecycle.bpy = type("Bpy", (), {"app": bpy.app, "types": Types()})
         for _ in range(ROUNDS):
             addon.register()
             assert len(there) == len(lifecycle.DRAWINGS) and remains()["timers"]
+            assert remains()["tools"] == ["arapfields.pin"]
             addon.unregister()
-            assert not there and not remains()["timers"] and not lifecycle._drawn
+            left = remains()
+            assert not there and not lifecycle._drawn
+            assert not left["timers"] and not left["tools"] and not left["key maps"]
     finally:
         lifecycle.bpy = bpy
         lifecycle.has_window, library_loading.has_window, _ = kept
+        tool.has_window = host.has_window
         addon.register()
     assert host.has_window() is False
 

@@ -147,6 +147,7 @@ class Meter:
             "calls": len(self.wall),
             "longest_ms": round(1e3 * max(self.wall), 2),
             "median_ms": round(1e3 * float(np.median(self.wall)), 2),
+            "median_own_ms": round(1e3 * float(np.median(self.own)), 2),
             "longest_own_ms": round(1e3 * max(self.own), 2),
         }
 

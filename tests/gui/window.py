@@ -2,7 +2,7 @@
 """Run by a real Blender with a window: jobs, live mode, the panel. docs/development.md says how.
 
 blender --factory-startup --python tests/gui/window.py -- OUTPUT_FOLDER [PART ...]
-Parts are panel, use, jobs, stalls, live and endings; all where none is named. Writes checks.json, and
+Parts are panel, use, jobs, stalls, live, pins and endings; all where none is named. Writes checks.json, and
 pictures where ImageMagick's `import` is at hand; xdotool moves the mouse. Ends with a job running, which must
 not hold it.
 """
@@ -21,6 +21,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests/blender"), str(ROOT / "tests/gui")]
 import jobs  # noqa: E402
 import live  # noqa: E402
 import panel  # noqa: E402
+import pins  # noqa: E402
 import scenes  # noqa: E402
 import stage  # noqa: E402
 import stalls  # noqa: E402
@@ -39,6 +40,7 @@ def steps():
         "jobs": lambda: jobs.checks(FOUND, OUTPUT),
         "stalls": lambda: stalls.checks(FOUND, OUTPUT),
         "live": lambda: live.checks(FOUND, OUTPUT),
+        "pins": lambda: pins.checks(FOUND, OUTPUT),
         "endings": lambda: jobs.endings(FOUND),
     }
     stage.empty_file()

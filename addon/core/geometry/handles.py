@@ -8,6 +8,9 @@ import numpy as np
 from ..errors import UserError
 from .spaces import rigid_motion
 
+PIN_SAMPLES = 12  # of the surface that a pin holds at least: those nearest to it
+FAR_SHARE = 0.5  # of the largest distance from all pins: what is farther is far
+FAR_WEIGHT = 0.02  # with which what is far holds its place, relative to a pin
 ANCHOR_TOLERANCE = 1e-5  # motion, relative to the box, below which a handle is an anchor
 MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 
@@ -17,7 +20,7 @@ class Handle:
     """One handle in solve space. `rest` and `target` map the cube [-1, 1]³ onto the box."""
 
     name: str
-    kind: str  # CUBE, POINT or GROUP
+    kind: str  # CUBE, POINT, GROUP, PIN or FAR
     rest: np.ndarray
     target: np.ndarray
     weights: np.ndarray | None = None  # GROUP: (n,) of the source's vertices
@@ -29,8 +32,16 @@ class Handle:
 
     def inside(self, points):
         """(n,) whether the points lie in the rest box."""
-        local = (points - self.rest[:3, 3]) @ np.linalg.inv(self.rest[:3, :3]).T
-        return (np.abs(local) <= 1).all(axis=1)
+        return (np.abs(self._in_box(points)) <= 1).all(axis=1)
+
+    def pinned(self, points):
+        """Indices of the points that a pin holds: those in its ball, the nearest ones where these are few."""
+        away = (self._in_box(points) ** 2).sum(axis=1)
+        count = max(int((away <= 1).sum()), min(PIN_SAMPLES, len(points)))
+        return np.sort(np.argpartition(away, count - 1)[:count])
+
+    def _in_box(self, points):
+        return (points - self.rest[:3, 3]) @ np.linalg.inv(self.rest[:3, :3]).T
 
 
 def box_matrix(matrix_world, size):
@@ -67,3 +78,15 @@ def require_held(counts):
 def nothing_held(names):
     """The UserError that names handles which hold nothing."""
     return UserError("no part of the surface lies in the rest region of {names}", names=", ".join(names))
+
+
+def far_handle():
+    """Stands for an anchor where there is none: what is far from all pins holds its place, weakly."""
+    return Handle("", "FAR", np.eye(4), np.eye(4), weight=FAR_WEIGHT)
+
+
+def far_from(handles, points):
+    """Indices of the points that are far from all pins, in solve space at rest."""
+    centers = np.array([handle.rest[:3, 3] for handle in handles if handle.kind != "FAR"])
+    away = np.linalg.norm(points[:, None] - centers, axis=2).min(axis=1)
+    return np.flatnonzero(away >= FAR_SHARE * away.max())

@@ -34,3 +34,10 @@ def rotation_vectors(rotations):
         axis *= np.where((axis * twice[half]).sum(axis=1) < 0, -1.0, 1.0)[:, None]
         result[half] = axis * angle[half, None]
     return result
+
+
+def best_rotation(before, after):
+    """(3, 3) the rotation that takes (n, 3) points nearest to those after, both about their means."""
+    before, after = before - before.mean(axis=0), after - after.mean(axis=0)
+    left, _, right = np.linalg.svd(after.T @ before)
+    return left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))]) @ right

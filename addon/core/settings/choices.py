@@ -5,6 +5,7 @@ HANDLE_KINDS = (
     ("CUBE", "Region", "What lies in the box at rest follows the Empty"),
     ("POINT", "Point", "The point of the surface nearest to the Empty at rest follows it"),
     ("GROUP", "Vertex Group", "What a vertex group of the object holds follows the Empty"),
+    ("PIN", "Pin", "A small round region of the surface follows the Empty"),
 )
 HANDLE_PLACES = (
     ("AUTO", "Selected Empties", "The selected Empties; where none is selected, a new one at the 3D cursor"),

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One drag of a handle, from the press to the release: live, and taken back bit for bit where cancelled."""
+
+from mathutils import Matrix, Vector
+
+from ..blender import modifier_stack
+from ..blender.object_references import ObjectReference, settings_of
+from ..field_modifier import motion
+from ..live import sessions
+from . import pins
+
+TRANSFORMS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
+
+
+class Before:
+    """What a drag changes, as it was: begun before the pin is placed."""
+
+    def __init__(self, context, source):
+        settings, layer = settings_of(source), context.view_layer
+        self.source, self.was_live = ObjectReference(source), sessions.is_live(source)
+        self.motion = motion.snapshot(source)
+        self.hold_far, self.row = settings.hold_far, settings.active_handle
+        self.active = ObjectReference(layer.objects.active) if layer.objects.active else None
+        self.selected = [ObjectReference(item) for item in context.selected_objects]
+
+    def choose(self, context):
+        """Selects what was selected."""
+        for item in context.selected_objects:
+            item.select_set(False)
+        for reference in self.selected:
+            item = reference.find()
+            if item is not None:
+                item.select_set(True)
+        context.view_layer.objects.active = self.active.find() if self.active else None
+
+    def show(self, context):
+        """Makes the shape what it was; the solver follows."""
+        source = self.source.get()
+        if self.motion is None:
+            modifier = modifier_stack.find(source)
+            motion.write_to(motion.carrier(source, modifier), motion.Motion(None))
+        else:
+            motion.restore(source, self.motion)
+        stay(context, source.session_uid)
+
+
+class Drag:
+    """A handle's Empty under way. `is_new`: the pin was placed by this very press."""
+
+    def __init__(self, context, before, empty, is_new=False):
+        self.before, self.is_new, self.has_moved = before, is_new, False
+        self.empty, self.start = ObjectReference(empty), empty.matrix_world.copy()
+        self.values = {name: tuple(getattr(empty, name)) for name in TRANSFORMS}
+        source = before.source.get()
+        if not sessions.is_live(source, "DEFORM"):
+            sessions.begin(context, source, keeps=True)
+        sessions.live[source.session_uid].keeps = True
+
+    def move(self, context, location):
+        """Takes the Empty to a location (3,) in world space."""
+        matrix = self.empty.get().matrix_world.copy()
+        matrix.translation = Vector(location)
+        self.put(context, matrix)
+
+    def turn(self, context, axis, angle):
+        """Turns the Empty from where it was at the start, about an axis (3,) through it."""
+        middle = self.start.translation
+        turn = Matrix.Translation(middle) @ Matrix.Rotation(angle, 4, Vector(axis))
+        self.put(context, turn @ Matrix.Translation(-middle) @ self.start)
+
+    def put(self, context, matrix):
+        self.has_moved = True
+        self.empty.get().matrix_world = matrix
+        sessions.update(context)
+
+    def session(self):
+        return sessions.live.get(self.before.source.uid)
+
+    def is_settled(self):
+        """Whether the shape has reached the handle, and is as good as it gets."""
+        session = self.session()
+        return session is None or (session.worker is not None and session.worker.resting)
+
+    def end(self, context):
+        """What is shown now stays; a press without a move changes no shape."""
+        session = self.session()
+        if not self.has_moved:
+            self.before.show(context)
+        elif session is not None:
+            session.wait(sessions.WAIT, refined=False)
+            session.show()
+            stay(context, self.before.source.uid)
+            keep_frame(context, self.empty.get())
+
+    def cancel(self, context):
+        """All is as it was before the press, bit for bit."""
+        source, empty = self.before.source.get(), self.empty.find()
+        if self.is_new and empty is not None:
+            pins.discard(source, empty)
+        elif empty is not None:
+            for name, value in self.values.items():
+                setattr(empty, name, value)
+        settings = settings_of(source)
+        settings.hold_far, settings.active_handle = self.before.hold_far, self.before.row
+        self.before.choose(context)
+        if sessions.is_live(source):
+            self.before.show(context)
+            if not self.before.was_live:
+                sessions.end(context, source)
+
+
+def stay(context, uid):
+    """Has the live shape of that source stay as it is until a handle moves."""
+    if uid in sessions.live:  # else it ended with an error, which the panel tells
+        sessions.live[uid].restored()
+        sessions.update(context)
+
+
+def keep_frame(context, empty):
+    """Keys the handle where Blender's automatic keys are on."""
+    if context.scene.tool_settings.use_keyframe_insert_auto:
+        turn = {"QUATERNION": "quaternion", "AXIS_ANGLE": "axis_angle"}.get(empty.rotation_mode, "euler")
+        for path in ("location", f"rotation_{turn}"):
+            empty.keyframe_insert(path)
+
+
+def of_entry(context, source, entry):
+    """A drag of a handle that is there."""
+    before = Before(context, source)
+    pins.select(context, entry.empty)
+    return Drag(context, before, entry.empty)
+
+
+def of_new_pin(context, source, location, radius, **further):
+    """A drag of a new pin."""
+    before = Before(context, source)
+    entry = pins.place(context, source, location, radius, **further)
+    try:
+        return Drag(context, before, entry.empty, is_new=True)
+    except Exception:
+        pins.discard(source, entry.empty)
+        settings_of(source).hold_far = before.hold_far
+        before.choose(context)
+        raise

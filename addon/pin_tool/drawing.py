@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the pin tool draws: its pins, the active one's ring, and the surface under the cursor."""
+
+import bpy
+import gpu
+import numpy as np
+from gpu_extras.batch import batch_for_shader
+
+from ..names import TOOL
+from . import pins, screen
+from .hover import RING, hover
+
+LIGHT = (1.0, 0.85, 0.4)
+DARK = (0.05, 0.05, 0.05, 0.9)
+PIN, CORNERS = 7, 24  # radius of a pin's disc in pixels; corners of a circle
+ANGLES = np.linspace(0, 2 * np.pi, CORNERS, endpoint=False)
+SQUARE = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * 0.9
+CIRCLE = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
+ENOUGH = 8  # triangles within the radius that show it; a disc does where they are fewer
+LIFT = 1.5  # pixels by which the lit surface is drawn before the shape
+
+
+def is_active(context):
+    """Whether the pin tool is the one in use in this window's Object Mode."""
+    tool = context.workspace.tools.from_space_view3d_mode("OBJECT", create=False)
+    return tool is not None and tool.idname == TOOL and context.mode == "OBJECT"
+
+
+class Brush:
+    """Draws flat shapes that face the viewer."""
+
+    def __init__(self, context):
+        region, view = context.region, context.region_data
+        self.size = region.width, region.height
+        self.perspective = np.array(view.perspective_matrix)
+        turn = np.array(view.view_rotation.to_matrix())
+        self.right, self.up, self.towards = turn.T
+        self.scale = context.preferences.system.ui_scale
+        self.fill = gpu.shader.from_builtin("UNIFORM_COLOR")
+        self.line = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+
+    def pixel(self, location):
+        return screen.pixel_size(self.perspective, self.size, location)
+
+    def outline(self, location, shape, pixels):
+        """(n, 3) corners of a shape, (n, 2), so many pixels large."""
+        length = pixels * self.scale * self.pixel(location)
+        return location + length * (shape[:, :1] * self.right + shape[:, 1:] * self.up)
+
+    def area(self, colour, corners):
+        fan = [corners[i] for k in range(1, len(corners) - 1) for i in (0, k, k + 1)]
+        self.triangles(colour, np.array(fan))
+
+    def triangles(self, colour, points):
+        self.fill.uniform_float("color", colour)
+        batch_for_shader(self.fill, "TRIS", {"pos": points.astype(np.float32).tolist()}).draw(self.fill)
+
+    def loop(self, colour, corners, width):
+        self.line.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
+        self.line.uniform_float("lineWidth", width * self.scale)
+        self.line.uniform_float("color", colour)
+        closed = [*corners.tolist(), corners[0].tolist()]
+        batch_for_shader(self.line, "LINE_STRIP", {"pos": closed}).draw(self.line)
+
+
+def draw():
+    context = bpy.context
+    if context.region_data is None or not is_active(context):
+        return
+    brush = Brush(context)
+    gpu.state.blend_set("ALPHA")
+    target = hover.target if hover.drag is None else None
+    if target is not None and target.kind == "SURFACE":
+        draw_surface(brush, target)
+    gpu.state.depth_test_set("NONE")
+    for _, entry in pins.handles_in_view(context):
+        draw_handle(brush, entry, target, entry.empty == pins.chosen(context))
+    gpu.state.blend_set("NONE")
+
+
+def draw_surface(brush, target):
+    """The part of the surface that a pin would hold, and its rim."""
+    gpu.state.depth_test_set("LESS_EQUAL")
+    lift = LIFT * brush.pixel(target.location)
+    across = np.linalg.svd(target.normal[None])[2][1:]
+    rim = target.location + target.radius * (CIRCLE @ across)
+    if len(target.lit) >= ENOUGH:
+        brush.triangles((*LIGHT, 0.35), target.lit.reshape(-1, 3) + lift * brush.towards)
+    else:
+        brush.area((*LIGHT, 0.35), rim + lift * brush.towards)
+    gpu.state.depth_test_set("NONE")
+    brush.loop((*LIGHT, 0.9), rim, 2.0)
+
+
+def draw_handle(brush, entry, target, is_chosen):
+    """A disc, for an anchor a square; larger under the cursor; the chosen one has a ring to turn it by."""
+    location = np.array(entry.empty.matrix_world.translation)
+    meant = target is not None and target.empty is not None and target.empty.uid == entry.empty.session_uid
+    shape = SQUARE if entry.anchor else CIRCLE
+    size = PIN * (1.35 if meant and target.kind == "HANDLE" else 1.0)
+    brush.area(DARK, brush.outline(location, shape, size + 2))
+    brush.area((*entry.colour, 1.0), brush.outline(location, shape, size))
+    if is_chosen:
+        brush.loop((1.0, 1.0, 1.0, 0.95), brush.outline(location, shape, size + 2), 2.0)
+        if not entry.anchor:
+            bright = 0.95 if meant and target.kind == "RING" else 0.45
+            brush.loop((*entry.colour, bright), brush.outline(location, CIRCLE, RING), 2.5)

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What lies under the cursor: a handle, the active handle's ring, a surface; and what of it lights up."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from bpy_extras import view3d_utils
+
+from ..blender.object_references import ObjectReference
+from ..core.geometry.spaces import transform
+from ..handles.empties import matrix_of
+from . import pins, screen
+
+REACH = 14  # pixels within which a handle is met, at a scale of 1
+RING, RING_REACH = (
+    46,
+    7,
+)  # radius in pixels of the active handle's ring, and how near to it the cursor meets it
+
+
+@dataclass(frozen=True)
+class Target:
+    """`kind` is HANDLE, RING, SURFACE, or REFUSED for a mesh that cannot be pinned."""
+
+    kind: str
+    source: ObjectReference
+    empty: ObjectReference | None = None
+    location: np.ndarray | None = None  # (3,) on the surface, in world space
+    normal: np.ndarray | None = None
+    radius: float = 0.0  # in the world, of the region that a pin there would hold
+    face: int = -1  # of the mesh as shown, which has `face_count` of them
+    face_count: int = 0
+    lit: np.ndarray | None = None  # (k, 3, 3) triangles within the radius, in world space
+
+
+class Hover:
+    """The target under the cursor when the mouse last moved, and whether a drag goes on."""
+
+    def __init__(self):
+        self.clear()
+
+    def clear(self):
+        self.target = self.drag = None
+
+
+hover = Hover()
+
+
+class View:
+    """The 3D view that an event came from."""
+
+    def __init__(self, context, event):
+        self.region, self.view = context.region, context.region_data
+        self.pixel = event.mouse_region_x, event.mouse_region_y
+        self.size = self.region.width, self.region.height
+        self.perspective = np.array(self.view.perspective_matrix)
+        self.scale = context.preferences.system.ui_scale
+
+    def ray(self):
+        """(origin, direction) of the line of sight, in world space."""
+        return (
+            view3d_utils.region_2d_to_origin_3d(self.region, self.view, self.pixel),
+            view3d_utils.region_2d_to_vector_3d(self.region, self.view, self.pixel),
+        )
+
+    def beside(self, location, offset=(0, 0)):
+        """The point as deep as a location, under the cursor and so many pixels beside it."""
+        pixel = np.add(self.pixel, offset)
+        return view3d_utils.region_2d_to_location_3d(self.region, self.view, pixel, location)
+
+    def pixel_of(self, location):
+        return screen.project(self.perspective, self.size, location)[0]
+
+    @property
+    def towards(self):
+        """The axis that points at the viewer."""
+        return self.view.view_rotation @ type(self.view.view_location)((0, 0, 1))
+
+
+def under(context, view):
+    """The Target under the cursor, or None. Handles come first, behind or before the mesh."""
+    found = pins.handles_in_view(context)
+    spots = screen.project(
+        view.perspective, view.size, [e.empty.matrix_world.translation for _, e in found] or np.empty((0, 3))
+    )
+    index = screen.nearest(spots, view.pixel, REACH * view.scale)
+    if index >= 0:
+        source, entry = found[index]
+        return Target("HANDLE", ObjectReference(source), ObjectReference(entry.empty))
+    active = pins.chosen(context)
+    for (source, entry), spot in zip(found, spots, strict=True):
+        away = np.linalg.norm(spot - view.pixel) - RING * view.scale
+        if entry.empty == active and not entry.anchor and abs(away) <= RING_REACH * view.scale:
+            return Target("RING", ObjectReference(source), ObjectReference(active))
+    return surface(context, view)
+
+
+def surface(context, view):
+    """The Target of the first surface along the line of sight; None where that is no mesh to pin."""
+    depsgraph = context.evaluated_depsgraph_get()
+    met, location, normal, face, item, matrix = context.scene.ray_cast(depsgraph, *view.ray())
+    if not met or not pins.is_mesh(item.original) or matrix != item.original.matrix_world:
+        return None
+    source, location = item.original, np.array(location)
+    if pins.refusal(source) is not None:
+        return Target("REFUSED", ObjectReference(source))
+    radius = context.scene.arapfields.pin_radius * screen.pixel_size(view.perspective, view.size, location)
+    mesh = source.evaluated_get(depsgraph).data
+    return Target(
+        "SURFACE",
+        ObjectReference(source),
+        location=location,
+        normal=np.array(normal),
+        radius=radius,
+        face=face,
+        face_count=len(mesh.polygons),
+        lit=lit(mesh, matrix_of(source), location, radius),
+    )
+
+
+def lit(mesh, world, location, radius):
+    """(k, 3, 3) the triangles of a mesh with a corner within the radius of the location, in world space."""
+    flat = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+    mesh.attributes["position"].data.foreach_get("vector", flat)
+    points = flat.reshape(-1, 3)
+    least = np.linalg.svd(world[:3, :3], compute_uv=False).min()  # local lengths are so much shorter
+    middle = transform(np.linalg.inv(world), location[None])[0]
+    kept = ((points - middle.astype(np.float32)) ** 2).sum(axis=1) <= (radius / least) ** 2
+    mesh.calc_loop_triangles()
+    corners = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
+    mesh.loop_triangles.foreach_get("vertices", corners)
+    corners = corners.reshape(-1, 3)
+    chosen = transform(world, points[corners[kept[corners].any(axis=1)]].reshape(-1, 3)).reshape(-1, 3, 3)
+    near = np.linalg.norm(chosen - location, axis=2).min(axis=1) <= radius
+    return chosen[near].astype(np.float32)

@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+import numpy as np
+
+from ..blender.object_references import owner_of, source_of
+from ..blender.redraw import redraw
+from ..core.errors import UserError
+from ..live import sessions
+from ..live.warm import warm
+from ..names import TOOL, Op
+from . import drag, pins
+from .hover import View, hover, under
+from .modal import Dragging, PinOperator
+
+
+class ARAPFIELDS_OT_pin_tool(PinOperator, bpy.types.Operator):
+    """Take the tool that pins the surface and drags it, in the toolbar"""
+
+    bl_idname = Op.PIN_TOOL
+    bl_label = "ARAP Pin Tool"
+
+    def execute(self, context):
+        if bpy.app.background:
+            return self.refuse(UserError("A window is needed"))
+        bpy.ops.wm.tool_set_by_id(name=TOOL, space_type="VIEW_3D")
+        return {"FINISHED"}
+
+
+class ARAPFIELDS_OT_pin_hover(PinOperator, bpy.types.Operator):
+    """Light up what lies under the cursor"""
+
+    bl_idname = Op.PIN_HOVER
+    bl_label = "ARAP Pin: Light Up"
+    bl_options = {"INTERNAL"}
+
+    def invoke(self, context, event):
+        if context.region_data is not None and hover.drag is None:
+            before, hover.target = hover.target, under(context, View(context, event))
+            if before is not None or hover.target is not None:
+                context.region.tag_redraw()
+            source = hover.target.source.find() if hover.target is not None else None
+            if source is not None and hover.target.kind == "SURFACE" and not sessions.is_live(source):
+                warm.prepare(context, source)
+        return {"PASS_THROUGH"}
+
+
+class ARAPFIELDS_OT_pin_drag(Dragging, bpy.types.Operator):
+    """Place a pin on the surface under the cursor, or take the one that is there, and drag it"""
+
+    bl_idname = Op.PIN_DRAG
+    bl_label = "ARAP Pin: Drag"
+
+    def invoke(self, context, event):
+        view = View(context, event)
+        target = under(context, view)
+        if target is None:
+            return {"PASS_THROUGH"}
+        try:
+            source = target.source.get()
+            if target.kind == "REFUSED":
+                raise pins.refusal(source)
+            if target.kind == "SURFACE":
+                where = {"face": target.face, "face_count": target.face_count}
+                dragged = drag.of_new_pin(context, source, target.location, target.radius, **where)
+                return self.start(context, view, dragged, "MOVE")
+            entry = pins.entry_of(target.empty.get())
+            if entry.anchor:
+                return {"FINISHED"} if pins.select(context, entry.empty) else {"CANCELLED"}
+            dragged = drag.of_entry(context, source, entry)
+            return self.start(context, view, dragged, "TURN" if target.kind == "RING" else "MOVE")
+        except (UserError, ValueError) as error:
+            return self.refuse(error)
+
+
+class ARAPFIELDS_OT_pin_anchor(PinOperator, bpy.types.Operator):
+    """Place an anchor on the surface under the cursor, or make the pin there an anchor or a pin again"""
+
+    bl_idname = Op.PIN_ANCHOR
+    bl_label = "ARAP Pin: Anchor"
+    bl_options = {"UNDO"}
+
+    def invoke(self, context, event):
+        target = under(context, View(context, event))
+        if target is None:
+            return {"PASS_THROUGH"}
+        try:
+            source = target.source.get()
+            if target.kind == "REFUSED":
+                raise pins.refusal(source)
+            if target.kind == "SURFACE":
+                where = {"face": target.face, "face_count": target.face_count, "anchor": True}
+                drag.of_new_pin(context, source, target.location, target.radius, **where).end(context)
+            else:
+                entry = pins.entry_of(target.empty.get())
+                pins.select(context, entry.empty)
+                entry.anchor = not entry.anchor
+                drag.of_entry(context, source, entry).end(context)
+        except (UserError, ValueError) as error:
+            return self.refuse(error)
+        redraw(context, "WINDOW", "UI")
+        return {"FINISHED"}
+
+
+class ARAPFIELDS_OT_pin_add(PinOperator, bpy.types.Operator):
+    """Place a pin on the object, at the place of its shown surface that is nearest to a location"""
+
+    bl_idname = Op.PIN_ADD
+    bl_label = "ARAP Pin: Add"
+    bl_options = {"REGISTER", "UNDO"}
+
+    location: bpy.props.FloatVectorProperty(
+        name="Location", description="Where the pin is placed, in the world", subtype="TRANSLATION"
+    )
+    radius: bpy.props.FloatProperty(
+        name="Radius",
+        description="Of the region that the pin holds, in the world",
+        subtype="DISTANCE",
+        default=0.1,
+        min=1e-6,
+    )
+    anchor: bpy.props.BoolProperty(name="Anchor", description="Place an anchor")
+
+    def invoke(self, context, event):
+        self.location = context.scene.cursor.location
+        return self.execute(context)
+
+    def execute(self, context):
+        source = source_of(context)
+        try:
+            if source is None:
+                raise UserError("Select a mesh object")
+            context.view_layer.update()
+            pins.place(context, source, np.array(self.location), self.radius, anchor=self.anchor)
+        except (UserError, ValueError) as error:
+            return self.refuse(error)
+        return {"FINISHED"}
+
+
+class ARAPFIELDS_OT_pin_delete(PinOperator, bpy.types.Operator):
+    """Delete the chosen pin or handle with its Empty, or the one under the cursor"""
+
+    bl_idname = Op.PIN_DELETE
+    bl_label = "ARAP Pin: Delete"
+    bl_options = {"UNDO"}
+
+    under: bpy.props.BoolProperty(
+        name="Under the Cursor", description="The one under the cursor", options={"SKIP_SAVE"}
+    )
+
+    def invoke(self, context, event):
+        if not self.under:
+            return self.execute(context)
+        target = under(context, View(context, event))
+        empty = target.empty.find() if target is not None and target.kind == "HANDLE" else None
+        return self.delete(context, empty)
+
+    def execute(self, context):
+        return self.delete(context, pins.chosen(context))
+
+    def delete(self, context, empty):
+        if empty is None:
+            return {"PASS_THROUGH"}
+        pins.remove(context, owner_of(empty), empty)
+        hover.clear()
+        redraw(context, "WINDOW", "UI")
+        return {"FINISHED"}
+
+
+class ARAPFIELDS_OT_pin_turn(PinOperator, bpy.types.Operator):
+    """Turn the chosen pin, by the mouse or about an axis as Blender's R does; the shape follows"""
+
+    bl_idname = Op.PIN_TURN
+    bl_label = "ARAP Pin: Turn"
+
+    def invoke(self, context, event):
+        empty = pins.chosen(context)
+        if empty is None:
+            return {"PASS_THROUGH"}
+        source = owner_of(empty)
+        try:
+            if not sessions.is_live(source, "DEFORM"):
+                sessions.begin(context, source, keeps=True)
+        except (UserError, ValueError) as error:
+            return self.refuse(error)
+        sessions.live[source.session_uid].keeps = True
+        return bpy.ops.transform.rotate("INVOKE_DEFAULT") and {"FINISHED"}
+
+
+CLASSES = [
+    ARAPFIELDS_OT_pin_tool,
+    ARAPFIELDS_OT_pin_hover,
+    ARAPFIELDS_OT_pin_drag,
+    ARAPFIELDS_OT_pin_anchor,
+    ARAPFIELDS_OT_pin_add,
+    ARAPFIELDS_OT_pin_delete,
+    ARAPFIELDS_OT_pin_turn,
+]

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pins: handles whose Empties stand on the surface, each of which holds a small round region of it."""
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ..blender import object_references
+from ..blender.object_references import owner_of, settings_of
+from ..core.errors import UserError
+from ..core.geometry.handles import box_matrix
+from ..field_modifier import motion
+from ..handles import empties, naming
+from ..live import sessions
+from ..results import placement
+from . import places
+
+MAJORITY = 0.5  # mean weight from which a vertex group gives a pin its name
+
+
+def refusal(item):
+    """Why an object cannot be pinned, as a UserError; None where it can."""
+    error = object_references.refusal(item)
+    if error is None and item.library is not None:
+        error = UserError(
+            "{name} is linked from another file; make it local to give it handles", name=item.name
+        )
+    if error is None and item.mode != "OBJECT":
+        error = UserError("{name} is not in Object Mode", name=item.name)
+    settings = settings_of(item) if error is None else None
+    if settings is not None and not placement.in_place(settings.output, settings.target):
+        error = UserError(
+            "pins move {name} itself; choose Original Mesh as its output, and no New Object as its result",
+            name=item.name,
+        )
+    return error
+
+
+def is_mesh(item):
+    """Whether it is a mesh of the user's own, no result of ours."""
+    return item is not None and item.type == "MESH" and owner_of(item) is None
+
+
+def handles_in_view(context):
+    """[(source, entry)] of all handles that are seen."""
+    found = []
+    for source in context.view_layer.objects:
+        if source.type == "MESH" and settings_of(source).handles:
+            found += [(source, entry) for entry in empties.used(source) if entry.empty.visible_get()]
+    return found
+
+
+def chosen(context):
+    """The Empty of the active handle, where it is selected too; or None."""
+    active = context.view_layer.objects.active
+    is_handle = active is not None and active.type == "EMPTY" and active.select_get()
+    return active if is_handle and entry_of(active) is not None else None
+
+
+def entry_of(empty):
+    """The Empty's handle, or None."""
+    source = owner_of(empty)
+    index = -1 if source is None else empties.find(source, empty)
+    return settings_of(source).handles[index] if index >= 0 else None
+
+
+def place(context, source, location, radius, face=None, face_count=None, anchor=False):
+    """A pin at a location on the shown surface, (3,) in world space; returns its handle.
+
+    Where the surface is deformed the pin is at rest where that place was, so that nothing moves.
+    """
+    error = refusal(source)
+    if error is not None:
+        raise error
+    settings = settings_of(source)
+    if not empties.used(source):
+        settings.hold_far = True
+    found = places.find(context, source, location, radius, face, face_count)
+    now, rest = np.eye(4), np.eye(4)
+    now[:3, :3], now[:3, 3], rest[:3, 3] = found.turn, found.now, found.rest
+    empty = empties.make_empty(context, source, Matrix(now.tolist()), radius, name(source, found.weights))
+    entry = empties.add(source, empty, "PIN")
+    entry.rest = (np.linalg.inv(empties.matrix_of(source)) @ box_matrix(rest, radius)).ravel()
+    entry.anchor = anchor
+    select(context, empty)
+    return entry
+
+
+def name(source, weights):
+    """The vertex group that holds most of the place, or a number that no object has."""
+    best = max(weights, key=weights.get, default=None)
+    if best is not None and weights[best] >= MAJORITY:
+        return naming.name_of_group(best)
+    return naming.numbered(source, "PIN")
+
+
+def select(context, empty):
+    """Makes this Empty the only one that is selected, its row the active one; whether it was not so yet."""
+    layer, source = context.view_layer, owner_of(empty)
+    index = empties.find(source, empty)
+    others = [item for item in context.selected_objects if item != empty]
+    is_new = layer.objects.active != empty or not empty.select_get() or bool(others)
+    for item in others:
+        item.select_set(False)
+    empty.select_set(True)
+    layer.objects.active = empty
+    if settings_of(source).active_handle != index:
+        settings_of(source).active_handle = index
+    return is_new
+
+
+def discard(source, empty):
+    empties.remove(source, empties.find(source, empty))
+    bpy.data.objects.remove(empty)
+
+
+def remove(context, source, empty):
+    """Deletes a handle with its Empty; with the last one the motion goes too."""
+    discard(source, empty)
+    left = empties.used(source)
+    if left:
+        select(context, left[-1].empty)
+        return
+    settings_of(source).hold_far = False
+    sessions.end(context, source)
+    motion.remove(source)
+    source.select_set(True)
+    context.view_layer.objects.active = source

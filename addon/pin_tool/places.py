@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From a place on the shown surface back to the rest shape: where it is there, and how it has turned since.
+
+The field's modifier only moves points, so that faces and their corners before and after it are the same.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from mathutils import Vector
+from mathutils.geometry import barycentric_transform, closest_point_on_tri
+
+from ..blender import mesh_arrays, modifier_stack
+from ..core.geometry.rotations import best_rotation
+from ..core.geometry.spaces import transform
+from ..handles.empties import matrix_of
+
+CANDIDATES = 64  # triangles that are looked at where the face is not known
+LEAST = 12  # points of which the turn of a place is told, at least
+
+
+@dataclass(frozen=True)
+class Place:
+    rest: np.ndarray  # (3,) in world space, of the shape before the field
+    now: np.ndarray  # (3,) where the field has it
+    turn: np.ndarray  # (3, 3) the rotation of the surface about it from rest
+    weights: dict  # mean weight of the points about it in each vertex group, by name
+
+
+def find(context, source, location, radius, face=None, face_count=None):
+    """The Place at a location on the shown surface, (3,) in world space.
+
+    `face` is that of the shown mesh, which has `face_count` of them: where the mesh before the field has as
+    many, the place is looked for in that face alone.
+    """
+    world = matrix_of(source)
+    with modifier_stack.moved_mesh(context, source) as mesh:
+        now = transform(world, mesh_arrays.positions(mesh))
+        mesh.calc_loop_triangles()
+        corners = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
+        mesh.loop_triangles.foreach_get("vertices", corners)
+        faces = np.empty(len(mesh.loop_triangles), dtype=np.int32)
+        mesh.loop_triangles.foreach_get("polygon_index", faces)
+        known = face is not None and face_count == len(mesh.polygons)
+        rest = now
+        if modifier_stack.find(source) is not None:
+            with modifier_stack.evaluated_mesh(context, source, in_place=True) as still:
+                rest = transform(world, mesh_arrays.positions(still))
+        triangles = corners.reshape(-1, 3)
+        chosen = triangles[faces == face] if known else near(now, triangles, location)
+        at_rest, there = map_back(now, rest, chosen, location)
+        about = around(rest, at_rest, radius)
+        weights = group_weights(source, mesh, about)
+    return Place(at_rest, there, best_rotation(rest[about], now[about]), weights)
+
+
+def near(points, triangles, location):
+    """The triangles whose middles are nearest to the location."""
+    away = ((points[triangles].mean(axis=1) - location) ** 2).sum(axis=1)
+    count = min(CANDIDATES, len(away))
+    return triangles[np.argpartition(away, count - 1)[:count]]
+
+
+def map_back(now, rest, triangles, location):
+    """((3,) the place at rest of the point of these triangles nearest to the location, (3,) that point)."""
+    best, where, found = np.inf, Vector(location), triangles[0]
+    for corners in triangles:
+        point = closest_point_on_tri(Vector(location), *(Vector(now[i]) for i in corners))
+        away = (point - Vector(location)).length
+        if away < best:
+            best, where, found = away, point, corners
+    ends = [Vector(now[i]) for i in found], [Vector(rest[i]) for i in found]
+    mapped = np.array(barycentric_transform(where, *ends[0], *ends[1]))
+    if not np.isfinite(mapped).all():  # the triangle has no area
+        closest = found[np.linalg.norm(now[found] - where, axis=1).argmin()]
+        mapped = rest[closest]
+    return mapped, np.array(where)
+
+
+def around(rest, place, radius):
+    """Indices of the points within the radius, and of some nearest ones where these are few."""
+    away = np.linalg.norm(rest - place, axis=1)
+    count = max(int((away <= radius).sum()), min(LEAST, len(rest)))
+    return np.argpartition(away, count - 1)[:count]
+
+
+def group_weights(source, mesh, indices):
+    """{name: mean weight of these points of the mesh in that vertex group}."""
+    names = {group.index: group.name for group in source.vertex_groups}
+    sums = dict.fromkeys(names.values(), 0.0)
+    for index in indices.tolist() if names else ():
+        for entry in mesh.vertices[index].groups:
+            if entry.group in names:
+                sums[names[entry.group]] += entry.weight / len(indices)
+    return sums

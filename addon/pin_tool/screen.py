@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Points on the screen: pixels from the left and the bottom of a region, by its perspective matrix."""
+
+import numpy as np
+
+
+def project(perspective, size, points):
+    """(n, 2) pixels of (n, 3) points in world space, NaN for those behind the eye.
+
+    `perspective` is the (4, 4) matrix of the view (world → clip space), `size` the region's width and height.
+    """
+    points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+    perspective = np.asarray(perspective, dtype=np.float64)
+    clip = points @ perspective[:, :3].T + perspective[:, 3]
+    depth = np.where(clip[:, 3:] > 0, clip[:, 3:], np.nan)
+    return (clip[:, :2] / depth + 1) / 2 * np.asarray(size, dtype=np.float64)
+
+
+def pixel_size(perspective, size, point):
+    """How long a pixel is in the world at a point (3,) there."""
+    perspective = np.asarray(perspective, dtype=np.float64)
+    depth = perspective[3, :3] @ np.asarray(point, dtype=np.float64) + perspective[3, 3]
+    return abs(depth) / (np.linalg.norm(perspective[0, :3]) * size[0] / 2)
+
+
+def nearest(places, pixel, reach):
+    """Index of the (n, 2) place nearest to a pixel, or -1 where none is within `reach` pixels."""
+    if not len(places):
+        return -1
+    away = np.linalg.norm(np.asarray(places) - pixel, axis=1)
+    away = np.where(np.isnan(away), np.inf, away)
+    best = int(away.argmin())
+    return best if away[best] <= reach else -1
+
+
+def turn_between(center, before, after):
+    """The angle (radians, counter-clockwise, -π to π) about a pixel from one pixel to another."""
+    a, b = np.subtract(before, center), np.subtract(after, center)
+    return float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b))

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The tool in the toolbar of Object Mode, and its key map, which the user can change."""
+
+from pathlib import Path
+
+import bpy
+
+from ..blender.host import has_window
+from ..names import TOOL, Op
+
+ICON = str(Path(__file__).resolve().parents[1] / "icons" / "pin")  # Blender adds .dat
+RADIUS = "scene.arapfields.pin_radius"
+
+
+class ARAPFIELDS_TOOL_pin(bpy.types.WorkSpaceTool):
+    bl_space_type = "VIEW_3D"
+    bl_context_mode = "OBJECT"
+    bl_idname = TOOL
+    bl_label = "ARAP Pin"
+    bl_description = (
+        "Pin the surface and drag it: the shape follows, as rigid as it can be. "
+        "Shift-click: anchor. Ctrl-click or X: delete. R or the ring: turn. F: radius"
+    )
+    bl_icon = ICON
+    bl_cursor = "CROSSHAIR"
+    bl_keymap = (
+        (Op.PIN_HOVER, {"type": "MOUSEMOVE", "value": "ANY", "any": True}, None),
+        (Op.PIN_DRAG, {"type": "LEFTMOUSE", "value": "PRESS"}, None),
+        (Op.PIN_ANCHOR, {"type": "LEFTMOUSE", "value": "PRESS", "shift": True}, None),
+        (
+            Op.PIN_DELETE,
+            {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True},
+            {"properties": [("under", True)]},
+        ),
+        (Op.PIN_DELETE, {"type": "X", "value": "PRESS"}, None),
+        (Op.PIN_DELETE, {"type": "DEL", "value": "PRESS"}, None),
+        (Op.PIN_TURN, {"type": "R", "value": "PRESS"}, None),
+        (
+            "wm.radial_control",
+            {"type": "F", "value": "PRESS"},
+            {"properties": [("data_path_primary", RADIUS)]},
+        ),
+    )
+
+    def draw_settings(context, layout, tool):
+        layout.prop(context.scene.arapfields, "pin_radius")
+
+
+def register():
+    if has_window():
+        bpy.utils.register_tool(ARAPFIELDS_TOOL_pin, after={"builtin.measure"}, separator=True)
+
+
+def unregister():
+    if hasattr(ARAPFIELDS_TOOL_pin, "_bl_tool"):
+        bpy.utils.unregister_tool(ARAPFIELDS_TOOL_pin)

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Undo and redo of pins: what a step holds comes back bit for bit, and no solver answers to it."""
+
+from inside import in_blender
+
+ROUNDS = 20
+
+
+@in_blender
+def test_rounds_of_undo_and_redo_are_exact():
+    import bpy
+    import scenes
+    from test_pins import WAIT, pin, state
+    from test_pins_undo import ROUNDS
+
+    from addon.live import sessions
+
+    scenes.bar()
+    bpy.context.preferences.edit.use_global_undo = True
+    states = []
+    targets = (None, (1.0, 0.0, 0.6), (-1.0, 0.1, 0.5), (0.0, 0.0, -0.4))
+    for number, target in enumerate(targets):
+        if target is not None:
+            bar = bpy.data.objects["Bar"]
+            start = scenes.world_points(bar)[(0, 3, 40)[number - 1]]
+            pin(bar, start, 0.1, target=target)
+            sessions.update(bpy.context, wait=WAIT, refined=True)
+        bpy.ops.ed.undo_push(message=f"step {number}")
+        states.append(state(bpy.data.objects["Bar"]))
+    assert len({str(one) for one in states}) == len(states)
+
+    def settled():
+        bpy.context.view_layer.update()
+        sessions.update(bpy.context, wait=WAIT, refined=True)
+        return state(bpy.data.objects["Bar"])
+
+    def same(found, kept):
+        """All but whether the object is live: that ends where a step knows of none."""
+        return found[:2] == kept[:2] and found[3:] == kept[3:]
+
+    for _ in range(ROUNDS):
+        for step in (2, 1, 0):
+            bpy.ops.ed.undo()
+            assert same(settled(), states[step]), step
+        for step in (1, 2, 3):
+            bpy.ops.ed.redo()
+            assert same(settled(), states[step]), step
+
+
+@in_blender
+def test_a_drag_after_an_undone_one_starts_from_what_is_shown():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_pins import WAIT, follow, pin
+
+    from addon.live import sessions
+    from addon.pin_tool import drag
+
+    scenes.bar()
+    bpy.context.preferences.edit.use_global_undo = True
+    pin(bpy.data.objects["Bar"], (1.0, 0.0, 0.25), target=(1.0, 0.0, 0.5))
+    bpy.ops.ed.undo_push(message="first")
+    bar = bpy.data.objects["Bar"]
+    shown = scenes.world_points(bar)
+    dragged = drag.of_entry(bpy.context, bar, bar.arapfields.handles[0])
+    dragged.move(bpy.context, (1.0, 0.4, 0.9))
+    follow()
+    dragged.end(bpy.context)
+    bpy.ops.ed.undo_push(message="second")
+    bpy.ops.ed.undo()
+    sessions.update(bpy.context, wait=WAIT)
+    bar = bpy.data.objects["Bar"]
+    assert np.array_equal(scenes.world_points(bar), shown)
+    dragged = drag.of_entry(bpy.context, bar, bar.arapfields.handles[0])
+    dragged.move(bpy.context, (1.0, 0.0, 0.5 + 1e-3))
+    follow()
+    assert 0 < np.abs(scenes.world_points(bar) - shown).max() < 0.02
