@@ -14,11 +14,13 @@ SETTINGS = {  # class of properties → page
     "ARAPFIELDS_PG_deform": "deform",
     "ARAPFIELDS_PG_stylize": "stylize",
     "ARAPFIELDS_PG_handle": "handles",
+    "ARAPFIELDS_PG_scene": "pins",
     "ARAPFIELDS_PG_object": "results",
 }
 LABELS = {
     "surface": "Implicit Surface",
     "handles": "Handles",
+    "pins": "Pins",
     "deform": "Deform",
     "stylize": "Stylize",
     "results": "Result",

@@ -4,6 +4,7 @@
 import numpy as np
 
 from ..blender import timers
+from ..blender.guide import Guided
 from ..blender.language import translated
 from ..blender.redraw import redraw
 from ..core.errors import UserError
@@ -16,8 +17,10 @@ TICK = 0.05  # seconds between looks at a shape that comes to rest
 NAVIGATION = ("MIDDLEMOUSE", "WHEEL", "TRACKPAD", "NDOF", "NUMPAD")  # types of events that turn the view
 
 
-class PinOperator:
+class PinOperator(Guided):
     """Mixin: works in a 3D view in Object Mode."""
+
+    guide = "pins"
 
     @classmethod
     def poll(cls, context):

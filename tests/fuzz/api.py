@@ -233,11 +233,10 @@ def unbound(rng):
     native = [v for v in vars(af._native).values() if isinstance(v, type)]
     chosen = rng.choice([v for v in native if not issubclass(v, BaseException)])
     called = ("__call__", "__len__", "__repr__", "__eq__")
-    # A report that is not there is an AttributeError, as of any attribute, and no other call raises that.
-    names = [n for n in dir(chosen) if n != "report" and (not n.startswith("__") or n in called)]
+    names = [n for n in dir(chosen) if not n.startswith("__") or n in called]
+    names = [n for n in names if n != "report"]  # an AttributeError, as of any attribute, where there is none
     member = getattr(chosen, names[rng.integers(len(names))])
-    call = member.fget if isinstance(member, property) else member
-    return call, [chosen.__new__(chosen), *[ROWS] * int(rng.integers(2))]
+    return getattr(member, "fget", member), [chosen.__new__(chosen), *[ROWS] * int(rng.integers(2))]
 
 
 def case(rng, things):
