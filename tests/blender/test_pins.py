@@ -217,3 +217,18 @@ def test_a_solver_set_up_beforehand_gives_the_same_shape():
         bpy.data.objects.remove(bar)
     assert np.abs(shapes[1] - shapes[0]).max() < 1e-3
     assert 0 < np.abs(shapes[2] - shapes[0]).max() < 0.05
+
+
+@in_blender
+def test_a_drag_keys_the_pin_where_automatic_keys_are_on():
+    import bpy
+    import scenes
+    from test_pins import pin
+
+    bar = scenes.bar()
+    assert pin(bar, (-1.0, 0.0, 0.25), 0.1, target=(-1.0, 0.0, 0.4)).animation_data is None
+    bpy.context.scene.tool_settings.use_keyframe_insert_auto = True
+    keyed = pin(bar, (1.0, 0.0, 0.25), 0.1, target=(1.0, 0.0, 0.6))
+    assert keyed.animation_data.action is not None
+    bpy.context.scene.frame_set(20)
+    assert abs(keyed.location.z - 0.6) < 1e-6
