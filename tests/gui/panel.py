@@ -42,96 +42,52 @@ def rows():
     return (*EVERYDAY, *said, "advanced")
 
 
-class Drawn:
-    """What is open, told by Blender's own drawing: a closed section is not asked for its content."""
-
-    names, redraws = set(), 0
-
-    @classmethod
-    def watch(cls):
-        from addon.blender.section import Section
-
-        def draw(section, context, original=Section.draw):
-            cls.names.add(section.bl_idname.removeprefix("ARAPFIELDS_PT_").replace("_", "-"))
-            original(section, context)
-
-        def note():
-            cls.redraws += 1
-
-        if not cls.redraws:
-            Section.draw = draw
-            bpy.types.SpaceView3D.draw_handler_add(note, (), "UI", "POST_PIXEL")
-
-    @classmethod
-    def look(cls):
-        """Has the sidebar drawn; `names` are then those that are open."""
-        for _ in range(2):  # what was being drawn may be older
-            before = cls.redraws
-            cls.names.clear()
-            for region in stage.view()[1].regions:
-                region.tag_redraw()
-            for _ in range(100):
-                yield 0.1
-                if cls.redraws > before:
-                    break
-
-
 def sections(folder, name):
-    Drawn.watch()
     yield from open_alone(set())
     yield from picture(folder, f"{name}-closed")
     for row, section in enumerate(rows()):
-        yield from press(section, row)
+        yield from press(row)
         yield from picture(folder, f"{name}-{section}")
         if section == "stylize":
             stage.tool("mousemove", STYLES[0], round(STYLES[1] + STEP * row), "click", 1)
-            yield 2.0
+            yield 1.0
             stage.picture(folder, f"{name}-styles")
             stage.tool("key", "Escape")
-            yield 1.0
+            yield 0.5
         elif section == "advanced":
             yield from within(folder, name, row)
-        yield from press(section, row)
+        yield from press(row)
 
 
 def picture(folder, name):
+    """Of the sidebar, with the mouse where it lights nothing up."""
     stage.tool("mousemove", 500, 940)
-    yield 1.5
+    yield 0.7
     stage.picture(folder, name, SIDEBAR)
 
 
 def within(folder, name, row):
     """The sections in Advanced, which is open at that row, one by one."""
     for number, section in enumerate(WITHIN):
-        yield from press(section, row + 1, number)
+        yield from press(row + 1, number)
         yield from picture(folder, f"{name}-{section}")
-        yield from press(section, row + 1, number)
+        yield from press(row + 1, number)
 
 
 def open_alone(names):
     """Opens these sections and closes all others: with Ctrl a click closes all but one."""
-    Drawn.watch()
     for words in (("mousemove", *HEADER), ("keydown", "ctrl"), ("click", 1), ("keyup", "ctrl")):
         stage.tool(*words)
         yield 0.7
-    yield from Drawn.look()
-    if "source" in Drawn.names:
-        yield from press("source", 0)
+    yield from press(0)
     for row, section in reversed(list(enumerate(rows()))):
         if section in names:
-            yield from press(section, row)
+            yield from press(row)
 
 
-def press(section, row, inner=0):
-    """Opens a section that is closed, closes one that is open."""
-    yield from Drawn.look()
-    was_open = section in Drawn.names
-    for _ in range(3):
-        stage.tool("mousemove", HEADER[0], round(HEADER[1] + STEP * row + INNER * inner), "click", 1)
-        yield 1.0
-        yield from Drawn.look()
-        if (section in Drawn.names) != was_open:
-            return
+def press(row, inner=0):
+    stage.tool("mousemove", HEADER[0], round(HEADER[1] + STEP * row + INNER * inner), "click", 1)
+    yield 1.0
 
 
 def preferences(folder, name):
