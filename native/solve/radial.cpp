@@ -14,8 +14,8 @@ namespace {
 
 /// Steps between two looks at the clock.
 constexpr int steps_at_once = 10;
-/// From so many centers on, few centers make a first result, in so many steps at most.
-constexpr int worth_a_first = 600, first_steps = 12;
+/// From so many centers on, half of them, or so many, make a first result, in so many steps at most.
+constexpr int worth_a_first = 600, most_first = 500, first_steps = 12;
 /// Samples a center that carry it, and that the energy sees: more centers than samples can tell apart would
 /// fit them and fold between them.
 constexpr int carrying_samples = 8, deform_samples = 8, style_samples = 6;
@@ -104,6 +104,7 @@ Solution deform_radial(const SurfaceSamples& samples, const std::vector<Handle>&
   std::shared_ptr<RadialField> first;
   if (fine.fine_centers >= worth_a_first) {
     LiveOptions few = live_options(options);
+    set_centers(few, std::min(most_first, fine.fine_centers / 2), deform_samples, samples);
     few.handle_weight = fine.handle_weight;
     few.tolerance = LiveOptions().tolerance;
     LiveSolver solver(samples, handles, few, progress.part(0.0, 0.1), shape);

@@ -9,6 +9,8 @@ from tolerances import LIVE_DRIFT, LIVE_IDENTITY, TRACKED
 
 import arapfields as af
 
+# Of the energy: what single precision loses until a solver measures its jets anew, every sixteenth solve.
+MEASURED_ANEW = 1e-5
 QUICK = {"samples": 800, "coarse_centers": 30, "fine_centers": 120}
 
 
@@ -66,7 +68,7 @@ def test_steps_never_raise_what_is_minimised(samples):
     for _ in range(40):
         live.solve(targets, iterations=1, tolerance=1e-9)
         values.append(live.report.value)
-    assert (np.diff(values) <= 1e-12).all()
+    assert (np.diff(values) <= MEASURED_ANEW * np.array(values[:-1])).all()
     assert values[-1] < 0.5 * values[0]
 
 
