@@ -70,9 +70,11 @@ void bind_core(py::module_& module) {
             self.watch(as_points(points, "points"), seconds);
           },
           "points"_a, "seconds"_a = 0.4,
-          "Before a call of deform or stylize: it shall say about every `seconds` where its field takes "
-          "these\n"
-          "points (n, 3), given a third of its time at most. The result of the call stays the same.")
+          "Before a call of deform or stylize: it shall say where its field takes these points (n, 3), at "
+          "once\n"
+          "when there is a first result and then about every `seconds`, given a third of its time at most. "
+          "The\n"
+          "result of the call stays the same.")
       .def_property_readonly("looks", &Task::looks, "How often the watched points were looked at.")
       .def_property_readonly("watched", &Task::watched,
                              "Where the watched points were then, (n, 3) single precision; empty at first.");

@@ -48,6 +48,23 @@ void gemm(Transpose transpose_a, Transpose transpose_b, Scalar alpha,
   });
 }
 
+template <class Scalar>
+void lower_gram(Transpose transpose_a, const Eigen::Ref<const RowMatrix<Scalar>>& a, Scalar beta,
+                Eigen::Ref<RowMatrix<Scalar>> c) {
+  const ThreadScope scope;
+  at::Tensor ta = tensor_view(a);
+  if (transpose_a == Transpose::yes) ta = ta.t();
+  const at::Tensor tc = tensor_view(c);
+  const Tiles tiles(c.rows());
+  parallel_jobs(tiles.count() * tiles.count(), [&](Index job) {
+    const at::AutoDispatchBelowADInplaceOrView quick;
+    const Index i = job / tiles.count(), j = job % tiles.count();
+    if (j > i) return;
+    at::Tensor tile = tiles.of(tiles.of(tc, 0, i), 1, j);
+    at::addmm_out(tile, tile, tiles.of(ta, 0, i), tiles.of(ta, 0, j).t(), beta, 1);
+  });
+}
+
 /// By blocks of columns, left to right: a block's own factor, what is below it, then its products off the
 /// rest.
 template <class Scalar>
@@ -119,6 +136,8 @@ RowMatrix<Scalar> cholesky_solve(const Eigen::Ref<const RowMatrix<Scalar>>& fact
   template void gemm<Scalar>(Transpose, Transpose, Scalar, const Eigen::Ref<const RowMatrix<Scalar>>&, \
                              const Eigen::Ref<const RowMatrix<Scalar>>&, Scalar,                       \
                              Eigen::Ref<RowMatrix<Scalar>>);                                           \
+  template void lower_gram<Scalar>(Transpose, const Eigen::Ref<const RowMatrix<Scalar>>&, Scalar,      \
+                                   Eigen::Ref<RowMatrix<Scalar>>);                                     \
   template RowMatrix<Scalar> cholesky<Scalar>(const Eigen::Ref<const RowMatrix<Scalar>>&);             \
   template RowMatrix<Scalar> lower_inverse<Scalar>(const Eigen::Ref<const RowMatrix<Scalar>>&);        \
   template RowMatrix<Scalar> cholesky_solve<Scalar>(const Eigen::Ref<const RowMatrix<Scalar>>&,        \

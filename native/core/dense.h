@@ -15,6 +15,11 @@ void gemm(Transpose transpose_a, Transpose transpose_b, Scalar alpha,
           const Eigen::Ref<const RowMatrix<Scalar>>& a, const Eigen::Ref<const RowMatrix<Scalar>>& b,
           Scalar beta, Eigen::Ref<RowMatrix<Scalar>> c);
 
+/// The lower triangle of C = op(A) op(A)ᵀ + beta C; what is above it is left undefined.
+template <class Scalar>
+void lower_gram(Transpose transpose_a, const Eigen::Ref<const RowMatrix<Scalar>>& a, Scalar beta,
+                Eigen::Ref<RowMatrix<Scalar>> c);
+
 /// Lower Cholesky factor of a symmetric positive definite matrix; throws InvalidInput where it is not.
 template <class Scalar>
 RowMatrix<Scalar> cholesky(const Eigen::Ref<const RowMatrix<Scalar>>& a);

@@ -35,7 +35,7 @@ void Task::watch(PointsIn points, double pause) {
   require(pause >= 0.0, "seconds", std::to_string(pause), "must not be negative");
   watch_ = points;
   pause_ = pause;
-  next_look_ = Clock::now() + seconds(pause_);
+  next_look_ = Clock::now();
 }
 
 Index Task::looks() const {

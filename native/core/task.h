@@ -21,8 +21,8 @@ class ARAPFIELDS_EXPORT Task {
   std::string message() const;
   void report(double fraction, const std::string& message);
 
-  /// Asks the running call to say, about every `seconds`, where its present field takes these points. Called
-  /// before the call begins. Looks take a third of the call's time at most.
+  /// Asks the running call to say where its present field takes these points, as soon as it has one and then
+  /// about every `seconds`. Called before the call begins. Looks take a third of the call's time at most.
   void watch(PointsIn points, double seconds);
   /// How often that was done, and where the points (n,3) were at the last time; (0, 3) at first.
   Index looks() const;

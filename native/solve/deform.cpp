@@ -55,14 +55,12 @@ ObjectiveTerms terms_of(const SurfaceSamples& samples, const std::vector<Handle>
 /// for the blend to bend is a hundredth of what soft handles leave. The blend is a neural field's; its
 /// network is zero.
 Solution exact_radial(const SurfaceSamples& samples, const std::vector<Handle>& handles,
-                      DeformOptions options, const Progress& progress, const SolveHooks& hooks) {
-  constexpr double closer = 100.0, heaviest = 1e9;
+                      const DeformOptions& options, const Progress& progress, const SolveHooks& hooks) {
   const ObjectiveTerms terms = terms_of(samples, handles, options);
   std::vector<std::string> notes;
   const auto blend = exact_blend(terms.handles, options.margin, notes);
-  options.exact_handles = false;
-  options.handles.handle_weight = std::min(closer * options.handles.handle_weight, heaviest);
-  const Solution soft = deform_radial(samples, handles, options, progress.part(0.0, 0.95), hooks);
+  const Solution soft =
+      deform_radial(samples, handles, followed_closely(options), progress.part(0.0, 0.95), hooks);
   MlpShape shape{options.network, 3};
   shape.width = shape.layers = shape.octaves = 1;
   auto field = std::make_shared<NeuralField>(shape, 0);

@@ -6,8 +6,9 @@
 namespace arapfields {
 
 LiveSolver::LiveSolver(const SurfaceSamples& samples, const std::vector<Handle>& handles,
-                       const LiveOptions& options, const Progress& progress)
-    : state_(std::make_unique<State>(samples, handles, options, progress)) {}
+                       const LiveOptions& options, const Progress& progress,
+                       std::shared_ptr<const RestShape> shape)
+    : state_(std::make_unique<State>(samples, handles, options, progress, std::move(shape))) {}
 
 LiveSolver::~LiveSolver() = default;
 LiveSolver::LiveSolver(LiveSolver&&) noexcept = default;

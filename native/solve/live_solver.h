@@ -13,13 +13,16 @@
 
 namespace arapfields {
 
+struct RestShape;
+
 /// Deforms a surface at interactive rates: the energy of deform (and stylize) over a radial field, solved
 /// from where the last solve ended. Serves one caller at a time.
 class ARAPFIELDS_EXPORT LiveSolver {
  public:
-  /// Handles in mesh coordinates; none are needed where a style follows. Throws InvalidInput as deform does.
+  /// Handles in mesh coordinates; none are needed where a style follows. `shape` (solve/rest_shape.h) is that
+  /// of the samples where several solvers share it. Throws InvalidInput as deform does.
   LiveSolver(const SurfaceSamples& samples, const std::vector<Handle>& handles, const LiveOptions& options,
-             const Progress& progress = {});
+             const Progress& progress = {}, std::shared_ptr<const RestShape> shape = nullptr);
   ~LiveSolver();
   LiveSolver(LiveSolver&&) noexcept;
   LiveSolver& operator=(LiveSolver&&) noexcept;

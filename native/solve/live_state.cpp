@@ -7,21 +7,16 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "sampling/canonical_order.h"
-#include "sampling/local_thickness.h"
 #include "solve/live_setup.h"
 #include "solve/live_stiffness.h"
 #include "solve/notes.h"
+#include "solve/rest_shape.h"
 #include "solve/setup.h"
 #include "solve/surface_stiffness.h"
 
 namespace arapfields {
 namespace {
 
-/// Samples that the centers' centers are chosen from.
-constexpr Index center_candidates = 6000;
-/// Centers stand as densely as the root of the thickness asks, down to this share of its median.
-constexpr double least_size = 0.1;
 /// Weight, against the surface's energy, with which a style without handles holds the lowest sample in place.
 constexpr double anchor_weight = 1.0;
 
@@ -41,33 +36,25 @@ constexpr double worthwhile_gain = 0.1;
 }  // namespace
 
 LiveSolver::State::State(const SurfaceSamples& samples, const std::vector<Handle>& handles,
-                         const LiveOptions& options, const Progress& progress)
+                         const LiveOptions& options, const Progress& progress,
+                         std::shared_ptr<const RestShape> shape)
     : options_(options), frame_(samples.frame), surface_(samples.points), surface_normals_(samples.normals) {
   options.validate();
-  require_samples(samples);
   const Stopwatch watch;
   const ThreadScope threads(options.threads);
-  Random random(static_cast<std::uint64_t>(options.seed));
-  const std::vector<std::uint32_t> order = canonical_order(surface_);
-  const LocalThickness thickness(surface_, surface_normals_, order);
-  chosen_ = stratified(order, options.samples, random);
-  const std::vector<Index> candidates = stratified(order, center_candidates, random);
+  const auto seed = static_cast<std::uint64_t>(options.seed);
+  if (!shape) shape = std::make_shared<const RestShape>(samples, options.interior, seed);
+  Random random(seed);
+  chosen_ = stratified(shape->order, options.samples, random);
   std::vector<RadialScale> scales;
   if (options.coarse_centers > 0) scales.push_back({options.coarse_centers, options.coarse_radius_factor});
   scales.push_back({options.fine_centers, options.fine_radius_factor, true});
-  const Points spread = rows_of(surface_, candidates);
-  const Vector thick = thickness.at(spread);
-  const bool oriented = surface_normals_.rows() == surface_.rows();
-  const Points spread_normals = oriented ? rows_of(surface_normals_, candidates) : Points();
-  RadialLayout layout{.sizes = (thick / thickness.median()).cwiseMax(least_size).cwiseSqrt(), .inner = {}};
-  if (oriented) layout.inner = spread - thick.asDiagonal() * spread_normals;
-  basis_ = radial_basis(spread, scales, layout);
-  if (options.interior && oriented) basis_.set_embedding(interior_embedding(spread, spread_normals));
+  basis_ = radial_basis(shape->sites, scales, shape->layout);
+  if (options.interior) basis_.set_embedding(shape->embedding);
   coefficients_ = basis_.identity();
   progress.report(0.2, "centers placed");
-  bending_ = SurfaceStiffness(samples, options.surface, order).bending(rows_of(surface_, chosen_));
-  stiffness_ = stiffness_matrix(basis_, rows_of(surface_, chosen_), bending_);
-  progress.report(0.8, "stiffness");
+  bending_ = SurfaceStiffness(shape->thickness, options.surface).bending(rows_of(surface_, chosen_));
+  stiffness_ = stiffness_matrix(basis_, rows_of(surface_, chosen_), bending_, progress.part(0.2, 0.8));
   prepare(fast_);
   set_handles(handles);
   report_.setup_seconds = watch.seconds();
@@ -278,9 +265,11 @@ void LiveSolver::State::reset() {
   report_.setup_seconds = setup;
 }
 
-/// The projection in the surrogate's norm; its factor is that of fewer samples, so it takes some rounds.
+/// The projection in the surrogate's norm, by conjugate gradients, since the preconditioner knows a part of
+/// the samples. What single precision leaves of far coefficients grows with each round: the round of least
+/// energy is the start.
 void LiveSolver::State::adopt(const DeformationField& field) {
-  constexpr int rounds = 3;
+  constexpr int rounds = 8;
   const ThreadScope threads(options_.threads);
   const LiveObjective<float>& objective = *fast_.objective;
   const Points places = rows_of(surface_, chosen_);
@@ -293,10 +282,27 @@ void LiveSolver::State::adopt(const DeformationField& field) {
       Eigen::Map<const Vector>(jets.view().data, 30 * places.rows()).cast<float>();
   wanted.segment(30 * places.rows(), 3 * ends.rows()) =
       Eigen::Map<const Vector>(ends.data(), 3 * ends.rows()).cast<float>();
-  VectorF u;
-  for (int round = 0; round < rounds; ++round) {
-    objective.measure(coefficients_, u);
-    coefficients_ += objective.precondition(objective.pull_back(objective.weighted(wanted - u)));
+  const auto dot = [](const auto& a, const auto& b) { return a.cwiseProduct(b).sum(); };
+  VectorF u, du;
+  objective.measure(coefficients_, u);
+  double value = objective.value(u, nullptr);
+  RowMatrix<double> residual = objective.pull_back(objective.weighted(wanted - u));
+  RowMatrix<double> image = objective.precondition(residual), direction = image;
+  double square = dot(residual, image);
+  for (int round = 0; round < rounds && square > 0.0; ++round) {
+    objective.measure(direction, du);
+    const RowMatrix<double> product = objective.pull_back(objective.weighted(du));
+    const double step = square / dot(direction, product);
+    u += static_cast<float>(step) * du;
+    const double next_value = objective.value(u, nullptr);
+    if (!(next_value < value)) break;
+    value = next_value;
+    coefficients_ += step * direction;
+    residual -= step * product;
+    image = objective.precondition(residual);
+    const double next = dot(residual, image);
+    direction = image + next / square * direction;
+    square = next;
   }
   fast_.u.resize(0);
   exact_.u.resize(0);

@@ -13,7 +13,7 @@ namespace arapfields {
 class LiveSolver::State {
  public:
   State(const SurfaceSamples& samples, const std::vector<Handle>& handles, const LiveOptions& options,
-        const Progress& progress);
+        const Progress& progress, std::shared_ptr<const RestShape> shape);
   void set_handles(const std::vector<Handle>& handles);
   void set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights,
                  const Vec3& up);

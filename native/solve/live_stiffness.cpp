@@ -2,7 +2,11 @@
 #include "solve/live_stiffness.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
+#include <numbers>
+#include <utility>
 #include <vector>
 
 #include "core/dense.h"
@@ -14,43 +18,120 @@ namespace {
 
 /// Centers overlap so much that the matrix is singular to rounding.
 constexpr double ridge = 1e-9;
-/// Samples a center, and at least: a sample has nine derivatives.
-constexpr double samples_a_center = 1.5;
-constexpr Index least_samples = 1000;
+/// Samples a center, and at least. A sample has nine derivatives, of which three mixtures are looked at: more
+/// places for the same products, so that no function hides between them.
+constexpr Index samples_a_center = 4, least_samples = 1000;
+constexpr int derivatives = 9, mixtures = 3;
 /// Samples that a stance is held at.
 constexpr Index stance_samples = 1000;
-/// Parts that are summed on their own: the result does not depend on the number of threads.
-constexpr Index parts = 4;
+/// Parts that are summed on their own: the result does not depend on the number of threads. Between two looks
+/// at the task, a slice of each.
+constexpr Index parts = 4, slices = 8;
+/// Points whose products are taken together: neighbours, which feel much the same centers.
+constexpr Index block_size = 16, blocks_at_once = 3;
 
-/// Adds the products of the block's functions' derivatives, weighted, at its points: rows and columns of
-/// `sum` are the centers, then the three linear functions.
-void add_block(const RadialBlock<double>& block, const double* roots, Index points, RowMatrix<double>& sum,
-               std::vector<double>& jets, RowMatrix<double>& rows, RowMatrix<double>& products) {
-  const Index active = block.active_count, size = active + 3, centers = sum.rows() - 4;
-  jets.resize(static_cast<std::size_t>(active * 10 * 16));
-  ARAPFIELDS_DISPATCH(radial_rows(block, 10, jets.data()));
-  rows.setZero(9 * points, size);
-  for (Index a = 0; a < active; ++a)
-    for (int c = 1; c < 10; ++c) {
-      const double shared = c < 7 ? 1.0 : std::sqrt(2.0);  // mixed derivatives stand for two
-      for (Index p = 0; p < points; ++p)
-        rows((c - 1) * points + p, a) =
-            jets[static_cast<std::size_t>((a * 10 + c) * 16 + p)] * (c < 4 ? 1.0 : shared * roots[p]);
+/// An orthogonal matrix (cosines) times √3: three of its rows stand for all nine in the mean.
+RowMatrix<double> mixing_matrix() {
+  RowMatrix<double> result(derivatives, derivatives);
+  for (int i = 0; i < derivatives; ++i)
+    for (int c = 0; c < derivatives; ++c)
+      result(i, c) = std::sqrt(i == 0 ? 1.0 : 2.0) / std::sqrt(static_cast<double>(mixtures)) *
+                     std::cos(std::numbers::pi * (2 * c + 1) * i / (2.0 * derivatives));
+  return result;
+}
+
+/// The products of the basis functions' derivatives, weighted, summed over points.
+class Products {
+ public:
+  Products(const RadialEvaluator<double>& sites, Vector roots)
+      : sites_(sites), roots_(std::move(roots)), mixing_(mixing_matrix()) {}
+
+  /// Of the points of blocks first to last−1. Of `sum`, whose rows and columns are the centers, the constant
+  /// and three linear functions, the lower triangle counts.
+  void add(Index first, Index last, RowMatrix<double>& sum);
+
+ private:
+  void feel(Index first, Index last);
+  void add_rows(Index b, Index column);
+  void mix(Index b);
+
+  const RadialEvaluator<double>& sites_;
+  Vector roots_;  // √λ of the points
+  RowMatrix<double> mixing_;
+  std::vector<std::int32_t> active_, both_;  // centers that the points feel, ascending
+  std::vector<double> jets_;
+  std::array<double, mixtures * derivatives * block_size> mix_{};  // (mixture, derivative, point)
+  RowMatrix<double> rows_, products_;
+};
+
+void Products::feel(Index first, Index last) {
+  active_.clear();
+  for (Index b = first; b < last; ++b) {
+    const RadialBlock<double> block = sites_.block(b);
+    both_.clear();
+    std::set_union(active_.begin(), active_.end(), block.active, block.active + block.active_count,
+                   std::back_inserter(both_));
+    active_.swap(both_);
+  }
+}
+
+/// What each derivative at each point of a block counts in each mixture; neighbours have different mixtures.
+void Products::mix(Index b) {
+  const Index points = std::min(block_size, sites_.size() - block_size * b);
+  mix_.fill(0.0);
+  for (int m = 0; m < mixtures; ++m)
+    for (int c = 0; c < derivatives; ++c)
+      for (Index p = 0; p < points; ++p) {
+        const double shared = c < 6 ? 1.0 : std::numbers::sqrt2;  // mixed derivatives stand for two
+        mix_[static_cast<std::size_t>((m * derivatives + c) * block_size + p)] =
+            mixing_(mixtures * (p % 3) + m, c) * (c < 3 ? 1.0 : shared * roots_[block_size * b + p]);
+      }
+}
+
+void Products::add_rows(Index b, Index column) {
+  const RadialBlock<double> block = sites_.block(b);
+  jets_.resize(static_cast<std::size_t>(block.active_count * (derivatives + 1) * block_size));
+  ARAPFIELDS_DISPATCH(radial_rows(block, derivatives + 1, jets_.data()));
+  mix(b);
+  auto place = active_.begin();
+  for (Index a = 0; a < block.active_count; ++a) {
+    place = std::find(place, active_.end(), block.active[a]);
+    const double* jets = &jets_[static_cast<std::size_t>((a * (derivatives + 1) + 1) * block_size)];
+    const double* factors = mix_.data();
+    for (int m = 0; m < mixtures; ++m) {
+      double* to = &rows_(place - active_.begin(), column + m * block_size);
+      for (int c = 0; c < derivatives; ++c, factors += block_size)
+        for (Index p = 0; p < block_size; ++p) to[p] += factors[p] * jets[c * block_size + p];
     }
-  for (int k = 0; k < 3; ++k) rows.block(k * points, active + k, points, 1).setOnes();
-  products.resize(size, size);
-  gemm<double>(Transpose::yes, Transpose::no, 1.0, rows, rows, 0.0, products);
-  const auto place = [&](Index i) { return i < active ? Index{block.active[i]} : centers + 1 + i - active; };
+  }
+  for (int k = 0; k < 3; ++k)
+    for (int m = 0; m < mixtures; ++m)
+      for (Index p = 0; p < block_size; ++p)
+        rows_(rows_.rows() - 3 + k, column + m * block_size + p) =
+            mix_[static_cast<std::size_t>((m * derivatives + k) * block_size + p)];
+}
+
+void Products::add(Index first, Index last, RowMatrix<double>& sum) {
+  feel(first, last);
+  const Index count = static_cast<Index>(active_.size()), size = count + 3, centers = sum.rows() - 4;
+  rows_.setZero(size, mixtures * block_size * (last - first));
+  for (Index b = first; b < last; ++b) add_rows(b, mixtures * block_size * (b - first));
+  products_.resize(size, size);
+  lower_gram<double>(Transpose::no, rows_, 0.0, products_);
+  const auto place = [&](Index i) {
+    return i < count ? Index{active_[static_cast<std::size_t>(i)]} : centers + 1 + i - count;
+  };
   for (Index i = 0; i < size; ++i) {
     double* to = sum.row(place(i)).data();
-    for (Index j = 0; j < size; ++j) to[place(j)] += products(i, j);
+    for (Index j = 0; j <= i; ++j) to[place(j)] += products_(i, j);
   }
 }
 
 }  // namespace
 
-RowMatrix<double> stiffness_matrix(const RadialBasis& basis, PointsIn samples, const Vector& bending) {
-  const Index wanted = std::max(least_samples, static_cast<Index>(samples_a_center * basis.center_count()));
+RowMatrix<double> stiffness_matrix(const RadialBasis& basis, PointsIn samples, const Vector& bending,
+                                   const Progress& progress) {
+  const Index wanted = std::max(least_samples, samples_a_center * basis.center_count());
   const Index taken = std::min<Index>(samples.rows(), wanted);
   Points some(taken, 3);
   Vector roots(taken);
@@ -59,19 +140,19 @@ RowMatrix<double> stiffness_matrix(const RadialBasis& basis, PointsIn samples, c
     roots[i] = std::sqrt(bending[i * samples.rows() / taken]);
   }
   const RadialEvaluator<double> sites(basis, some);
-  std::vector<RowMatrix<double>> sums(parts);
-  const Index blocks = (taken + 15) / 16;
-  parallel_for(0, parts, 1, [&](Index first, Index last) {
-    std::vector<double> jets;
-    RowMatrix<double> rows, products;
-    for (Index part = first; part < last; ++part) {
-      auto& sum = sums[static_cast<std::size_t>(part)];
-      sum.setZero(basis.size(), basis.size());
-      for (Index b = part * blocks / parts; b < (part + 1) * blocks / parts; ++b)
-        add_block(sites.block(b), &roots[16 * b], std::min<Index>(16, taken - 16 * b), sum, jets, rows,
-                  products);
-    }
-  });
+  std::vector<RowMatrix<double>> sums(parts, RowMatrix<double>::Zero(basis.size(), basis.size()));
+  std::vector<Products> products(parts, Products(sites, roots));
+  const Index groups = (sites.blocks() + blocks_at_once - 1) / blocks_at_once;
+  for (Index slice = 0; slice < slices; ++slice) {
+    parallel_jobs(parts, [&](Index part) {
+      const Index piece = part * slices + slice, pieces = parts * slices;
+      for (Index group = piece * groups / pieces; group < (piece + 1) * groups / pieces; ++group)
+        products[static_cast<std::size_t>(part)].add(group * blocks_at_once,
+                                                     std::min(sites.blocks(), (group + 1) * blocks_at_once),
+                                                     sums[static_cast<std::size_t>(part)]);
+    });
+    progress.report(static_cast<double>(slice + 1) / slices, "stiffness");
+  }
   for (std::size_t part = 1; part < sums.size(); ++part) sums[0] += sums[part];
   return sums[0] / static_cast<double>(taken);
 }
@@ -94,7 +175,7 @@ std::pair<RowMatrix<double>, Vector> stance_rows(const RadialBasis& basis, Point
 RowMatrix<double> inverse_factor(RowMatrix<double> stiffness, const RowMatrix<double>& values,
                                  const Vector& weights) {
   const RowMatrix<double> weighted = weights.cwiseSqrt().asDiagonal() * values;
-  gemm<double>(Transpose::yes, Transpose::no, 1.0, weighted, weighted, 1.0, stiffness);
+  lower_gram<double>(Transpose::yes, weighted, 1.0, stiffness);
   stiffness.diagonal().array() += ridge * stiffness.diagonal().mean();
   return lower_inverse<double>(cholesky<double>(stiffness));
 }

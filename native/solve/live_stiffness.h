@@ -3,14 +3,17 @@
 
 #include <utility>
 
+#include "core/task.h"
 #include "energies/stance.h"
 #include "fields/radial_basis.h"
 
 namespace arapfields {
 
-/// mean (‖J‖² + λ‖D‖²) over (some of) the samples, with each one's λ, as a matrix of the basis:
-/// what of the energy's Hessian depends on the rest surface alone.
-RowMatrix<double> stiffness_matrix(const RadialBasis& basis, PointsIn samples, const Vector& bending);
+/// mean (‖J‖² + λ‖D‖²) over (some of) the samples, with each one's λ, as a matrix of the basis, of which the
+/// lower triangle is filled: what of the energy's Hessian depends on the rest surface alone. An estimate, for
+/// preconditioners: a sample is asked for three mixtures of its derivatives.
+RowMatrix<double> stiffness_matrix(const RadialBasis& basis, PointsIn samples, const Vector& bending,
+                                   const Progress& progress = {});
 
 /// Rows (n, size) of values at the samples and weights (n) with which Σ_p weights_p values_pᵀ values_p is the
 /// Hessian of half the stance's energy, its upward part spread over all directions: for at most a thousand of
@@ -18,7 +21,8 @@ RowMatrix<double> stiffness_matrix(const RadialBasis& basis, PointsIn samples, c
 std::pair<RowMatrix<double>, Vector> stance_rows(const RadialBasis& basis, PointsIn samples,
                                                  const Stance& stance);
 
-/// L⁻¹ for L Lᵀ = stiffness + Σ_p weights_p values_pᵀ values_p + a ridge for what rounding leaves singular.
+/// L⁻¹ for L Lᵀ = stiffness (its lower triangle) + Σ_p weights_p values_pᵀ values_p + a ridge for what
+/// rounding leaves singular.
 RowMatrix<double> inverse_factor(RowMatrix<double> stiffness, const RowMatrix<double>& values,
                                  const Vector& weights);
 

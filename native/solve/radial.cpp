@@ -4,8 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "solve/live_objective.h"
+#include "core/parallel.h"
 #include "solve/live_solver.h"
+#include "solve/rest_shape.h"
 #include "solve/setup.h"
 
 namespace arapfields {
@@ -13,10 +14,14 @@ namespace {
 
 /// Steps between two looks at the clock.
 constexpr int steps_at_once = 10;
-/// From so many centers on, few centers make a first result, in so many steps at most.
-constexpr int worth_a_first = 600, first_steps = 12;
-constexpr int samples_a_center = 8;
+/// From so many centers on, half of them, or so many, make a first result, in so many steps at most.
+constexpr int worth_a_first = 600, most_first = 500, first_steps = 12;
+/// Samples a center that carry it, and that the energy sees: more centers than samples can tell apart would
+/// fit them and fold between them.
+constexpr int carrying_samples = 8, deform_samples = 8, style_samples = 6;
 constexpr Index least_centers = 50;
+/// Fine centers of a style.
+constexpr int style_centers = 1000;
 
 template <class Options>
 LiveOptions live_options(const Options& options) {
@@ -25,8 +30,16 @@ LiveOptions live_options(const Options& options) {
   live.handle_samples = options.handles.handle_batch;
   live.threads = options.machine.threads;
   live.seed = options.training.seed;
-  live.tolerance = 1e-5;
+  live.tolerance = 3e-5;
   return live;
+}
+
+/// So many fine centers and a fifth as many coarse ones, or what the samples carry.
+void set_centers(LiveOptions& live, int centers, int samples_a_center, const SurfaceSamples& samples) {
+  const Index carried = std::max(least_centers, samples.size() / carrying_samples);
+  live.fine_centers = static_cast<int>(std::min<Index>(centers, carried));
+  live.coarse_centers = live.fine_centers / 5;
+  live.samples = std::max(live.samples, samples_a_center * live.fine_centers);
 }
 
 /// Solves until it converges, is out of steps or time, or the observer ends it. The solver's energy is the
@@ -82,41 +95,44 @@ Solution finish(const LiveSolver& live, const SurfaceSamples& samples, const Obj
 Solution deform_radial(const SurfaceSamples& samples, const std::vector<Handle>& handles,
                        const DeformOptions& options, const Progress& progress, const SolveHooks& hooks) {
   require(options.handles.handle_weight > 0.0, "handle_weight", "0", "must be positive for 'radial'");
+  const ThreadScope threads(options.machine.threads);
   LiveOptions fine = live_options(options);
-  // More centers than the samples can tell apart would fit these and fold between them.
-  const Index carried = samples.size() / samples_a_center;
-  const int centers = static_cast<int>(std::min<Index>(options.centers, std::max(least_centers, carried)));
-  fine.samples = std::max(fine.samples, samples_a_center * centers);
-  fine.coarse_centers = centers / 5;
-  fine.fine_centers = centers;
+  set_centers(fine, options.centers, deform_samples, samples);
   fine.handle_weight = options.handles.handle_weight;
+  const auto shape = std::make_shared<const RestShape>(samples, fine.interior,
+                                                       static_cast<std::uint64_t>(options.training.seed));
   std::shared_ptr<RadialField> first;
-  if (centers >= worth_a_first) {
+  if (fine.fine_centers >= worth_a_first) {
     LiveOptions few = live_options(options);
+    set_centers(few, std::min(most_first, fine.fine_centers / 2), deform_samples, samples);
     few.handle_weight = fine.handle_weight;
     few.tolerance = LiveOptions().tolerance;
-    LiveSolver solver(samples, handles, few, progress.part(0.0, 0.1));
+    LiveSolver solver(samples, handles, few, progress.part(0.0, 0.1), shape);
     first = solver.solve(std::min(first_steps, options.training.iterations), 0.0, progress.part(0.1, 0.15));
     progress.look([&](PointsIn points) { return first->at(points); });
   }
   const double done = first ? 0.15 : 0.0;
-  LiveSolver solver(samples, handles, fine, progress.part(done, 0.4));
+  LiveSolver solver(samples, handles, fine, progress.part(done, 0.4), shape);
   if (first) solver.adopt(*first);
   const LoopResult loop = run(solver, options.training, progress.part(0.4, 0.95), hooks, 1.0);
   ObjectiveTerms terms;
-  terms.stiffness = SurfaceStiffness(samples, options.surface);
+  terms.stiffness = SurfaceStiffness(shape->thickness, options.surface);
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
   return finish(solver, samples, terms, loop, progress);
+}
+
+DeformOptions followed_closely(DeformOptions options) {
+  constexpr double closer = 100.0, heaviest = 1e9;
+  options.exact_handles = false;
+  options.handles.handle_weight = std::min(closer * options.handles.handle_weight, heaviest);
+  return options;
 }
 
 std::shared_ptr<const DeformationField> radial_start(const SurfaceSamples& samples,
                                                      const std::vector<Handle>& handles,
                                                      DeformOptions options, const Progress& progress) {
   constexpr int start_steps = 30;
-  constexpr double closer = 100.0, heaviest = 1e9;  // under exact handles, which the blend then hardly bends
-  if (options.exact_handles)
-    options.handles.handle_weight = std::min(closer * options.handles.handle_weight, heaviest);
-  options.exact_handles = false;
+  if (options.exact_handles) options = followed_closely(options);
   options.invertibility = 0.0;
   options.training.iterations = start_steps;
   return deform_radial(samples, handles, options, progress).field;
@@ -127,9 +143,7 @@ Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const
                         const Vec3& up, const SolveHooks& hooks) {
   // The live solver's energy has weight 1: all other weights are divided by this one's.
   LiveOptions live = live_options(options);
-  live.samples = 6000;
-  live.coarse_centers = 200;
-  live.fine_centers = 1000;
+  set_centers(live, style_centers, style_samples, samples);
   live.tolerance = 1e-4;
   live.handle_weight = std::max(options.handles.handle_weight, 1e-3) / options.rigidity;
   live.surface.barrier = options.surface.barrier / options.rigidity;

@@ -14,6 +14,9 @@ namespace arapfields {
 Solution deform_radial(const SurfaceSamples& samples, const std::vector<Handle>& handles,
                        const DeformOptions& options, const Progress& progress, const SolveHooks& hooks = {});
 
+/// Options of a soft solve that leaves a blend with exact handles hardly anything to bend.
+DeformOptions followed_closely(DeformOptions options);
+
 /// What a network may refine: deform_radial's field after some tens of steps, whatever options.field says and
 /// without exact handles, which the network's own blend adds.
 std::shared_ptr<const DeformationField> radial_start(const SurfaceSamples& samples,

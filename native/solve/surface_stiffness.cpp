@@ -14,16 +14,19 @@ constexpr double uniform_bending = 0.01;
 
 }  // namespace
 
-SurfaceStiffness::SurfaceStiffness(const SurfaceSamples& samples, const SurfaceOptions& options,
-                                   const std::vector<std::uint32_t>& order)
+SurfaceStiffness::SurfaceStiffness(std::shared_ptr<const LocalThickness> thickness,
+                                   const SurfaceOptions& options)
     : bending_(options.bending *
                (options.bending_unit == BendingUnit::cube ? uniform_bending : reach * reach)) {
-  if (bending_ > 0.0 && options.bending_unit == BendingUnit::thickness)
-    thickness_ = std::make_shared<const LocalThickness>(samples.points, samples.normals, order);
+  if (bending_ > 0.0 && options.bending_unit == BendingUnit::thickness) thickness_ = std::move(thickness);
 }
 
 SurfaceStiffness::SurfaceStiffness(const SurfaceSamples& samples, const SurfaceOptions& options)
-    : SurfaceStiffness(samples, options, canonical_order(samples.points)) {}
+    : SurfaceStiffness(nullptr, options) {
+  if (bending_ > 0.0 && options.bending_unit == BendingUnit::thickness)
+    thickness_ = std::make_shared<const LocalThickness>(samples.points, samples.normals,
+                                                        canonical_order(samples.points));
+}
 
 Vector SurfaceStiffness::bending(PointsIn points) const {
   if (!thickness_) return Vector::Constant(points.rows(), bending_);

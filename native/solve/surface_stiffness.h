@@ -15,9 +15,7 @@ class SurfaceStiffness {
  public:
   SurfaceStiffness() = default;
   explicit SurfaceStiffness(double bending) : bending_(bending) {}
-  /// `order` as LocalThickness takes it.
-  SurfaceStiffness(const SurfaceSamples& samples, const SurfaceOptions& options,
-                   const std::vector<std::uint32_t>& order);
+  SurfaceStiffness(std::shared_ptr<const LocalThickness> thickness, const SurfaceOptions& options);
   SurfaceStiffness(const SurfaceSamples& samples, const SurfaceOptions& options);
 
   /// Whether any point resists bending.

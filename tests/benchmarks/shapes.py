@@ -20,6 +20,7 @@ import meshes  # noqa: E402
 from network_oracle import Network  # noqa: E402
 
 OURS = {"bunny": "dinosaur", "spot": "dog", "hand": "hand", "whale": "lizard", "cube": "mug"}
+CREATURES = ("dinosaur", "lizard", "octopus")
 FULL = 70  # degrees of a whole drag
 HALF_EXTENT = 0.75  # of our own shapes, as fit_sdf has it: the networks' frame is then the identity
 
@@ -43,10 +44,10 @@ def label(name):
 
 @functools.cache
 def own_mesh(name):
-    """Vertices and triangles of the stand-in, centred, its largest half-extent HALF_EXTENT."""
+    """Vertices and triangles of a creature or a stand-in, centred, its largest half-extent HALF_EXTENT."""
     import menagerie
 
-    shape = menagerie.load(OURS[name])
+    shape = menagerie.load(OURS.get(name, name))
     vertices = shape.vertices.astype(float)
     low, high = vertices.min(0), vertices.max(0)
     return HALF_EXTENT * (vertices - (low + high) / 2) / ((high - low).max() / 2), shape.triangles

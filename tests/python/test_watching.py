@@ -28,6 +28,15 @@ def test_a_watched_solve_shows_the_shape_and_ends_the_same(field):
         assert np.abs(task.watched - watched(points)).max() < 1e-5
 
 
+@pytest.mark.parametrize("options", [SMALL | {"field": "neural"}, {}])
+def test_the_first_shape_there_is_is_shown(options):
+    """However long is to be waited between two looks."""
+    samples, task = bar_samples(), af.Task()
+    task.watch(samples.points[:50], seconds=1000.0)
+    af.deform(samples, HANDLES, af.DeformOptions(**options), task=task)
+    assert task.looks == 1
+
+
 def test_points_that_cannot_be_watched_are_named():
     with pytest.raises(af.InvalidInput, match="points"):
         af.Task().watch(np.full((2, 3), np.nan))

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "solve/rest_shape.h"
+
+#include "core/random.h"
+#include "sampling/canonical_order.h"
+#include "solve/live_setup.h"
+#include "solve/setup.h"
+
+namespace arapfields {
+namespace {
+
+constexpr Index most_sites = 6000;
+/// Centers stand as densely as the root of the thickness asks, down to this share of its median.
+constexpr double least_size = 0.1;
+/// Of the seed's random numbers, those for sites.
+constexpr std::uint64_t stream = 2;
+
+}  // namespace
+
+RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t seed) {
+  require_samples(samples);
+  order = canonical_order(samples.points);
+  thickness = std::make_shared<const LocalThickness>(samples.points, samples.normals, order);
+  Random random(seed, stream);
+  const std::vector<Index> chosen = stratified(order, most_sites, random);
+  sites = rows_of(samples.points, chosen);
+  const Vector thick = thickness->at(sites);
+  layout.sizes = (thick / thickness->median()).cwiseMax(least_size).cwiseSqrt();
+  if (samples.normals.rows() != samples.size()) return;
+  const Points normals = rows_of(samples.normals, chosen);
+  layout.inner = sites - thick.asDiagonal() * normals;
+  if (interior) embedding = interior_embedding(sites, normals);
+}
+
+}  // namespace arapfields
