@@ -18,10 +18,8 @@ constexpr int steps_at_once = 10;
 constexpr int worth_a_first = 600, most_first = 500, first_steps = 12;
 /// Samples a center that carry it, and that the energy sees: more centers than samples can tell apart would
 /// fit them and fold between them.
-constexpr int carrying_samples = 8, deform_samples = 8, style_samples = 6;
+constexpr int samples_a_center = 8;
 constexpr Index least_centers = 50;
-/// Fine centers of a style.
-constexpr int style_centers = 1000;
 
 template <class Options>
 LiveOptions live_options(const Options& options) {
@@ -35,8 +33,8 @@ LiveOptions live_options(const Options& options) {
 }
 
 /// So many fine centers and a fifth as many coarse ones, or what the samples carry.
-void set_centers(LiveOptions& live, int centers, int samples_a_center, const SurfaceSamples& samples) {
-  const Index carried = std::max(least_centers, samples.size() / carrying_samples);
+void set_centers(LiveOptions& live, int centers, const SurfaceSamples& samples) {
+  const Index carried = std::max(least_centers, samples.size() / samples_a_center);
   live.fine_centers = static_cast<int>(std::min<Index>(centers, carried));
   live.coarse_centers = live.fine_centers / 5;
   live.samples = std::max(live.samples, samples_a_center * live.fine_centers);
@@ -97,14 +95,14 @@ Solution deform_radial(const SurfaceSamples& samples, const std::vector<Handle>&
   require(options.handles.handle_weight > 0.0, "handle_weight", "0", "must be positive for 'radial'");
   const ThreadScope threads(options.machine.threads);
   LiveOptions fine = live_options(options);
-  set_centers(fine, options.centers, deform_samples, samples);
+  set_centers(fine, options.centers, samples);
   fine.handle_weight = options.handles.handle_weight;
   const auto shape = std::make_shared<const RestShape>(samples, fine.interior,
                                                        static_cast<std::uint64_t>(options.training.seed));
   std::shared_ptr<RadialField> first;
   if (fine.fine_centers >= worth_a_first) {
     LiveOptions few = live_options(options);
-    set_centers(few, std::min(most_first, fine.fine_centers / 2), deform_samples, samples);
+    set_centers(few, std::min(most_first, fine.fine_centers / 2), samples);
     few.handle_weight = fine.handle_weight;
     few.tolerance = LiveOptions().tolerance;
     LiveSolver solver(samples, handles, few, progress.part(0.0, 0.1), shape);
@@ -143,7 +141,9 @@ Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const
                         const Vec3& up, const SolveHooks& hooks) {
   // The live solver's energy has weight 1: all other weights are divided by this one's.
   LiveOptions live = live_options(options);
-  set_centers(live, style_centers, style_samples, samples);
+  live.samples = 6000;
+  live.coarse_centers = 200;
+  live.fine_centers = 1000;
   live.tolerance = 1e-4;
   live.handle_weight = std::max(options.handles.handle_weight, 1e-3) / options.rigidity;
   live.surface.barrier = options.surface.barrier / options.rigidity;
