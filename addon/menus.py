@@ -16,6 +16,8 @@ class ARAPFIELDS_MT_object(bpy.types.Menu):
 
     def draw(self, context):
         layout, source = self.layout, source_of(context)
+        layout.operator(Op.PIN_TOOL, icon="PINNED")
+        layout.operator(Op.PIN_ADD, icon="ADD")
         layout.operator(Op.ADD_HANDLE, icon="EMPTY_DATA")
         layout.operator(Op.SET_REST, icon="PINNED")
         layout.operator(Op.RESET_HANDLE, icon="LOOP_BACK")

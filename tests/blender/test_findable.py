@@ -3,7 +3,19 @@
 
 from inside import in_blender
 
-OURS = ("ADD_HANDLE", "SET_REST", "RESET_HANDLE", "DEFORM", "LIVE", "STYLIZE", "LIVE_KEEP", "BAKE", "FIT")
+OURS = (
+    "PIN_TOOL",
+    "PIN_ADD",
+    "ADD_HANDLE",
+    "SET_REST",
+    "RESET_HANDLE",
+    "DEFORM",
+    "LIVE",
+    "STYLIZE",
+    "LIVE_KEEP",
+    "BAKE",
+    "FIT",
+)
 
 
 @in_blender
