@@ -16,7 +16,7 @@ from ..core.errors import UserError
 from ..core.runtime import jobs, native
 from ..core.runtime.threads import start_thread
 from ..core.settings.styles import style_identifier
-from ..handles import empties
+from ..handles import empties, naming
 from ..names import REPORT
 from . import files
 from .parser import solve_settings
@@ -88,10 +88,12 @@ def add_handles(source, path):
             rest[:3, :3] *= max(np.ptp(corners, axis=0).max(), 1e-6) / 100
             target[:3, :3] = rest[:3, :3]
             rest[:3, 3], target[:3, 3] = made.rest, made.target
-        empty = empties.make_empty(bpy.context, source, Matrix(rest.tolist()), 1.0)
+        kind = "POINT" if point else "CUBE"
+        held = naming.name_for(source, rest[:3, 3], kind)
+        empty = empties.make_empty(bpy.context, source, Matrix(rest.tolist()), 1.0, held)
         if not np.allclose(empty.matrix_world, rest, rtol=1e-4, atol=1e-6 * np.abs(rest).max()):
             raise UserError(f"{name}: its box is sheared; an Empty cannot be")
-        entry = empties.add(source, empty, "POINT" if point else "CUBE")
+        entry = empties.add(source, empty, kind)
         entry.weight = item.get("weight", 1.0)
         empty.matrix_world = Matrix(target.tolist())
     bpy.context.view_layer.update()

@@ -9,7 +9,8 @@ from inside import in_blender
 class Window:
     """Stands for a context with a window: notes timers, status texts and modal handlers."""
 
-    def __init__(self):
+    def __init__(self, app):
+        self.app = app
         self.timers, self.texts, self.handlers = [], [], []
         self.window, self.window_manager, self.workspace = object(), self, self
         self.windows, self.data, self.context = [], self, self
@@ -32,14 +33,15 @@ class Window:
 @contextlib.contextmanager
 def window():
     """A Window that the add-on takes for Blender's own."""
+    from addon.blender import timers
     from addon.jobs import display, modal
 
-    stand_in, kept = Window(), (display.bpy, modal.has_window)
-    display.bpy, modal.has_window = stand_in, lambda: True
+    stand_in, kept = Window(timers.bpy.app), (display.bpy, timers.bpy, modal.has_window)
+    display.bpy, timers.bpy, modal.has_window = stand_in, stand_in, lambda: True
     try:
         yield stand_in
     finally:
-        display.bpy, modal.has_window = kept
+        display.bpy, timers.bpy, modal.has_window = kept
 
 
 def operator(work):

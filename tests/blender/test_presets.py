@@ -48,5 +48,5 @@ def test_each_style_has_its_picture():
     folder = Path(addon.__file__).parent / "icons"
     assert {path.stem for path in folder.glob("*.png")} == {name.replace(" ", "_") for name, _ in STYLES}
     assert all(
-        path.read_bytes()[:4] == b"\x89PNG" and path.stat().st_size < 8000 for path in folder.glob("*")
+        path.read_bytes()[:4] == b"\x89PNG" and path.stat().st_size < 8000 for path in folder.glob("*.png")
     )
