@@ -70,7 +70,7 @@ def install(path):
 def use():
     import bpy
     import scenes
-    from bl_ext.user_default.arapfields.core import native
+    from bl_ext.user_default.arapfields.core.runtime import native
 
     assert not native.problem(), native.problem()
     import arapfields

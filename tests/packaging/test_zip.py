@@ -15,13 +15,14 @@ pytest.importorskip("pybind11", reason="pybind11 is not installed")
 from extension import bindings, check, dependencies  # noqa: E402
 from extension.archive import OPTIONS  # noqa: E402
 
+GUIDE = "guide/index.html"
 WHEEL = "wheels/arapfields-0.1.0-py3-none-linux_x86_64.whl"
 POLIB = "wheels/polib-1.2.0-py2.py3-none-any.whl"
 MANIFEST = f'platforms = ["linux-x64"]\nwheels = ["./{WHEEL}", "./{POLIB}"]\n'
 PARTS = ["arapfields/libarapfields.so", "arapfields/_native.cpython-311-x86_64-linux-gnu.so"]
 
 
-def make_zip(path, manifest=MANIFEST, wheel=WHEEL, parts=PARTS, others=(OPTIONS,)):
+def make_zip(path, manifest=MANIFEST, wheel=WHEEL, parts=PARTS, others=(OPTIONS, GUIDE)):
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w") as inner:
         for part in parts:
@@ -44,7 +45,8 @@ def test_a_whole_zip_passes(tmp_path):
     [
         ({}, [(3, 11), (3, 13)], "no binding for Python 3.13"),
         ({"parts": PARTS[1:]}, [(3, 11)], "0 copies"),
-        ({"others": ()}, [(3, 11)], "lacks core/settings/options.json"),
+        ({"others": (GUIDE,)}, [(3, 11)], "lacks core/settings/options.json"),
+        ({"others": (OPTIONS,)}, [(3, 11)], "lacks guide/index.html"),
         ({"manifest": MANIFEST.replace("linux-x64", "windows-x64")}, [], "declares windows-x64"),
         ({"manifest": 'platforms = ["linux-x64"]\n'}, [], "declares linux-x64, for which no wheel"),
         ({"manifest": MANIFEST.replace(f', "./{POLIB}"', "")}, [], "lacks the wheel of polib"),
