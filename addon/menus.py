@@ -49,10 +49,12 @@ def draw_in_empties(menu, context):
     operator.kind, operator.place = "CUBE", "CURSOR"
 
 
+# Blender 4.2 has no menu of its own for Empties.
+EMPTIES = "VIEW3D_MT_empty_add" if hasattr(bpy.types, "VIEW3D_MT_empty_add") else "VIEW3D_MT_add"
 PLACES = {  # of bpy.types: what is drawn at the end
     "STATUSBAR_HT_header": status_bar.draw,
     "VIEW3D_MT_object": draw_in_object_menu,
-    "VIEW3D_MT_empty_add": draw_in_empties,
+    EMPTIES: draw_in_empties,
 }
 CLASSES = [ARAPFIELDS_MT_object]
 
