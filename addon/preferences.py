@@ -13,28 +13,26 @@ from .names import PACKAGE, Op
 class ARAPFIELDS_AP_preferences(bpy.types.AddonPreferences):
     bl_idname = PACKAGE
 
-    __annotations__ = annotations(MACHINE)
-    cache_folder: bpy.props.StringProperty(
-        name="Fit Folder",
-        description="Where fitted surfaces are kept; empty for Blender's own folder for this extension",
-        subtype="DIR_PATH",
-    )
-
-    show_boxes: bpy.props.BoolProperty(
-        name="Show Boxes",
-        description="Draw the handles' boxes, at rest and now, in the viewport",
-        default=True,
-    )
-
-    show_previews: bpy.props.BoolProperty(
-        name="Show Previews",
-        description="Draw what a running job has so far in the viewport; off where drawing is slow",
-        default=True,
-    )
-
-    was_welcomed: bpy.props.BoolProperty(
-        name="Welcomed", description="Whether it was said where the extension is", options={"HIDDEN"}
-    )
+    __annotations__ = annotations(MACHINE) | {
+        "cache_folder": bpy.props.StringProperty(
+            name="Fit Folder",
+            description="Where fitted surfaces are kept; empty for Blender's own folder for this extension",
+            subtype="DIR_PATH",
+        ),
+        "show_boxes": bpy.props.BoolProperty(
+            name="Show Boxes",
+            description="Draw the handles' boxes, at rest and now, in the viewport",
+            default=True,
+        ),
+        "show_previews": bpy.props.BoolProperty(
+            name="Show Previews",
+            description="Draw what a running job has so far in the viewport; off where drawing is slow",
+            default=True,
+        ),
+        "was_welcomed": bpy.props.BoolProperty(
+            name="Welcomed", description="Whether it was said where the extension is", options={"HIDDEN"}
+        ),
+    }
 
     def draw(self, context):
         layout = self.layout
