@@ -13,6 +13,20 @@ from .hover import View, hover, under
 from .modal import Dragging, PinOperator
 
 
+def source_of_target(target):
+    """The object under the cursor; UserError where it cannot be pinned."""
+    source = target.source.get()
+    if target.kind == "REFUSED":
+        raise pins.refusal(source)
+    return source
+
+
+def drag_of_new_pin(context, source, target, **further):
+    """The drag of a pin that is placed where the cursor is on the surface."""
+    where = {"face": target.face, "face_count": target.face_count}
+    return drag.of_new_pin(context, source, target.location, target.radius, **where, **further)
+
+
 class ARAPFIELDS_OT_pin_tool(PinOperator, bpy.types.Operator):
     """Take the tool that pins the surface and drags it, in the toolbar"""
 
@@ -56,13 +70,9 @@ class ARAPFIELDS_OT_pin_drag(Dragging, bpy.types.Operator):
         if target is None:
             return {"PASS_THROUGH"}
         try:
-            source = target.source.get()
-            if target.kind == "REFUSED":
-                raise pins.refusal(source)
+            source = source_of_target(target)
             if target.kind == "SURFACE":
-                where = {"face": target.face, "face_count": target.face_count}
-                dragged = drag.of_new_pin(context, source, target.location, target.radius, **where)
-                return self.start(context, view, dragged, "MOVE")
+                return self.start(context, view, drag_of_new_pin(context, source, target), "MOVE")
             entry = pins.entry_of(target.empty.get())
             if entry.anchor:
                 return {"FINISHED"} if pins.select(context, entry.empty) else {"CANCELLED"}
@@ -84,12 +94,9 @@ class ARAPFIELDS_OT_pin_anchor(PinOperator, bpy.types.Operator):
         if target is None:
             return {"PASS_THROUGH"}
         try:
-            source = target.source.get()
-            if target.kind == "REFUSED":
-                raise pins.refusal(source)
+            source = source_of_target(target)
             if target.kind == "SURFACE":
-                where = {"face": target.face, "face_count": target.face_count, "anchor": True}
-                drag.of_new_pin(context, source, target.location, target.radius, **where).end(context)
+                drag_of_new_pin(context, source, target, anchor=True).end(context)
             else:
                 entry = pins.entry_of(target.empty.get())
                 pins.select(context, entry.empty)
