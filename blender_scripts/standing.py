@@ -55,6 +55,12 @@ def feet(rest, triangles):
     return [part for part in parts if len(part) >= LEAST_FOOT]
 
 
+def on_the_ground(rest, parts, slack=0.02):
+    """Those of the parts that stand on one plane: within a share of the height of its lowest point."""
+    low, height = rest[:, 2].min(), np.ptp(rest[:, 2])
+    return [part for part in parts if rest[part, 2].min() < low + slack * height]
+
+
 def unevenness(vertices, parts, height):
     """How far apart the feet's lowest points lie, as a share of the height."""
     return float(np.ptp([vertices[part, 2].min() for part in parts]) / height)

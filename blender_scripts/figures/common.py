@@ -97,6 +97,14 @@ def turned(shape, x, degrees, scale=1.0, y=0.0):
     return Matrix.Translation((x, y, lift)) @ turn @ Matrix.Scale(scale, 4)
 
 
+def in_column(made, rest, column, degrees, spacing):
+    """In its column on the floor, at the scale at which the rest shape fills one: a row has one scale."""
+    turn = np.radians(degrees)
+    width = np.ptp(rest.vertices[:, :2] @ (np.cos(turn), -np.sin(turn)))
+    scale = min(1.8 / width, 1.9 / np.ptp(rest.vertices[:, 2]))
+    return turned(made, column * spacing, degrees, scale)
+
+
 def measured(field):
     """The figures of a solve that captions and pages quote."""
     report = field.report

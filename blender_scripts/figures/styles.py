@@ -6,7 +6,7 @@ import stage
 
 import arapfields as af
 
-from .common import add, samples_of, shape, stack, suzanne, turned, warped
+from .common import add, in_column, samples_of, shape, stack, suzanne, warped
 
 STYLES = ["cube", "octahedron", "dodecahedron", "hexagonal prism", "square pyramid", "cylinder"]
 ROWS = [("dog", 48), ("suzanne", 28), ("octopus", 0)]  # and its turn
@@ -74,20 +74,12 @@ class Live:
         )
 
 
-def place(made, rest, column, degrees):
-    """In its column on the floor, all of a row at the scale at which the rest shape fills its column."""
-    turn = np.radians(degrees)
-    width = np.ptp(rest.vertices[:, :2] @ (np.cos(turn), -np.sin(turn)))
-    scale = min(1.8 / width, 1.9 / np.ptp(rest.vertices[:, 2]))
-    return turned(made, column * SPACING, degrees, scale)
-
-
 def spheres(path):
     """The first row: each style's preference."""
     stage.clear()
     balls = [ball(preference_colours(style)) for style in STYLES]
     shown = [
-        add(made, style, place(made, made, 1 + i, 25))
+        add(made, style, in_column(made, made, 1 + i, 25, SPACING))
         for i, (style, made) in enumerate(zip(STYLES, balls, strict=True))
     ]
     shown += [stage.caption(style, (SPACING * (1 + i), -0.9, -0.42), 0.24) for i, style in enumerate(STYLES)]
@@ -102,10 +94,10 @@ def render(output):
         rest = suzanne() if name == "suzanne" else shape(name)
         live = Live(samples_of(rest))
         stage.clear()
-        shown = [add(rest, name, place(rest, rest, 0, degrees))]
+        shown = [add(rest, name, in_column(rest, rest, 0, degrees, SPACING))]
         for column, style in enumerate(STYLES, 1):
             moved, results[f"{name}, {style}"] = stylized(rest, live, style)
-            shown.append(add(moved, style, place(moved, rest, column, degrees)))
+            shown.append(add(moved, style, in_column(moved, rest, column, degrees, SPACING)))
         paths.append(output / f"styles-{name}.png")
         stage.photograph(shown, paths[-1], elevation=12, around=ENDS, margin=0.01)
     stack(paths, output / "styles.png")

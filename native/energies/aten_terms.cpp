@@ -2,6 +2,7 @@
 #include <ATen/ATen.h>
 
 #include "energies/aten_energies.h"
+#include "energies/stance.h"
 
 namespace arapfields {
 namespace {
@@ -72,8 +73,21 @@ at::Tensor aten_stance(const at::Tensor& jets, const at::Tensor& rest, const at:
   const at::Tensor others = ways - ways.mean(0, true), rises = at::mm(ways, up.unsqueeze(1));
   const at::Tensor uneven = rises - (touching * rises).sum() / at::clamp_min(ground.sum(), 1e-30);
   const at::Tensor lifted = touching * uneven;
-  if (cotangents.defined()) cotangents[0].add_(others + lifted * up.unsqueeze(0), 2.0 * weight * share);
-  return ((others * others).sum() + (lifted * uneven).sum()) * share;
+  // Of the turn closest to the ways, what is not about the upward axis; in float64, as the inertia is
+  // inverted.
+  const at::Tensor arms = (rest - rest.mean(0, true)).to(at::kDouble), upward = up.to(at::kDouble);
+  const at::Tensor size = at::clamp_min((arms * arms).sum(), 1e-30);
+  const at::Tensor inertia = (1.0 + 1e-9) * size * at::eye(3, arms.options()) - at::mm(arms.t(), arms);
+  const at::Tensor inverse = at::linalg_inv(inertia);
+  const at::Tensor turn = at::mv(inverse, at::linalg_cross(arms, ways.to(at::kDouble)).sum(0));
+  const at::Tensor lean = turn - at::dot(turn, upward) * upward;
+  const at::Tensor pull = (Stance::lean_weight * size * at::mv(inverse, lean)).expand_as(arms);
+  if (cotangents.defined())
+    cotangents[0].add_(
+        others + lifted * up.unsqueeze(0) + at::linalg_cross(pull, arms).to(jets.scalar_type()),
+        2.0 * weight * share);
+  const at::Tensor leaning = Stance::lean_weight * size * at::dot(lean, lean);
+  return ((others * others).sum() + (lifted * uneven).sum() + leaning.to(jets.scalar_type())) * share;
 }
 
 }  // namespace arapfields

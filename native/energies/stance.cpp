@@ -11,7 +11,31 @@ namespace arapfields {
 namespace {
 
 /// Share of the height within which a figure touches the ground, and what that weighs against all else.
-constexpr double ground_height = 0.05, ground_weight = 8.0;
+constexpr double ground_height = 0.05, ground_weight = 128.0;
+/// Of a line, which has no turn about itself: added to its inertia, as a share of its size squared.
+constexpr double thinnest = 1e-9;
+
+/// lean_weight · Σ‖a‖² · ‖ω − (ω·up) up‖² of samples with arms a (n,3) about their mean, ω being the
+/// infinitesimal rotation closest to their ways (n,3); and half its cotangents are arms · slope.
+struct Lean {
+  double energy = 0.0;
+  Mat3 slope = Mat3::Zero();
+};
+
+Lean lean_of(const Points& arms, const Points& ways, const Vec3& up) {
+  const Mat3 spread = arms.transpose() * arms, moment = arms.transpose() * ways;
+  const double size = spread.trace();
+  if (!(size > 0.0)) return {};
+  const Mat3 inertia = (1.0 + thinnest) * size * Mat3::Identity() - spread;
+  const Vec3 torque(moment(1, 2) - moment(2, 1), moment(2, 0) - moment(0, 2), moment(0, 1) - moment(1, 0));
+  const auto solver = inertia.ldlt();
+  Vec3 turn = solver.solve(torque);
+  turn -= turn.dot(up) * up;
+  const Vec3 pull = Stance::lean_weight * size * solver.solve(turn);
+  Mat3 slope;  // of row vectors: a · slope = pull × a
+  slope << 0.0, pull.z(), -pull.y(), -pull.z(), 0.0, pull.x(), pull.y(), -pull.x(), 0.0;
+  return {Stance::lean_weight * size * turn.squaredNorm(), slope};
+}
 
 }  // namespace
 
@@ -55,11 +79,15 @@ double stance_energy(JetView<const Scalar> jets, ConstPointsRef<Scalar> rest, co
   const double on_ground = stance.ground.sum();
   if (on_ground > 0.0) rises.array() -= stance.ground.dot(rises) / on_ground;
   const double share = stance.scale / static_cast<double>(jets.count);
+  const Points arms =
+      (rest.template cast<double>().rowwise() - rest.template cast<double>().colwise().mean()).eval();
+  const Lean lean = lean_of(arms, ways, stance.up);
   if (cotangents.data != nullptr)
     Eigen::Map<PointsOf<Scalar>>(cotangents.data, jets.count, 3) +=
-        (2.0 * weight * share * (ways + stance.ground.cwiseProduct(rises) * stance.up.transpose()))
+        (2.0 * weight * share *
+         (ways + stance.ground.cwiseProduct(rises) * stance.up.transpose() + arms * lean.slope))
             .template cast<Scalar>();
-  return share * (ways.squaredNorm() + stance.ground.dot(rises.cwiseAbs2()));
+  return share * (ways.squaredNorm() + stance.ground.dot(rises.cwiseAbs2()) + lean.energy);
 }
 
 #define ARAPFIELDS_STANCE(Scalar)                                                                     \

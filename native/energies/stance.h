@@ -10,6 +10,7 @@ struct ARAPFIELDS_EXPORT_TO_TESTS Stance {
   Vec3 up = Vec3::UnitZ();
   double scale = 1.0;  ///< one over its squared radius of gyration
   Vector ground;       ///< (n) weights of the samples on the ground, above 0 within 5 % of the height
+  static constexpr double lean_weight = 20.0;  ///< of a turn of the whole about a horizontal axis
 
   /// Of samples (n,3). Throws InvalidInput for a zero or non-finite direction.
   static Stance of(PointsIn points, const Vec3& upwards);
@@ -17,10 +18,11 @@ struct ARAPFIELDS_EXPORT_TO_TESTS Stance {
   Stance at(const std::vector<Index>& rows) const;
 };
 
-/// scale · (mean ‖d − d̄‖² + mean ground ((d − d̂)·up)²) with d = f(x) − x the ways of samples x (n,3), d̄ their
-/// mean and d̂ their mean over the ground: how far a surface moves other than by a translation, and how uneven
-/// its ground becomes. Rigidity minds neither: it turns a leg, or the whole, for nothing. Adds weight times
-/// its cotangents on the value column (data may be null).
+/// scale · (mean ‖d − d̄‖² + mean ground ((d − d̂)·up)² + lean_weight · mean ‖a‖² · ‖ω − (ω·up) up‖²) with
+/// d = f(x) − x the ways of samples x (n,3), d̄ their mean, d̂ their mean over the ground, a = x − x̄ and ω the
+/// infinitesimal rotation closest to d: how far a surface moves other than by a translation, how uneven its
+/// ground becomes, and how far the whole leans. Rigidity minds none of these: it turns a leg, or the whole,
+/// for nothing. Adds weight times its cotangents on the value column (data may be null).
 template <class Scalar>
 ARAPFIELDS_EXPORT_TO_TESTS double stance_energy(JetView<const Scalar> jets, ConstPointsRef<Scalar> rest,
                                                 const Stance& stance, double weight,

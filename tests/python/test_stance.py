@@ -11,6 +11,8 @@ from energy_oracles import gradient_of
 import arapfields as af
 from arapfields._native import testing
 
+LEAN = 20.0  # energies/stance.h, lean_weight
+
 
 def figure(count=300, seed=0):
     """Points of a cloud that is taller than wide."""
@@ -23,7 +25,20 @@ def oracle(jets, rest, stance):
     rises = ways @ up
     uneven = rises - (ground * rises).sum() / ground.sum()
     even = ((ways - ways.mean(0)) ** 2).sum(1).mean()
-    return stance.scale * (even + (ground * uneven**2).mean())
+    return stance.scale * (even + (ground * uneven**2).mean() + leaning(ways, torch.tensor(rest), up))
+
+
+def leaning(ways, rest, up):
+    """LEAN times the squared size and the squared turn about horizontal axes that is closest to the ways."""
+    arms = rest - rest.mean(0)
+    generators = torch.zeros(3, 3, 3, dtype=arms.dtype)  # [axis]: row vectors a ↦ axis × a
+    for axis in range(3):
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        generators[axis, i, j], generators[axis, j, i] = 1, -1
+    turned = torch.stack([(arms @ generator).reshape(-1) for generator in generators], 1)
+    turn = torch.linalg.lstsq(turned, (ways - ways.mean(0)).reshape(-1, 1)).solution[:, 0]
+    lean = turn - (turn @ up) * up
+    return LEAN * (arms**2).sum(1).mean() * (lean @ lean)
 
 
 @pytest.mark.parametrize("order", [1, 4, 10])
