@@ -212,9 +212,7 @@ def _animate(added):
         "spot.obj --tracks walk.json -o walk.pc2 --shard 2/8",
     )
     parser.add_argument("input", help=MESH)
-    parser.add_argument(
-        "--tracks", required=True, metavar="FILE", help=".json or .npz, see docs/command-line.md"
-    )
+    parser.add_argument("--tracks", required=True, metavar="FILE", help=".json or .npz, see docs/animate.md")
     parser.add_argument(
         "-o", "--output", required=True, metavar="FILE", help=".pc2, .mdd, or .usd, .usda, .usdc by usd-core"
     )

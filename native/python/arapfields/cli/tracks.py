@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Handle tracks: where each handle is, frame by frame; docs/command-line.md describes the two formats."""
+"""Handle tracks: where each handle is, frame by frame; docs/animate.md describes the two formats."""
 
 import io
 import json
