@@ -30,13 +30,14 @@ def commands(page):
     return list(filter(None, (shlex.split(line, comments=True) for line in text.splitlines())))
 
 
+PROGRAMS = {"make", "arapfields", "blender", "python", ".venv/bin/python", "sbatch", "openjd"}
 ALL = [(page, command) for page in pages.PAGES for command in commands(page)]
 
 
 def test_every_block_is_of_a_kind_that_is_tested():
     kinds = {kind for page in pages.PAGES for kind, _ in pages.FENCE.findall(page.read_text())}
     assert kinds == {"python", "sh", "json", "cpp", "cmake"}
-    assert {words[0] for _, words in ALL} == {"make", "arapfields", "blender", "python", ".venv/bin/python"}
+    assert {words[0] for _, words in ALL} == PROGRAMS
 
 
 def test_words_of_make_are_in_the_makefile():

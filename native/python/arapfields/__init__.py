@@ -59,6 +59,7 @@ from .arrays import ArrayLike
 from .cmake import cmake_dir
 from .energies import Energy, EnergyValue, Jets
 from .grids import save_grid, sdf_grid
+from .point_cache import PointCacheReader, PointCacheWriter
 from .reports import (
     DeformedExtractionReport,
     EnergyReport,
@@ -118,6 +119,8 @@ __all__ = [
     "MeshSdf",
     "NeuralSdf",
     "Point",
+    "PointCacheReader",
+    "PointCacheWriter",
     "PointHandle",
     "RadialField",
     "Region",

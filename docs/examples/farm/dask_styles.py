@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Stylizes every mesh of a folder on the workers of a Dask cluster; what is there already is skipped.
+
+python docs/examples/farm/dask_styles.py meshes cubic            on this machine, a worker a processor
+python docs/examples/farm/dask_styles.py meshes cubic tcp://head:8786
+"""
+
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from distributed import Client
+
+import arapfields as af
+from arapfields import farm
+
+OPTIONS = af.StylizeOptions(iterations=100)
+
+
+def stylized(job: tuple[Path, Path]) -> float:
+    """The energy reached; the result is there whole or not at all."""
+    source, target = job
+    mesh = trimesh.load(source, force="mesh", process=False)
+    vertices, triangles = np.array(mesh.vertices), np.array(mesh.faces)
+    field = af.stylize(af.sample_mesh(vertices, triangles, count=5000), "cube", OPTIONS)
+    partial = target.with_name(f".{target.stem}.{os.getpid()}{target.suffix}")
+    trimesh.Trimesh(field(vertices), triangles, process=False).export(partial)
+    partial.replace(target)
+    return field.report.energy
+
+
+def tell(outcome: farm.Outcome[tuple[Path, Path], float]) -> None:
+    text = f"energy {outcome.value:.4f}" if outcome.done else f"FAILED: {outcome.error}"
+    print(f"{outcome.item[0].name}: {text}", flush=True)
+
+
+def main() -> int:
+    source, target = (Path(name).resolve() for name in sys.argv[1:3])
+    target.mkdir(parents=True, exist_ok=True)
+    jobs = [(path, target / path.name) for path in sorted(source.glob("*.ply"))]
+    jobs = [job for job in jobs if not job[1].exists()]
+    # Without an address, workers on this machine, one for each processor, a thread each.
+    with Client(sys.argv[3]) if len(sys.argv) > 3 else Client(threads_per_worker=1) as client:
+        outcomes = farm.map(stylized, jobs, client, on_done=tell)
+    return 0 if all(outcome.done for outcome in outcomes) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
