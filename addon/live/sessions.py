@@ -20,6 +20,7 @@ from ..field_modifier import motion
 from ..handles import empties
 from ..results import result_objects
 from . import live_object
+from .following import scene_frame
 from .session import Changed, Session
 
 INTERVAL = 1 / 60  # seconds between looks at the handles
@@ -170,14 +171,23 @@ def follow_frame(depsgraph):
             seen = source.evaluated_get(depsgraph)
             where = functools.partial(rendered_matrix, depsgraph=depsgraph)
             request = session.current_request(bpy.context, source, where, seen)
-            session.requested = request
-            session.worker.request(request)
+            session.take(request, scene_frame(depsgraph.scene))
             session.worker.wait(WAIT, refined=True)
+            session.wait_for_frame(WAIT)
             session.show()
         except Changed:
             continue
         except (UserError, ValueError, ReferenceError) as error:
             give_up(uid, session, error)
+
+
+def show_frame():
+    """Shows frames that are solved already as the scene comes to them, in the same picture."""
+    for session in list(live.values()):
+        if session.frames is not None:
+            with contextlib.suppress(Changed, UserError, ValueError, ReferenceError):  # the timer tells
+                session.look(bpy.context)
+                session.show()
 
 
 def warn_of_hidden(source, session, depsgraph):
