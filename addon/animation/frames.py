@@ -29,18 +29,12 @@ def choose(context, sources, values):
     scene, which = context.scene, values["range"]
     first, last = values.get("start"), values.get("end")
     if first is None or last is None:
-        span = animation(sources) if which == "HANDLES" else scene_range(scene)
+        span = animation(sources) if which == "HANDLES" else animated.scene_range(scene)
         first, last = span[0] if first is None else first, span[1] if last is None else last
     if last < first:
         raise UserError("the last frame, {last}, comes before the first, {first}", first=first, last=last)
     step = values["step"] / values["subframes"]
     return Frames(float(first), step, int((last - first) / step + 1e-9) + 1)
-
-
-def scene_range(scene):
-    if scene.use_preview_range:
-        return scene.frame_preview_start, scene.frame_preview_end
-    return scene.frame_start, scene.frame_end
 
 
 def animation(sources):

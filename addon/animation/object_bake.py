@@ -130,21 +130,18 @@ class ObjectBake:
 
     def place(self, context, job):
         """Coroutine: the cache in its place and what plays it; returns the line to report."""
-        source = self.reference.get()
-        if mesh_arrays.fingerprint(source.data) != self.session.fingerprint:
-            raise UserError("{name} changed while it was worked on; run again", name=source.name)
+        source = self.unchanged_source()
         if self.path is None:
             return (yield from self.add_keys(context, source, job))
-        try:
-            self.writer.commit()
-        except OSError as error:
-            raise UserError("{error}", error=error) from error
+        self.commit()
         player = source
         sessions.end(context, source)  # what was live is baked now
         if not self.in_place:
-            player = self.new_player(context, source)
+            player = result_objects.show(
+                context, source, "BAKE", "BAKE", self.mesh(context, source), {"frames": self.frames.count}
+            )
             result_objects.hide(source)
-        cache_modifier.play(player, self.told, self.frames.start, self.frames.step)
+        self.play(player)
         digest, faces = mesh_arrays.fingerprint(player.data)
         record = {"mesh": digest.hex(), "faces": faces, "start": self.frames.start, "step": self.frames.step}
         record |= {"points": len(self.session.rest), "frames": self.frames.count}
@@ -159,18 +156,33 @@ class ObjectBake:
             size=size,
         )
 
-    def new_player(self, context, source):
-        """An object of its own, where the source's own vertices do not take the motion."""
+    def unchanged_source(self):
+        source = self.reference.get()
+        if mesh_arrays.fingerprint(source.data) != self.session.fingerprint:
+            raise UserError("{name} changed while it was worked on; run again", name=source.name)
+        return source
+
+    def commit(self):
+        try:
+            self.writer.commit()
+        except OSError as error:
+            raise UserError("{error}", error=error) from error
+
+    def play(self, player):
+        """Has an object play the cache."""
+        cache_modifier.play(player, self.told, self.frames.start, self.frames.step)
+
+    def mesh(self, context, source):
+        """Of an object of its own, where the source's own vertices do not take the motion."""
         session = self.session
         if session.topology is not None:
-            mesh = result_objects.surface_mesh(source, session.local(session.rest), session.topology)
-        else:
-            mesh = result_objects.shown_mesh(context, source, len(session.rest))
-        return result_objects.show(context, source, "BAKE", "BAKE", mesh, {"frames": self.frames.count})
+            return result_objects.surface_mesh(source, session.local(session.rest), session.topology)
+        return result_objects.shown_mesh(context, source, len(session.rest))
 
     def add_keys(self, context, source, job):
         """The object with a shape key a frame; taken away again where the user cancels."""
-        item = self.new_player(context, source)
+        report = {"frames": self.frames.count}
+        item = result_objects.show(context, source, "BAKE", "BAKE", self.mesh(context, source), report)
         frames, kept = [plain(frame) for frame in self.frames], False
         weight = size_text(keys_weight(len(self.session.rest), len(frames)))
         try:

@@ -4,8 +4,9 @@ import bpy
 from ..blender import modifier_stack
 from ..blender.language import translated
 from ..blender.section import Advanced, note, wrapped
+from ..live import animated
 from ..names import Op
-from . import frames, object_bake, played
+from . import object_bake, played
 
 
 class ARAPFIELDS_PT_animation(Advanced, bpy.types.Panel):
@@ -45,7 +46,7 @@ class ARAPFIELDS_PT_animation(Advanced, bpy.types.Panel):
 
 def weight(context, source, bake):
     """What the frames would weigh, as far as it is known before they are read."""
-    first, last = (bake.start, bake.end) if bake.range == "CUSTOM" else frames.scene_range(context.scene)
+    first, last = (bake.start, bake.end) if bake.range == "CUSTOM" else animated.scene_range(context.scene)
     count = max(0, (last - first) * bake.subframes // bake.step + 1)
     size = object_bake.size_text(object_bake.keys_weight(len(source.data.vertices), count - 1))
     if bake.range == "HANDLES":

@@ -62,6 +62,31 @@ def suspend(source):
     return playing
 
 
+MEMBERS = ("cache_format", "filepath", "frame_scale", "frame_start", "show_viewport", "show_render")
+
+
+def snapshot(source):
+    """What restore() needs to have the object show what it does now."""
+    cache, field = modifier_stack.find_cache(source), modifier_stack.find(source)
+    return (
+        None if cache is None else [getattr(cache, name) for name in MEMBERS],
+        None if field is None else (field.show_viewport, field.show_render),
+    )
+
+
+def restore(source, shown):
+    """Undoes a play() since the snapshot."""
+    of_cache, of_field = shown
+    cache, field = modifier_stack.find_cache(source), modifier_stack.find(source)
+    if of_cache is None:
+        remove(source)
+    elif cache is not None:
+        for name, value in zip(MEMBERS, of_cache, strict=True):
+            setattr(cache, name, value)
+    if of_field is not None and field is not None:
+        field.show_viewport, field.show_render = of_field
+
+
 def remove(source):
     """Takes the modifier away, and shows the field again; the file stays."""
     set_playing(source, False)

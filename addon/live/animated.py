@@ -11,6 +11,13 @@ def frame_range(source, kind):
     return (min(first for first, _ in ranges), max(last for _, last in ranges)) if ranges else None
 
 
+def scene_range(scene):
+    """(first, last) frame of the scene, or of its preview where that is on."""
+    if scene.use_preview_range:
+        return scene.frame_preview_start, scene.frame_preview_end
+    return scene.frame_start, scene.frame_end
+
+
 def involved(source, kind):
     """The objects, and what they hang on, whose animation a source's shape follows; each once."""
     style = settings_of(source).stylize

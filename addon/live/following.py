@@ -20,9 +20,9 @@ class Following(Solving):
         if self.requested is None or not alike(request, self.requested):
             self.requested, self.quiet = request, self.is_restored
             self.follows_animation, self.exact = frame != self.frame, None
-            known = self.follows_animation and self.frames is not None and self.frames.get(frame, request)
-            self.is_asked = bool(known)
-            if not known:
+            kept = None if self.frames is None else self.frames.get(frame, request)
+            self.is_asked = kept is not None and self.follows_animation
+            if not self.is_asked:
                 self.worker.request(request)
         self.frame = frame
         if self.follows_animation and not self.is_asked and self.rest is not None:  # the solver is set up

@@ -24,6 +24,7 @@ class SolvedFrames:
         self._changed = threading.Condition()
         self._wanted, self._kept = {}, {}  # frame: request; frame: (request, shape or error, edition)
         self._task, self._ended, self._edition, self._bytes = native.library().Task(), False, 0, 0
+        self.has_news = False  # whether another frame was solved since somebody looked
         self._thread = start_thread("frames", self._run, low_priority)
 
     def get(self, frame, request):
@@ -99,6 +100,7 @@ class SolvedFrames:
                     self._drop(next(iter(self._kept)))  # the one that was solved first
                 self._kept[frame] = request, shape, edition
                 self._bytes += size(shape)
+                self.has_news = True
                 self._changed.notify_all()
 
 

@@ -14,12 +14,14 @@ import bpy
 from ..blender import timers
 from ..blender.language import translated
 from ..blender.object_references import settings_of
+from ..blender.redraw import redraw
 from ..core.errors import UserError
 from ..core.runtime import jobs
 from ..field_modifier import motion
 from ..handles import empties
 from ..results import result_objects
 from . import live_object
+from .animated import scene_range
 from .following import scene_frame
 from .session import Changed, Session
 
@@ -155,7 +157,20 @@ def poll_live():
         return None
     if not live.is_rendering:
         update(bpy.context)
+        for session in live.values():
+            if session.frames is not None and session.frames.has_news:
+                session.frames.has_news = False
+                redraw(bpy.context, "UI")
     return INTERVAL
+
+
+def solved_frames(source, scene):
+    """(how many of the scene's frames live mode has solved, how many there are); None where none is."""
+    session = live.get(source.session_uid)
+    if session is None or session.frames is None:
+        return None
+    first, last = scene_range(scene)
+    return session.frames.count(first, last), last - first + 1
 
 
 def follow_frame(depsgraph):

@@ -38,7 +38,7 @@ def test_animated_handles_are_baked_into_keys():
 
 
 def stepped(**given):
-    """The bake operator as a window runs it, to be stepped by hand: its arguments are set on a plain object."""
+    """The bake operator as a window runs it, to be stepped by hand; a plain object has its arguments."""
     import types
 
     import addon.animation.operators as bake

@@ -202,7 +202,7 @@ def test_whatever_goes_wrong_is_named_and_the_last_good_cache_stays():
     from test_bake import cancelled_at, stepped
     from test_bake_cache import animated
 
-    bar, folder = animated()
+    _, folder = animated()
     bpy.ops.arapfields.bake(start=1, end=3)
     path = folder / "cache/Bar.pc2"
     good = path.read_bytes()

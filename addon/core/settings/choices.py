@@ -65,7 +65,12 @@ BAKE_FORMATS = (
     ("KEYS", "Shape Keys", "An object with one shape key a frame, all in the .blend: for short ranges"),
 )
 BAKE_KINDS = (
-    ("AUTO", "Automatic", "What is live; else the style where it follows the handles or is keyframed without any, or the handles"),
+    (
+        "AUTO",
+        "Automatic",
+        "What is live; else the deformation, or the style where it follows the handles, or has keyframes and "
+        "there are no handles",
+    ),
     ("DEFORM", "Deform", "What the handles do"),
     ("STYLIZE", "Stylize", "What the style does, and the handles where it follows them"),
 )
