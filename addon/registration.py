@@ -12,13 +12,20 @@ from .properties import item
 
 CONTENTS = [  # modules with CLASSES
     # what is stored in the .blend: object.arapfields
-    *("handles.properties", "pin_tool.properties", "properties.settings", "properties.item"),
+    *(
+        "handles.properties",
+        "pin_tool.properties",
+        "animation.properties",
+        "properties.settings",
+        "properties.item",
+    ),
     # features
     *("surface.operators", "surface.panel"),
     *("handles.operators", "handles.resizing", "handles.panel"),
     *("deform.operators", "deform.panel"),
     *("stylize.operators", "stylize.panel"),
     *("live.operators", "pin_tool.operators", "animation.operators"),
+    *("animation.export_operators", "animation.panel"),
     *("results.operators", "results.panel", "jobs.operators", "jobs.panel"),
     *("menus", "preferences"),
 ]

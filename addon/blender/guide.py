@@ -15,6 +15,7 @@ SETTINGS = {  # class of properties → page
     "ARAPFIELDS_PG_stylize": "stylize",
     "ARAPFIELDS_PG_handle": "handles",
     "ARAPFIELDS_PG_scene": "pins",
+    "ARAPFIELDS_PG_bake": "animation",
     "ARAPFIELDS_PG_object": "results",
 }
 LABELS = {
@@ -24,6 +25,7 @@ LABELS = {
     "deform": "Deform",
     "stylize": "Stylize",
     "results": "Result",
+    "animation": "Animation",
     "jobs": "Status",
 }
 pages = {}  # pattern of Blender's names → page, while the extension is on

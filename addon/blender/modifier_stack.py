@@ -10,6 +10,7 @@ import bpy
 
 from ..core.errors import UserError
 from ..names import FIELD_GROUP
+from .object_references import settings_of
 
 STAGE = "arapfields_stage"  # custom property of the scene that holds the copy
 FREE_NORMALS = "custom_normal"  # attribute of custom normals; free ones are vectors, Blender 4.5 and later
@@ -29,14 +30,24 @@ def find(source):
     return next((modifier for modifier in source.modifiers if is_field(modifier)), None)
 
 
+def find_cache(source):
+    """The modifier that plays the object's bake, or None."""
+    return next((modifier for modifier in source.modifiers if is_cache(modifier)), None)
+
+
+def is_cache(modifier):
+    return modifier.type == "MESH_CACHE" and modifier.persistent_uid == settings_of(modifier.id_data).bake.uid
+
+
 def is_field(modifier):
     return modifier.type == "NODES" and modifier.node_group is not None and FIELD_GROUP in modifier.node_group
 
 
 def place(source):
-    """Where the field modifier is in the stack, or would come: before what only refines the shape."""
+    """Where the field modifier is in the stack, or would come: at the cache that plays in its place, else
+    before what only refines the shape."""
     stack = list(source.modifiers)
-    found = next((index for index, modifier in enumerate(stack) if is_field(modifier)), None)
+    found = next((index for index, one in enumerate(stack) if is_field(one) or is_cache(one)), None)
     if found is not None:
         return found
     end = len(stack)
@@ -46,9 +57,9 @@ def place(source):
 
 
 def before(source, in_place):
-    """The modifiers that make the shape to work on: those before the place, else all but the field's."""
+    """The modifiers that make the shape to work on: those before the place, else all but ours."""
     stack = list(source.modifiers)
-    return stack[: place(source)] if in_place else [m for m in stack if not is_field(m)]
+    return stack[: place(source)] if in_place else [m for m in stack if not (is_field(m) or is_cache(m))]
 
 
 def shown_before(source, in_place):

@@ -20,10 +20,12 @@ from ..handles import empties
 from ..results import placement
 from ..stylize import preference
 from ..surface.source_surface import read_surface
+from .animated import frame_range
+from .following import Following, scene_frame
 from .live_modifier import PAUSING, LiveModifier
 from .live_object import LiveObject
-from .setup import differ_in_handles, energy_weights, layout_of, same
-from .solving import Solving
+from .request import Request
+from .setup import differ_in_handles, energy_weights, layout_of
 from .warm import warm
 
 PREVIEW_CELLS = 96  # at most, of the implicit surface that is shown while it moves
@@ -33,19 +35,31 @@ class Changed(Exception):
     """The source was edited, or its handles or settings: the solver must be set up again."""
 
 
-class Session(Solving):
+class Session(Following):
     """Reads its source when made, on the main thread; everything that takes time is done by the worker.
 
     `shown`: whether there is something to be seen of it; `display` is that of a session before it.
+    `in_place`: whether it works on the shape at the modifier's place; None: where it is shown there.
     `keeps`: what it shows is the user's work, which stays: bit for bit until a handle moves, and at the end.
     """
 
-    def __init__(self, context, source, kind="DEFORM", shown=True, follow=True, display=None, keeps=False):
+    def __init__(
+        self,
+        context,
+        source,
+        kind="DEFORM",
+        shown=True,
+        follow=True,
+        display=None,
+        keeps=False,
+        in_place=None,
+    ):
         self.keeps, self.quiet, self.is_restored = keeps, False, False
         settings = settings_of(source)
         self.source, self.kind, self.layout = ObjectReference(source), kind, layout_of(source, kind)
         self.output = settings.output
-        in_place = shown and placement.in_place(self.output, settings.target)
+        if in_place is None:
+            in_place = shown and placement.in_place(self.output, settings.target)
         self.surface = read_surface(context, source, in_place=in_place)
         self.surface.exact = settings.surface == "EXACT"
         self.moves_by_itself = in_place and has_motion_before(source)
@@ -62,6 +76,8 @@ class Session(Solving):
             None  # (n, 3) those that the solver moves, in local coordinates and solve space
         )
         self.worker, self.display = None, display if shown else None
+        if keeps or frame_range(source, kind) is None:
+            self.frame = scene_frame(context.scene)
         if shown:
             self.show_on(context, source, in_place)
             settings.live_kind = kind
@@ -111,9 +127,12 @@ class Session(Solving):
             run_to_completion(self.reading)
         self.look(bpy.context)
         self.worker.wait(seconds, refined)
+        if refined:
+            self.wait_for_frame(seconds)
 
     def stop(self):
         self.reading.close()
+        self.stop_frames()
         if self.worker is not None:
             self.worker.stop()
 
@@ -137,10 +156,7 @@ class Session(Solving):
             raise Changed
         if self.may_have_moved:
             self.read_points(context, source)
-        request = self.current_request(context, source)
-        if self.requested is None or not same(request, self.requested):
-            self.requested, self.quiet = request, self.is_restored
-            self.worker.request(request)
+        self.take(self.current_request(context, source), scene_frame(context.scene))
         if self.is_restored:
             self.is_restored, self.quiet = False, True
             self.display.before = motion.snapshot(source)
@@ -173,18 +189,17 @@ class Session(Solving):
         return mesh_arrays.fingerprint(source.data) != self.fingerprint
 
     def current_request(self, context, source, where=empties.matrix_of, seen=None):
-        """(targets of the handles, (key, directions, strength, sharpness, up) of the style or None, points,
-        handles).
+        """The Request of what the handles and settings are now.
 
         `where(object)` is the world matrix of one, and `seen` the source, as a render has them for instance.
         """
         space, settings = space_of(where(source), source.name), settings_of(seen or source).stylize
-        targets = []
+        energy, targets = energy_weights(settings_of(seen or source), self.kind), []
         if self.handles:
             current = empties.solve_handles(source, space, where=where)
             targets = [h.target[:3, 3] if h.kind == "POINT" else h.target for h in current]
         if self.kind != "STYLIZE":
-            return targets, None, self.placed, self.handles
+            return Request(targets, None, self.placed, self.handles, energy)
         style = preference.requested_style(settings, space, where=where)
         strength, sharpness = (
             from_single_precision(settings.strength),
@@ -192,13 +207,15 @@ class Session(Solving):
         )
         directions = style.directions(native.library())
         key = (*style.key(), strength, sharpness)
-        return targets, (key, directions, strength, sharpness, style.up), self.placed, self.handles
+        further = key, directions, strength, sharpness, style.up
+        return Request(targets, further, self.placed, self.handles, energy)
 
     def show(self):
         """Shows the newest shape; True when there was one."""
         shape, error = self.worker.poll() if self.worker is not None else (None, "")
         if error:
             raise UserError(error)
+        shape = self.of_frame(shape)
         if shape is None or self.quiet:
             return False
         return self.display.show(self.source.get(), shape)

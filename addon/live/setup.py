@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a live solver is set up for; where that changes, it is set up anew."""
 
-import numpy as np
-
 from ..blender import modifier_stack
 from ..blender.object_references import settings_of
 from ..blender.property_definitions import from_single_precision
@@ -30,11 +28,12 @@ def uses_handles(settings, kind):
 
 
 def layout_of(source, kind):
-    """What the solver was set up for: the handles and their rest regions, and what is shown."""
+    """What the solver was set up for: the handles and their rest regions, and what is shown. The energy's
+    weights are not among it: they may be animated."""
     settings = settings_of(source)
     held = [(e.empty.session_uid, e.kind, e.group, e.weight, tuple(e.rest)) for e in empties.used(source)]
     style = settings.stylize.region, settings.stylize.region_material
-    further = (*energy_weights(settings, kind).items(), settings.output, settings.target, settings.surface)
+    further = (settings.output, settings.target, settings.surface)
     if kind == "STYLIZE":
         further += (*style, settings.stylize.use_handles)
     used = uses_handles(settings, kind)
@@ -46,12 +45,3 @@ def stack_of(source):
     kept = modifier_stack.before(source, in_place=True)
     shown = [(modifier.name, modifier.type, modifier.show_viewport) for modifier in kept]
     return shown, source.data.users > 1
-
-
-def same(a, b):
-    """Whether two requests ask for the same."""
-    if (a[1] and a[1][0]) != (b[1] and b[1][0]):
-        return False
-    return (
-        a[2] is b[2] and a[3] is b[3] and all(np.array_equal(x, y) for x, y in zip(a[0], b[0], strict=True))
-    )
