@@ -15,12 +15,14 @@ SETTINGS = {  # class of properties → page
     "ARAPFIELDS_PG_stylize": "stylize",
     "ARAPFIELDS_PG_handle": "handles",
     "ARAPFIELDS_PG_scene": "pins",
+    "ARAPFIELDS_PG_carried": "characters",
     "ARAPFIELDS_PG_object": "results",
 }
 LABELS = {
     "surface": "Implicit Surface",
     "handles": "Handles",
     "pins": "Pins",
+    "characters": "Characters",
     "deform": "Deform",
     "stylize": "Stylize",
     "results": "Result",

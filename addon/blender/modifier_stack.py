@@ -10,6 +10,7 @@ import bpy
 
 from ..core.errors import UserError
 from ..names import FIELD_GROUP
+from .object_references import settings_of
 
 STAGE = "arapfields_stage"  # custom property of the scene that holds the copy
 FREE_NORMALS = "custom_normal"  # attribute of custom normals; free ones are vectors, Blender 4.5 and later
@@ -46,9 +47,25 @@ def place(source):
 
 
 def before(source, in_place):
-    """The modifiers that make the shape to work on: those before the place, else all but the field's."""
-    stack = list(source.modifiers)
-    return stack[: place(source)] if in_place else [m for m in stack if not is_field(m)]
+    """The modifiers that make the shape to work on: those before the place, else all but the field's.
+
+    Without the armatures whose bones are handles: the field does what they would do.
+    """
+    stack, rigs = list(source.modifiers), handle_rigs(source)
+    kept = stack[: place(source)] if in_place else [m for m in stack if not is_field(m)]
+    return [modifier for modifier in kept if not is_replaced(modifier, rigs)]
+
+
+def handle_rigs(source):
+    """The armatures whose bones are handles of an object, or of the one that carries it."""
+    owners = [source, settings_of(source).carried_by]
+    entries = [entry for owner in owners if owner is not None for entry in settings_of(owner).handles]
+    return [entry.rig for entry in entries if entry.kind == "BONE" and entry.rig is not None]
+
+
+def is_replaced(modifier, rigs):
+    """Whether a modifier poses by one of these armatures."""
+    return modifier.type == "ARMATURE" and modifier.object in rigs
 
 
 def shown_before(source, in_place):

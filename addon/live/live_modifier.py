@@ -7,7 +7,7 @@ from ..blender import modifier_stack
 from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..deform.solve_job import SolvedMesh
-from ..field_modifier import motion
+from ..field_modifier import armatures, motion
 from ..results import placement
 from .live_object import LIVE
 
@@ -19,6 +19,7 @@ class LiveModifier:
 
     def __init__(self, context, source, _):
         self.before, self.shown = motion.snapshot(source), None
+        self.was_silent = bool(settings_of(source).silenced)
         self.bind(context, source)
 
     def bind(self, context, source):
@@ -44,13 +45,19 @@ class LiveModifier:
             settings_of(source).live_kind = ""
             if source.mode != "EDIT":
                 motion.restore(source, self.before)
+                if not self.was_silent:
+                    armatures.restore(source)
 
     def keep(self, context, source, kind):
         """Leaves the motion where it is, or puts it where the user wants the result; returns the object."""
         settings = settings_of(source)
         settings.live_kind = ""
         target, shape = settings.target, self.shown
-        if target in ("REPLACE", "KEY") and shape is not None:
+        if (
+            target in ("REPLACE", "KEY")
+            and shape is not None
+            and not placement.refusal(source, "WARP", target)
+        ):
             solved = SolvedMesh(shape.points.astype(np.float64), None, {"output": LIVE})
             placement.place_result(context, source, kind, "WARP", target, solved, shape.rest)
         return source

@@ -10,6 +10,8 @@ from ..blender import mesh_arrays, modifier_stack, vertex_groups
 from ..blender.host import has_window
 from ..blender.object_references import ObjectReference, settings_of
 from ..blender.property_definitions import from_single_precision
+from ..carried.carrying import Carrying, Reshaped
+from ..carried.places import depsgraph_of
 from ..core.errors import UserError
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
@@ -36,11 +38,11 @@ class Changed(Exception):
 class Session(Solving):
     """Reads its source when made, on the main thread; everything that takes time is done by the worker.
 
-    `shown`: whether there is something to be seen of it; `display` is that of a session before it.
+    `shown`: whether there is something to be seen of it, which goes on from that of an `earlier` session.
     `keeps`: what it shows is the user's work, which stays: bit for bit until a handle moves, and at the end.
     """
 
-    def __init__(self, context, source, kind="DEFORM", shown=True, follow=True, display=None, keeps=False):
+    def __init__(self, context, source, kind="DEFORM", shown=True, follow=True, earlier=None, keeps=False):
         self.keeps, self.quiet, self.is_restored = keeps, False, False
         settings = settings_of(source)
         self.source, self.kind, self.layout = ObjectReference(source), kind, layout_of(source, kind)
@@ -61,16 +63,19 @@ class Session(Solving):
         self.points = self.rest = (
             None  # (n, 3) those that the solver moves, in local coordinates and solve space
         )
-        self.worker, self.display = None, display if shown else None
+        self.worker, self.display = None, earlier.display if shown and earlier else None
+        self.carrying, self.frames = Carrying(context, source), []
+        self.surface.together = self.carrying.solids(context, self.surface.space)
         if shown:
             self.show_on(context, source, in_place)
+            self.carrying.bind(context, earlier.carrying.before if earlier else None)
             settings.live_kind = kind
         self.reading = self.read(context, follow)
 
     def ready_solver(self):
-        return (
-            warm.take(self.surface, self.energy) if self.kind == "DEFORM" and self.surface.in_place else None
-        )
+        if self.kind != "DEFORM" or not self.surface.in_place or self.surface.together:
+            return None
+        return warm.take(self.surface, self.energy)
 
     def show_on(self, context, source, in_place):
         """Shows the shape where that belongs; what a session before made is used again, or goes."""
@@ -137,6 +142,7 @@ class Session(Solving):
             raise Changed
         if self.may_have_moved:
             self.read_points(context, source)
+        self.refresh_carried(context)
         request = self.current_request(context, source)
         if self.requested is None or not same(request, self.requested):
             self.requested, self.quiet = request, self.is_restored
@@ -144,6 +150,7 @@ class Session(Solving):
         if self.is_restored:
             self.is_restored, self.quiet = False, True
             self.display.before = motion.snapshot(source)
+            self.carrying.renew()
 
     def restored(self):
         """What the source and its handles are now came from elsewhere: an undone step, a cancelled drag.
@@ -165,6 +172,13 @@ class Session(Solving):
         if not np.array_equal(points, self.placed):
             self.placed = points
 
+    def refresh_carried(self, context):
+        """Reads again what of the carried objects may have been edited."""
+        try:
+            self.carrying.refresh(context)
+        except Reshaped:
+            raise Changed from None
+
     def is_edited(self, source):
         """Whether the source's mesh is another than when it was read; looked at after an update of it."""
         if not self.may_be_edited:
@@ -172,19 +186,21 @@ class Session(Solving):
         self.may_be_edited = False
         return mesh_arrays.fingerprint(source.data) != self.fingerprint
 
-    def current_request(self, context, source, where=empties.matrix_of, seen=None):
+    def current_request(self, context, source, where=empties.matrix_of, seen=None, depsgraph=None):
         """(targets of the handles, (key, directions, strength, sharpness, up) of the style or None, points,
-        handles).
+        handles, frames of what is carried).
 
-        `where(object)` is the world matrix of one, and `seen` the source, as a render has them for instance.
+        `where(object, bone)` is the world matrix of one, and `seen` the source, as a render's `depsgraph` has
+        them for instance.
         """
         space, settings = space_of(where(source), source.name), settings_of(seen or source).stylize
         targets = []
         if self.handles:
             current = empties.solve_handles(source, space, where=where)
             targets = [h.target[:3, 3] if h.kind == "POINT" else h.target for h in current]
+        frames = self.carrying.frames(space, depsgraph or depsgraph_of(context))
         if self.kind != "STYLIZE":
-            return targets, None, self.placed, self.handles
+            return targets, None, self.placed, self.handles, frames
         style = preference.requested_style(settings, space, where=where)
         strength, sharpness = (
             from_single_precision(settings.strength),
@@ -192,7 +208,7 @@ class Session(Solving):
         )
         directions = style.directions(native.library())
         key = (*style.key(), strength, sharpness)
-        return targets, (key, directions, strength, sharpness, style.up), self.placed, self.handles
+        return targets, (key, directions, strength, sharpness, style.up), self.placed, self.handles, frames
 
     def show(self):
         """Shows the newest shape; True when there was one."""
@@ -201,7 +217,15 @@ class Session(Solving):
             raise UserError(error)
         if shape is None or self.quiet:
             return False
-        return self.display.show(self.source.get(), shape)
+        shown = self.display.show(self.source.get(), shape)
+        if shown:
+            self.carrying.show(shape.carried)
+        return shown
+
+    def take_away(self, source):
+        """Everything looks as it did before; `source` is None where it is gone."""
+        self.display.take_away(source)
+        self.carrying.take_away()
 
     def show_last(self):
         """What the worker made before it ended; an error of it no longer matters."""

@@ -17,7 +17,7 @@ from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..core.runtime import jobs
 from ..field_modifier import motion
-from ..handles import empties
+from ..handles import empties, movers
 from ..results import result_objects
 from . import live_object
 from .session import Changed, Session
@@ -58,8 +58,9 @@ def begin(context, source, kind="DEFORM", keeps=False):
         earlier.stop()
     session = None
     try:
-        session = Session(context, source, kind, display=earlier.display if earlier else None, keeps=keeps)
+        session = Session(context, source, kind, earlier=earlier, keeps=keeps)
         session.advance()  # a small mesh is read at once
+        tell(session)
     except UserError:
         if session or earlier:
             take_away(session or earlier)
@@ -77,7 +78,7 @@ def end(context, source, keep=False):
     session.show_last()
     if keep:
         return session.display.keep(context, source, session.kind)
-    session.display.take_away(source)
+    session.take_away(source)
     return None
 
 
@@ -96,10 +97,17 @@ def update(context, wait=0.0, refined=False):
             if wait:
                 session.wait(wait, refined)
             session.show()
+            tell(session)
         except Changed:
             restart(context, uid, session)
         except (UserError, ValueError, ReferenceError) as error:
             give_up(uid, session, error)
+
+
+def tell(session):
+    """Names the carried objects that are left out."""
+    for reason in session.carrying.take_warnings():
+        jobs.add_message("WARNING", f"{session.source.name}: {translated(reason)}")
 
 
 def give_up(uid, session, error):
@@ -113,7 +121,7 @@ def give_up(uid, session, error):
 def take_away(session):
     """Takes the live shape away, also where an undone step left the source or the shape in no scene."""
     with contextlib.suppress(UserError, ReferenceError, AttributeError):
-        session.display.take_away(session.source.find())
+        session.take_away(session.source.find())
 
 
 def watch(depsgraph):
@@ -122,7 +130,10 @@ def watch(depsgraph):
         return
     updated = [(u.id.original, u.is_updated_geometry) for u in depsgraph.updates]
     meshes = {item.session_uid for item, shape in updated if shape and isinstance(item, bpy.types.Mesh)}
+    objects = {item.session_uid for item, shape in updated if shape and isinstance(item, bpy.types.Object)}
+    data = {item.session_uid for item, _ in updated if not isinstance(item, bpy.types.Object)}
     for session in live.values():
+        session.carrying.watch(objects, data)
         source = session.source.find()
         if source is None:
             continue
@@ -169,7 +180,7 @@ def follow_frame(depsgraph):
             warn_of_hidden(source, session, depsgraph)
             seen = source.evaluated_get(depsgraph)
             where = functools.partial(rendered_matrix, depsgraph=depsgraph)
-            request = session.current_request(bpy.context, source, where, seen)
+            request = session.current_request(bpy.context, source, where, seen, depsgraph)
             session.requested = request
             session.worker.request(request)
             session.worker.wait(WAIT, refined=True)
@@ -183,7 +194,8 @@ def follow_frame(depsgraph):
 def warn_of_hidden(source, session, depsgraph):
     """Says once which handles a render does not see, and so cannot follow."""
     there = {item.original.session_uid for item in depsgraph.ids}
-    hidden = [e.empty.name for e in empties.used(source) if e.empty.session_uid not in there]
+    used = empties.used(source)
+    hidden = [movers.name_of(e) for e in used if movers.mover_of(e).session_uid not in there]
     if hidden and session.handles:
         text = translated(
             "{names} is hidden in renders, which therefore do not follow it", names=", ".join(hidden)
@@ -193,8 +205,8 @@ def warn_of_hidden(source, session, depsgraph):
             jobs.add_message(*message)
 
 
-def rendered_matrix(item, depsgraph):
-    return empties.matrix_of(item.original.evaluated_get(depsgraph))
+def rendered_matrix(item, bone="", *, depsgraph):
+    return empties.matrix_of(item.original.evaluated_get(depsgraph), bone)
 
 
 def recover():

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a live session's worker does: the solver is set up, then makes a shape for each request."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -29,6 +29,7 @@ class Shape:
     rest: np.ndarray | None  # (n, 3) where the source's own points are without the field; None for surfaces
     turns: np.ndarray | None = None  # (n, 3) axis · angle, for free custom normals
     topology: Topology | None = None
+    carried: list = field(default_factory=list)  # what Carrying.moved made
 
 
 class Solving:
@@ -81,7 +82,7 @@ class Solving:
         return self.shape(self.solver.tracked())
 
     def solve(self, request, **further):
-        targets, style, points, handles = request
+        targets, style, points, handles, self.frames = request
         self.follow_points(points)
         if handles is not self.bound:
             af = native.library()
@@ -105,10 +106,12 @@ class Solving:
         yield self.shape(self.solver.field(self.rest))
 
     def shape(self, solved):
+        field = self.solver.field if self.frames or self.surface.has_free_normals else None
+        carried = self.carrying.moved(native.library(), self.samples, field, self.frames)
         if self.topology is not None:
-            return Shape(self.local(solved), None, topology=self.topology)
-        turns = self.surface.turns(self.solver.field, self.rest) if self.surface.in_place else None
-        return Shape(self.local(solved), np.asarray(self.points, dtype=np.float32), turns)
+            return Shape(self.local(solved), None, topology=self.topology, carried=carried)
+        turns = self.surface.turns(field, self.rest) if self.surface.in_place else None
+        return Shape(self.local(solved), np.asarray(self.points, dtype=np.float32), turns, carried=carried)
 
     def local(self, solved):
         if not np.isfinite(solved).all():
