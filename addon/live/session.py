@@ -64,7 +64,7 @@ class Session(Solving):
             None  # (n, 3) those that the solver moves, in local coordinates and solve space
         )
         self.worker, self.display = None, earlier.display if shown and earlier else None
-        self.carrying, self.frames = Carrying(context, source), []
+        self.carrying, self.riding = Carrying(context, source), []
         self.surface.together = self.carrying.solids(context, self.surface.space)
         if shown:
             self.show_on(context, source, in_place)

@@ -82,7 +82,7 @@ class Solving:
         return self.shape(self.solver.tracked())
 
     def solve(self, request, **further):
-        targets, style, points, handles, self.frames = request
+        targets, style, points, handles, self.riding = request
         self.follow_points(points)
         if handles is not self.bound:
             af = native.library()
@@ -106,8 +106,8 @@ class Solving:
         yield self.shape(self.solver.field(self.rest))
 
     def shape(self, solved):
-        field = self.solver.field if self.frames or self.surface.has_free_normals else None
-        carried = self.carrying.moved(native.library(), self.samples, field, self.frames)
+        field = self.solver.field if self.riding or self.surface.has_free_normals else None
+        carried = self.carrying.moved(native.library(), self.samples, field, self.riding)
         if self.topology is not None:
             return Shape(self.local(solved), None, topology=self.topology, carried=carried)
         turns = self.surface.turns(field, self.rest) if self.surface.in_place else None
