@@ -66,6 +66,8 @@ def after_render(*_):
 def after_frame(scene, depsgraph):
     if sessions.live.is_rendering:
         sessions.follow_frame(depsgraph)
+    elif sessions.live and not modifier_stack.is_stage(scene):
+        sessions.show_frame()
 
 
 HANDLERS = {  # of bpy.app.handlers

@@ -30,6 +30,7 @@ class ARAPFIELDS_MT_object(bpy.types.Menu):
         layout.operator(Op.LIVE, text="Live Stylize", icon=icon).kind = "STYLIZE"
         layout.operator(Op.LIVE_KEEP, icon="CHECKMARK")
         layout.operator(Op.BAKE, icon="REC")
+        layout.operator_menu_enum(Op.EXPORT, "format", text="Export Animation", icon="EXPORT")
         layout.separator()
         layout.operator(Op.FIT, icon="MOD_REMESH")
         layout.operator(Op.EXTRACT, icon="OUTLINER_OB_SURFACE")

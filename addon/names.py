@@ -13,6 +13,7 @@ WARP_KEY = "ARAP Fields"  # shape key that carries the motion
 FIELD_MODIFIER = "ARAP Fields"  # modifier that carries the motion, and its node group
 OFFSETS = "ARAP Fields"  # point attribute of the motion: an offset in the object's coordinates
 TURNS = "ARAP Fields Turns"  # and how free custom normals turn: axis · angle
+CACHE_MODIFIER = "ARAP Fields Cache"  # Blender's Mesh Cache modifier that plays a bake
 FIELD_GROUP = "arapfields_group"  # custom property of that modifier's node groups: which, and its version
 RESULT_SUFFIX = {
     "DEFORM": "_deformed",
@@ -46,6 +47,8 @@ class Op(StrEnum):
     REMOVE_FIELD = "arapfields.remove_field"
     MIRROR_HANDLE = "arapfields.mirror_handle"
     BAKE = "arapfields.bake"
+    REMOVE_BAKE = "arapfields.remove_bake"
+    EXPORT = "arapfields.export_animation"
     PIN_TOOL = "arapfields.pin_tool"
     PIN_HOVER = "arapfields.pin_hover"
     PIN_DRAG = "arapfields.pin_drag"

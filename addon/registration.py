@@ -12,7 +12,7 @@ from .properties import item
 
 CONTENTS = [  # modules with CLASSES
     # what is stored in the .blend: object.arapfields
-    *("handles.properties", "pin_tool.properties", "properties.settings"),
+    *("handles.properties", "pin_tool.properties", "animation.properties", "properties.settings"),
     *("carried.properties", "properties.item"),
     # features
     *("surface.operators", "surface.panel"),
@@ -21,6 +21,7 @@ CONTENTS = [  # modules with CLASSES
     *("stylize.operators", "stylize.panel"),
     *("carried.operators", "carried.panel"),
     *("live.operators", "pin_tool.operators", "animation.operators"),
+    *("animation.export_operators", "animation.panel"),
     *("results.operators", "results.panel", "jobs.operators", "jobs.panel"),
     *("menus", "preferences"),
 ]

@@ -30,14 +30,24 @@ def find(source):
     return next((modifier for modifier in source.modifiers if is_field(modifier)), None)
 
 
+def find_cache(source):
+    """The modifier that plays the object's bake, or None."""
+    return next((modifier for modifier in source.modifiers if is_cache(modifier)), None)
+
+
+def is_cache(modifier):
+    return modifier.type == "MESH_CACHE" and modifier.persistent_uid == settings_of(modifier.id_data).bake.uid
+
+
 def is_field(modifier):
     return modifier.type == "NODES" and modifier.node_group is not None and FIELD_GROUP in modifier.node_group
 
 
 def place(source):
-    """Where the field modifier is in the stack, or would come: before what only refines the shape."""
+    """Where the field modifier is in the stack, or would come: at the cache that plays in its place, else
+    before what only refines the shape."""
     stack = list(source.modifiers)
-    found = next((index for index, modifier in enumerate(stack) if is_field(modifier)), None)
+    found = next((index for index, one in enumerate(stack) if is_field(one) or is_cache(one)), None)
     if found is not None:
         return found
     end = len(stack)
@@ -47,12 +57,12 @@ def place(source):
 
 
 def before(source, in_place):
-    """The modifiers that make the shape to work on: those before the place, else all but the field's.
+    """The modifiers that make the shape to work on: those before the place, else all but ours.
 
     Without the armatures whose bones are handles: the field does what they would do.
     """
     stack, rigs = list(source.modifiers), handle_rigs(source)
-    kept = stack[: place(source)] if in_place else [m for m in stack if not is_field(m)]
+    kept = stack[: place(source)] if in_place else [m for m in stack if not (is_field(m) or is_cache(m))]
     return [modifier for modifier in kept if not is_replaced(modifier, rigs)]
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from ..blender import modifier_stack
 from ..core.errors import UserError
 from ..names import FIELD_MODIFIER, HELPER_SUFFIX, OFFSETS, TURNS
-from . import armatures, inputs, node_group
+from . import armatures, cache_modifier, inputs, node_group
 
 written = set()  # session_uid of objects that were moved since Blender's last update, which is ours alone
 
@@ -43,6 +43,7 @@ def bind(context, source):
     modifier = modifier_stack.find(source)
     armatures.silence(source)
     made = None
+    cache_modifier.suspend(source)
     with modifier_stack.evaluated_mesh(context, source, in_place=True) as mesh:
         normals, count = modifier_stack.free_normals(mesh), len(mesh.vertices)
     on_mesh = lies_on_mesh(source)

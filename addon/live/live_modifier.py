@@ -7,7 +7,7 @@ from ..blender import modifier_stack
 from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..deform.solve_job import SolvedMesh
-from ..field_modifier import armatures, motion
+from ..field_modifier import armatures, cache_modifier, motion
 from ..results import placement
 from .live_object import LIVE
 
@@ -20,6 +20,7 @@ class LiveModifier:
     def __init__(self, context, source, _):
         self.before, self.shown = motion.snapshot(source), None
         self.was_silent = bool(settings_of(source).silenced)
+        self.was_playing = cache_modifier.is_playing(source)
         self.bind(context, source)
 
     def bind(self, context, source):
@@ -47,6 +48,8 @@ class LiveModifier:
                 motion.restore(source, self.before)
                 if not self.was_silent:
                     armatures.restore(source)
+                if self.was_playing:
+                    cache_modifier.set_playing(source, True)
 
     def keep(self, context, source, kind):
         """Leaves the motion where it is, or puts it where the user wants the result; returns the object."""

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The buttons of live mode, which the sections of deforming and stylizing show."""
 
+import bpy
+
+from ..blender.language import translated
 from ..names import Op
 from . import sessions
 
@@ -13,5 +16,10 @@ def live_buttons(layout, source, kind, refusal):
     start = row.row(align=True)
     start.enabled = on or refusal is None
     start.operator(Op.LIVE, icon="PAUSE" if on else "PLAY", depress=on).kind = kind
+    solved = sessions.solved_frames(source, bpy.context.scene) if on else None
+    if solved is not None:
+        count, total = solved
+        text = translated("{count} of {total} frames solved", count=count, total=total)
+        layout.progress(factor=count / max(1, total), text=text)
     if on:
         row.operator(Op.LIVE_KEEP, icon="CHECKMARK")

@@ -22,10 +22,12 @@ from ..handles import empties
 from ..results import placement
 from ..stylize import preference
 from ..surface.source_surface import read_surface
+from .animated import frame_range
+from .following import Following, scene_frame
 from .live_modifier import PAUSING, LiveModifier
 from .live_object import LiveObject
-from .setup import differ_in_handles, energy_weights, layout_of, same
-from .solving import Solving
+from .request import Request
+from .setup import differ_in_handles, energy_weights, has_motion_before, layout_of
 from .warm import warm
 
 PREVIEW_CELLS = 96  # at most, of the implicit surface that is shown while it moves
@@ -35,19 +37,31 @@ class Changed(Exception):
     """The source was edited, or its handles or settings: the solver must be set up again."""
 
 
-class Session(Solving):
+class Session(Following):
     """Reads its source when made, on the main thread; everything that takes time is done by the worker.
 
     `shown`: whether there is something to be seen of it, which goes on from that of an `earlier` session.
+    `in_place`: whether it works on the shape at the modifier's place; None: where it is shown there.
     `keeps`: what it shows is the user's work, which stays: bit for bit until a handle moves, and at the end.
     """
 
-    def __init__(self, context, source, kind="DEFORM", shown=True, follow=True, earlier=None, keeps=False):
+    def __init__(
+        self,
+        context,
+        source,
+        kind="DEFORM",
+        shown=True,
+        follow=True,
+        earlier=None,
+        keeps=False,
+        in_place=None,
+    ):
         self.keeps, self.quiet, self.is_restored = keeps, False, False
         settings = settings_of(source)
         self.source, self.kind, self.layout = ObjectReference(source), kind, layout_of(source, kind)
         self.output = settings.output
-        in_place = shown and placement.in_place(self.output, settings.target)
+        if in_place is None:
+            in_place = shown and placement.in_place(self.output, settings.target)
         self.surface = read_surface(context, source, in_place=in_place)
         self.surface.exact = settings.surface == "EXACT"
         self.moves_by_itself = in_place and has_motion_before(source)
@@ -66,6 +80,8 @@ class Session(Solving):
         self.worker, self.display = None, earlier.display if shown and earlier else None
         self.carrying, self.riding = Carrying(context, source), []
         self.surface.together = self.carrying.solids(context, self.surface.space)
+        if keeps or frame_range(source, kind) is None:
+            self.frame = scene_frame(context.scene)
         if shown:
             self.show_on(context, source, in_place)
             self.carrying.bind(context, earlier.carrying.before if earlier else None)
@@ -116,9 +132,12 @@ class Session(Solving):
             run_to_completion(self.reading)
         self.look(bpy.context)
         self.worker.wait(seconds, refined)
+        if refined:
+            self.wait_for_frame(seconds)
 
     def stop(self):
         self.reading.close()
+        self.stop_frames()
         if self.worker is not None:
             self.worker.stop()
 
@@ -143,10 +162,7 @@ class Session(Solving):
         if self.may_have_moved:
             self.read_points(context, source)
         self.refresh_carried(context)
-        request = self.current_request(context, source)
-        if self.requested is None or not same(request, self.requested):
-            self.requested, self.quiet = request, self.is_restored
-            self.worker.request(request)
+        self.take(self.current_request(context, source), scene_frame(context.scene))
         if self.is_restored:
             self.is_restored, self.quiet = False, True
             self.display.before = motion.snapshot(source)
@@ -187,20 +203,19 @@ class Session(Solving):
         return mesh_arrays.fingerprint(source.data) != self.fingerprint
 
     def current_request(self, context, source, where=empties.matrix_of, seen=None, depsgraph=None):
-        """(targets of the handles, (key, directions, strength, sharpness, up) of the style or None, points,
-        handles, frames of what is carried).
+        """The Request of what the handles and settings are now.
 
         `where(object, bone)` is the world matrix of one, and `seen` the source, as a render's `depsgraph` has
         them for instance.
         """
         space, settings = space_of(where(source), source.name), settings_of(seen or source).stylize
-        targets = []
+        energy, targets = energy_weights(settings_of(seen or source), self.kind), []
         if self.handles:
             current = empties.solve_handles(source, space, where=where)
             targets = [h.target[:3, 3] if h.kind == "POINT" else h.target for h in current]
         frames = self.carrying.frames(space, depsgraph or depsgraph_of(context))
         if self.kind != "STYLIZE":
-            return targets, None, self.placed, self.handles, frames
+            return Request(targets, None, self.placed, self.handles, energy, frames)
         style = preference.requested_style(settings, space, where=where)
         strength, sharpness = (
             from_single_precision(settings.strength),
@@ -208,13 +223,15 @@ class Session(Solving):
         )
         directions = style.directions(native.library())
         key = (*style.key(), strength, sharpness)
-        return targets, (key, directions, strength, sharpness, style.up), self.placed, self.handles, frames
+        further = key, directions, strength, sharpness, style.up
+        return Request(targets, further, self.placed, self.handles, energy, frames)
 
     def show(self):
         """Shows the newest shape; True when there was one."""
         shape, error = self.worker.poll() if self.worker is not None else (None, "")
         if error:
             raise UserError(error)
+        shape = self.of_frame(shape)
         if shape is None or self.quiet:
             return False
         shown = self.display.show(self.source.get(), shape)
@@ -231,8 +248,3 @@ class Session(Solving):
         """What the worker made before it ended; an error of it no longer matters."""
         with contextlib.suppress(UserError, ReferenceError):
             self.show()
-
-
-def has_motion_before(source):
-    """Whether the points at the field's place may move without an edit of the mesh."""
-    return bool(modifier_stack.shown_before(source, in_place=True)) or source.data.shape_keys is not None

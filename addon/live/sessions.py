@@ -14,13 +14,17 @@ import bpy
 from ..blender import timers
 from ..blender.language import translated
 from ..blender.object_references import settings_of
+from ..blender.redraw import redraw
 from ..core.errors import UserError
 from ..core.runtime import jobs
 from ..field_modifier import motion
 from ..handles import empties, movers
 from ..results import result_objects
 from . import live_object
+from .animated import scene_range
+from .following import scene_frame
 from .session import Changed, Session
+from .setup import moves
 
 INTERVAL = 1 / 60  # seconds between looks at the handles
 WAIT = 30.0  # seconds at most that a script waits for the first shape
@@ -143,13 +147,6 @@ def watch(depsgraph):
             session.may_have_moved = True
 
 
-def moves(item, source):
-    """Whether an update of this may move the points of the source before its field does."""
-    if isinstance(item, bpy.types.Object):
-        return item == source or (item.type != "EMPTY" or settings_of(item).handle_of != source)
-    return isinstance(item, bpy.types.Key | bpy.types.Armature | bpy.types.Lattice | bpy.types.Curve)
-
-
 def restart(context, uid, session):
     """The source or its handles changed: the solver is set up anew, the shape stays where it is."""
     source = session.source.get()
@@ -165,7 +162,20 @@ def poll_live():
         return None
     if not live.is_rendering:
         update(bpy.context)
+        for session in live.values():
+            if session.frames is not None and session.frames.has_news:
+                session.frames.has_news = False
+                redraw(bpy.context, "UI")
     return INTERVAL
+
+
+def solved_frames(source, scene):
+    """(how many of the scene's frames live mode has solved, how many there are); None where none is."""
+    session = live.get(source.session_uid)
+    if session is None or session.frames is None:
+        return None
+    first, last = scene_range(scene)
+    return session.frames.count(first, last), last - first + 1
 
 
 def follow_frame(depsgraph):
@@ -181,14 +191,23 @@ def follow_frame(depsgraph):
             seen = source.evaluated_get(depsgraph)
             where = functools.partial(rendered_matrix, depsgraph=depsgraph)
             request = session.current_request(bpy.context, source, where, seen, depsgraph)
-            session.requested = request
-            session.worker.request(request)
+            session.take(request, scene_frame(depsgraph.scene))
             session.worker.wait(WAIT, refined=True)
+            session.wait_for_frame(WAIT)
             session.show()
         except Changed:
             continue
         except (UserError, ValueError, ReferenceError) as error:
             give_up(uid, session, error)
+
+
+def show_frame():
+    """Shows frames that are solved already as the scene comes to them, in the same picture."""
+    for session in list(live.values()):
+        if session.frames is not None:
+            with contextlib.suppress(Changed, UserError, ValueError, ReferenceError):  # the timer tells
+                session.look(bpy.context)
+                session.show()
 
 
 def warn_of_hidden(source, session, depsgraph):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a live solver is set up for; where that changes, it is set up anew."""
 
-import numpy as np
+import bpy
 
 from ..blender import modifier_stack
 from ..blender.object_references import settings_of
@@ -30,14 +30,15 @@ def uses_handles(settings, kind):
 
 
 def layout_of(source, kind):
-    """What the solver was set up for: the handles and their rest regions, and what is shown."""
+    """What the solver was set up for: the handles and their rest regions, and what is shown. The energy's
+    weights are not among it: they may be animated."""
     settings = settings_of(source)
     held = [
         (movers.key_of(e), e.kind, e.group, e.weight, e.hold_from, tuple(e.rest))
         for e in empties.used(source)
     ]
     style = settings.stylize.region, settings.stylize.region_material
-    further = (*energy_weights(settings, kind).items(), settings.output, settings.target, settings.surface)
+    further = (settings.output, settings.target, settings.surface)
     if kind == "STYLIZE":
         further += (*style, settings.stylize.use_handles)
     further += tuple((e.item.session_uid if e.item else 0, e.way) for e in settings.carried)
@@ -52,12 +53,13 @@ def stack_of(source):
     return shown, source.data.users > 1
 
 
-def same(a, b):
-    """Whether two requests ask for the same."""
-    if (a[1] and a[1][0]) != (b[1] and b[1][0]) or len(a[4]) != len(b[4]):
-        return False
-    if not all(one.same(other) for one, other in zip(a[4], b[4], strict=True)):
-        return False
-    return (
-        a[2] is b[2] and a[3] is b[3] and all(np.array_equal(x, y) for x, y in zip(a[0], b[0], strict=True))
-    )
+def has_motion_before(source):
+    """Whether the points at the field's place may move without an edit of the mesh."""
+    return bool(modifier_stack.shown_before(source, in_place=True)) or source.data.shape_keys is not None
+
+
+def moves(item, source):
+    """Whether an update of this may move the points of the source before its field does."""
+    if isinstance(item, bpy.types.Object):
+        return item == source or (item.type != "EMPTY" or settings_of(item).handle_of != source)
+    return isinstance(item, bpy.types.Key | bpy.types.Armature | bpy.types.Lattice | bpy.types.Curve)

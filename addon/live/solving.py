@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a live session's worker does: the solver is set up, then makes a shape for each request."""
 
+import copy
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -35,6 +36,9 @@ class Shape:
 class Solving:
     """Mixin of a session: all of this runs on its worker, or on another thread than the main one."""
 
+    single = None  # the points that the solver moves, and these in single precision
+    follows_animation = False  # whether what is asked for came with another frame, rather than by a drag
+
     def prepare(self):
         """Sets the solver up; on the worker."""
         af, surface = native.library(), self.surface
@@ -45,7 +49,18 @@ class Solving:
             return
         own_triangles = surface.exact and self.output == "WARP"
         self.samples = surface.samples(ProgressTracker(af.Task), SAMPLES, 0, own_triangles)
-        options = {**self.energy}
+        if self.kind == "STYLIZE" and self.weights is not None:
+            self.weights = vertex_groups.at_points(surface.vertices, self.weights, self.samples.points)
+        self.make_solver(self.handles, self.energy)
+        if self.output != "WARP":
+            self.rest, self.topology = surface.extract(ProgressTracker(af.Task), self.cells, 0.1)
+            self.solver.track(self.rest)
+        else:
+            self.follow_points(surface.local)
+
+    def make_solver(self, handles, energy):
+        """A solver for these handles and weights of the energy's terms, which moves nothing yet."""
+        af, options = native.library(), {**energy}
         if self.kind == "STYLIZE":
             options |= STYLE[2]
             # The live energy has stretch and bend with weight 1: all others are relative to it.
@@ -53,18 +68,13 @@ class Solving:
             options["gauss_weight"] = af.LiveOptions().gauss_weight
             for name in ("barrier", "gauss_weight", "keep_stance", "handle_weight"):
                 options[name] /= rigidity
-            if self.weights is not None:
-                self.weights = vertex_groups.at_points(surface.vertices, self.weights, self.samples.points)
-        self.bound = self.handles
-        handles = native_handles(af, self.bound, surface, self.samples)
-        options["interior"] = bool(handles)  # a style alone acts everywhere alike
+        self.bound, self.energy, self.style_set = handles, energy, None
+        held = native_handles(af, handles, self.surface, self.samples)
+        options["interior"] = bool(held)  # a style alone acts everywhere alike
         options |= supported_options(af.LiveOptions, machine_options())
-        self.solver = af.LiveDeformer(self.samples, handles, af.LiveOptions(**options))
-        if self.output != "WARP":
-            self.rest, self.topology = surface.extract(ProgressTracker(af.Task), self.cells, 0.1)
+        self.solver = af.LiveDeformer(self.samples, held, af.LiveOptions(**options))
+        if self.rest is not None:
             self.solver.track(self.rest)
-        else:
-            self.follow_points(surface.local)
 
     def ready_solver(self):
         """(samples, solver) of this surface without handles, where one is set up; or None."""
@@ -81,9 +91,24 @@ class Solving:
         self.solve(request)
         return self.shape(self.solver.tracked())
 
+    def twin(self):
+        """The same with a solver of its own, for another thread; the samples and the surface are shared."""
+        other = copy.copy(self)
+        other.make_solver(self.bound, self.energy)
+        return other
+
+    def solve_from_rest(self, request, task=None):
+        """The request's own shape, whatever was solved before it: the same bits on any thread."""
+        self.solver.reset()
+        steps = REFINEMENTS * STEPS_AT_ONCE
+        self.solve(request, iterations=steps, tolerance=FINE_TOLERANCE, task=task)
+        return self.shape(self.solver.field(self.rest))
+
     def solve(self, request, **further):
-        targets, style, points, handles, self.riding = request
+        targets, style, points, handles, energy, self.riding = request
         self.follow_points(points)
+        if energy != self.energy:
+            self.make_solver(handles, energy)
         if handles is not self.bound:
             af = native.library()
             self.solver.set_handles(native_handles(af, handles, self.surface, self.samples))
@@ -95,7 +120,10 @@ class Solving:
         self.solver.solve(targets if handles else None, **further)
 
     def refined(self, request, token):
-        """Better and better shapes, until the energy falls no more; on the worker."""
+        """Better and better shapes, until the energy falls no more; on the worker. None where another thread
+        solves the frame from rest."""
+        if self.follows_animation:
+            return
         for _ in range(REFINEMENTS):
             self.solve(request, iterations=STEPS_AT_ONCE, tolerance=FINE_TOLERANCE)
             if token.cancelled:
@@ -111,7 +139,9 @@ class Solving:
         if self.topology is not None:
             return Shape(self.local(solved), None, topology=self.topology, carried=carried)
         turns = self.surface.turns(field, self.rest) if self.surface.in_place else None
-        return Shape(self.local(solved), np.asarray(self.points, dtype=np.float32), turns, carried=carried)
+        if self.single is None or self.single[0] is not self.points:
+            self.single = self.points, np.asarray(self.points, dtype=np.float32)
+        return Shape(self.local(solved), self.single[1], turns, carried=carried)
 
     def local(self, solved):
         if not np.isfinite(solved).all():

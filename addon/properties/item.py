@@ -3,6 +3,7 @@
 
 import bpy
 
+from ..animation.properties import ARAPFIELDS_PG_bake
 from ..blender.object_references import owner_of, settings_of
 from ..blender.property_definitions import annotations
 from ..blender.selection import row_chosen
@@ -58,6 +59,9 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     )
     stylize: bpy.props.PointerProperty(
         type=ARAPFIELDS_PG_stylize, name="Stylize", description="Settings of the stylization"
+    )
+    bake: bpy.props.PointerProperty(
+        type=ARAPFIELDS_PG_bake, name="Bake", description="Settings of bakes, and what the last one is"
     )
     handles: bpy.props.CollectionProperty(
         type=ARAPFIELDS_PG_handle,

@@ -16,7 +16,6 @@ class ARAPFIELDS_PT_result(Advanced, bpy.types.Panel):
         layout = self.layout
         layout.prop(settings, "output")
         layout.prop(settings, "target")
-        layout.operator(Op.BAKE, icon="REC")
         layout.prop(settings, "resolution")
         layout.prop(settings, "refine_thin")
         layout.prop(settings, "normals")

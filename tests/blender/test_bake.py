@@ -24,7 +24,7 @@ def test_animated_handles_are_baked_into_keys():
 
     bar = animated()
     bpy.context.scene.frame_set(3)
-    assert bpy.ops.arapfields.bake(start=1, end=5, step=2) == {"FINISHED"}
+    assert bpy.ops.arapfields.bake(format="KEYS", start=1, end=5, step=2) == {"FINISHED"}
     assert bpy.context.scene.frame_current == 3
     result = bpy.data.objects["Bar_baked"]
     assert [k.name for k in result.data.shape_keys.key_blocks[1:]] == ["frame 1", "frame 3", "frame 5"]
@@ -37,15 +37,50 @@ def test_animated_handles_are_baked_into_keys():
     assert np.all(np.diff(heights) > 0.1)
 
 
-@in_blender
-def test_a_cancelled_bake_leaves_nothing():
-    """Stepped as a window would: cancelled while reading, while solving and while storing."""
-    import bpy
-    from test_bake import animated
+def stepped(**given):
+    """The bake operator as a window runs it, to be stepped by hand; a plain object has its arguments."""
+    import types
 
     import addon.animation.operators as bake
+
+    class Operator(bake.BakeOperator):
+        title, in_window, scope, filepath = "Bake", False, "ACTIVE", given.pop("filepath", "")
+        prepare, warn_of_weight = bake.ARAPFIELDS_OT_bake.prepare, bake.ARAPFIELDS_OT_bake.warn_of_weight
+        properties = types.SimpleNamespace(is_property_set=lambda name: name in given)
+
+        def add_message(self, level, text):
+            self.said = text
+
+    for name, value in given.items():
+        setattr(Operator, name, value)
+    return Operator()
+
+
+def cancelled_at(operator, stage):
+    """Steps it, cancels it when it says this, and returns what the operator does."""
+    import bpy
+
     from addon.core.runtime import jobs
     from addon.core.runtime.coroutines import Pause
+
+    coroutine = operator.coroutine(bpy.context)
+    try:
+        while True:
+            if next(coroutine) is Pause.WORKER:
+                jobs.running().join(0.001)
+            if stage in jobs.running().message:
+                jobs.running().cancel()
+    except StopIteration as ended:
+        return ended.value
+    finally:
+        jobs.stop()
+
+
+@in_blender
+def test_a_cancelled_bake_leaves_nothing():
+    """Stepped as a window would: cancelled while solving and while storing."""
+    import bpy
+    from test_bake import animated, cancelled_at, stepped
 
     bar = animated()
 
@@ -54,31 +89,29 @@ def test_a_cancelled_bake_leaves_nothing():
         return [sorted(kind.keys()) for kind in kinds]
 
     before = names()
-
-    class Operator:
-        title, start, end, step = "Bake", 1, 5, 1
-        in_window = False
-        coroutine, prepare = bake.ARAPFIELDS_OT_bake.coroutine, bake.ARAPFIELDS_OT_bake.prepare
-        read = bake.ARAPFIELDS_OT_bake.read
-        conclude, apply_one = bake.JobOperator.conclude, bake.JobOperator.apply_one
-
-        def add_message(self, level, text):
-            self.said = text
-
-    for stage in ("Reading frame 3", "frame 2", "Storing frame 3"):
-        operator = Operator()
-        coroutine, result = operator.coroutine(bpy.context), None
-        while result is None:
-            try:
-                if next(coroutine) is Pause.WORKER:
-                    jobs.running().join(0.001)
-            except StopIteration as ended:
-                result = ended.value
-                break
-            if stage in jobs.running().message:
-                jobs.running().cancel()
-        jobs.stop()
-        assert result == {"CANCELLED"}, stage
+    for stage in ("frame 2", "Storing frame 3"):
+        operator = stepped(format="KEYS", start=1, end=5)
+        assert cancelled_at(operator, stage) == {"CANCELLED"}, stage
         assert operator.said == "Bake cancelled"
         assert bpy.context.scene.frame_current == 1 and bar.name == "Bar"
-        assert names() == before, stage
+        assert names() == before and not bar.hide_get(), stage
+
+
+@in_blender
+def test_many_keys_say_what_they_weigh():
+    import bpy
+    from test_bake import animated
+
+    from addon.animation import object_bake
+    from addon.core.runtime import jobs
+
+    animated()
+    object_bake.HEAVY = 1e3
+    try:
+        assert bpy.ops.arapfields.bake(format="KEYS", start=1, end=2) == {"FINISHED"}
+    finally:
+        object_bake.HEAVY = 500e6
+    told = [text for level, text in jobs.messages() if level == "WARNING"]
+    assert told == ["Bar: shape keys of 13.9 kB in the .blend and in memory; a cache would take neither"], (
+        told
+    )

@@ -69,6 +69,35 @@ NORMALS = (
     ("SMOOTH", "Smooth", "Shaded as one smooth surface"),
     ("FLAT", "Flat", "Every triangle shaded for itself"),
 )
+BAKE_FORMATS = (
+    (
+        "PC2",
+        "PC2 Cache",
+        "A file beside the .blend, which Blender's Mesh Cache modifier plays; of any length",
+    ),
+    ("MDD", "MDD Cache", "The same in the other format of that modifier, which more programs read"),
+    ("KEYS", "Shape Keys", "An object with one shape key a frame, all in the .blend: for short ranges"),
+)
+BAKE_KINDS = (
+    (
+        "AUTO",
+        "Automatic",
+        "What is live; else the deformation, or the style where it follows the handles, or has keyframes and "
+        "there are no handles",
+    ),
+    ("DEFORM", "Deform", "What the handles do"),
+    ("STYLIZE", "Stylize", "What the style does, and the handles where it follows them"),
+)
+BAKE_RANGES = (
+    ("SCENE", "Scene", "The scene's frames, or its preview range where that is on"),
+    ("HANDLES", "Animation", "From the first to the last keyframe of what moves the handles or the style"),
+    ("CUSTOM", "Custom", "From one frame to another"),
+)
+EXPORT_FORMATS = (
+    ("ABC", "Alembic", "An .abc file: the mesh at every frame"),
+    ("USD", "USD", "A .usdc file: the mesh at every frame"),
+    ("GLTF", "glTF", "A .glb file: one morph target a frame; for short ranges"),
+)
 LIVE_KINDS = (
     ("DEFORM", "Deform", "The shape follows its handles"),
     ("STYLIZE", "Stylize", "The shape follows the style's settings, and its handles where the style does"),

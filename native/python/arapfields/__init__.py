@@ -61,6 +61,7 @@ from .arrays import ArrayLike
 from .cmake import cmake_dir
 from .energies import Energy, EnergyValue, Jets
 from .grids import save_grid, sdf_grid
+from .point_cache import PointCacheReader, PointCacheWriter
 from .reports import (
     DeformedExtractionReport,
     EnergyReport,
@@ -121,6 +122,8 @@ __all__ = [
     "MeshSdf",
     "NeuralSdf",
     "Point",
+    "PointCacheReader",
+    "PointCacheWriter",
     "PointHandle",
     "RadialField",
     "Region",

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bakes of several objects in one pass over the frames: the main thread plays and reads them, the worker
+solves and writes them, neither holding more than a few."""
+
+import contextlib
+
+from ..blender.language import translated
+from ..core.errors import UserError
+from ..core.runtime.coroutines import Pause
+from ..core.runtime.jobs import Item
+from ..core.runtime.progress import JobCancelled
+from .frames import FrameFeed
+
+AHEAD = 8  # frames that are read before they are solved, where each has positions of its own
+
+
+class BakePass:
+    """The bakes (object_bake.ObjectBake), all of the same frames.
+
+    Requests of handles alone are small: the frames are then played at once, and the scene is back where it
+    was while the worker goes on.
+    """
+
+    def __init__(self, bakes, frames):
+        self.bakes, self.frames = bakes, frames
+        moving = any(bake.session.moves_by_itself for bake in bakes)
+        self.feed = FrameFeed(AHEAD if moving else frames.count)
+
+    def item(self, context, job, failures):
+        names = ", ".join(bake.name for bake in self.bakes)
+        return Item(names, self.work, lambda _: self.place(context, job, failures))
+
+    def play(self, context, job):
+        """Coroutine that plays the frames and notes what each asks for; the scene ends where it was."""
+        scene = context.scene
+        present = scene.frame_current, scene.frame_subframe
+        try:
+            for frame in self.frames:
+                while self.feed.is_full and not job.done:
+                    yield Pause.WORKER
+                if job.done:  # cancelled, or every object failed
+                    return
+                whole = int(frame // 1)
+                scene.frame_set(whole, subframe=frame - whole)
+                self.feed.put([bake.request(context) for bake in self.bakes])
+                yield Pause.REDRAW
+        finally:
+            self.feed.close()
+            with contextlib.suppress(ReferenceError):
+                scene.frame_set(present[0], subframe=present[1])
+
+    def work(self, tracker):
+        """On the worker."""
+        task, count = tracker.start("Solving", 1.0), self.frames.count
+        try:
+            for bake in self.bakes:
+                bake.attempt(bake.prepare)
+            for number, frame in enumerate(self.frames):
+                requests = self.feed.take(task)
+                task.report(number / count, translated("frame {frame}", frame=f"{frame:g}"))
+                for bake, request in zip(self.bakes, requests, strict=True):
+                    if task.cancelled:
+                        raise JobCancelled
+                    bake.attempt(bake.add, request)
+                if all(bake.error is not None for bake in self.bakes):
+                    break
+            for bake in self.bakes:
+                bake.attempt(bake.finish)
+        except BaseException:
+            self.discard()
+            raise
+
+    def place(self, context, job, failures):
+        """Coroutine: what was baked is put in its place; returns the line to report."""
+        lines = []
+        for bake in self.bakes:
+            try:
+                if bake.error is not None:
+                    raise bake.error
+                lines.append((yield from bake.place(context, job)))
+            except (UserError, ValueError) as error:
+                failures.append(f"{bake.name}: {translated(error)}")
+        if not lines:
+            raise UserError("{error}", error=failures.pop())
+        return ", ".join(lines)
+
+    def discard(self):
+        """Removes what is not in its place."""
+        for bake in self.bakes:
+            bake.discard()

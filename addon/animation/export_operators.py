@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import contextlib
+import shutil
+import tempfile
+from pathlib import Path
+
+import bpy
+
+from ..blender.language import translated
+from ..blender.object_references import ObjectReference, source_of
+from ..core.errors import UserError
+from ..core.runtime.jobs import Item
+from ..core.settings.choices import EXPORT_FORMATS
+from ..field_modifier import cache_modifier
+from ..names import Op
+from ..results import result_objects
+from . import exporters, frames, object_bake, played
+from .object_bake import ObjectBake
+from .operators import BakeOperator, effective_kind, refusal_of
+from .properties import settings
+
+
+class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
+    """Write what the object does, frame by frame, to a file that other programs read"""
+
+    bl_idname = Op.EXPORT
+    bl_label = "Export Animation"
+    bl_options = set()
+    title = "Export"
+    folder = None  # of the caches that are played while the exporter runs
+    guide = "animation"
+
+    __annotations__ = {
+        **{name: one for name, one in settings(options={"SKIP_SAVE"}).items() if name != "format"},
+        "format": bpy.props.EnumProperty(
+            items=EXPORT_FORMATS, name="Format", description="What kind of file", options={"SKIP_SAVE"}
+        ),
+        "filepath": bpy.props.StringProperty(
+            name="File",
+            description="Where it goes; empty for a file with the object's name beside the .blend",
+            subtype="FILE_PATH",
+            options={"SKIP_SAVE"},
+        ),
+    }
+
+    @classmethod
+    def refuses(cls, source):
+        """What plays a cache is exported as it is; what does not is solved first."""
+        return None if cache_modifier.is_playing(source) else super().refuses(source)
+
+    def prepare(self, context, job):
+        try:
+            active = source_of(context)
+            sources = self.sources(context)
+            suffix = exporters.SUFFIXES[self.format]
+            path, _ = object_bake.cache_path(active, suffix, "//", self.filepath)
+            self.found = frames.choose(
+                context, [(source, effective_kind(source, self)) for source in sources], self.values(active)
+            )
+            self.items = [ObjectReference(source) for source in sources]
+            unsolved = [source for source in sources if self.is_unsolved(source)]
+            return (yield from self.plan(context, job, path, unsolved))
+        except (UserError, ValueError, OSError) as error:
+            self.failures.append(translated(error))
+            return []
+
+    def is_unsolved(self, source):
+        """Whether a source must be solved first; UserError where its cache does not fit."""
+        if not cache_modifier.is_playing(source):
+            return refusal_of(source, effective_kind(source, self)) is None
+        reason = played.problem(source, look_closely=True)
+        if reason is not None:
+            raise reason
+        return False
+
+    def plan(self, context, job, path, unsolved):
+        names = ", ".join(reference.name for reference in self.items)
+        if not unsolved:
+            return [Item(names, lambda _: None, lambda _: self.export(context, job, path))]
+        self.folder = Path(tempfile.mkdtemp(prefix=f".{path.stem}-frames-", dir=path.parent))
+
+        def make(source, kind, found):
+            cache = self.folder / f"{source.session_uid}.pc2"
+            return ObjectBake(context, source, kind, found, cache, str(cache))
+
+        kinds = [(source, effective_kind(source, self)) for source in unsolved]
+        items = yield from self.begin(context, job, kinds, self.values(unsolved[0]), make)
+        if not items or self.failures:
+            raise UserError("{error}", error=self.failures.pop())
+        return [Item(names, items[0].work, lambda _: self.export(context, job, path))]
+
+    def export(self, context, job, path):
+        """Coroutine: what was solved plays for as long as the exporter runs; then all is as it was."""
+        with contextlib.ExitStack() as stack:
+            shown = {reference.uid: reference.get() for reference in self.items}
+            for bake in self.passed.bakes if self.passed is not None else ():
+                if bake.error is not None:
+                    raise bake.error
+                shown[bake.reference.uid] = self.play(context, bake, stack)
+            yield from exporters.write(context, self.format, path, list(shown.values()), self.found)
+        return translated(
+            "{count} frames exported to {path} ({size})",
+            count=exporters.count_of(self.format, self.found),
+            path=path.name,
+            size=object_bake.size_text(path.stat().st_size),
+        )
+
+    def play(self, context, bake, stack):
+        """The object that plays a bake until the stack is left."""
+        source = bake.unchanged_source()
+        bake.commit()
+        player = source
+        if bake.in_place:
+            stack.callback(cache_modifier.restore, source, cache_modifier.snapshot(source))
+        else:
+            player = bpy.data.objects.new(f"{source.name}_baked", bake.mesh(context, source))
+            context.scene.collection.objects.link(player)
+            stack.callback(result_objects.discard, player)
+            result_objects.place(context, source, player)
+        bake.play(player)
+        return player
+
+    def coroutine(self, context):
+        try:
+            return (yield from super().coroutine(context))
+        finally:
+            if self.folder is not None:
+                shutil.rmtree(self.folder, ignore_errors=True)
+
+
+CLASSES = [ARAPFIELDS_OT_export_animation]

@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Animated objects to files, by Blender's own exporters: what is shown of them at every frame."""
+
+import contextlib
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ..blender import mesh_arrays
+from ..core.errors import UserError
+from ..core.runtime.coroutines import Pause
+from ..live.animated import curves_of
+from . import export_checks
+from .object_bake import plain
+
+SUFFIXES = {"ABC": ".abc", "USD": ".usdc", "GLTF": ".glb"}
+
+
+def write(context, kind, path, items, frames):
+    """Coroutine: writes these objects' frames, all of it or nothing; UserError that names the file."""
+    from arapfields._files import whole_file
+
+    # USD's textures are found by paths relative to its own folder.
+    with selection_kept(context), whole_file(path, beside=kind == "USD") as partial:
+        with contextlib.ExitStack() as stack:
+            shown = items
+            if kind == "GLTF":
+                shown = []
+                for item in items:
+                    shown.append(morphing := MorphingCopy(context, item))
+                    stack.callback(morphing.discard)
+                    yield from morphing.add(frames)
+                shown = [morphing.item for morphing in shown]
+            select(context, shown)
+            try:
+                CALLS[kind](context, str(partial), frames)
+            except RuntimeError as error:
+                reason = str(error).removeprefix("Error: ").strip()
+                raise UserError(
+                    "{path}: Blender cannot write it ({reason})", path=path, reason=reason
+                ) from error
+        if not export_checks.is_whole(partial, kind):
+            raise UserError("{path}: Blender could not write all of it; the disk may be full", path=path)
+
+
+def alembic(context, path, frames):
+    samples = max(1, round(1 / frames.step))
+    bpy.ops.wm.alembic_export(
+        filepath=path,
+        selected=True,
+        start=first_frame(frames),
+        end=last_frame(frames),
+        xsamples=samples,
+        gsamples=samples,
+        as_background_job=False,
+    )
+
+
+def usd(context, path, frames):
+    scene = context.scene
+    before = scene.frame_start, scene.frame_end
+    scene.frame_start, scene.frame_end = first_frame(frames), last_frame(frames)
+    try:
+        bpy.ops.wm.usd_export(filepath=path, selected_objects_only=True, export_animation=True)
+    finally:
+        scene.frame_start, scene.frame_end = before
+
+
+def gltf(context, path, frames):
+    bpy.ops.export_scene.gltf(
+        filepath=path,
+        export_format="GLB",
+        use_selection=True,
+        export_attributes=True,
+        export_skins=False,
+        export_morph=True,
+        export_animations=True,
+        export_frame_range=False,
+        export_force_sampling=False,
+        export_optimize_animation_size=False,
+    )
+
+
+CALLS = {"ABC": alembic, "USD": usd, "GLTF": gltf}
+
+
+def first_frame(frames):
+    return int(frames.start)
+
+
+def last_frame(frames):
+    return int(frames.start + (frames.count - 1) * frames.step)
+
+
+def count_of(kind, frames):
+    """How many frames a file of that kind holds."""
+    return frames.count if kind == "GLTF" else last_frame(frames) - first_frame(frames) + 1
+
+
+class MorphingCopy:
+    """An object whose shape keys are the frames of another, moved as that one moves."""
+
+    def __init__(self, context, item):
+        self.context, self.source, self.item, self.action = context, item, None, None
+
+    def add(self, frames):
+        """Coroutine that plays the frames; the scene ends where it was."""
+        scene, keys = self.context.scene, []
+        present = scene.frame_current, scene.frame_subframe
+        try:
+            for number, frame in enumerate(frames):
+                whole = int(frame // 1)
+                scene.frame_set(whole, subframe=frame - whole)
+                keys.append(self.key(number, frame))
+                yield Pause.REDRAW
+        finally:
+            scene.frame_set(present[0], subframe=present[1])
+        self.animate(keys, list(frames))
+
+    def key(self, number, frame):
+        depsgraph = self.context.evaluated_depsgraph_get()
+        evaluated = self.source.evaluated_get(depsgraph)
+        world = evaluated.matrix_world.copy()
+        if number == 0:
+            mesh = bpy.data.meshes.new_from_object(
+                evaluated, preserve_all_data_layers=True, depsgraph=depsgraph
+            )
+            self.item = bpy.data.objects.new(self.source.name, mesh)
+            self.context.scene.collection.objects.link(self.item)
+            self.item.matrix_world = self.world = world
+            points = mesh_arrays.positions(mesh)
+            self.item.shape_key_add(name="Basis", from_mix=False)
+        else:
+            mesh = evaluated.to_mesh(preserve_all_data_layers=False, depsgraph=depsgraph)
+            points = mesh_arrays.positions(mesh)
+            evaluated.to_mesh_clear()
+            if len(points) != len(self.item.data.vertices):
+                raise UserError(
+                    "{name} has another number of vertices at frame {frame}; glTF needs the same at all",
+                    name=self.source.name,
+                    frame=plain(frame),
+                )
+            moved = np.array(self.world.inverted_safe() @ world)
+            if not np.allclose(moved, np.array(Matrix.Identity(4)), atol=1e-7):
+                points = points @ moved[:3, :3].T + moved[:3, 3]
+        key = self.item.shape_key_add(name=f"frame {plain(frame)}", from_mix=False)
+        key.data.foreach_set("co", np.ascontiguousarray(points, dtype=np.float32).ravel())
+        return key
+
+    def animate(self, keys, frames):
+        """Each key at full value at its frame, and at none at its neighbours, in straight lines."""
+        for number, key in enumerate(keys):
+            for at in range(max(0, number - 1), min(len(frames), number + 2)):
+                key.value = float(at == number)
+                key.keyframe_insert("value", frame=frames[at])
+        self.action = self.item.data.shape_keys.animation_data.action
+        for curve in curves_of(self.action):
+            for point in curve.keyframe_points:
+                point.interpolation = "LINEAR"
+
+    def discard(self):
+        mesh, action = self.item.data if self.item else None, self.action
+        if self.item is not None:
+            bpy.data.objects.remove(self.item)
+            bpy.data.meshes.remove(mesh)
+        if action is not None and action.users == 0:
+            bpy.data.actions.remove(action)
+
+
+@contextlib.contextmanager
+def selection_kept(context):
+    """What is selected and active is so again after the block."""
+    layer = context.view_layer
+    chosen, active = [item.name for item in context.selected_objects], layer.objects.active
+    name = active.name if active else ""
+    try:
+        yield
+    finally:
+        for item in layer.objects:
+            item.select_set(item.name in chosen)
+        layer.objects.active = layer.objects.get(name)
+
+
+def select(context, items):
+    """Selects these objects alone; UserError names one that is hidden and so would be left out."""
+    for item in context.view_layer.objects:
+        item.select_set(False)
+    for item in items:
+        if not item.visible_get():
+            raise UserError("{name} is hidden; show it to export it", name=item.name)
+        item.select_set(True)
+    context.view_layer.objects.active = items[0]

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which frames are baked, and how they come from the main thread, which reads them, to the worker."""
+
+import threading
+from dataclasses import dataclass
+
+from ..core.errors import UserError
+from ..core.runtime.progress import JobCancelled
+from ..live import animated
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Sample i is that of frame start + i · step."""
+
+    start: float
+    step: float
+    count: int
+
+    def __iter__(self):
+        return (self.start + i * self.step for i in range(self.count))
+
+
+def choose(context, sources, values):
+    """The Frames that the settings ask for: `sources` are (object, kind), `values` the settings by name.
+
+    `start` and `end` count where they are given, whatever the range is.
+    """
+    scene, which = context.scene, values["range"]
+    first, last = values.get("start"), values.get("end")
+    if first is None or last is None:
+        span = animation(sources) if which == "HANDLES" else animated.scene_range(scene)
+        first, last = span[0] if first is None else first, span[1] if last is None else last
+    if last < first:
+        raise UserError("the last frame, {last}, comes before the first, {first}", first=first, last=last)
+    step = values["step"] / values["subframes"]
+    return Frames(float(first), step, int((last - first) / step + 1e-9) + 1)
+
+
+def animation(sources):
+    spans = [span for span in (animated.frame_range(*one) for one in sources) if span is not None]
+    if not spans:
+        names = ", ".join(source.name for source, _ in sources)
+        raise UserError("nothing that moves {names} is animated; choose another range", names=names)
+    return round(min(first for first, _ in spans)), round(max(last for _, last in spans))
+
+
+class FrameFeed:
+    """What was read of each frame, in order, at most so many frames ahead of who works on them."""
+
+    PATIENCE = 0.05  # seconds between looks whether the job was cancelled
+
+    def __init__(self, ahead):
+        self._ahead, self._frames, self._changed = ahead, [], threading.Condition()
+        self._broken = False
+
+    @property
+    def is_full(self):
+        with self._changed:
+            return len(self._frames) >= self._ahead
+
+    def put(self, frame):
+        with self._changed:
+            self._frames.append(frame)
+            self._changed.notify()
+
+    def close(self):
+        """No more frames come: the main thread was stopped."""
+        with self._changed:
+            self._broken = True
+            self._changed.notify()
+
+    def take(self, task):
+        """The next frame; JobCancelled where the task is cancelled first, or none comes any more."""
+        with self._changed:
+            while not self._frames:
+                if task.cancelled or self._broken:
+                    raise JobCancelled
+                self._changed.wait(self.PATIENCE)
+            return self._frames.pop(0)

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One object's bake: its solver, where its frames go, and what plays them at last."""
+
+import contextlib
+import json
+import re
+from pathlib import Path
+
+import bpy
+
+from ..blender import mesh_arrays
+from ..blender.language import translated
+from ..blender.object_references import ObjectReference, settings_of
+from ..core.errors import UserError
+from ..core.runtime.coroutines import Pause
+from ..field_modifier import cache_modifier
+from ..handles import empties
+from ..live import animated, sessions
+from ..live.session import Session
+from ..results import placement, result_objects
+from .properties import FOLDER
+
+SUFFIXES = {"PC2": ".pc2", "MDD": ".mdd"}
+STYLE_PATH = "arapfields.stylize"  # of what is keyframed of a style
+HEAVY = 500e6  # bytes of shape keys, above which a cache would serve better
+
+
+def kind_of(source, kind):
+    """DEFORM or STYLIZE: what is baked of a source where AUTO is asked for."""
+    settings = settings_of(source)
+    if kind != "AUTO":
+        return kind
+    if settings.live_kind:
+        return settings.live_kind
+    held = bool(empties.used(source))
+    styled = settings.stylize.use_handles if held else animated.has_keys(source, STYLE_PATH)
+    return "STYLIZE" if styled else "DEFORM"
+
+
+def cache_path(source, suffix, folder, filepath=""):
+    """(absolute path, the same as the modifier has it) of an object's cache; UserError where none can be."""
+    name = re.sub(r'[\x00-\x1f/\\:*?"<>|]', "_", source.name)
+    told = filepath or f"{folder.rstrip('/') or '/'}/{name}{suffix}"
+    if told.startswith("//") and not bpy.data.filepath:
+        raise UserError("save the .blend first, or choose a folder: the cache lies beside it")
+    path = Path(bpy.path.abspath(told))
+    if path.suffix.lower() != suffix:
+        raise UserError("{path}: the format needs the extension {suffix}", path=path, suffix=suffix)
+    if not filepath and folder == FOLDER:
+        path.parent.mkdir(exist_ok=True)
+    if not path.parent.is_dir():
+        raise UserError("{folder}: no such folder", folder=path.parent)
+    if bpy.data.filepath:
+        with contextlib.suppress(ValueError):  # on another drive
+            told = bpy.path.relpath(str(path))
+    return path, told
+
+
+class ObjectBake:
+    """Made and placed on the main thread; prepared, and given its frames, by the worker.
+
+    `path` is where the cache goes; None for shape keys.
+    """
+
+    def __init__(self, context, source, kind, frames, path=None, told=""):
+        settings = settings_of(source)
+        in_place = placement.in_place(settings.output, settings.target) and path is not None
+        self.session = Session(context, source, kind, shown=False, follow=False, in_place=in_place)
+        self.reference, self.frames, self.path, self.told = ObjectReference(source), frames, path, told
+        self.fps = context.scene.render.fps / context.scene.render.fps_base
+        self.in_place, self.error, self.writer, self.shapes = in_place, None, None, []
+
+    @property
+    def name(self):
+        return self.reference.name
+
+    def request(self, context):
+        """What is asked for at the scene's frame, or the error that ends this object's bake."""
+        try:
+            source = self.reference.get()
+            if self.session.moves_by_itself:
+                self.session.read_points(context, source)
+            return self.session.current_request(context, source)
+        except (UserError, ValueError) as error:
+            return error
+
+    def prepare(self):
+        self.session.prepare()
+        if self.path is None:
+            return
+        from arapfields.point_cache import PointCacheWriter
+
+        frames, points = self.frames, len(self.session.rest)
+        self.writer = PointCacheWriter(
+            self.path, points, frames.count, start=frames.start, step=frames.step, fps=self.fps
+        )
+
+    def add(self, request):
+        """Solves one frame and puts it where it goes."""
+        if isinstance(request, Exception):
+            raise request
+        points = self.session.solve_from_rest(request).points
+        if self.writer is not None:
+            self.writer.write(points)
+        else:
+            self.shapes.append(points)
+
+    def attempt(self, call, *given):
+        """Does a part of the work; what goes wrong ends this object's bake alone."""
+        if self.error is not None:
+            return
+        try:
+            call(*given)
+        except MemoryError:
+            self.error = UserError("not enough memory for these settings")
+        except (UserError, ValueError, OSError) as error:
+            self.error = error if isinstance(error, UserError) else UserError("{error}", error=error)
+        if self.error is not None:
+            self.discard()
+
+    def finish(self):
+        if self.writer is not None:
+            self.writer.finish()
+
+    def discard(self):
+        """Removes what was not put in its place; the cache of an earlier bake stays as it is."""
+        if self.writer is not None:
+            self.writer.discard()
+        self.shapes.clear()
+
+    def place(self, context, job):
+        """Coroutine: the cache in its place and what plays it; returns the line to report."""
+        source = self.unchanged_source()
+        if self.path is None:
+            return (yield from self.add_keys(context, source, job))
+        self.commit()
+        player = source
+        sessions.end(context, source)  # what was live is baked now
+        if not self.in_place:
+            player = result_objects.show(
+                context, source, "BAKE", "BAKE", self.mesh(context, source), {"frames": self.frames.count}
+            )
+            result_objects.hide(source)
+        self.play(player)
+        digest, faces = mesh_arrays.fingerprint(player.data)
+        record = {"mesh": digest.hex(), "faces": faces, "start": self.frames.start, "step": self.frames.step}
+        record |= {"points": len(self.session.rest), "frames": self.frames.count}
+        record["count"] = len(player.data.vertices)
+        settings_of(player).bake.record = json.dumps(record)
+        size = size_text(self.path.stat().st_size)
+        return translated(
+            "{count} frames of {points} points baked into {path} ({size})",
+            count=self.frames.count,
+            points=f"{len(self.session.rest):,}",
+            path=self.path.name,
+            size=size,
+        )
+
+    def unchanged_source(self):
+        source = self.reference.get()
+        if mesh_arrays.fingerprint(source.data) != self.session.fingerprint:
+            raise UserError("{name} changed while it was worked on; run again", name=source.name)
+        return source
+
+    def commit(self):
+        try:
+            self.writer.commit()
+        except OSError as error:
+            raise UserError("{error}", error=error) from error
+
+    def play(self, player):
+        """Has an object play the cache."""
+        cache_modifier.play(player, self.told, self.frames.start, self.frames.step)
+
+    def mesh(self, context, source):
+        """Of an object of its own, where the source's own vertices do not take the motion."""
+        session = self.session
+        if session.topology is not None:
+            return result_objects.surface_mesh(source, session.local(session.rest), session.topology)
+        return result_objects.shown_mesh(context, source, len(session.rest))
+
+    def add_keys(self, context, source, job):
+        """The object with a shape key a frame; taken away again where the user cancels."""
+        report = {"frames": self.frames.count}
+        item = result_objects.show(context, source, "BAKE", "BAKE", self.mesh(context, source), report)
+        frames, kept = [plain(frame) for frame in self.frames], False
+        weight = size_text(keys_weight(len(self.session.rest), len(frames)))
+        try:
+            for number in range(len(frames)):
+                job.report_main_thread(
+                    number / len(frames), translated("Storing frame {frame}", frame=frames[number])
+                )
+                result_objects.add_frame(item, frames, number, self.shapes[number])
+                self.shapes[number] = None  # the key has it
+                yield Pause.REDRAW
+            context.scene.frame_set(context.scene.frame_current)  # else the key stored last stays on
+            result_objects.hide(source)
+            kept = True
+        finally:
+            if not kept:
+                with contextlib.suppress(ReferenceError):
+                    result_objects.discard(item)
+        return translated("{count} frames baked into shape keys of {size}", count=len(frames), size=weight)
+
+
+def plain(frame):
+    """A whole frame as an integer, which is how keys are named."""
+    return int(frame) if frame == int(frame) else round(frame, 4)
+
+
+def keys_weight(points, frames):
+    """Bytes in the .blend, and in memory, of so many shape keys and their basis."""
+    return 12 * points * (frames + 1)
+
+
+def size_text(count):
+    """Bytes as people read them."""
+    for unit, size in (("GB", 1e9), ("MB", 1e6)):
+        if count >= size:
+            return f"{count / size:.1f} {unit}"
+    return f"{count / 1e3:.1f} kB"

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+
+from ..blender import modifier_stack
+from ..blender.language import translated
+from ..blender.section import Advanced, note, wrapped
+from ..live import animated
+from ..names import Op
+from . import object_bake, played
+
+
+class ARAPFIELDS_PT_animation(Advanced, bpy.types.Panel):
+    bl_label = "Animation"
+    bl_idname = "ARAPFIELDS_PT_animation"
+    bl_order = 4
+
+    def fill(self, context, source, settings):
+        layout, bake = self.layout, settings.bake
+        layout.prop(bake, "format")
+        layout.prop(bake, "kind")
+        layout.prop(bake, "range")
+        if bake.range == "CUSTOM":
+            row = layout.row(align=True)
+            row.prop(bake, "start")
+            row.prop(bake, "end")
+        row = layout.row(align=True)
+        row.prop(bake, "step")
+        row.prop(bake, "subframes")
+        if bake.format != "KEYS":
+            layout.prop(bake, "folder")
+        wrapped(layout, weight(context, source, bake))
+        row = layout.row(align=True)
+        row.operator(Op.BAKE, icon="REC")
+        row.operator_menu_enum(Op.BAKE, "scope", text="", icon="DOWNARROW_HLT")
+        modifier = modifier_stack.find_cache(source)
+        if modifier is not None:
+            row = layout.row(align=True)
+            row.label(text=modifier.name, icon="MOD_MESHDEFORM", translate=False)
+            row.prop(modifier, "show_viewport", text="")
+            row.prop(modifier, "show_render", text="")
+            row.operator(Op.REMOVE_BAKE, text="", icon="X")
+            layout.prop(modifier, "filepath", text="")
+            note(layout, played.problem(source))
+        layout.operator_menu_enum(Op.EXPORT, "format", icon="EXPORT")
+
+
+def weight(context, source, bake):
+    """What the frames would weigh, as far as it is known before they are read."""
+    first, last = (bake.start, bake.end) if bake.range == "CUSTOM" else animated.scene_range(context.scene)
+    count = max(0, (last - first) * bake.subframes // bake.step + 1)
+    size = object_bake.size_text(object_bake.keys_weight(len(source.data.vertices), count - 1))
+    if bake.range == "HANDLES":
+        return translated("{size} for the scene's frames", size=size)
+    return translated("{count} samples, {size}", count=count, size=size)
+
+
+CLASSES = [ARAPFIELDS_PT_animation]

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether the cache that an object plays is there and still fits it."""
+
+import json
+from pathlib import Path
+
+import bpy
+
+from ..blender import mesh_arrays, modifier_stack
+from ..blender.object_references import settings_of
+from ..core.errors import UserError
+from ..core.runtime import native
+
+
+def cache_of(source):
+    """The path of the cache that the object plays; None where it plays none."""
+    modifier = modifier_stack.find_cache(source)
+    return None if modifier is None else Path(bpy.path.abspath(modifier.filepath, library=source.library))
+
+
+def record_of(source):
+    """What is noted of the object's bake; {} where nothing is, or nothing legible."""
+    try:
+        record = json.loads(settings_of(source).bake.record or "{}")
+    except ValueError:
+        return {}
+    return record if isinstance(record, dict) else {}
+
+
+def problem(source, look_closely=False):
+    """Why the object's bake cannot be played, or is of another mesh, as a UserError; None where all is well.
+
+    Closely looked at, the mesh itself is read, too, and the cache's header.
+    """
+    path, record = cache_of(source), record_of(source)
+    if path is None:
+        return None
+    if not path.is_file():
+        return UserError(
+            "{name}: its bake {path} is not there; choose the file in its modifier, or bake again",
+            name=source.name,
+            path=path,
+        )
+    if record.get("count") not in (None, len(source.data.vertices)):
+        return changed(source)
+    return closely(source, path, record) if look_closely else None
+
+
+def closely(source, path, record):
+    from_mesh, faces = mesh_arrays.fingerprint(source.data)
+    if record.get("mesh") not in (None, from_mesh.hex()) or record.get("faces") not in (None, faces):
+        return changed(source)
+    native.library()
+    from arapfields.point_cache import PointCacheReader
+
+    try:
+        with PointCacheReader(path) as cache:
+            points = cache.points
+    except (ValueError, OSError) as error:
+        return UserError("{name}: {error}", name=source.name, error=error)
+    if record.get("points") not in (None, points):
+        return UserError(
+            "{name}: {path} holds {found} points; its bake had {count}",
+            name=source.name,
+            path=path,
+            found=points,
+            count=record["points"],
+        )
+    return None
+
+
+def changed(source):
+    return UserError("{name}: its mesh changed since the bake; bake again", name=source.name)

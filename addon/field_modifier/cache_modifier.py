@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The modifier that plays a bake: Blender's own Mesh Cache, where the field's modifier stands in the stack.
+
+While it plays, the field's modifier is off; what gives the object a new motion puts it back.
+"""
+
+from ..blender import modifier_stack
+from ..blender.object_references import settings_of
+from ..names import CACHE_MODIFIER
+from . import inputs
+
+
+def play(source, path, start, step):
+    """Has the object play a cache (PC2 or MDD by its suffix) of which sample i is frame start + i · step.
+
+    The modifier that there is already keeps its place, its name and what the user set. `path` may be relative
+    to the .blend. Returns the modifier.
+    """
+    modifier = modifier_stack.find_cache(source)
+    if modifier is None:
+        modifier = add(source)
+    modifier.cache_format = "MDD" if path.lower().endswith(".mdd") else "PC2"
+    modifier.filepath = path
+    modifier.time_mode, modifier.play_mode = "FRAME", "SCENE"  # counted in samples
+    modifier.frame_scale, modifier.frame_start = 1.0 / step, start / step
+    set_playing(source, True)
+    return modifier
+
+
+def add(source):
+    """A new one, with the field's own fading and vertex group, if any."""
+    field, index = modifier_stack.find(source), modifier_stack.place(source)
+    modifier = source.modifiers.new(CACHE_MODIFIER, "MESH_CACHE")
+    settings_of(source).bake.uid = modifier.persistent_uid
+    if field is not None:
+        index += 1
+        modifier.factor = inputs.get(field, "Factor")
+        group = inputs.get_attribute(field, "Mask")
+        modifier.vertex_group = group if group in source.vertex_groups else ""
+    source.modifiers.move(source.modifiers.find(modifier.name), index)
+    return source.modifiers[index]
+
+
+def is_playing(source):
+    """Whether the object's shape is the bake's."""
+    modifier = modifier_stack.find_cache(source)
+    return modifier is not None and modifier.show_viewport
+
+
+def set_playing(source, on):
+    """Shows the bake instead of the field, or the other way round."""
+    for modifier, shown in ((modifier_stack.find_cache(source), on), (modifier_stack.find(source), not on)):
+        if modifier is not None:
+            modifier.show_viewport = modifier.show_render = shown
+
+
+def suspend(source):
+    """The field's motion is about to change: it is shown, rather than the bake. Whether the bake was."""
+    playing = is_playing(source)
+    if playing:
+        set_playing(source, False)
+    return playing
+
+
+MEMBERS = ("cache_format", "filepath", "frame_scale", "frame_start", "show_viewport", "show_render")
+
+
+def snapshot(source):
+    """What restore() needs to have the object show what it does now."""
+    cache, field = modifier_stack.find_cache(source), modifier_stack.find(source)
+    return (
+        None if cache is None else [getattr(cache, name) for name in MEMBERS],
+        None if field is None else (field.show_viewport, field.show_render),
+    )
+
+
+def restore(source, shown):
+    """Undoes a play() since the snapshot."""
+    of_cache, of_field = shown
+    cache, field = modifier_stack.find_cache(source), modifier_stack.find(source)
+    if of_cache is None:
+        remove(source)
+    elif cache is not None:
+        for name, value in zip(MEMBERS, of_cache, strict=True):
+            setattr(cache, name, value)
+    if of_field is not None and field is not None:
+        field.show_viewport, field.show_render = of_field
+
+
+def remove(source):
+    """Takes the modifier away, and shows the field again; the file stays."""
+    set_playing(source, False)
+    modifier = modifier_stack.find_cache(source)
+    if modifier is not None:
+        source.modifiers.remove(modifier)
+    settings_of(source).bake.uid = 0

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which frames the animation of a source's handles and style spans."""
+
+from ..blender.object_references import settings_of
+from ..handles import empties, movers
+
+
+def frame_range(source, kind):
+    """(first, last) frame of all that moves the handles, the style or the source; None where nothing does."""
+    ranges = [span for item in involved(source, kind) for span in ranges_of(item)]
+    return (min(first for first, _ in ranges), max(last for _, last in ranges)) if ranges else None
+
+
+def scene_range(scene):
+    """(first, last) frame of the scene, or of its preview where that is on."""
+    if scene.use_preview_range:
+        return scene.frame_preview_start, scene.frame_preview_end
+    return scene.frame_start, scene.frame_end
+
+
+def involved(source, kind):
+    """The objects, and what they hang on, whose animation a source's shape follows; each once."""
+    style = settings_of(source).stylize
+    used = [source]
+    if kind == "DEFORM" or style.use_handles:
+        used += [movers.mover_of(entry) for entry in empties.used(source)]
+    if kind == "STYLIZE":
+        used += [item for item in (style.frame_object, style.style_object) if item is not None]
+    found = {}
+    while used:
+        item = used.pop()
+        if item.name_full in found:
+            continue
+        found[item.name_full] = item
+        used += [] if item.parent is None else [item.parent]
+        targets = [getattr(constraint, "target", None) for constraint in item.constraints]
+        targets += [getattr(modifier, "object", None) for modifier in item.modifiers]
+        used += [target for target in targets if target is not None]
+        used += drivers(item)
+    return list(found.values())
+
+
+def drivers(item):
+    """The objects from which drivers of this one read."""
+    data = item.animation_data
+    targets = [
+        target.id
+        for curve in (data.drivers if data else ())
+        for variable in curve.driver.variables
+        for target in variable.targets
+    ]
+    return [target for target in targets if hasattr(target, "matrix_world")]
+
+
+def ranges_of(item):
+    """(first, last) of each action and strip that moves an object."""
+    data = item.animation_data
+    if data is None:
+        return
+    if data.action is not None:
+        yield tuple(data.action.frame_range)
+    for track in data.nla_tracks:
+        for strip in track.strips:
+            if not track.mute and not strip.mute:
+                yield strip.frame_start, strip.frame_end
+
+
+def has_keys(item, path):
+    """Whether an object's own action moves properties whose path begins like that."""
+    data = item.animation_data
+    action = data.action if data is not None else None
+    return action is not None and any(curve.data_path.startswith(path) for curve in curves_of(action))
+
+
+def curves_of(action):
+    """An action's curves; from Blender 4.4 on they lie in the channel bags of its layers' strips."""
+    for layer in getattr(action, "layers", ()):
+        for strip in layer.strips:
+            for bag in getattr(strip, "channelbags", ()):
+                yield from bag.fcurves
+    yield from getattr(action, "fcurves", ())

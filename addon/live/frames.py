@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frames of a live source that were solved once, and the thread that solves them beside the window.
+
+A frame's shape is that of its request alone, solved from rest (Solving.solve_from_rest): it does not matter
+in which order frames are seen. Each shape is kept with its request, so a frame whose handles, style or points
+have changed since is never shown.
+"""
+
+import threading
+
+from ..core.errors import UserError
+from ..core.runtime import native
+from ..core.runtime.threads import start_thread
+from .request import alike
+
+LARGEST = 1 << 30  # bytes of shapes that one source keeps
+
+
+class SolvedFrames:
+    """{frame: shape}, filled by a thread for the frames that are asked for, the newest first."""
+
+    def __init__(self, make, low_priority=False):
+        self._make, self._solving = make, None  # a Solving of the thread's own
+        self._changed = threading.Condition()
+        self._wanted, self._kept = {}, {}  # frame: request; frame: (request, shape or error, edition)
+        self._task, self._ended, self._edition, self._bytes = native.library().Task(), False, 0, 0
+        self.has_news = False  # whether another frame was solved since somebody looked
+        self._thread = start_thread("frames", self._run, low_priority)
+
+    def get(self, frame, request):
+        """The shape of that frame for this request; None while it is not solved."""
+        with self._changed:
+            kept = self._kept.get(frame)
+            if kept is None:
+                return None
+            if not alike(kept[0], request):
+                self._edition += 1  # the animation was edited: what is not seen again counts no more
+                self._drop(frame)
+                return None
+            self._kept[frame] = (*kept[:2], self._edition)
+            if isinstance(kept[1], Exception):
+                raise UserError("{error}", error=kept[1])
+            return kept[1]
+
+    def ask(self, frame, request):
+        """Has that frame solved next."""
+        with self._changed:
+            self._wanted.pop(frame, None)
+            self._wanted[frame] = request
+            self._changed.notify_all()
+
+    def wait(self, frame, request, timeout):
+        """The shape of that frame, asked for if need be; None when it takes longer than so many seconds."""
+        shape = self.get(frame, request)
+        if shape is None:
+            self.ask(frame, request)
+            with self._changed:
+                self._changed.wait_for(lambda: frame in self._kept or self._ended, timeout)
+            shape = self.get(frame, request)
+        return shape
+
+    def count(self, first, last):
+        """How many whole frames of the range are solved for the animation as it was last seen."""
+        with self._changed:
+            return sum(
+                kept[2] == self._edition and first <= frame <= last and frame == int(frame)
+                for frame, kept in self._kept.items()
+            )
+
+    def stop(self):
+        """Ends the thread and waits for it."""
+        with self._changed:
+            self._ended = True
+            self._task.cancel()
+            self._changed.notify_all()
+        self._thread.join()
+
+    def _drop(self, frame):
+        self._bytes -= size(self._kept.pop(frame)[1])
+
+    def _run(self):
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._wanted or self._ended)
+                if self._ended:
+                    return
+                frame, request = self._wanted.popitem()
+                edition = self._edition
+            try:
+                self._solving = self._solving or self._make()
+                shape = self._solving.solve_from_rest(request, self._task)
+            except Exception as error:  # told where the frame is shown
+                shape = error
+            with self._changed:
+                if self._ended:
+                    return
+                if frame in self._kept:
+                    self._drop(frame)
+                while self._kept and self._bytes + size(shape) > LARGEST:
+                    self._drop(next(iter(self._kept)))  # the one that was solved first
+                self._kept[frame] = request, shape, edition
+                self._bytes += size(shape)
+                self.has_news = True
+                self._changed.notify_all()
+
+
+def size(shape):
+    """Bytes that belong to a shape alone."""
+    parts = getattr(shape, "points", None), getattr(shape, "turns", None)
+    return sum(part.nbytes for part in parts if part is not None)

@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bakes as point caches: what plays them, where they lie, and what is left when something goes wrong."""
+
+from inside import in_blender
+
+EXACT = 1e-6  # single precision of positions of size one
+
+
+def animated(name="Bar", folder=None):
+    """A bar whose right end rises from frame 1 to frame 5, in a saved file; (bar, its folder)."""
+    import tempfile
+    from pathlib import Path
+
+    import bpy
+    import scenes
+
+    bar, _, moving = scenes.bar_with_handles(name)
+    for frame, height in ((1, 0.0), (5, 0.4)):
+        moving.location.z = height
+        moving.keyframe_insert("location", frame=frame)
+    scenes.activate(bar)
+    folder = folder or Path(tempfile.mkdtemp())
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "scene.blend"))
+    return bpy.data.objects[name], folder
+
+
+def at(item, frame):
+    """(n, 3) local points of an object as shown at a frame."""
+    import bpy
+    from stacks import local_points
+
+    whole = int(frame // 1)
+    bpy.context.scene.frame_set(whole, subframe=frame - whole)
+    return local_points(item)
+
+
+def solved(source, frame, kind="DEFORM"):
+    """(n, 3) the solver's own answer at a frame, in local coordinates."""
+    import bpy
+
+    from addon.core.runtime.coroutines import run_to_completion
+    from addon.live.session import Session
+
+    session = Session(bpy.context, source, kind, shown=False, follow=False, in_place=True)
+    run_to_completion(session.reading)
+    whole = int(frame // 1)
+    bpy.context.scene.frame_set(whole, subframe=frame - whole)
+    if session.moves_by_itself:
+        session.read_points(bpy.context, source)
+    session.prepare()
+    return session.solve_from_rest(session.current_request(bpy.context, source)).points
+
+
+@in_blender
+def test_a_cache_plays_what_the_solver_says_at_every_frame():
+    import bpy
+    import numpy as np
+    from test_bake_cache import EXACT, animated, at, solved
+
+    bar, folder = animated()
+    bpy.context.scene.frame_set(3)
+    assert bpy.ops.arapfields.bake(start=1, end=5, subframes=2) == {"FINISHED"}
+    assert bpy.context.scene.frame_current == 3
+    path = folder / "cache/Bar.pc2"
+    assert path.stat().st_size == 32 + 9 * 12 * len(bar.data.vertices)
+    (modifier,) = bar.modifiers
+    assert modifier.type == "MESH_CACHE" and modifier.filepath == "//cache/Bar.pc2"
+    for frame in (1, 2.5, 4, 5):
+        assert np.abs(at(bar, frame) - solved(bar, frame)).max() <= EXACT, frame
+    assert np.abs(at(bar, 9) - at(bar, 5)).max() == 0
+
+
+@in_blender
+def test_the_cache_stands_where_the_field_does_and_a_second_bake_keeps_its_modifier():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_bake_cache import EXACT, animated, at, solved
+
+    bar, folder = animated()
+    bar.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    bpy.ops.arapfields.deform(**scenes.QUICK)
+    assert [m.type for m in bar.modifiers] == ["NODES", "SUBSURF"]
+    bpy.ops.arapfields.bake(start=1, end=3)
+    field, cache, _ = bar.modifiers
+    assert cache.type == "MESH_CACHE" and not field.show_viewport and not field.show_render
+    cache.factor, cache.name = 0.5, "Renamed"
+    bpy.ops.arapfields.bake(start=2, end=6, step=2, format="MDD", filepath="//other.mdd")
+    assert [m.type for m in bar.modifiers] == ["NODES", "MESH_CACHE", "SUBSURF"]
+    cache = bar.modifiers["Renamed"]
+    assert cache.factor == 0.5 and cache.filepath == "//other.mdd" and cache.cache_format == "MDD"
+    assert (folder / "other.mdd").stat().st_size == 8 + 3 * 4 + 3 * 12 * len(bar.data.vertices)
+    cache.factor, bar.modifiers["Subdivision"].show_viewport = 1.0, False
+    for frame in (2, 6):
+        assert np.abs(at(bar, frame) - solved(bar, frame)).max() <= EXACT, frame
+    assert bpy.ops.arapfields.remove_bake() == {"FINISHED"}
+    assert [m.type for m in bar.modifiers] == ["NODES", "SUBSURF"] and field.show_viewport
+
+
+@in_blender
+def test_several_objects_are_baked_in_one_pass_and_one_that_fails_stops_no_other():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_bake_cache import EXACT, animated, at, solved
+
+    first, folder = animated("One")
+    second, _ = animated("Two", folder)
+    plain = scenes.bar("Plain")
+    plain.location.y = 3
+    scenes.activate(plain, second, first)
+    assert bpy.ops.arapfields.bake(start=1, end=3, scope="SELECTED") == {"FINISHED"}
+    from addon.core.runtime import jobs
+
+    assert sorted(path.name for path in (folder / "cache").iterdir()) == ["One.pc2", "Two.pc2"]
+    assert ("WARNING", "Plain: Add a handle first") in jobs.messages(), jobs.messages()
+    for bar in (first, second):
+        assert np.abs(at(bar, 3) - solved(bar, 3)).max() <= EXACT
+
+
+@in_blender
+def test_what_moves_before_the_field_is_read_at_every_frame():
+    import bpy
+    import numpy as np
+    from stacks import add_modifier
+    from test_bake_cache import EXACT, animated, at, solved
+
+    import addon.animation.bake_job as bake_job
+
+    bar, _ = animated()
+    add_modifier(bar, "ARMATURE")
+    bone = bar.modifiers[0].object.pose.bones["Second"]
+    for frame, turn in ((1, 0.0), (5, 0.5)):
+        bone.rotation_euler.z = turn
+        bone.keyframe_insert("rotation_euler", frame=frame)
+    bpy.context.scene.frame_set(1)
+    ahead, bake_job.AHEAD = bake_job.AHEAD, 1
+    try:
+        assert bpy.ops.arapfields.bake(start=1, end=5) == {"FINISHED"}
+    finally:
+        bake_job.AHEAD = ahead
+    shown = {frame: at(bar, frame) for frame in (2, 5)}
+    for frame, points in shown.items():
+        bpy.context.scene.frame_set(1)
+        assert np.abs(points - solved(bar, frame)).max() <= EXACT
+    assert np.abs(shown[5] - shown[2]).max() > 0.2
+
+
+@in_blender
+def test_outputs_that_are_no_modifier_play_on_an_object_of_their_own():
+    import bpy
+    import numpy as np
+    from test_bake_cache import animated, at
+
+    bar, folder = animated()
+    bar.arapfields.output, bar.arapfields.resolution = "SURFACE", 24
+    for _ in range(2):
+        assert bpy.ops.arapfields.bake(start=1, end=5, step=4) == {"FINISHED"}
+        bpy.context.view_layer.objects.active = bar
+    item = bpy.data.objects["Bar_baked"]
+    assert [m.type for m in item.modifiers] == ["MESH_CACHE"] and bar.hide_render and not bar.modifiers
+    assert (folder / "cache/Bar.pc2").stat().st_size == 32 + 2 * 12 * len(item.data.vertices)
+    rise = at(item, 5) - at(item, 1)
+    right = at(item, 1)[:, 0] > 0.9
+    assert np.abs(rise[right][:, 2] - 0.4).max() < 0.1 and np.abs(rise[at(item, 1)[:, 0] < -0.9]).max() < 0.1
+
+
+@in_blender
+def test_live_and_deform_put_the_field_back_and_a_bake_ends_live():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_bake_cache import animated, at
+    from test_live import step
+
+    from addon.field_modifier import cache_modifier
+    from addon.live import sessions
+
+    bar, _ = animated()
+    bpy.ops.arapfields.bake(start=1, end=5)
+    baked = at(bar, 4)
+    bpy.ops.arapfields.live()
+    assert not cache_modifier.is_playing(bar)
+    step(refined=True)
+    assert np.abs(at(bar, 4) - baked).max() < 1e-4
+    bpy.ops.arapfields.live()
+    assert cache_modifier.is_playing(bar) and np.array_equal(at(bar, 4), baked)
+    bpy.ops.arapfields.live()
+    assert bpy.ops.arapfields.bake(start=1, end=5) == {"FINISHED"}
+    assert not sessions.is_live(bar) and cache_modifier.is_playing(bar)
+    bpy.ops.arapfields.deform(**scenes.QUICK)
+    assert not cache_modifier.is_playing(bar) and bar.modifiers["ARAP Fields"].show_viewport
+
+
+@in_blender
+def test_whatever_goes_wrong_is_named_and_the_last_good_cache_stays():
+    import os
+    import resource
+
+    import bpy
+    import pytest
+    from test_bake import cancelled_at, stepped
+    from test_bake_cache import animated
+
+    _, folder = animated()
+    bpy.ops.arapfields.bake(start=1, end=3)
+    path = folder / "cache/Bar.pc2"
+    good = path.read_bytes()
+
+    def fails(text, **arguments):
+        with pytest.raises(RuntimeError, match=text):
+            bpy.ops.arapfields.bake(**arguments)
+        assert path.read_bytes() == good and [p.name for p in path.parent.iterdir()] == ["Bar.pc2"]
+
+    fails("the last frame, 3, comes before the first, 7", start=7, end=3)
+    fails("no such folder", start=1, end=2, filepath="//gone/Bar.pc2")
+    fails("needs the extension .mdd", start=1, end=2, format="MDD", filepath="//cache/Bar.pc2")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)  # stands for a full disk
+    resource.setrlimit(resource.RLIMIT_FSIZE, (9000, hard))
+    try:
+        fails("Bar.pc2", start=1, end=5)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    operator = stepped(format="PC2", start=1, end=5, folder="//cache")
+    assert cancelled_at(operator, "frame 3") == {"CANCELLED"}
+    assert path.read_bytes() == good and os.listdir(path.parent) == ["Bar.pc2"]
+    for handle in ("Fixed", "Moving"):
+        bpy.data.objects[handle].animation_data_clear()
+    fails("nothing that moves Bar is animated", range="HANDLES")
+
+
+@in_blender
+def test_a_bake_that_no_longer_fits_is_named():
+    import bpy
+    from test_bake_cache import animated
+
+    from addon.animation import played
+
+    bar, folder = animated()
+    assert bpy.ops.arapfields.bake(range="HANDLES") == {"FINISHED"}
+    assert played.record_of(bar)["frames"] == 5 and played.problem(bar, look_closely=True) is None
+    bar.data.vertices[0].co.x += 0.1
+    assert "mesh changed since the bake" in str(played.problem(bar, look_closely=True))
+    bar.data.vertices[0].co.x -= 0.1
+    (folder / "cache/Bar.pc2").rename(folder / "cache/moved.pc2")
+    assert "is not there" in str(played.problem(bar))
+    bar.modifiers[0].filepath = "//cache/moved.pc2"
+    content = (folder / "cache/moved.pc2").read_bytes()
+    (folder / "cache/moved.pc2").write_bytes(content[:-1])
+    assert "bytes" in str(played.problem(bar, look_closely=True))
+
+
+@in_blender
+def test_an_unsaved_file_asks_for_a_place():
+    import tempfile
+
+    import bpy
+    import pytest
+    from test_bake import animated
+
+    animated()
+    with pytest.raises(RuntimeError, match=r"save the \.blend first"):
+        bpy.ops.arapfields.bake(start=1, end=2)
+    path = tempfile.mkdtemp() + "/anywhere.pc2"
+    assert bpy.ops.arapfields.bake(start=1, end=2, filepath=path) == {"FINISHED"}
+    assert bpy.data.objects["Bar"].modifiers[0].filepath == path

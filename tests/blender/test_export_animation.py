@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Alembic, USD and glTF with what the object does, read back by another Blender, by usd-core and by hand."""
+
+import pytest
+from inside import in_blender
+
+EXACT = 1e-6  # of the object's size: single precision
+READER = """
+import sys, json, bpy, numpy as np
+bpy.ops.wm.read_factory_settings(use_empty=True)
+kind, path, out, fps, first, last = sys.argv[1:7]
+bpy.context.scene.render.fps = int(fps)
+if kind == "ABC":
+    bpy.ops.wm.alembic_import(filepath=path, set_frame_range=True, as_background_job=False)
+elif kind == "USD":
+    bpy.ops.wm.usd_import(filepath=path, set_frame_range=True)
+else:
+    bpy.ops.import_scene.gltf(filepath=path)
+item = next(o for o in bpy.data.objects if o.type == "MESH")
+scene, found = bpy.context.scene, {}
+for frame in range(int(first), int(last) + 1):
+    scene.frame_set(frame)
+    evaluated = item.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh = evaluated.to_mesh()
+    flat = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("co", flat)
+    world = np.array(evaluated.matrix_world)
+    found[str(frame)] = flat.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3]
+    if kind == "GLTF":
+        index = np.empty(len(mesh.vertices), np.float32)
+        mesh.attributes["_ORIGINAL_INDEX"].data.foreach_get("value", index)
+        found["index"] = index
+    evaluated.to_mesh_clear()
+np.savez(out, range=[scene.frame_start, scene.frame_end], **found)
+import os
+os._exit(7)
+"""
+
+
+def scene_to_export():
+    """A bar that moves and bends from frame 3 to 7, at 25 frames a second, in a saved file; (bar, folder)."""
+    import bpy
+    import numpy as np
+    from test_bake_cache import animated
+
+    bar, folder = animated()
+    bar.location, bar.rotation_euler.z, bar.scale.y = (0.3, 0.2, 0.1), 0.4, 1.2
+    index = bar.data.attributes.new("_ORIGINAL_INDEX", "FLOAT", "POINT")
+    index.data.foreach_set("value", np.arange(len(bar.data.vertices), dtype=np.float32))
+    scene = bpy.context.scene
+    scene.render.fps, scene.frame_start, scene.frame_end = 25, 2, 5
+    return bar, folder
+
+
+def shown(item, frames):
+    """{frame: (n, 3) world points}."""
+    import bpy
+    import scenes
+
+    found = {}
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        found[frame] = scenes.world_points(item)
+    return found
+
+
+def state(item):
+    import bpy
+
+    flags = [(m.name, m.type, m.show_viewport, m.show_render) for m in item.modifiers]
+    kinds = bpy.data.objects, bpy.data.meshes, bpy.data.actions, bpy.data.shape_keys, bpy.data.scenes
+    scene = bpy.context.scene
+    return (
+        flags,
+        [sorted(kind.keys()) for kind in kinds],
+        (scene.frame_start, scene.frame_end, scene.frame_current),
+        [o.name for o in bpy.context.selected_objects],
+    )
+
+
+@pytest.mark.parametrize("kind", ["ABC", "USD", "GLTF"])
+@in_blender
+def test_what_is_exported_is_read_back(kind):
+    """By Blender itself, in a process that never heard of the extension."""
+    import subprocess
+    import sys
+
+    import bpy
+    import numpy as np
+    from test_export_animation import EXACT, READER, scene_to_export, shown, state
+
+    bar, folder = scene_to_export()
+    path = folder / f"Bar{dict(ABC='.abc', USD='.usdc', GLTF='.glb')[kind]}"
+    bpy.context.scene.frame_set(4)
+    before = state(bar)
+    assert bpy.ops.arapfields.export_animation(format=kind, filepath=str(path)) == {"FINISHED"}
+    assert state(bar) == before and sorted(p.name for p in folder.iterdir()) == [path.name, "scene.blend"]
+    bpy.ops.arapfields.bake()
+    expected = shown(bar, range(2, 6))
+    first = path.stat().st_size
+    assert bpy.ops.arapfields.export_animation(format=kind, filepath=str(path)) == {"FINISHED"}
+    assert abs(path.stat().st_size - first) < 100  # from the bake as well: nothing else is in it
+    out = folder / "found.npz"
+    command = [sys.executable, "-c", READER, kind, str(path), str(out), "25", "2", "5"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 7, done.stdout + done.stderr
+    found = np.load(out)
+    size = np.ptp(expected[2], axis=0).max()
+    index = found["index"].astype(int) if kind == "GLTF" else slice(None)
+    for frame, points in expected.items():
+        assert np.abs(found[str(frame)] - points[index]).max() <= EXACT * size, frame
+    if kind == "GLTF":
+        assert set(index) == set(range(len(bar.data.vertices)))
+    else:
+        assert found["range"].tolist() == [2, 5]
+
+
+@in_blender
+def test_the_times_of_a_gltf_are_the_frames_seconds():
+    import json
+    import struct
+
+    import bpy
+    import numpy as np
+    from test_export_animation import scene_to_export
+
+    _, folder = scene_to_export()
+    bpy.ops.arapfields.export_animation(format="GLTF", filepath=str(folder / "a.glb"))
+    content = (folder / "a.glb").read_bytes()
+    (length,) = struct.unpack("<I", content[12:16])
+    told = json.loads(content[20 : 20 + length])
+    (animation,) = told["animations"]
+    times = told["accessors"][animation["samplers"][0]["input"]]
+    assert np.allclose([*times["min"], *times["max"]], [2 / 25, 5 / 25]) and times["count"] == 4
+    assert len(told["meshes"][0]["primitives"][0]["targets"]) == 4
+
+
+@in_blender
+def test_usd_is_what_its_own_library_reads():
+    import bpy
+    import numpy as np
+    import pytest
+    from test_export_animation import EXACT, scene_to_export, shown
+
+    usd = pytest.importorskip("pxr.Usd", reason="usd-core is not installed")
+    from pxr import UsdGeom
+
+    bar, folder = scene_to_export()
+    bpy.ops.arapfields.bake(subframes=2)
+    path = folder / "Bar.usdc"
+    bpy.ops.arapfields.export_animation(format="USD", filepath=str(path))
+    stage = usd.Stage.Open(str(path))
+    assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (2, 5)
+    assert stage.GetTimeCodesPerSecond() == 25
+    (mesh,) = [UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)]
+    for frame, points in shown(bar, range(2, 6)).items():
+        local = np.array(mesh.GetPointsAttr().Get(frame), dtype=float)
+        matrix = np.array(UsdGeom.XformCache(frame).GetLocalToWorldTransform(mesh.GetPrim()))
+        world = local @ matrix[:3, :3] + matrix[3, :3]
+        assert np.abs(world - points).max() <= EXACT * np.ptp(points, axis=0).max(), frame
+
+
+@pytest.mark.parametrize("kind", ["ABC", "USD", "GLTF"])
+@in_blender
+def test_an_export_that_fails_is_named_and_changes_nothing(kind):
+    import resource
+
+    import bpy
+    import pytest
+    from test_export_animation import scene_to_export, state
+
+    bar, folder = scene_to_export()
+    bpy.ops.arapfields.bake()
+    path = folder / f"Bar{dict(ABC='.abc', USD='.usdc', GLTF='.glb')[kind]}"
+    path.write_bytes(b"before")
+    before = state(bar)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)  # stands for a full disk
+    resource.setrlimit(resource.RLIMIT_FSIZE, (3000, hard))
+    try:
+        with pytest.raises(RuntimeError, match=path.name):
+            bpy.ops.arapfields.export_animation(format=kind, filepath=str(path))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert path.read_bytes() == b"before" and state(bar) == before
+    (folder / "cache/Bar.pc2").unlink()
+    with pytest.raises(RuntimeError, match="is not there"):
+        bpy.ops.arapfields.export_animation(format=kind, filepath=str(path))
+    with pytest.raises(RuntimeError, match="no such folder"):
+        bpy.ops.arapfields.export_animation(format=kind, filepath=str(folder / "gone" / path.name))
+    assert path.read_bytes() == b"before"

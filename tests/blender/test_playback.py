@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A frame's shape is the frame's alone: played, jumped to, baked or rendered; and styles that are animated."""
+
+from inside import in_blender
+
+SAME = 1e-4  # of the object's size: the agreed limit; two solves of one request agree in every bit
+
+
+def turning(frames=40):
+    """A bar whose right end turns by 150° and rises from frame 1 to the last."""
+    import bpy
+    import scenes
+
+    bar, _, moving = scenes.bar_with_handles()
+    for frame, turn, height in ((1, 0.0, 0.0), (frames, 2.6, 0.3)):
+        moving.rotation_euler.x, moving.location.z = turn, height
+        moving.keyframe_insert("rotation_euler", frame=frame)
+        moving.keyframe_insert("location", frame=frame)
+    bpy.context.scene.frame_set(1)
+    scenes.activate(bar)
+    return bar
+
+
+def styled():
+    """A ball that becomes a cube from frame 1 to 40, and everything else of the style changes with it."""
+    import bpy
+
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
+    ball = bpy.context.object
+    axes = bpy.data.objects.new("Axes", None)
+    bpy.context.collection.objects.link(axes)
+    style = ball.arapfields.stylize
+    style.frame, style.frame_object = "EMPTY", axes
+    for frame, strength, sharpness, bending, turn in ((1, 0.1, 4.0, 0.01, 0.0), (40, 1.0, 9.0, 0.5, 1.0)):
+        style.strength, style.sharpness, style.bending, axes.rotation_euler.z = (
+            strength,
+            sharpness,
+            bending,
+            turn,
+        )
+        for name in ("strength", "sharpness", "bending"):
+            style.keyframe_insert(name, frame=frame)
+        axes.keyframe_insert("rotation_euler", frame=frame)
+    bpy.context.scene.frame_set(1)
+    return ball
+
+
+def live_at(item, kind, frames):
+    """(n, 3) what live mode shows when it has come by these frames, stepped as a window would."""
+    import bpy
+    from stacks import local_points
+    from test_live import step
+
+    bpy.context.scene.frame_set(1)
+    bpy.context.view_layer.objects.active = item
+    bpy.ops.arapfields.live(kind=kind)
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        step()
+    step(refined=True)
+    return local_points(item)
+
+
+def every_way(item, kind):
+    """{way: (n, 3) points of frame 37}."""
+    import tempfile
+
+    import bpy
+    from stacks import local_points
+    from test_live_render import camera
+    from test_playback import live_at
+
+    scene, found = camera(8), {}
+    for name, frames in (("played", range(20, 38)), ("back", [40, 39, 38, 37]), ("jumped", [37])):
+        found[name] = live_at(item, kind, frames)
+        bpy.ops.arapfields.live(kind=kind)
+    live_at(item, kind, [30])
+    scene.frame_start = scene.frame_end = 37
+    scene.render.filepath = tempfile.mkdtemp() + "/frame"
+    bpy.ops.render.render(animation=True)
+    scene.frame_set(37)
+    found["rendered"] = local_points(item)
+    bpy.ops.arapfields.live(kind=kind)
+    for start in (37, 1):
+        path = f"{tempfile.mkdtemp()}/bake.pc2"
+        bpy.ops.arapfields.bake(kind=kind, start=start, end=37, step=36, filepath=path)
+        scene.frame_set(37)
+        found[f"baked from {start}"] = local_points(item)
+    return found
+
+
+@in_blender
+def test_a_frame_is_the_same_played_jumped_to_baked_and_rendered():
+    import numpy as np
+    from test_playback import SAME, every_way, turning
+
+    bar = turning()
+    found = every_way(bar, "DEFORM")
+    size = np.ptp(found["jumped"], axis=0).max()
+    for way, points in found.items():
+        assert np.abs(points - found["jumped"]).max() <= SAME * size, way
+
+
+@in_blender
+def test_a_frame_of_an_animated_style_is_the_same_in_every_way():
+    import bpy
+    import numpy as np
+    from test_playback import SAME, every_way, styled
+
+    ball = styled()
+    found = every_way(ball, "STYLIZE")
+    for way, points in found.items():
+        assert np.abs(points - found["jumped"]).max() <= SAME * 2, way
+    assert bpy.ops.arapfields.bake(start=1, end=1, filepath="/tmp/x.pc2") == {"FINISHED"}
+
+
+@in_blender
+def test_every_animated_setting_of_a_style_changes_what_is_solved():
+    """strength, sharpness, stiffness and orientation, each alone between two frames."""
+    import tempfile
+
+    import bpy
+    import numpy as np
+    from stacks import local_points
+
+    for name, values in (("strength", (0.2, 1.0)), ("sharpness", (1.0, 9.0)), ("bending", (0.001, 5.0))):
+        bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
+        ball = bpy.context.object
+        style = ball.arapfields.stylize
+        for frame, value in zip((1, 2), values, strict=True):
+            setattr(style, name, value)
+            style.keyframe_insert(name, frame=frame)
+        path = f"{tempfile.mkdtemp()}/bake.pc2"
+        assert bpy.ops.arapfields.bake(start=1, end=2, filepath=path) == {"FINISHED"}
+        shapes = []
+        for frame in (1, 2):
+            bpy.context.scene.frame_set(frame)
+            shapes.append(local_points(ball))
+        assert np.abs(shapes[1] - shapes[0]).max() > 1e-3, name
+
+
+@in_blender
+def test_live_playback_keeps_solved_frames_and_tells_how_many():
+    import bpy
+    import numpy as np
+    from stacks import local_points
+    from test_live import step
+    from test_playback import live_at, turning
+
+    from addon.live import sessions
+
+    bar = turning()
+    first = live_at(bar, "DEFORM", [10])
+    frames = sessions.live[bar.session_uid].frames
+    for frame in (11, 12):
+        bpy.context.scene.frame_set(frame)
+        step(refined=True)
+    solved = frames._solving.solver.report
+    assert frames.count(1, 40) >= 3
+    bpy.context.scene.frame_set(10)  # shown at once, without another solve
+    assert np.array_equal(local_points(bar), first) and frames._solving.solver.report == solved
+    moving = bpy.data.objects["Moving"]
+    moving.location.y = 0.5
+    moving.keyframe_insert("location", frame=10)
+    bpy.context.scene.frame_set(10)
+    step(refined=True)
+    assert np.abs(local_points(bar) - first).max() > 0.1  # never a shape of another animation
+    assert frames.count(1, 40) < 3
+
+
+@in_blender
+def test_a_drag_at_a_frame_goes_on_from_the_shape_at_hand():
+    import bpy
+    import numpy as np
+    from stacks import local_points
+    from test_live import step
+    from test_playback import live_at, turning
+
+    from addon.live import sessions
+
+    bar = turning()
+    before = live_at(bar, "DEFORM", [20])
+    session = sessions.live[bar.session_uid]
+    assert session.follows_animation
+    bpy.data.objects["Moving"].location.y += 0.2
+    step(refined=True)
+    assert not session.follows_animation
+    shift = (local_points(bar) - before)[before[:, 0] > 0.9]
+    assert np.abs(shift.mean(axis=0)[1] - 0.2) < 0.05

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""PC2 and MDD: the bytes that the formats say, whole or not at all."""
+
+import struct
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from caches import FRAMES, POINTS, names, random_motion, write
+
+import arapfields as af
+from arapfields.point_cache import PointCacheReader, PointCacheWriter
+
+HEADERS = {"pc2": 32, "mdd": 8 + 4 * FRAMES}
+
+
+@pytest.fixture
+def motion():
+    return random_motion()
+
+
+@pytest.mark.parametrize("suffix", ["pc2", "mdd", "PC2"])
+def test_what_is_written_is_read(suffix, motion, tmp_path):
+    path = write(tmp_path / f"x.{suffix}", motion, start=10, step=0.5, fps=25)
+    assert path.stat().st_size == HEADERS[suffix.lower()] + 12 * POINTS * FRAMES
+    with PointCacheReader(path) as cache:
+        assert (len(cache), cache.points) == (FRAMES, POINTS)
+        assert all(np.array_equal(a, b) for a, b in zip(cache, motion, strict=True))
+        assert np.array_equal(cache[-1], motion[-1]) and np.array_equal(cache[2], motion[2])
+        assert cache[0].dtype == np.float32 and cache[0].dtype.isnative
+        frames = 10 + 0.5 * np.arange(FRAMES)
+        assert cache.unit == ("seconds" if suffix == "mdd" else "frames")
+        # Single precision keeps 24 bits.
+        np.testing.assert_allclose(cache.times, frames / 25 if suffix == "mdd" else frames, rtol=2**-23)
+        for outside in (FRAMES, -FRAMES - 1):
+            with pytest.raises(IndexError):
+                cache[outside]
+
+
+def test_the_bytes_are_those_of_the_formats(motion, tmp_path):
+    pc2 = write(tmp_path / "x.pc2", motion, start=3, step=2).read_bytes()
+    assert pc2[:12] == b"POINTCACHE2\0"
+    assert struct.unpack("<2i2fi", pc2[12:32]) == (1, POINTS, 3.0, 2.0, FRAMES)
+    assert pc2[32:] == motion.astype("<f4").tobytes()
+    mdd = write(tmp_path / "x.mdd", motion, start=3, step=2, fps=4).read_bytes()
+    assert struct.unpack(">2i", mdd[:8]) == (FRAMES, POINTS)
+    assert np.array_equal(np.frombuffer(mdd[8:28], ">f4"), [0.75, 1.25, 1.75, 2.25, 2.75])
+    assert mdd[28:] == motion.astype(">f4").tobytes()
+
+
+def test_other_arrays_are_taken(motion, tmp_path):
+    with PointCacheWriter(tmp_path / "x.pc2", POINTS, 4) as cache:
+        cache.write(motion[0].astype(float))
+        cache.write(motion[0].tolist())
+        cache.write(np.asfortranarray(motion[0]))
+        cache.write(motion[0].astype(">f4"))
+    with PointCacheReader(tmp_path / "x.pc2") as cache:
+        assert all(np.array_equal(positions, motion[0]) for positions in cache)
+
+
+@pytest.mark.parametrize(
+    ("positions", "text"),
+    [
+        (np.full((POINTS, 3), np.nan), "point 0 is NaN"),
+        (np.where(np.arange(POINTS)[:, None] == 4, np.inf, np.ones(3)), "point 4 is NaN, infinite"),
+        (np.full((POINTS, 3), 1e39), "beyond single precision"),
+        (np.zeros((POINTS + 1, 3)), r"shape \(8, 3\)"),
+        (np.zeros(3 * POINTS), "shape"),
+        (np.full((POINTS, 3), "a"), "positions"),
+        (None, "positions"),
+    ],
+)
+def test_frames_that_cannot_be_kept(positions, text, motion, tmp_path):
+    before = write(tmp_path / "x.pc2", motion).read_bytes()
+    with (
+        pytest.raises(af.InvalidInput, match=text),
+        PointCacheWriter(tmp_path / "x.pc2", POINTS, FRAMES) as cache,
+    ):
+        cache.write(positions)
+    assert (tmp_path / "x.pc2").read_bytes() == before and names(tmp_path) == ["x.pc2"]
+
+
+@pytest.mark.parametrize("written", [0, 2, FRAMES + 1])
+def test_a_cache_has_the_frames_that_were_promised(written, motion, tmp_path):
+    before = write(tmp_path / "x.mdd", motion).read_bytes()
+    with (
+        pytest.raises(af.InvalidInput, match=r"x\.mdd: (sample 5: the cache was made|. of 5 samples)"),
+        PointCacheWriter(tmp_path / "x.mdd", POINTS, FRAMES) as cache,
+    ):
+        for _ in range(written):
+            cache.write(motion[0] + 1)
+    assert (tmp_path / "x.mdd").read_bytes() == before and names(tmp_path) == ["x.mdd"]
+
+
+def test_an_error_in_the_block_leaves_what_was_there(motion, tmp_path):
+    with (
+        pytest.raises(ZeroDivisionError),
+        PointCacheWriter(tmp_path / "x.pc2", POINTS, FRAMES) as cache,
+    ):
+        cache.write(motion[0])
+        raise ZeroDivisionError
+    assert names(tmp_path) == []
+
+
+def test_several_caches_take_their_places_together(motion, tmp_path):
+    caches = [PointCacheWriter(tmp_path / f"{i}.pc2", POINTS, FRAMES) for i in range(3)]
+    for positions in motion:
+        for cache in caches:
+            cache.write(positions)
+    for cache in caches:
+        cache.finish()
+    assert not list(tmp_path.glob("*.pc2"))
+    for cache in caches:
+        cache.commit()
+        cache.discard()
+    assert names(tmp_path) == ["0.pc2", "1.pc2", "2.pc2"]
+
+
+@pytest.mark.parametrize(
+    ("settings", "text"),
+    [
+        ({"points": 0}, "points"),
+        ({"points": -3}, "points"),
+        ({"points": 2**31}, "points"),
+        ({"points": 2.0}, "points"),
+        ({"frames": 0}, "frames: got 0"),
+        ({"frames": True}, "frames"),
+        ({"start": np.nan}, "start"),
+        ({"start": "a"}, "start"),
+        ({"step": 0}, "step"),
+        ({"step": -1}, "step"),
+        ({"step": 1e-50}, "step"),
+        ({"step": np.inf}, "step"),
+        ({"fps": 0}, "fps"),
+        ({"start": 1e9, "step": 0.5}, "vanish"),
+        ({"path": "x.abc"}, "unknown; point caches are .pc2, .mdd"),
+        ({"path": "x"}, "no extension"),
+    ],
+)
+def test_what_makes_no_cache(settings, text, tmp_path):
+    settings = {"path": "x.mdd", "points": POINTS, "frames": FRAMES} | settings
+    path = tmp_path / settings.pop("path")
+    with pytest.raises(af.InvalidInput, match=text) as error:
+        PointCacheWriter(path, **settings)
+    assert str(path) in str(error.value) and names(tmp_path) == []
+
+
+MANY = """
+import resource, sys
+import numpy as np
+from arapfields.point_cache import PointCacheReader, PointCacheWriter
+frame = np.random.default_rng(0).normal(size=(20_000, 3))
+def peak(count):
+    with PointCacheWriter(sys.argv[1], len(frame), count) as cache:
+        for _ in range(count):
+            cache.write(frame)
+    with PointCacheReader(sys.argv[1]) as cache:
+        for _ in cache:
+            pass
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+few = peak(4)
+print(peak(400) - few)
+"""
+
+
+def test_memory_does_not_grow_with_the_frames(tmp_path):
+    """396 further frames are 95 MB; what the interpreter keeps stays far below."""
+    said = subprocess.run(
+        [sys.executable, "-c", MANY, tmp_path / "x.pc2"], capture_output=True, text=True, check=True
+    )
+    assert int(said.stdout) < 5000  # kB
