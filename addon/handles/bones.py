@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ..blender import modifier_stack
 from ..blender.object_references import in_scene, settings_of
 from ..blender.selection import choose_row
 from ..core.errors import UserError
@@ -33,23 +34,26 @@ def is_selected(rig, name):
     return pose.select if hasattr(pose, "select") else pose.bone.select
 
 
-def chosen(source, rig, which):
-    """Names of the bones to make handles of, by the choices of BONES; UserError where there are none."""
+def chosen(rig, which, holding):
+    """Names of the bones to make handles of, by the choices of BONES; UserError where there are none.
+
+    `holding` are the names of the vertex groups that hold something.
+    """
     names = []
     if which == "SELECTED" or (which == "AUTO" and rig.mode == "POSE"):
         names = [bone.name for bone in rig.pose.bones if is_selected(rig, bone.name)]
     if not names and which != "SELECTED":
         names = [bone.name for bone in rig.data.bones if bone.use_deform]
-        holding = holding_groups(source)
         names = [name for name in names if name in holding] or names
     if not names:
         raise UserError("no bone of {rig} is selected, or deforms", rig=rig.name)
     return names
 
 
-def holding_groups(source):
-    """Names of the vertex groups that hold a vertex."""
-    indices = {entry.group for vertex in source.data.vertices for entry in vertex.groups if entry.weight > 0}
+def holding_groups(context, source):
+    """Names of the vertex groups that hold a vertex of the shape that is worked on, mirrored sides and all."""
+    with modifier_stack.evaluated_mesh(context, source, settings_of(source).in_place) as mesh:
+        indices = {entry.group for vertex in mesh.vertices for entry in vertex.groups if entry.weight > 0}
     return {group.name for group in source.vertex_groups if group.index in indices}
 
 
@@ -85,7 +89,7 @@ def rest_in_world(rig, name):
     return empties.matrix_of(rig) @ np.array(bone.matrix_local, dtype=np.float64) @ movers.bone_box(bone)
 
 
-def mirror(source, entry):
+def mirror(context, source, entry):
     """A handle of the bone on the other side."""
     name = bpy.utils.flip_name(entry.bone)
     if name == entry.bone or name not in entry.rig.data.bones:
@@ -93,7 +97,7 @@ def mirror(source, entry):
             "the armature {rig} has no bone on the other side of {bone}", rig=entry.rig.name, bone=entry.bone
         )
     weight, hold_from = entry.weight, entry.hold_from
-    mirrored = add(source, entry.rig, name, holding_groups(source))
+    mirrored = add(source, entry.rig, name, holding_groups(context, source))
     mirrored.weight, mirrored.hold_from = weight, hold_from
 
 

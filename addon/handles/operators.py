@@ -142,8 +142,8 @@ class ARAPFIELDS_OT_add_bones(HandleOperator, bpy.types.Operator):
 
     def change(self, context, source):
         rig = bones.armature_of(context, source)
-        names = bones.chosen(source, rig, self.bones)
-        groups = bones.holding_groups(source)
+        groups = bones.holding_groups(context, source)
+        names = bones.chosen(rig, self.bones, groups)
         for name in names:
             bones.add(source, rig, name, groups)
         counts.count_inside(context, source)
@@ -169,7 +169,7 @@ class ARAPFIELDS_OT_mirror_handle(HandleOperator, bpy.types.Operator):
         for key in keys:  # entries move in memory as others are added
             entry = next(entry for entry in empties.used(source) if movers.key_of(entry) == key)
             if entry.kind == "BONE":
-                bones.mirror(source, entry)
+                bones.mirror(context, source, entry)
             else:
                 empties.mirror(context, source, entry, "XYZ".index(self.axis))
         counts.count_inside(context, source)
