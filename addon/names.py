@@ -30,6 +30,7 @@ class Op(StrEnum):
 
     FIT = "arapfields.fit"
     ADD_HANDLE = "arapfields.add_handle"
+    ADD_BONES = "arapfields.add_bones"
     SET_REST = "arapfields.set_rest"
     RESET_HANDLE = "arapfields.reset_handle"
     REMOVE_HANDLE = "arapfields.remove_handle"
@@ -38,6 +39,8 @@ class Op(StrEnum):
     EXTRACT = "arapfields.extract"
     STYLIZE = "arapfields.stylize"
     SET_STYLE = "arapfields.set_style"
+    CARRY = "arapfields.carry"
+    RELEASE = "arapfields.release"
     LIVE = "arapfields.live"
     LIVE_KEEP = "arapfields.live_keep"
     APPLY_KEY = "arapfields.apply_as_shape_key"

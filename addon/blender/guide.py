@@ -15,6 +15,7 @@ SETTINGS = {  # class of properties → page
     "ARAPFIELDS_PG_stylize": "stylize",
     "ARAPFIELDS_PG_handle": "handles",
     "ARAPFIELDS_PG_scene": "pins",
+    "ARAPFIELDS_PG_carried": "characters",
     "ARAPFIELDS_PG_bake": "animation",
     "ARAPFIELDS_PG_object": "results",
 }
@@ -22,6 +23,7 @@ LABELS = {
     "surface": "Implicit Surface",
     "handles": "Handles",
     "pins": "Pins",
+    "characters": "Characters",
     "deform": "Deform",
     "stylize": "Stylize",
     "results": "Result",

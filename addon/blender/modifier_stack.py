@@ -57,9 +57,25 @@ def place(source):
 
 
 def before(source, in_place):
-    """The modifiers that make the shape to work on: those before the place, else all but ours."""
-    stack = list(source.modifiers)
-    return stack[: place(source)] if in_place else [m for m in stack if not (is_field(m) or is_cache(m))]
+    """The modifiers that make the shape to work on: those before the place, else all but ours.
+
+    Without the armatures whose bones are handles: the field does what they would do.
+    """
+    stack, rigs = list(source.modifiers), handle_rigs(source)
+    kept = stack[: place(source)] if in_place else [m for m in stack if not (is_field(m) or is_cache(m))]
+    return [modifier for modifier in kept if not is_replaced(modifier, rigs)]
+
+
+def handle_rigs(source):
+    """The armatures whose bones are handles of an object, or of the one that carries it."""
+    owners = [source, settings_of(source).carried_by]
+    entries = [entry for owner in owners if owner is not None for entry in settings_of(owner).handles]
+    return [entry.rig for entry in entries if entry.kind == "BONE" and entry.rig is not None]
+
+
+def is_replaced(modifier, rigs):
+    """Whether a modifier poses by one of these armatures."""
+    return modifier.type == "ARMATURE" and modifier.object in rigs
 
 
 def shown_before(source, in_place):

@@ -73,9 +73,22 @@ def source_of(context):
     if active.type == "EMPTY" and owner is None:
         meshes = [item for item in context.selected_objects if item.type == "MESH"]
         return meshes[0] if len(meshes) == 1 else None
+    if active.type == "ARMATURE":
+        return posed_by(active, context)
     if active.type not in ("EMPTY", "MESH"):
         return None
     return owner or active
+
+
+def posed_by(rig, context):
+    """The mesh object that an armature stands for: the one selected with it, else the first that it moves."""
+    selected = [item for item in context.selected_objects if item.type == "MESH"]
+    if selected:
+        return selected[0] if len(selected) == 1 else None
+    meshes = [item for item in context.view_layer.objects if item.type == "MESH"]
+    held = [item for item in meshes if any(entry.rig == rig for entry in settings_of(item).handles)]
+    posed = [m for m in meshes if any(s.type == "ARMATURE" and s.object == rig for s in m.modifiers)]
+    return next(iter(held), posed[0] if len(posed) == 1 else None)
 
 
 def refusal(item, in_edit_mode=False):

@@ -60,12 +60,21 @@ def _read(reference, shown, names):
 
 def at_points(vertices, weights, points):
     """(p,) weights of points, each from its three nearest vertices by inverse distance."""
-    tree = KDTree(len(vertices))
-    for index, vertex in enumerate(vertices):
-        tree.insert(vertex, index)
-    tree.balance()
-    near = [[(index, distance) for _, index, distance in tree.find_n(point, 3)] for point in points]
-    indices, distances = np.moveaxis(np.array(near, dtype=np.float64), 2, 0)
-    shares = 1.0 / np.maximum(distances, 1e-12)
-    blended = (shares * weights[indices.astype(np.int64)]).sum(axis=1) / shares.sum(axis=1)
-    return np.clip(blended, 0.0, 1.0)
+    return NearestVertices(vertices, points)(weights)
+
+
+class NearestVertices:
+    """Takes (n,) weights of vertices to points, each from its three nearest vertices by inverse distance."""
+
+    def __init__(self, vertices, points):
+        tree = KDTree(len(vertices))
+        for index, vertex in enumerate(vertices):
+            tree.insert(vertex, index)
+        tree.balance()
+        near = [[(index, distance) for _, index, distance in tree.find_n(point, 3)] for point in points]
+        indices, distances = np.moveaxis(np.array(near, dtype=np.float64), 2, 0)
+        self.indices, self.shares = indices.astype(np.int64), 1.0 / np.maximum(distances, 1e-12)
+
+    def __call__(self, weights):
+        blended = (self.shares * weights[self.indices]).sum(axis=1) / self.shares.sum(axis=1)
+        return np.clip(blended, 0.0, 1.0)

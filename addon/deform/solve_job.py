@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What deforming and stylizing share: a field is solved on the worker, then moves a mesh."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
@@ -10,8 +10,11 @@ from ..blender.host import has_window
 from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..blender.property_definitions import effective_value
+from ..carried.carrying import Carrying
+from ..carried.places import depsgraph_of
 from ..core.errors import UserError
 from ..core.geometry.edges import Topology
+from ..core.runtime import native
 from ..core.runtime.jobs import Item
 from ..jobs.job_operator import JobOperator
 from ..results import placement
@@ -27,6 +30,7 @@ class SolvedMesh:
     topology: Topology | None  # of the implicit surface; None for the source's own mesh
     report: dict
     turns: np.ndarray | None = None  # (n, 3) axis · angle, for free custom normals
+    carried: list = field(default_factory=list)  # what Carrying.moved made
 
 
 def plan_solve_job(context, operator, source, kind, samples, seed, solve):
@@ -40,6 +44,9 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
     surface = read_surface(context, source, in_place=placement.in_place(output, target))
     surface.exact = effective_value("surface", settings, operator) == "EXACT"
     surface.refine_thin = effective_value("refine_thin", settings, operator)
+    carrying = Carrying(context, source)
+    surface.together = carrying.solids(context, surface.space)
+    frames = carrying.frames(surface.space, depsgraph_of(context))
 
     preview = Preview(surface) if operator.in_window else None
 
@@ -48,7 +55,8 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
             tracker.rest_preview_points = preview.points
         own_triangles = surface.exact and output == "WARP"
         weight = 1.0 if output == "WARP" else 0.7  # of the solve in what is left to do
-        field = solve(tracker, surface, surface.samples(tracker, samples, seed, own_triangles), weight)
+        points = surface.samples(tracker, samples, seed, own_triangles)
+        field = solve(tracker, surface, points, weight)
         topology, report = None, {"output": output, **field.report.to_dict()}
         if output == "REMESH":
             after, topology, figures = surface.extract_moved(tracker, field, cells)
@@ -61,11 +69,14 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
         if not np.isfinite(after).all():
             raise UserError("the result has vertices that are not finite; try other settings")
         turns = surface.turns(field, before) if placement.keeps_mesh(output, target) else None
-        return SolvedMesh(surface.space.to_local(after), topology, report, turns)
+        carried = carrying.moved(native.library(), points, field, frames)
+        return SolvedMesh(surface.space.to_local(after), topology, report, turns, carried)
 
     def apply(solved):
         owner = surface.reference.get()
         item = placement.place_result(bpy.context, owner, kind, output, target, solved, surface.local)
+        carrying.put(bpy.context, solved.carried)
+        operator.warnings += [f"{owner.name}: {translated(reason)}" for reason in carrying.take_warnings()]
         said = describe(item, solved.report)
         hidden = translated("{name} is hidden", name=owner.name) if item != owner else ""
         return f"{said}, {hidden}" if hidden else said

@@ -13,7 +13,7 @@ import numpy as np
 from ..blender import modifier_stack
 from ..core.errors import UserError
 from ..names import FIELD_MODIFIER, HELPER_SUFFIX, OFFSETS, TURNS
-from . import cache_modifier, inputs, node_group
+from . import armatures, cache_modifier, inputs, node_group
 
 written = set()  # session_uid of objects that were moved since Blender's last update, which is ours alone
 
@@ -41,6 +41,7 @@ def bind(context, source):
     Where there is one already, its place and inputs stay, and its motion where the points are as many.
     """
     modifier = modifier_stack.find(source)
+    armatures.silence(source)
     made = None
     cache_modifier.suspend(source)
     with modifier_stack.evaluated_mesh(context, source, in_place=True) as mesh:
@@ -190,7 +191,13 @@ def restore(source, motion):
 
 
 def remove(source):
-    """Takes the object's modifier away, with all that was made for it."""
+    """Takes the object's modifier away, with all that was made for it; its armature poses it again."""
+    discard(source)
+    armatures.restore(source)
+
+
+def discard(source):
+    """Takes the object's modifier away where what it moved is part of the mesh now."""
     modifier = modifier_stack.find(source)
     if modifier is not None:
         helper, group = inputs.get(modifier, "Offsets"), modifier.node_group

@@ -12,11 +12,12 @@ from ..blender.host import has_window
 from ..blender.object_references import ObjectReference, settings_of
 from ..blender.redraw import redraw
 from ..core.errors import UserError
+from ..core.geometry.handles import Handle
 from ..core.runtime import native
 from ..core.runtime.coroutines import Pause, run_to_completion, step_for
 from ..core.runtime.threads import start_thread
-from . import empties
-from .native_handles import HELD
+from . import empties, movers
+from .native_handles import Holding
 
 COUNTED = 4000  # samples of the surface of which a handle's part is told
 LARGE = 20000  # vertices from which a window does not wait
@@ -41,15 +42,13 @@ def counting(context, source):
     in_place = settings_of(source).in_place
     reference, mesh = ObjectReference(source), mesh_arrays.read(context, source, in_place)
     weights = yield from vertex_groups.read_weights(context, source, empties.group_names(source), in_place)
-    regions = [
-        (entry.empty.session_uid, entry.kind, entry.group, np.array(entry.rest, dtype=np.float64))
-        for entry in empties.used(reference.get())
-    ]
+    source = reference.get()
+    regions = {movers.key_of(entry): region_of(entry, weights) for entry in empties.used(source)}
     counts, failures = {}, []
 
     def work():
         try:
-            counts.update(points_inside(mesh, regions, weights))
+            counts.update(points_inside(mesh, regions))
         except ValueError as error:
             failures.append(error)
 
@@ -62,23 +61,26 @@ def counting(context, source):
     if failures:
         raise failures[0]
     for entry in empties.used(reference.get()):
-        entry.inside = counts.get(entry.empty.session_uid, -1)
+        entry.inside = counts.get(movers.key_of(entry), -1)
 
 
-def points_inside(mesh, regions, weights):
-    """{session_uid of the Empty: points that it holds, -1 for a point or a pin}; on the worker."""
+def region_of(entry, weights):
+    """A handle where it is at rest, in the source's coordinates."""
+    rest = np.array(entry.rest, dtype=np.float64).reshape(4, 4)
+    return Handle("", entry.kind, rest, rest, weights.get(entry.group), hold_from=entry.hold_from)
+
+
+def points_inside(mesh, regions):
+    """{the handle's key: points that it holds, -1 for a point or a pin}; on the worker."""
     points = native.library().sample_mesh(mesh.vertices, mesh.triangles, count=COUNTED, seed=0).points
-    counts = {}
-    for uid, kind, group, rest in regions:
-        if kind in ("POINT", "PIN"):  # both always hold something
-            counts[uid] = -1
-            continue
-        if kind == "GROUP":
-            held = vertex_groups.at_points(mesh.vertices, weights[group], points) >= HELD
+    counts, holding = {}, Holding(mesh.vertices, points, list(regions.values()))
+    for key, handle in regions.items():
+        if handle.kind in ("POINT", "PIN"):  # both always hold something
+            counts[key] = -1
+        elif handle.kind in ("GROUP", "BONE"):
+            counts[key] = len(holding.of(handle))
         else:
-            box = rest.reshape(4, 4)
-            held = (np.abs((points - box[:3, 3]) @ np.linalg.inv(box[:3, :3]).T) <= 1).all(axis=1)
-        counts[uid] = int(held.sum())
+            counts[key] = int(handle.inside(points).sum())
     return counts
 
 

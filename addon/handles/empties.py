@@ -9,20 +9,12 @@ from ..blender import mesh_arrays, modifier_stack, vertex_groups
 from ..blender.object_references import in_scene, settings_of
 from ..blender.selection import choose_row
 from ..core.errors import UserError
-from ..core.geometry.handles import box_matrix, far_handle, solve_handle
+from ..core.geometry.handles import far_handle, solve_handle
 from ..core.geometry.spaces import transform
 from ..core.runtime.coroutines import run_to_completion
 from . import naming
+from .movers import box_now, current_box, is_there, matrix_of, name_of
 from .palette import free_colour
-
-
-def matrix_of(item):
-    return np.array(item.matrix_world, dtype=np.float64)
-
-
-def current_box(empty, where=matrix_of):
-    """The cube [-1, 1]³ → world, of an Empty where it is now."""
-    return box_matrix(where(empty), empty.empty_display_size)
 
 
 def rest_box(source, entry, where=matrix_of):
@@ -31,18 +23,29 @@ def rest_box(source, entry, where=matrix_of):
 
 
 def store_rest(source, entry):
-    """Makes where the handle's Empty is now its rest pose."""
-    relative = np.linalg.inv(matrix_of(source)) @ current_box(entry.empty)
+    """Makes where the handle's Empty or bone is now its rest pose."""
+    relative = np.linalg.inv(matrix_of(source)) @ box_now(entry)
     entry.rest = relative.ravel()
 
 
 def used(source):
-    """The handles whose Empties are still there."""
-    return [entry for entry in settings_of(source).handles if in_scene(entry.empty)]
+    """The handles whose Empties or bones are still there."""
+    return [entry for entry in settings_of(source).handles if is_there(entry)]
+
+
+def lost_bone(source):
+    """The UserError that names a bone that its armature has no more; None where all are there."""
+    for entry in settings_of(source).handles:
+        if entry.kind == "BONE" and in_scene(entry.rig) and not is_there(entry):
+            names = {"rig": entry.rig.name, "bone": entry.bone}
+            return UserError("the armature {rig} has no bone {bone}; take that handle off the list", **names)
+    return None
 
 
 def require_handles(source):
     """Why a source's handles cannot be followed, as a UserError; None where they can."""
+    if lost_bone(source):
+        return lost_bone(source)
     if not used(source):
         return UserError("Add a handle first")
     return vertex_groups.missing(source, group_names(source))
@@ -50,7 +53,7 @@ def require_handles(source):
 
 def holding_nothing(source):
     """Names of the handles that held no part of the surface when their rest poses were stored."""
-    return [entry.empty.name for entry in used(source) if entry.inside == 0]
+    return [name_of(entry) for entry in used(source) if entry.inside == 0]
 
 
 def find(source, empty):
@@ -61,21 +64,23 @@ def find(source, empty):
 
 def group_names(source):
     """The vertex groups that the source's handles hold."""
-    return [entry.group for entry in used(source) if entry.kind == "GROUP"]
+    return [e.group for e in used(source) if e.kind == "GROUP" or (e.kind == "BONE" and e.group)]
 
 
 def solve_handles(source, space, weights=None, where=matrix_of):
     """All handles of a source as the solver wants them; UserError when there is none.
 
     `weights` are those of the vertex groups by name; without them, groups say only where they go.
-    `where(object)` is the world matrix of one.
+    `where(object, bone)` is the world matrix of an object or of its posed bone.
     """
-    handles = []
+    handles, lost = [], lost_bone(source)
+    if lost is not None:
+        raise lost
     for entry in used(source):
-        boxes = rest_box(source, entry, where), current_box(entry.empty, where)
-        held = weights[entry.group] if weights and entry.kind == "GROUP" else None
-        options = {"weights": held, "weight": entry.weight}
-        handles.append(solve_handle(entry.empty.name, entry.kind, *boxes, space, **options))
+        boxes = rest_box(source, entry, where), box_now(entry, where)
+        held = weights[entry.group] if weights and entry.group and entry.kind in ("GROUP", "BONE") else None
+        options = {"weights": held, "weight": entry.weight, "hold_from": entry.hold_from}
+        handles.append(solve_handle(name_of(entry), entry.kind, *boxes, space, **options))
     if not handles:
         raise UserError("{name} has no handle; add one in the panel's Handles section", name=source.name)
     return [*handles, far_handle()] if holds_far(source) else handles
@@ -105,7 +110,7 @@ def add(source, empty, kind="CUBE"):
         index, colour = len(settings.handles), free_colour(settings.handles)
         settings.handles.add().colour = colour
     entry = settings.handles[index]
-    entry.empty, entry.kind = empty, kind
+    entry.empty, entry.kind, entry.rig, entry.bone = empty, kind, None, ""
     settings_of(empty).handle_of = source
     empty.empty_display_type = SHAPES[kind]
     store_rest(source, entry)

@@ -1,12 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Handles as the native solver takes them, with the samples that each holds."""
 
-import numpy as np
-
-from ..blender.vertex_groups import at_points
+from ..blender.vertex_groups import NearestVertices
 from ..core.geometry.handles import far_from, require_held
-
-HELD = 0.5  # weight from which a vertex group's handle holds a sample
 
 
 def native_handles(af, handles, rest, samples):
@@ -14,12 +10,12 @@ def native_handles(af, handles, rest, samples):
 
     `handles` are core.geometry.handles.Handle, `rest` is the source's surface at rest.
     """
-    counts, natives = {}, []
+    counts, natives, holding = {}, [], Holding(rest.vertices, samples.points, handles)
     for handle in handles:
         if handle.kind == "POINT":
             natives.append(af.Point(handle.rest[:3, 3], handle.target[:3, 3], weight=handle.weight))
-        elif handle.kind == "GROUP":
-            held = np.flatnonzero(at_points(rest.vertices, handle.weights, samples.points) >= HELD)
+        elif handle.kind in ("GROUP", "BONE"):
+            held = holding.of(handle)
             counts[handle.name] = len(held)
             natives.append(region(af, handle, held))
         elif handle.kind == "PIN":
@@ -31,6 +27,21 @@ def native_handles(af, handles, rest, samples):
             natives.append(af.Cuboid(handle.rest, handle.target, weight=handle.weight))
     require_held(counts)
     return natives
+
+
+class Holding:
+    """Which (p, 3) points of a surface groups and bones hold; their weights are those of `vertices`."""
+
+    def __init__(self, vertices, points, handles):
+        self.vertices, self.points, self.handles = vertices, points, handles
+        self._at_points = None
+
+    def of(self, handle):
+        """Indices of the points that one of the handles holds."""
+        if handle.weights is None:
+            return handle.about_bone(self.points, self.handles)
+        self._at_points = self._at_points or NearestVertices(self.vertices, self.points)
+        return handle.by_weight(self._at_points(handle.weights))
 
 
 def region(af, handle, held):

@@ -8,9 +8,9 @@ from ..blender.selection import select_alone
 from ..core.errors import UserError
 from ..core.geometry.handles import nothing_held
 from ..core.runtime import native
-from ..core.settings.choices import HANDLE_KINDS, HANDLE_PLACES
+from ..core.settings.choices import BONES, EMPTY_KINDS, HANDLE_PLACES
 from ..names import Op
-from . import counts, empties, naming
+from . import bones, counts, empties, movers, naming
 
 
 class HandleOperator(Guided):
@@ -59,7 +59,7 @@ class HandleOperator(Guided):
 def chosen_entries(context, source):
     """The handles whose Empties are selected, or the one chosen in the list."""
     settings = settings_of(source)
-    selected = [entry for entry in empties.used(source) if entry.empty in context.selected_objects]
+    selected = [entry for entry in empties.used(source) if is_selected(context, entry)]
     if selected:
         return selected
     copies = [item for item in context.selected_objects if settings_of(item).handle_of == source]
@@ -71,6 +71,12 @@ def chosen_entries(context, source):
     return [settings.handles[index]] if 0 <= index < len(settings.handles) else []
 
 
+def is_selected(context, entry):
+    if entry.kind == "BONE":
+        return entry.rig.mode == "POSE" and bones.is_selected(entry.rig, entry.bone)
+    return entry.empty in context.selected_objects
+
+
 class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
     """Make the selected Empties handles of the object, or make a new box at the cursor or around vertices"""
 
@@ -80,7 +86,7 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
     in_edit_mode = counts_points = True
 
     kind: bpy.props.EnumProperty(
-        items=HANDLE_KINDS, name="Kind", description="What of the surface the handle holds"
+        items=EMPTY_KINDS, name="Kind", description="What of the surface the handle holds"
     )
     place: bpy.props.EnumProperty(
         items=HANDLE_PLACES, name="Place", description="Where the handle is", options={"SKIP_SAVE"}
@@ -120,6 +126,30 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
         return translated("{count} handles added to {name}", count=len(selected), name=source.name)
 
 
+class ARAPFIELDS_OT_add_bones(HandleOperator, bpy.types.Operator):
+    """Make handles of an armature's bones: posing it moves what they hold"""
+
+    bl_idname = Op.ADD_BONES
+    bl_label = "From Armature"
+    needs_handle = False
+    counts_points = True
+
+    bones: bpy.props.EnumProperty(items=BONES, name="Bones", description="Which bones become handles")
+
+    @classmethod
+    def refuses(cls, source):
+        return ARAPFIELDS_OT_add_handle.refuses(source)
+
+    def change(self, context, source):
+        rig = bones.armature_of(context, source)
+        groups = bones.holding_groups(context, source)
+        names = bones.chosen(rig, self.bones, groups)
+        for name in names:
+            bones.add(source, rig, name, groups)
+        counts.count_inside(context, source)
+        return translated("{count} handles added to {name}", count=len(names), name=source.name)
+
+
 class ARAPFIELDS_OT_mirror_handle(HandleOperator, bpy.types.Operator):
     """Make handles like the selected ones on the other side of the object"""
 
@@ -134,10 +164,14 @@ class ARAPFIELDS_OT_mirror_handle(HandleOperator, bpy.types.Operator):
     )
 
     def change(self, context, source):
-        entries = [entry.empty for entry in chosen_entries(context, source) if entry.empty is not None]
-        for empty in entries:
-            entry = settings_of(source).handles[empties.find(source, empty)]
-            empties.mirror(context, source, entry, "XYZ".index(self.axis))
+        entries = [e for e in chosen_entries(context, source) if movers.is_there(e)]
+        keys = [movers.key_of(entry) for entry in entries]
+        for key in keys:  # entries move in memory as others are added
+            entry = next(entry for entry in empties.used(source) if movers.key_of(entry) == key)
+            if entry.kind == "BONE":
+                bones.mirror(context, source, entry)
+            else:
+                empties.mirror(context, source, entry, "XYZ".index(self.axis))
         counts.count_inside(context, source)
         return translated("{count} handles mirrored", count=len(entries))
 
@@ -154,7 +188,7 @@ class ARAPFIELDS_OT_set_rest(HandleOperator, bpy.types.Operator):
     def change(self, context, source):
         entries = empties.used(source) if self.all else chosen_entries(context, source)
         for entry in entries:
-            if entry.empty is not None:
+            if movers.is_there(entry):
                 empties.store_rest(source, entry)
         counts.count_inside(context, source)
         return translated("{count} rest poses stored", count=len(entries))
@@ -171,8 +205,9 @@ class ARAPFIELDS_OT_reset_handle(HandleOperator, bpy.types.Operator):
     def change(self, context, source):
         entries = empties.used(source) if self.all else chosen_entries(context, source)
         for entry in entries:
-            if entry.empty is not None:
+            if movers.is_there(entry) and entry.kind != "BONE":
                 empties.reset(source, entry)
+        bones.reset(context, source, [e for e in entries if movers.is_there(e) and e.kind == "BONE"])
         return translated("{count} handles moved back", count=len(entries))
 
 
@@ -198,6 +233,7 @@ class ARAPFIELDS_OT_remove_handle(HandleOperator, bpy.types.Operator):
 
 CLASSES = [
     ARAPFIELDS_OT_add_handle,
+    ARAPFIELDS_OT_add_bones,
     ARAPFIELDS_OT_mirror_handle,
     ARAPFIELDS_OT_set_rest,
     ARAPFIELDS_OT_reset_handle,

@@ -2,24 +2,27 @@
 import bpy
 
 from ..blender.language import translated
-from ..blender.object_references import in_scene, source_of
+from ..blender.object_references import source_of
 from ..blender.section import Section, wrapped
 from ..names import Op
-from . import empties
+from . import empties, movers
 
-ICONS = {"CUBE": "CUBE", "POINT": "DOT", "GROUP": "GROUP_VERTEX", "PIN": "PINNED"}
+ICONS = {"CUBE": "CUBE", "POINT": "DOT", "GROUP": "GROUP_VERTEX", "PIN": "PINNED", "BONE": "BONE_DATA"}
 
 
 class ARAPFIELDS_UL_handles(bpy.types.UIList):
     def draw_item(self, context, layout, data, item, icon, active_data, active_propname, index):
         row = layout.row(align=True)
-        if not in_scene(item.empty):
+        if not movers.is_there(item):
             row.label(text="(deleted)", icon="ERROR")
             return
         swatch = row.row()
         swatch.ui_units_x = 0.8
         swatch.prop(item, "colour", text="")
-        row.prop(item.empty, "name", text="", emboss=False, icon=ICONS[item.kind])
+        if item.kind == "BONE":
+            row.prop(item, "bone", text="", emboss=False, icon=ICONS[item.kind])
+        else:
+            row.prop(item.empty, "name", text="", emboss=False, icon=ICONS[item.kind])
         if item.inside >= 0:
             row.label(
                 text=f"{item.inside:,}" if item.inside else translated("empty"),
@@ -46,6 +49,7 @@ class ARAPFIELDS_MT_add_handle(bpy.types.Menu):
             row.enabled = empties.can_place(source_of(context), kind, place)
             operator = row.operator(Op.ADD_HANDLE, text=text, icon=icon)
             operator.kind, operator.place = kind, place
+        layout.operator(Op.ADD_BONES, icon="ARMATURE_DATA")
 
 
 class ARAPFIELDS_MT_more_handle(bpy.types.Menu):
@@ -86,8 +90,10 @@ class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
         if 0 <= settings.active_handle < len(settings.handles):
             entry = settings.handles[settings.active_handle]
             layout.prop(entry, "weight")
-            if entry.kind == "GROUP":
+            if entry.kind in ("GROUP", "BONE"):
                 layout.prop_search(entry, "group", source, "vertex_groups")
+            if entry.group:
+                layout.prop(entry, "hold_from")
 
 
 CLASSES = [

@@ -6,13 +6,33 @@ import bpy
 from ..core.settings.choices import HANDLE_KINDS
 
 
+def is_armature(_, item):
+    return item.type == "ARMATURE"
+
+
 class ARAPFIELDS_PG_handle(bpy.types.PropertyGroup):
     empty: bpy.props.PointerProperty(type=bpy.types.Object, name="Empty", description="Moves the handle")
+    rig: bpy.props.PointerProperty(
+        type=bpy.types.Object,
+        name="Armature",
+        description="The armature whose bone moves the handle, for handles of that kind",
+        poll=is_armature,
+    )
+    bone: bpy.props.StringProperty(name="Bone", description="The bone that moves the handle")
     kind: bpy.props.EnumProperty(
         items=HANDLE_KINDS, name="Kind", description="What of the surface the handle holds"
     )
     group: bpy.props.StringProperty(
-        name="Vertex Group", description="The group that the handle holds, for handles of that kind"
+        name="Vertex Group",
+        description="The group that the handle holds; a bone without one holds what lies about it",
+    )
+    hold_from: bpy.props.FloatProperty(
+        name="Hold From",
+        description="Weight of the vertex group from which the surface is held; less stays free to bend",
+        default=0.5,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
     )
     weight: bpy.props.FloatProperty(
         name="Weight",

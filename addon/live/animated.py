@@ -2,7 +2,7 @@
 """Which frames the animation of a source's handles and style spans."""
 
 from ..blender.object_references import settings_of
-from ..handles import empties
+from ..handles import empties, movers
 
 
 def frame_range(source, kind):
@@ -23,7 +23,7 @@ def involved(source, kind):
     style = settings_of(source).stylize
     used = [source]
     if kind == "DEFORM" or style.use_handles:
-        used += [entry.empty for entry in empties.used(source)]
+        used += [movers.mover_of(entry) for entry in empties.used(source)]
     if kind == "STYLIZE":
         used += [item for item in (style.frame_object, style.style_object) if item is not None]
     found = {}

@@ -7,7 +7,7 @@ from ..blender import modifier_stack
 from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..deform.solve_job import SolvedMesh
-from ..field_modifier import cache_modifier, motion
+from ..field_modifier import armatures, cache_modifier, motion
 from ..results import placement
 from .live_object import LIVE
 
@@ -19,6 +19,7 @@ class LiveModifier:
 
     def __init__(self, context, source, _):
         self.before, self.shown = motion.snapshot(source), None
+        self.was_silent = bool(settings_of(source).silenced)
         self.was_playing = cache_modifier.is_playing(source)
         self.bind(context, source)
 
@@ -45,6 +46,8 @@ class LiveModifier:
             settings_of(source).live_kind = ""
             if source.mode != "EDIT":
                 motion.restore(source, self.before)
+                if not self.was_silent:
+                    armatures.restore(source)
                 if self.was_playing:
                     cache_modifier.set_playing(source, True)
 
@@ -53,7 +56,11 @@ class LiveModifier:
         settings = settings_of(source)
         settings.live_kind = ""
         target, shape = settings.target, self.shown
-        if target in ("REPLACE", "KEY") and shape is not None:
+        if (
+            target in ("REPLACE", "KEY")
+            and shape is not None
+            and not placement.refusal(source, "WARP", target)
+        ):
             solved = SolvedMesh(shape.points.astype(np.float64), None, {"output": LIVE})
             placement.place_result(context, source, kind, "WARP", target, solved, shape.rest)
         return source

@@ -5,6 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..carried.passengers import Frame
+
 
 class Request(NamedTuple):
     """One pose. Where two requests are alike, so are the shapes that are solved for them from rest."""
@@ -14,6 +16,7 @@ class Request(NamedTuple):
     points: np.ndarray  # (n, 3) the source's own, in local coordinates, where the field is evaluated
     handles: list  # at rest
     energy: dict  # weights of the energy's terms, by name
+    carried: list  # carried.passengers.Frame of what goes along
 
 
 def alike(a, b):
@@ -21,6 +24,8 @@ def alike(a, b):
     if (a.style and a.style[0]) != (b.style and b.style[0]) or a.energy != b.energy:
         return False
     if a.handles is not b.handles or not same_points(a.points, b.points):
+        return False
+    if len(a.carried) != len(b.carried) or not all(map(Frame.same, a.carried, b.carried)):
         return False
     return len(a.targets) == len(b.targets) and all(map(np.array_equal, a.targets, b.targets))
 

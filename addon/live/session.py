@@ -10,6 +10,8 @@ from ..blender import mesh_arrays, modifier_stack, vertex_groups
 from ..blender.host import has_window
 from ..blender.object_references import ObjectReference, settings_of
 from ..blender.property_definitions import from_single_precision
+from ..carried.carrying import Carrying, Reshaped
+from ..carried.places import depsgraph_of
 from ..core.errors import UserError
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
@@ -25,7 +27,7 @@ from .following import Following, scene_frame
 from .live_modifier import PAUSING, LiveModifier
 from .live_object import LiveObject
 from .request import Request
-from .setup import differ_in_handles, energy_weights, layout_of
+from .setup import differ_in_handles, energy_weights, has_motion_before, layout_of
 from .warm import warm
 
 PREVIEW_CELLS = 96  # at most, of the implicit surface that is shown while it moves
@@ -38,7 +40,7 @@ class Changed(Exception):
 class Session(Following):
     """Reads its source when made, on the main thread; everything that takes time is done by the worker.
 
-    `shown`: whether there is something to be seen of it; `display` is that of a session before it.
+    `shown`: whether there is something to be seen of it, which goes on from that of an `earlier` session.
     `in_place`: whether it works on the shape at the modifier's place; None: where it is shown there.
     `keeps`: what it shows is the user's work, which stays: bit for bit until a handle moves, and at the end.
     """
@@ -50,7 +52,7 @@ class Session(Following):
         kind="DEFORM",
         shown=True,
         follow=True,
-        display=None,
+        earlier=None,
         keeps=False,
         in_place=None,
     ):
@@ -75,18 +77,21 @@ class Session(Following):
         self.points = self.rest = (
             None  # (n, 3) those that the solver moves, in local coordinates and solve space
         )
-        self.worker, self.display = None, display if shown else None
+        self.worker, self.display = None, earlier.display if shown and earlier else None
+        self.carrying, self.riding = Carrying(context, source), []
+        self.surface.together = self.carrying.solids(context, self.surface.space)
         if keeps or frame_range(source, kind) is None:
             self.frame = scene_frame(context.scene)
         if shown:
             self.show_on(context, source, in_place)
+            self.carrying.bind(context, earlier.carrying.before if earlier else None)
             settings.live_kind = kind
         self.reading = self.read(context, follow)
 
     def ready_solver(self):
-        return (
-            warm.take(self.surface, self.energy) if self.kind == "DEFORM" and self.surface.in_place else None
-        )
+        if self.kind != "DEFORM" or not self.surface.in_place or self.surface.together:
+            return None
+        return warm.take(self.surface, self.energy)
 
     def show_on(self, context, source, in_place):
         """Shows the shape where that belongs; what a session before made is used again, or goes."""
@@ -156,10 +161,12 @@ class Session(Following):
             raise Changed
         if self.may_have_moved:
             self.read_points(context, source)
+        self.refresh_carried(context)
         self.take(self.current_request(context, source), scene_frame(context.scene))
         if self.is_restored:
             self.is_restored, self.quiet = False, True
             self.display.before = motion.snapshot(source)
+            self.carrying.renew()
 
     def restored(self):
         """What the source and its handles are now came from elsewhere: an undone step, a cancelled drag.
@@ -181,6 +188,13 @@ class Session(Following):
         if not np.array_equal(points, self.placed):
             self.placed = points
 
+    def refresh_carried(self, context):
+        """Reads again what of the carried objects may have been edited."""
+        try:
+            self.carrying.refresh(context)
+        except Reshaped:
+            raise Changed from None
+
     def is_edited(self, source):
         """Whether the source's mesh is another than when it was read; looked at after an update of it."""
         if not self.may_be_edited:
@@ -188,18 +202,20 @@ class Session(Following):
         self.may_be_edited = False
         return mesh_arrays.fingerprint(source.data) != self.fingerprint
 
-    def current_request(self, context, source, where=empties.matrix_of, seen=None):
+    def current_request(self, context, source, where=empties.matrix_of, seen=None, depsgraph=None):
         """The Request of what the handles and settings are now.
 
-        `where(object)` is the world matrix of one, and `seen` the source, as a render has them for instance.
+        `where(object, bone)` is the world matrix of one, and `seen` the source, as a render's `depsgraph` has
+        them for instance.
         """
         space, settings = space_of(where(source), source.name), settings_of(seen or source).stylize
         energy, targets = energy_weights(settings_of(seen or source), self.kind), []
         if self.handles:
             current = empties.solve_handles(source, space, where=where)
             targets = [h.target[:3, 3] if h.kind == "POINT" else h.target for h in current]
+        frames = self.carrying.frames(space, depsgraph or depsgraph_of(context))
         if self.kind != "STYLIZE":
-            return Request(targets, None, self.placed, self.handles, energy)
+            return Request(targets, None, self.placed, self.handles, energy, frames)
         style = preference.requested_style(settings, space, where=where)
         strength, sharpness = (
             from_single_precision(settings.strength),
@@ -208,7 +224,7 @@ class Session(Following):
         directions = style.directions(native.library())
         key = (*style.key(), strength, sharpness)
         further = key, directions, strength, sharpness, style.up
-        return Request(targets, further, self.placed, self.handles, energy)
+        return Request(targets, further, self.placed, self.handles, energy, frames)
 
     def show(self):
         """Shows the newest shape; True when there was one."""
@@ -218,14 +234,17 @@ class Session(Following):
         shape = self.of_frame(shape)
         if shape is None or self.quiet:
             return False
-        return self.display.show(self.source.get(), shape)
+        shown = self.display.show(self.source.get(), shape)
+        if shown:
+            self.carrying.show(shape.carried)
+        return shown
+
+    def take_away(self, source):
+        """Everything looks as it did before; `source` is None where it is gone."""
+        self.display.take_away(source)
+        self.carrying.take_away()
 
     def show_last(self):
         """What the worker made before it ended; an error of it no longer matters."""
         with contextlib.suppress(UserError, ReferenceError):
             self.show()
-
-
-def has_motion_before(source):
-    """Whether the points at the field's place may move without an edit of the mesh."""
-    return bool(modifier_stack.shown_before(source, in_place=True)) or source.data.shape_keys is not None

@@ -18,12 +18,13 @@ from ..blender.redraw import redraw
 from ..core.errors import UserError
 from ..core.runtime import jobs
 from ..field_modifier import motion
-from ..handles import empties
+from ..handles import empties, movers
 from ..results import result_objects
 from . import live_object
 from .animated import scene_range
 from .following import scene_frame
 from .session import Changed, Session
+from .setup import moves
 
 INTERVAL = 1 / 60  # seconds between looks at the handles
 WAIT = 30.0  # seconds at most that a script waits for the first shape
@@ -61,8 +62,9 @@ def begin(context, source, kind="DEFORM", keeps=False):
         earlier.stop()
     session = None
     try:
-        session = Session(context, source, kind, display=earlier.display if earlier else None, keeps=keeps)
+        session = Session(context, source, kind, earlier=earlier, keeps=keeps)
         session.advance()  # a small mesh is read at once
+        tell(session)
     except UserError:
         if session or earlier:
             take_away(session or earlier)
@@ -80,7 +82,7 @@ def end(context, source, keep=False):
     session.show_last()
     if keep:
         return session.display.keep(context, source, session.kind)
-    session.display.take_away(source)
+    session.take_away(source)
     return None
 
 
@@ -99,10 +101,17 @@ def update(context, wait=0.0, refined=False):
             if wait:
                 session.wait(wait, refined)
             session.show()
+            tell(session)
         except Changed:
             restart(context, uid, session)
         except (UserError, ValueError, ReferenceError) as error:
             give_up(uid, session, error)
+
+
+def tell(session):
+    """Names the carried objects that are left out."""
+    for reason in session.carrying.take_warnings():
+        jobs.add_message("WARNING", f"{session.source.name}: {translated(reason)}")
 
 
 def give_up(uid, session, error):
@@ -116,7 +125,7 @@ def give_up(uid, session, error):
 def take_away(session):
     """Takes the live shape away, also where an undone step left the source or the shape in no scene."""
     with contextlib.suppress(UserError, ReferenceError, AttributeError):
-        session.display.take_away(session.source.find())
+        session.take_away(session.source.find())
 
 
 def watch(depsgraph):
@@ -125,7 +134,10 @@ def watch(depsgraph):
         return
     updated = [(u.id.original, u.is_updated_geometry) for u in depsgraph.updates]
     meshes = {item.session_uid for item, shape in updated if shape and isinstance(item, bpy.types.Mesh)}
+    objects = {item.session_uid for item, shape in updated if shape and isinstance(item, bpy.types.Object)}
+    data = {item.session_uid for item, _ in updated if not isinstance(item, bpy.types.Object)}
     for session in live.values():
+        session.carrying.watch(objects, data)
         source = session.source.find()
         if source is None:
             continue
@@ -133,13 +145,6 @@ def watch(depsgraph):
             session.may_be_edited |= source.session_uid not in motion.written
         elif session.moves_by_itself and any(moves(item, source) for item, _ in updated):
             session.may_have_moved = True
-
-
-def moves(item, source):
-    """Whether an update of this may move the points of the source before its field does."""
-    if isinstance(item, bpy.types.Object):
-        return item == source or (item.type != "EMPTY" or settings_of(item).handle_of != source)
-    return isinstance(item, bpy.types.Key | bpy.types.Armature | bpy.types.Lattice | bpy.types.Curve)
 
 
 def restart(context, uid, session):
@@ -185,7 +190,7 @@ def follow_frame(depsgraph):
             warn_of_hidden(source, session, depsgraph)
             seen = source.evaluated_get(depsgraph)
             where = functools.partial(rendered_matrix, depsgraph=depsgraph)
-            request = session.current_request(bpy.context, source, where, seen)
+            request = session.current_request(bpy.context, source, where, seen, depsgraph)
             session.take(request, scene_frame(depsgraph.scene))
             session.worker.wait(WAIT, refined=True)
             session.wait_for_frame(None)  # a picture of another frame would be none
@@ -208,7 +213,8 @@ def show_frame():
 def warn_of_hidden(source, session, depsgraph):
     """Says once which handles a render does not see, and so cannot follow."""
     there = {item.original.session_uid for item in depsgraph.ids}
-    hidden = [e.empty.name for e in empties.used(source) if e.empty.session_uid not in there]
+    used = empties.used(source)
+    hidden = [movers.name_of(e) for e in used if movers.mover_of(e).session_uid not in there]
     if hidden and session.handles:
         text = translated(
             "{names} is hidden in renders, which therefore do not follow it", names=", ".join(hidden)
@@ -218,8 +224,8 @@ def warn_of_hidden(source, session, depsgraph):
             jobs.add_message(*message)
 
 
-def rendered_matrix(item, depsgraph):
-    return empties.matrix_of(item.original.evaluated_get(depsgraph))
+def rendered_matrix(item, bone="", *, depsgraph):
+    return empties.matrix_of(item.original.evaluated_get(depsgraph), bone)
 
 
 def recover():

@@ -2,7 +2,7 @@
 """What a live session's worker does: the solver is set up, then makes a shape for each request."""
 
 import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -30,6 +30,7 @@ class Shape:
     rest: np.ndarray | None  # (n, 3) where the source's own points are without the field; None for surfaces
     turns: np.ndarray | None = None  # (n, 3) axis · angle, for free custom normals
     topology: Topology | None = None
+    carried: list = field(default_factory=list)  # what Carrying.moved made
 
 
 class Solving:
@@ -104,7 +105,7 @@ class Solving:
         return self.shape(self.solver.field(self.rest))
 
     def solve(self, request, **further):
-        targets, style, points, handles, energy = request
+        targets, style, points, handles, energy, self.riding = request
         self.follow_points(points)
         if energy != self.energy:
             self.make_solver(handles, energy)
@@ -133,12 +134,14 @@ class Solving:
         yield self.shape(self.solver.field(self.rest))
 
     def shape(self, solved):
+        field = self.solver.field if self.riding or self.surface.has_free_normals else None
+        carried = self.carrying.moved(native.library(), self.samples, field, self.riding)
         if self.topology is not None:
-            return Shape(self.local(solved), None, topology=self.topology)
-        turns = self.surface.turns(self.solver.field, self.rest) if self.surface.in_place else None
+            return Shape(self.local(solved), None, topology=self.topology, carried=carried)
+        turns = self.surface.turns(field, self.rest) if self.surface.in_place else None
         if self.single is None or self.single[0] is not self.points:
             self.single = self.points, np.asarray(self.points, dtype=np.float32)
-        return Shape(self.local(solved), self.single[1], turns)
+        return Shape(self.local(solved), self.single[1], turns, carried=carried)
 
     def local(self, solved):
         if not np.isfinite(solved).all():

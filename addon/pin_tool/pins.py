@@ -7,6 +7,7 @@ from mathutils import Matrix
 
 from ..blender import object_references
 from ..blender.object_references import owner_of, settings_of
+from ..carried import passengers
 from ..core.errors import UserError
 from ..core.geometry.handles import box_matrix
 from ..field_modifier import motion
@@ -46,7 +47,8 @@ def handles_in_view(context):
     found = []
     for source in context.view_layer.objects:
         if source.type == "MESH" and settings_of(source).handles:
-            found += [(source, entry) for entry in empties.used(source) if entry.empty.visible_get()]
+            entries = [entry for entry in empties.used(source) if entry.kind != "BONE"]
+            found += [(source, entry) for entry in entries if entry.empty.visible_get()]
     return found
 
 
@@ -119,10 +121,13 @@ def remove(context, source, empty):
     discard(source, empty)
     left = empties.used(source)
     if left:
-        select(context, left[-1].empty)
+        with_empties = [entry for entry in left if entry.kind != "BONE"]
+        if with_empties:
+            select(context, with_empties[-1].empty)
         return
     settings_of(source).hold_far = False
     sessions.end(context, source)
     motion.remove(source)
+    passengers.give_back_all(source)
     source.select_set(True)
     context.view_layer.objects.active = source

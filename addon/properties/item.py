@@ -7,6 +7,7 @@ from ..animation.properties import ARAPFIELDS_PG_bake
 from ..blender.object_references import owner_of, settings_of
 from ..blender.property_definitions import annotations
 from ..blender.selection import row_chosen
+from ..carried.properties import ARAPFIELDS_PG_carried
 from ..core.settings.choices import NORMALS, OUTPUTS, PLACEMENT_NUMBERS, PLACEMENTS, SURFACES
 from ..core.settings.parameters import EXTRACTION
 from ..handles.properties import ARAPFIELDS_PG_handle
@@ -74,6 +75,19 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     )
     active_handle: bpy.props.IntProperty(
         name="Active Handle", description="Row chosen in the list of handles", update=row_chosen
+    )
+    carried: bpy.props.CollectionProperty(
+        type=ARAPFIELDS_PG_carried, name="Carried Objects", description="Objects that the field moves as well"
+    )
+    active_carried: bpy.props.IntProperty(
+        name="Active Carried Object", description="Row chosen in the list of carried objects"
+    )
+    carried_by: bpy.props.PointerProperty(
+        type=bpy.types.Object, name="Carried By", description="The object whose field moves this one"
+    )
+    silenced: bpy.props.StringProperty(
+        name="Armatures Switched Off",
+        description="Armature modifiers that the field replaces, and whether they were on, as JSON",
     )
     handle_of: bpy.props.PointerProperty(
         type=bpy.types.Object, name="Handle Of", description="The object that this Empty is a handle of"

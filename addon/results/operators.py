@@ -5,6 +5,7 @@ from ..blender import mesh_arrays, modifier_stack
 from ..blender.guide import Guided
 from ..blender.language import translated
 from ..blender.object_references import refusal, settings_of, source_of
+from ..carried import passengers
 from ..core.errors import UserError
 from ..field_modifier import motion
 from ..names import Op
@@ -54,7 +55,7 @@ class ARAPFIELDS_OT_apply_as_shape_key(FieldOperator, bpy.types.Operator):
         if source.data.shape_keys is None:
             source.shape_key_add(name="Basis", from_mix=False)
         result_objects.add_warp_key(source, before, after)
-        motion.remove(source)
+        motion.discard(source)
         return {"FINISHED"}
 
 
@@ -66,6 +67,7 @@ class ARAPFIELDS_OT_remove_field(FieldOperator, bpy.types.Operator):
 
     def execute(self, context):
         motion.remove(source_of(context))
+        passengers.give_back_all(source_of(context))
         return {"FINISHED"}
 
 

@@ -8,7 +8,7 @@ import bpy
 from ..blender import mesh_arrays, modifier_stack
 from ..blender.object_references import settings_of
 from ..core.errors import UserError
-from ..field_modifier import motion
+from ..field_modifier import armatures, motion
 from ..handles import empties
 from ..names import REPORT
 from . import result_objects
@@ -56,7 +56,8 @@ def place_result(context, source, kind, output, target, moved, before):
     else:
         single_user(source)
         mesh_arrays.set_positions(source.data, moved.vertices)
-    motion.remove(source)  # what it moved is part of the mesh now
+    armatures.silence(source)
+    motion.discard(source)  # what it moved is part of the mesh now
     source[REPORT] = json.dumps(moved.report)
     if target == "REPLACE":
         for entry in empties.used(source):
@@ -90,6 +91,8 @@ def refusal(source, output, target):
         reason = None
     if reason is None and settings_of(source).live_kind:
         reason = UserError("{name} is live; end live mode first", name=source.name)
+    if reason is None and target == "REPLACE" and settings_of(source).carried:
+        reason = UserError("{name} carries other objects; choose Modifier for the result", name=source.name)
     if reason is None and output != "WARP" and target == "KEY":
         reason = UserError("a shape key keeps the mesh; choose Original Mesh for the output")
     if reason is None and output == "WARP" and not keeps_mesh(output, target):

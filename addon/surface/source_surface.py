@@ -35,6 +35,7 @@ class SourceSurface:
     in_place: bool = False  # the shape at the place of the field's modifier, not all that is shown
     has_free_normals: bool = False
     exact: bool = True  # whether the implicit surface is the triangles', or a fit of them
+    together: list = field(default_factory=list)  # (vertices, triangles) of what is sampled with it
     refine_thin: bool = False  # whether extraction cuts its cells up at thin parts
     _sdf: object = None  # the fitted surface, once it was asked for
     _triangles: object = None  # the exact one
@@ -81,6 +82,8 @@ class SourceSurface:
         if not own_triangles:
             sdf = self.implicit(tracker, 0.3)
             return af.sample_surface(sdf, count=count, seed=seed, task=tracker.start("Sampling", 0.15))
+        if self.together:
+            return af.sample_meshes([(self.vertices, self.triangles), *self.together], count=count, seed=seed)
         return af.sample_mesh(self.vertices, self.triangles, count=count, seed=seed)
 
     def turns(self, field, points):

@@ -8,8 +8,8 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix
 
 from ..blender import user_preferences
-from ..blender.object_references import in_scene, settings_of, source_of
-from ..handles import empties
+from ..blender.object_references import settings_of, source_of
+from ..handles import empties, movers
 
 CORNERS = np.array([(x, y, z, 1.0) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 EDGES = [(a, b) for a in range(8) for b in range(a) if (CORNERS[a] != CORNERS[b]).sum() == 1]
@@ -26,14 +26,22 @@ def box_lines(matrix):
     return [corners[end].tolist() for edge in EDGES for end in edge]
 
 
+def shown_handles(source):
+    """Those whose Empties are seen, and of those that bones move the one chosen in the list."""
+    settings = settings_of(source)
+    for index, entry in enumerate(settings.handles):
+        if not movers.is_there(entry) or not movers.mover_of(entry).visible_get():
+            continue
+        if entry.kind != "BONE" or index == settings.active_handle:
+            yield entry
+
+
 def segments(source):
     """((r, g, b), width, line ends in world space) of all handles of a source."""
     lines = []
-    for entry in settings_of(source).handles:
-        if not in_scene(entry.empty) or not entry.empty.visible_get():
-            continue
-        rest, now = empties.rest_box(source, entry), empties.current_box(entry.empty)
-        thick = CHOSEN if entry.empty.select_get() else THICK
+    for entry in shown_handles(source):
+        rest, now = empties.rest_box(source, entry), movers.box_now(entry)
+        thick = CHOSEN if entry.kind == "BONE" or entry.empty.select_get() else THICK
         if np.allclose(rest, now, atol=1e-6):
             lines.append((tuple(entry.colour), thick, box_lines(rest)))
             continue

@@ -34,6 +34,7 @@ void bind_energies(py::module_& module);
 void bind_solve(py::module_& module);
 void bind_extraction(py::module_& module);
 void bind_live(py::module_& module);
+void bind_attachment(py::module_& module);
 void bind_curves(py::module_& module);
 void bind_solve_testing(py::module_& module);
 

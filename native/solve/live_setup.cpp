@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "energies/rotation.h"
-
 namespace arapfields {
 
 std::vector<Index> random_subset(Index n, Index count, Random& random) {
@@ -30,22 +28,6 @@ std::vector<Index> stratified(const std::vector<std::uint32_t>& list, Index coun
 Points rows_of(PointsIn points, const std::vector<Index>& rows) {
   Points result(static_cast<Index>(rows.size()), 3);
   for (std::size_t i = 0; i < rows.size(); ++i) result.row(static_cast<Index>(i)) = points.row(rows[i]);
-  return result;
-}
-
-Alignment best_alignment(PointsIn points, PointsIn targets, const Vector& weights) {
-  Alignment result;
-  const double total = weights.sum();
-  const Eigen::RowVector3d from = weights.transpose() * points / total;
-  const Eigen::RowVector3d to = weights.transpose() * targets / total;
-  const Points arms = points.rowwise() - from, wanted = targets.rowwise() - to;
-  const Mat3 spread = wanted.transpose() * weights.asDiagonal() * arms;
-  // Points on a line leave the turn about it open: a little of the identity keeps it small.
-  result.rotation = closest_rotation(spread + (1e-6 * spread.norm() + 1e-300) * Mat3::Identity());
-  result.translation = to.transpose() - result.rotation * from.transpose();
-  const Points moved = (points * result.rotation.transpose()).rowwise() + result.translation.transpose();
-  const double before = weights.dot((points - targets).rowwise().squaredNorm());
-  if (before > 0.0) result.gain = weights.dot((moved - targets).rowwise().squaredNorm()) / before;
   return result;
 }
 

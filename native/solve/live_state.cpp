@@ -7,6 +7,7 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "core/random.h"
+#include "energies/alignment.h"
 #include "solve/live_setup.h"
 #include "solve/live_stiffness.h"
 #include "solve/notes.h"

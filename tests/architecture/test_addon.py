@@ -14,6 +14,7 @@ ORDER = [
     "jobs",
     "field_modifier",
     "handles",
+    "carried",
     "surface",
     "results",
     "viewport",

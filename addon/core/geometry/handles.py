@@ -11,6 +11,8 @@ from .spaces import rigid_motion
 PIN_SAMPLES = 12  # of the surface that a pin holds at least: those nearest to it
 FAR_SHARE = 0.5  # of the largest distance from all pins: what is farther is far
 FAR_WEIGHT = 0.02  # with which what is far holds its place, relative to a pin
+BONE_GAP = 0.25  # of a bone's width by which what it holds is nearer to it than to any other bone
+BONE_REACH = 4.0  # widths within which a bone that holds nothing takes what is nearest
 ANCHOR_TOLERANCE = 1e-5  # motion, relative to the box, below which a handle is an anchor
 MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 
@@ -20,10 +22,11 @@ class Handle:
     """One handle in solve space. `rest` and `target` map the cube [-1, 1]³ onto the box."""
 
     name: str
-    kind: str  # CUBE, POINT, GROUP, PIN or FAR
+    kind: str  # CUBE, POINT, GROUP, PIN, BONE or FAR
     rest: np.ndarray
     target: np.ndarray
-    weights: np.ndarray | None = None  # GROUP: (n,) of the source's vertices
+    weights: np.ndarray | None = None  # GROUP, and BONE that has one: (n,) of the source's vertices
+    hold_from: float = 0.5  # weight from which they hold
     weight: float = 1.0  # how strictly it is followed, relative to others
 
     @property
@@ -39,6 +42,34 @@ class Handle:
         away = (self._in_box(points) ** 2).sum(axis=1)
         count = max(int((away <= 1).sum()), min(PIN_SAMPLES, len(points)))
         return np.sort(np.argpartition(away, count - 1)[:count])
+
+    def by_weight(self, weights):
+        """Indices of the points that these (n,) weights hold; of a bone whose are all lower, the highest."""
+        held = np.flatnonzero(weights >= self.hold_from)
+        if len(held) or self.kind != "BONE":
+            return held
+        highest = np.argsort(-weights, kind="stable")[:PIN_SAMPLES]
+        return np.sort(highest[weights[highest] > 0])
+
+    def about_bone(self, points, handles):
+        """Indices of the points in the capsule along a bone that are nearer to it than to the other bones."""
+        away = self._from_bone(points)
+        bones = [handle for handle in handles if handle.kind == "BONE" and handle is not self]
+        others = np.min([bone._from_bone(points) for bone in bones], axis=0) if bones else np.inf
+        away = np.where(away + BONE_GAP <= others, away, np.inf)
+        held = np.flatnonzero(away <= 1)
+        if len(held):
+            return held
+        nearest = np.argsort(away, kind="stable")[:PIN_SAMPLES]
+        return np.sort(nearest[away[nearest] <= BONE_REACH])
+
+    def _from_bone(self, points):
+        """(n,) distances from the line along the box's y axis, in widths of the box."""
+        axes, from_center = self.rest[:3, :3], points - self.rest[:3, 3]
+        half = axes[:, 1]
+        along = np.clip(from_center @ half / (half @ half), -1.0, 1.0)
+        width = np.sqrt(np.linalg.norm(axes[:, 0]) * np.linalg.norm(axes[:, 2]))
+        return np.linalg.norm(from_center - along[:, None] * half, axis=1) / width
 
     def _in_box(self, points):
         return (points - self.rest[:3, 3]) @ np.linalg.inv(self.rest[:3, :3]).T

@@ -1,16 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Choices that are no option of the solvers: (identifier, label, tip) each, as Blender's menus show them."""
 
-HANDLE_KINDS = (
+EMPTY_KINDS = (  # of handles that Empties move
     ("CUBE", "Region", "What lies in the box at rest follows the Empty"),
     ("POINT", "Point", "The point of the surface nearest to the Empty at rest follows it"),
     ("GROUP", "Vertex Group", "What a vertex group of the object holds follows the Empty"),
     ("PIN", "Pin", "A small round region of the surface follows the Empty"),
 )
+HANDLE_KINDS = (
+    *EMPTY_KINDS,
+    ("BONE", "Bone", "The bone's vertex group, or what lies about the bone, follows it"),
+)
 HANDLE_PLACES = (
     ("AUTO", "Selected Empties", "The selected Empties; where none is selected, a new one at the 3D cursor"),
     ("CURSOR", "3D Cursor", "A new box at the 3D cursor"),
     ("SELECTION", "Selected Vertices", "A new box around the mesh's selected vertices"),
+)
+BONES = (  # of an armature, as handles
+    ("AUTO", "Automatic", "The bones selected in Pose Mode; else all deforming bones"),
+    ("SELECTED", "Selected", "The selected bones"),
+    ("DEFORMING", "Deforming", "All bones that deform and, where the mesh has groups of bones, have one"),
+)
+CARRYING = (  # ways in which the field moves other objects
+    ("FOLLOW", "Follow", "Bends with the body: clothes, hair, lattices"),
+    ("RIGID", "Rigid", "Moves and turns as a whole: eyes, buttons, glasses"),
+    ("TOGETHER", "Together", "Bends with the body and resists as the body does: sleeves, armour"),
 )
 SCOPES = (  # of a job
     ("ACTIVE", "Active", "The active object alone"),

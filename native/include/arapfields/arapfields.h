@@ -2,6 +2,7 @@
 // All of the C++ interface.
 #pragma once
 
+#include "arapfields/attachments.h"
 #include "arapfields/curves.h"
 #include "arapfields/deform.h"
 #include "arapfields/device.h"

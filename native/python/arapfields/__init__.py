@@ -5,6 +5,7 @@ Arrays are NumPy, all coordinates are the mesh's own; distances are negative ins
 """
 
 from ._native import (
+    Attachment,
     Cancelled,
     CuboidHandle,
     CurveField,
@@ -43,6 +44,7 @@ from ._native import (
     fit_sdf,
     gauss_preference,
     preferred_normals,
+    rigid_motion,
     sample_curve,
     sample_mesh,
     sample_surface,
@@ -83,6 +85,7 @@ InverseOptions = InverseTrainingOptions
 
 __all__ = [
     "ArrayLike",
+    "Attachment",
     "Cancelled",
     "Cuboid",
     "CuboidHandle",
@@ -143,6 +146,7 @@ __all__ = [
     "fit_sdf",
     "gauss_preference",
     "preferred_normals",
+    "rigid_motion",
     "sample_curve",
     "sample_mesh",
     "sample_surface",

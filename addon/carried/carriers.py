@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One carried object of each kind: what of it the field moves, and how it takes the motion.
+
+Each has `points`, (n, 3) in its own coordinates at rest. `moved(rest, now, parent, after)` runs on a worker:
+rest, now and parent are (4, 4) matrices to solve space, `after` the points there where the field takes them;
+`write` puts what it returns onto the object, on the main thread.
+"""
+
+import numpy as np
+
+from ..blender import modifier_stack
+from ..core.errors import UserError
+from ..core.geometry.spaces import inverse, transform
+from ..field_modifier import motion
+
+
+class Carrier:
+    """What all kinds share. `before` is what the object had when it was bound, to be restored."""
+
+    is_transform = False
+
+    def __init__(self, context, item):
+        self.points = self.read(context, item)
+        if not len(self.points):
+            raise UserError("{name} is empty; it is not carried", name=item.name)
+        if not np.isfinite(self.points).all():
+            raise UserError("{name} has points that are not finite; it is not carried", name=item.name)
+
+    def basis(self, item, entry, depsgraph):
+        """The object's own motion without the field's, where the field moves it as a whole; else None."""
+        return None
+
+    def moved(self, rest, now, parent, after):
+        return np.ascontiguousarray(transform(inverse(now), after), dtype=np.float32)
+
+
+class MeshCarrier(Carrier):
+    """A mesh, by the field's modifier."""
+
+    def read(self, context, item):
+        reason = motion.refusal(item)
+        if reason is not None:
+            raise reason
+        with modifier_stack.evaluated_mesh(context, item, in_place=True) as mesh:
+            return mesh_positions(mesh)
+
+    def bind(self, context, item, entry):
+        motion.bind(context, item)
+
+    def write(self, item, entry, shape):
+        motion.write(item, motion.Motion(shape - self.points.astype(np.float32)))
+
+    def snapshot(self, item, entry):
+        return motion.snapshot(item)
+
+    def restore(self, item, entry, before):
+        motion.restore(item, before)
+
+    @staticmethod
+    def is_on(item):
+        return modifier_stack.find(item) is not None
+
+    @staticmethod
+    def release(item, entry):
+        motion.remove(item)
+
+
+def mesh_positions(mesh):
+    flat = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+    mesh.vertices.foreach_get("co", flat)
+    return flat.reshape(-1, 3).astype(np.float64)

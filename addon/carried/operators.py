@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+
+from ..blender.guide import Guided
+from ..blender.language import translated
+from ..blender.object_references import owner_of, refusal, settings_of, source_of
+from ..core.errors import UserError
+from ..core.settings.choices import CARRYING
+from ..live import sessions
+from ..names import Op
+from . import carrying, passengers, refusals
+
+
+class CarriedOperator(Guided):
+    """Mixin: works on the list of objects that the panel's source carries."""
+
+    bl_options = {"REGISTER", "UNDO"}
+    guide = "characters"
+    needs_carried = True
+
+    @classmethod
+    def poll(cls, context):
+        source = source_of(context)
+        reason = refusal(source) or cls.refuses(source)
+        if reason:
+            cls.poll_message_set(translated(reason))
+        return not reason
+
+    @classmethod
+    def refuses(cls, source):
+        if source.library is not None:
+            return UserError(
+                "{name} is linked from another file; make it local to carry objects", name=source.name
+            )
+        if cls.needs_carried and not settings_of(source).carried:
+            return UserError("{name} carries nothing", name=source.name)
+        return None
+
+
+class ARAPFIELDS_OT_carry(CarriedOperator, bpy.types.Operator):
+    """Have the active object's field move the other selected objects as well"""
+
+    bl_idname = Op.CARRY
+    bl_label = "Carry Selected"
+    needs_carried = False
+
+    way: bpy.props.EnumProperty(items=CARRYING, name="Way", description="How the objects are carried")
+
+    def execute(self, context):
+        context.view_layer.update()
+        source, added, refused = source_of(context), 0, []
+        for item in context.selected_objects:
+            if item == source or (item.type == "EMPTY" and owner_of(item) == source):
+                continue
+            try:
+                carry(source, item, self.way)
+                added += 1
+            except UserError as error:
+                refused.append(translated(error))
+        for text in refused:
+            self.report({"WARNING"} if added else {"ERROR"}, text)
+        if not added:
+            if not refused:
+                self.report({"ERROR"}, translated("Select the objects to carry as well"))
+            return {"CANCELLED"}
+        self.report(
+            {"INFO"}, translated("{name} carries {count} more objects", name=source.name, count=added)
+        )
+        return {"FINISHED"}
+
+
+def carry(source, item, way):
+    """Puts an object on a source's list, or gives it another way there; UserError where that cannot be."""
+    reason = refusals.of_item(source, item)
+    if reason is not None:
+        raise reason
+    other = settings_of(item).carried_by
+    if other is not None and other != source and carrying.find(other, item) is not None:
+        raise UserError("{name} is carried by {other} already", name=item.name, other=other.name)
+    entry = carrying.find(source, item)
+    if entry is None:
+        entry = settings_of(source).carried.add()
+        settings_of(source).active_carried = len(settings_of(source).carried) - 1
+    entry.name, entry.item, entry.way = item.name, item, way
+    settings_of(item).carried_by = source
+
+
+class ARAPFIELDS_OT_release(CarriedOperator, bpy.types.Operator):
+    """Take the chosen object off the list, or all of them: each is again as it was before it was carried"""
+
+    bl_idname = Op.RELEASE
+    bl_label = "Release"
+
+    all: bpy.props.BoolProperty(name="All", description="Every object that is carried")
+
+    def execute(self, context):
+        source = source_of(context)
+        settings = settings_of(source)
+        count = len(settings.carried)
+        rows = range(count) if self.all else [min(max(settings.active_carried, 0), count - 1)]
+        for row in reversed(rows):
+            passengers.release(source, row)
+        settings.active_carried = max(0, min(settings.active_carried, len(settings.carried) - 1))
+        if sessions.is_live(source):
+            sessions.live[source.session_uid].carrying.forget(settings)
+        return {"FINISHED"}
+
+
+CLASSES = [ARAPFIELDS_OT_carry, ARAPFIELDS_OT_release]

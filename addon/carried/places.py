@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a carried object is, and where it would be while the bones that are handles rest.
+
+An object that hangs on such a bone goes with it already; the field moves it from where the bone rests, so
+that no motion counts twice.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from mathutils import Matrix
+
+from ..core.errors import UserError
+
+FOLLOWING = {"CHILD_OF", "COPY_LOCATION", "COPY_TRANSFORMS", "ARMATURE"}  # constraints that place an object
+
+
+@dataclass(frozen=True)
+class Place:
+    """(4, 4) matrices to the world: of the object at rest and now, and of its parent now."""
+
+    rest: np.ndarray
+    now: np.ndarray
+    parent: np.ndarray
+
+
+def array(matrix):
+    return np.array(matrix, dtype=np.float64)
+
+
+def depsgraph_of(context):
+    """What Blender has evaluated last; nothing is evaluated for it."""
+    return context.view_layer.depsgraph or context.evaluated_depsgraph_get()
+
+
+def place_of(item, rigs, depsgraph, basis=None):
+    """The object's Place; `basis` is its own motion where it is another than the object's present one."""
+    seen = item.evaluated_get(depsgraph)
+    now, own = array(seen.matrix_world), array(seen.matrix_basis)
+    parent = parent_now(item, depsgraph, now, own)
+    if basis is None and not hangs_on(item, rigs):
+        return Place(now, now, parent)
+    at_rest = parent_at_rest(item, rigs, depsgraph) if hangs_on(item, rigs) else parent
+    return Place(at_rest @ (own if basis is None else basis), now, parent)
+
+
+def parent_now(item, depsgraph, now, own):
+    """What takes the object's own motion to the world."""
+    if item.parent is None:
+        return np.eye(4)
+    if not any(constraint.enabled for constraint in item.constraints):
+        return now @ np.linalg.inv(own)
+    return parent_of(item, depsgraph, array(item.parent.evaluated_get(depsgraph).matrix_world), posed=True)
+
+
+def parent_at_rest(item, rigs, depsgraph):
+    rest = place_of(item.parent, rigs, depsgraph).rest
+    return parent_of(item, depsgraph, rest, posed=item.parent not in rigs)
+
+
+def parent_of(item, depsgraph, world, posed):
+    """The parent's part in an object's matrix where the parent is at `world`."""
+    inverse = array(item.matrix_parent_inverse)
+    if item.parent_type == "OBJECT":
+        return world @ inverse
+    if item.parent_type != "BONE" or item.parent_bone not in item.parent.data.bones:
+        raise UserError("{name} hangs on {parent} in a way that cannot be followed", **names(item))
+    bone = item.parent.data.bones[item.parent_bone]
+    pose = item.parent.evaluated_get(depsgraph).pose.bones[item.parent_bone].matrix
+    tail = array(Matrix.Translation((0, bone.length, 0)))
+    if bone.use_relative_parent:
+        tail = np.linalg.inv(array(bone.matrix_local))
+    return world @ array(pose if posed else bone.matrix_local) @ tail @ inverse
+
+
+def names(item):
+    return {"name": item.name, "parent": item.parent.name}
+
+
+def hangs_on(item, rigs):
+    """Whether an object goes with a bone of one of these armatures, by itself or by what it is a child of."""
+    if item.parent is None:
+        return False
+    return (item.parent in rigs and item.parent_type == "BONE") or hangs_on(item.parent, rigs)
+
+
+def constrained_to(item, rigs):
+    """Whether constraints place the object by one of these armatures, which cannot be told from the field."""
+    return any(c.enabled and c.type in FOLLOWING and targets(c) & set(rigs) for c in item.constraints)
+
+
+def targets(constraint):
+    entries = getattr(constraint, "targets", None)  # of an Armature constraint
+    found = [entry.target for entry in entries] if entries is not None else [constraint.target]
+    return {item for item in found if item is not None}

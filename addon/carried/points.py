@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Objects that are carried point by point and are no meshes: by the field's modifier, or by a shape key."""
+
+import bpy
+import numpy as np
+
+from ..blender import modifier_stack
+from ..core.errors import UserError
+from ..field_modifier import motion, node_group
+from ..names import FIELD_MODIFIER, OFFSETS, WARP_KEY
+from .carriers import Carrier
+
+SURFACE_NODE = "GeometryNodeDeformCurvesOnSurface"  # of modifiers that move hair with its surface
+
+
+def refuse_shared(item):
+    if item.library is not None or item.data.library is not None or item.data.override_library is not None:
+        raise UserError("{name} is linked from another file; make it local to carry it", name=item.name)
+    if item.data.users > 1:
+        raise UserError("{name} shares its data with other objects; make it single-user", name=item.name)
+
+
+class AttributeCarrier(Carrier):
+    """Hair curves, point clouds, Grease Pencil: an offset a point on the data itself, and a modifier."""
+
+    def read(self, context, item):
+        refuse_shared(item)
+        if any(follows_surface(modifier) for modifier in item.modifiers):
+            raise UserError("{name} follows its surface by a modifier of its own", name=item.name)
+        layers = layers_of(item)
+        self.counts = [len(layer["position"].data) for layer in layers]
+        return np.concatenate([vectors(layer["position"]) for layer in layers] or [np.zeros((0, 3))])
+
+    def bind(self, context, item, entry):
+        if modifier_stack.find(item) is None:
+            made = item.modifiers.new(FIELD_MODIFIER, "NODES")
+            made.node_group = node_group.find_or_make()
+            item.modifiers.move(len(item.modifiers) - 1, 0)  # hair grown from these follows
+
+    def write(self, item, entry, shape):
+        if modifier_stack.find(item) is None:
+            raise UserError("the modifier of {name} was removed", name=item.name)
+        put_offsets(item, self.counts, shape - self.points.astype(np.float32))
+
+    def snapshot(self, item, entry):
+        if modifier_stack.find(item) is None:
+            return None
+        layers = layers_of(item)
+        return [vectors(layer[OFFSETS]) if OFFSETS in layer else None for layer in layers]
+
+    def restore(self, item, entry, before):
+        if before is None:
+            self.release(item, entry)
+            return
+        for layer, offsets in zip(layers_of(item), before, strict=True):
+            if offsets is not None and OFFSETS in layer and len(layer[OFFSETS].data) == len(offsets):
+                put_vectors(layer[OFFSETS], offsets)
+        item.data.update_tag()
+
+    @staticmethod
+    def is_on(item):
+        return modifier_stack.find(item) is not None
+
+    @staticmethod
+    def release(item, entry):
+        modifier = modifier_stack.find(item)
+        if modifier is not None:
+            group = modifier.node_group
+            item.modifiers.remove(modifier)
+            if group.users == 0:
+                bpy.data.node_groups.remove(group)
+        for layer in layers_of(item):
+            if OFFSETS in layer:
+                layer.remove(layer[OFFSETS])
+        item.data.update_tag()
+
+
+def follows_surface(modifier):
+    nodes = modifier.node_group.nodes if modifier.type == "NODES" and modifier.node_group else ()
+    return modifier.show_viewport and any(node.bl_idname == SURFACE_NODE for node in nodes)
+
+
+def layers_of(item):
+    """The collections of attributes on which an object's points lie; Grease Pencil has one a drawing."""
+    if item.type != "GREASEPENCIL":
+        return [item.data.attributes]
+    drawings = [frame.drawing for layer in item.data.layers for frame in layer.frames]
+    return [drawing.attributes for drawing in drawings if "position" in drawing.attributes]
+
+
+def vectors(attribute):
+    flat = np.empty(3 * len(attribute.data), dtype=np.float32)
+    attribute.data.foreach_get("vector", flat)
+    return flat.reshape(-1, 3).astype(np.float64)
+
+
+def put_vectors(attribute, values):
+    attribute.data.foreach_set("vector", np.ascontiguousarray(values, dtype=np.float32).ravel())
+
+
+def put_offsets(item, counts, offsets):
+    layers = layers_of(item)
+    if counts != [len(layer["position"].data) for layer in layers]:
+        raise UserError("{name} changed while it was worked on; run again", name=item.name)
+    motion.written.add(item.session_uid)
+    for layer, part in zip(layers, np.split(offsets, np.cumsum(counts)[:-1]), strict=True):
+        made = layer.get(OFFSETS) or layer.new(OFFSETS, "FLOAT_VECTOR", "POINT")
+        put_vectors(made, part)
+    item.data.update_tag()
+
+
+class KeyCarrier(Carrier):
+    """Curves, surfaces and lattices: a shape key of its own, above the user's."""
+
+    def read(self, context, item):
+        refuse_shared(item)
+        keys = item.data.shape_keys
+        if keys is not None and (not keys.use_relative or item.show_only_shape_key):
+            raise UserError(
+                "{name} shows one shape key alone, or absolute ones; it is not carried", name=item.name
+            )
+        self.parts = parts_of(item)
+        return own_points(item)
+
+    def bind(self, context, item, entry):
+        if item.data.shape_keys is None:
+            item.shape_key_add(name="Basis", from_mix=False)
+        if own_key(item) is None:
+            key = item.shape_key_add(name=WARP_KEY, from_mix=False)
+            key.value = 1.0
+
+    def write(self, item, entry, shape):
+        key = own_key(item)
+        if key is None:
+            raise UserError("the shape key of {name} was removed", name=item.name)
+        if len(shape) != sum(width * count for width, count in parts_of(item)):
+            raise UserError("{name} changed while it was worked on; run again", name=item.name)
+        motion.written.add(item.session_uid)
+        put_key(key, key_points(item.data.shape_keys.reference_key) + (shape - self.points))
+        item.data.update_tag()
+
+    def snapshot(self, item, entry):
+        key = own_key(item)
+        return item.data.shape_keys is not None, None if key is None else key_points(key)
+
+    def restore(self, item, entry, before):
+        had_keys, points = before
+        if points is None:
+            drop_key(item, also_basis=not had_keys)
+        elif own_key(item) is not None and len(key_points(own_key(item))) == len(points):
+            put_key(own_key(item), points)
+            item.data.update_tag()
+
+    @staticmethod
+    def is_on(item):
+        return own_key(item) is not None
+
+    @staticmethod
+    def release(item, entry):
+        drop_key(item, also_basis=True)
+
+
+def own_key(item):
+    keys = item.data.shape_keys
+    return keys.key_blocks.get(WARP_KEY) if keys is not None else None
+
+
+def drop_key(item, also_basis):
+    """Takes our key away; the basis too, where nothing else is left and there need not be one."""
+    if own_key(item) is not None:
+        item.shape_key_remove(own_key(item))
+    keys = item.data.shape_keys
+    if also_basis and keys is not None and len(keys.key_blocks) == 1:
+        item.shape_key_clear()
+
+
+FIELDS = ("co", "handle_left", "handle_right")  # of a Bézier point
+
+
+def parts_of(item):
+    """[(positions a point, points)] of an object's splines; of a lattice, one."""
+    if item.type == "LATTICE":
+        return [(1, len(item.data.points))]
+    splines = item.data.splines
+    return [(3, len(s.bezier_points)) if s.type == "BEZIER" else (1, len(s.points)) for s in splines]
+
+
+def own_points(item):
+    """(n, 3) an object's control points, with its shape keys but without ours."""
+    keys = item.data.shape_keys
+    if keys is not None:
+        points = key_points(keys.reference_key)
+        for key in keys.key_blocks[1:]:
+            if key.name != WARP_KEY and not key.mute and key.value:
+                points = points + key.value * (key_points(key) - key_points(key.relative_key))
+        return points
+    if item.type == "LATTICE":
+        return np.array([point.co_deform for point in item.data.points], dtype=np.float64).reshape(-1, 3)
+    found = []
+    for spline in item.data.splines:
+        if spline.type == "BEZIER":
+            found += [getattr(point, field) for point in spline.bezier_points for field in FIELDS]
+        else:
+            found += [point.co[:3] for point in spline.points]
+    return np.array(found, dtype=np.float64).reshape(-1, 3)
+
+
+def key_points(key):
+    """(n, 3) positions of a key, those of Bézier points with their handles."""
+    found = []
+    for point in key.data:
+        found += [getattr(point, field) for field in FIELDS if hasattr(point, field)]
+    return np.array(found, dtype=np.float64).reshape(-1, 3)
+
+
+def put_key(key, points):
+    rows = iter(points.tolist())
+    for point in key.data:
+        for field in FIELDS:
+            if hasattr(point, field):
+                setattr(point, field, next(rows))

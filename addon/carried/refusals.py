@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Why an object is not carried."""
+
+from ..blender.modifier_stack import handle_rigs
+from ..blender.object_references import in_scene, settings_of
+from ..core.errors import UserError
+from .places import constrained_to
+
+BINDING = {"LATTICE": "object", "CURVE": "object", "HOOK": "object"}  # modifiers that follow another object
+BINDING |= {"MESH_DEFORM": "object", "SURFACE_DEFORM": "target"}
+
+
+def of_entry(source, entry):
+    """Why an entry of a source's list is left out now, as a UserError; None where it is not."""
+    item = entry.item
+    if not in_scene(item):
+        return UserError("{name}, which {source} carries, was deleted", name=entry.name, source=source.name)
+    reason = of_item(source, item)
+    if reason is not None:
+        return reason
+    if item.mode == "EDIT":
+        return UserError("{name} is in Edit Mode; leave it first", name=item.name)
+    if not item.visible_get():
+        return UserError("{name} is hidden; it is not carried", name=item.name)
+    return None
+
+
+def of_item(source, item):
+    """Why an object cannot be carried at all, as a UserError; None where it can."""
+    if item == source:
+        return UserError("{name} cannot carry itself", name=item.name)
+    if item.library is not None:
+        return UserError("{name} is linked from another file; make it local to carry it", name=item.name)
+    settings = settings_of(item)
+    if len(settings.handles):
+        return UserError("{name} has handles of its own; it is not carried", name=item.name)
+    if settings.handle_of == source and any(e.empty == item for e in settings_of(source).handles):
+        return UserError("{name} is a handle of {source} itself", name=item.name, source=source.name)
+    rigs = handle_rigs(source)
+    if item in rigs:
+        return UserError("the bones of {name} are handles of {source}", name=item.name, source=source.name)
+    if constrained_to(item, rigs):
+        return UserError("{name} follows the armature by a constraint; it is not carried", name=item.name)
+    return moves_anyway(source, item)
+
+
+def moves_anyway(source, item):
+    """Names what an object moves with already, which the field moves; None where there is nothing."""
+    carried = [entry.item for entry in settings_of(source).carried if entry.item not in (None, item)]
+    parent = item.parent
+    while parent is not None:
+        if parent in carried and is_moved_whole(source, parent):
+            return moves_with(item, parent)
+        parent = parent.parent
+    for modifier in item.modifiers:
+        target = getattr(modifier, BINDING[modifier.type]) if modifier.type in BINDING else None
+        if modifier.show_viewport and target is not None and target in [source, *carried]:
+            return moves_with(item, target)
+    return None
+
+
+def is_moved_whole(source, item):
+    """Whether a carried object moves as a whole, with all of its children."""
+    way = next(entry.way for entry in settings_of(source).carried if entry.item == item)
+    return way == "RIGID" or item.type not in POINTWISE
+
+
+def moves_with(item, other):
+    return UserError("{name} moves with {other} already", name=item.name, other=other.name)
+
+
+POINTWISE = {"MESH", "CURVES", "POINTCLOUD", "GREASEPENCIL", "CURVE", "SURFACE", "LATTICE", "ARMATURE"}

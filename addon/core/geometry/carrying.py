@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How carried objects move: whole ones rigidly, bones one by one. Matrices are (4, 4), points (n, 3)."""
+
+import numpy as np
+
+from .rotations import best_rotation
+from .spaces import inverse
+
+
+def rigid_motion_of(before, after):
+    """The rigid motion that takes points nearest to those after."""
+    motion = np.eye(4)
+    motion[:3, :3] = best_rotation(before, after)
+    motion[:3, 3] = after.mean(axis=0) - motion[:3, :3] @ before.mean(axis=0)
+    return motion
+
+
+def frame_points(size=1.0):
+    """(7, 3) points that stand for an object without a shape: its origin and the ends of its axes."""
+    return size * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+
+
+def turn_between(before, after):
+    """(3, 3) the rotation nearest to what takes one matrix's axes to the other's."""
+    left, _, right = np.linalg.svd(after[:3, :3] @ np.linalg.inv(before[:3, :3]))
+    return left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))]) @ right
+
+
+BONE_POINTS = np.array([(0, 0, 0), (0, 1, 0), (0.5, 0, 0), (-0.5, 0, 0), (0, 0, 0.5), (0, 0, -0.5)])
+
+
+def bone_points(poses, lengths):
+    """(6 k, 3) points of k bones, posed by (k, 4, 4) matrices: head, tail, and four beside the head."""
+    local = BONE_POINTS * np.asarray(lengths, dtype=np.float64)[:, None, None]
+    return (np.einsum("kij,knj->kni", poses[:, :3, :3], local) + poses[:, None, :3, 3]).reshape(-1, 3)
+
+
+def bone_poses(poses, before, after):
+    """(k, 4, 4) poses of bones whose points move: heads follow, bones point at their moved tails."""
+    before, after = (points.reshape(-1, len(BONE_POINTS), 3) for points in (before, after))
+    found = poses.copy()
+    for pose, one, other in zip(found, before, after, strict=True):
+        turn = best_rotation(one, other)
+        turn = shortest_turn(turn @ (one[1] - one[0]), other[1] - other[0]) @ turn
+        pose[:3, :3] = turn @ pose[:3, :3]
+        pose[:3, 3] = other[0]
+    return found
+
+
+def shortest_turn(a, b):
+    """(3, 3) the rotation that turns the direction of a to that of b the shortest way."""
+    a, b = a / np.linalg.norm(a), b / np.linalg.norm(b)
+    axis, cosine = np.cross(a, b), float(a @ b)
+    if cosine < -0.999999:  # nearly opposite: any axis across will do
+        axis = np.cross(a, np.eye(3)[np.abs(a).argmin()])
+        axis /= np.linalg.norm(axis)
+        return 2 * np.outer(axis, axis) - np.eye(3)
+    skew = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.eye(3) + skew + skew @ skew / (1 + cosine)
+
+
+def posed(rest, parents, bases):
+    """(k, 4, 4) where bones come by their own motions; the other way round than `chained`."""
+    found = np.empty_like(bases)
+    for index, parent in enumerate(parents):
+        bound = rest[index] if parent < 0 else found[parent] @ inverse(rest[parent]) @ rest[index]
+        found[index] = bound @ bases[index]
+    return found
+
+
+def chained(rest, parents, targets, connected):
+    """(k, 4, 4) the own motions (`matrix_basis`) that pose bones at these targets, parents first in order.
+
+    rest (k, 4, 4) are the bones at rest, `parents` their parents' numbers or -1; a connected bone's head
+    stays at its parent's tail, so that only its turn is taken.
+    """
+    posed, bases = np.empty_like(targets), np.empty_like(targets)
+    for index, parent in enumerate(parents):
+        bound = rest[index] if parent < 0 else posed[parent] @ inverse(rest[parent]) @ rest[index]
+        bases[index] = inverse(bound) @ targets[index]
+        if connected[index]:
+            bases[index][:3, 3] = 0.0
+        posed[index] = bound @ bases[index]
+    return bases

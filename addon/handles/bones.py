@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bones of armatures as handles: what a bone holds follows the posed bone."""
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ..blender import modifier_stack
+from ..blender.object_references import in_scene, settings_of
+from ..blender.selection import choose_row
+from ..core.errors import UserError
+from . import empties, movers
+from .palette import free_colour
+
+HOLD_FROM = 0.8  # weight of a bone's group from which it holds; between two bones the surface bends freely
+
+
+def armature_of(context, source):
+    """The armature that is selected, or the one that the mesh follows; UserError where there is none."""
+    selected = [item for item in context.selected_objects if item.type == "ARMATURE"]
+    moved_by = [m.object for m in source.modifiers if m.type == "ARMATURE" and in_scene(m.object)]
+    parents = [source.parent] if source.parent is not None and source.parent.type == "ARMATURE" else []
+    found = next(iter([*selected, *moved_by, *parents]), None)
+    if found is None:
+        raise UserError("{name} follows no armature; select one as well", name=source.name)
+    if found.pose is None or not len(found.pose.bones):
+        raise UserError("the armature {rig} has no bones to pose", rig=found.name)
+    return found
+
+
+def is_selected(rig, name):
+    """Whether a bone is selected; Blender 5 keeps that with the posed bone."""
+    pose = rig.pose.bones[name]
+    return pose.select if hasattr(pose, "select") else pose.bone.select
+
+
+def chosen(rig, which, holding):
+    """Names of the bones to make handles of, by the choices of BONES; UserError where there are none.
+
+    `holding` are the names of the vertex groups that hold something.
+    """
+    names = []
+    if which == "SELECTED" or (which == "AUTO" and rig.mode == "POSE"):
+        names = [bone.name for bone in rig.pose.bones if is_selected(rig, bone.name)]
+    if not names and which != "SELECTED":
+        names = [bone.name for bone in rig.data.bones if bone.use_deform]
+        names = [name for name in names if name in holding] or names
+    if not names:
+        raise UserError("no bone of {rig} is selected, or deforms", rig=rig.name)
+    return names
+
+
+def holding_groups(context, source):
+    """Names of the vertex groups that hold a vertex of the shape that is worked on, mirrored sides and all."""
+    with modifier_stack.evaluated_mesh(context, source, settings_of(source).in_place) as mesh:
+        indices = {entry.group for vertex in mesh.vertices for entry in vertex.groups if entry.weight > 0}
+    return {group.name for group in source.vertex_groups if group.index in indices}
+
+
+def find(source, rig, name):
+    """Index of the bone's handle in the source's list, or -1."""
+    entries = enumerate(settings_of(source).handles)
+    return next((i for i, e in entries if e.kind == "BONE" and e.rig == rig and e.bone == name), -1)
+
+
+def add(source, rig, name, groups):
+    """Makes a bone a handle of the source, at rest where the bone rests; one it was already is only reset.
+
+    `groups` are the names of the vertex groups that hold something.
+    """
+    settings, index = settings_of(source), find(source, rig, name)
+    is_new = index < 0
+    if is_new:
+        index, colour = len(settings.handles), free_colour(settings.handles)
+        settings.handles.add().colour = colour
+    entry = settings.handles[index]
+    entry.kind, entry.rig, entry.bone = "BONE", rig, name
+    if is_new:
+        entry.group = name if name in groups else ""
+        entry.hold_from = HOLD_FROM
+    entry.rest = (np.linalg.inv(empties.matrix_of(source)) @ rest_in_world(rig, name)).ravel()
+    choose_row(settings, index)
+    return entry
+
+
+def rest_in_world(rig, name):
+    """The cube [-1, 1]³ → world, of a bone at rest."""
+    bone = rig.data.bones[name]
+    return empties.matrix_of(rig) @ np.array(bone.matrix_local, dtype=np.float64) @ movers.bone_box(bone)
+
+
+def mirror(context, source, entry):
+    """A handle of the bone on the other side."""
+    name = bpy.utils.flip_name(entry.bone)
+    if name == entry.bone or name not in entry.rig.data.bones:
+        raise UserError(
+            "the armature {rig} has no bone on the other side of {bone}", rig=entry.rig.name, bone=entry.bone
+        )
+    weight, hold_from = entry.weight, entry.hold_from
+    mirrored = add(source, entry.rig, name, holding_groups(context, source))
+    mirrored.weight, mirrored.hold_from = weight, hold_from
+
+
+def reset(context, source, entries):
+    """Poses the bones of these handles as they were at rest, parents first."""
+    for entry in sorted(entries, key=lambda entry: len(entry.rig.data.bones[entry.bone].parent_recursive)):
+        box = movers.bone_box(entry.rig.data.bones[entry.bone])
+        target = np.linalg.inv(empties.matrix_of(entry.rig)) @ empties.rest_box(source, entry)
+        entry.rig.pose.bones[entry.bone].matrix = Matrix((target @ np.linalg.inv(box)).tolist())
+        context.view_layer.update()

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What moves a handle, an Empty or a bone, and where it is."""
+
+import numpy as np
+
+from ..blender.object_references import in_scene
+from ..core.geometry.handles import box_matrix
+
+
+def matrix_of(item, bone=""):
+    """(4, 4) the world matrix of an object, or of its posed bone of that name."""
+    matrix = np.array(item.matrix_world, dtype=np.float64)
+    return matrix @ np.array(item.pose.bones[bone].matrix, dtype=np.float64) if bone else matrix
+
+
+def current_box(empty, where=matrix_of):
+    """The cube [-1, 1]³ → world, of an Empty where it is now."""
+    return box_matrix(where(empty), empty.empty_display_size)
+
+
+def box_now(entry, where=matrix_of):
+    """The cube [-1, 1]³ → world, of a handle where it is now."""
+    if entry.kind == "BONE":
+        return where(entry.rig, entry.bone) @ bone_box(entry.rig.data.bones[entry.bone])
+    return current_box(entry.empty, where)
+
+
+def bone_box(bone):
+    """The cube [-1, 1]³ → a bone's own coordinates: as long as the bone, as wide as its envelope reaches."""
+    reach = max(bone.envelope_distance + (bone.head_radius + bone.tail_radius) / 2, 0.2 * bone.length)
+    box = np.diag([reach, bone.length / 2, reach, 1.0])
+    box[1, 3] = bone.length / 2
+    return box
+
+
+def is_there(entry):
+    if entry.kind != "BONE":
+        return in_scene(entry.empty)
+    return in_scene(entry.rig) and entry.rig.pose is not None and entry.bone in entry.rig.pose.bones
+
+
+def mover_of(entry):
+    """The object that moves a handle: its Empty, or its bone's armature."""
+    return entry.rig if entry.kind == "BONE" else entry.empty
+
+
+def name_of(entry):
+    return entry.bone if entry.kind == "BONE" else entry.empty.name
+
+
+def key_of(entry):
+    """Tells a source's handles apart, also when they are renamed or others are removed."""
+    return mover_of(entry).session_uid, entry.bone

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/types.h"
+
+namespace arapfields {
+
+/// The rigid motion of space after which points are nearest to their targets, and the factor by which it
+/// lowers the weighted sum of their squared distances (1: not at all).
+struct Alignment {
+  Mat3 rotation = Mat3::Identity();
+  Vec3 translation = Vec3::Zero();
+  double gain = 1.0;
+};
+/// Points on a line leave the turn about it open: `tie`, a share of the spread, keeps it small.
+Alignment best_alignment(PointsIn points, PointsIn targets, const Vector& weights, double tie = 1e-6);
+
+/// The same motion as a matrix, of points (n,3) → moved (n,3): of all rotations and translations the one with
+/// the least weighted sum of squares (Kabsch 1976, "A solution for the best rotation to relate two sets of
+/// vectors"). Never a reflection; points in one place, or on one line, turn as little as they can. Weights
+/// (n, none negative; empty: all 1). Throws InvalidInput for no points, other counts, NaN or infinity.
+ARAPFIELDS_EXPORT Mat4 rigid_motion(PointsIn points, PointsIn moved, const Vector& weights = {});
+
+}  // namespace arapfields

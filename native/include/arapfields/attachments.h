@@ -1,0 +1,6 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What goes along with a deformed body: Attachment, rigid_motion.
+#pragma once
+
+#include "energies/alignment.h"
+#include "solve/attachment.h"

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A character of several objects: body with Mirror and Subdivision, eyes, shirt, hair, hat, armature."""
+
+from types import SimpleNamespace
+
+import bmesh
+import bpy
+import numpy as np
+import scenes
+from characters import Capsules
+from mathutils import Matrix, Vector
+
+import arapfields as af
+
+HEIGHT = 1.8
+EYE, EYES = 0.032, [(side * 0.055, -0.118, 1.68) for side in (-1, 1)]
+LOOSE = 0.02  # of the shirt, from the skin
+PARTS = [((0, 0, 0.85), (0, 0, 1.28), 0.16), ((0, 0, 1.2), (0, 0, 1.55), 0.065), ((0, 0, 1.62), (0, 0, 1.7), 0.14)]
+for s in (-1, 1):
+    PARTS += [((s * 0.1, 0, 1.28), (s * 0.78, 0, 1.28), 0.055), ((s * 0.09, 0, 0.82), (s * 0.11, 0, 0.1), 0.08)]
+BONES = {  # name: parent, head, tail
+    "Hips": (None, (0, 0, 0.8), (0, 0, 1.0)),
+    "Chest": ("Hips", (0, 0, 1.0), (0, 0, 1.36)),
+    "Neck": ("Chest", (0, 0, 1.36), (0, 0, 1.5)),
+    "Head": ("Neck", (0, 0, 1.5), (0, 0, 1.85)),
+}
+for s, side in ((1, "L"), (-1, "R")):
+    BONES[f"Upper Arm.{side}"] = ("Chest", (s * 0.17, 0, 1.28), (s * 0.45, 0, 1.28))
+    BONES[f"Forearm.{side}"] = (f"Upper Arm.{side}", (s * 0.45, 0, 1.28), (s * 0.82, 0, 1.28))
+    BONES[f"Leg.{side}"] = ("Hips", (s * 0.1, 0, 0.72), (s * 0.11, 0, 0.05))
+
+
+def link(name, data):
+    item = bpy.data.objects.new(name, data)
+    bpy.context.collection.objects.link(item)
+    return item
+
+
+def half_body():
+    """The mesh of the half with x ≥ 0, open along the middle."""
+    shape = Capsules(PARTS, af.Frame([0, 0, 0.9], 1.0))
+    vertices, corners = af.extract_surface(shape, resolution=80)[:2]
+    mesh = bpy.data.meshes.new("Body")
+    made = bmesh.new()
+    points = [made.verts.new(vertex) for vertex in vertices.tolist()]
+    for corner in corners.tolist():
+        made.faces.new([points[i] for i in corner])
+    cut = [*made.verts, *made.edges, *made.faces]
+    bmesh.ops.bisect_plane(made, geom=cut, plane_co=(0, 0, 0), plane_no=(1, 0, 0), clear_inner=True)
+    bmesh.ops.remove_doubles(made, verts=made.verts, dist=2e-3)
+    for vertex in made.verts:
+        vertex.co.x = 0.0 if vertex.co.x < 2e-3 else vertex.co.x
+    made.to_mesh(mesh)
+    made.free()
+    mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
+    return mesh
+
+
+def rig():
+    item = link("Rig", bpy.data.armatures.new("Rig"))
+    bpy.context.view_layer.objects.active = item
+    bpy.ops.object.mode_set(mode="EDIT")
+    for name, (parent, head, tail) in BONES.items():
+        bone = item.data.edit_bones.new(name)
+        bone.head, bone.tail = head, tail
+        if parent:
+            bone.parent = item.data.edit_bones[parent]
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for bone in item.pose.bones:
+        bone.rotation_mode = "XYZ"
+    return item
+
+
+def weigh(item):
+    """Vertex groups of the bones, which blend where two are about as near."""
+    points = np.array([vertex.co for vertex in item.data.vertices])
+    away = []
+    for _, head, tail in BONES.values():
+        head, way = np.array(head), np.array(tail) - head
+        share = np.clip((points - head) @ way / (way @ way), 0, 1)
+        away.append(np.linalg.norm(points - head - share[:, None] * way, axis=1))
+    weights = np.exp(-((np.array(away) - np.min(away, axis=0)) / 0.04))
+    weights /= weights.sum(axis=0)
+    for name, row in zip(BONES, weights, strict=True):
+        group = item.vertex_groups.new(name=name)
+        for index in np.flatnonzero(row > 0.02).tolist():
+            group.add([index], float(row[index]), "REPLACE")
+
+
+def seen_mesh(item):
+    """(vertices (n, 3) in the world, their normals, triangles) of an object as it is shown."""
+    bpy.context.view_layer.update()
+    seen = item.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh, world = seen.to_mesh(), np.array(seen.matrix_world)
+    mesh.calc_loop_triangles()
+    points = np.array([vertex.co for vertex in mesh.vertices]) @ world[:3, :3].T + world[:3, 3]
+    normals = np.array([vertex.normal for vertex in mesh.vertices]) @ world[:3, :3].T
+    triangles = np.array([triangle.vertices for triangle in mesh.loop_triangles])
+    seen.to_mesh_clear()
+    return points, normals, triangles
+
+
+def shirt(body):
+    points, normals, triangles = seen_mesh(body)
+    inside = (points[:, 2] > 0.9) & (points[:, 2] < 1.37) & (np.abs(points[:, 0]) < 0.4)
+    kept = triangles[inside[triangles].all(axis=1)]
+    used, corners = np.unique(kept, return_inverse=True)
+    mesh = bpy.data.meshes.new("Shirt")
+    mesh.from_pydata((points + LOOSE * normals)[used].tolist(), [], corners.reshape(kept.shape).tolist())
+    return link("Shirt", mesh)
+
+
+def hair(body):
+    """Strands that grow from the upper head."""
+    points, normals, triangles = seen_mesh(body)
+    middles, out = points[triangles].mean(axis=1), normals[triangles].mean(axis=1)
+    rows = np.flatnonzero((middles[:, 2] > 1.66) & (middles[:, 1] > -0.05))[::7]
+    curves = bpy.data.hair_curves.new("Hair")
+    curves.add_curves([6] * len(rows))
+    lengths = np.linspace(0, 0.12, 6)[:, None]
+    strands = [middles[row] + lengths * out[row] - [0, 0, 1] * lengths**2 * 3 for row in rows]
+    curves.attributes["position"].data.foreach_set("vector", np.concatenate(strands).astype(np.float32).ravel())
+    return link("Hair", curves)
+
+
+def hat():
+    """A cone on the head, bent by a lattice; (hat, lattice)."""
+    bpy.ops.mesh.primitive_cone_add(vertices=24, radius1=0.17, depth=0.3, location=(0, 0.02, 1.93))
+    item = bpy.context.object
+    item.name = "Hat"
+    cage = link("Hat Lattice", bpy.data.lattices.new("Hat Lattice"))
+    cage.data.points_u = cage.data.points_v = cage.data.points_w = 3
+    cage.location, cage.scale = (0, 0.02, 1.93), (0.4, 0.4, 0.4)
+    for point in list(cage.data.points)[18:]:
+        point.co_deform.y += 0.2
+    item.modifiers.new("Lattice", "LATTICE").object = cage
+    return item, cage
+
+
+def build():
+    """The character at rest, in T-pose, its bones handles of the body, all else carried."""
+    body = link("Body", half_body())
+    made = SimpleNamespace(body=body, rig=rig())
+    weigh(body)
+    mirror = body.modifiers.new("Mirror", "MIRROR")
+    mirror.use_clip = True
+    body.modifiers.new("Armature", "ARMATURE").object = made.rig
+    subdivision = body.modifiers.new("Subdivision", "SUBSURF")
+    subdivision.levels = subdivision.render_levels = 1
+    made.eyes = []
+    for place, side in zip(EYES, "RL", strict=True):
+        bpy.ops.mesh.primitive_uv_sphere_add(segments=16, ring_count=12, radius=EYE, location=place)
+        bpy.context.object.name = f"Eye.{side}"
+        made.eyes.append(bpy.context.object)
+    made.shirt, made.hair = shirt(body), hair(body)
+    made.hat, made.cage = hat()
+    scenes.activate(made.rig, body)
+    bpy.ops.arapfields.add_bones()
+    scenes.activate(*made.eyes, body)
+    bpy.ops.arapfields.carry(way="RIGID")
+    scenes.activate(made.shirt, made.hair, made.cage, body)
+    bpy.ops.arapfields.carry(way="FOLLOW")
+    scenes.activate(body)
+    return made
+
+
+def pose(made, neck=np.pi / 4, arm=np.pi / 3):
+    """Turns the neck sideways, and raises the left arm."""
+    for name, axis, angle in (("Neck", (0, 0, 1), neck), ("Upper Arm.L", (0, -1, 0), arm)):
+        bone = made.rig.pose.bones[name]
+        head = Matrix.Translation(bone.bone.head_local)
+        turn = head @ Matrix.Rotation(angle, 4, Vector(axis)) @ head.inverted()
+        bone.matrix = turn @ bone.bone.matrix_local
+        bpy.context.view_layer.update()

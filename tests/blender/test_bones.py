@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bones of armatures as handles."""
+
+from inside import in_blender
+
+QUICK = {"field": "radial", "samples": 2000}
+SAME = 1e-6  # of the size: single precision of matrices and positions
+
+
+def rigged_bar(with_groups=True):
+    """(bar, rig): a bar whose two bones bend it in the middle, by its armature modifier."""
+    import scenes
+    from stacks import add_modifier, armature
+
+    bar = scenes.bar()
+    if with_groups:
+        add_modifier(bar, "ARMATURE")
+        rig = bar.modifiers["Armature"].object
+    else:
+        rig = armature()
+    rig.pose.bones["Second"].rotation_euler.z = 0.0
+    scenes.activate(rig, bar)
+    return bar, rig
+
+
+@in_blender
+def test_posed_bones_drive_the_field_live_and_the_armature_is_not_doubled():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_bones import rigged_bar
+    from test_live import step
+
+    from addon.live import sessions
+
+    bar, rig = rigged_bar()
+    rest = scenes.world_points(bar)
+    assert bpy.ops.arapfields.add_bones() == {"FINISHED"}
+    entries = bar.arapfields.handles
+    assert [(e.kind, e.bone, e.group) for e in entries] == [
+        ("BONE", "Bone", "Bone"),
+        ("BONE", "Second", "Second"),
+    ]
+    assert all(entry.inside > 0 for entry in entries) and bar.modifiers["Armature"].show_viewport
+    scenes.activate(bar)
+    assert bpy.ops.arapfields.live() == {"FINISHED"}
+    assert not bar.modifiers["Armature"].show_viewport and not bar.modifiers["Armature"].show_render
+    rig.pose.bones["Second"].rotation_euler.z = 0.8
+    step(refined=True)
+    assert sessions.is_live(bar)
+    moved = scenes.world_points(bar)
+    turned = rest[rest[:, 0] > 0.9]
+    matrix = np.array(rig.matrix_world @ rig.pose.bones["Second"].matrix)
+    matrix = matrix @ np.linalg.inv(np.array(rig.matrix_world @ rig.data.bones["Second"].matrix_local))
+    expected = turned @ matrix[:3, :3].T + matrix[:3, 3]
+    assert np.abs(moved[rest[:, 0] > 0.9] - expected).max() < 0.05
+    assert np.abs(moved - rest)[rest[:, 0] < -0.9].max() < 0.05
+    bpy.ops.arapfields.live()
+    assert bar.modifiers["Armature"].show_viewport and bar.modifiers["Armature"].show_render
+    assert [m.name for m in bar.modifiers] == ["Armature"] and not bar.arapfields.silenced
+
+
+@in_blender
+def test_a_bone_equals_a_constrained_empty_with_the_same_region():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_bones import QUICK, SAME, rigged_bar
+
+    bar, rig = rigged_bar()
+    rest = scenes.world_points(bar)
+    bar.scale, rig.location = (1.2, 1.2, 1.2), (0.1, 0.2, -0.1)
+    bpy.context.view_layer.update()
+    bpy.ops.arapfields.add_bones()
+    empties = []
+    for name in ("Bone", "Second"):
+        empty = scenes.cube_empty((0, 0, 0), (0.2, 0.3, 0.4), name)
+        follow = empty.constraints.new("COPY_TRANSFORMS")
+        follow.target, follow.subtarget = rig, name
+        empties.append(empty)
+    bpy.context.view_layer.update()
+    scenes.activate(rig, bar)
+
+    def posed(angle):
+        rig.pose.bones["Second"].rotation_euler.z = angle
+        rig.pose.bones["Bone"].location.z = 0.3 * angle
+        bpy.context.view_layer.update()
+
+    found = []
+    for kind in ("BONE", "GROUP"):
+        posed(0.0)
+        if kind == "GROUP":
+            while len(bar.arapfields.handles):
+                bpy.ops.arapfields.remove_handle()
+            for empty in empties:
+                scenes.activate(empty, bar)
+                bpy.ops.arapfields.add_handle(kind="GROUP", group=empty.name.split(".")[0])
+                bar.arapfields.handles[-1].hold_from = 0.8
+            bar.modifiers["Armature"].show_viewport = False
+        posed(0.7)
+        scenes.activate(bar)
+        assert bpy.ops.arapfields.deform(**QUICK, target="MODIFIER") == {"FINISHED"}
+        found.append(scenes.world_points(bar))
+        bpy.ops.arapfields.remove_field()
+    moved = np.linalg.norm(found[0] - 1.2 * rest, axis=1)
+    assert np.abs(found[0] - found[1]).max() < SAME * 2.4 and moved.max() > 0.4
+
+
+@in_blender
+def test_frames_in_any_order_give_the_same_poses():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_bones import rigged_bar
+    from test_live import step
+
+    bar, rig = rigged_bar()
+    bone = rig.pose.bones["Second"]
+    for frame, angle in ((1, 0.0), (5, 0.6), (9, -0.6)):
+        bone.rotation_euler.z = angle
+        bone.keyframe_insert("rotation_euler", frame=frame)
+    bpy.context.scene.frame_set(7)  # handles are made amid the motion
+    bpy.ops.arapfields.add_bones()
+    scenes.activate(bar)
+    bpy.ops.arapfields.live()
+    shown = {}
+    for frame in (1, 5, 9, 3, 9, 5, 1):
+        bpy.context.scene.frame_set(frame)
+        step(refined=True)
+        points = scenes.world_points(bar)
+        before = shown.setdefault(frame, points)
+        assert np.abs(before - points).max() < 1e-3  # where the solver stops
+    assert np.abs(shown[5] - shown[9]).max() > 0.5
+
+
+@in_blender
+def test_bones_without_groups_hold_what_lies_about_them():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_bones import rigged_bar
+    from test_live import step
+
+    bar, rig = rigged_bar(with_groups=False)
+    assert bpy.ops.arapfields.add_bones(bones="DEFORMING") == {"FINISHED"}
+    assert [entry.group for entry in bar.arapfields.handles] == ["", ""]
+    held = [entry.inside for entry in bar.arapfields.handles]
+    assert min(held) > 1000 and sum(held) < 4000
+    rest = scenes.world_points(bar)
+    scenes.activate(bar)
+    bpy.ops.arapfields.live()
+    rig.pose.bones["Second"].rotation_euler.z = 0.5
+    step(refined=True)
+    shift = scenes.world_points(bar) - rest
+    assert np.linalg.norm(shift[rest[:, 0] > 0.9], axis=1).mean() > 0.3
+    assert np.abs(shift[rest[:, 0] < -0.9]).max() < 0.05
+
+
+@in_blender
+def test_what_is_wrong_with_bones_is_named():
+    import bpy
+    import pytest
+    import scenes
+    from test_bones import rigged_bar
+
+    bar = scenes.bar()
+    with pytest.raises(RuntimeError, match="Bar follows no armature"):
+        bpy.ops.arapfields.add_bones()
+    bpy.data.objects.remove(bar)
+    bar, rig = rigged_bar()
+    with pytest.raises(RuntimeError, match="no bone of Armature is selected"):
+        for bone in rig.data.bones:
+            bone.select = False
+        bpy.ops.arapfields.add_bones(bones="SELECTED")
+    bpy.ops.arapfields.add_bones()
+    rig.data.bones["Second"].name = "Third"
+    scenes.activate(bar)
+    with pytest.raises(RuntimeError, match="Armature has no bone Second"):
+        bpy.ops.arapfields.deform()
+    assert len(bar.arapfields.handles) == 2 and bar.modifiers["Armature"].show_viewport
+    rig.data.bones["Third"].name = "Second"
+    empty = bpy.data.objects.new("Hollow", bpy.data.armatures.new("Hollow"))
+    bpy.context.collection.objects.link(empty)
+    scenes.activate(empty, bar)
+    with pytest.raises(RuntimeError, match="the armature Hollow has no bones to pose"):
+        bpy.ops.arapfields.add_bones()
+    bpy.data.objects.remove(rig)
+    scenes.activate(bar)
+    with pytest.raises(RuntimeError, match="Add a handle first"):
+        bpy.ops.arapfields.deform()
+
+
+@in_blender
+def test_handle_operators_work_on_bones():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_bones import SAME, rigged_bar
+
+    bar, rig = rigged_bar()
+    bpy.ops.arapfields.add_bones()
+    rig.pose.bones["Second"].rotation_euler.z = 0.5
+    rig.pose.bones["Bone"].rotation_mode = "XYZ"
+    rig.pose.bones["Bone"].rotation_euler.x = 0.3
+    bpy.context.view_layer.update()
+    scenes.activate(bar)
+    bpy.ops.arapfields.reset_handle(all=True)
+    for bone in rig.pose.bones:
+        assert np.abs(np.array(bone.matrix) - np.array(bone.bone.matrix_local)).max() < SAME
+    bpy.ops.arapfields.remove_handle(delete=True)
+    assert len(bar.arapfields.handles) == 1 and rig.name in bpy.data.objects
+    bpy.ops.arapfields.live()
+    bpy.ops.arapfields.live_keep()
+    assert not bar.modifiers["Armature"].show_viewport
+    bpy.ops.arapfields.remove_field()
+    assert bar.modifiers["Armature"].show_viewport
+
+
+@in_blender
+def test_a_replaced_mesh_is_not_posed_again():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_bones import QUICK, rigged_bar
+
+    bar, rig = rigged_bar()
+    bpy.ops.arapfields.add_bones()
+    rig.pose.bones["Second"].rotation_euler.z = 0.5
+    scenes.activate(bar)
+    assert bpy.ops.arapfields.deform(**QUICK, target="REPLACE") == {"FINISHED"}
+    once = scenes.world_points(bar)
+    assert bpy.ops.arapfields.deform(**QUICK, target="REPLACE") == {"FINISHED"}
+    assert np.abs(scenes.world_points(bar) - once).max() < 0.01 and np.ptp(once, axis=0)[1] > 0.6

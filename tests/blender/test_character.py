@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A whole character moves by its bones: eyes stay in their sockets, the shirt off the skin, hair on the head."""
+
+import pytest
+from inside import in_blender
+
+STEPS = 4  # of live mode, in which its solver comes to rest
+
+
+@pytest.mark.slow  # about ten seconds
+@in_blender
+def test_a_character_moves_whole():
+    import bpy
+    import character
+    import numpy as np
+    from test_character import STEPS, distances, hair_points, rigid
+    from test_live import step
+
+    from addon.core.runtime import jobs
+    from addon.live import sessions
+
+    made = character.build()
+    rest = {item.name: character.seen_mesh(item)[0] for item in (made.body, made.shirt, made.hat, *made.eyes)}
+    skin = rest["Body"], character.seen_mesh(made.body)[2]
+    strands = hair_points(made.hair)
+    jobs.board.messages.clear()
+    assert bpy.ops.arapfields.live() == {"FINISHED"}
+    for share in np.linspace(0, 1, 4)[1:]:
+        character.pose(made, neck=share * np.pi / 4, arm=share * np.pi / 3)
+        for _ in range(STEPS):
+            step(refined=True)
+    assert sessions.is_live(made.body) and not jobs.messages(), jobs.messages()
+    now = {name: character.seen_mesh(bpy.data.objects[name])[0] for name in rest}
+    posed = now["Body"], skin[1]
+    figures = {}
+
+    head = rest["Body"][:, 2] > 1.6
+    turn = rigid(rest["Body"][head], now["Body"][head])
+    angle = np.degrees(np.arccos((np.trace(turn[:3, :3]) - 1) / 2))
+    figures["head turned, degrees"] = angle
+    hand = rest["Body"][:, 0] > 0.75
+    figures["hand raised"] = (now["Body"][hand] - rest["Body"][hand])[:, 2].mean()
+
+    for eye in made.eyes:
+        before, after = rest[eye.name], now[eye.name]
+        center = before.mean(axis=0)
+        socket = np.linalg.norm(rest["Body"] - center, axis=1) < 2.5 * character.EYE
+        with_socket = rigid(rest["Body"][socket], now["Body"][socket])
+        off = after.mean(axis=0) - (with_socket[:3, :3] @ center + with_socket[:3, 3])
+        figures[f"{eye.name} off its socket, of its radius"] = np.linalg.norm(off) / character.EYE
+        depths = distances(*skin, before), distances(*posed, after)
+        clear = np.abs(depths[0]) > 0.05 * character.EYE
+        figures[f"{eye.name} cut by the skin, vertices"] = int((depths[0] * depths[1] < 0)[clear].sum())
+
+    off = distances(*skin, rest["Shirt"]), distances(*posed, now["Shirt"])
+    figures["shirt's distance changes on average"] = np.abs(off[1] / off[0] - 1).mean()
+    figures["shirt's mean distance changes"] = abs(off[1].mean() / off[0].mean() - 1)
+    figures["shirt's least distance, of its own"] = (off[1] / off[0]).min()
+
+    roots = hair_points(made.hair)[:, 0]
+    figures["hair roots off the scalp, of the size"] = np.abs(distances(*posed, roots)).max() / character.HEIGHT
+    figures["hair roots off at rest"] = np.abs(distances(*skin, strands[:, 0])).max() / character.HEIGHT
+    on_head = rest["Hat"] @ turn[:3, :3].T + turn[:3, 3]
+    figures["hat off the head's motion, of the size"] = (
+        np.linalg.norm(now["Hat"] - on_head, axis=1).max() / character.HEIGHT
+    )
+    for name, figure in figures.items():
+        print(f"{name}: {figure:.3g}")
+
+    assert 40 < figures["head turned, degrees"] < 50 and figures["hand raised"] > 0.4
+    for eye in made.eyes:
+        assert figures[f"{eye.name} off its socket, of its radius"] < 0.02
+        assert not figures[f"{eye.name} cut by the skin, vertices"]
+    assert figures["shirt's distance changes on average"] <= 0.03
+    assert figures["shirt's least distance, of its own"] > 0
+    assert figures["hair roots off the scalp, of the size"] <= 1e-4
+    assert figures["hat off the head's motion, of the size"] < 0.02
+    bpy.ops.arapfields.live()
+    character.pose(made, 0, 0)
+    for name, before in rest.items():
+        assert np.abs(character.seen_mesh(bpy.data.objects[name])[0] - before).max() < 1e-4
+
+
+def distances(vertices, triangles, points):
+    """(p,) signed distances of points from a surface, negative inside."""
+    import arapfields as af
+
+    return af.signed_distance(vertices, triangles, points)
+
+
+def hair_points(hair):
+    """(strands, points of each, 3) as they are shown."""
+    import bpy
+    import numpy as np
+
+    data = hair.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    flat = np.empty(3 * len(data.points), np.float32)
+    data.attributes["position"].data.foreach_get("vector", flat)
+    return flat.reshape(len(data.curves), -1, 3).astype(np.float64)
+
+
+def rigid(before, after):
+    import arapfields as af
+
+    return af.rigid_motion(before, after)

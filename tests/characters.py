@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Simple bodies of capsules, with what characters wear: seen by tests of all that a field carries along."""
+
+import numpy as np
+
+import arapfields as af
+
+
+class Capsules(af.ImplicitFunction):
+    """Capsules (start, end, radius) that flow into each other a little."""
+
+    BLEND = 40.0
+
+    def __init__(self, parts, frame):
+        super().__init__(frame)
+        self.parts = [(np.array(a, float), np.array(b, float), float(r)) for a, b, r in parts]
+
+    def distances(self, points):
+        """(parts, n) to each capsule."""
+        found = []
+        for start, end, radius in self.parts:
+            way = end - start
+            share = np.clip((points - start) @ way / (way @ way), 0, 1)
+            found.append(np.linalg.norm(points - start - share[:, None] * way, axis=1) - radius)
+        return np.array(found)
+
+    def __call__(self, points):
+        distances = self.distances(points)
+        nearest = distances.min(0)
+        return nearest - np.log(np.exp(-self.BLEND * (distances - nearest)).sum(0)) / self.BLEND
+
+
+LEG, HIP, FOOT, THICKNESS = 0.12, 0.7, 0.05, 0.06  # half the legs' distance, heights, radius
+
+
+def trousers():
+    """Two legs along z under a trunk; half as wide as it is high."""
+    parts = [((side * LEG, 0, FOOT), (side * LEG, 0, HIP), THICKNESS) for side in (-1, 1)]
+    parts += [((-LEG, 0, HIP), (LEG, 0, HIP), 0.09), ((0, 0, HIP), (0, 0, 1.2), 0.11)]
+    return Capsules(parts, af.Frame([0, 0, 0.6], 0.8))
+
+
+def ring(half_width, half_depth, heights, around):
+    """A skirt: vertices (heights · around, 3) of an elliptic tube about z, and its edges (e, 2)."""
+    angles = np.linspace(0, 2 * np.pi, around, endpoint=False)
+    layers = [
+        np.column_stack([half_width * np.cos(angles), half_depth * np.sin(angles), 0 * angles + z])
+        for z in heights
+    ]
+    index = np.arange(len(heights) * around).reshape(len(heights), around)
+    rounds = np.column_stack([index.ravel(), np.roll(index, -1, axis=1).ravel()])
+    downs = np.column_stack([index[:-1].ravel(), index[1:].ravel()])
+    return np.concatenate(layers), np.concatenate([rounds, downs])

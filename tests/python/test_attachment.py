@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Points that a field carries along with a body, and rigid motions."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+from cases import box, moved, shift, turn
+from characters import FOOT, HIP, LEG, ring, trousers
+from energy_oracles import random_rotations
+
+import arapfields as af
+
+
+def length(samples):
+    """About that of the body."""
+    return np.ptp(samples.points, axis=0).max()
+
+
+@pytest.fixture(scope="module")
+def body():
+    return af.sample_surface(trousers(), 6000, seed=0)
+
+
+@pytest.fixture(scope="module")
+def striding(body):
+    """The trunk held; the legs spread by 20 degrees each about the hips."""
+    return spread(body, 20)
+
+
+def spread(body, degrees):
+    handles = [moved(box([-1, -1, HIP], [1, 1, 2]))]
+    for side in (-1, 1):
+        leg = box([min(0, side), -1, -1], [max(0, side), 1, HIP - 0.2])
+        handles.append(moved(leg, turn([0, 1, 0], -side * degrees, (side * LEG, 0, HIP))))
+    return af.deform(body, handles)
+
+
+def leg_axis(side, heights, degrees):
+    """Points of a leg's axis as its handle takes them."""
+    points = np.column_stack([0 * heights + side * LEG, 0 * heights, heights])
+    motion = turn([0, 1, 0], -side * degrees, (side * LEG, 0, HIP))
+    return points @ motion[:3, :3].T + motion[:3, 3]
+
+
+def test_points_on_the_surface_go_where_the_field_takes_them(body, striding):
+    points = body.points[:500]
+    attached = af.Attachment(body, points)
+    assert np.abs(attached.positions(striding) - striding(points)).max() <= 1e-12  # rounding
+    assert (attached.distances < 1e-9).all()
+
+
+def test_hair_roots_stay_on_the_scalp(body, striding):
+    """Strands from points between the samples: their roots are the field's own to 1e-4 of the size."""
+    surface, _ = af.extract_surface(trousers(), 96)
+    chosen = np.random.default_rng(0).choice(len(surface), 300, replace=False)
+    roots = surface[chosen]
+    attached = af.Attachment(body, np.concatenate([roots, roots + np.array([0, 0.3, 0])]))
+    assert np.abs(attached.positions(striding)[:300] - striding(roots)).max() < 1e-4 * length(body)
+
+
+def test_at_rest_nothing_moves_and_a_rigid_motion_moves_all(body):
+    rng = np.random.default_rng(1)
+    points = rng.uniform([-1, -1, -0.5], [1, 1, 2], (2000, 3))
+    attached = af.Attachment(body, points)
+    handles = [moved(box([-1, -1, -1], [1, 1, 3]))]
+    live = af.LiveDeformer(body, handles)
+    assert np.abs(attached.positions(live.solve()) - points).max() < 1e-6
+    motion = np.eye(4)
+    motion[:3, :3] = random_rotations(1, rng)[0]
+    motion[:3, 3] = [0.5, -1, 2]
+    field = live.solve([motion @ box([-1, -1, -1], [1, 1, 3])], iterations=200, tolerance=1e-12)
+    expected = points @ motion[:3, :3].T + motion[:3, 3]
+    assert np.abs(attached.positions(field) - expected).max() < 1e-3
+
+
+@pytest.mark.parametrize("degrees", [10, 20, 30])
+@pytest.mark.parametrize("half_width, half_depth", [(0.35, 0.3), (0.3, 0.22), (0.5, 0.5)])
+def test_a_wide_skirt_spreads_with_the_legs_and_does_not_tear(body, degrees, half_width, half_depth):
+    """No edge is stretched by over 10 % more than the legs' distance at its height."""
+    heights = np.linspace(FOOT, HIP - 0.1, 23)
+    points, edges = ring(half_width, half_depth, heights, 160)
+    carried = af.Attachment(body, points).positions(spread(body, degrees))
+    apart = leg_axis(1, heights, degrees) - leg_axis(-1, heights, degrees)
+    asked = (np.linalg.norm(apart, axis=1) / (2 * LEG))[edges[:, 0] // 160]
+    before = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+    after = np.linalg.norm(carried[edges[:, 0]] - carried[edges[:, 1]], axis=1)
+    assert (after / before / asked).max() < 1.1
+    sideways = carried[:, 0] - points[:, 0]
+    lowest = points[:, 2] < FOOT + 1e-9
+    at_right, at_left = points[:, 0] > 0.9 * half_width, points[:, 0] < -0.9 * half_width
+    assert sideways[lowest & at_right].mean() > 0.05 and sideways[lowest & at_left].mean() < -0.05
+
+
+@pytest.mark.parametrize("distance", [0.01, 0.03, 0.05])
+def test_a_shirt_keeps_its_distance_to_the_skin(body, distance):
+    """The trunk bent by 45 degrees: distances change by 3 % at most on average, and never their sign."""
+    top = box([-1, -1, 1.1], [1, 1, 2])
+    handles = [moved(box([-1, -1, -1], [1, 1, HIP])), moved(top, turn([1, 0, 0], 45, (0, 0, 0.9)))]
+    field = af.deform(body, handles)
+    surface, triangles = af.extract_surface(trousers(), 128)
+    normals = trousers_normals(surface)
+    trunk = (surface[:, 2] > 0.75) & (surface[:, 2] < 1.15)
+    shirt = surface[trunk] + distance * normals[trunk]
+    before = af.signed_distance(surface, triangles, shirt)
+    carried = af.Attachment(body, shirt).positions(field)
+    after = af.signed_distance(field(surface), triangles, carried)
+    assert after.min() > 0
+    assert np.abs(after / before - 1).mean() < 0.03
+
+
+def trousers_normals(points):
+    body, step = trousers(), 1e-4
+    slope = np.column_stack([(body(points + e) - body(points - e)) for e in step * np.eye(3)])
+    return slope / np.linalg.norm(slope, axis=1, keepdims=True)
+
+
+def test_neighbours_stay_neighbours_everywhere(body, striding):
+    """Wherever frames carry: a small step stays one. The legs ask for a few times its length between them."""
+    rng = np.random.default_rng(2)
+    points = rng.uniform([-0.6, -0.6, -0.2], [0.6, 0.6, 1.5], (20000, 3))
+    points = points[trousers()(points) > 0.1 * length(body)]
+    steps = 1e-3 * random_rotations(len(points), rng)[:, 0]
+    attached = af.Attachment(body, np.concatenate([points, points + steps]))
+    first, second = np.split(attached.positions(striding), 2)
+    assert np.linalg.norm(second - first, axis=1).max() < 8e-3
+
+
+def test_kinds_of_fields_and_frames_agree(body, striding):
+    points = np.random.default_rng(3).uniform([-0.5, -0.5, 0], [0.5, 0.5, 1.4], (3000, 3))
+    once = af.Attachment(body, points)
+    expected = once.positions(striding)
+    assert np.array_equal(once.positions(striding), expected)  # from what the first call kept
+
+    other = af.SurfaceSamples(body.points, body.normals, af.Frame([1, 2, 3], 2.5))
+    assert np.abs(af.Attachment(other, points).positions(striding) - expected).max() < 1e-5
+    results = [None] * 4
+
+    def ask(i):
+        results[i] = once.positions(striding)
+
+    threads = [threading.Thread(target=ask, args=(i,)) for i in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all(np.array_equal(result, expected) for result in results)
+
+
+def test_what_cannot_be_attached_is_refused(body, striding):
+    empty = af.Attachment(body, np.empty((0, 3)))
+    assert empty.positions(striding).shape == (0, 3) and len(empty) == 0
+    with pytest.raises(af.InvalidInput, match="points"):
+        af.Attachment(body, [[0, 0, np.nan]])
+    with pytest.raises(af.InvalidInput, match="points"):
+        af.Attachment(body, [[0, 0]])
+    one = af.SurfaceSamples([[1.0, 2, 3]], [[0, 0, 1]], af.Frame([0, 0, 0], 1))
+    far = af.Attachment(one, [[1.0, 2, 3], [4, 5, 6], [100, 0, 0]])
+    assert np.abs(far.positions(striding)).max() < 1e3  # one place alone serves all
+
+
+def test_rigid_motions():
+    rng = np.random.default_rng(4)
+    points = rng.normal(size=(50, 3))
+    rotation = random_rotations(1, rng)[0]
+    found = af.rigid_motion(points, points @ rotation.T + [1, 2, 3])
+    assert np.abs(found[:3, :3] - rotation).max() < 1e-11 and np.allclose(found[:3, 3], [1, 2, 3])
+    mirrored = af.rigid_motion(points, points * [-1, 1, 1])
+    assert np.linalg.det(mirrored[:3, :3]) == pytest.approx(1)
+    assert np.array_equal(af.rigid_motion([[1, 2, 3]], [[3, 2, 1]]), shift([2, 0, -2]))
+    line = np.outer(np.arange(5.0), [1, 0, 0])
+    assert np.allclose(af.rigid_motion(line, line + np.array([0, 0, 1])), shift([0, 0, 1]))
+    weights = np.r_[np.ones(25), np.zeros(25)]
+    half = np.concatenate([points[:25] + np.array([1, 0, 0]), rng.normal(size=(25, 3))])
+    assert np.allclose(af.rigid_motion(points, half, weights=weights), shift([1, 0, 0]))
+    assert np.allclose(af.rigid_motion(1e200 * points, 1e200 * (points + 1))[:3, :3], np.eye(3))
+    for bad, name in [
+        (((points, points[:9])), "moved"),
+        (((points[:0], points[:0])), "points"),
+        (((points, points * np.inf)), "moved"),
+    ]:
+        with pytest.raises(af.InvalidInput, match=name):
+            af.rigid_motion(*bad)
+    with pytest.raises(af.InvalidInput, match="weights"):
+        af.rigid_motion(points, points, weights=-np.ones(50))
+
+
+def test_many_points_are_carried_at_interactive_rates(body):
+    """100,000 points, a third of them far: thirty shapes a second on two cores, with room to spare for
+    slow and busy machines."""
+    rng = np.random.default_rng(5)
+    near = body.points[rng.integers(len(body), size=66_000)] + rng.normal(0, 0.01, (66_000, 3))
+    far = rng.uniform([-0.7, -0.7, -0.2], [0.7, 0.7, 1.6], (34_000, 3))
+    attached = af.Attachment(body, np.concatenate([near, far]))
+    leg = box([-1, -1, -1], [0, 1, HIP - 0.2])
+    live = af.LiveDeformer(body, [moved(box([-1, -1, HIP], [1, 1, 2])), moved(leg)])
+    attached.positions(live.solve())
+    shapes = [
+        live.solve([np.array(box([-1, -1, HIP], [1, 1, 2])), shift([0, 0.01 * i, 0]) @ leg]) for i in range(5)
+    ]
+    start = time.process_time()
+    for field in shapes:
+        attached.positions(field)
+    assert (time.process_time() - start) / len(shapes) < 0.4  # processor time of all threads
