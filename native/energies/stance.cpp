@@ -27,7 +27,8 @@ Stance Stance::of(PointsIn points, const Vec3& upwards) {
   stance.ground =
       band > 0.0 ? Vector((1.0 - (heights.array() - low) / band).max(0.0)) : Vector::Ones(points.rows());
   stance.ground *= ground_weight / stance.ground.mean();
-  const double square = (points.rowwise() - points.colwise().mean()).rowwise().squaredNorm().mean();
+  const Eigen::RowVector3d middle = points.colwise().mean();
+  const double square = (points.rowwise() - middle).rowwise().squaredNorm().mean();
   if (square > 0.0) stance.scale = 1.0 / square;
   return stance;
 }
