@@ -9,7 +9,8 @@ from bpy.app.handlers import persistent
 from . import commands, first_run, install_check, menus
 from .blender import icons, library_loading, modifier_stack, timers, translations
 from .blender.host import has_window
-from .core.runtime import jobs
+from .core.runtime import jobs, threads
+from .deform import first_result
 from .field_modifier import motion
 from .handles import counts, rows
 from .jobs.display import display
@@ -25,7 +26,7 @@ from .viewport import handle_boxes, previews
 @persistent
 def before_load(*_):
     """The file is about to go: whatever works on it ends, and nothing of it is applied."""
-    for state in (jobs.board, counts.pending, staleness.changed, rows.seen, warm):
+    for state in (jobs.board, counts.pending, staleness.changed, rows.seen, warm, first_result.steps):
         state.clear()
     sessions.stop_all()
 
@@ -33,12 +34,19 @@ def before_load(*_):
 @persistent
 def before_undo(*_):
     jobs.stop()
+    display.clear_previews()
+
+
+@persistent
+def before_save(*_):
+    display.clear_previews()
 
 
 @persistent
 def after_restore(*_):
     """A file was loaded, or a step undone or redone."""
     hover.clear()
+    first_result.steps.recover()
     sessions.recover()
 
 
@@ -73,6 +81,7 @@ def after_frame(scene, depsgraph):
 HANDLERS = {  # of bpy.app.handlers
     "load_pre": before_load,
     "load_post": after_restore,
+    "save_pre": before_save,
     "undo_pre": before_undo,
     "undo_post": after_restore,
     "redo_pre": before_undo,
@@ -97,9 +106,22 @@ PARTS = (  # what begins with the extension, and how it ends
 # What may be there when the extension is disabled, in the order in which it ends; each has clear().
 # Timers are started by blender/timers.py, threads by core/runtime/threads.py.
 STATE = (jobs.board, display, sessions.live, counts.pending, staleness.changed, motion.written)
-STATE += (hover, warm, previews.shown, rows.seen, timers)
+STATE += (hover, warm, previews.shown, first_result.steps, rows.seen, timers)
+
+LONGEST = 10.0  # seconds that the end of the process waits for a thread
 
 _begun, _drawn = [], []
+
+
+def end_threads():
+    """Where the process ends with the extension still enabled: no thread may be at work in the native library
+    when that is unloaded. Nothing of Blender's is there any more."""
+    jobs.stop()
+    for session in sessions.live.values():
+        if session.worker is not None:
+            session.worker.stop()
+    for thread in threads.own_threads():
+        thread.join(LONGEST)
 
 
 def register():

@@ -39,6 +39,7 @@ def register():
     except Exception:
         unregister()
         raise
+    atexit.register(lifecycle.end_threads)
     if host.is_module():
         # Python's own bpy shuts down as its last reference goes; classes still registered would keep it
         # alive into the process's exit handlers, where it waits for a thread of its own for ever.
@@ -48,6 +49,7 @@ def register():
 def unregister():
     """Undoes register(), or what it did before it failed; once: Blender calls it too when it ends."""
     atexit.unregister(unregister)
+    atexit.unregister(lifecycle.end_threads)
     lifecycle.unregister()
     guide.end()
     item.detach()

@@ -20,6 +20,7 @@ from ..jobs.job_operator import JobOperator
 from ..results import placement
 from ..surface.source_surface import read_surface
 from ..viewport.previews import Preview
+from .first_result import FirstResult
 
 
 @dataclass
@@ -48,7 +49,8 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
     surface.together = carrying.solids(context, surface.space)
     frames = carrying.frames(surface.space, depsgraph_of(context))
 
-    preview = Preview(surface) if operator.in_window else None
+    shown = FirstResult if placement.keeps_mesh(output, target) else Preview
+    preview = shown(surface) if operator.in_window else None
 
     def work(tracker):
         if preview is not None:
@@ -73,6 +75,8 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
         return SolvedMesh(surface.space.to_local(after), topology, report, turns, carried)
 
     def apply(solved):
+        if preview is not None:
+            preview.clear()
         owner = surface.reference.get()
         item = placement.place_result(bpy.context, owner, kind, output, target, solved, surface.local)
         carrying.put(bpy.context, solved.carried)
@@ -90,9 +94,14 @@ def destination(settings, operator):
     return output, placement.effective_target(output, effective_value("target", settings, operator))
 
 
-def placement_refusal(source):
-    """Why a result cannot go where the object's settings say, as a UserError; None where it can."""
+def placement_refusal(source, kind=""):
+    """Why a result cannot go where the object's settings say, as a UserError; None where it can.
+
+    `kind`: the section that tells it, DEFORM or STYLIZE; that the object is live stands in one of them alone.
+    """
     settings = settings_of(source)
+    if kind and settings.live_kind not in ("", kind):
+        return None
     target = placement.effective_target(settings.output, settings.target)
     return placement.refusal(source, settings.output, target)
 

@@ -17,12 +17,12 @@ class Display:
     """Status bar, sidebar and preview of one job at a time, each drawn no more often than drawing allows."""
 
     def __init__(self):
-        self._timer = self._preview = None
-        self._words, self._count, self._left = "", 0, 0.0
+        self._timer, self._previews = None, []
+        self._words, self._seen, self._left = "", None, 0.0
 
     def begin(self, context):
         self._timer = timers.start_events(context, TICK)
-        self._words, self._count, self._left = "", 0, time.monotonic()
+        self._words, self._seen, self._left = "", None, time.monotonic()
         self._progress_throttle, self._preview_throttle = RedrawThrottle(0.25), RedrawThrottle(0.4)
 
     def note_arrival(self):
@@ -39,9 +39,11 @@ class Display:
         now = time.monotonic()
         if self._preview_throttle.is_due(now) and user_preferences.show_previews():
             item, count, points = job.preview_points()
-            if count and count != self._count and item.preview is not None:
-                self._preview, self._count = item.preview, count
-                self._preview.show(points)
+            if count and (item, count) != self._seen and item.preview is not None:
+                self._seen = item, count
+                if item.preview not in self._previews:
+                    self._previews.append(item.preview)
+                item.preview.show(points)
                 redraw(context, "WINDOW")
                 self._preview_throttle.begin(now)
         words = f"{job.message}  {job.fraction:.0%}"
@@ -51,16 +53,20 @@ class Display:
             self._progress_throttle.begin(now)
             self._words = words
 
+    def clear_previews(self):
+        """Takes away what is shown of results that are not there yet."""
+        while self._previews:
+            self._previews.pop().clear()
+
     def clear(self):
         """Takes everything away: the job has ended, or the extension is being disabled."""
-        if self._preview is not None:
-            self._preview.clear()
+        self.clear_previews()
         if self._timer is not None:
             timers.stop_events(self._timer)
             for workspace in bpy.data.workspaces:
                 workspace.status_text_set(None)
             redraw(bpy.context, "UI", "WINDOW")
-        self._timer = self._preview = None
+        self._timer = None
 
 
 display = Display()

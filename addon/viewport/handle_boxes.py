@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Handles in the viewport: the rest box of each, thin, and where it is now, thick; faint behind the mesh."""
+"""Handles in the viewport: the rest box of each, thin, and where it is now, thick; faint behind the mesh.
+
+Of a pin, whose Empty is a ball on the surface, the way that it has gone.
+"""
 
 import bpy
 import gpu
@@ -42,11 +45,15 @@ def segments(source):
     for entry in shown_handles(source):
         rest, now = empties.rest_box(source, entry), movers.box_now(entry)
         thick = CHOSEN if entry.kind == "BONE" or entry.empty.select_get() else THICK
+        way = [rest[:3, 3].tolist(), now[:3, 3].tolist()]
+        if entry.kind == "PIN":
+            if not np.allclose(*way, atol=1e-6):
+                lines.append((tuple(entry.colour), thick, way))
+            continue
         if np.allclose(rest, now, atol=1e-6):
             lines.append((tuple(entry.colour), thick, box_lines(rest)))
             continue
         lines.append((tuple(entry.colour), THIN, box_lines(rest)))
-        way = [rest[:3, 3].tolist(), now[:3, 3].tolist()]
         lines.append((tuple(entry.colour), thick, box_lines(now) + way))
     return lines
 

@@ -51,7 +51,8 @@ Stance Stance::of(PointsIn points, const Vec3& upwards) {
   stance.ground =
       band > 0.0 ? Vector((1.0 - (heights.array() - low) / band).max(0.0)) : Vector::Ones(points.rows());
   stance.ground *= ground_weight / stance.ground.mean();
-  const double square = (points.rowwise() - points.colwise().mean()).rowwise().squaredNorm().mean();
+  const Eigen::RowVector3d middle = points.colwise().mean();
+  const double square = (points.rowwise() - middle).rowwise().squaredNorm().mean();
   if (square > 0.0) stance.scale = 1.0 / square;
   return stance;
 }
@@ -79,8 +80,8 @@ double stance_energy(JetView<const Scalar> jets, ConstPointsRef<Scalar> rest, co
   const double on_ground = stance.ground.sum();
   if (on_ground > 0.0) rises.array() -= stance.ground.dot(rises) / on_ground;
   const double share = stance.scale / static_cast<double>(jets.count);
-  const Points arms =
-      (rest.template cast<double>().rowwise() - rest.template cast<double>().colwise().mean()).eval();
+  Points arms = rest.template cast<double>();
+  arms.rowwise() -= arms.colwise().mean().eval();
   const Lean lean = lean_of(arms, ways, stance.up);
   if (cotangents.data != nullptr)
     Eigen::Map<PointsOf<Scalar>>(cotangents.data, jets.count, 3) +=

@@ -272,6 +272,7 @@ void LiveSolver::State::reset() {
 void LiveSolver::State::adopt(const DeformationField& field) {
   constexpr int rounds = 8;
   const ThreadScope threads(options_.threads);
+  if (inverse_factor_.size() == 0) factorise();
   const LiveObjective<float>& objective = *fast_.objective;
   const Points places = rows_of(surface_, chosen_);
   JetBlock<double> jets(places.rows(), JetOrder::second);

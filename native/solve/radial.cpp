@@ -16,6 +16,8 @@ namespace {
 constexpr int steps_at_once = 10;
 /// From so many centers on, half of them, or so many, make a first result, in so many steps at most.
 constexpr int worth_a_first = 600, most_first = 500, first_steps = 12;
+/// What makes the first result of a style.
+constexpr int style_first_centers = 400, style_first_samples = 4000, style_first_steps = 30;
 /// Samples a center that carry it, and that the energy sees: more centers than samples can tell apart would
 /// fit them and fold between them.
 constexpr int samples_a_center = 8;
@@ -38,6 +40,13 @@ void set_centers(LiveOptions& live, int centers, const SurfaceSamples& samples) 
   live.fine_centers = static_cast<int>(std::min<Index>(centers, carried));
   live.coarse_centers = live.fine_centers / 5;
   live.samples = std::max(live.samples, samples_a_center * live.fine_centers);
+}
+
+/// A result of some steps at most, shown to whoever watches: what a finer solver starts from.
+std::shared_ptr<const RadialField> first_result(LiveSolver& solver, int steps, const Progress& progress) {
+  const std::shared_ptr<const RadialField> first = solver.solve(steps, 0.0, progress);
+  progress.look([&](PointsIn points) { return first->at(points); });
+  return first;
 }
 
 /// Solves until it converges, is out of steps or time, or the observer ends it. The solver's energy is the
@@ -99,15 +108,15 @@ Solution deform_radial(const SurfaceSamples& samples, const std::vector<Handle>&
   fine.handle_weight = options.handles.handle_weight;
   const auto shape = std::make_shared<const RestShape>(samples, fine.interior,
                                                        static_cast<std::uint64_t>(options.training.seed));
-  std::shared_ptr<RadialField> first;
+  std::shared_ptr<const RadialField> first;
   if (fine.fine_centers >= worth_a_first) {
     LiveOptions few = live_options(options);
     set_centers(few, std::min(most_first, fine.fine_centers / 2), samples);
     few.handle_weight = fine.handle_weight;
     few.tolerance = LiveOptions().tolerance;
     LiveSolver solver(samples, handles, few, progress.part(0.0, 0.1), shape);
-    first = solver.solve(std::min(first_steps, options.training.iterations), 0.0, progress.part(0.1, 0.15));
-    progress.look([&](PointsIn points) { return first->at(points); });
+    first =
+        first_result(solver, std::min(first_steps, options.training.iterations), progress.part(0.1, 0.15));
   }
   const double done = first ? 0.15 : 0.0;
   LiveSolver solver(samples, handles, fine, progress.part(done, 0.4), shape);
@@ -150,12 +159,23 @@ Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const
   live.gauss_weight = options.gauss_weight / options.rigidity;
   live.keep_stance = options.keep_stance / options.rigidity;
   live.interior = !handles.empty();  // a style alone acts everywhere alike: nothing is to be held apart
-  LiveSolver solver(samples, handles, live, progress.part(0.0, 0.3));
+  const auto shape = std::make_shared<const RestShape>(samples, live.interior,
+                                                       static_cast<std::uint64_t>(options.training.seed));
+  LiveOptions few = live;
+  few.samples = style_first_samples;
+  few.fine_centers = style_first_centers;
+  few.coarse_centers = few.fine_centers / 5;
+  LiveSolver quick(samples, handles, few, progress.part(0.0, 0.1), shape);
+  quick.set_style(preferred, options.strength, options.sharpness, weights, up);
+  const auto first =
+      first_result(quick, std::min(style_first_steps, options.training.iterations), progress.part(0.1, 0.15));
+  LiveSolver solver(samples, handles, live, progress.part(0.15, 0.3), shape);
   solver.set_style(preferred, options.strength, options.sharpness, weights, up);
+  solver.adopt(*first);
   const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95), hooks, options.rigidity);
   ObjectiveTerms terms;
   terms.rigidity = options.rigidity;
-  terms.stiffness = SurfaceStiffness(samples, options.surface);
+  terms.stiffness = SurfaceStiffness(shape->thickness, options.surface);
   terms.preference = gauss_preference(preferred, options.sharpness);
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
   return finish(solver, samples, terms, loop, progress);

@@ -85,7 +85,7 @@ def is_busy(state):
     if state is jobs.board:
         return state.job is not None
     if state is display:
-        return state._timer is not None or state._preview is not None
+        return state._timer is not None or bool(state._previews)
     if state is previews.shown:
         return state.mesh is not None
     return bool(state) if isinstance(state, (dict, set)) else bool(state._started)

@@ -2,9 +2,9 @@
 """Run by a real Blender with a window: jobs, live mode, the panel. docs/development.md says how.
 
 blender --factory-startup --python tests/gui/window.py -- OUTPUT_FOLDER [PART ...]
-Parts are panel, use, jobs, stalls, live, pins and endings; all where none is named. Writes checks.json, and
-pictures where ImageMagick's `import` is at hand; xdotool moves the mouse. Ends with a job running, which must
-not hold it.
+Parts are panel, use, jobs, stalls, live, press, pins and endings; all where none is named. Writes checks.json,
+and pictures where ImageMagick's `import` is at hand; xdotool moves the mouse. Ends with a job running, which
+must not hold it.
 """
 
 import json
@@ -22,6 +22,7 @@ import jobs  # noqa: E402
 import live  # noqa: E402
 import panel  # noqa: E402
 import pins  # noqa: E402
+import press  # noqa: E402
 import scenes  # noqa: E402
 import stage  # noqa: E402
 import stalls  # noqa: E402
@@ -40,6 +41,7 @@ def steps():
         "jobs": lambda: jobs.checks(FOUND, OUTPUT),
         "stalls": lambda: stalls.checks(FOUND, OUTPUT),
         "live": lambda: live.checks(FOUND, OUTPUT),
+        "press": lambda: press.checks(FOUND, OUTPUT),
         "pins": lambda: pins.checks(FOUND, OUTPUT),
         "endings": lambda: jobs.endings(FOUND),
     }
@@ -57,6 +59,7 @@ def steps():
     with stage.override():
         scenes.bar_with_handles()
         bpy.ops.arapfields.live("INVOKE_DEFAULT")
+        bpy.data.objects["Bar"].arapfields.target = "NEW"  # the live one itself would refuse
     jobs.invoke(jobs.LONG)
     yield 0.5
 

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a running solve has so far, shown by the source itself: its field modifier moves, until the job ends.
+
+Nothing of it stays: before the result is placed, the job cancelled, a step undone or the file saved, the
+motion that was there before is put back bit for bit. Steps that were pushed meanwhile hold it, so that it is
+put back in them as well when Blender returns to them.
+"""
+
+import hashlib
+
+import bpy
+
+from ..blender import timers
+from ..core.errors import UserError
+from ..field_modifier import motion
+
+WAIT = 0.2  # seconds between looks whether Edit Mode has been left
+
+
+class Steps(dict):
+    """{session_uid: {digest of shown offsets: the motion before them}} of this file's jobs."""
+
+    def note(self, source, shown, before):
+        self.setdefault(source.session_uid, {})[digest(shown)] = before
+
+    def recover(self):
+        """After a step was undone or redone: puts back what a solve has moved in it."""
+        for source in bpy.data.objects:
+            known = self.get(source.session_uid)
+            shown = motion.snapshot(source) if known and source.mode != "EDIT" else None
+            if shown is not None and digest(shown) in known:
+                motion.restore(source, known[digest(shown)])
+
+
+steps = Steps()
+
+
+def digest(moved):
+    return None if moved.offsets is None else hashlib.sha1(moved.offsets.tobytes()).digest()
+
+
+class FirstResult:
+    """Shows a solve's points on the source that it works on; main thread but for `points`."""
+
+    def __init__(self, surface):
+        self._surface, self._shown, self._before = surface, False, None
+
+    @property
+    def points(self):
+        """(n, 3) points at rest, in solve space."""
+        return self._surface.vertices
+
+    def show(self, points):
+        """Moves the source's points to (n, 3) in solve space; not while the user works on the mesh."""
+        source = self._surface.reference.find()
+        if source is None or source.mode != "OBJECT":
+            return
+        try:
+            if not self._shown:
+                before = motion.snapshot(source)
+                motion.bind(bpy.context, source)
+                self._shown, self._before = True, before
+            local = self._surface.space.to_local(points.astype(float))
+            motion.write(source, motion.Motion(local - self._surface.local))
+            steps.note(source, motion.snapshot(source), self._before)
+        except UserError:  # the mesh is another one by now: the job itself will tell
+            self.clear()
+
+    def clear(self):
+        """Puts back what was there before."""
+        if self._shown:
+            self._shown = False
+            put_back(self._surface.reference, self._before)
+
+
+def put_back(reference, before):
+    """Gives the source that motion, as soon as Edit Mode is left."""
+
+    def attempt():
+        source = reference.find()
+        if source is not None and source.mode == "EDIT":
+            return WAIT
+        if source is not None:
+            motion.restore(source, before)
+        return None
+
+    if attempt() is not None:
+        timers.start(attempt, first=WAIT)

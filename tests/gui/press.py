@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From the press of Deform and of Stylize to a picture, on 50,000 vertices; what is shown before stays nowhere."""
+
+import time
+
+import bpy
+import numpy as np
+import scenes
+import stage
+
+LIMIT = 60.0  # seconds until a result is given up
+ROUNDS = 2
+
+
+def checks(found, folder):
+    for name in ("deform", "stylize"):
+        found[f"press_{name}"] = rounds = []
+        for number in range(ROUNDS):
+            yield from one(rounds, name, folder if number == 0 else None)
+        found[f"cancel_{name}"] = yield from cancelled(name, folder)
+    yield from with_steps_between(found)
+
+
+def round_off(bar):
+    """Makes the bar an ellipsoid, which no style leaves as it is."""
+    flat = np.empty(3 * len(bar.data.vertices), dtype=np.float32)
+    bar.data.vertices.foreach_get("co", flat)
+    half = np.array([1.0, 0.25, 0.25], dtype=np.float32)
+    way = flat.reshape(-1, 3) / half
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    bar.data.vertices.foreach_set("co", (1.2 * half * way).ravel())
+    bar.data.update()
+
+
+def set_stage():
+    """An ellipsoid of some 50,000 vertices with a handle that has moved."""
+    stage.empty_file()
+    with stage.override():
+        bar, _, moving = scenes.bar_with_handles()
+        stage.dense_bar()
+        round_off(bar)
+        moving.location.z += 0.6
+        bpy.context.view_layer.update()
+        bpy.ops.view3d.view_all()
+        scenes.activate(bar)
+        bpy.ops.ed.undo_push(message="stage")
+    return bar
+
+
+def press(name):
+    with stage.override():
+        getattr(bpy.ops.arapfields, name)("INVOKE_DEFAULT")
+
+
+def shape(bar):
+    return scenes.world_points(bar)
+
+
+def one(rounds, name, folder):
+    """Seconds to the first picture of a moved mesh and to the last one, and how they differ."""
+    from addon.core.runtime import jobs
+    from addon.field_modifier import motion
+
+    bar = set_stage()
+    yield 2.0
+    before, rest, written = stage.everything(), shape(bar), []
+    original, motion.write = (
+        motion.write,
+        lambda *given: (written.append(time.perf_counter()), original(*given)),
+    )
+    drawn, stop = stage.draws()
+    begin = time.perf_counter()
+    press(name)
+    said = time.perf_counter() - begin
+    first = None
+    while jobs.running() is not None and time.perf_counter() - begin < LIMIT:
+        if written and first is None and any(at > written[0] for at in drawn):
+            first = shape(bar)
+            if folder is not None:
+                stage.picture(folder, f"press-{name}-first")
+        yield 0.01
+    yield 1.0
+    stop()
+    motion.write = original
+    last = shape(bar)
+    size = np.ptp(rest, axis=0).max()
+    rounds.append(
+        {
+            "press_s": round(said, 3),
+            "first_shape_s": round(written[0] - begin, 3) if written else None,
+            "first_picture_s": seconds_to(drawn, written[:1], begin),
+            "last_picture_s": seconds_to(drawn, written[-1:], begin),
+            "shapes": len(written),
+            "first_off_by": None if first is None else round(float(np.abs(last - first).max() / size), 4),
+            "moved_by": round(float(np.abs(last - rest).max() / size), 4),
+        }
+    )
+    if folder is not None:
+        stage.picture(folder, f"press-{name}-last")
+    with stage.override():
+        bpy.ops.ed.undo()
+    yield 0.5
+    rounds[-1]["one_undo_step"] = stage.everything() == before
+    print(name, rounds[-1], flush=True)
+
+
+def seconds_to(drawn, written, begin):
+    """The first drawing that began after the shape was there."""
+    after = [at - begin for at in drawn if written and at > written[0]]
+    return round(after[0], 3) if after else None
+
+
+def until_shown(bar, rest):
+    from addon.core.runtime import jobs
+
+    begin = time.perf_counter()
+    while jobs.running() is not None and time.perf_counter() - begin < LIMIT:
+        yield 0.01
+        if not np.array_equal(shape(bar), rest):
+            return
+
+
+def cancelled(name, folder):
+    """A job that is cancelled when its first result is there, over nothing and over a result before it."""
+    from addon.core.runtime import jobs
+
+    exact = []
+    for earlier in (False, True):
+        bar = set_stage()
+        if earlier:
+            with stage.override():
+                bpy.ops.arapfields.deform("EXEC_DEFAULT", **scenes.QUICK)
+        yield 1.0
+        before, rest = stage.everything(), shape(bar)
+        press(name)
+        yield from until_shown(bar, rest)
+        was_shown = jobs.running() is not None
+        bpy.ops.arapfields.cancel()
+        while jobs.running() is not None:
+            yield 0.02
+        yield 0.3
+        exact.append(was_shown and stage.everything() == before and np.array_equal(shape(bar), rest))
+    return exact
+
+
+def with_steps_between(found):
+    """A step that was pushed while the first result was shown holds nothing of it."""
+    from addon.core.runtime import jobs
+
+    bar = set_stage()
+    yield 1.0
+    before, rest = stage.everything(), shape(bar)
+    press("deform")
+    yield from until_shown(bar, rest)
+    bpy.ops.ed.undo_push(message="between")
+    while jobs.running() is not None:
+        yield 0.02
+    yield 0.3
+    moved = not np.array_equal(shape(bar), rest)
+    with stage.override():
+        bpy.ops.ed.undo()
+    yield 0.5
+    bar = bpy.data.objects["Bar"]
+    found["step_between_holds_nothing"] = moved and stage.everything() == before
+    found["step_between_shape"] = np.array_equal(shape(bar), rest)
