@@ -1,9 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the tests of batches share: folders of inputs, and a stand-in for Blender."""
+"""What the tests of batches share: folders of inputs, and a stand-in for Blender.
+
+python tests/batches.py FLAGS is a batch of that stand-in.
+"""
 
 import os
 import sys
+from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from addon.commands.batch import run_batch
+from addon.commands.main import interruptible
 from addon.commands.parser import parse
 from addon.commands.record import FOLDER, Record
 
@@ -57,3 +65,8 @@ def statuses(folder):
 def starts(folder):
     """Names of the inputs, as often as a Blender was started for them."""
     return sorted((folder / "starts").read_text().split())
+
+
+if __name__ == "__main__":
+    with interruptible():
+        sys.exit(run_batch(parse(["batch", *sys.argv[1:]]), FakeLaunch()))

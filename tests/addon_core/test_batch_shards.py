@@ -28,21 +28,10 @@ def many(tmp_path):
     return tmp_path
 
 
-RUN = f"""
-import sys; sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / "tests")!r}]
-from pathlib import Path
-from batches import FakeLaunch, batch
-from addon.commands.batch import run_batch
-from addon.commands.main import interruptible
-with interruptible():
-    sys.exit(run_batch(batch(Path(sys.argv[1]), *sys.argv[2:]), FakeLaunch()))
-"""
-
-
 def start(folder, *flags):
-    return subprocess.Popen(
-        [sys.executable, "-c", RUN, str(folder), *flags], stdout=subprocess.PIPE, text=True
-    )
+    where = ["--style", "cube", "-i", str(folder / "in"), "-o", str(folder / "out")]
+    command = [sys.executable, str(ROOT / "tests" / "batches.py"), *where, *flags]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
 
 
 def complete(folder):

@@ -6,6 +6,7 @@ import os
 import shutil
 import signal
 import subprocess
+import sys
 import time
 
 import numpy as np
@@ -81,16 +82,16 @@ def test_each_frame_is_the_solve_of_its_own_pose(place):
     assert names(place) == ["all.pc2", "bar.ply", "some.pc2", "tracks.json"]
 
 
-@pytest.mark.parametrize("order", [(1, 2, 3), (3, 1, 2)])
-def test_shards_in_any_order_make_the_same(order, place):
+def test_shards_in_any_order_make_the_same(place):
     assert animate(place, "one.pc2") == 0
-    for number in order:
+    for number in (3, 1, 2):
         assert not (place / "parts.pc2").exists()
         assert animate(place, "parts.pc2", "--shard", f"{number}/3") == 0
     assert (place / "parts.pc2").read_bytes() == (place / "one.pc2").read_bytes()
     assert names(place) == ["bar.ply", "one.pc2", "parts.pc2", "tracks.json"]
 
 
+@pytest.mark.slow
 def test_a_killed_run_goes_on_where_it_was(place):
     long = tracks_of(np.array([turned(0.5 * i) @ RIGHT for i in range(20)]))
     (place / "long.json").write_text(json.dumps(long))
@@ -158,7 +159,10 @@ def test_mdd_and_npz_tell_the_same(place):
         np.testing.assert_allclose(cache.times, np.arange(1, FRAMES + 1) / 25, rtol=ONE_ULP)
 
 
-@pytest.mark.parametrize("suffix", ["usda", "usdc", "usd"])
+@pytest.mark.parametrize(
+    "suffix",
+    ["usdc", pytest.param("usda", marks=pytest.mark.slow), pytest.param("usd", marks=pytest.mark.slow)],
+)
 def test_usd_is_read_back(suffix, place):
     usd = pytest.importorskip("pxr.Usd", reason="usd-core is not installed")
     geometry = pytest.importorskip("pxr.UsdGeom")
@@ -180,7 +184,7 @@ def test_usd_is_read_back(suffix, place):
 
 
 def test_usd_without_its_package_is_named(place, monkeypatch, capsys):
-    monkeypatch.setitem(__import__("sys").modules, "pxr", None)
+    monkeypatch.setitem(sys.modules, "pxr", None)
     assert animate(place, "x.usda") == 2
     assert "pip install 'arapfields[usd]'" in said(capsys)
 
@@ -193,6 +197,30 @@ def test_what_was_there_stays_where_the_disk_is_full(place, monkeypatch, capsys)
     assert animate(place, "x.pc2", "--frames", "2", "3") == 2
     assert "No space left" in said(capsys)
     assert (place / "x.pc2").read_bytes() == before
+
+
+FULL = """
+import resource, signal, sys
+import numpy as np
+from arapfields._files import whole_file
+from arapfields.cli.usd import write_usd
+resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+frames = np.random.default_rng(0).normal(size=(20, 5000, 3))
+try:
+    with whole_file(sys.argv[1]) as partial:
+        write_usd(partial, np.array([[0, 1, 2]]), frames, fps=24, start=1, up="z")
+except OSError as error:
+    print(error)
+"""
+
+
+def test_a_disk_that_is_full_for_usd_is_named(tmp_path):
+    pytest.importorskip("pxr.Usd", reason="usd-core is not installed")
+    (tmp_path / "x.usdc").write_text("before")
+    done = subprocess.run([sys.executable, "-c", FULL, tmp_path / "x.usdc"], capture_output=True, text=True)
+    assert "the disk may be full" in done.stdout and str(tmp_path / "x.usdc") in done.stdout, done
+    assert (tmp_path / "x.usdc").read_text() == "before" and names(tmp_path) == ["x.usdc"]
 
 
 @pytest.mark.parametrize(

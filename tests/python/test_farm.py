@@ -85,6 +85,13 @@ def test_what_is_no_client_is_named(arguments, text):
         farm.map(*arguments)
 
 
+@pytest.mark.slow
+def test_a_function_that_cannot_travel_is_named(client):
+    options = af.StylizeOptions()
+    with pytest.raises(af.InvalidInput, match="function: cannot travel"):
+        farm.map(lambda item: options, [1], client)
+
+
 def test_without_dask_the_way_to_get_it_is_named(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)
     with pytest.raises(ImportError, match=r"pip install 'arapfields\[farm\]'"):

@@ -16,15 +16,15 @@ from distributed import Client
 import arapfields as af
 from arapfields import farm
 
-OPTIONS = af.StylizeOptions(iterations=100)
-
 
 def stylized(job: tuple[Path, Path]) -> float:
     """The energy reached; the result is there whole or not at all."""
     source, target = job
     mesh = trimesh.load(source, force="mesh", process=False)
     vertices, triangles = np.array(mesh.vertices), np.array(mesh.faces)
-    field = af.stylize(af.sample_mesh(vertices, triangles, count=5000), "cube", OPTIONS)
+    field = af.stylize(
+        af.sample_mesh(vertices, triangles, count=5000), "cube", af.StylizeOptions(iterations=100)
+    )
     partial = target.with_name(f".{target.stem}.{os.getpid()}{target.suffix}")
     trimesh.Trimesh(field(vertices), triangles, process=False).export(partial)
     partial.replace(target)

@@ -54,6 +54,7 @@ def map(
     """
     try:
         from distributed import Client, as_completed
+        from distributed.protocol.pickle import dumps
     except ImportError:
         raise ImportError("farm.map needs the package distributed: pip install 'arapfields[farm]'") from None
     if not isinstance(client, Client) or client.asynchronous:
@@ -64,6 +65,12 @@ def map(
         raise InvalidInput(f"function: got {type(function).__name__}; a function of one item is needed")
     if not isinstance(retries, int) or not 0 <= retries <= 1000:
         raise InvalidInput(f"retries: got {retries!r:.40}; an integer from 0 to 1000 is needed")
+    try:
+        dumps(function)
+    except Exception as error:
+        raise InvalidInput(
+            f"function: cannot travel to the workers ({str(error).splitlines()[0]})"
+        ) from error
     there = list(items)
     futures: dict[Any, int] = {}
     outcomes: dict[int, Outcome[Item, Value]] = {}

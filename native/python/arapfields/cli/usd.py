@@ -61,7 +61,8 @@ def write_usd(path, triangles, frames, *, fps, start, up, name="mesh"):
         del stage, mesh, points, extent
         _look(usd, UsdGeom, path, start, count, frame)
     except Tf.ErrorException as error:
-        text = f"not written whole ({str(error).splitlines()[0]}); the disk may be full"
+        said = " ".join(str(error).split())[:200] or "it said nothing"
+        text = f"USD could not write all of it ({said}); the disk may be full"
         raise OSError(errno.EIO, text, str(path)) from error
 
 
