@@ -32,6 +32,7 @@ endforeach()
 
 arapfields_install(arapfields arapfields/include arapfields/share/cmake/arapfields python EXCLUDE_FROM_ALL)
 install(TARGETS _native LIBRARY DESTINATION arapfields COMPONENT python EXCLUDE_FROM_ALL)
-install(FILES "${ARAPFIELDS_GENERATED}/options.json" DESTINATION arapfields COMPONENT python EXCLUDE_FROM_ALL)
+install(FILES "${ARAPFIELDS_GENERATED}/options.json" "${ARAPFIELDS_GENERATED}/libtorch.txt"
+  DESTINATION arapfields COMPONENT python EXCLUDE_FROM_ALL)
 install(DIRECTORY python/arapfields/ DESTINATION arapfields COMPONENT python EXCLUDE_FROM_ALL
   PATTERN "__pycache__" EXCLUDE)

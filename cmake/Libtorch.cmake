@@ -11,6 +11,11 @@ if(NOT LIBTORCH_DIR)
   endif()
 endif()
 set(LIBTORCH_DIR "${LIBTORCH_DIR}" CACHE PATH "torch folder of a torch wheel")
+set(LIBTORCH_VERSION "")  # as pip names it, e.g. 2.13.0
+if(EXISTS "${LIBTORCH_DIR}/version.py")
+  file(STRINGS "${LIBTORCH_DIR}/version.py" LIBTORCH_VERSION REGEX "^__version__")
+  string(REGEX REPLACE "^[^'\"]*['\"]([^'\"+]*).*$" "\\1" LIBTORCH_VERSION "${LIBTORCH_VERSION}")
+endif()
 
 add_library(libtorch::libtorch INTERFACE IMPORTED)
 target_include_directories(libtorch::libtorch SYSTEM INTERFACE

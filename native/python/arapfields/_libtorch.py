@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether the torch beside this package is the one that its library was built against.
+
+libtorch's C++ interface changes from version to version: with another one the library fails to load at best, and
+crashes at worst. So importing this module compares the versions, before anything is loaded.
+"""
+
+from importlib import metadata
+from pathlib import Path
+
+HERE = Path(__file__).parent
+
+
+def check(folder: Path = HERE) -> None:
+    """ImportError, in one line, where the installed torch is missing or another one than was built against.
+
+    Nothing is asked where the package carries libtorch itself, as in Blender's extension.
+    """
+    noted = folder / "libtorch.txt"
+    built_against = noted.read_text().strip() if noted.is_file() else ""
+    if not built_against or any(folder.glob("*torch_cpu*")):
+        return
+    remedy = f"pip install torch=={built_against}"
+    try:
+        installed = metadata.version("torch")
+    except metadata.PackageNotFoundError:
+        raise ImportError(f"arapfields needs torch {built_against}, which is not installed: {remedy}") from None
+    if installed.partition("+")[0] != built_against:
+        raise ImportError(
+            f"arapfields was built against torch {built_against}, and torch {installed} is installed: {remedy}, "
+            "or build arapfields anew"
+        )
+
+
+check()
