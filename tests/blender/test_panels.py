@@ -200,7 +200,9 @@ def test_the_panel_draws(state):
         assert shown == ["ARAPFIELDS_PT_source"]
     else:
         said = "ARAPFIELDS_PT_status" in shown
-        assert len(shown) == 9 + said and said == (state in ("fitted", "fit cleared", "running", "a failure"))
+        assert len(shown) == 10 + said and said == (
+            state in ("fitted", "fit cleared", "running", "a failure")
+        )
     if state in EXPECTED:
         section, text = EXPECTED[state]
         assert text in " ".join(found[section]), found[section]  # long texts take several labels
