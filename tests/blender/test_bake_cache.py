@@ -56,6 +56,7 @@ def test_a_cache_plays_what_the_solver_says_at_every_frame():
     import bpy
     import numpy as np
     from test_bake_cache import EXACT, animated, at, solved
+    from test_panels import drawn
 
     bar, folder = animated()
     bpy.context.scene.frame_set(3)
@@ -65,6 +66,8 @@ def test_a_cache_plays_what_the_solver_says_at_every_frame():
     assert path.stat().st_size == 32 + 9 * 12 * len(bar.data.vertices)
     (modifier,) = bar.modifiers
     assert modifier.type == "MESH_CACHE" and modifier.filepath == "//cache/Bar.pc2"
+    shown = drawn()["ARAPFIELDS_PT_animation"]
+    assert "ARAP Fields Cache" in shown and "250 samples, 1.2 MB" in shown, shown
     for frame in (1, 2.5, 4, 5):
         assert np.abs(at(bar, frame) - solved(bar, frame)).max() <= EXACT, frame
     assert np.abs(at(bar, 9) - at(bar, 5)).max() == 0

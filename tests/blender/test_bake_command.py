@@ -37,6 +37,7 @@ bpy.ops.wm.save_mainfile()
     return folder, run
 
 
+@pytest.mark.slow
 def test_parts_in_any_order_make_the_cache_that_one_process_makes(scene):
     folder, run = scene
     run("-o", folder / "baked.blend")
