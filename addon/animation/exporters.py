@@ -13,7 +13,7 @@ from ..core.errors import UserError
 from ..core.runtime.coroutines import Pause
 from ..live.animated import curves_of
 from . import export_checks
-from .object_bake import plain, size_text
+from .caches import plain, size_text
 
 SUFFIXES = {"ABC": ".abc", "USD": ".usdc", "GLTF": ".glb"}
 
@@ -37,7 +37,7 @@ def write(context, kind, path, items, frames):
             require_room(context, path, items, frames)
             try:
                 CALLS[kind](context, str(partial), frames)
-            except RuntimeError as error:
+            except (AttributeError, RuntimeError) as error:  # the former where the exporter is switched off
                 told = [line for line in str(error).splitlines() if line and not line.startswith("Location:")]
                 reason = told[-1].removeprefix("Error: ") if told else ""
                 raise UserError(
