@@ -2,6 +2,7 @@
 """One object's bake: its solver, where its frames go, and what plays them at last."""
 
 import contextlib
+import functools
 import json
 import re
 from pathlib import Path
@@ -18,10 +19,12 @@ from ..handles import empties
 from ..live import animated, sessions
 from ..live.session import Session
 from ..results import placement, result_objects
+from .carried_bake import CarriedBake
 from .properties import FOLDER
 
 SUFFIXES = {"PC2": ".pc2", "MDD": ".mdd"}
 STYLE_PATH = "arapfields.stylize"  # of what is keyframed of a style
+BARRED = re.compile(r'[\x00-\x1f/\\:*?"<>|]')  # letters that a file's name cannot have
 HEAVY = 500e6  # bytes of shape keys, above which a cache would serve better
 
 
@@ -39,7 +42,7 @@ def kind_of(source, kind):
 
 def cache_path(source, suffix, folder, filepath=""):
     """(absolute path, the same as the modifier has it) of an object's cache; UserError where none can be."""
-    name = re.sub(r'[\x00-\x1f/\\:*?"<>|]', "_", source.name)
+    name = BARRED.sub("_", source.name)
     told = filepath or f"{folder.rstrip('/') or '/'}/{name}{suffix}"
     if told.startswith("//") and not bpy.data.filepath:
         raise UserError("save the .blend first, or choose a folder: the cache lies beside it")
@@ -56,6 +59,12 @@ def cache_path(source, suffix, folder, filepath=""):
     return path, told
 
 
+def cache_beside(path, told, name):
+    """The same as cache_path, of an object that goes along: beside the other's cache, with both names."""
+    file = f"{path.stem} {BARRED.sub('_', name)}{path.suffix}"
+    return path.with_name(file), told.removesuffix(path.name) + file
+
+
 class ObjectBake:
     """Made and placed on the main thread; prepared, and given its frames, by the worker.
 
@@ -69,6 +78,8 @@ class ObjectBake:
         self.reference, self.frames, self.path, self.told = ObjectReference(source), frames, path, told
         self.fps = context.scene.render.fps / context.scene.render.fps_base
         self.in_place, self.error, self.writer, self.shapes = in_place, None, None, []
+        beside = None if path is None else functools.partial(cache_beside, path, told)
+        self.carried = CarriedBake(self.session.carrying, frames, beside, self.fps)
 
     @property
     def name(self):
@@ -80,12 +91,15 @@ class ObjectBake:
             source = self.reference.get()
             if self.session.moves_by_itself:
                 self.session.read_points(context, source)
+            self.session.carrying.expect_motion()
+            self.session.refresh_carried(context)
             return self.session.current_request(context, source)
         except (UserError, ValueError) as error:
             return error
 
     def prepare(self):
         self.session.prepare()
+        self.carried.prepare()
         if self.path is None:
             return
         from arapfields.point_cache import PointCacheWriter
@@ -99,7 +113,9 @@ class ObjectBake:
         """Solves one frame and puts it where it goes."""
         if isinstance(request, Exception):
             raise request
-        points = self.session.solve_from_rest(request).points
+        shape = self.session.solve_from_rest(request)
+        points = shape.points
+        self.carried.add(shape.carried)
         if self.writer is not None:
             self.writer.write(points)
         else:
@@ -119,6 +135,7 @@ class ObjectBake:
             self.discard()
 
     def finish(self):
+        self.carried.finish()
         if self.writer is not None:
             self.writer.finish()
 
@@ -127,10 +144,18 @@ class ObjectBake:
         if self.writer is not None:
             self.writer.discard()
         self.shapes.clear()
+        self.carried.discard()
 
     def place(self, context, job):
-        """Coroutine: the cache in its place and what plays it; returns the line to report."""
+        """Coroutine: the caches in their places and what plays them; returns the line to report."""
         source = self.unchanged_source()
+        told = yield from self.place_own(context, source, job)
+        if self.carried.carrying.passengers:
+            sessions.end(context, source)
+            yield from self.carried.place(context, source, job)
+        return told
+
+    def place_own(self, context, source, job):
         if self.path is None:
             return (yield from self.add_keys(context, source, job))
         self.commit()

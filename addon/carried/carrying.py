@@ -10,7 +10,7 @@ from ..core.geometry.spaces import transform
 from ..field_modifier import motion
 from . import refusals
 from .carriers import MeshCarrier
-from .passengers import Frame, Passenger, give_back, is_carried_otherwise
+from .passengers import Frame, Passenger, find, give_back, is_carried_otherwise
 from .places import depsgraph_of, place_of
 from .transforms import BonesCarrier
 
@@ -74,6 +74,12 @@ class Carrying:
             edited = item.data is not None and item.data.session_uid in data
             moved = item.session_uid in objects and passenger.moves_by_itself(item)
             passenger.may_be_edited |= edited or moved
+
+    def expect_motion(self):
+        """Another frame: what moves by itself may have other points."""
+        for passenger in self.passengers:
+            item = passenger.reference.find()
+            passenger.may_be_edited |= item is not None and passenger.moves_by_itself(item)
 
     def refresh(self, context):
         """Reads again what may have been edited; whether any has other points."""
@@ -197,8 +203,3 @@ PAUSING = ("EDIT", "SCULPT", "SCULPT_CURVES", "EDIT_GREASE_PENCIL")  # modes in 
 
 def near(a, b):
     return np.allclose(a, b, rtol=0.0, atol=SAME_PLACE * max(1e-12, np.abs(a[:3, :3]).max()))
-
-
-def find(source, item):
-    """The entry of an object in a source's list, or None."""
-    return next((e for e in settings_of(source).carried if item is not None and e.item == item), None)
