@@ -103,11 +103,11 @@ class Carrying:
 
     # On a worker.
 
-    def moved(self, af, samples, field, frames):
-        """[(passenger, what its carrier writes)] of all where the field takes them."""
-        return [(frame.passenger, self.moved_one(af, samples, field, frame)) for frame in frames]
+    def moved(self, af, samples, field, frames, strength=1.0):
+        """[(passenger, what its carrier writes)] of all where the field takes them, so much of the way."""
+        return [(frame.passenger, self.moved_one(af, samples, field, frame, strength)) for frame in frames]
 
-    def moved_one(self, af, samples, field, frame):
+    def moved_one(self, af, samples, field, frame, strength=1.0):
         passenger = frame.passenger
         attached = passenger.attached
         if attached is None or attached[0] is not frame.points or not near(attached[1], frame.rest):
@@ -116,6 +116,9 @@ class Carrying:
         after = np.asarray(attached[2].positions(field))
         if not np.isfinite(after).all():
             raise UserError("the shape has vertices that are NaN or infinite; move the handles less far")
+        if strength != 1.0:
+            rest = transform(frame.rest, frame.points)
+            after = rest + strength * (after - rest)
         return passenger.carrier.moved(frame.rest, frame.now, frame.parent, after)
 
     # Main thread: showing and taking back.

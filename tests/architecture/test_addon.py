@@ -15,6 +15,7 @@ ORDER = [
     "field_modifier",
     "handles",
     "carried",
+    "poses",
     "surface",
     "results",
     "viewport",
