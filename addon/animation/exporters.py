@@ -2,6 +2,7 @@
 """Animated objects to files, by Blender's own exporters: what is shown of them at every frame."""
 
 import contextlib
+import shutil
 
 import bpy
 import numpy as np
@@ -12,7 +13,7 @@ from ..core.errors import UserError
 from ..core.runtime.coroutines import Pause
 from ..live.animated import curves_of
 from . import export_checks
-from .object_bake import plain
+from .object_bake import plain, size_text
 
 SUFFIXES = {"ABC": ".abc", "USD": ".usdc", "GLTF": ".glb"}
 
@@ -22,7 +23,7 @@ def write(context, kind, path, items, frames):
     from arapfields._files import whole_file
 
     # USD's textures are found by paths relative to its own folder.
-    with selection_kept(context), whole_file(path, beside=kind == "USD") as partial:
+    with scene_kept(context), whole_file(path, beside=kind == "USD") as partial:
         with contextlib.ExitStack() as stack:
             shown = items
             if kind == "GLTF":
@@ -33,15 +34,33 @@ def write(context, kind, path, items, frames):
                     yield from morphing.add(frames)
                 shown = [morphing.item for morphing in shown]
             select(context, shown)
+            require_room(context, path, items, frames)
             try:
                 CALLS[kind](context, str(partial), frames)
             except RuntimeError as error:
-                reason = str(error).removeprefix("Error: ").strip()
+                told = [line for line in str(error).splitlines() if line and not line.startswith("Location:")]
+                reason = told[-1].removeprefix("Error: ") if told else ""
                 raise UserError(
                     "{path}: Blender cannot write it ({reason})", path=path, reason=reason
                 ) from error
         if not export_checks.is_whole(partial, kind):
             raise UserError("{path}: Blender could not write all of it; the disk may be full", path=path)
+
+
+def require_room(context, path, items, frames):
+    """UserError where the disk has no room for the frames: Alembic's writer would take Blender down."""
+    need, samples = 1e6, frames.count + (count_of("ABC", frames) if frames.step > 1 else 0)
+    for item in items:
+        mesh = item.evaluated_get(context.evaluated_depsgraph_get()).data
+        moving, still = (
+            12 * (len(mesh.vertices) + len(mesh.loops)),
+            32 * (len(mesh.vertices) + len(mesh.loops)),
+        )
+        need += samples * moving + still
+    free = shutil.disk_usage(path.parent).free
+    if free < need:
+        needs, has = size_text(need), size_text(free)
+        raise UserError("{path}: it takes up to {needs}, and {has} are free", path=path, needs=needs, has=has)
 
 
 def alembic(context, path, frames):
@@ -169,9 +188,11 @@ class MorphingCopy:
 
 
 @contextlib.contextmanager
-def selection_kept(context):
-    """What is selected and active is so again after the block."""
-    layer = context.view_layer
+def scene_kept(context):
+    """What is selected and active, and the frame, are so again after the block: an exporter that fails
+    leaves them as they come."""
+    layer, scene = context.view_layer, context.scene
+    frame, subframe = scene.frame_current, scene.frame_subframe
     chosen, active = [item.name for item in context.selected_objects], layer.objects.active
     name = active.name if active else ""
     try:
@@ -180,6 +201,8 @@ def selection_kept(context):
         for item in layer.objects:
             item.select_set(item.name in chosen)
         layer.objects.active = layer.objects.get(name)
+        if (scene.frame_current, scene.frame_subframe) != (frame, subframe):
+            scene.frame_set(frame, subframe=subframe)
 
 
 def select(context, items):

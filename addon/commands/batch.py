@@ -1,12 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """batch: every file of a folder, each in a Blender of its own: one failure or crash stops no other."""
 
-import json
-import os
-import signal
-import subprocess
 import sys
-import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -14,9 +9,11 @@ from pathlib import Path
 
 from ..core.errors import UserError
 from ..core.runtime import native
-from .launch import PARENT
+from .children import Children
 from .parser import FORMATS, solve_settings
-from .record import NAME, Record, options_hash, stamp
+from .record import Record, described, digest, stamp
+
+LOOK = 1.0  # seconds between two looks at what other batches are at work on
 
 
 @dataclass(frozen=True)
@@ -34,25 +31,48 @@ def run_batch(options, launch):
     settings = solve_settings(options)
     if "handles" in settings and not settings["handles"].is_file():
         raise UserError(f"{settings['handles']}: no such file")
-    tasks = plan(options)
+    everything = plan(options)
+    number, parts = options.shard or (1, 1)
+    tasks = everything[number - 1 :: parts]
     record = Record(options.output)
-    if record.damaged:
-        say(f"{record.path} is damaged; everything is done anew")
-    digest = options_hash(options.solve_verb, settings, native.library().__version__)
-    skipped = [t for t in tasks if not options.again and record.is_done(t.name, t.source, t.target, digest)]
+    told = described(options.solve_verb, settings, native.library().__version__)
+    options_name = digest(told)
+    skipped = [
+        t for t in tasks if not options.again and record.is_done(t.name, t.source, t.target, options_name)
+    ]
     todo = [task for task in tasks if task not in skipped]
     for task in skipped:
         say(f"{task.name}: skipped, done already")
+    for task in todo:
+        if record.is_damaged(task.name):
+            say(f"{record.place(task.name)} is damaged; {task.name} is done anew")
     if options.dry_run:
         for task in todo:
             say(f"{task.name}: would become {task.target}")
         return 0
-    say(f"{len(todo)} of {len(tasks)} files to do, {options.jobs} at a time")
-    failed = work(todo, options, settings, launch, record, digest)
+    agree(options, record, told)
+    of = f", the part {number}/{parts} of {len(everything)}" if options.shard else ""
+    say(f"{len(todo)} of {len(tasks)} files to do{of}, {options.jobs} at a time")
+    try:
+        counts = Work(options, settings, launch, record, told).run(todo)
+    finally:
+        record.close()
     seconds = time.perf_counter() - begin
-    figures = f"{len(todo) - failed} done, {len(skipped)} skipped, {failed} failed"
-    say(f"{len(tasks)} files: {figures}, in {seconds:.0f} s; {options.output / NAME} tells more")
-    return 1 if failed else 0
+    figures = f"{counts['done']} done, {len(skipped) + counts['skipped']} skipped, {counts['failed']} failed"
+    say(f"{len(tasks)} files: {figures}, in {seconds:.0f} s; {record.folder} tells more")
+    return 1 if counts["failed"] else 0
+
+
+def agree(options, record, told):
+    """Names results of other settings or of another version in the folder; parts of one job share both."""
+    other = record.agree(told, anew=options.again or not options.shard)
+    if other and options.shard and not options.again:
+        raise UserError(
+            f"{options.output}: holds results made with {other}; the parts of one job must agree: "
+            "choose another folder, or --again"
+        )
+    if other:
+        say(f"{options.output}: holds results made with {other}; those are done anew")
 
 
 def plan(options):
@@ -95,30 +115,62 @@ def refuse_twins(tasks):
             taken[path] = task.name
 
 
-def work(todo, options, settings, launch, record, digest):
-    """Runs the tasks, so many at a time; returns how many failed."""
-    failed = number = 0
-    environment = launch.environment(min(options.jobs, max(1, len(todo))))
-    with ThreadPoolExecutor(options.jobs) as pool, Children(environment, options.limit) as children:
-        waiting = {}
-        for task in todo:
-            task.target.parent.mkdir(parents=True, exist_ok=True)
-            arguments = [*flags(settings), "--quiet", "-i", str(task.source), "-o", str(task.target)]
-            command = launch.command(options.solve_verb, arguments)
-            waiting[pool.submit(children.run, command)] = task, stamp(task.source)
+class Work:
+    """Files done so many at a time, each by one batch alone; others may be at work in the same folder."""
+
+    def __init__(self, options, settings, launch, record, told):
+        self.options, self.flags, self.launch, self.record = options, flags(settings), launch, record
+        self.digest = digest(told)
+        self.again = options.again
+
+    def run(self, todo):
+        """How many files were done, skipped because another batch did them, and failed."""
+        counts, number = {"done": 0, "skipped": 0, "failed": 0}, 0
+        environment = self.launch.environment(min(self.options.jobs, max(1, len(todo))))
+        with (
+            ThreadPoolExecutor(self.options.jobs) as pool,
+            Children(environment, self.options.limit) as children,
+        ):
+            waiting = {pool.submit(self.one, task, children): task for task in todo}
+            try:
+                while waiting:
+                    later = []
+                    for future in as_completed(waiting):
+                        task, outcome = waiting[future], future.result()
+                        if outcome is None:
+                            later.append(task)
+                            continue
+                        status = outcome["status"]
+                        counts[status if status in counts else "failed"] += 1
+                        number += 1
+                        say(f"[{number}/{len(todo)}] {task.name}: {describe(outcome)}")
+                    if later:  # what another batch is at work on is its own, unless it ends without a result
+                        time.sleep(LOOK)
+                    waiting = {pool.submit(self.one, task, children): task for task in later}
+            except BaseException:
+                for future in waiting:
+                    future.cancel()
+                children.stop()
+                raise
+        return counts
+
+    def one(self, task, children):
+        """One file's outcome; None while another batch works on it."""
+        if not self.record.claim(task.name):
+            return None
         try:
-            for future in as_completed(waiting):
-                task, seen = waiting[future]
-                outcome, number = future.result(), number + 1
-                failed += outcome["status"] != "done"
-                record.note(task.name, output=task.target.name, options=digest, source=seen, **outcome)
-                say(f"[{number}/{len(todo)}] {task.name}: {describe(outcome)}")
-        except BaseException:
-            for future in waiting:
-                future.cancel()
-            children.stop()
-            raise
-    return failed
+            if not self.again and self.record.is_done(task.name, task.source, task.target, self.digest):
+                return {"status": "skipped", "message": "done by another batch", "seconds": 0.0}
+            task.target.parent.mkdir(parents=True, exist_ok=True)
+            seen = stamp(task.source)
+            arguments = [*self.flags, "--quiet", "-i", str(task.source), "-o", str(task.target)]
+            outcome = children.run(self.launch.command(self.options.solve_verb, arguments))
+            if not children.stopped:
+                made = {"output": task.target.name, "options": self.digest, "source": seen}
+                self.record.note(task.name, **made, **outcome)
+            return outcome
+        finally:
+            self.record.release(task.name)
 
 
 def flags(settings):
@@ -134,100 +186,10 @@ def flags(settings):
 
 
 def describe(outcome):
-    word = {"done": "done", "partial": "FAILED in part"}.get(outcome["status"], "FAILED")
+    word = {"done": "done", "skipped": "skipped", "partial": "FAILED in part"}.get(
+        outcome["status"], "FAILED"
+    )
     return f"{word} in {outcome['seconds']:.1f} s: {outcome['message']}"
-
-
-class Children:
-    """The Blenders at work; leaving the block ends those that still are."""
-
-    def __init__(self, environment, limit):
-        self.limit, self.running, self.stopped = limit, set(), False
-        self.pipe, self.alive = os.pipe()  # nothing is ever written; the system closes it with this process
-        self.environment = {**environment, PARENT: str(self.pipe)}
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.stop()
-        os.close(self.pipe)
-        os.close(self.alive)
-
-    def stop(self):
-        self.stopped = True
-        for process in list(self.running):
-            end(process)
-
-    def run(self, command):
-        """One file's outcome; never raises for what happens to the child."""
-        begin = time.perf_counter()
-        with tempfile.TemporaryDirectory(prefix="arapfields-") as folder:
-            report, log = Path(folder) / "report.json", Path(folder) / "log"
-            with log.open("wb") as stream:
-                code = self.wait([*command, "--report", str(report)], stream)
-            outcome = understand(code, report, log.read_text(errors="replace"))
-        if code is None:
-            outcome["message"] = f"given up after {self.limit:g} s"
-        return {**outcome, "seconds": round(time.perf_counter() - begin, 2)}
-
-    def wait(self, command, stream):
-        """The child's exit code; None when it took too long."""
-        if self.stopped:
-            return 130
-        process = subprocess.Popen(
-            command,
-            stdout=stream,
-            stderr=subprocess.STDOUT,
-            stdin=subprocess.DEVNULL,
-            env=self.environment,
-            pass_fds=(self.pipe,),
-            start_new_session=True,  # a Ctrl-C reaches the batch, which ends its children
-        )
-        self.running.add(process)
-        try:
-            return process.wait(self.limit)
-        except subprocess.TimeoutExpired:
-            end(process)
-            return None
-        finally:
-            self.running.discard(process)
-
-
-def end(process):
-    """Asks a child to stop, which leaves no partial files; one that does not listen is killed."""
-    process.send_signal(signal.SIGINT)
-    try:
-        process.wait(5.0)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
-
-
-def read_objects(report):
-    """What a child says of its objects; nothing where it did not come to that."""
-    try:
-        objects = json.loads(report.read_text())["objects"]
-        return [{**o, "status": str(o["status"]), "message": str(o["message"])} for o in objects]
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return []
-
-
-def understand(code, report, log):
-    """{"status", "message", "objects"} from what a child left."""
-    objects = read_objects(report)
-    failures = [o["message"] for o in objects if o["status"] != "done"]
-    if code == 0 and objects:
-        return {"status": "done", "message": "; ".join(o["message"] for o in objects), "objects": objects}
-    if failures:
-        status = "partial" if len(failures) < len(objects) else "failed"
-        return {"status": status, "message": "; ".join(failures), "objects": objects}
-    said = [line for line in log.splitlines() if line.startswith("arapfields")]
-    last = said[-1:] or [line for line in log.splitlines() if line.strip()][-1:] or ["it said nothing"]
-    reason = last[0].removeprefix("arapfields: ")
-    if code is not None and code < 0:
-        reason = f"Blender was ended by signal {-code} ({reason})"
-    return {"status": "failed", "message": reason, "objects": objects}
 
 
 def say(text):

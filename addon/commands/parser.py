@@ -95,6 +95,7 @@ def add_batch(verbs):
     batch.add_argument("--recursive", action="store_true", help="folders within the folder too")
     batch.add_argument("--again", action="store_true", help="also what is done already")
     batch.add_argument("--dry-run", action="store_true", help="say what would be done, and do nothing")
+    batch.add_argument("--shard", type=shard, metavar="I/N", help="the part I of N of the files alone")
     batch.add_argument("--limit", type=seconds, metavar="SECONDS", help="give up a file after so long")
 
 
@@ -161,6 +162,12 @@ def count(text):
     if not text.isdigit() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is no number of at least 1")
     return int(text)
+
+
+def shard(text):
+    from arapfields.cli.options import shard as part
+
+    return part(text)
 
 
 def seconds(text):

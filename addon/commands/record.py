@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a batch has done: a file in the output folder, by which the next run knows what it may skip."""
+"""What a batch has done: a file an input, by which the next run, or another machine, knows what to skip."""
 
 import contextlib
 import fcntl
@@ -8,16 +8,33 @@ import json
 import os
 from pathlib import Path
 
-NAME = "arapfields-batch.json"
-VERSION = 1
+FOLDER = "arapfields-batch"
+VERSION = 2
+BATCH = (
+    "batch.json"  # what the folder's results have in common; an input's own file has a name with its suffix
+)
+LOCK = "lock"
 
 
-def options_hash(verb, settings, version):
-    """A name for what is done to a file; the content of files among the settings counts, not their names."""
-    parts = [VERSION, version, verb]
+def described(verb, settings, version):
+    """What is done to an input, as JSON; of files among the settings the content counts, not their names."""
+    told = {"version": version, "verb": verb}
     for name, value in sorted(settings.items()):
-        parts.append([name, Path(value).read_text() if isinstance(value, Path) else value])
-    return hashlib.blake2b(json.dumps(parts).encode(), digest_size=12).hexdigest()
+        told[name] = digest(Path(value).read_text()) if isinstance(value, Path) else value
+    return told
+
+
+def digest(content):
+    """A short name for what JSON can hold."""
+    return hashlib.blake2b(json.dumps([VERSION, content]).encode(), digest_size=12).hexdigest()
+
+
+def differences(then, now):
+    """A phrase for what two descriptions do not share."""
+    names = [name for name in sorted({*then, *now}) if then.get(name) != now.get(name)]
+    return ", ".join(
+        f"{name} {then.get(name, 'unset')!s:.40} (now {now.get(name, 'unset')!s:.40})" for name in names
+    )
 
 
 def stamp(path):
@@ -27,51 +44,104 @@ def stamp(path):
 
 
 class Record:
-    """{input: what was made of it}, written anew, whole, after each file; several batches may share one."""
+    """The folder beside the results: a file an input, each written whole. Several batches may share it."""
 
     def __init__(self, folder):
-        self.path = Path(folder) / NAME
-        self.entries, self.damaged = self._read()
+        self.folder = Path(folder) / FOLDER
+        self._lock = None
 
-    def _read(self):
-        """The entries on the disk, and whether they are damaged."""
-        try:
-            content = json.loads(self.path.read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            return {}, False
-        except (ValueError, RecursionError):
-            return {}, True
-        known = isinstance(content, dict) and content.get("version") == VERSION
-        if not known or not isinstance(content.get("files"), dict):
-            return {}, True
-        return content["files"], False
+    def place(self, name):
+        """Where the entry of an input is kept; a very long name is shortened."""
+        path = self.folder / f"{name}.json"
+        if len(os.fsencode(path.name)) > 240:
+            path = path.with_name(f"{digest(name)}.json")
+        return path
+
+    def entry(self, name):
+        """What is noted of an input; nothing where that is damaged."""
+        return read(self.place(name))
+
+    def is_damaged(self, name):
+        return self.place(name).exists() and not self.entry(name)
 
     def is_done(self, name, source, target, options):
         """Whether the result is there, newer than its source, and made with the same options."""
-        entry = self.entries.get(name)
-        if not isinstance(entry, dict) or entry.get("status") != "done" or entry.get("options") != options:
+        entry = self.entry(name)
+        if entry.get("status") != "done" or entry.get("options") != options:
             return False
         if entry.get("output") != target.name or entry.get("source") != stamp(source):
             return False
         return target.is_file() and target.stat().st_mtime_ns >= source.stat().st_mtime_ns
 
     def note(self, name, **entry):
-        """Adds an entry to what is on the disk by now: another batch may have noted its own."""
+        self._write(self.place(name), {"input": name, **entry})
+
+    def _write(self, path, content):
         from arapfields._files import json_text, write_text
 
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        with locked(self.path.parent):
-            there, damaged = self._read()
-            self.entries = {**(self.entries if damaged else there), name: entry}
-            write_text(self.path, json_text({"version": VERSION, "files": self.entries}, indent=1))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_text(path, json_text({"format": VERSION, **content}, indent=1))
+
+    def claim(self, name):
+        """Whether this process alone works on the input from now on; False while another one does.
+
+        A lock of the system's, on a byte that the name chooses: it ends with the process, however that ends,
+        and reaches other machines where their folder is shared with locks. Without locks all claims are
+        granted: an input may then be done twice, with one result.
+        """
+        try:
+            fcntl.lockf(self._locks(), fcntl.LOCK_EX | fcntl.LOCK_NB, 1, byte_of(name))
+        except (BlockingIOError, PermissionError):
+            return False
+        except OSError:
+            pass
+        return True
+
+    def release(self, name):
+        with contextlib.suppress(OSError):
+            fcntl.lockf(self._locks(), fcntl.LOCK_UN, 1, byte_of(name))
+
+    def _locks(self):
+        if self._lock is None:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            self._lock = open(self.folder / LOCK, "ab")  # noqa: SIM115
+        return self._lock
+
+    def settings(self):
+        """What the folder's results are made with; None where nothing tells."""
+        found = read(self.folder / BATCH).get("settings")
+        return found if isinstance(found, dict) else None
+
+    def agree(self, told, anew):
+        """What differs between these settings and those of the folder, which become these where `anew`."""
+        with contextlib.suppress(OSError):
+            fcntl.lockf(self._locks(), fcntl.LOCK_EX, 1, byte_of(BATCH))
+        try:
+            there = self.settings()
+            other = differences(there, told) if there else ""
+            if not there or (other and anew):
+                self._write(self.folder / BATCH, {"settings": told})
+            return other
+        finally:
+            self.release(BATCH)
+
+    def close(self):
+        if self._lock is not None:
+            self._lock.close()
+            self._lock = None
 
 
-@contextlib.contextmanager
-def locked(folder):
-    """No other process is in such a block with the same folder."""
-    descriptor = os.open(folder, os.O_RDONLY)
+def byte_of(name):
+    """A byte of the lock's file, which need not be as long."""
+    return int.from_bytes(
+        hashlib.blake2b(name.encode(errors="surrogateescape"), digest_size=7).digest(), "big"
+    )
+
+
+def read(path):
+    """An object of a file; an empty one where there is none, or something else."""
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(descriptor)
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (FileNotFoundError, NotADirectoryError, ValueError, RecursionError):
+        return {}
+    return content if isinstance(content, dict) and content.get("format") == VERSION else {}

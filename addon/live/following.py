@@ -32,7 +32,7 @@ class Following(Solving):
             self.is_asked = True
 
     def wait_for_frame(self, seconds):
-        """Until the frame at hand is solved, so many seconds at most."""
+        """Until the frame at hand is solved, so many seconds at most; None: however long that takes."""
         if self.follows_animation:
             self.take(self.requested, self.frame)
         if self.follows_animation and self.frames is not None:

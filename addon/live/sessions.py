@@ -193,7 +193,7 @@ def follow_frame(depsgraph):
             request = session.current_request(bpy.context, source, where, seen, depsgraph)
             session.take(request, scene_frame(depsgraph.scene))
             session.worker.wait(WAIT, refined=True)
-            session.wait_for_frame(WAIT)
+            session.wait_for_frame(None)  # a picture of another frame would be none
             session.show()
         except Changed:
             continue

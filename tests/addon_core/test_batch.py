@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The batch without Blender: which files, what is done already, what became of a child; and the flags."""
 
-import json
 import os
 import subprocess
 import sys
@@ -9,50 +8,18 @@ import time
 from pathlib import Path
 
 import pytest
+from batches import FakeLaunch, batch, make_folders, statuses
 
-from addon.commands.batch import Children, flags, plan, run_batch, understand
+from addon.commands.batch import flags, plan, run_batch
+from addon.commands.children import Children, understand
 from addon.commands.parser import parse, solve_settings
-from addon.commands.record import NAME, Record, options_hash
+from addon.commands.record import Record, described
 from addon.core.errors import UserError
 
 
 @pytest.fixture
 def folders(tmp_path):
-    (tmp_path / "in/sub").mkdir(parents=True)
-    for name in ("b.ply", "a.obj", "c.STL", "notes.txt", ".hidden.ply", "sub/d.ply"):
-        (tmp_path / "in" / name).write_text(name)
-    return tmp_path
-
-
-def batch(folders, *further, output="out"):
-    where = ["-i", str(folders / "in"), "-o", str(folders / output)]
-    return parse(["batch", "--style", "cube", *where, *further])
-
-
-class FakeLaunch:
-    """Instead of Blender a Python one-liner that writes the output; it fails, or dies, by the file's name."""
-
-    code = """
-import json, os, sys
-a = sys.argv; source, target, report = (a[a.index(flag) + 1] for flag in ("-i", "-o", "--report"))
-if "dies" in source: os.kill(os.getpid(), 11)
-if "hangs" in source: import time; time.sleep(60)
-good = "fails" not in source
-if good: open(target, "w").write("made")
-note = {"object": "x", "status": "done" if good else "failed", "message": "x: made" if good else "x: no"}
-open(report, "w").write(json.dumps({"objects": [note]}))
-sys.exit(0 if good else 1)
-"""
-
-    def command(self, verb, arguments):
-        return [sys.executable, "-c", self.code, verb, *arguments]
-
-    def environment(self, jobs):
-        return dict(os.environ)
-
-
-def statuses(folder):
-    return {n: e["status"] for n, e in json.loads((folder / NAME).read_text())["files"].items()}
+    return make_folders(tmp_path)
 
 
 def test_files_are_found_by_suffix_pattern_and_depth(folders):
@@ -100,7 +67,7 @@ def test_one_failure_or_crash_stops_no_other_and_a_second_run_does_the_rest(fold
         "fails.ply": "failed",
     }
     assert (out / "a.obj").read_text() == "made"
-    assert "ended by signal 11" in json.loads((out / NAME).read_text())["files"]["dies.ply"]["message"]
+    assert "ended by signal 11" in Record(out).entry("dies.ply")["message"]
     (folders / "in/dies.ply").rename(folders / "in/lives.ply")
     assert run_batch(batch(folders), FakeLaunch()) == 1
     assert "5 files: 1 done, 3 skipped, 1 failed" in capsys.readouterr().out
@@ -138,7 +105,7 @@ def test_a_file_that_takes_too_long_is_given_up(folders):
     begin = time.monotonic()
     assert run_batch(batch(folders, "--pattern", "hangs*", "--limit", "0.5"), FakeLaunch()) == 1
     assert time.monotonic() - begin < 30
-    assert "given up after 0.5 s" in (folders / "out" / NAME).read_text()
+    assert "given up after 0.5 s" in Record(folders / "out").entry("hangs.ply")["message"]
 
 
 def test_leaving_ends_the_children(tmp_path):
@@ -148,20 +115,23 @@ def test_leaving_ends_the_children(tmp_path):
     assert process.poll() is not None
 
 
-def test_a_damaged_record_means_doing_all_anew(tmp_path):
-    (tmp_path / NAME).write_text("{")
-    record = Record(tmp_path)
-    assert record.damaged and record.entries == {}
+def test_a_damaged_note_means_doing_that_file_anew(folders, capsys):
+    assert run_batch(batch(folders), FakeLaunch()) == 0
+    Record(folders / "out").place("b.ply").write_text("{")
+    capsys.readouterr()
+    assert run_batch(batch(folders), FakeLaunch()) == 0
+    said = capsys.readouterr().out
+    assert "b.ply.json is damaged" in said and "3 files: 1 done, 2 skipped" in said
 
 
 def test_handles_count_by_their_content(tmp_path):
     one, two = tmp_path / "one.json", tmp_path / "two.json"
     one.write_text("[]")
     two.write_text("[]")
-    same = options_hash("deform", {"handles": one}, "1")
-    assert same == options_hash("deform", {"handles": two}, "1") != options_hash("deform", {}, "1")
+    same = described("deform", {"handles": one}, "1")
+    assert same == described("deform", {"handles": two}, "1") != described("deform", {}, "1")
     two.write_text("[1]")
-    assert options_hash("deform", {"handles": two}, "1") != same
+    assert described("deform", {"handles": two}, "1") != same
 
 
 def test_flags_come_back_as_the_same_settings(folders):

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a batch notes beside other batches, damaged notes, and children whose parent is killed."""
 
-import json
 import subprocess
 import sys
 import time
@@ -9,42 +8,54 @@ from pathlib import Path
 
 import pytest
 
-from addon.commands.batch import understand
-from addon.commands.record import NAME, Record
+from addon.commands.children import understand
+from addon.commands.record import Record, differences
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def statuses(folder):
-    return {n: e["status"] for n, e in json.loads((folder / NAME).read_text())["files"].items()}
-
-
-@pytest.mark.parametrize(
-    "text", ["[]", '{"version": 1, "files": 3}', "[" * 100000, '{"version": 2}', "\x00\xff"]
-)
-def test_records_of_any_content_are_read(text, tmp_path):
-    (tmp_path / NAME).write_text(text)
+@pytest.mark.parametrize("text", ["[]", '{"format": 2', "[" * 100000, '{"format": 1}', "\x00\xff", ""])
+def test_notes_of_any_content_are_read(text, tmp_path):
     record = Record(tmp_path)
-    assert record.damaged and record.entries == {}
     record.note("a.ply", status="done")
-    assert Record(tmp_path).entries == {"a.ply": {"status": "done"}}
+    assert record.entry("a.ply")["status"] == "done" and not record.is_damaged("a.ply")
+    record.place("a.ply").write_text(text)
+    assert record.entry("a.ply") == {} and record.is_damaged("a.ply")
+    record.note("a.ply", status="done")
+    assert record.entry("a.ply")["status"] == "done"
 
 
-def test_batches_that_share_a_folder_keep_each_others_notes(tmp_path):
-    one, two = Record(tmp_path), Record(tmp_path)
-    one.note("a.ply", status="done")
-    two.note("b.ply", status="done")
-    assert statuses(tmp_path) == {"a.ply": "done", "b.ply": "done"}
+def test_names_of_any_length_and_letters_are_noted(tmp_path):
+    record = Record(tmp_path)
+    for name in ("é" * 123 + ".ply", "sub/" + "x" * 250 + ".ply", "a\udcff.ply", "sub/deep/a.obj"):
+        record.note(name, status="done")
+        assert Record(tmp_path).entry(name)["status"] == "done"
+        assert record.claim(name)
+        record.release(name)
+
+
+def test_an_input_is_claimed_by_one_process_until_it_ends(tmp_path):
     code = (
-        f"import sys; sys.path.insert(0, {str(ROOT)!r})\n"
+        f"import sys, time; sys.path.insert(0, {str(ROOT)!r})\n"
         "from addon.commands.record import Record\n"
-        "record = Record(sys.argv[1])\n"
-        "for i in range(10): record.note(f'{sys.argv[2]}-{i}.ply', status='done')\n"
+        "record = Record(sys.argv[1]); print(record.claim('a.ply'), flush=True); time.sleep(60)\n"
     )
-    running = [subprocess.Popen([sys.executable, "-c", code, str(tmp_path), str(k)]) for k in range(3)]
-    assert [process.wait(60) for process in running] == [0, 0, 0]
-    assert len(statuses(tmp_path)) == 2 + 3 * 10
-    assert [path.name for path in tmp_path.iterdir()] == [NAME]
+    other = subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE, text=True)
+    record = Record(tmp_path)
+    try:
+        assert other.stdout.readline() == "True\n"
+        assert not record.claim("a.ply") and record.claim("b.ply")
+        other.kill()
+        other.wait()
+        assert record.claim("a.ply")
+    finally:
+        other.kill()
+        record.close()
+
+
+def test_differences_are_named():
+    then, now = {"version": "1", "verb": "stylize", "strength": 0.5}, {"version": "2", "verb": "stylize"}
+    assert differences(then, now) == "strength 0.5 (now unset), version 1 (now 2)"
 
 
 def test_children_end_with_a_parent_that_is_killed(tmp_path):
@@ -55,7 +66,7 @@ def test_children_end_with_a_parent_that_is_killed(tmp_path):
     )
     parent = (
         f"import os, sys; sys.path.insert(0, {str(ROOT)!r})\n"
-        "from addon.commands.batch import Children\n"
+        "from addon.commands.children import Children\n"
         "with Children(dict(os.environ), None) as children:\n"
         f"    children.run([sys.executable, '-c', {child!r}, sys.argv[1]])\n"
     )

@@ -122,7 +122,7 @@ def test_batches_in_blender_itself(extension, blender):
     assert "2 files: 2 done, 0 skipped, 0 failed" in done.stdout, done.stdout
     assert sorted(p.name for p in (blender.folder / "out").iterdir()) == [
         "a.obj",
-        "arapfields-batch.json",
+        "arapfields-batch",
         "b.obj",
     ]
 

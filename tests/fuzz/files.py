@@ -9,8 +9,8 @@ import numpy as np
 import trimesh
 
 import arapfields as af
-from addon.commands.batch import read_objects
-from addon.commands.record import NAME, Record
+from addon.commands.children import read_objects
+from addon.commands.record import Record, differences
 from arapfields.__main__ import main
 from arapfields.cli import files
 from arapfields.cli.handles import build_handles, read_handles
@@ -152,7 +152,8 @@ class Records(Target):
     def make(self):
         entry = {"status": "done", "message": "x", "options": "0", "source": [1, 2], "output": "a.ply"}
         self.values = {
-            "record": {"version": 1, "files": {"a.ply": {**entry, "seconds": 1.0, "objects": []}}},
+            "record": {"format": 2, "input": "a.ply", **entry, "seconds": 1.0, "objects": []},
+            "batch": {"format": 2, "settings": {"version": "1", "verb": "stylize", "strength": 0.5}},
             "report": {
                 "input": "a",
                 "objects": [{"object": "a", "status": "done", "message": "x", "figures": {}}],
@@ -169,8 +170,12 @@ class Records(Target):
         return self.values["record"]
 
     def use(self, path):
-        (self.folder / NAME).write_bytes(path.read_bytes())
-        Record(self.folder).is_done("a.ply", path, path, "0")
+        record = Record(self.folder)
+        record.folder.mkdir(exist_ok=True)
+        for place in (record.place("a.ply"), record.place("batch").with_name("batch.json")):
+            place.write_bytes(path.read_bytes())
+        record.is_done("a.ply", path, path, "0")
+        differences(record.settings() or {}, {"version": "1"})
         read_objects(path)
 
 

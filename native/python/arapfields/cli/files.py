@@ -31,7 +31,7 @@ def _trimesh():
 
 
 @contextlib.contextmanager
-def _readable(path, kind):
+def readable(path, kind):
     """InvalidInput naming the file instead of whatever a reader stumbles over in a damaged one."""
     try:
         yield
@@ -55,7 +55,7 @@ def read_mesh(path):
     """
     path = existing_file(path, MESH_SUFFIXES)
     trimesh = _trimesh()
-    with _readable(path, path.suffix[1:].upper()):
+    with readable(path, path.suffix[1:].upper()):
         mesh = trimesh.load(path, force="mesh", process=False, maintain_order=True, skip_materials=True)
         vertices, triangles = np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
     for name, rows in (("vertices", vertices), ("faces", triangles)):
@@ -98,7 +98,7 @@ def write_moved_mesh(path, source, mesh, move):
     if path.suffix.lower() == Path(source).suffix.lower() == ".obj":
         text = Path(source).read_text(errors="surrogateescape")
         text = re.sub(r"\\\r?\n", "", text)  # lines that go on in the next
-        with _readable(source, "OBJ"):
+        with readable(source, "OBJ"):
             before = np.array([[float(c) for c in m.groups()[1:]] for m in OBJ_VERTEX.finditer(text)])
         if np.isfinite(before).all():
             rows = iter(move(before.reshape(-1, 3)))
@@ -145,7 +145,7 @@ def read_normals(path):
     path = existing_file(path, (*MESH_SUFFIXES, ".txt", ".csv", ".npy"))
     if is_mesh(path):
         return _face_normals(path)
-    with _readable(path, "rows of three numbers"):
+    with readable(path, "rows of three numbers"):
         if path.suffix.lower() == ".npy":  # mapped: its size is compared with the file's
             normals = np.array(np.lib.format.open_memmap(path, mode="r"), float)
         else:

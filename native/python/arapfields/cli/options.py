@@ -2,6 +2,7 @@
 """Options of the library as flags: one for each, its sentence as help, its default kept."""
 
 import argparse
+import re
 
 from .._native import InvalidInput
 from .._options import options_of
@@ -50,6 +51,14 @@ def integer(low, high=2**31 - 1):
         return value
 
     return number
+
+
+def shard(text):
+    """A flag's type: "i/n", the i-th of n parts, 1 ≤ i ≤ n."""
+    found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text.strip())
+    if not found or not 1 <= int(found[1]) <= int(found[2]):
+        raise argparse.ArgumentTypeError(f"{text[:40]!r} is not I/N, the part I of N, such as 1/4")
+    return int(found[1]), int(found[2])
 
 
 def given_options(structure, arguments):

@@ -7,9 +7,10 @@ import sys
 
 import arapfields as af
 
-from . import verbs
+from . import usd, verbs
+from .animate import animate
 from .flags import MESH, SOURCE, extraction_flags, inverse_flag, report_flag, sdf_flag, solve_flags
-from .options import add_option_flag, add_option_flags
+from .options import add_option_flag, add_option_flags, shard
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -46,7 +47,7 @@ def _parser():
         "--cmake-dir", action=CMakeDir, nargs=0, help="print where CMake finds the C++ package, and exit"
     )
     added = parser.add_subparsers(dest="verb", metavar="VERB", required=True, parser_class=OneLineParser)
-    for add in (_fit, _sample, _deform, _stylize, _extract, _warp, _grid):
+    for add in (_fit, _sample, _deform, _stylize, _extract, _warp, _grid, _animate):
         verb = add(added)
         verb.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
     return parser
@@ -197,4 +198,38 @@ def _grid(added):
         help=".npz (values, origin, spacing), or .vdb where Blender's openvdb module is found",
     )
     add_option_flag(parser, "grid", "resolution")
+    return parser
+
+
+def _animate(added):
+    parser = _verb(
+        added,
+        "animate",
+        animate,
+        "a mesh under handles that move from frame to frame, as a point cache or USD",
+        "spot.obj --tracks walk.json -o walk.pc2",
+        "spot.obj --tracks walk.npz -o walk.usdc --frames 1 48 --up-axis y",
+        "spot.obj --tracks walk.json -o walk.pc2 --shard 2/8",
+    )
+    parser.add_argument("input", help=MESH)
+    parser.add_argument(
+        "--tracks", required=True, metavar="FILE", help=".json or .npz, see docs/command-line.md"
+    )
+    parser.add_argument(
+        "-o", "--output", required=True, metavar="FILE", help=".pc2, .mdd, or .usd, .usda, .usdc by usd-core"
+    )
+    parser.add_argument(
+        "--frames",
+        nargs=2,
+        type=int,
+        metavar=("FIRST", "LAST"),
+        help="these frames of the tracks alone [all]",
+    )
+    parser.add_argument(
+        "--shard", type=shard, metavar="I/N", help="solve the part I of N; the last part writes the output"
+    )
+    parser.add_argument("--up-axis", choices=usd.AXES, default="z", help="what USD is told is up [z]")
+    add_option_flags(
+        parser, "live", "solve of a frame (300 steps and a tolerance of 1e-6 without these flags)"
+    )
     return parser

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Blenders that a batch starts, one a file, and what became of each."""
+
+import json
+import os
+import signal
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+from .launch import PARENT
+
+
+class Children:
+    """The Blenders at work; leaving the block ends those that still are."""
+
+    def __init__(self, environment, limit):
+        self.limit, self.running, self.stopped = limit, set(), False
+        self.pipe, self.alive = os.pipe()  # nothing is ever written; the system closes it with this process
+        self.environment = {**environment, PARENT: str(self.pipe)}
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.stop()
+        os.close(self.pipe)
+        os.close(self.alive)
+
+    def stop(self):
+        self.stopped = True
+        for process in list(self.running):
+            end(process)
+
+    def run(self, command):
+        """One file's outcome; never raises for what happens to the child."""
+        begin = time.perf_counter()
+        with tempfile.TemporaryDirectory(prefix="arapfields-") as folder:
+            report, log = Path(folder) / "report.json", Path(folder) / "log"
+            with log.open("wb") as stream:
+                code = self.wait([*command, "--report", str(report)], stream)
+            outcome = understand(code, report, log.read_text(errors="replace"))
+        if code is None:
+            outcome["message"] = f"given up after {self.limit:g} s"
+        return {**outcome, "seconds": round(time.perf_counter() - begin, 2)}
+
+    def wait(self, command, stream):
+        """The child's exit code; None when it took too long."""
+        if self.stopped:
+            return 130
+        process = subprocess.Popen(
+            command,
+            stdout=stream,
+            stderr=subprocess.STDOUT,
+            stdin=subprocess.DEVNULL,
+            env=self.environment,
+            pass_fds=(self.pipe,),
+            start_new_session=True,  # a Ctrl-C reaches the batch, which ends its children
+        )
+        self.running.add(process)
+        try:
+            return process.wait(self.limit)
+        except subprocess.TimeoutExpired:
+            end(process)
+            return None
+        finally:
+            self.running.discard(process)
+
+
+def end(process):
+    """Asks a child to stop, which leaves no partial files; one that does not listen is killed."""
+    process.send_signal(signal.SIGINT)
+    try:
+        process.wait(5.0)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+def read_objects(report):
+    """What a child says of its objects; nothing where it did not come to that."""
+    try:
+        objects = json.loads(report.read_text())["objects"]
+        return [{**o, "status": str(o["status"]), "message": str(o["message"])} for o in objects]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return []
+
+
+def understand(code, report, log):
+    """{"status", "message", "objects"} from what a child left."""
+    objects = read_objects(report)
+    failures = [o["message"] for o in objects if o["status"] != "done"]
+    if code == 0 and objects:
+        return {"status": "done", "message": "; ".join(o["message"] for o in objects), "objects": objects}
+    if failures:
+        status = "partial" if len(failures) < len(objects) else "failed"
+        return {"status": status, "message": "; ".join(failures), "objects": objects}
+    said = [line for line in log.splitlines() if line.startswith("arapfields")]
+    last = said[-1:] or [line for line in log.splitlines() if line.strip()][-1:] or ["it said nothing"]
+    reason = last[0].removeprefix("arapfields: ")
+    if code is not None and code < 0:
+        reason = f"Blender was ended by signal {-code} ({reason})"
+    return {"status": "failed", "message": reason, "objects": objects}

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frames that have been solved already: a file each, so that a run goes on where another ended."""
+
+import contextlib
+import errno
+import fcntl
+import hashlib
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+
+from .._files import whole_file
+from .._native import InvalidInput
+
+TYPE = np.dtype("<f4")
+
+
+class FrameStore:
+    """The folder ".NAME.frames" beside an output. Several processes, also of several machines, may fill it.
+
+    A frame's file appears whole, and its name tells what it was made from: a frame whose handles, or whose
+    mesh, options or version have changed is not found.
+    """
+
+    def __init__(self, output, points, common):
+        """`common`: bytes that stand for all that the frames have in common."""
+        output = Path(output)
+        self.folder = output.with_name(f".{output.name}.frames")
+        self._points, self._common = points, hashlib.blake2b(common, digest_size=16).digest()
+
+    @property
+    def frame_bytes(self):
+        return TYPE.itemsize * 3 * self._points
+
+    def place(self, number, targets):
+        content = hashlib.blake2b(self._common, digest_size=12)
+        for target in targets:
+            content.update(np.ascontiguousarray(target, "<f8").tobytes())
+        return self.folder / f"{number:07d}-{content.hexdigest()}"
+
+    def has(self, place):
+        try:
+            return place.stat().st_size == self.frame_bytes
+        except OSError:
+            return False
+
+    def put(self, place, positions):
+        """Keeps (points, 3); what is not finite has no place in a file."""
+        with np.errstate(over="ignore"):
+            kept = np.ascontiguousarray(positions, TYPE)
+        if not np.isfinite(kept).all():
+            raise InvalidInput(f"frame {int(place.name[:7])}: the solve gave no finite positions")
+        self.folder.mkdir(exist_ok=True)
+        with whole_file(place) as partial:
+            kept.tofile(partial)
+
+    def get(self, place):
+        try:
+            frame = np.fromfile(place, TYPE)
+        except FileNotFoundError:
+            frame = np.empty(0)
+        if frame.size != 3 * self._points:
+            raise OSError(errno.EIO, "a solved frame has gone meanwhile; run it again", str(place))
+        return frame.reshape(-1, 3)
+
+    def require_room(self, missing, output_bytes):
+        """OSError where the frames to come and the output will not fit on the disk."""
+        needed = missing * self.frame_bytes + output_bytes
+        free = shutil.disk_usage(self.folder.parent).free
+        if free < needed:
+            text = f"{os.strerror(errno.ENOSPC)}: {needed:,} bytes are needed for a while, {free:,} are free"
+            raise OSError(errno.ENOSPC, text, str(self.folder.parent))
+
+    @contextlib.contextmanager
+    def alone(self):
+        """No other process is in such a block, where the file system has locks."""
+        self.folder.mkdir(exist_ok=True)
+        with open(self.folder / "lock", "ab") as file:
+            with contextlib.suppress(OSError):
+                fcntl.lockf(file, fcntl.LOCK_EX)
+            yield
+
+    def remove(self, places=None):
+        """Forgets these frames; without them all, also those of other settings."""
+        for place in places or ():
+            place.unlink(missing_ok=True)
+        if places is None or not any(path.name != "lock" for path in self.folder.iterdir()):
+            shutil.rmtree(self.folder, ignore_errors=True)

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the tests of batches share: folders of inputs, and a stand-in for Blender."""
+
+import os
+import sys
+
+from addon.commands.parser import parse
+from addon.commands.record import FOLDER, Record
+
+
+def make_folders(place):
+    (place / "in/sub").mkdir(parents=True)
+    for name in ("b.ply", "a.obj", "c.STL", "notes.txt", ".hidden.ply", "sub/d.ply"):
+        (place / "in" / name).write_text(name)
+    return place
+
+
+def batch(folders, *further, output="out"):
+    where = ["-i", str(folders / "in"), "-o", str(folders / output)]
+    return parse(["batch", "--style", "cube", *where, *further])
+
+
+class FakeLaunch:
+    """Instead of Blender a Python one-liner that writes the output; it fails, or dies, by the file's name."""
+
+    code = """
+import json, os, sys
+a = sys.argv; source, target, report = (a[a.index(flag) + 1] for flag in ("-i", "-o", "--report"))
+with open(os.path.join(os.path.dirname(target), "starts"), "a") as starts:
+    starts.write(os.path.basename(source) + "\\n")
+if "dies" in source: os.kill(os.getpid(), 11)
+if "hangs" in source: import time; time.sleep(60)
+good = "fails" not in source
+if "slow" in source: import time; time.sleep(0.05)
+if good: open(target, "w").write("made")
+note = {"object": "x", "status": "done" if good else "failed", "message": "x: made" if good else "x: no"}
+open(report, "w").write(json.dumps({"objects": [note]}))
+sys.exit(0 if good else 1)
+"""
+
+    def command(self, verb, arguments):
+        return [sys.executable, "-c", self.code, verb, *arguments]
+
+    def environment(self, jobs):
+        return dict(os.environ)
+
+
+def statuses(folder):
+    """Input → status, of all that is noted."""
+    record = Record(folder)
+    names = [
+        path.relative_to(folder / FOLDER).as_posix()[:-5] for path in (folder / FOLDER).rglob("*.*.json")
+    ]
+    return {name: record.entry(name)["status"] for name in sorted(names)}
+
+
+def starts(folder):
+    """Names of the inputs, as often as a Blender was started for them."""
+    return sorted((folder / "starts").read_text().split())
