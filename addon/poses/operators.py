@@ -161,7 +161,7 @@ class PoseFile:
     """Mixin: a file is chosen in a window."""
 
     filepath: bpy.props.StringProperty(name="File", description="The pose's file", subtype="FILE_PATH")
-    filter_glob: bpy.props.StringProperty(default=f"*{SUFFIX}", options={"HIDDEN"})
+    filter_glob: bpy.props.StringProperty(name="Filter", default=f"*{SUFFIX}", options={"HIDDEN"})
 
     def invoke(self, context, event):
         context.window_manager.fileselect_add(self)

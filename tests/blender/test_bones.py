@@ -66,7 +66,8 @@ def test_a_bone_equals_a_constrained_empty_with_the_same_region():
     import bpy
     import numpy as np
     import scenes
-    from test_bones import QUICK, SAME, STOPPED, handles_of, rigged_bar
+    from bones import handles_of
+    from test_bones import QUICK, SAME, STOPPED, rigged_bar
 
     bar, rig = rigged_bar()
     rest = scenes.world_points(bar)
@@ -109,24 +110,6 @@ def test_a_bone_equals_a_constrained_empty_with_the_same_region():
         assert np.array_equal(held, same_held) and len(held) > 100
         assert np.abs(motion - same_motion).max() < SAME
     assert np.abs(found[0] - found[1]).max() < STOPPED and moved.max() > 0.4
-
-
-def handles_of(bar):
-    """[(samples that it holds, its (4, 4) motion)] of the bar's handles, as the solver gets them."""
-    import bpy
-
-    import arapfields as af
-    from addon.blender import mesh_arrays, vertex_groups
-    from addon.core.geometry.spaces import space_of
-    from addon.core.runtime.coroutines import run_to_completion
-    from addon.handles import empties
-    from addon.handles.native_handles import native_handles
-
-    space, mesh = space_of(bar.matrix_world), mesh_arrays.read(bpy.context, bar, in_place=True)
-    reading = vertex_groups.read_weights(bpy.context, bar, empties.group_names(bar), in_place=True)
-    handles = empties.solve_handles(bar, space, run_to_completion(reading))
-    samples = af.sample_mesh(space.to_solve(mesh.vertices), mesh.triangles, count=2000, seed=0)
-    return [(native.samples, native.motion) for native in native_handles(af, handles, mesh, samples)]
 
 
 @in_blender

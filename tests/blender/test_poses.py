@@ -89,6 +89,7 @@ def test_strength_files_and_refusals():
     import numpy as np
     import pytest
     import scenes
+    from mathutils import Matrix
     from riders import rider, shown
     from test_poses import creature, saved
 
@@ -120,18 +121,18 @@ def test_strength_files_and_refusals():
     assert bpy.context.scene.arapfields.poses.keys() == ["bent"]
 
     held = scenes.world_points(other)
-    other.data.transform(__import__("mathutils").Matrix.Translation((0, 3, 0)))
+    other.data.transform(Matrix.Translation((0, 3, 0)))
     bpy.context.view_layer.update()
     with pytest.raises(RuntimeError, match="100% of Other lie outside of the pose's field"):
         bpy.ops.arapfields.apply_pose(name="bent")
-    other.data.transform(__import__("mathutils").Matrix.Translation((0, -3, 0)))
+    other.data.transform(Matrix.Translation((0, -3, 0)))
     assert np.abs(scenes.world_points(other) - held).max() < 1e-5
     content = path.read_bytes()
     for broken in (b"", content[: len(content) // 2], b"PK" + content[2:100], b"nonsense" * 50):
         path.write_bytes(broken)
-        with pytest.raises(RuntimeError, match="bent.arappose holds no pose"):
+        with pytest.raises(RuntimeError, match="holds no pose"):
             bpy.ops.arapfields.import_pose(filepath=str(path))
-    with pytest.raises(RuntimeError, match="No such file"):
+    with pytest.raises(RuntimeError, match=r"none\.arappose: No such file"):
         bpy.ops.arapfields.import_pose(filepath=str(path.with_name("none.arappose")))
 
 
