@@ -16,6 +16,7 @@ from ..core.errors import UserError
 from ..core.runtime.coroutines import Pause
 from ..field_modifier import cache_modifier
 from ..results import result_objects
+from .caches import plain
 
 BAKED_KEY = "ARAP Fields frame "  # how baked keys of curves and lattices begin
 
@@ -24,14 +25,17 @@ class CarriedBake:
     """Given the shapes of each frame in turn by the worker; placed on the main thread.
 
     `cache_of(name)` is (path, the same as a modifier has it) of an object's cache; None for shape keys.
+    `is_shared`: other processes solve other frames, of the source alone.
     """
 
-    def __init__(self, carrying, frames, cache_of, fps):
+    def __init__(self, carrying, frames, cache_of, fps, is_shared):
         self.carrying, self.frames, self.fps, self.warnings = carrying, frames, fps, []
         self.shapes, self.writers, self.places = {}, {}, {}
         for passenger in list(carrying.passengers):
             name = passenger.reference.name
-            if isinstance(passenger.carrier, AttributeCarrier):
+            if is_shared:
+                carrying.leave(passenger, UserError("{name} is not baked in parts; bake it whole", name=name))
+            elif isinstance(passenger.carrier, AttributeCarrier):
                 carrying.leave(passenger, UserError("{name} cannot be baked; live mode plays it", name=name))
             elif cache_of is not None and isinstance(passenger.carrier, MeshCarrier):
                 self.places[passenger] = cache_of(name)
@@ -93,7 +97,7 @@ class CarriedBake:
         cache_modifier.play(item, self.places[passenger][1], self.frames.start, self.frames.step)
 
     def add_object(self, context, passenger, item):
-        shapes, frames = self.shapes[passenger], [whole(frame) for frame in self.frames]
+        shapes, frames = self.shapes[passenger], [plain(frame) for frame in self.frames]
         mesh = result_objects.shown_mesh(context, item, len(shapes[0]))
         report = {"frames": len(frames)}
         baked = result_objects.show(context, item, "BAKE", "BAKE", mesh, report, select=False)
@@ -110,7 +114,7 @@ class CarriedBake:
         keys = item.data.shape_keys
         for key in [key for key in keys.key_blocks if key.name.startswith(BAKED_KEY)]:
             item.shape_key_remove(key)
-        basis, frames = key_points(keys.reference_key), [whole(frame) for frame in self.frames]
+        basis, frames = key_points(keys.reference_key), [plain(frame) for frame in self.frames]
         for number, shape in enumerate(self.shapes[passenger]):
             key = item.shape_key_add(name=f"{BAKED_KEY}{frames[number]}", from_mix=False)
             put_key(key, basis + (shape - passenger.carrier.points))
@@ -125,7 +129,7 @@ class CarriedBake:
         try:
             for number, frame in enumerate(self.frames):
                 job.report_main_thread(
-                    number / self.frames.count, translated("Storing frame {frame}", frame=whole(frame))
+                    number / self.frames.count, translated("Storing frame {frame}", frame=plain(frame))
                 )
                 scene.frame_set(int(frame // 1), subframe=frame - frame // 1)
                 for passenger in moved:
@@ -150,8 +154,3 @@ def insert(item, carrier, frame):
         mode = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
         for path in ("location", mode.get(bone.rotation_mode, "rotation_euler"), "scale"):
             bone.keyframe_insert(path, frame=frame)
-
-
-def whole(frame):
-    """A whole frame as an integer, which is how keys are named."""
-    return int(frame) if frame == int(frame) else round(frame, 4)

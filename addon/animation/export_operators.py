@@ -14,9 +14,9 @@ from ..core.settings.choices import EXPORT_FORMATS
 from ..field_modifier import cache_modifier
 from ..names import Op
 from ..results import result_objects
-from . import exporters, frames, object_bake, played
+from . import caches, exporters, frames, played
+from .bake_operator import BakeOperator, effective_kind, refusal_of
 from .object_bake import ObjectBake
-from .operators import BakeOperator, effective_kind, refusal_of
 from .properties import settings
 
 
@@ -53,7 +53,7 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
             active = source_of(context)
             sources = self.sources(context)
             suffix = exporters.SUFFIXES[self.format]
-            path, _ = object_bake.cache_path(active, suffix, "//", self.filepath)
+            path, _ = caches.cache_path(active, suffix, "//", self.filepath)
             self.found = frames.choose(
                 context, [(source, effective_kind(source, self)) for source in sources], self.values(active)
             )
@@ -102,7 +102,7 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
             "{count} frames exported to {path} ({size})",
             count=exporters.count_of(self.format, self.found),
             path=path.name,
-            size=object_bake.size_text(path.stat().st_size),
+            size=caches.size_text(path.stat().st_size),
         )
 
     def play(self, context, bake, stack):

@@ -13,7 +13,7 @@ from ..core.errors import UserError
 from ..core.runtime.coroutines import Pause
 from ..live.animated import curves_of
 from . import export_checks
-from .object_bake import plain, size_text
+from .caches import plain, size_text
 
 SUFFIXES = {"ABC": ".abc", "USD": ".usdc", "GLTF": ".glb"}
 

@@ -4,10 +4,7 @@
 import contextlib
 import functools
 import json
-import re
-from pathlib import Path
-
-import bpy
+import time
 
 from ..blender import mesh_arrays
 from ..blender.language import translated
@@ -19,13 +16,11 @@ from ..handles import empties
 from ..live import animated, sessions
 from ..live.session import Session
 from ..results import placement, result_objects
+from .caches import cache_beside, keys_weight, plain, size_text
 from .carried_bake import CarriedBake
-from .properties import FOLDER
+from .parts import SharedFrames
 
-SUFFIXES = {"PC2": ".pc2", "MDD": ".mdd"}
 STYLE_PATH = "arapfields.stylize"  # of what is keyframed of a style
-BARRED = re.compile(r'[\x00-\x1f/\\:*?"<>|]')  # letters that a file's name cannot have
-HEAVY = 500e6  # bytes of shape keys, above which a cache would serve better
 
 
 def kind_of(source, kind):
@@ -40,38 +35,13 @@ def kind_of(source, kind):
     return "STYLIZE" if styled else "DEFORM"
 
 
-def cache_path(source, suffix, folder, filepath=""):
-    """(absolute path, the same as the modifier has it) of an object's cache; UserError where none can be."""
-    name = BARRED.sub("_", source.name)
-    told = filepath or f"{folder.rstrip('/') or '/'}/{name}{suffix}"
-    if told.startswith("//") and not bpy.data.filepath:
-        raise UserError("save the .blend first, or choose a folder: the cache lies beside it")
-    path = Path(bpy.path.abspath(told))
-    if path.suffix.lower() != suffix:
-        raise UserError("{path}: the format needs the extension {suffix}", path=path, suffix=suffix)
-    if not filepath and folder == FOLDER:
-        path.parent.mkdir(exist_ok=True)
-    if not path.parent.is_dir():
-        raise UserError("{folder}: no such folder", folder=path.parent)
-    if bpy.data.filepath:
-        with contextlib.suppress(ValueError):  # on another drive
-            told = bpy.path.relpath(str(path))
-    return path, told
-
-
-def cache_beside(path, told, name):
-    """The same as cache_path, of an object that goes along: beside the other's cache, with both names."""
-    file = f"{path.stem} {BARRED.sub('_', name)}{path.suffix}"
-    return path.with_name(file), told.removesuffix(path.name) + file
-
-
 class ObjectBake:
     """Made and placed on the main thread; prepared, and given its frames, by the worker.
 
-    `path` is where the cache goes; None for shape keys.
+    `path` is where the cache goes; None for shape keys. `part`: (i, n) where n processes share the frames.
     """
 
-    def __init__(self, context, source, kind, frames, path=None, told=""):
+    def __init__(self, context, source, kind, frames, path=None, told="", part=None):
         settings = settings_of(source)
         in_place = placement.in_place(settings.output, settings.target) and path is not None
         self.session = Session(context, source, kind, shown=False, follow=False, in_place=in_place)
@@ -79,7 +49,10 @@ class ObjectBake:
         self.fps = context.scene.render.fps / context.scene.render.fps_base
         self.in_place, self.error, self.writer, self.shapes = in_place, None, None, []
         beside = None if path is None else functools.partial(cache_beside, path, told)
-        self.carried = CarriedBake(self.session.carrying, frames, beside, self.fps)
+        self.carried = CarriedBake(
+            self.session.carrying, frames, beside, self.fps, is_shared=part is not None
+        )
+        self.part, self.shared, self.missing, self.begun = part, None, 0, time.time()
 
     @property
     def name(self):
@@ -100,12 +73,16 @@ class ObjectBake:
     def prepare(self):
         self.session.prepare()
         self.carried.prepare()
-        if self.path is None:
-            return
+        if self.path is not None and self.part is not None:
+            self.shared = SharedFrames(self.path, self.session, len(self.session.rest), self.part)
+        elif self.path is not None:
+            self.writer = self.new_writer()
+
+    def new_writer(self):
         from arapfields.point_cache import PointCacheWriter
 
         frames, points = self.frames, len(self.session.rest)
-        self.writer = PointCacheWriter(
+        return PointCacheWriter(
             self.path, points, frames.count, start=frames.start, step=frames.step, fps=self.fps
         )
 
@@ -113,6 +90,9 @@ class ObjectBake:
         """Solves one frame and puts it where it goes."""
         if isinstance(request, Exception):
             raise request
+        if self.shared is not None:
+            self.shared.add(self.session, request)
+            return
         shape = self.session.solve_from_rest(request)
         points = shape.points
         self.carried.add(shape.carried)
@@ -136,8 +116,23 @@ class ObjectBake:
 
     def finish(self):
         self.carried.finish()
-        if self.writer is not None:
+        if self.shared is not None:
+            with self.shared.alone():
+                self.join()
+        elif self.writer is not None:
             self.writer.finish()
+
+    def join(self):
+        """Makes the cache where all of its frames are there."""
+        self.missing = self.shared.missing()
+        if self.missing and self.path.exists() and self.path.stat().st_mtime > self.begun:
+            self.missing = 0  # another process has made it meanwhile
+        elif not self.missing:
+            self.writer = self.new_writer()
+            for points in self.shared:
+                self.writer.write(points)
+            self.writer.commit()
+            self.shared.remove()
 
     def discard(self):
         """Removes what was not put in its place; the cache of an earlier bake stays as it is."""
@@ -158,7 +153,15 @@ class ObjectBake:
     def place_own(self, context, source, job):
         if self.path is None:
             return (yield from self.add_keys(context, source, job))
-        self.commit()
+        if self.missing:
+            return translated(
+                "{missing} of {count} frames to come: who solves the last one makes {path}",
+                missing=self.missing,
+                count=self.frames.count,
+                path=self.path.name,
+            )
+        if self.shared is None:
+            self.commit()
         player = source
         sessions.end(context, source)  # what was live is baked now
         if not self.in_place:
@@ -226,21 +229,3 @@ class ObjectBake:
                 with contextlib.suppress(ReferenceError):
                     result_objects.discard(item)
         return translated("{count} frames baked into shape keys of {size}", count=len(frames), size=weight)
-
-
-def plain(frame):
-    """A whole frame as an integer, which is how keys are named."""
-    return int(frame) if frame == int(frame) else round(frame, 4)
-
-
-def keys_weight(points, frames):
-    """Bytes in the .blend, and in memory, of so many shape keys and their basis."""
-    return 12 * points * (frames + 1)
-
-
-def size_text(count):
-    """Bytes as people read them."""
-    for unit, size in (("GB", 1e9), ("MB", 1e6)):
-        if count >= size:
-            return f"{count / size:.1f} {unit}"
-    return f"{count / 1e3:.1f} kB"

@@ -6,7 +6,7 @@ from ..blender.language import translated
 from ..blender.section import Advanced, note, wrapped
 from ..live import animated
 from ..names import Op
-from . import object_bake, played
+from . import caches, played
 
 
 class ARAPFIELDS_PT_animation(Advanced, bpy.types.Panel):
@@ -48,7 +48,7 @@ def weight(context, source, bake):
     """What the frames would weigh, as far as it is known before they are read."""
     first, last = (bake.start, bake.end) if bake.range == "CUSTOM" else animated.scene_range(context.scene)
     count = max(0, (last - first) * bake.subframes // bake.step + 1)
-    size = object_bake.size_text(object_bake.keys_weight(len(source.data.vertices), count - 1))
+    size = caches.size_text(caches.keys_weight(len(source.data.vertices), count - 1))
     if bake.range == "HANDLES":
         return translated("{size} for the scene's frames", size=size)
     return translated("{count} samples, {size}", count=count, size=size)

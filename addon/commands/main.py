@@ -37,6 +37,10 @@ def verb(name):
         from .batch import run_batch
 
         return run_batch
+    if name == "bake":
+        from .bake import run_bake
+
+        return run_bake
     from .single import run_single
 
     return run_single

@@ -2,6 +2,7 @@
 """The verbs, their flags and their help; the solves' flags come from the tables that make the panel."""
 
 import argparse
+import re
 import sys
 from pathlib import Path, PurePath
 
@@ -77,7 +78,43 @@ def parser():
         one.add_argument("--report", type=Path, metavar="FILE", help="figures for each object, as JSON")
         one.add_argument("--quiet", action="store_true", help="no progress")
     add_batch(verbs)
+    add_bake(verbs)
     return made
+
+
+def add_bake(verbs):
+    text = "bake the animation of a .blend, as it is, into caches beside it or another program's file"
+    bake = verbs.add_parser("bake", help=text, description=text)
+    bake.add_argument("-i", "--input", type=Path, required=True, metavar="FILE", help="a .blend")
+    bake.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help="a .blend that plays the caches; .abc, .usdc or .glb",
+    )
+    bake.add_argument("--folder", type=Path, help="of the caches [cache, beside the .blend]")
+    bake.add_argument("--format", choices=("pc2", "mdd"), default="pc2", help="of the caches [pc2]")
+    bake.add_argument(
+        "--objects", nargs="+", metavar="NAME", help="only these [all with handles or keyed styles]"
+    )
+    bake.add_argument("--kind", choices=("deform", "stylize"), help="what is baked [each object's own]")
+    bake.add_argument("--frames", type=frames, metavar="A-B", help="from frame A to B [the scene's]")
+    bake.add_argument("--step", type=count, metavar="N", help="frames from one sample to the next")
+    bake.add_argument("--subframes", type=count, metavar="N", help="samples a step, for motion blur")
+    bake.add_argument(
+        "--shard", type=shard, metavar="I/N", help="solve the part I of N; the last makes the cache"
+    )
+    bake.add_argument("--quiet", action="store_true", help="no progress")
+    bake.set_defaults(handles=None)
+
+
+def frames(text):
+    """A flag's type: "a-b", frames of a scene, which may be negative."""
+    found = re.fullmatch(r"(-?\d{1,7})-(-?\d{1,7})", text.strip())
+    if not found or int(found[2]) < int(found[1]):
+        raise argparse.ArgumentTypeError(f"{text[:40]!r} is not A-B, from frame A to B, such as 1-250")
+    return int(found[1]), int(found[2])
 
 
 def add_batch(verbs):

@@ -42,10 +42,12 @@ def stepped(**given):
     import types
 
     import addon.animation.operators as bake
+    from addon.animation.bake_operator import BakeOperator
 
-    class Operator(bake.BakeOperator):
+    class Operator(BakeOperator):
         title, in_window, scope, filepath = "Bake", False, "ACTIVE", given.pop("filepath", "")
         prepare, warn_of_weight = bake.ARAPFIELDS_OT_bake.prepare, bake.ARAPFIELDS_OT_bake.warn_of_weight
+        part = (0, 0)
         properties = types.SimpleNamespace(is_property_set=lambda name: name in given)
 
         def add_message(self, level, text):
@@ -102,15 +104,15 @@ def test_many_keys_say_what_they_weigh():
     import bpy
     from test_bake import animated
 
-    from addon.animation import object_bake
+    from addon.animation import caches
     from addon.core.runtime import jobs
 
     animated()
-    object_bake.HEAVY = 1e3
+    caches.HEAVY = 1e3
     try:
         assert bpy.ops.arapfields.bake(format="KEYS", start=1, end=2) == {"FINISHED"}
     finally:
-        object_bake.HEAVY = 500e6
+        caches.HEAVY = 500e6
     told = [text for level, text in jobs.messages() if level == "WARNING"]
     assert told == ["Bar: shape keys of 13.9 kB in the .blend and in memory; a cache would take neither"], (
         told

@@ -119,6 +119,7 @@ def test_a_frame_of_an_animated_style_is_the_same_in_every_way():
         assert away <= SAME * 2, (way, away)
 
 
+@pytest.mark.slow
 @in_blender
 def test_every_animated_setting_of_a_style_changes_what_is_solved():
     """strength, sharpness, stiffness and orientation, each alone between two frames."""

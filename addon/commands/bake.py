@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""bake: the animation of a .blend as it is, into caches or another program's file, alone or in parts."""
+
+import sys
+
+import bpy
+
+from ..animation.object_bake import kind_of
+from ..core.errors import UserError
+from ..core.runtime import jobs
+from ..handles import empties
+from . import files
+from .single import progress, wanted
+
+EXPORTS = {".abc": "ABC", ".usdc": "USD", ".glb": "GLTF"}
+
+
+def run_bake(options, _):
+    """Exit code 0 when every object's frames are done, or this part of them; 1 when one failed."""
+    if options.input.suffix.lower() != ".blend":
+        raise UserError(f"{options.input}: is no .blend; a scene is baked as it is")
+    suffix = options.output.suffix.lower() if options.output else ""
+    if suffix not in ("", ".blend", *EXPORTS):
+        known = ", ".join((".blend", *EXPORTS))
+        raise UserError(f"{options.output}: unknown extension; known are {known}")
+    if suffix in EXPORTS and options.shard:
+        raise UserError("--shard: an exported file has no parts; bake the parts first, then export")
+    target = options.output.resolve() if options.output else None
+    folder = str(options.folder.resolve()) if options.folder else None
+    files.read(options.input)
+    sources = wanted(options) if options.objects else animated(options)
+    given = {"kind": options.kind.upper()} if options.kind else {}
+    if options.frames:
+        given["start"], given["end"] = options.frames
+    given |= {name: getattr(options, name) for name in ("step", "subframes") if getattr(options, name)}
+    choose(sources)
+    with progress(options.quiet):
+        if suffix in EXPORTS:
+            call, further = bpy.ops.arapfields.export_animation, {"filepath": str(target)}
+            further["format"] = EXPORTS[suffix]
+        else:
+            call, further = bpy.ops.arapfields.bake, {"format": options.format.upper()}
+            further["part"] = options.shard or (1, 1)
+            if folder:
+                further["folder"] = folder
+        done = finished(call, {**given, **further})
+    for level, text in jobs.messages():
+        print(f"arapfields: {text}", file=sys.stdout if level == "INFO" else sys.stderr, flush=True)
+    if done and suffix == ".blend":
+        files.write(target, [])
+    failed = any(level != "INFO" for level, _ in jobs.messages())
+    return 0 if done and not failed else 1
+
+
+def animated(options):
+    """Every object with handles, or with a style that has keyframes."""
+    meshes = [item for item in bpy.context.view_layer.objects if item.type == "MESH"]
+    meshes = [item for item in meshes if empties.used(item) or kind_of(item, "AUTO") == "STYLIZE"]
+    if not meshes:
+        raise UserError(f"{options.input}: no object has handles, or a style with keyframes")
+    return meshes
+
+
+def choose(sources):
+    """Selects these objects, all of which the operators then work on."""
+    for item in bpy.context.selected_objects:
+        item.select_set(False)
+    for item in sources:
+        item.hide_set(False)
+        item.select_set(True)
+    bpy.context.view_layer.objects.active = sources[0]
+
+
+def finished(call, given):
+    """Whether an operator came to its end; KeyboardInterrupt where it was interrupted."""
+    try:
+        if call("EXEC_DEFAULT", scope="SELECTED", **given) == {"CANCELLED"}:
+            raise KeyboardInterrupt
+    except (RuntimeError, TypeError) as error:
+        if not jobs.messages():
+            raise UserError(str(error).removeprefix("Error: ").strip()) from error
+        return False
+    return True

@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bakes the animation of a .blend, as it is.
+
+    blender -b -P blender_scripts/bake.py -- --input walk.blend --output walk_baked.blend
+    python blender_scripts/bake.py …          where bpy is installed
+    blender --command arapfields bake …       where the extension is installed
+
+`--help` tells the flags; docs/command-line.md more.
+"""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+import headless
+
+if __name__ == "__main__":
+    headless.main("bake", __file__)

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A .blend as a job: baked by one process, or by several that share its frames, with kills in between."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def scene(tmp_path, user_folder):
+    """(folder with scene.blend: a bar that bends from frame 1 to 5, run(*arguments))."""
+    pytest.importorskip("bpy", reason="PyPI's bpy is not installed")
+    folder = tmp_path / "scene"
+    folder.mkdir()
+    make = f"""
+import sys; sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / "tests/blender")!r}]
+import addon, bpy; bpy.ops.wm.read_homefile(use_empty=True); addon.register()
+from pathlib import Path
+import test_bake_cache
+test_bake_cache.animated("Bar", Path({str(folder)!r}))
+bpy.context.scene.frame_end = 5
+bpy.ops.wm.save_mainfile()
+"""
+    subprocess.run([sys.executable, "-c", make], env=user_folder, check=True, capture_output=True)
+
+    def run(*arguments, check=True):
+        call = [sys.executable, str(ROOT / "blender_scripts/bake.py"), "-i", str(folder / "scene.blend")]
+        done = subprocess.run([*call, *map(str, arguments)], env=user_folder, capture_output=True, text=True)
+        assert not check or done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+        return done
+
+    return folder, run
+
+
+@pytest.mark.slow
+def test_parts_in_any_order_make_the_cache_that_one_process_makes(scene):
+    folder, run = scene
+    run("-o", folder / "baked.blend")
+    whole = (folder / "cache/Bar.pc2").read_bytes()
+    assert len(whole) == 32 + 5 * 12 * 386 and (folder / "baked.blend").exists()
+    shared = folder / "shared"
+    shared.mkdir()
+    parts = ["--folder", shared, "--shard"]
+    said = run(*parts, "2/3").stdout
+    assert "3 of 5 frames to come" in said or "4 of 5 frames to come" in said
+    assert not (shared / "Bar.pc2").exists()
+    frames = sorted((shared / ".Bar.pc2.frames").iterdir())
+    kept = [path for path in frames if path.name != "lock"]
+    kept[0].unlink()  # as if it had been killed before it came to that frame
+    stamps = {path: path.stat().st_mtime_ns for path in kept[1:]}
+    run(*parts, "3/3"), run(*parts, "2/3")
+    assert all(path.stat().st_mtime_ns == stamp for path, stamp in stamps.items())  # solved once
+    run(*parts, "1/3")
+    assert (shared / "Bar.pc2").read_bytes() == whole
+    assert [path.name for path in shared.iterdir()] == ["Bar.pc2"]
+
+
+def test_an_export_and_what_cannot_be_baked(scene):
+    folder, run = scene
+    run("-o", folder / "bar.usdc", "--frames", "2-4")
+    assert (folder / "bar.usdc").read_bytes()[:8] == b"PXR-USDC"
+    for arguments, text in (
+        (["-o", folder / "bar.obj"], "unknown extension"),
+        (["--frames", "5-1"], "is not A-B"),
+        (["--objects", "None"], "no mesh object named None"),
+        (["--folder", folder / "gone"], "no such folder"),
+        (["-o", folder / "bar.abc", "--shard", "1/2"], "an exported file has no parts"),
+    ):
+        done = run(*arguments, check=False)
+        assert done.returncode in (1, 2) and text in done.stderr, (arguments, done.stderr)
+    assert np.all([not path.name.startswith(".") for path in folder.iterdir()])
