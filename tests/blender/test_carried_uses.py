@@ -148,3 +148,21 @@ def test_a_shirt_of_the_same_armature_is_not_posed_twice():
     assert not shirt.modifiers["Armature"].show_viewport
     bpy.ops.arapfields.live()
     assert shirt.modifiers["Armature"].show_viewport and len(shirt.modifiers) == 1
+
+
+@in_blender
+def test_a_group_of_a_bone_that_is_missing_is_named():
+    import bpy
+    import pytest
+    import scenes
+    from test_bones import rigged_bar
+
+    bar, _ = rigged_bar()
+    bpy.ops.arapfields.add_bones()
+    bar.vertex_groups.remove(bar.vertex_groups["Second"])
+    scenes.activate(bar)
+    for run in (bpy.ops.arapfields.deform, bpy.ops.arapfields.live):
+        with pytest.raises(RuntimeError, match="Bar has no vertex group Second"):
+            run()
+    assert len(bar.arapfields.handles) == 2 and bar.modifiers["Armature"].show_viewport
+    assert len(bar.modifiers) == 1
