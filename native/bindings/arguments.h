@@ -27,6 +27,10 @@ inline bool is_any(PyObject*) { return true; }
 ARAPFIELDS_PYTHON_TYPE(ArrayArgument, "arapfields.arrays.ArrayLike")
 ARAPFIELDS_PYTHON_TYPE(PointsArgument, "numpy.typing.NDArray[numpy.float64]")
 ARAPFIELDS_PYTHON_TYPE(ArraysArgument, "collections.abc.Iterable[arapfields.arrays.ArrayLike]")
+ARAPFIELDS_PYTHON_TYPE(
+    MeshesArgument,
+    "collections.abc.Iterable[tuple[arapfields.arrays.ArrayLike, arapfields.arrays.ArrayLike]]")
+ARAPFIELDS_PYTHON_TYPE(OptionalArraysArgument, "collections.abc.Iterable[arapfields.arrays.ArrayLike | None]")
 ARAPFIELDS_PYTHON_TYPE(NormalsArgument, "arapfields.arrays.ArrayLike | arapfields._native.StyleName")
 ARAPFIELDS_PYTHON_TYPE(StyleArgument, "arapfields._native.StyleName")
 ARAPFIELDS_PYTHON_TYPE(HandlesArgument, "collections.abc.Iterable[arapfields._native.Handle]")

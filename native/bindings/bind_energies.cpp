@@ -20,47 +20,70 @@ struct CuboidHandle : Handle {};
 struct PointHandle : Handle {};
 struct RegionHandle : Handle {};
 
+double checked_reach(double reach) {
+  require_not_negative("reach", reach);
+  return reach;
+}
+
 void bind_handles(py::module_& module) {
-  py::class_<Handle>(module, "Handle",
-                     "A part of the surface asked to follow a rigid motion; mesh coordinates.")
+  py::class_<Handle>(
+      module, "Handle",
+      "A part of the surface asked to follow a rigid motion, or where it may scale, an affine\n"
+      "map; mesh coordinates. With a `reach`, a length, it moves only what is no farther from what it "
+      "holds,\n"
+      "measured through the inside of the shape; beyond that of all handles that have one nothing\n"
+      "moves at all. A handle without one then only holds: where it moves too, everything may.")
       .def_readonly("weight", &Handle::weight, "Factor of this handle's part of the loss.")
       .def_property_readonly(
           "motion", [](const Handle& self) { return self.motion(); },
-          "(4, 4) rigid motion rest → target; InvalidInput where it scales, shears or mirrors.");
+          "(4, 4) motion rest → target: rigid, or affine with allow_scale.")
+      .def_readonly("reach", &Handle::reach,
+                    "How far it moves things, through the inside of the shape, in mesh units; 0: everything.")
+      .def_readonly("allow_scale", &Handle::allow_scale,
+                    "Whether targets may be larger, smaller, longer or sheared.");
   py::class_<CuboidHandle, Handle>(
       module, "CuboidHandle",
       "The surface inside a box. `rest` and `target` (4, 4) map the cube [-1, 1]³ onto the box before and\n"
-      "after; target·rest⁻¹ must be rigid. A box that does not move holds its part in place.")
-      .def(py::init([](const ArrayArgument& rest, const ArrayArgument& target, double weight) {
+      "after; target·rest⁻¹ must be rigid, unless `allow_scale` lets it be any affine map that neither\n"
+      "flattens nor mirrors. A box that does not move holds its part in place.")
+      .def(py::init([](const ArrayArgument& rest, const ArrayArgument& target, double weight,
+                       bool allow_scale, double reach) {
              CuboidHandle handle;
+             handle.allow_scale = allow_scale;
+             handle.reach = checked_reach(reach);
              handle.rest = as_matrix4(rest, "rest");
              handle.target = as_matrix4(target, "target");
              handle.weight = weight;
              handle.motion();
              return handle;
            }),
-           "rest"_a, "target"_a, "weight"_a = 1.0)
+           "rest"_a, "target"_a, "weight"_a = 1.0, py::kw_only(), "allow_scale"_a = false, "reach"_a = 0.0)
       .def_property_readonly("rest", [](const CuboidHandle& self) { return self.rest; })
       .def_property_readonly("target", [](const CuboidHandle& self) { return self.target; });
   py::class_<PointHandle, Handle>(module, "PointHandle",
                                   "One material point: `rest` (3,) is to arrive at `target` (3,).")
-      .def(py::init([](const ArrayArgument& rest, const ArrayArgument& target, double weight) {
+      .def(py::init([](const ArrayArgument& rest, const ArrayArgument& target, double weight, double reach) {
              PointHandle handle;
+             handle.reach = checked_reach(reach);
              handle.kind = Handle::Kind::point;
              handle.rest_point = as_vec3(rest, "rest");
              handle.target_point = as_vec3(target, "target");
              handle.weight = weight;
              return handle;
            }),
-           "rest"_a, "target"_a, "weight"_a = 1.0)
+           "rest"_a, "target"_a, "weight"_a = 1.0, py::kw_only(), "reach"_a = 0.0)
       .def_property_readonly("rest", [](const PointHandle& self) { return self.rest_point; })
       .def_property_readonly("target", [](const PointHandle& self) { return self.target_point; });
   py::class_<RegionHandle, Handle>(
       module, "RegionHandle",
-      "The listed samples (indices into the surface samples), moved by target·rest⁻¹ (4, 4 each, rigid).")
+      "The listed samples (indices into the surface samples), moved by target·rest⁻¹ (4, 4 each), which "
+      "must\n"
+      "be rigid unless `allow_scale` lets it be any affine map that neither flattens nor mirrors.")
       .def(py::init([](const ArrayArgument& samples, const ArrayArgument& rest, const ArrayArgument& target,
-                       double weight) {
+                       double weight, bool allow_scale, double reach) {
              RegionHandle handle;
+             handle.allow_scale = allow_scale;
+             handle.reach = checked_reach(reach);
              handle.kind = Handle::Kind::region;
              handle.samples = as_indices(samples, "samples");
              handle.rest = as_matrix4(rest, "rest");
@@ -69,7 +92,8 @@ void bind_handles(py::module_& module) {
              handle.motion();
              return handle;
            }),
-           "samples"_a, "rest"_a, "target"_a, "weight"_a = 1.0)
+           "samples"_a, "rest"_a, "target"_a, "weight"_a = 1.0, py::kw_only(), "allow_scale"_a = false,
+           "reach"_a = 0.0)
       .def_property_readonly("samples", [](const RegionHandle& self) { return self.samples; })
       .def_property_readonly("rest", [](const RegionHandle& self) { return self.rest; })
       .def_property_readonly("target", [](const RegionHandle& self) { return self.target; });

@@ -6,6 +6,7 @@
 #include "bindings/reports.h"
 #include "fields/inverse.h"
 #include "io/files.h"
+#include "solve/apply_field.h"
 
 namespace arapfields::python {
 namespace {
@@ -85,6 +86,18 @@ void bind_fields(py::module_& module) {
       module, "DeformationField", py::dynamic_attr(),
       "A smooth deformation of space, x ↦ f(x), with its derivatives; all in mesh coordinates.")
       .def("__call__", &values, "points"_a, "Where the points (p, 3) go: (p, 3).")
+      .def(
+          "apply",
+          [](const DeformationField& field, const ArrayArgument& points, double strength) {
+            const Points mesh = as_points(points, "points");
+            return run_long(nullptr, [&](const Progress&) { return apply_field(field, mesh, strength); });
+          },
+          "points"_a, py::kw_only(), "strength"_a = 1.0,
+          "The same for another mesh of the same shape, coarser, finer or of other topology, `strength` of "
+          "the\n"
+          "way: (p, 3). InvalidInput where over a tenth of the points lie farther than 0.1 of the body's "
+          "size\n"
+          "from the surface that the field was solved on, and outside of the box around it.")
       .def("jacobian", &jacobian, "points"_a, "(p, 3, 3): [:, i, j] is the derivative of f_i by x_j.")
       .def("hessian", &hessian, "points"_a, "(p, 3, 3, 3): [:, i, j, k] is ∂²f_i/∂x_j∂x_k (1/length).")
       .def("inverse", &inverse, "points"_a, py::kw_only(), "tolerance"_a = NewtonInverseOptions().tolerance,

@@ -122,6 +122,27 @@ void bind_live(py::module_& module) {
           [](LiveSolver& live, const HandlesArgument& handles) { live.set_handles(as_handles(handles)); },
           "handles"_a,
           "Other handles for the same surface; the shape at hand is kept as the start of the next solve.")
+      .def(
+          "set_weights",
+          [](LiveSolver& live, const std::optional<ArrayArgument>& weights,
+             const std::optional<ArrayArgument>& bend_weights) {
+            const Vector w = weights ? as_vector(*weights, "weights") : Vector();
+            const Vector b = bend_weights ? as_vector(*bend_weights, "bend_weights") : Vector();
+            run_long(nullptr, [&](const Progress&) { live.set_weights(w, b); });
+          },
+          "weights"_a = py::none(), "bend_weights"_a = py::none(),
+          "How stiff each sample is (n,), and how stiff against bending (n,), from the next solve on, as in\n"
+          "SurfaceSamples.with_weights; None: 1 everywhere.")
+      .def(
+          "set_symmetry",
+          [](LiveSolver& live, const std::string& symmetry, Task* task) {
+            SymmetryPlane plane{};
+            choose(symmetry, "symmetry", plane);
+            run_long(task, [&](const Progress& progress) { live.set_symmetry(plane, progress); });
+          },
+          "symmetry"_a, py::kw_only(), "task"_a = py::none(),
+          "Both sides of the plane on which 'x', 'y' or 'z' is 0 move alike from the next solve on, or with\n"
+          "'none' each for itself; the shape at hand is the start. Takes as long as a new LiveDeformer.")
       .def("set_style", &set_style, "normals"_a, "strength"_a = StylizeOptions().strength, py::kw_only(),
            "sharpness"_a = StylizeOptions().sharpness, "weights"_a = py::none(), "up"_a = py::none(),
            "Turns the surface towards preferred normals, (k, 3) or a style's name, from the next solve on; "

@@ -35,10 +35,10 @@ ArapValue arap_energy(JetView<const Scalar> jets, double bending, double weight,
                                 static_cast<Scalar>(bending),
                                 factors.weights,
                                 factors.bending};
-  const auto sums = sum_over_ranges<3>(jets.count, [&](Index begin, Index end, double* out) {
+  const auto sums = sum_over_ranges<4>(jets.count, [&](Index begin, Index end, double* out) {
     ARAPFIELDS_DISPATCH(arap_range(block, begin, end, out));
   });
-  return {sums[0] / n, sums[1] / n, sums[2] / n};
+  return {sums[0] / n, sums[1] / n, sums[2] / n, sums[3] / n};
 }
 
 template <class Scalar>

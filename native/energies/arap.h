@@ -7,9 +7,10 @@ namespace arapfields {
 
 /// Means over the points of how far J is from a rotation and of how fast that rotation turns.
 struct ArapValue {
-  double stretch = 0.0;  ///< mean ‖J − R‖²_F
-  double bend = 0.0;     ///< mean Σ_k ⟨∂_k R, ∂_k R Y⟩; 0 where the jets have no second derivatives
-  double energy = 0.0;   ///< mean w (‖J − R‖² + bending·l·bend), with the points' own factors w and l
+  double stretch = 0.0;         ///< mean ‖J − R‖²_F
+  double bend = 0.0;            ///< mean Σ_k ⟨∂_k R, ∂_k R Y⟩; 0 where the jets have no second derivatives
+  double energy = 0.0;          ///< mean w (‖J − R‖² + bending·l·bend), with the points' own factors w and l
+  double stretch_energy = 0.0;  ///< mean w ‖J − R‖², the stretch's part of it
 };
 
 /// What single points count: a factor on each point's energy, and one on its bending. Null: all 1.

@@ -167,7 +167,9 @@ void run(const ArapBlock<Scalar>& block, std::int64_t begin, std::int64_t end, d
         gradient[i][k] = (Scalar(2) * block.stretch_weight * factor) * difference;
       }
     sums[0] += sum_of_valid<Scalar>(stretch, valid);
-    sums[2] += sum_of_valid<Scalar>(factor * stretch, valid);
+    const double weighted = sum_of_valid<Scalar>(factor * stretch, valid);
+    sums[2] += weighted;
+    sums[3] += weighted;
     if (block.has_second) {
       Bend<Scalar> bend;
       evaluate_bend(block, point, valid, polar, bend);

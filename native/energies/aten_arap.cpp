@@ -133,7 +133,8 @@ at::Tensor aten_arap(const at::Tensor& jets, double bending, double weight, cons
   const at::Tensor stretch = squares.sum() * share;
   at::Tensor gradient = difference * (factor * (2.0 * weight * share));
   at::Tensor bend = at::zeros_like(stretch);
-  at::Tensor energy = (squares * factor).sum() * share;
+  const at::Tensor weighted = (squares * factor).sum() * share;
+  at::Tensor energy = weighted.clone();
   if (jets.size(0) == 10) {
     const at::Tensor inverse = at::clamp_min(polar.sums, smallest_sum).reciprocal();
     const at::Tensor k_inverse = at::bmm(polar.axes * inverse.unsqueeze(1), polar.axes.transpose(1, 2));
@@ -158,7 +159,7 @@ at::Tensor aten_arap(const at::Tensor& jets, double bending, double weight, cons
     }
   }
   if (cotangents.defined()) cotangents.slice(0, 1, 4).add_(gradient.permute({2, 0, 1}));
-  return at::stack({stretch, bend, energy});
+  return at::stack({stretch, bend, energy, weighted});
 }
 
 }  // namespace arapfields

@@ -37,7 +37,8 @@ struct AtenFactors {
   at::Tensor weights, bending;
 };
 
-/// (3): stretch, bend and energy; the bend is 0 where the jets have no second derivatives.
+/// (4): stretch, bend, energy and the stretch's part of it; the bend is 0 where the jets have no second
+/// derivatives.
 at::Tensor aten_arap(const at::Tensor& jets, double bending, double weight, const EnergyTables& tables,
                      at::Tensor cotangents, const AtenFactors& factors = {});
 /// Normals (n,3), weights (n) or undefined, the preference as rows (normal, weight) (k,4).

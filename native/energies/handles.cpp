@@ -13,6 +13,8 @@ namespace arapfields {
 namespace {
 
 constexpr double rigid_tolerance = 1e-3;
+/// Volume of a target's box, against the cube of its longest edge, below which it is flat.
+constexpr double least_volume = 1e-9;
 
 std::string name_of(Index index) { return "handles[" + std::to_string(index) + "]"; }
 
@@ -47,6 +49,7 @@ Handle Handle::in_cube(const Frame& frame) const {
   result.target = frame.placement_to_cube(target);
   result.rest_point = (rest_point - frame.center) / frame.scale;
   result.target_point = (target_point - frame.center) / frame.scale;
+  result.reach = reach / frame.scale;
   return result;
 }
 
@@ -67,12 +70,22 @@ Mat4 Handle::motion(Index index) const {
   require(extent > 0.0 && std::abs(box.determinant()) > 1e-12 * extent * extent * extent, name_of(index),
           "its rest box is flat", "the rest pose needs a volume");
   const Mat3 linear = target.topLeftCorner<3, 3>() * box.inverse();
+  if (allow_scale) {
+    const double largest = linear.colwise().norm().maxCoeff();
+    require(linear.allFinite() && std::abs(linear.determinant()) > least_volume * largest * largest * largest,
+            name_of(index), "its target is flat", "a target with a volume is needed");
+    require(linear.determinant() > 0.0, name_of(index), "its target mirrors the rest pose",
+            "turning, moving, scaling and shearing are allowed");
+    result.topLeftCorner<3, 3>() = linear;
+    result.topRightCorner<3, 1>() = target.topRightCorner<3, 1>() - linear * rest.topRightCorner<3, 1>();
+    return result;
+  }
   require(linear.determinant() > 0.0, name_of(index), "its target mirrors the rest pose",
           "a rigid motion (rotation and translation) is allowed");
   const double deviation = (linear.transpose() * linear - Mat3::Identity()).cwiseAbs().maxCoeff();
   require(deviation <= rigid_tolerance, name_of(index),
           "its target scales or shears the rest pose by " + std::to_string(deviation),
-          "a rigid motion (rotation and translation) is allowed");
+          "a rigid motion (rotation and translation) is allowed, and more with allow_scale");
   const Mat3 rotation = closest_rotation(linear);
   result.topLeftCorner<3, 3>() = rotation;
   result.topRightCorner<3, 1>() = target.topRightCorner<3, 1>() - rotation * rest.topRightCorner<3, 1>();
@@ -84,6 +97,7 @@ BoundHandles::BoundHandles(std::vector<Handle> handles, PointsIn samples) : hand
     const Handle& handle = handles_[static_cast<std::size_t>(i)];
     require(std::isfinite(handle.weight) && handle.weight > 0.0, name_of(i) + ".weight",
             std::to_string(handle.weight), "must be positive");
+    require_not_negative(name_of(i) + ".reach", handle.reach);
     motions_.push_back(handle.motion(i));
     if (handle.kind == Handle::Kind::point) {
       members_.push_back(-1);

@@ -9,7 +9,7 @@
 
 namespace arapfields {
 
-/// A part of the surface that is asked to follow a rigid motion.
+/// A part of the surface that is asked to follow a rigid motion, or where it may scale, an affine map.
 struct ARAPFIELDS_EXPORT Handle {
   enum class Kind {
     cuboid,  ///< the samples inside the box that `rest` makes of [-1,1]³
@@ -18,17 +18,21 @@ struct ARAPFIELDS_EXPORT Handle {
   };
   Kind kind = Kind::cuboid;
   Mat4 rest = Mat4::Identity();    ///< cuboid, region: the motion is target·rest⁻¹
-  Mat4 target = Mat4::Identity();  ///< rigidly moved rest
+  Mat4 target = Mat4::Identity();  ///< rigidly moved rest, or any box where the handle may scale
   Vec3 rest_point = Vec3::Zero();  ///< point
   Vec3 target_point = Vec3::Zero();
   std::vector<Index> samples;  ///< region: sample indices
   double weight = 1.0;         ///< factor of this handle's part of the loss
+  /// How far it moves things, measured through the inside of the shape, in mesh units; 0: everything.
+  double reach = 0.0;
+  bool allow_scale = false;  ///< cuboid, region: targets may be larger, smaller, longer, sheared
 
   /// The handle of mesh coordinates in the frame's cube.
   Handle in_cube(const Frame& frame) const;
   /// target·rest⁻¹ made exactly rigid (of a point: the translation). Throws InvalidInput that names handle
   /// `index` for non-finite matrices, a rest pose without volume, and motions that scale, shear or mirror by
-  /// more than 1e-3.
+  /// more than 1e-3. Where the handle may scale, it is target·rest⁻¹ itself; a target that is flat or mirrors
+  /// the rest pose, which no space can follow without being torn, is refused then.
   Mat4 motion(Index index = 0) const;
 };
 

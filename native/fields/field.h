@@ -25,7 +25,7 @@ class ARAPFIELDS_EXPORT DeformationField {
   virtual at::Tensor jets(const at::Tensor& points, JetOrder order) const;
 
   /// Where points (n,3) of mesh coordinates go, in mesh coordinates.
-  Points at(PointsIn mesh_points) const {
+  virtual Points at(PointsIn mesh_points) const {
     Points values(mesh_points.rows(), 3);
     evaluate(frame_.to_cube(mesh_points), {values.data(), values.rows(), JetOrder::value});
     return frame_.to_mesh(values);

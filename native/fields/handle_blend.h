@@ -8,8 +8,9 @@
 
 namespace arapfields {
 
-/// A region that moves rigidly, in cube coordinates: the box {placement·u, u ∈ [-1,1]³} (a point where its
-/// linear part is zero) and the motion x ↦ C x that takes it from rest to target.
+/// A region that moves rigidly, or where its handle may scale affinely, in cube coordinates: the box
+/// {placement·u, u ∈ [-1,1]³} (a point where its linear part is zero) and the motion x ↦ C x that takes it
+/// from rest to target.
 struct RigidRegion {
   Mat4 placement = Mat4::Identity();
   Mat4 motion = Mat4::Identity();

@@ -91,6 +91,51 @@ RowMatrix<double> fitted_slopes(const Points& nodes, const Points& values, const
   return slopes;
 }
 
+/// Nodes near the plane are put on it, all others followed by their reflections; returns each one's twin.
+std::vector<Index> add_reflections(Points& nodes, Points& normals, int axis, double width) {
+  constexpr double nearly_on_plane = 0.25;
+  const Points places = nodes, directions = normals;
+  nodes.resize(2 * places.rows(), 3);
+  normals.resize(2 * places.rows(), 3);
+  std::vector<Index> twins;
+  Index count = 0;
+  for (Index i = 0; i < places.rows(); ++i) {
+    Eigen::RowVector3d flat = directions.row(i);
+    flat[axis] = 0.0;
+    const bool on_plane = places(i, axis) < nearly_on_plane * width && flat.norm() > 0.5;
+    for (int k = 0; k < (on_plane ? 1 : 2); ++k) {
+      nodes.row(count + k) = places.row(i);
+      normals.row(count + k) = on_plane ? Eigen::RowVector3d(flat.normalized()) : directions.row(i);
+      nodes(count + k, axis) *= on_plane ? 0.0 : (k == 0 ? 1.0 : -1.0);
+      if (!on_plane && k == 1) normals(count + k, axis) *= -1.0;
+      twins.push_back(on_plane ? count : count + 1 - k);
+    }
+    count += on_plane ? 1 : 2;
+  }
+  nodes.conservativeResize(count, 3);
+  normals.conservativeResize(count, 3);
+  return twins;
+}
+
+/// ψ is even or odd across the plane, but for rounding: each coordinate becomes so exactly.
+void symmetrise(InteriorEmbedding& embedding, const std::vector<Index>& twins, int axis) {
+  const Points values = embedding.values;
+  const RowMatrix<double> slopes = embedding.slopes;
+  for (int k = 0; k < 3; ++k) {
+    double likeness = 0.0;
+    for (std::size_t i = 0; i < twins.size(); ++i)
+      likeness += values(static_cast<Index>(i), k) * values(twins[i], k);
+    const double sign = likeness < 0.0 ? -1.0 : 1.0;
+    for (std::size_t i = 0; i < twins.size(); ++i) {
+      const auto row = static_cast<Index>(i);
+      embedding.values(row, k) = 0.5 * (values(row, k) + sign * values(twins[i], k));
+      for (int j = 0; j < 3; ++j)
+        embedding.slopes(row, 3 * k + j) =
+            0.5 * (slopes(row, 3 * k + j) + (j == axis ? -sign : sign) * slopes(twins[i], 3 * k + j));
+    }
+  }
+}
+
 }  // namespace
 
 void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out) const {
@@ -136,19 +181,25 @@ void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out) const {
   });
 }
 
-std::shared_ptr<const InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn normals) {
+std::shared_ptr<const InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn normals, int axis) {
   if (samples.rows() < least_nodes || normals.rows() != samples.rows()) return nullptr;
-  const FarthestPoints chosen = farthest_points(samples, std::min<Index>(most_nodes, samples.rows()));
-  const Index n = static_cast<Index>(chosen.indices.size());
-  if (n < least_nodes || !(chosen.fill_distance > 0.0)) return nullptr;
+  const Index most = axis < 0 ? most_nodes : most_nodes / 2;
+  const FarthestPoints chosen = farthest_points(samples, std::min<Index>(most, samples.rows()));
+  if (static_cast<Index>(chosen.indices.size()) < least_nodes || !(chosen.fill_distance > 0.0))
+    return nullptr;
   InteriorEmbedding embedding;
   embedding.width = chosen.fill_distance;
   embedding.nodes = samples(chosen.indices, Eigen::all);
-  const Points node_normals = normals(chosen.indices, Eigen::all);
+  Points node_normals = normals(chosen.indices, Eigen::all);
+  std::vector<Index> twins;
+  if (axis >= 0) twins = add_reflections(embedding.nodes, node_normals, axis, embedding.width);
+  const Index n = embedding.nodes.rows();
+  // Landmarks are the first nodes, and no half of a pair.
+  const Index count = landmarks + (axis >= 0 && twins[landmarks - 1] == landmarks ? 1 : 0);
   const InteriorGraph graph(embedding.nodes, node_normals, embedding.width);
-  RowMatrix<double> excess = (detour * graph.distances(landmarks)).array().square();
+  RowMatrix<double> excess = (detour * graph.distances(count)).array().square();
   for (Index i = 0; i < n; ++i)
-    for (Index l = 0; l < landmarks; ++l)
+    for (Index l = 0; l < count; ++l)
       excess(i, l) =
           std::max(0.0, excess(i, l) - (embedding.nodes.row(i) - embedding.nodes.row(l)).squaredNorm());
   embedding.values = std::sqrt(emphasis) * leading_coordinates(excess);
@@ -165,6 +216,7 @@ std::shared_ptr<const InteriorEmbedding> interior_embedding(PointsIn samples, Po
       (embedding.values.rowwise() - middle).colwise().squaredNorm().maxCoeff() / static_cast<double>(n);
   if (spread < worthwhile_spread * worthwhile_spread * size * size) return nullptr;
   embedding.slopes = fitted_slopes(embedding.nodes, embedding.values, neighbours);
+  if (axis >= 0) symmetrise(embedding, twins, axis);
   return std::make_shared<const InteriorEmbedding>(std::move(embedding));
 }
 

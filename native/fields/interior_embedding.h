@@ -25,7 +25,10 @@ struct ARAPFIELDS_EXPORT InteriorEmbedding {
 /// ψ of a surface from samples (n,3) of it and their outward normals: the embedding that best explains by how
 /// much ways through the interior exceed straight lines (classical scaling with landmarks: de Silva and
 /// Tenenbaum). Null where they hardly do, and for less than a hundred different samples.
+/// With an axis (0, 1, 2), samples lie where that coordinate is positive, stand for their reflections too,
+/// and ψ is symmetric: the lengths of ways from x to y and from S x to S y are the same.
 ARAPFIELDS_EXPORT std::shared_ptr<const InteriorEmbedding> interior_embedding(PointsIn samples,
-                                                                              PointsIn normals);
+                                                                              PointsIn normals,
+                                                                              int axis = -1);
 
 }  // namespace arapfields

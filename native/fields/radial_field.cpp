@@ -17,8 +17,9 @@ constexpr Index worth_sorting = 64;
 
 }  // namespace
 
-RadialField::RadialField(RadialBasis basis, RowMatrix<double> coefficients)
-    : basis_(std::move(basis)), coefficients_(std::move(coefficients)) {
+RadialField::RadialField(RadialBasis basis, RowMatrix<double> coefficients,
+                         std::shared_ptr<const Influence> influence)
+    : basis_(std::move(basis)), coefficients_(std::move(coefficients)), influence_(std::move(influence)) {
   require(basis_.radii.size() == basis_.center_count(), "radii",
           std::to_string(basis_.radii.size()) + " numbers",
           "one for each of the " + std::to_string(basis_.center_count()) + " centers is needed");
@@ -35,6 +36,7 @@ RadialField::RadialField(RadialBasis basis, RowMatrix<double> coefficients)
 void RadialField::evaluate(PointsIn points, JetView<double> out) const {
   if (points.rows() <= worth_sorting) {
     RadialEvaluator<double>(basis_, points, out.order).evaluate(coefficients_, out);
+    if (influence_) influence_->confine(points, out);
     return;
   }
   const std::vector<std::uint32_t> order = morton_order(points);
@@ -46,6 +48,16 @@ void RadialField::evaluate(PointsIn points, JetView<double> out) const {
       for (Index i = first; i < last; ++i)
         std::copy_n(sorted.view().at(c, i), 3, out.at(c, order[static_cast<std::size_t>(i)]));
   });
+  if (influence_) influence_->confine(points, out);
+}
+
+Points RadialField::at(PointsIn mesh_points) const {
+  Points result = DeformationField::at(mesh_points);
+  if (!influence_) return result;
+  const Vector share = influence_->at(frame().to_cube(mesh_points));
+  for (Index i = 0; i < result.rows(); ++i)  // the way to the cube and back rounds
+    if (share[i] == 0.0) result.row(i) = mesh_points.row(i);
+  return result;
 }
 
 }  // namespace arapfields

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "fields/field.h"
+#include "fields/influence.h"
 #include "fields/radial_basis.h"
 
 namespace arapfields {
@@ -10,15 +11,20 @@ namespace arapfields {
 class ARAPFIELDS_EXPORT RadialField : public DeformationField {
  public:
   /// Coefficients (basis.size(), 3); throws InvalidInput for other shapes, non-finite numbers or radii ≤ 0.
-  RadialField(RadialBasis basis, RowMatrix<double> coefficients);
+  /// With an influence, nothing moves where that is 0, to the last bit.
+  RadialField(RadialBasis basis, RowMatrix<double> coefficients,
+              std::shared_ptr<const Influence> influence = nullptr);
   void evaluate(PointsIn points, JetView<double> out) const override;
+  Points at(PointsIn mesh_points) const override;
 
   const RadialBasis& basis() const { return basis_; }
   const RowMatrix<double>& coefficients() const { return coefficients_; }
+  const std::shared_ptr<const Influence>& influence() const { return influence_; }
 
  private:
   RadialBasis basis_;
   RowMatrix<double> coefficients_;
+  std::shared_ptr<const Influence> influence_;
 };
 
 }  // namespace arapfields

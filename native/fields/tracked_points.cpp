@@ -7,7 +7,7 @@
 namespace arapfields {
 
 TrackedPoints::TrackedPoints(const RadialBasis& basis, const Frame& frame, PointsIn mesh_points)
-    : frame_(frame) {
+    : frame_(frame), rest_(mesh_points) {
   require(mesh_points.allFinite(), "points", "some are NaN or infinite", "all must be finite");
   if (mesh_points.rows() == 0) return;
   order_ = morton_order(mesh_points);
@@ -15,6 +15,10 @@ TrackedPoints::TrackedPoints(const RadialBasis& basis, const Frame& frame, Point
   for (Index i = 0; i < sorted.rows(); ++i)
     sorted.row(i) = mesh_points.row(order_[static_cast<std::size_t>(i)]);
   evaluator_ = RadialEvaluator<float>(basis, frame.to_cube(sorted), JetOrder::value);
+}
+
+void TrackedPoints::set_influence(const Influence* influence) {
+  shares_ = influence != nullptr ? influence->at(frame_.to_cube(rest_)) : Vector();
 }
 
 PointsF TrackedPoints::moved(const RowMatrix<double>& coefficients) const {
@@ -26,6 +30,10 @@ PointsF TrackedPoints::moved(const RowMatrix<double>& coefficients) const {
   for (Index i = 0; i < size(); ++i)
     result.row(order_[static_cast<std::size_t>(i)]) =
         (frame_.scale * sorted.row(i).cast<double>() + center).cast<float>();
+  for (Index i = 0; i < shares_.size(); ++i)
+    if (shares_[i] < 1.0)
+      result.row(i) =
+          (rest_.row(i) + shares_[i] * (result.row(i).cast<double>() - rest_.row(i))).cast<float>();
   return result;
 }
 

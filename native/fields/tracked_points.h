@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/frame.h"
+#include "fields/influence.h"
 #include "fields/radial_evaluator.h"
 
 namespace arapfields {
@@ -12,6 +13,8 @@ class TrackedPoints {
  public:
   TrackedPoints() = default;
   TrackedPoints(const RadialBasis& basis, const Frame& frame, PointsIn mesh_points);
+  /// What moves them only so far; null: nothing.
+  void set_influence(const Influence* influence);
   /// Where the field with these coefficients takes them, (n,3) in mesh coordinates.
   PointsF moved(const RowMatrix<double>& coefficients) const;
   Index size() const { return evaluator_.size(); }
@@ -20,6 +23,8 @@ class TrackedPoints {
   Frame frame_;
   std::vector<std::uint32_t> order_;
   RadialEvaluator<float> evaluator_;
+  Points rest_;    // mesh coordinates
+  Vector shares_;  // of the motion; empty: all of it
 };
 
 }  // namespace arapfields

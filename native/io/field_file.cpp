@@ -55,6 +55,10 @@ class FieldArrays {
     add_rows(prefix + "centers", basis.centers);
     file.add(prefix + "radii", {basis.radii.size()}, basis.radii.data());
     add_rows(prefix + "coefficients", field.coefficients());
+    if (const Influence* influence = field.influence().get()) {
+      add_rows(prefix + "influence.places", influence->places());
+      file.add(prefix + "influence.reaches", {influence->reaches().size()}, influence->reaches().data());
+    }
     if (!basis.embedding) return;
     add_rows(prefix + "embedding.nodes", basis.embedding->nodes);
     add_rows(prefix + "embedding.values", basis.embedding->values);
@@ -75,6 +79,7 @@ Json structure_of(const DeformationField& field) {
   } else if (const auto* radial = dynamic_cast<const RadialField*>(&field)) {
     structure["type"] = "radial";
     structure["centers"] = radial->basis().center_count();
+    if (radial->influence()) structure["influence"] = radial->influence()->places().rows();
     if (const InteriorEmbedding* embedding = radial->basis().embedding.get())
       structure["embedding"] = {{"nodes", embedding->nodes.rows()}, {"width", embedding->width}};
   } else {
@@ -117,7 +122,8 @@ std::shared_ptr<DeformationField> read_neural(ArchiveReader& file, const Json& s
 
 std::shared_ptr<DeformationField> read_radial(ArchiveReader& file, const Json& structure,
                                               const std::string& name, const std::string& prefix) {
-  const JsonObject object(structure, name, {"type", "frame", "rest_points", "centers", "embedding"});
+  const JsonObject object(structure, name,
+                          {"type", "frame", "rest_points", "centers", "embedding", "influence"});
   const Index count = object.integer("centers", 0, most_rows);
   RadialBasis basis;
   basis.centers = file.points(prefix + "centers", count);
@@ -133,7 +139,15 @@ std::shared_ptr<DeformationField> read_radial(ArchiveReader& file, const Json& s
     made.slopes = Eigen::Map<const RowMatrix<double>>(slopes.data(), nodes, 9);
     basis.set_embedding(std::make_shared<const InteriorEmbedding>(std::move(made)));
   }
-  return std::make_shared<RadialField>(std::move(basis), file.points(prefix + "coefficients", count + 4));
+  std::shared_ptr<const Influence> influence;
+  if (object.has("influence")) {
+    const Index places = object.integer("influence", 1, most_rows);
+    influence = std::make_shared<const Influence>(file.points(prefix + "influence.places", places),
+                                                  file.doubles(prefix + "influence.reaches", {places}),
+                                                  basis.embedding);
+  }
+  return std::make_shared<RadialField>(std::move(basis), file.points(prefix + "coefficients", count + 4),
+                                       std::move(influence));
 }
 
 std::shared_ptr<DeformationField> read_field(ArchiveReader& file, const Json& structure,
@@ -147,7 +161,7 @@ std::shared_ptr<DeformationField> read_field(ArchiveReader& file, const Json& st
                                       : read_radial(file, structure, name, prefix);
   const JsonObject object(
       structure, name,
-      {"type", "frame", "rest_points", "network", "handles", "base", "centers", "embedding"});
+      {"type", "frame", "rest_points", "network", "handles", "base", "centers", "embedding", "influence"});
   field->set_frame(read_frame(object.at("frame"), object.name("frame")));
   field->set_rest_points(file.points(prefix + "rest_points", object.integer("rest_points", 0, most_rows)));
   return field;

@@ -4,7 +4,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <string>
+#include <utility>
 
 #include "core/errors.h"
 #include "core/memory.h"
@@ -14,9 +16,66 @@ namespace arapfields {
 namespace {
 
 constexpr Index grain = 4096;
+/// Beyond it a sample would drown all others in rounding.
+constexpr double most_weight = 1e9;
 
 Vec3 corner(const Points& vertices, const Triangles& triangles, Index t, int k) {
   return vertices.row(triangles(t, k)).transpose();
+}
+
+/// One or several meshes' triangles, and where they lie in the cube.
+struct Joined {
+  Points vertices;
+  Triangles triangles;
+  VertexWeights painted;
+  Frame frame;
+  std::vector<Index> ends;  // of each mesh's triangles; empty for a single mesh
+};
+
+/// Painted weights at drawn points; none where all are 1, so that they cost and change nothing.
+Vector at_draws(const Vector& painted, const Triangles& triangles,
+                const std::vector<AreaSampler::Draw>& draws) {
+  if (painted.size() == 0 || (painted.array() == 1.0).all()) return {};
+  Vector result(static_cast<Index>(draws.size()));
+  for (Index i = 0; i < result.size(); ++i) {
+    const AreaSampler::Draw& draw = draws[static_cast<std::size_t>(i)];
+    double sum = 0.0;
+    for (int k = 0; k < 3; ++k) sum += draw.corners[k] * painted[triangles(draw.triangle, k)];
+    result[i] = sum;
+  }
+  return result;
+}
+
+SurfaceSamples draw_from(Joined joined, Index count, std::uint64_t seed) {
+  require(count > 0, "count", std::to_string(count), "at least 1 is needed");
+  require_memory("count", 20.0 * sizeof(double) * static_cast<double>(count));
+  SurfaceSamples samples;
+  samples.frame = joined.frame;
+  const AreaSampler sampler(joined.frame.to_cube(joined.vertices), joined.triangles);
+  samples.points.resize(count, 3);
+  samples.normals.resize(count, 3);
+  const bool several = !joined.ends.empty();
+  const bool painted = joined.painted.weights.size() > 0 || joined.painted.bend_weights.size() > 0;
+  std::vector<AreaSampler::Draw> draws(static_cast<std::size_t>(several || painted ? count : 0));
+  parallel_for(0, count, grain, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) {
+      Random random(seed, static_cast<std::uint64_t>(i));
+      const AreaSampler::Draw draw = sampler.draw(random);
+      samples.points.row(i) = draw.point.transpose();
+      samples.normals.row(i) = sampler.unit_normal(draw.triangle).transpose();
+      if (!draws.empty()) draws[static_cast<std::size_t>(i)] = draw;
+    }
+  });
+  samples.weights = at_draws(joined.painted.weights, joined.triangles, draws);
+  samples.bend_weights = at_draws(joined.painted.bend_weights, joined.triangles, draws);
+  for (Index i = 0; i < count && several; ++i) {
+    const auto found =
+        std::upper_bound(joined.ends.begin(), joined.ends.end(), draws[static_cast<std::size_t>(i)].triangle);
+    samples.mesh_indices.push_back(static_cast<std::int32_t>(found - joined.ends.begin()));
+  }
+  samples.redraw = [kept = std::make_shared<const Joined>(std::move(joined))](
+                       Index again, std::uint64_t other) { return draw_from(*kept, again, other); };
+  return samples;
 }
 
 }  // namespace
@@ -46,7 +105,8 @@ AreaSampler::Draw AreaSampler::draw(Random& random) const {
   return {(1.0 - root) * corner(vertices_, triangles_, t, 0) +
               root * (1.0 - split) * corner(vertices_, triangles_, t, 1) +
               root * split * corner(vertices_, triangles_, t, 2),
-          t};
+          t,
+          {1.0 - root, root * (1.0 - split), root * split}};
 }
 
 Vec3 AreaSampler::unit_normal(Index triangle) const {
@@ -95,26 +155,64 @@ Frame mesh_frame(PointsIn vertices, TrianglesIn triangles) {
   return frame;
 }
 
-SurfaceSamples sample_mesh(PointsIn vertices, TrianglesIn triangles, Index count, std::uint64_t seed) {
-  require(count > 0, "count", std::to_string(count), "at least 1 is needed");
-  require_memory("count", 6.0 * sizeof(double) * static_cast<double>(count));
-  SurfaceSamples samples;
-  samples.frame = area_frame(vertices, triangles);
-  samples.redraw = [v = Points(vertices), t = Triangles(triangles)](Index again, std::uint64_t other) {
-    return sample_mesh(v, t, again, other);
-  };
-  const AreaSampler sampler(samples.frame.to_cube(vertices), triangles);
-  samples.points.resize(count, 3);
-  samples.normals.resize(count, 3);
-  parallel_for(0, count, grain, [&](Index begin, Index end) {
-    for (Index i = begin; i < end; ++i) {
-      Random random(seed, static_cast<std::uint64_t>(i));
-      const AreaSampler::Draw draw = sampler.draw(random);
-      samples.points.row(i) = draw.point.transpose();
-      samples.normals.row(i) = sampler.unit_normal(draw.triangle).transpose();
+void require_weights(const std::string& argument, const Vector& weights, Index count) {
+  if (weights.size() == 0) return;
+  require(weights.size() == count, argument, std::to_string(weights.size()) + " numbers",
+          std::to_string(count) + ", or none, are needed");
+  require(weights.allFinite() && weights.minCoeff() >= 0.0 && weights.maxCoeff() <= most_weight, argument,
+          "some are negative, too large or not finite", "all must be from 0 to " + number_text(most_weight));
+}
+
+SurfaceSamples sample_mesh(PointsIn vertices, TrianglesIn triangles, Index count, std::uint64_t seed,
+                           const VertexWeights& painted) {
+  require_weights("weights", painted.weights, vertices.rows());
+  require_weights("bend_weights", painted.bend_weights, vertices.rows());
+  return draw_from({vertices, triangles, painted, area_frame(vertices, triangles), {}}, count, seed);
+}
+
+SurfaceSamples sample_meshes(const std::vector<TriangleMesh>& meshes, Index count, std::uint64_t seed,
+                             const std::vector<VertexWeights>& painted) {
+  require(!meshes.empty(), "meshes", "there are none", "at least one is needed");
+  require(painted.empty() || painted.size() == meshes.size(), "weights", std::to_string(painted.size()),
+          "one for each of the " + std::to_string(meshes.size()) + " meshes, or none, is needed");
+  Joined all;
+  Index vertices = 0, triangles = 0;
+  for (std::size_t i = 0; i < meshes.size(); ++i) {
+    const std::string name = std::string("meshes[").append(std::to_string(i)).append("]");
+    try {
+      validate(meshes[i]);
+      if (i == 0) all.frame = area_frame(meshes[i].vertices, meshes[i].triangles);
+    } catch (const InvalidInput& error) {
+      throw InvalidInput(name + ": " + error.what());
     }
-  });
-  return samples;
+    if (!painted.empty()) {
+      require_weights(name + ".weights", painted[i].weights, meshes[i].vertices.rows());
+      require_weights(name + ".bend_weights", painted[i].bend_weights, meshes[i].vertices.rows());
+    }
+    vertices += meshes[i].vertices.rows();
+    triangles += meshes[i].triangles.rows();
+    all.ends.push_back(triangles);
+  }
+  require(vertices <= INT32_MAX && triangles <= INT32_MAX, "meshes", "too many vertices or triangles in all",
+          "32-bit indices reach no farther");
+  all.vertices.resize(vertices, 3);
+  all.triangles.resize(triangles, 3);
+  all.painted = {Vector::Ones(painted.empty() ? 0 : vertices), Vector::Ones(painted.empty() ? 0 : vertices)};
+  Index v = 0, t = 0;
+  for (std::size_t i = 0; i < meshes.size(); ++i) {
+    const TriangleMesh& mesh = meshes[i];
+    all.vertices.middleRows(v, mesh.vertices.rows()) = mesh.vertices;
+    all.triangles.middleRows(t, mesh.triangles.rows()) = mesh.triangles.array() + static_cast<int>(v);
+    if (!painted.empty()) {
+      if (painted[i].weights.size() > 0)
+        all.painted.weights.segment(v, mesh.vertices.rows()) = painted[i].weights;
+      if (painted[i].bend_weights.size() > 0)
+        all.painted.bend_weights.segment(v, mesh.vertices.rows()) = painted[i].bend_weights;
+    }
+    v += mesh.vertices.rows();
+    t += mesh.triangles.rows();
+  }
+  return draw_from(std::move(all), count, seed);
 }
 
 }  // namespace arapfields

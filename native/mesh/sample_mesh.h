@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "core/random.h"
@@ -19,6 +20,7 @@ class ARAPFIELDS_EXPORT AreaSampler {
   struct Draw {
     Vec3 point;
     Index triangle;
+    Vec3 corners;  ///< shares of the triangle's corners in the point
   };
   Draw draw(Random& random) const;
   Vec3 unit_normal(Index triangle) const;
@@ -37,9 +39,26 @@ ARAPFIELDS_EXPORT Frame area_frame(PointsIn vertices, TrianglesIn triangles);
 /// functions that are known in the cube alone.
 ARAPFIELDS_EXPORT Frame mesh_frame(PointsIn vertices, TrianglesIn triangles);
 
+/// How stiff a mesh is about its vertices (n each; empty: all 1; ≥ 0): factors of the samples' energies, and
+/// of the bending in them. Between vertices they are linear.
+struct VertexWeights {
+  Vector weights = {}, bend_weights = {};
+};
+
 /// `count` independent points, uniform by area, with their triangles' unit normals, in cube coordinates of
-/// area_frame(). Sample i depends on the seed and i alone. Throws InvalidInput as AreaSampler does.
+/// area_frame(). Sample i depends on the seed and i alone. Throws InvalidInput as AreaSampler does, and for
+/// weights of another number, negative or not finite.
 ARAPFIELDS_EXPORT SurfaceSamples sample_mesh(PointsIn vertices, TrianglesIn triangles, Index count,
-                                             std::uint64_t seed);
+                                             std::uint64_t seed, const VertexWeights& painted = {});
+
+/// The same of several meshes that are to deform as one: a body first, whose frame the samples have, then
+/// what is to resist with it. Each gets as many samples as its share of the area asks. `painted` has an entry
+/// for each mesh, or none. Throws InvalidInput that names the mesh.
+ARAPFIELDS_EXPORT SurfaceSamples sample_meshes(const std::vector<TriangleMesh>& meshes, Index count,
+                                               std::uint64_t seed,
+                                               const std::vector<VertexWeights>& painted = {});
+
+/// Throws InvalidInput naming `argument` unless weights are `count` finite numbers, none negative, or empty.
+ARAPFIELDS_EXPORT void require_weights(const std::string& argument, const Vector& weights, Index count);
 
 }  // namespace arapfields

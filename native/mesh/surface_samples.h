@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <vector>
 
 #include "core/frame.h"
 #include "core/types.h"
@@ -17,6 +18,9 @@ struct SurfaceSamples {
   /// Draws `count` other samples of the same surface, in the same frame; empty where the surface is not
   /// known.
   std::function<SurfaceSamples(Index count, std::uint64_t seed)> redraw;
+  Vector weights = {};                          ///< (n; empty: all 1) ≥ 0, factors of the samples' energies
+  Vector bend_weights = {};                     ///< (n; empty: all 1) ≥ 0, factors of the bending in them
+  std::vector<std::int32_t> mesh_indices = {};  ///< (n; empty: all 0) which of several meshes each lies on
   Index size() const { return points.rows(); }
 };
 

@@ -6,6 +6,11 @@
 namespace arapfields {
 
 void check_together(const DeformOptions& o) {
+  if (o.symmetry != SymmetryPlane::none) {
+    const std::string with = std::string(name_of(o.symmetry)) + " with ";
+    require(o.field != FieldKind::neural, "symmetry", with + "field='neural'", "it needs field='radial'");
+    require(!o.exact_handles, "symmetry", with + "exact_handles", "it needs handles that pull");
+  }
   if (o.field != FieldKind::radial) return;
   const std::string with = " with field='radial'", allowed = "it needs field='neural'";
   require(o.invertibility == 0.0, "invertibility", number_text(o.invertibility) + with, allowed);

@@ -10,39 +10,21 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "distance/morton.h"
-#include "distance/signed_distance.h"
 #include "energies/rotation.h"
 #include "fields/radial_evaluator.h"
 #include "fields/radial_field.h"
+#include "sampling/nearest_sample.h"
 #include "solve/carrier_frames.h"
 #include "solve/setup.h"
 
 namespace arapfields {
 namespace {
 
-/// The size of a body by its radius of gyration: an animal's length.
-constexpr double size_of_gyration = 2.5;
 /// Shares of the size up to which the field alone, and from which frames alone carry a point; and the gaps
 /// between samples within which a point may lie on the surface.
 constexpr double near_share = 0.05, far_share = 0.09, gaps = 4.0;
 /// A surface by its size: an order of magnitude is enough.
 constexpr double area_side = 1.4;
-
-double size_of(PointsIn samples) {
-  const bool extended = (samples.rowwise() - samples.row(0)).cwiseAbs().maxCoeff() > 0.0;
-  return extended ? size_of_gyration * Frame::balanced(samples, Vector::Ones(samples.rows()), {}, 1.0).scale
-                  : 1.0;
-}
-
-/// Distances of points to the nearest sample: those to triangles that are samples.
-Vector distances_to(PointsIn samples, PointsIn points, const Progress& progress) {
-  Vector result(points.rows());
-  if (points.rows() == 0) return result;
-  Triangles corners(samples.rows(), 3);
-  for (Index i = 0; i < samples.rows(); ++i) corners.row(i).setConstant(static_cast<std::int32_t>(i));
-  SignedDistance(samples, corners, progress).unsigned_distance(points, result, progress);
-  return result;
-}
 
 /// Points at which the fields of one basis are evaluated, neighbours beside each other.
 struct RadialSites {
@@ -86,10 +68,10 @@ Attachment::State::State(const SurfaceSamples& samples, PointsIn points, const P
   const ThreadScope threads;
   const Points placed = frame_.to_cube(points);
   require(placed.allFinite(), "points", "some are too far away", "they must be within reach of the body");
-  const double size = size_of(samples.points);
+  const double size = body_size(samples.points);
   const double gap = area_side * size / std::sqrt(static_cast<double>(samples.size()));
   const double near = std::max(near_share * size, gaps * gap), far = near * far_share / near_share;
-  const Vector distances = distances_to(samples.points, placed, progress);
+  const Vector distances = nearest_distances(samples.points, placed, progress);
   distances_ = frame_.scale * distances;
   progress.report(0.3, "distances to the body");
   std::vector<double> shares;
@@ -108,7 +90,7 @@ Attachment::State::State(const SurfaceSamples& samples, PointsIn points, const P
 
 Points Attachment::State::near_values(const DeformationField& field) const {
   const auto* radial = dynamic_cast<const RadialField*>(&field);
-  if (radial == nullptr || typeid(field) != typeid(RadialField) || near_.empty())
+  if (radial == nullptr || typeid(field) != typeid(RadialField) || radial->influence() || near_.empty())
     return field.at(near_points_);
   std::shared_ptr<const RadialSites> sites;
   {

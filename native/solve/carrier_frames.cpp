@@ -12,10 +12,10 @@
 namespace arapfields {
 namespace {
 
-/// Places for near and for far points, and how many of them a point goes along with: all that a far one sees.
+/// Places for near and for far points, and how many of them a point goes along with.
 /// More of them would let the nearest dominate; these few spread what lies between two legs over the way
 /// between them. Distances, in sizes of the surface, up to which the first, and from which the others serve.
-constexpr Index near_places = 256, far_places = 64, most_nearest = 64;
+constexpr Index near_places = 256, far_places = 64, most_nearest = 48;
 constexpr double near_distance = 0.05, far_distance = 0.1;
 
 constexpr int row_length = 16;  // of a place: rotation − 1, offset, shift

@@ -47,6 +47,7 @@ ObjectiveTerms terms_of(const SurfaceSamples& samples, const std::vector<Handle>
   terms.barrier_threshold = options.surface.barrier_threshold;
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
   terms.pull = options.handles;
+  terms.weights = energy_weights(samples, terms.handles);
   if (options.exact_handles) terms.pull.handle_weight = 0.0;
   return terms;
 }
@@ -84,9 +85,13 @@ Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handle
   require(options.fresh_samples == 0 || samples.redraw, "options.fresh_samples",
           "the samples are a plain list of points",
           "samples of sample_mesh or sample_surface are needed, which know their surface");
+  if (options.exact_handles) require_no_reach(handles, "exact_handles");
   if (chosen_field(options) == FieldKind::radial)
     return options.exact_handles ? exact_radial(samples, handles, options, progress, hooks)
                                  : deform_radial(samples, handles, options, progress, hooks);
+  require(options.symmetry == SymmetryPlane::none, "options.symmetry",
+          std::string(name_of(options.symmetry)) + " with options of a network", "it needs field='radial'");
+  require_no_reach(handles, "a network");
   const ThreadScope threads(options.machine.threads);
   ObjectiveTerms terms = terms_of(samples, handles, options);
   terms.external = hooks.energies;

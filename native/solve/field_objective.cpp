@@ -55,14 +55,14 @@ FieldObjective::FieldObjective(const SurfaceSamples& samples, ObjectiveTerms ter
     : samples_(samples),
       terms_(std::move(terms)),
       order_(morton_order(samples.points)),
-      bending_(terms_.stiffness.bending(samples.points)) {}
+      bending_(bending_at(samples, terms_.stiffness)) {}
 
 FieldObjective::~FieldObjective() = default;
 
 Index FieldObjective::next_fresh(Random& random) {
   if (used_ == pool_.size()) {
     pool_ = samples_.redraw(samples_.size(), random.bits() >> 1);
-    pool_bending_ = terms_.stiffness.bending(pool_.points);
+    pool_bending_ = bending_at(pool_, terms_.stiffness);
     used_ = 0;
   }
   return used_++;
@@ -84,7 +84,7 @@ FieldObjective::Batch FieldObjective::draw(Random& random) {
       batch.points.row(b) = pool_.points.row(i);
       batch.bending[b] = pool_bending_[i];
       if (styled()) batch.normals.row(b) = pool_.normals.row(i);
-      if (batch.weights.size() > 0) batch.weights[b] = 1.0;
+      if (batch.weights.size() > 0) batch.weights[b] = pool_.weights.size() > 0 ? pool_.weights[i] : 1.0;
       if (batch.preference_weights.size() > 0) batch.preference_weights[b] = 1.0;
       continue;
     }
@@ -122,8 +122,8 @@ double FieldObjective::by_kernels(TrainableField& field, Random& random) {
     computed_.push_back({name, term, {}});
     value += term;
   };
-  add("stretch", terms_.rigidity * arap.stretch);
-  if (terms_.stiffness.bends()) add("bend", terms_.rigidity * (arap.energy - arap.stretch));
+  add("stretch", terms_.rigidity * arap.stretch_energy);
+  if (terms_.stiffness.bends()) add("bend", terms_.rigidity * (arap.energy - arap.stretch_energy));
   if (styled())
     add("style",
         terms_.gauss * gauss_energy<Scalar>(jets.view(), batch.normals.cast<Scalar>(),
@@ -168,8 +168,8 @@ at::Tensor FieldObjective::by_compositions(TrainableField& field, Random& random
     computed_.push_back({name, 0.0, term});
     value += term;
   };
-  add("stretch", terms_.rigidity * arap[0]);
-  if (terms_.stiffness.bends()) add("bend", terms_.rigidity * (arap[2] - arap[0]));
+  add("stretch", terms_.rigidity * arap[3]);
+  if (terms_.stiffness.bends()) add("bend", terms_.rigidity * (arap[2] - arap[3]));
   if (styled())
     add("style",
         terms_.gauss *

@@ -15,12 +15,14 @@ constexpr double coefficient_weight = 1e-10;
 }  // namespace
 
 template <class Scalar>
-LiveObjective<Scalar>::LiveObjective(const RadialBasis& basis, PointsIn samples, const Vector& bending,
-                                     double handle_weight)
-    : center_count_(basis.center_count()),
-      handle_weight_(handle_weight),
-      samples_(basis, samples),
-      bending_(bending.cast<Scalar>()) {}
+LiveObjective<Scalar>::LiveObjective(const RadialBasis& basis, PointsIn samples, double handle_weight)
+    : center_count_(basis.center_count()), handle_weight_(handle_weight), samples_(basis, samples) {}
+
+template <class Scalar>
+void LiveObjective<Scalar>::set_stiffness(const Vector& bending, const Vector& weights) {
+  bending_ = bending.cast<Scalar>();
+  weights_ = weights.cast<Scalar>();
+}
 
 template <class Scalar>
 void LiveObjective<Scalar>::set_barrier(double weight, double threshold) {
@@ -62,8 +64,8 @@ template <class Scalar>
 bool LiveObjective<Scalar>::accepted(const Measurements& u) const {
   if (!hooks_.observer) return true;
   const LiveTerms terms = evaluate(u, nullptr);
-  std::vector<LossTerm> told{{"stretch", terms.arap.stretch}};
-  if ((bending_.array() > 0).any()) told.push_back({"bend", terms.arap.energy - terms.arap.stretch});
+  std::vector<LossTerm> told{{"stretch", terms.arap.stretch_energy}};
+  if ((bending_.array() > 0).any()) told.push_back({"bend", terms.arap.energy - terms.arap.stretch_energy});
   if (style_) told.push_back({"style", style_->weight * terms.gauss});
   if (stance_) told.push_back({"stance", stance_->weight * terms.stance});
   if (barrier_ > 0.0) told.push_back({"barrier", barrier_ * terms.barrier});
@@ -95,7 +97,8 @@ LiveTerms LiveObjective<Scalar>::evaluate(const Measurements& u, Measurements* c
   Scalar* out = cotangents != nullptr ? cotangents->data() : nullptr;
   const JetView<Scalar> jet_cotangents{out, samples_.size(), JetOrder::second};
   LiveTerms terms;
-  terms.arap = arap_energy<Scalar>(jets(u), 1.0, 1.0, jet_cotangents, {nullptr, bending_.data()});
+  terms.arap = arap_energy<Scalar>(jets(u), 1.0, 1.0, jet_cotangents,
+                                   {weights_.size() > 0 ? weights_.data() : nullptr, bending_.data()});
   const Index pairs = pairs_.sources.rows();
   terms.handles =
       handle_energy<Scalar>({u.data() + handle_offset(), pairs, JetOrder::value}, pairs_, handle_weight_,
@@ -124,6 +127,7 @@ Eigen::VectorX<Scalar> LiveObjective<Scalar>::weighted(const Measurements& u) co
       to = share * from;
     else
       to = share * (bending_.asDiagonal() * from);
+    if (weights_.size() > 0) to = weights_.asDiagonal() * to;
   }
   Eigen::Map<PointsOf<Scalar>>(result.data() + handle_offset(), pairs, 3) =
       Scalar(2.0 * handle_weight_) * (pairs_.weights.asDiagonal() * handle_values(u));
@@ -148,6 +152,7 @@ RowMatrix<double> LiveObjective<Scalar>::pull_back(const Measurements& cotangent
   gradient += handle_basis_.transpose_times(handle_values(cotangents)).template cast<double>();
   Eigen::Map<Vector>(gradient.data(), 3 * center_count_) +=
       cotangents.tail(3 * center_count_).template cast<double>();
+  if (mirror_) mirror_->symmetrise(gradient);
   return gradient;
 }
 
@@ -156,7 +161,10 @@ RowMatrix<double> LiveObjective<Scalar>::precondition(const RowMatrix<double>& g
   const double size = gradient.norm();
   if (!(size > 0.0)) return gradient;
   const PointsF scaled = (gradient / size).cast<float>();
-  return (0.5 * size) * inverse_factor_.transpose_times(inverse_factor_.times(scaled)).cast<double>();
+  RowMatrix<double> step =
+      (0.5 * size) * inverse_factor_.transpose_times(inverse_factor_.times(scaled)).cast<double>();
+  if (mirror_) mirror_->symmetrise(step);
+  return step;
 }
 
 template class LiveObjective<float>;

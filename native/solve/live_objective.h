@@ -8,6 +8,7 @@
 #include "energies/gauss.h"
 #include "energies/handles.h"
 #include "energies/stance.h"
+#include "fields/mirror.h"
 #include "fields/radial_evaluator.h"
 #include "solve/live_hooks.h"
 #include "solve/quasi_newton.h"
@@ -48,8 +49,9 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
  public:
   using Measurements = Eigen::VectorX<Scalar>;
 
-  /// `bending` (n): λ of each sample.
-  LiveObjective(const RadialBasis& basis, PointsIn samples, const Vector& bending, double handle_weight);
+  LiveObjective(const RadialBasis& basis, PointsIn samples, double handle_weight);
+  /// λ of each sample (n), and its factor on its energy (n; empty: all 1).
+  void set_stiffness(const Vector& bending, const Vector& weights);
   /// A barrier against folds with this weight and threshold; 0: none.
   void set_barrier(double weight, double threshold);
   /// Other handles (cube coordinates), with the factor of the preconditioner that goes with them.
@@ -61,6 +63,8 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
   /// `rest` (n,3): the samples.
   void set_hooks(const LiveHooks& hooks, PointsIn rest);
   void set_stance(const std::optional<LiveStance>& stance);
+  /// Gradients and steps are those of symmetric fields alone.
+  void set_mirror(const std::optional<Mirror>& mirror) { mirror_ = mirror; }
 
   LiveTerms terms(const Measurements& u) const { return evaluate(u, nullptr); }
   JetView<const Scalar> jets(const Measurements& u) const {
@@ -89,7 +93,7 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
   Index center_count_;
   double handle_weight_, barrier_ = 0.0, barrier_threshold_ = 0.1;
   RadialEvaluator<Scalar> samples_;
-  Eigen::VectorX<Scalar> bending_;
+  Eigen::VectorX<Scalar> bending_, weights_;  // weights_ may be empty
   HandleBatch<Scalar> pairs_;
   TallMatrix<Scalar> handle_basis_;   // (pairs, size)
   TallMatrix<float> inverse_factor_;  // L⁻¹ of the preconditioner's matrix L Lᵀ
@@ -98,6 +102,7 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
   PointsOf<Scalar> stance_rest_;
   PointsOf<Scalar> style_normals_;
   Eigen::VectorX<Scalar> style_weights_;
+  std::optional<Mirror> mirror_;
   LiveHooks hooks_;
   Points rest_;  // for external energies
 };

@@ -25,6 +25,14 @@ void LiveSolver::clear_style() { state_->clear_style(); }
 
 void LiveSolver::set_hooks(const LiveHooks& hooks) { state_->set_hooks(hooks); }
 
+void LiveSolver::set_weights(const Vector& weights, const Vector& bend_weights) {
+  state_->set_weights(weights, bend_weights);
+}
+
+void LiveSolver::set_symmetry(SymmetryPlane symmetry, const Progress& progress) {
+  if (symmetry != state_->options().symmetry) state_ = state_->with_symmetry(symmetry, progress);
+}
+
 void LiveSolver::set_targets(const std::vector<Handle>& moved) { state_->set_targets(moved); }
 
 std::shared_ptr<RadialField> LiveSolver::solve(Index iterations, double tolerance, const Progress& progress) {

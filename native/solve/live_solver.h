@@ -35,6 +35,12 @@ class ARAPFIELDS_EXPORT LiveSolver {
   void set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights = {},
                  const Vec3& up = Vec3::UnitZ());
   void clear_style();
+  /// Other weights of the samples (mesh/surface_samples.h), for instance while they are painted. What they
+  /// enter is factored anew; moving handles does not ask for it.
+  void set_weights(const Vector& weights, const Vector& bend_weights = {});
+  /// Makes the field symmetric across a plane through the origin of the mesh's coordinates, or no longer so,
+  /// from the next solve on; the shape at hand is the start, as nearly as it can be.
+  void set_symmetry(SymmetryPlane symmetry, const Progress& progress = {});
   /// Energies that join the solver's own, and an observer of its steps.
   void set_hooks(const LiveHooks& hooks);
   /// Moves the handles' targets.

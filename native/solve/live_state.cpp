@@ -14,12 +14,10 @@
 #include "solve/rest_shape.h"
 #include "solve/setup.h"
 #include "solve/surface_stiffness.h"
+#include "solve/symmetry.h"
 
 namespace arapfields {
 namespace {
-
-/// Weight, against the surface's energy, with which a style without handles holds the lowest sample in place.
-constexpr double anchor_weight = 1.0;
 
 /// Samples × centers below which a step takes about a millisecond: waking other threads, which may be busy
 /// with drawing, would cost more than they do.
@@ -39,23 +37,37 @@ constexpr double worthwhile_gain = 0.1;
 LiveSolver::State::State(const SurfaceSamples& samples, const std::vector<Handle>& handles,
                          const LiveOptions& options, const Progress& progress,
                          std::shared_ptr<const RestShape> shape)
-    : options_(options), frame_(samples.frame), surface_(samples.points), surface_normals_(samples.normals) {
+    : options_(options),
+      samples_(options.symmetry == SymmetryPlane::none ? samples
+                                                       : across(samples, axis_of(options.symmetry))),
+      frame_(samples_.frame),
+      surface_(samples_.points),
+      surface_normals_(samples_.normals) {
   options.validate();
+  require_samples(samples_);
   const Stopwatch watch;
   const ThreadScope threads(options.threads);
   const auto seed = static_cast<std::uint64_t>(options.seed);
-  if (!shape) shape = std::make_shared<const RestShape>(samples, options.interior, seed);
+  const int axis = axis_of(options.symmetry);
+  if (!shape) shape = std::make_shared<const RestShape>(samples_, options.interior, seed, axis);
   Random random(seed);
   chosen_ = stratified(shape->order, options.samples, random);
   std::vector<RadialScale> scales;
   if (options.coarse_centers > 0) scales.push_back({options.coarse_centers, options.coarse_radius_factor});
   scales.push_back({options.fine_centers, options.fine_radius_factor, true});
-  basis_ = radial_basis(shape->sites, scales, shape->layout);
+  if (axis >= 0) {
+    mirror_.emplace();
+    mirror_->axis = axis;
+    basis_ = mirrored_basis({shape->sites, Points(0, 3), shape->layout}, scales, *mirror_);
+  } else {
+    basis_ = radial_basis(shape->sites, scales, shape->layout);
+  }
   if (options.interior) basis_.set_embedding(shape->embedding);
   coefficients_ = basis_.identity();
   progress.report(0.2, "centers placed");
-  bending_ = SurfaceStiffness(shape->thickness, options.surface).bending(rows_of(surface_, chosen_));
-  stiffness_ = stiffness_matrix(basis_, rows_of(surface_, chosen_), bending_, progress.part(0.2, 0.8));
+  own_bending_ = SurfaceStiffness(shape->thickness, options.surface).bending(rows_of(surface_, chosen_));
+  bound_ = BoundHandles(in_cube(handles, frame_), surface_);
+  stiffen(progress.part(0.2, 0.8));
   prepare(fast_);
   set_handles(handles);
   report_.setup_seconds = watch.seconds();
@@ -63,80 +75,15 @@ LiveSolver::State::State(const SurfaceSamples& samples, const std::vector<Handle
 
 template <class Scalar>
 void LiveSolver::State::prepare(Precision<Scalar>& precision) {
-  precision.objective = std::make_unique<LiveObjective<Scalar>>(basis_, rows_of(surface_, chosen_), bending_,
-                                                                options_.handle_weight);
+  precision.objective =
+      std::make_unique<LiveObjective<Scalar>>(basis_, rows_of(surface_, chosen_), options_.handle_weight);
+  precision.objective->set_stiffness(bending_, weights_);
+  precision.objective->set_mirror(mirror_);
   precision.objective->set_barrier(options_.surface.barrier, options_.surface.barrier_threshold);
   if (inverse_factor_.size() > 0) precision.objective->set_handles(pairs_, pair_values_, inverse_factor_);
   precision.objective->set_style(style_);
   precision.objective->set_hooks(hooks_, rows_of(surface_, chosen_));
   precision.objective->set_stance(stance_);
-}
-
-void LiveSolver::State::choose_pairs() {
-  pair_rows_.clear();
-  if (handles_.empty()) {
-    Index lowest = 0;
-    (surface_ * up_).minCoeff(&lowest);
-    pairs_ = {surface_.row(lowest), surface_.row(lowest),
-              Vector::Constant(1, anchor_weight / options_.handle_weight)};
-    return;
-  }
-  Random random(static_cast<std::uint64_t>(options_.seed), 1);
-  std::vector<double> weights;
-  for (Index i = 0; i < bound_.count(); ++i) {
-    const std::vector<Index> rows =
-        random_subset(bound_.begin(i + 1) - bound_.begin(i), options_.handle_samples, random);
-    const double share = 1.0 / static_cast<double>(static_cast<Index>(rows.size()) * bound_.count());
-    for (const Index row : rows) {
-      pair_rows_.push_back(bound_.begin(i) + row);
-      weights.push_back(bound_.handle(i).weight * share);
-    }
-  }
-  pairs_ = {rows_of(bound_.sources(), pair_rows_), rows_of(bound_.targets(), pair_rows_),
-            Eigen::Map<const Vector>(weights.data(), static_cast<Index>(weights.size()))};
-}
-
-void LiveSolver::State::set_handles(const std::vector<Handle>& handles) {
-  const ThreadScope threads(options_.threads);
-  bound_ = BoundHandles(in_cube(handles, frame_), surface_);
-  handles_ = handles;
-  choose_pairs();
-  choose_stance();
-  inverse_factor_.resize(0, 0);
-  if (!handles_.empty()) factorise();
-}
-
-/// The preconditioner of the handles and the stance at hand.
-void LiveSolver::State::factorise() {
-  pair_values_ = radial_rows(basis_, pairs_.sources, JetOrder::value);
-  RowMatrix<double> values = pair_values_;
-  Vector weights = options_.handle_weight * pairs_.weights;
-  if (stance_) {
-    const auto [rows, shares] = stance_rows(basis_, stance_->rest, stance_->stance);
-    values.conservativeResize(values.rows() + rows.rows(), Eigen::NoChange);
-    weights.conservativeResize(values.rows());
-    values.bottomRows(rows.rows()) = rows;
-    weights.tail(rows.rows()) = stance_->weight * shares;
-  }
-  inverse_factor_ = inverse_factor(stiffness_, values, weights);
-  for_each_precision([&](auto& precision) {
-    precision.objective->set_handles(pairs_, pair_values_, inverse_factor_);
-    precision.objective->set_stance(stance_);
-    precision.u.resize(0);
-  });
-  u_before_.resize(0);
-  optimizer_.forget();
-}
-
-void LiveSolver::State::set_targets(const std::vector<Handle>& moved) {
-  bound_.retarget(in_cube(moved, frame_));
-  for (std::size_t i = 0; i < handles_.size(); ++i) {
-    handles_[i].target = moved[i].target;
-    handles_[i].target_point = moved[i].target_point;
-  }
-  if (handles_.empty()) return;
-  pairs_.targets = rows_of(bound_.targets(), pair_rows_);
-  for_each_precision([&](auto& precision) { precision.objective->set_targets(pairs_.targets); });
 }
 
 void LiveSolver::State::set_hooks(const LiveHooks& hooks) {
@@ -201,6 +148,7 @@ void LiveSolver::State::follow_rigidly() {
   if (alignment.gain > worthwhile_gain) return;
   coefficients_ *= alignment.rotation.transpose();
   coefficients_.row(basis_.center_count()) += alignment.translation.transpose();
+  if (mirror_) mirror_->symmetrise(coefficients_);
   fast_.u.resize(0);
   u_before_.resize(0);
   optimizer_.forget();
@@ -227,8 +175,10 @@ void LiveSolver::State::extrapolate() {
 /// No energy of ours feels a translation: what is left of one is taken out exactly.
 void LiveSolver::State::hold_lowest() {
   Points value(1, 3);
-  RadialEvaluator<double>(basis_, pairs_.sources).evaluate(coefficients_, {value.data(), 1, JetOrder::value});
+  RadialEvaluator<double>(basis_, pairs_.sources.topRows(1))
+      .evaluate(coefficients_, {value.data(), 1, JetOrder::value});
   coefficients_.row(basis_.center_count()) += pairs_.sources.row(0) - value.row(0);
+  if (mirror_) mirror_->symmetrise(coefficients_);
   fast_.u.resize(0);
   exact_.u.resize(0);
 }
@@ -244,8 +194,11 @@ void LiveSolver::State::measure(Precision<Scalar>& precision) {
   report_.distortion = distortion<Scalar>(objective.jets(precision.u));
   report_.notes = notes_on(report_.distortion, far_target(bound_, surface_));
   const Points values = objective.handle_values(precision.u).template cast<double>();
-  const Vector distance = (values - pairs_.targets).rowwise().norm();
-  report_.handle_mean = frame_.scale * distance.dot(pairs_.weights) / pairs_.weights.sum();
+  // Those of the handles come first; without handles all count.
+  const Index own = handles_.empty() ? values.rows() : static_cast<Index>(pair_rows_.size());
+  const Vector distance = (values - pairs_.targets).topRows(own).rowwise().norm();
+  report_.handle_mean =
+      frame_.scale * distance.dot(pairs_.weights.head(own)) / pairs_.weights.head(own).sum();
   report_.handle_max = frame_.scale * distance.maxCoeff();
 }
 
@@ -266,53 +219,30 @@ void LiveSolver::State::reset() {
   report_.setup_seconds = setup;
 }
 
-/// The projection in the surrogate's norm, by conjugate gradients, since the preconditioner knows a part of
-/// the samples. What single precision leaves of far coefficients grows with each round: the round of least
-/// energy is the start.
-void LiveSolver::State::adopt(const DeformationField& field) {
-  constexpr int rounds = 8;
-  const ThreadScope threads(options_.threads);
-  const LiveObjective<float>& objective = *fast_.objective;
-  const Points places = rows_of(surface_, chosen_);
-  JetBlock<double> jets(places.rows(), JetOrder::second);
-  field.evaluate(places, jets.view());
-  Points ends(pairs_.sources.rows(), 3);
-  field.evaluate(pairs_.sources, {ends.data(), ends.rows(), JetOrder::value});
-  VectorF wanted = VectorF::Zero(30 * places.rows() + 3 * ends.rows() + 3 * basis_.center_count());
-  wanted.head(30 * places.rows()) =
-      Eigen::Map<const Vector>(jets.view().data, 30 * places.rows()).cast<float>();
-  wanted.segment(30 * places.rows(), 3 * ends.rows()) =
-      Eigen::Map<const Vector>(ends.data(), 3 * ends.rows()).cast<float>();
-  const auto dot = [](const auto& a, const auto& b) { return a.cwiseProduct(b).sum(); };
-  VectorF u, du;
-  objective.measure(coefficients_, u);
-  double value = objective.value(u, nullptr);
-  RowMatrix<double> residual = objective.pull_back(objective.weighted(wanted - u));
-  RowMatrix<double> image = objective.precondition(residual), direction = image;
-  double square = dot(residual, image);
-  for (int round = 0; round < rounds && square > 0.0; ++round) {
-    objective.measure(direction, du);
-    const RowMatrix<double> product = objective.pull_back(objective.weighted(du));
-    const double step = square / dot(direction, product);
-    u += static_cast<float>(step) * du;
-    const double next_value = objective.value(u, nullptr);
-    if (!(next_value < value)) break;
-    value = next_value;
-    coefficients_ += step * direction;
-    residual -= step * product;
-    image = objective.precondition(residual);
-    const double next = dot(residual, image);
-    direction = image + next / square * direction;
-    square = next;
-  }
-  fast_.u.resize(0);
-  exact_.u.resize(0);
-  u_before_.resize(0);
-  optimizer_.forget();
+void LiveSolver::State::track(PointsIn points) {
+  tracked_ = TrackedPoints(basis_, frame_, points);
+  tracked_.set_influence(influence_.get());
+  tracked_rest_ = points;
+}
+
+std::unique_ptr<LiveSolver::State> LiveSolver::State::with_symmetry(SymmetryPlane symmetry,
+                                                                    const Progress& progress) const {
+  LiveOptions options = options_;
+  options.symmetry = symmetry;
+  auto next = std::make_unique<State>(samples_, handles_, options, progress, nullptr);
+  if (style_asked_)
+    next->set_style(style_asked_->preferred, style_asked_->strength, style_asked_->sharpness,
+                    style_asked_->weights, style_asked_->up);
+  next->set_hooks(hooks_);
+  if (next->inverse_factor_.size() == 0) next->factorise();
+  next->adopt(*field());
+  if (tracked_rest_.rows() > 0) next->track(tracked_rest_);
+  next->report_.setup_seconds += report_.setup_seconds;
+  return next;
 }
 
 std::shared_ptr<RadialField> LiveSolver::State::field() const {
-  auto result = std::make_shared<RadialField>(basis_, coefficients_);
+  auto result = std::make_shared<RadialField>(basis_, coefficients_, influence_);
   result->set_frame(frame_);
   result->set_rest_points(rows_of(surface_, chosen_));
   return result;

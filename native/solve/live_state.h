@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "fields/mirror.h"
 #include "fields/tracked_points.h"
 #include "solve/live_objective.h"
 #include "solve/live_solver.h"
@@ -19,15 +20,19 @@ class LiveSolver::State {
                  const Vec3& up);
   void clear_style();
   void set_hooks(const LiveHooks& hooks);
+  void set_weights(const Vector& weights, const Vector& bend_weights);
   void set_targets(const std::vector<Handle>& moved);
   std::shared_ptr<RadialField> solve(Index iterations, double tolerance, const Progress& progress);
   void reset();
   void adopt(const DeformationField& field);
-  void track(PointsIn points) { tracked_ = TrackedPoints(basis_, frame_, points); }
+  void track(PointsIn points);
+  /// The same session, symmetric otherwise: its handles, targets, style, hooks, shape and tracked points.
+  std::unique_ptr<State> with_symmetry(SymmetryPlane symmetry, const Progress& progress) const;
   PointsF tracked() const { return tracked_.moved(coefficients_); }
   std::shared_ptr<RadialField> field() const;
   const LiveReport& report() const { return report_; }
   const std::vector<Handle>& handles() const { return handles_; }
+  const LiveOptions& options() const { return options_; }
 
  private:
   template <class Scalar>
@@ -48,7 +53,12 @@ class LiveSolver::State {
     if (fast_.objective) call(fast_);
     if (exact_.objective) call(exact_);
   }
+  void stiffen(const Progress& progress);
   void choose_pairs();
+  bool choose_influence();
+  std::shared_ptr<const Influence> reaches_of_handles() const;
+  Points pair_targets() const;
+  void reflect_pairs();
   void choose_stance();
   void stand_otherwise();
   void factorise();
@@ -57,18 +67,33 @@ class LiveSolver::State {
   void hold_lowest();
   int solve_threads() const;
 
+  /// What set_style was called with.
+  struct StyleAsked {
+    Points preferred;
+    double strength, sharpness;
+    Vector weights;
+    Vec3 up;
+  };
+
   LiveOptions options_;
+  SurfaceSamples samples_;
   Frame frame_;
   Points surface_, surface_normals_;  // all samples, cube coordinates
   std::vector<Index> chosen_;         // those that the energy sees
-  Vector bending_;                    // λ of these
+  Vector own_bending_;                // λ of these, without bend weights
+  Vector bending_, weights_;          // λ, and factors of the energy (empty: all 1)
+  std::optional<Mirror> mirror_;      // where the field is symmetric
   std::vector<Handle> handles_;
   BoundHandles bound_;
   std::vector<Index> pair_rows_;  // rows of bound_ that pull
   RadialBasis basis_;
-  HandleBatch<double> pairs_;
+  std::shared_ptr<const Influence> reaches_;    // of handles that reach so far only; null: there are none
+  std::shared_ptr<const Influence> influence_;  // these, unless a handle without a reach moves
+  Points held_;                                 // samples beyond it, which are held in place
+  HandleBatch<double> pairs_;                   // of handles, of what is held, and reflections of both
   RowMatrix<double> stiffness_, pair_values_, inverse_factor_;
   std::optional<LiveStyle> style_;
+  std::optional<StyleAsked> style_asked_;
   LiveHooks hooks_;
   Vec3 up_ = Vec3::UnitZ();
   std::optional<LiveStance> stance_;
@@ -79,6 +104,7 @@ class LiveSolver::State {
   RowMatrix<double> coefficients_before_;  // where the solve before the last one ended; empty: not known
   VectorF u_before_;
   TrackedPoints tracked_;
+  Points tracked_rest_;
   LiveReport report_;
 };
 

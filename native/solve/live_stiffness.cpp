@@ -43,8 +43,11 @@ RowMatrix<double> mixing_matrix() {
 /// The products of the basis functions' derivatives, weighted, summed over points.
 class Products {
  public:
-  Products(const RadialEvaluator<double>& sites, Vector roots)
-      : sites_(sites), roots_(std::move(roots)), mixing_(mixing_matrix()) {}
+  Products(const RadialEvaluator<double>& sites, Vector roots, Vector weight_roots)
+      : sites_(sites),
+        roots_(std::move(roots)),
+        weight_roots_(std::move(weight_roots)),
+        mixing_(mixing_matrix()) {}
 
   /// Of the points of blocks first to last−1. Of `sum`, whose rows and columns are the centers, the constant
   /// and three linear functions, the lower triangle counts.
@@ -56,7 +59,7 @@ class Products {
   void mix(Index b);
 
   const RadialEvaluator<double>& sites_;
-  Vector roots_;  // √λ of the points
+  Vector roots_, weight_roots_;  // √λ and √w of the points; the latter may be empty
   RowMatrix<double> mixing_;
   std::vector<std::int32_t> active_, both_;  // centers that the points feel, ascending
   std::vector<double> jets_;
@@ -84,7 +87,8 @@ void Products::mix(Index b) {
       for (Index p = 0; p < points; ++p) {
         const double shared = c < 6 ? 1.0 : std::numbers::sqrt2;  // mixed derivatives stand for two
         mix_[static_cast<std::size_t>((m * derivatives + c) * block_size + p)] =
-            mixing_(mixtures * (p % 3) + m, c) * (c < 3 ? 1.0 : shared * roots_[block_size * b + p]);
+            mixing_(mixtures * (p % 3) + m, c) * (c < 3 ? 1.0 : shared * roots_[block_size * b + p]) *
+            (weight_roots_.size() > 0 ? weight_roots_[block_size * b + p] : 1.0);
       }
 }
 
@@ -130,18 +134,19 @@ void Products::add(Index first, Index last, RowMatrix<double>& sum) {
 }  // namespace
 
 RowMatrix<double> stiffness_matrix(const RadialBasis& basis, PointsIn samples, const Vector& bending,
-                                   const Progress& progress) {
+                                   const Vector& weights, const Progress& progress) {
   const Index wanted = std::max(least_samples, samples_a_center * basis.center_count());
   const Index taken = std::min<Index>(samples.rows(), wanted);
   Points some(taken, 3);
-  Vector roots(taken);
+  Vector roots(taken), weight_roots(weights.size() > 0 ? taken : 0);
   for (Index i = 0; i < taken; ++i) {
     some.row(i) = samples.row(i * samples.rows() / taken);
     roots[i] = std::sqrt(bending[i * samples.rows() / taken]);
+    if (weights.size() > 0) weight_roots[i] = std::sqrt(weights[i * samples.rows() / taken]);
   }
   const RadialEvaluator<double> sites(basis, some);
   std::vector<RowMatrix<double>> sums(parts, RowMatrix<double>::Zero(basis.size(), basis.size()));
-  std::vector<Products> products(parts, Products(sites, roots));
+  std::vector<Products> products(parts, Products(sites, roots, weight_roots));
   const Index groups = (sites.blocks() + blocks_at_once - 1) / blocks_at_once;
   for (Index slice = 0; slice < slices; ++slice) {
     parallel_jobs(parts, [&](Index part) {

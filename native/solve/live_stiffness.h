@@ -9,11 +9,11 @@
 
 namespace arapfields {
 
-/// mean (‖J‖² + λ‖D‖²) over (some of) the samples, with each one's λ, as a matrix of the basis, of which the
-/// lower triangle is filled: what of the energy's Hessian depends on the rest surface alone. An estimate, for
-/// preconditioners: a sample is asked for three mixtures of its derivatives.
+/// mean w (‖J‖² + λ‖D‖²) over (some of) the samples, with each one's λ and w (empty: all 1), as a matrix of
+/// the basis, of which the lower triangle is filled: what of the energy's Hessian depends on the rest surface
+/// alone. An estimate, for preconditioners: a sample is asked for three mixtures of its derivatives.
 RowMatrix<double> stiffness_matrix(const RadialBasis& basis, PointsIn samples, const Vector& bending,
-                                   const Progress& progress = {});
+                                   const Vector& weights, const Progress& progress = {});
 
 /// Rows (n, size) of values at the samples and weights (n) with which Σ_p weights_p values_pᵀ values_p is the
 /// Hessian of half the stance's energy, its upward part spread over all directions: for at most a thousand of

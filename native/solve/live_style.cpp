@@ -5,6 +5,7 @@
 #include "core/errors.h"
 #include "solve/live_setup.h"
 #include "solve/live_state.h"
+#include "solve/setup.h"
 
 namespace arapfields {
 
@@ -19,9 +20,11 @@ void LiveSolver::State::set_style(PointsIn preferred, double strength, double sh
   if (strength == 0.0) return clear_style();
   require(surface_normals_.rows() == surface_.rows(), "samples", "they have no normals",
           "a style needs samples with normals");
+  require_no_reach(handles_);
   const GaussPreference preference = gauss_preference(preferred, sharpness);
   require(up.allFinite() && up.norm() > 0.0, "up", "zero, NaN or infinite", "a finite direction is needed");
   const bool other_way_up = up != up_, first = !style_;
+  style_asked_ = StyleAsked{preferred, strength, sharpness, weights, up};
   up_ = up;
   style_ = LiveStyle{preference,
                      rows_of(surface_normals_, chosen_),
@@ -39,6 +42,7 @@ void LiveSolver::State::set_style(PointsIn preferred, double strength, double sh
 void LiveSolver::State::clear_style() {
   const bool stood = stance_.has_value();
   style_.reset();
+  style_asked_.reset();
   for_each_precision([&](auto& precision) { precision.objective->set_style(style_); });
   optimizer_.forget();
   if (stood) stand_otherwise();

@@ -8,6 +8,7 @@
 #include "solve/live_solver.h"
 #include "solve/rest_shape.h"
 #include "solve/setup.h"
+#include "solve/symmetry.h"
 
 namespace arapfields {
 namespace {
@@ -90,18 +91,22 @@ Solution finish(const LiveSolver& live, const SurfaceSamples& samples, const Obj
 
 }  // namespace
 
-Solution deform_radial(const SurfaceSamples& samples, const std::vector<Handle>& handles,
+Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& handles,
                        const DeformOptions& options, const Progress& progress, const SolveHooks& hooks) {
+  const int axis = axis_of(options.symmetry);
+  const SurfaceSamples samples = axis < 0 ? given : across(given, axis);
   require(options.handles.handle_weight > 0.0, "handle_weight", "0", "must be positive for 'radial'");
   const ThreadScope threads(options.machine.threads);
   LiveOptions fine = live_options(options);
+  fine.symmetry = options.symmetry;
   set_centers(fine, options.centers, samples);
   fine.handle_weight = options.handles.handle_weight;
-  const auto shape = std::make_shared<const RestShape>(samples, fine.interior,
-                                                       static_cast<std::uint64_t>(options.training.seed));
+  const auto shape = std::make_shared<const RestShape>(
+      samples, fine.interior, static_cast<std::uint64_t>(options.training.seed), axis);
   std::shared_ptr<RadialField> first;
   if (fine.fine_centers >= worth_a_first) {
     LiveOptions few = live_options(options);
+    few.symmetry = options.symmetry;
     set_centers(few, std::min(most_first, fine.fine_centers / 2), samples);
     few.handle_weight = fine.handle_weight;
     few.tolerance = LiveOptions().tolerance;
@@ -116,6 +121,7 @@ Solution deform_radial(const SurfaceSamples& samples, const std::vector<Handle>&
   ObjectiveTerms terms;
   terms.stiffness = SurfaceStiffness(shape->thickness, options.surface);
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
+  terms.weights = energy_weights(samples, terms.handles);
   return finish(solver, samples, terms, loop, progress);
 }
 
@@ -158,6 +164,7 @@ Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const
   terms.stiffness = SurfaceStiffness(samples, options.surface);
   terms.preference = gauss_preference(preferred, options.sharpness);
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
+  terms.weights = energy_weights(samples, terms.handles);
   return finish(solver, samples, terms, loop, progress);
 }
 

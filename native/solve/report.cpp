@@ -39,10 +39,12 @@ SolveReport measure(const DeformationField& field, const SurfaceSamples& samples
   const Index count = std::min(samples.size(), max_samples);
   Points points(count, 3), normals(terms.preference ? count : 0, 3);
   Vector weights(terms.weights.size() > 0 ? count : 0);
+  Vector bend_weights = Vector::Ones(count);
   for (Index i = 0; i < count; ++i) {
     const Index pick = i * samples.size() / count;
     points.row(i) = samples.points.row(pick);
     if (weights.size() > 0) weights[i] = terms.weights[pick];
+    if (samples.bend_weights.size() > 0) bend_weights[i] = samples.bend_weights[pick];
     if (terms.preference) normals.row(i) = samples.normals.row(pick);
   }
   SolveReport report;
@@ -54,9 +56,11 @@ SolveReport measure(const DeformationField& field, const SurfaceSamples& samples
     JetBlock<double> block(rows, JetOrder::second);
     field.evaluate(points.middleRows(begin, rows), block.view());
     const JetView<const double> jets = block.view();
-    const Vector bending = terms.stiffness.bending(points.middleRows(begin, rows));
+    const Vector bending = terms.stiffness.bending(points.middleRows(begin, rows))
+                               .cwiseProduct(bend_weights.segment(begin, rows));
     const ArapValue arap = arap_energy<double>(
         jets, 1.0, 0.0, {}, {weights.size() > 0 ? weights.data() + begin : nullptr, bending.data()});
+    report.arap.stretch_energy += share * arap.stretch_energy;
     report.arap.stretch += share * arap.stretch;
     report.arap.bend += share * arap.bend;
     report.arap.energy += share * arap.energy;

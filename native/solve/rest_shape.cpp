@@ -2,6 +2,7 @@
 #include "solve/rest_shape.h"
 
 #include "core/random.h"
+#include "fields/mirror.h"
 #include "sampling/canonical_order.h"
 #include "solve/live_setup.h"
 #include "solve/setup.h"
@@ -17,7 +18,7 @@ constexpr std::uint64_t stream = 2;
 
 }  // namespace
 
-RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t seed) {
+RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t seed, int axis) {
   require_samples(samples);
   order = canonical_order(samples.points);
   thickness = std::make_shared<const LocalThickness>(samples.points, samples.normals, order);
@@ -26,10 +27,18 @@ RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t
   sites = rows_of(samples.points, chosen);
   const Vector thick = thickness->at(sites);
   layout.sizes = (thick / thickness->median()).cwiseMax(least_size).cwiseSqrt();
-  if (samples.normals.rows() != samples.size()) return;
-  const Points normals = rows_of(samples.normals, chosen);
-  layout.inner = sites - thick.asDiagonal() * normals;
-  if (interior) embedding = interior_embedding(sites, normals);
+  Points normals(0, 3);
+  if (samples.normals.rows() == samples.size()) {
+    normals = rows_of(samples.normals, chosen);
+    layout.inner = sites - thick.asDiagonal() * normals;
+  }
+  if (axis >= 0) {
+    FoldedPoints half = folded(sites, normals, layout, axis);
+    sites = std::move(half.points);
+    normals = std::move(half.normals);
+    layout = std::move(half.layout);
+  }
+  if (interior && normals.rows() > 0) embedding = interior_embedding(sites, normals, axis);
 }
 
 }  // namespace arapfields

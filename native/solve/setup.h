@@ -5,6 +5,7 @@
 #include "core/errors.h"
 #include "core/stopwatch.h"
 #include "energies/handles.h"
+#include "mesh/sample_mesh.h"
 #include "mesh/surface_samples.h"
 
 namespace arapfields {
@@ -12,6 +13,16 @@ namespace arapfields {
 inline void require_samples(const SurfaceSamples& samples) {
   require(samples.size() > 0, "samples", "none were given", "at least one is needed");
   require(samples.points.allFinite(), "samples", "some are NaN or infinite", "all must be finite");
+  require_weights("samples.weights", samples.weights, samples.size());
+  require_weights("samples.bend_weights", samples.bend_weights, samples.size());
+}
+
+/// Throws InvalidInput that names the first handle that has a reach, for what moves the whole shape.
+inline void require_no_reach(const std::vector<Handle>& handles, const std::string& why = "a style") {
+  for (std::size_t i = 0; i < handles.size(); ++i)
+    require(handles[i].reach == 0.0, "handles[" + std::to_string(i) + "].reach",
+            number_text(handles[i].reach) + " beside " + why,
+            "a reach is for radial fields that handles alone deform, without exact handles");
 }
 
 /// Handles of mesh coordinates in the frame's cube.

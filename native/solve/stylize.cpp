@@ -47,6 +47,7 @@ Solution stylize(const SurfaceSamples& samples, PointsIn preferred, const Styliz
                  const Vec3& up, const SolveHooks& hooks) {
   options.validate();
   check_samples(samples, weights);
+  require_no_reach(handles);
   if (chosen_field(options) == FieldKind::radial)
     return stylize_radial(samples, preferred, options, progress, weights, handles, up, hooks);
   const ThreadScope threads(options.machine.threads);
@@ -64,6 +65,7 @@ Solution stylize(const SurfaceSamples& samples, PointsIn preferred, const Styliz
   const Handle lowest = hold_lowest(samples, up);
   terms.handles = handles.empty() ? BoundHandles({lowest}, samples.points)
                                   : BoundHandles(in_cube(handles, samples.frame), samples.points);
+  terms.weights = energy_weights(samples, terms.handles);
   terms.pull = options.handles;
   if (handles.empty()) {
     terms.pull.handle_weight = 1.0;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "solve/surface_stiffness.h"
 
+#include <algorithm>
+
 #include "sampling/canonical_order.h"
 
 namespace arapfields {
@@ -9,6 +11,8 @@ namespace {
 /// The radius of a bend that costs as much as the stretch at a distance of it, in thicknesses: what makes λ
 /// 0.01 at the median of the bunny's surface.
 constexpr double reach = 0.345;
+/// What is left of a sample's resistance where a handle scales it.
+constexpr double yielding = 0.01;
 /// λ where it is the same everywhere: the paper's.
 constexpr double uniform_bending = 0.01;
 
@@ -26,6 +30,24 @@ SurfaceStiffness::SurfaceStiffness(const SurfaceSamples& samples, const SurfaceO
   if (bending_ > 0.0 && options.bending_unit == BendingUnit::thickness)
     thickness_ = std::make_shared<const LocalThickness>(samples.points, samples.normals,
                                                         canonical_order(samples.points));
+}
+
+Vector energy_weights(const SurfaceSamples& samples, const BoundHandles& handles) {
+  Vector result = samples.weights;
+  for (Index i = 0; i < handles.count(); ++i) {
+    if (!handles.handle(i).allow_scale) continue;
+    if (result.size() == 0) result.setOnes(samples.size());
+    for (Index p = handles.begin(i); p < handles.begin(i + 1); ++p) {
+      const Index sample = handles.members()[static_cast<std::size_t>(p)];
+      if (sample >= 0) result[sample] = std::min(result[sample], yielding);
+    }
+  }
+  return result;
+}
+
+Vector bending_at(const SurfaceSamples& samples, const SurfaceStiffness& stiffness) {
+  const Vector result = stiffness.bending(samples.points);
+  return samples.bend_weights.size() > 0 ? Vector(result.cwiseProduct(samples.bend_weights)) : result;
 }
 
 Vector SurfaceStiffness::bending(PointsIn points) const {

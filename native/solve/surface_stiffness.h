@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "energies/handles.h"
 #include "mesh/surface_samples.h"
 #include "options/surface.h"
 #include "sampling/local_thickness.h"
@@ -27,5 +28,12 @@ class SurfaceStiffness {
   double bending_ = 0.0;  // λ, or with a thickness the factor on its square
   std::shared_ptr<const LocalThickness> thickness_;
 };
+
+/// w of each sample (empty: all 1): the samples' own weights, and hardly any where a handle that may scale
+/// decides how large things are, which resisting would only make it fall short of.
+Vector energy_weights(const SurfaceSamples& samples, const BoundHandles& handles);
+
+/// The samples' λ times their own bend weights.
+Vector bending_at(const SurfaceSamples& samples, const SurfaceStiffness& stiffness);
 
 }  // namespace arapfields

@@ -75,6 +75,20 @@ int main(int argc, char** argv) {
   live.set_targets({end});
   const Points moved = live.solve()->at(mesh.vertices);
   // [live]
+  // [session]
+  live.set_weights(Vector::Constant(samples.size(), 10.0));
+  live.set_symmetry(SymmetryPlane::x);
+  end.reach = 0.3;
+  live.set_handles({end});
+  const Points posed = apply_field(*live.solve(), mesh.vertices, 0.5);
+  const SurfaceSamples two = sample_meshes({mesh, surface}, 2000, 1);
+  // [session]
+  // [along]
+  const Points hat = mesh.vertices.array() + 0.2;
+  const Attachment attached(samples, hat);  // once; positions() each frame
+  const Points hat_moved = attached.positions(*live.field());
+  const Mat4 button_motion = rigid_motion(hat, hat_moved);
+  // [along]
   // [hooks]
   DeformOptions quick;
   quick.field = FieldKind::radial;
@@ -86,6 +100,7 @@ int main(int argc, char** argv) {
   const TriangleMesh ball = extract_surface(Ball(), 32);
   std::cout << surface.vertices.rows() << " " << ball.vertices.rows() << " " << moved.rows() << " "
             << held.report.loop.iterations << "\n";
+  std::cout << posed.rows() << " " << two.size() << " " << button_motion.determinant() << "\n";
   std::cout << remeshed.vertices.rows() << " " << on_triangles.size() << "\n";
   return 0;
 }

@@ -96,19 +96,26 @@ def write_moved_mesh(path, source, mesh, move):
     go, which would be those of the old shape. Otherwise positions and triangles alone are written.
     """
     if path.suffix.lower() == Path(source).suffix.lower() == ".obj":
-        text = Path(source).read_text(errors="surrogateescape")
-        text = re.sub(r"\\\r?\n", "", text)  # lines that go on in the next
-        with readable(source, "OBJ"):
-            before = np.array([[float(c) for c in m.groups()[1:]] for m in OBJ_VERTEX.finditer(text)])
-        if np.isfinite(before).all():
-            rows = iter(move(before.reshape(-1, 3)))
-            moved = OBJ_VERTEX.sub(lambda m: m[1] + " ".join(f"{c:.9g}" for c in next(rows)), text)
-            moved = re.sub(r"^[ \t]*vn[ \t].*\n?", "", moved, flags=re.M)
-            moved = re.sub(r"^[ \t]*f[ \t].*$", _without_normals, moved, flags=re.M)
+        moved = moved_obj(source, move)
+        if moved is not None:
             path.write_text(moved, errors="surrogateescape")
             return
     vertices, triangles = mesh
     write_mesh(path, move(vertices), triangles)
+
+
+def moved_obj(source, move):
+    """The text of an OBJ file, its vertices moved; None where one is not finite."""
+    text = Path(source).read_text(errors="surrogateescape")
+    text = re.sub(r"\\\r?\n", "", text)  # lines that go on in the next
+    with readable(source, "OBJ"):
+        before = np.array([[float(c) for c in m.groups()[1:]] for m in OBJ_VERTEX.finditer(text)])
+    if not np.isfinite(before).all():
+        return None
+    rows = iter(move(before.reshape(-1, 3)))
+    moved = OBJ_VERTEX.sub(lambda m: m[1] + " ".join(f"{c:.9g}" for c in next(rows)), text)
+    moved = re.sub(r"^[ \t]*vn[ \t].*\n?", "", moved, flags=re.M)
+    return re.sub(r"^[ \t]*f[ \t].*$", _without_normals, moved, flags=re.M)
 
 
 def _without_normals(line):

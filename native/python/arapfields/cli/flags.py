@@ -18,6 +18,11 @@ def solve_flags(parser):
     extraction_flags(parser)
     inverse_flag(parser)
     sdf_flag(parser)
+    stiffness = parser.add_argument_group(
+        "stiffness: a number for each of the mesh's vertices (.txt, .csv or .npy), 1 for what is not painted"
+    )
+    stiffness.add_argument("--weights", metavar="FILE", help="how much it resists all change of shape")
+    stiffness.add_argument("--bend-weights", metavar="FILE", help="how much it resists bending")
     handles = parser.add_argument_group(
         "handles (x, y, z in the mesh's coordinates; inf and -inf leave a side of a box open)"
     )
@@ -50,6 +55,21 @@ def solve_flags(parser):
     )
     handles.add_argument(
         "--shift", type=triple, metavar="VECTOR", action=MoveHandle, **settings, help="shifts the last box"
+    )
+    handles.add_argument(
+        "--scale",
+        metavar="FACTORS",
+        action=MoveHandle,
+        **settings,
+        help="scales the last box about its pivot: a number, or x,y,z along its edges",
+    )
+    handles.add_argument(
+        "--reach",
+        type=float,
+        metavar="LENGTH",
+        action=MoveHandle,
+        **settings,
+        help="the last box or point moves only what is this near, through the inside of the shape",
     )
     handles.add_argument(
         "--point",

@@ -10,8 +10,11 @@ from .._files import existing_file
 from .._native import CuboidHandle, InvalidInput, PointHandle
 
 KEYS = {
-    "cuboid": {"rest", "target", "corners", "center", "half_extents", "rotation", "move", "weight"},
-    "point": {"rest", "target", "weight"},
+    "cuboid": {
+        *("rest", "target", "corners", "center", "half_extents", "rotation", "move", "weight"),
+        *("allow_scale", "reach"),
+    },
+    "point": {"rest", "target", "weight", "reach"},
 }
 
 
@@ -54,7 +57,8 @@ def build_handles(described, bounds):
 
 
 def _point(item, _):
-    return PointHandle(_numbers(item["rest"], (3,)), _numbers(item["target"], (3,)), item.get("weight", 1.0))
+    rest, target = (_numbers(item[key], (3,)) for key in ("rest", "target"))
+    return PointHandle(rest, target, item.get("weight", 1.0), reach=item.get("reach", 0.0))
 
 
 def _cuboid(item, bounds):
@@ -72,8 +76,13 @@ def _cuboid(item, bounds):
             raise ValueError("'target' and 'move' exclude each other")
         target = _numbers(item["target"], (4, 4))
     else:
-        target = _motion(item.get("move", {}), rest[:3, 3]) @ rest
-    return CuboidHandle(rest, target, item.get("weight", 1.0))
+        target = _motion(item.get("move", {}), rest) @ rest
+    scales = item.get("allow_scale", "scale" in item.get("move", {}))
+    if not isinstance(scales, bool):
+        raise ValueError(f"'allow_scale' is {scales!r}; true or false is needed")
+    return CuboidHandle(
+        rest, target, item.get("weight", 1.0), allow_scale=scales, reach=item.get("reach", 0.0)
+    )
 
 
 def _box(item):
@@ -97,14 +106,20 @@ def _corners(corners, bounds):
     return (low + high) / 2, (high - low) / 2
 
 
-def _motion(move, center):
-    """(4, 4): a turn about the pivot (the box's centre where none is named), then a shift."""
-    unknown = set(move) - {"rotate", "pivot", "translate"}
+def _motion(move, rest):
+    """(4, 4): scales along the box's edges and a turn, both about the pivot (its centre where none is named),
+    then a shift."""
+    known = ("scale", "rotate", "pivot", "translate")
+    unknown = set(move) - set(known)
     if unknown:
-        raise ValueError(f"unknown key {sorted(unknown)[0]!r} in 'move'; known are rotate, pivot, translate")
+        raise ValueError(f"unknown key {sorted(unknown)[0]!r} in 'move'; known are {', '.join(known)}")
     motion = np.eye(4)
     motion[:3, :3] = rotation(move.get("rotate"))
-    pivot = _numbers(move.get("pivot", center), (3,))
+    if "scale" in move:
+        factors = np.broadcast_to(np.asarray(move["scale"], float), 3)
+        edges = rest[:3, :3]
+        motion[:3, :3] = motion[:3, :3] @ edges @ np.diag(_numbers(factors, (3,))) @ np.linalg.inv(edges)
+    pivot = _numbers(move.get("pivot", rest[:3, 3]), (3,))
     shift = _numbers(move.get("translate", (0, 0, 0)), (3,))
     motion[:3, 3] = pivot - motion[:3, :3] @ pivot + shift
     return motion
@@ -167,9 +182,15 @@ class AddHandle(argparse.Action):
 
 
 class MoveHandle(argparse.Action):
-    """--turn AXIS DEGREES, --pivot POINT and --shift VECTOR move the box named last."""
+    """--turn AXIS DEGREES, --scale FACTORS, --pivot POINT and --shift VECTOR move the box named last; --reach
+    LENGTH is of a point too."""
 
     def __call__(self, parser, namespace, values, option_string=None):
+        if option_string == "--reach":
+            if not namespace.flagged:
+                raise argparse.ArgumentError(self, "follows the --box or --point that it is of")
+            namespace.flagged[-1][1]["reach"] = values
+            return
         if not namespace.flagged or namespace.flagged[-1][1]["type"] != "cuboid":
             raise argparse.ArgumentError(self, "follows the --box that it moves")
         move = namespace.flagged[-1][1].setdefault("move", {})
@@ -178,5 +199,10 @@ class MoveHandle(argparse.Action):
                 move["rotate"] = {"axis": triple(values[0]), "degrees": float(values[1])}
             except (ValueError, argparse.ArgumentTypeError) as error:
                 raise argparse.ArgumentError(self, f"expected AXIS as x,y,z and DEGREES: {error}") from None
+        elif option_string == "--scale":
+            try:
+                move["scale"] = triple(values) if "," in values else float(values)
+            except (ValueError, argparse.ArgumentTypeError) as error:
+                raise argparse.ArgumentError(self, f"expected a number or x,y,z: {error}") from None
         else:
             move["pivot" if option_string == "--pivot" else "translate"] = values

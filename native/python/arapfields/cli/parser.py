@@ -171,12 +171,26 @@ def _warp(added):
         added,
         "warp",
         verbs.warp,
-        "move any mesh by a saved field",
+        "move any mesh, point set or curves by a saved field",
         "field.safetensors teeth.obj -o moved.obj",
+        "field.safetensors fine.ply -o fine_posed.ply --share 0.5",
+        "field.safetensors hair.obj -o hair_moved.obj --body spot.obj",
+        "field.safetensors cloud.xyz -o moved.npy",
     )
     parser.add_argument("field", help=".safetensors that deform or stylize saved")
-    parser.add_argument("input", help=MESH)
-    parser.add_argument("-o", "--output", required=True, metavar="FILE", help=MESH)
+    parser.add_argument(
+        "input", help=f"{MESH}; curves: .obj; points: .ply, .xyz, .txt, .csv, .npy or .npz (points)"
+    )
+    parser.add_argument(
+        "-o", "--output", required=True, metavar="FILE", help="a mesh, curves or points, as the input"
+    )
+    parser.add_argument("--share", type=float, default=1.0, metavar="NUMBER", help="so much of the way [1]")
+    parser.add_argument(
+        "--body",
+        metavar="FILE",
+        help="the mesh that the field was solved on, at rest: what is not near it goes along with it, rather "
+        "than be refused",
+    )
     return parser
 
 

@@ -10,7 +10,7 @@ import arapfields as af
 
 from .. import grids
 from .._files import existing_file, json_text
-from . import files
+from . import files, points
 from .handles import build_handles, read_handles, rotation, triple, turn_upright
 from .options import given, given_options
 from .running import Outputs, with_progress
@@ -35,13 +35,13 @@ def sample(args):
         output = outputs.check(args.output, files.CLOUD_SUFFIXES, "--output")
         field = files.read_field(args.deformed_by) if args.deformed_by else None
         samples = _samples(_Source(args), args.count, args.seed, args)
-        points, normals = samples.points, samples.normals
+        rows, normals = samples.points, samples.normals
         if field is not None:
-            normals = np.linalg.solve(np.swapaxes(field.jacobian(points), 1, 2), normals[..., None])[..., 0]
+            normals = np.linalg.solve(np.swapaxes(field.jacobian(rows), 1, 2), normals[..., None])[..., 0]
             normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-            points = field(points)
-        outputs.write(output, lambda path: files.write_cloud(path, points, normals))
-    _summary(args, f"wrote {len(points)} points to {args.output}")
+            rows = field(rows)
+        outputs.write(output, lambda path: files.write_cloud(path, rows, normals))
+    _summary(args, f"wrote {len(rows)} points to {args.output}")
 
 
 def deform(args):
@@ -91,10 +91,17 @@ def extract(args):
 
 def warp(args):
     with Outputs() as outputs:
-        output = outputs.check(args.output, files.MESH_SUFFIXES, "--output")
+        output = outputs.check(args.output, points.WARPED, "--output")
         field = files.read_field(args.field)
-        mesh = files.read_mesh(args.input)
-        outputs.write(output, lambda path: files.write_moved_mesh(path, args.input, mesh, field))
+        write = points.warped(args.input)
+        body = af.sample_mesh(*files.read_mesh(args.body)) if args.body else None
+
+        def move(rest):
+            if body is None:
+                return field.apply(rest, strength=args.share)
+            return rest + args.share * (af.Attachment(body, rest).positions(field) - rest)
+
+        outputs.write(output, lambda path: write(path, move))
     _summary(args, f"wrote {args.output}")
 
 
@@ -136,8 +143,16 @@ def _fitted(vertices, triangles, options, args):
 
 
 def _samples(source, count, seed, args):
+    painted = {name: getattr(args, name) for name in ("weights", "bend_weights") if getattr(args, name, None)}
     if source.mesh:
-        return af.sample_mesh(*source.mesh, count, seed=seed)
+        count_of = len(source.mesh[0])
+        weights = {name: points.read_weights(path, count_of) for name, path in painted.items()}
+        return af.sample_mesh(*source.mesh, count, seed=seed, **weights)
+    if painted:
+        flag = "--" + next(iter(painted)).replace("_", "-")
+        raise af.InvalidInput(
+            f"{flag}: {source.path} has no vertices that numbers could be of; a mesh is needed"
+        )
     return with_progress(
         "sample", lambda task: af.sample_surface(source.sdf(), count=count, seed=seed, task=task), args.quiet
     )
@@ -179,8 +194,7 @@ def _solve(args, solve, seed, needs_handles):
         if source.mesh is None and "--output" in places:
             raise af.InvalidInput(f"--output: {source.path} holds no mesh to move; use --surface")
         samples = _samples(source, given(args, args.verb, "samples"), seed, args)
-        points = samples.points
-        bounds = np.array([points.min(0), points.max(0)])
+        bounds = np.array([samples.points.min(0), samples.points.max(0)])
         handles = build_handles(described, bounds) if described or needs_handles else []
         field = with_progress(args.verb, lambda task: solve(samples, handles, task), args.quiet)
         if "--output" in places:

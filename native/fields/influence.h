@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "fields/interior_embedding.h"
+
+namespace arapfields {
+
+/// How far motion reaches: m(x) is 1 about some places, 0 farther from all of them than their reach, and
+/// three times continuously differentiable between. Distances are those of ways through the shape's inside,
+/// where an embedding knows them. f becomes x + m(x) (f(x) − x).
+class Influence {
+ public:
+  /// Places (k,3) with their reaches (k, positive), in the cube. Throws InvalidInput for other numbers.
+  Influence(Points places, Vector reaches, std::shared_ptr<const InteriorEmbedding> embedding);
+
+  /// m at points (n,3).
+  Vector at(PointsIn points) const;
+  /// Jets of f at points (n,3) become those of x + m (f − x); where m is 0 exactly those of x.
+  void confine(PointsIn points, JetView<double> jets) const;
+
+  const Points& places() const { return places_; }
+  const Vector& reaches() const { return reaches_; }
+  const std::shared_ptr<const InteriorEmbedding>& embedding() const { return embedding_; }
+
+ private:
+  template <class Consume>
+  void for_each_point(PointsIn points, JetOrder order, Consume&& consume) const;
+
+  Points places_;
+  Vector reaches_;
+  std::shared_ptr<const InteriorEmbedding> embedding_;
+  Points embedded_;  // (k,3) ψ of the places; empty without an embedding
+};
+
+}  // namespace arapfields

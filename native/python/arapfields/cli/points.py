@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Points that a field moves: point sets, curves, and numbers for the vertices of a mesh."""
+
+import numpy as np
+
+from .._files import existing_file, write_arrays
+from .._native import InvalidInput
+from .files import MESH_SUFFIXES, OBJ_VERTEX, _readable, _trimesh, moved_obj, read_mesh, write_moved_mesh
+
+TEXT_SUFFIXES = (".xyz", ".txt", ".csv")
+ARRAY_SUFFIXES = (".npy", ".npz")
+WARPED = (*MESH_SUFFIXES, *TEXT_SUFFIXES, *ARRAY_SUFFIXES)
+
+
+def warped(source):
+    """What `source` holds and a field can move: a function that writes it, moved, to a path.
+
+    Meshes and OBJ curves keep all else of their file; of points alone, rows x y z are read and written.
+    """
+    source = existing_file(source, WARPED)
+    suffix = source.suffix.lower()
+    points = None
+    if suffix in MESH_SUFFIXES:
+        if suffix == ".obj" and not _has_faces(source):
+            return lambda path, move: _write_obj(path, source, move)
+        if suffix == ".ply":
+            points = _ply_cloud(source)
+        if points is None:
+            mesh = read_mesh(source)
+            return lambda path, move: write_moved_mesh(
+                _with(path, MESH_SUFFIXES, "a mesh"), source, mesh, move
+            )
+    else:
+        points = _rows(source)
+    if len(points) == 0 or not np.isfinite(points).all():
+        raise InvalidInput(f"{source}: has no points, or NaN or infinite ones; finite points are needed")
+    return lambda path, move: _write_points(path, move(points))
+
+
+def _with(path, suffixes, what):
+    if path.suffix.lower() not in suffixes:
+        raise InvalidInput(f"--output: {path.name} is no place for {what}; use {', '.join(suffixes)}")
+    return path
+
+
+def _has_faces(path):
+    with _readable(path, "OBJ"), path.open(errors="surrogateescape") as file:
+        return any(line.lstrip().startswith("f ") for line in file)
+
+
+def _write_obj(path, source, move):
+    """Lines, curves and points of an OBJ file, which has no faces."""
+    text = source.read_text(errors="surrogateescape")
+    if not OBJ_VERTEX.search(text):
+        raise InvalidInput(f"{source}: has no vertices; points, curves or a mesh are needed")
+    moved = moved_obj(source, move)
+    if moved is None:
+        raise InvalidInput(f"{source}: a vertex is NaN or infinite; coordinates must be finite")
+    _with(path, (".obj",), "curves").write_text(moved, errors="surrogateescape")
+
+
+def _ply_cloud(path):
+    """Points (n, 3) of a PLY file without faces; None for a mesh."""
+    trimesh = _trimesh()
+    with _readable(path, "PLY"):
+        loaded = trimesh.load(path, process=False)
+        return np.array(loaded.vertices, float) if isinstance(loaded, trimesh.PointCloud) else None
+
+
+def _rows(path):
+    """Points (n, 3) of rows of text, of which normals may follow, or of an array."""
+    suffix = path.suffix.lower()
+    with _readable(path, "points"):
+        if suffix == ".npz":
+            with np.load(path) as arrays:
+                if "points" not in arrays:
+                    raise InvalidInput(f"{path}: has no array 'points'")
+                rows = np.array(arrays["points"], float)
+        elif suffix == ".npy":
+            rows = np.array(np.lib.format.open_memmap(path, mode="r"), float)
+        else:
+            rows = np.loadtxt(path.read_text().replace(",", " ").splitlines(), ndmin=2)
+    if rows.ndim != 2 or rows.shape[1] not in (3, 6):
+        raise InvalidInput(
+            f"{path}: holds an array of shape {rows.shape}; rows of three numbers, or of six with normals, "
+            "are needed"
+        )
+    return rows[:, :3]
+
+
+def _write_points(path, points):
+    suffix = path.suffix.lower()
+    if suffix == ".npz":
+        write_arrays(path, points=points)
+    elif suffix == ".npy":
+        with path.open("wb") as file:
+            np.save(file, points)
+    elif suffix in TEXT_SUFFIXES:
+        np.savetxt(path, points, fmt="%.9g", delimiter="," if suffix == ".csv" else " ")
+    else:
+        _with(path, (".ply",), "points")
+        header = "".join(f"property double {name}\n" for name in "xyz")
+        text = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n{header}end_header\n"
+        path.write_bytes(text.encode() + np.ascontiguousarray(points, "<f8").tobytes())
+
+
+def read_weights(path, vertices):
+    """Numbers (n,) ≥ 0, one for each of so many vertices: rows of a text file, or a .npy array."""
+    path = existing_file(path, (*TEXT_SUFFIXES[1:], ".npy"))
+    with _readable(path, "numbers"):
+        if path.suffix.lower() == ".npy":
+            numbers = np.array(np.lib.format.open_memmap(path, mode="r"), float)
+        else:
+            numbers = np.loadtxt(path.read_text().replace(",", " ").split(), ndmin=1)
+    if numbers.shape != (vertices,):
+        raise InvalidInput(
+            f"{path}: holds {numbers.size} numbers; one for each of the {vertices} vertices is needed"
+        )
+    if not (np.isfinite(numbers).all() and (numbers >= 0).all() and (numbers > 0).any()):
+        raise InvalidInput(f"{path}: numbers are negative, not finite or all 0; some must be above 0")
+    return numbers

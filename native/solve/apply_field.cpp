@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "solve/apply_field.h"
+
+#include <cmath>
+#include <string>
+
+#include "core/errors.h"
+#include "sampling/nearest_sample.h"
+
+namespace arapfields {
+namespace {
+
+/// How far from the surface, in sizes of it, and what share of the points may lie beyond.
+constexpr double near_share = 0.1, most_outside = 0.1;
+
+}  // namespace
+
+Points apply_field(const DeformationField& field, PointsIn points, double strength) {
+  require(points.allFinite(), "points", "some coordinates are NaN or infinite", "all must be finite");
+  require_range("strength", strength, -10.0, 10.0);
+  const Points& rest = field.rest_points();
+  if (rest.rows() > 1 && points.rows() > 0) {
+    const double near = near_share * body_size(rest);
+    const Points placed = field.frame().to_cube(points);
+    const Vector distances = nearest_distances(rest, placed);
+    // What is deep inside, teeth and bones, lies in the box around the surface.
+    const Eigen::RowVector3d low = rest.colwise().minCoeff(), high = rest.colwise().maxCoeff();
+    Index outside = 0;
+    for (Index i = 0; i < points.rows(); ++i)
+      if (distances[i] > near &&
+          ((placed.row(i) - low).minCoeff() < 0.0 || (high - placed.row(i)).minCoeff() < 0.0))
+        ++outside;
+    const double share = static_cast<double>(outside) / static_cast<double>(points.rows());
+    if (share > most_outside)
+      throw InvalidInput("points",
+                         std::to_string(std::lround(100.0 * share)) +
+                             " % of them lie outside of the field, farther than " +
+                             number_text(near * field.frame().scale) + " from the surface it was solved on",
+                         "a mesh of the same shape, in the same place and size, is needed; what goes along "
+                         "with the body is carried by an Attachment");
+  }
+  const Points moved = field.at(points);
+  if (strength == 1.0) return moved;
+  return points + strength * (moved - points);
+}
+
+}  // namespace arapfields

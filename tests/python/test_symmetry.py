@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fields that are symmetric by construction, on samples that are not."""
+
+import numpy as np
+import pytest
+from cases import box, moved, turn
+from characters import HIP, LEG, trousers
+
+import arapfields as af
+
+REFLECTION = np.array([-1.0, 1, 1])
+EXACT = 1e-6  # of the size: what is asked for; rounding is far below
+
+
+@pytest.fixture(scope="module")
+def body():
+    return af.sample_surface(trousers(), 6000, seed=0)
+
+
+def leg(side, degrees):
+    rest = box([min(0, side), -1, -1], [max(0, side), 1, 0.4])
+    return moved(rest, turn([1, 0.3 * side, 0.5 * side], degrees, (side * LEG, 0, HIP)))
+
+
+TRUNK = moved(box([-1, -1, 0.9], [1, 1, 2]))
+
+
+def asymmetry(field, points):
+    return np.abs(field(points * REFLECTION) - field(points) * REFLECTION).max()
+
+
+@pytest.fixture(scope="module")
+def space():
+    return np.random.default_rng(0).uniform([-0.5, -0.5, -0.2], [0.5, 0.5, 1.5], (4000, 3))
+
+
+@pytest.mark.parametrize("centers", [150, 700])  # with a first result, and without
+def test_one_leg_moves_both(body, space, centers):
+    field = af.deform(body, [TRUNK, leg(1, 40)], af.DeformOptions(symmetry="x", centers=centers))
+    assert asymmetry(field, space) < EXACT
+    feet = body.points[body.points[:, 2] < 0.3]
+    assert np.linalg.norm(field(feet) - feet, axis=1).min() > 0.1
+    assert field.report.handle_error_mean < 0.02
+
+
+def test_symmetric_handles_cost_no_more_than_without(body, space):
+    handles = [TRUNK, leg(1, 40), leg(-1, 40)]
+    free = af.deform(body, handles)
+    tied = af.deform(body, handles, af.DeformOptions(symmetry="x"))
+    assert asymmetry(tied, space) < EXACT < asymmetry(free, space)
+    assert tied.report.loss[-1][1] < 1.01 * free.report.loss[-1][1]
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_every_plane_through_the_origin(axis, space):
+    """On a ball that is far from symmetric about any of them: the field is, all the same."""
+    rng = np.random.default_rng(1)
+    arms = rng.normal(size=(3000, 3))
+    arms /= np.linalg.norm(arms, axis=1, keepdims=True)
+    samples = af.SurfaceSamples(0.6 * arms + [0.1, 0.2, 0.7], arms)
+    k = "xyz".index(axis)
+    live = af.LiveDeformer(
+        samples, [af.Point(samples.points[0], samples.points[0] + 0.2)], af.LiveOptions(symmetry=axis)
+    )
+    field, flip = live.solve(), np.where(np.arange(3) == k, -1.0, 1.0)
+    assert np.abs(field(space * flip) - field(space) * flip).max() < EXACT
+    assert np.abs(field(space) - space).max() > 0.05
+
+
+def test_a_session_switches_it_during_a_drag(body, space):
+    live = af.LiveDeformer(body, [TRUNK, leg(1, 0)])
+    live.track(space)
+    for degrees in (10, 20):
+        free = live.solve([TRUNK.target, leg(1, degrees).target])
+    live.set_symmetry("x")
+    for degrees in (20, 30):
+        tied = live.solve([TRUNK.target, leg(1, degrees).target], iterations=60)
+        assert asymmetry(tied, space) < EXACT
+    assert np.abs(live.tracked() - tied(space)).max() < 1e-3
+    right = body.points[(body.points[:, 2] < 0.4) & (body.points[:, 0] > 0)]
+    assert np.abs(tied(right) - live.field(right)).max() == 0
+    live.set_symmetry("none")
+    before = np.abs(live.field(right) - tied(right)).max()
+    assert before < 0.02  # the shape is taken over
+    again = live.solve([TRUNK.target, leg(1, 20).target], iterations=200, tolerance=1e-6)
+    assert np.abs(again(right) - free(right)).max() < 0.03
+    assert asymmetry(again, space) > EXACT
+    with pytest.raises(af.InvalidInput, match="symmetry"):
+        live.set_symmetry("w")
+    assert np.array_equal(live.field(right), again(right))
+
+
+def test_a_switched_session_reaches_the_energy_of_a_fresh_one(body):
+    """Fewer steps serve since the shape at hand is the start."""
+    handles = [TRUNK, leg(1, 30)]
+    fresh = af.LiveDeformer(body, handles, af.LiveOptions(symmetry="x"))
+    fresh.solve(iterations=200, tolerance=1e-7)
+    live = af.LiveDeformer(body, handles)
+    live.solve(iterations=200, tolerance=1e-7)
+    live.set_symmetry("x")
+    live.solve(iterations=200, tolerance=1e-7)
+    assert live.report.value == pytest.approx(fresh.report.value, rel=1e-3)
+    live.reset()
+    assert np.abs(live.field(body.points) - body.points).max() < 1e-8
+
+
+def test_styles_are_symmetric_too(body, space):
+    live = af.LiveDeformer(body, options=af.LiveOptions(symmetry="x", interior=False))
+    live.set_style("cube", 1.0)
+    field = live.solve(iterations=30)
+    assert asymmetry(field, space) < EXACT
+    assert np.abs(field(body.points) - body.points).max() > 0.01
+
+
+def test_symmetry_and_weights_agree(body, space):
+    stiff = body.with_weights(np.where(body.points[:, 2] > HIP, 100.0, 1.0))
+    live = af.LiveDeformer(stiff, [TRUNK, leg(1, 30)], af.LiveOptions(symmetry="x"))
+    assert asymmetry(live.solve(iterations=50), space) < EXACT
+
+
+def test_what_cannot_be_symmetric_is_refused(body):
+    handles = [TRUNK, leg(1, 10)]
+    for options in (
+        {"field": "neural"},
+        {"exact_handles": True},
+        {"width": 32},  # chooses a network
+    ):
+        with pytest.raises(af.InvalidInput, match="symmetry"):
+            af.deform(body, handles, af.DeformOptions(symmetry="x", **options))
+    with pytest.raises(af.InvalidInput, match="symmetry"):
+        af.DeformOptions(symmetry="w")
