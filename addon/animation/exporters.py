@@ -37,7 +37,7 @@ def write(context, kind, path, items, frames):
             require_room(context, path, items, frames)
             try:
                 CALLS[kind](context, str(partial), frames)
-            except RuntimeError as error:
+            except (AttributeError, RuntimeError) as error:  # the former where the exporter is switched off
                 told = [line for line in str(error).splitlines() if line and not line.startswith("Location:")]
                 reason = told[-1].removeprefix("Error: ") if told else ""
                 raise UserError(

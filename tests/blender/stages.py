@@ -88,7 +88,8 @@ class Stage:
         from addon.deform.operators import ARAPFIELDS_OT_deform
 
         if self.name == "bake":
-            return Operator(ARAPFIELDS_OT_bake, start=1, end=3, step=1)
+            given = {"format": "KEYS", "filepath": "", "part": (0, 0)}
+            return Operator(ARAPFIELDS_OT_bake, start=1, end=3, step=1, **given)
         return Operator(ARAPFIELDS_OT_deform, **scenes.QUICK)
 
     def start(self, operator):

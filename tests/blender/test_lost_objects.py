@@ -154,7 +154,7 @@ def test_after_a_bake_the_present_frame_is_shown():
 
     bar = animated()
     bpy.context.scene.frame_set(1)
-    bpy.ops.arapfields.bake(start=1, end=5, step=2)
+    bpy.ops.arapfields.bake(format="KEYS", start=1, end=5, step=2)
     keys = bpy.data.objects["Bar_baked"].data.shape_keys.key_blocks
     assert [round(key.value, 3) for key in keys[1:]] == [1.0, 0.0, 0.0]
     shift = scenes.world_points(bpy.data.objects["Bar_baked"]) - scenes.world_points(bar)
