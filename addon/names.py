@@ -41,6 +41,7 @@ class Op(StrEnum):
     SET_STYLE = "arapfields.set_style"
     CARRY = "arapfields.carry"
     RELEASE = "arapfields.release"
+    STIFFNESS_PRESET = "arapfields.stiffness_preset"
     SAVE_POSE = "arapfields.save_pose"
     APPLY_POSE = "arapfields.apply_pose"
     REMOVE_POSE = "arapfields.remove_pose"

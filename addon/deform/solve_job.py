@@ -19,6 +19,7 @@ from ..core.runtime.jobs import Item
 from ..jobs.job_operator import JobOperator
 from ..poses import applying
 from ..results import placement
+from ..stiffness import painted
 from ..surface.source_surface import read_surface
 from ..viewport.previews import Preview
 
@@ -46,6 +47,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
     surface.exact = effective_value("surface", settings, operator) == "EXACT"
     surface.refine_thin = effective_value("refine_thin", settings, operator)
     carrying = Carrying(context, source)
+    surface.painted = painted.read(context, source, surface.in_place)
     surface.together = carrying.solids(context, surface.space)
     frames = carrying.frames(surface.space, depsgraph_of(context))
 

@@ -79,7 +79,7 @@ class ARAPFIELDS_OT_save_pose(OfSource, bpy.types.Operator):
     bl_idname = Op.SAVE_POSE
     bl_label = "Save Pose"
 
-    name: bpy.props.StringProperty(name="Name", description="Name of the pose", default="Pose")
+    pose: bpy.props.StringProperty(name="Name", description="Name of the pose", default="Pose")
 
     def change(self, context):
         source = source_of(context)
@@ -91,8 +91,8 @@ class ARAPFIELDS_OT_save_pose(OfSource, bpy.types.Operator):
             pose = applying.solved.get(source.session_uid)
         if pose is None:
             raise UserError("deform {name} first, or make it live: its field is saved", name=source.name)
-        keep(context, self.name, poses.to_bytes(pose))
-        return translated("{name} kept", name=self.name)
+        keep(context, self.pose, poses.to_bytes(pose))
+        return translated("{name} kept", name=self.pose)
 
     def invoke(self, context, event):
         return context.window_manager.invoke_props_dialog(self)
@@ -104,7 +104,7 @@ class ARAPFIELDS_OT_apply_pose(OfSource, bpy.types.Operator):
     bl_idname = Op.APPLY_POSE
     bl_label = "Apply Pose"
 
-    name: bpy.props.StringProperty(name="Name", description="Name of the pose; empty for the chosen one")
+    pose: bpy.props.StringProperty(name="Name", description="Name of the pose; empty for the chosen one")
     filepath: bpy.props.StringProperty(
         name="File", description="A pose's file, in place of a kept pose", subtype="FILE_PATH"
     )
@@ -123,7 +123,7 @@ class ARAPFIELDS_OT_apply_pose(OfSource, bpy.types.Operator):
             name = Path(self.filepath).name
             content = read(self.filepath)
         else:
-            entry = chosen(context, self.name)
+            entry = chosen(context, self.pose)
             name, content = entry.name, poses.from_text(entry.data, entry.name)
         told = applying.apply(context, source, poses.from_bytes(content, name), self.strength)
         for reason in told:
@@ -148,10 +148,10 @@ class ARAPFIELDS_OT_remove_pose(OfPose, bpy.types.Operator):
     bl_idname = Op.REMOVE_POSE
     bl_label = "Remove Pose"
 
-    name: bpy.props.StringProperty(name="Name", description="Name of the pose; empty for the chosen one")
+    pose: bpy.props.StringProperty(name="Name", description="Name of the pose; empty for the chosen one")
 
     def change(self, context):
-        group, name = context.scene.arapfields, chosen(context, self.name).name
+        group, name = context.scene.arapfields, chosen(context, self.pose).name
         group.poses.remove(group.poses.find(name))
         group.active_pose = max(0, min(group.active_pose, len(group.poses) - 1))
         return translated("{name} removed", name=name)
@@ -161,7 +161,9 @@ class PoseFile:
     """Mixin: a file is chosen in a window."""
 
     filepath: bpy.props.StringProperty(name="File", description="The pose's file", subtype="FILE_PATH")
-    filter_glob: bpy.props.StringProperty(name="Filter", default=f"*{SUFFIX}", options={"HIDDEN"})
+    filter_glob: bpy.props.StringProperty(
+        name="Filter", description="Files that are shown", default=f"*{SUFFIX}", options={"HIDDEN"}
+    )
 
     def invoke(self, context, event):
         context.window_manager.fileselect_add(self)

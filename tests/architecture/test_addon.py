@@ -16,6 +16,7 @@ ORDER = [
     "handles",
     "carried",
     "poses",
+    "stiffness",
     "surface",
     "results",
     "viewport",

@@ -42,7 +42,7 @@ def saved(source):
     moving.location.z, moving.rotation_euler.y = 0.4, -0.5
     scenes.activate(source)
     assert bpy.ops.arapfields.deform(field="radial", samples=3000) == {"FINISHED"}
-    assert bpy.ops.arapfields.save_pose(name="Bent") == {"FINISHED"}
+    assert bpy.ops.arapfields.save_pose(pose="Bent") == {"FINISHED"}
     return float(np.linalg.norm(scenes.world_points(source) - rest, axis=1).max())
 
 
@@ -65,7 +65,7 @@ def test_a_pose_fits_other_resolutions():
         before[item.name] = np.array([vertex.co for vertex in item.data.vertices])
     for item in others:
         scenes.activate(item)
-        assert bpy.ops.arapfields.apply_pose(name="Bent") == {"FINISHED"}
+        assert bpy.ops.arapfields.apply_pose(pose="Bent") == {"FINISHED"}
     for item in (source, *others):
         after[item.name] = scenes.world_points(item)
     source.data.calc_loop_triangles()
@@ -124,7 +124,7 @@ def test_strength_files_and_refusals():
     other.data.transform(Matrix.Translation((0, 3, 0)))
     bpy.context.view_layer.update()
     with pytest.raises(RuntimeError, match="100% of Other lie outside of the pose's field"):
-        bpy.ops.arapfields.apply_pose(name="bent")
+        bpy.ops.arapfields.apply_pose(pose="bent")
     other.data.transform(Matrix.Translation((0, -3, 0)))
     assert np.abs(scenes.world_points(other) - held).max() < 1e-5
     content = path.read_bytes()
@@ -149,8 +149,8 @@ def test_a_live_shape_is_saved():
     moving.location.z += 0.4
     step(refined=True)
     shown = scenes.world_points(bar)
-    assert bpy.ops.arapfields.save_pose(name="Raised") == {"FINISHED"}
+    assert bpy.ops.arapfields.save_pose(pose="Raised") == {"FINISHED"}
     bpy.ops.arapfields.live()
     assert np.abs(scenes.world_points(bar) - rest).max() < 1e-6
-    bpy.ops.arapfields.apply_pose(name="Raised")
+    bpy.ops.arapfields.apply_pose(pose="Raised")
     assert np.abs(scenes.world_points(bar) - shown).max() < 1e-4
