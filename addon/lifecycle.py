@@ -19,6 +19,7 @@ from .live.warm import warm
 from .pin_tool import drawing as pin_drawing
 from .pin_tool import tool
 from .pin_tool.hover import hover
+from .poses import applying
 from .surface import staleness
 from .viewport import handle_boxes, previews
 
@@ -26,7 +27,8 @@ from .viewport import handle_boxes, previews
 @persistent
 def before_load(*_):
     """The file is about to go: whatever works on it ends, and nothing of it is applied."""
-    for state in (jobs.board, counts.pending, staleness.changed, rows.seen, warm, first_result.steps):
+    passing = (jobs.board, counts.pending, staleness.changed, rows.seen, warm)
+    for state in (*passing, applying.solved, first_result.steps):
         state.clear()
     sessions.stop_all()
 
@@ -106,7 +108,7 @@ PARTS = (  # what begins with the extension, and how it ends
 # What may be there when the extension is disabled, in the order in which it ends; each has clear().
 # Timers are started by blender/timers.py, threads by core/runtime/threads.py.
 STATE = (jobs.board, display, sessions.live, counts.pending, staleness.changed, motion.written)
-STATE += (hover, warm, previews.shown, first_result.steps, rows.seen, timers)
+STATE += (hover, warm, applying.solved, previews.shown, first_result.steps, rows.seen, timers)
 
 LONGEST = 10.0  # seconds that the end of the process waits for a thread
 

@@ -19,6 +19,8 @@ class ARAPFIELDS_MT_object(bpy.types.Menu):
         layout.operator(Op.PIN_TOOL, icon="PINNED")
         layout.operator(Op.PIN_ADD, icon="ADD")
         layout.operator(Op.ADD_HANDLE, icon="EMPTY_DATA")
+        layout.operator(Op.ADD_BONES, text="Handles from Armature", icon="ARMATURE_DATA")
+        layout.operator(Op.CARRY, icon="LINKED")
         layout.operator(Op.SET_REST, icon="PINNED")
         layout.operator(Op.RESET_HANDLE, icon="LOOP_BACK")
         layout.separator()
@@ -34,6 +36,8 @@ class ARAPFIELDS_MT_object(bpy.types.Menu):
         layout.separator()
         layout.operator(Op.FIT, icon="MOD_REMESH")
         layout.operator(Op.EXTRACT, icon="OUTLINER_OB_SURFACE")
+        layout.operator(Op.SAVE_POSE, icon="FILE_TICK")
+        layout.operator(Op.APPLY_POSE, icon="CHECKMARK")
         layout.operator(Op.APPLY_KEY, icon="SHAPEKEY_DATA")
         layout.operator(Op.REMOVE_FIELD, text="Remove ARAP Fields Modifier", icon="X")
 

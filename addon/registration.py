@@ -12,14 +12,15 @@ from .properties import item
 
 CONTENTS = [  # modules with CLASSES
     # what is stored in the .blend: object.arapfields
-    *("handles.properties", "pin_tool.properties", "animation.properties", "properties.settings"),
-    *("carried.properties", "properties.item"),
+    *("handles.properties", "carried.properties", "poses.properties", "pin_tool.properties"),
+    *("stiffness.properties", "animation.properties", "properties.settings", "properties.item"),
     # features
     *("surface.operators", "surface.panel"),
     *("handles.operators", "handles.resizing", "handles.panel"),
     *("deform.operators", "deform.panel"),
     *("stylize.operators", "stylize.panel"),
-    *("carried.operators", "carried.panel"),
+    *("carried.operators", "carried.panel", "poses.operators", "poses.panel"),
+    *("stiffness.operators", "stiffness.panel"),
     *("live.operators", "pin_tool.operators", "animation.operators"),
     *("animation.export_operators", "animation.panel"),
     *("results.operators", "results.panel", "jobs.operators", "jobs.panel"),

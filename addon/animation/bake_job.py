@@ -23,7 +23,7 @@ class BakePass:
 
     def __init__(self, bakes, frames):
         self.bakes, self.frames = bakes, frames
-        moving = any(bake.session.moves_by_itself for bake in bakes)
+        moving = any(bake.session.moves_by_itself or bake.session.carrying.passengers for bake in bakes)
         self.feed = FrameFeed(AHEAD if moving else frames.count)
 
     def item(self, context, job, failures):
@@ -78,6 +78,7 @@ class BakePass:
                 if bake.error is not None:
                     raise bake.error
                 lines.append((yield from bake.place(context, job)))
+                failures += [f"{bake.name}: {translated(reason)}" for reason in bake.carried.warnings]
             except (UserError, ValueError) as error:
                 failures.append(f"{bake.name}: {translated(error)}")
         if not lines:

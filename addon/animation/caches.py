@@ -11,12 +11,13 @@ from ..core.errors import UserError
 from .properties import FOLDER
 
 SUFFIXES = {"PC2": ".pc2", "MDD": ".mdd"}
+BARRED = re.compile(r'[\x00-\x1f/\\:*?"<>|]')  # letters that a file's name cannot have
 HEAVY = 500e6  # bytes of shape keys, above which a cache would serve better
 
 
 def cache_path(source, suffix, folder, filepath=""):
     """(absolute path, the same as the modifier has it) of an object's cache; UserError where none can be."""
-    name = re.sub(r'[\x00-\x1f/\\:*?"<>|]', "_", source.name)
+    name = BARRED.sub("_", source.name)
     told = filepath or f"{folder.rstrip('/') or '/'}/{name}{suffix}"
     if told.startswith("//") and not bpy.data.filepath:
         raise UserError("save the .blend first, or choose a folder: the cache lies beside it")
@@ -31,6 +32,12 @@ def cache_path(source, suffix, folder, filepath=""):
         with contextlib.suppress(ValueError):  # on another drive
             told = bpy.path.relpath(str(path))
     return path, told
+
+
+def cache_beside(path, told, name):
+    """The same as cache_path, of an object that goes along: beside the other's cache, with both names."""
+    file = f"{path.stem} {BARRED.sub('_', name)}{path.suffix}"
+    return path.with_name(file), told.removesuffix(path.name) + file
 
 
 def plain(frame):

@@ -2,6 +2,7 @@
 """One object's bake: its solver, where its frames go, and what plays them at last."""
 
 import contextlib
+import functools
 import json
 import time
 
@@ -15,7 +16,8 @@ from ..handles import empties
 from ..live import animated, sessions
 from ..live.session import Session
 from ..results import placement, result_objects
-from .caches import keys_weight, plain, size_text
+from .caches import cache_beside, keys_weight, plain, size_text
+from .carried_bake import CarriedBake
 from .parts import SharedFrames
 
 STYLE_PATH = "arapfields.stylize"  # of what is keyframed of a style
@@ -46,6 +48,10 @@ class ObjectBake:
         self.reference, self.frames, self.path, self.told = ObjectReference(source), frames, path, told
         self.fps = context.scene.render.fps / context.scene.render.fps_base
         self.in_place, self.error, self.writer, self.shapes = in_place, None, None, []
+        beside = None if path is None else functools.partial(cache_beside, path, told)
+        self.carried = CarriedBake(
+            self.session.carrying, frames, beside, self.fps, is_shared=part is not None
+        )
         self.part, self.shared, self.missing, self.begun = part, None, 0, time.time()
 
     @property
@@ -58,12 +64,15 @@ class ObjectBake:
             source = self.reference.get()
             if self.session.moves_by_itself:
                 self.session.read_points(context, source)
+            self.session.carrying.expect_motion()
+            self.session.refresh_carried(context)
             return self.session.current_request(context, source)
         except (UserError, ValueError) as error:
             return error
 
     def prepare(self):
         self.session.prepare()
+        self.carried.prepare()
         if self.path is not None and self.part is not None:
             self.shared = SharedFrames(self.path, self.session, len(self.session.rest), self.part)
         elif self.path is not None:
@@ -84,7 +93,9 @@ class ObjectBake:
         if self.shared is not None:
             self.shared.add(self.session, request)
             return
-        points = self.session.solve_from_rest(request).points
+        shape = self.session.solve_from_rest(request)
+        points = shape.points
+        self.carried.add(shape.carried)
         if self.writer is not None:
             self.writer.write(points)
         else:
@@ -104,6 +115,7 @@ class ObjectBake:
             self.discard()
 
     def finish(self):
+        self.carried.finish()
         if self.shared is not None:
             with self.shared.alone():
                 self.join()
@@ -127,10 +139,18 @@ class ObjectBake:
         if self.writer is not None:
             self.writer.discard()
         self.shapes.clear()
+        self.carried.discard()
 
     def place(self, context, job):
-        """Coroutine: the cache in its place and what plays it; returns the line to report."""
+        """Coroutine: the caches in their places and what plays them; returns the line to report."""
         source = self.unchanged_source()
+        told = yield from self.place_own(context, source, job)
+        if self.carried.carrying.passengers:
+            sessions.end(context, source)
+            yield from self.carried.place(context, source, job)
+        return told
+
+    def place_own(self, context, source, job):
         if self.path is None:
             return (yield from self.add_keys(context, source, job))
         if self.missing:

@@ -16,6 +16,7 @@ SETTINGS = {  # class of properties → page
     "ARAPFIELDS_PG_handle": "handles",
     "ARAPFIELDS_PG_scene": "pins",
     "ARAPFIELDS_PG_carried": "characters",
+    "ARAPFIELDS_PG_stiffness": "characters",
     "ARAPFIELDS_PG_bake": "animation",
     "ARAPFIELDS_PG_object": "results",
 }

@@ -76,5 +76,8 @@ class NearestVertices:
         self.indices, self.shares = indices.astype(np.int64), 1.0 / np.maximum(distances, 1e-12)
 
     def __call__(self, weights):
-        blended = (self.shares * weights[self.indices]).sum(axis=1) / self.shares.sum(axis=1)
-        return np.clip(blended, 0.0, 1.0)
+        return np.clip(self.blend(weights), 0.0, 1.0)
+
+    def blend(self, values):
+        """(p,) of any (n,) values."""
+        return (self.shares * values[self.indices]).sum(axis=1) / self.shares.sum(axis=1)

@@ -10,7 +10,7 @@ from ..core.geometry.spaces import transform
 from ..field_modifier import motion
 from . import refusals
 from .carriers import MeshCarrier
-from .passengers import Frame, Passenger, give_back, is_carried_otherwise
+from .passengers import Frame, Passenger, find, give_back, is_carried_otherwise
 from .places import depsgraph_of, place_of
 from .transforms import BonesCarrier
 
@@ -75,6 +75,12 @@ class Carrying:
             moved = item.session_uid in objects and passenger.moves_by_itself(item)
             passenger.may_be_edited |= edited or moved
 
+    def expect_motion(self):
+        """Another frame: what moves by itself may have other points."""
+        for passenger in self.passengers:
+            item = passenger.reference.find()
+            passenger.may_be_edited |= item is not None and passenger.moves_by_itself(item)
+
     def refresh(self, context):
         """Reads again what may have been edited; whether any has other points."""
         changed = False
@@ -97,11 +103,11 @@ class Carrying:
 
     # On a worker.
 
-    def moved(self, af, samples, field, frames):
-        """[(passenger, what its carrier writes)] of all where the field takes them."""
-        return [(frame.passenger, self.moved_one(af, samples, field, frame)) for frame in frames]
+    def moved(self, af, samples, field, frames, strength=1.0):
+        """[(passenger, what its carrier writes)] of all where the field takes them, so much of the way."""
+        return [(frame.passenger, self.moved_one(af, samples, field, frame, strength)) for frame in frames]
 
-    def moved_one(self, af, samples, field, frame):
+    def moved_one(self, af, samples, field, frame, strength=1.0):
         passenger = frame.passenger
         attached = passenger.attached
         if attached is None or attached[0] is not frame.points or not near(attached[1], frame.rest):
@@ -110,6 +116,9 @@ class Carrying:
         after = np.asarray(attached[2].positions(field))
         if not np.isfinite(after).all():
             raise UserError("the shape has vertices that are NaN or infinite; move the handles less far")
+        if strength != 1.0:
+            rest = transform(frame.rest, frame.points)
+            after = rest + strength * (after - rest)
         return passenger.carrier.moved(frame.rest, frame.now, frame.parent, after)
 
     # Main thread: showing and taking back.
@@ -197,8 +206,3 @@ PAUSING = ("EDIT", "SCULPT", "SCULPT_CURVES", "EDIT_GREASE_PENCIL")  # modes in 
 
 def near(a, b):
     return np.allclose(a, b, rtol=0.0, atol=SAME_PLACE * max(1e-12, np.abs(a[:3, :3]).max()))
-
-
-def find(source, item):
-    """The entry of an object in a source's list, or None."""
-    return next((e for e in settings_of(source).carried if item is not None and e.item == item), None)

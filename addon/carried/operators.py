@@ -8,7 +8,7 @@ from ..core.errors import UserError
 from ..core.settings.choices import CARRYING
 from ..live import sessions
 from ..names import Op
-from . import carrying, passengers, refusals
+from . import passengers, refusals
 
 
 class CarriedOperator(Guided):
@@ -75,9 +75,9 @@ def carry(source, item, way):
     if reason is not None:
         raise reason
     other = settings_of(item).carried_by
-    if other is not None and other != source and carrying.find(other, item) is not None:
+    if other is not None and other != source and passengers.find(other, item) is not None:
         raise UserError("{name} is carried by {other} already", name=item.name, other=other.name)
-    entry = carrying.find(source, item)
+    entry = passengers.find(source, item)
     if entry is None:
         entry = settings_of(source).carried.add()
         settings_of(source).active_carried = len(settings_of(source).carried) - 1

@@ -51,6 +51,11 @@ class Frame:
         return self.points is other.points and all(np.array_equal(a, b) for a, b in pairs)
 
 
+def find(source, item):
+    """The entry of an object in a source's list, or None."""
+    return next((e for e in settings_of(source).carried if item is not None and e.item == item), None)
+
+
 def carrier_class(item, way):
     return TransformCarrier if way == "RIGID" else KINDS.get(item.type, TransformCarrier)
 

@@ -17,7 +17,9 @@ from ..core.geometry.edges import Topology
 from ..core.runtime import native
 from ..core.runtime.jobs import Item
 from ..jobs.job_operator import JobOperator
+from ..poses import applying
 from ..results import placement
+from ..stiffness import painted
 from ..surface.source_surface import read_surface
 from ..viewport.previews import Preview
 from .first_result import FirstResult
@@ -46,9 +48,11 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
     surface.exact = effective_value("surface", settings, operator) == "EXACT"
     surface.refine_thin = effective_value("refine_thin", settings, operator)
     carrying = Carrying(context, source)
+    surface.painted = painted.read(context, source, surface.in_place)
     surface.together = carrying.solids(context, surface.space)
     frames = carrying.frames(surface.space, depsgraph_of(context))
 
+    found = []  # the field and its samples
     shown = FirstResult if placement.keeps_mesh(output, target) else Preview
     preview = shown(surface) if operator.in_window else None
 
@@ -71,6 +75,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
         if not np.isfinite(after).all():
             raise UserError("the result has vertices that are not finite; try other settings")
         turns = surface.turns(field, before) if placement.keeps_mesh(output, target) else None
+        found.append((field, points))
         carried = carrying.moved(native.library(), points, field, frames)
         return SolvedMesh(surface.space.to_local(after), topology, report, turns, carried)
 
@@ -79,6 +84,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
             preview.clear()
         owner = surface.reference.get()
         item = placement.place_result(bpy.context, owner, kind, output, target, solved, surface.local)
+        applying.note(owner, *found[-1], surface.space)
         carrying.put(bpy.context, solved.carried)
         operator.warnings += [f"{owner.name}: {translated(reason)}" for reason in carrying.take_warnings()]
         said = describe(item, solved.report)

@@ -51,7 +51,7 @@ def chosen(rig, which, holding):
 
 
 def holding_groups(context, source):
-    """Names of the vertex groups that hold a vertex of the shape that is worked on, mirrored sides and all."""
+    """Names of the groups that hold a vertex of the shape that is worked on, mirrored sides and all."""
     with modifier_stack.evaluated_mesh(context, source, settings_of(source).in_place) as mesh:
         indices = {entry.group for vertex in mesh.vertices for entry in vertex.groups if entry.weight > 0}
     return {group.name for group in source.vertex_groups if group.index in indices}

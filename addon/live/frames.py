@@ -107,4 +107,5 @@ class SolvedFrames:
 def size(shape):
     """Bytes that belong to a shape alone."""
     parts = getattr(shape, "points", None), getattr(shape, "turns", None)
-    return sum(part.nbytes for part in parts if part is not None)
+    carried = sum(part.nbytes for _, part in getattr(shape, "carried", ()))
+    return carried + sum(part.nbytes for part in parts if part is not None)

@@ -4,13 +4,12 @@
 import contextlib
 
 import bpy
-import numpy as np
 
-from ..blender import mesh_arrays, modifier_stack, vertex_groups
+from ..blender import mesh_arrays, vertex_groups
 from ..blender.host import has_window
 from ..blender.object_references import ObjectReference, settings_of
 from ..blender.property_definitions import from_single_precision
-from ..carried.carrying import Carrying, Reshaped
+from ..carried.carrying import Carrying
 from ..carried.places import depsgraph_of
 from ..core.errors import UserError
 from ..core.geometry.spaces import space_of
@@ -20,9 +19,11 @@ from ..core.runtime.latest_request_worker import LatestRequestWorker
 from ..field_modifier import motion
 from ..handles import empties
 from ..results import placement
+from ..stiffness import painted
 from ..stylize import preference
 from ..surface.source_surface import read_surface
 from .animated import frame_range
+from .edits import Changed, Edits
 from .following import Following, scene_frame
 from .live_modifier import PAUSING, LiveModifier
 from .live_object import LiveObject
@@ -33,11 +34,7 @@ from .warm import warm
 PREVIEW_CELLS = 96  # at most, of the implicit surface that is shown while it moves
 
 
-class Changed(Exception):
-    """The source was edited, or its handles or settings: the solver must be set up again."""
-
-
-class Session(Following):
+class Session(Edits, Following):
     """Reads its source when made, on the main thread; everything that takes time is done by the worker.
 
     `shown`: whether there is something to be seen of it, which goes on from that of an `earlier` session.
@@ -56,7 +53,7 @@ class Session(Following):
         keeps=False,
         in_place=None,
     ):
-        self.keeps, self.quiet, self.is_restored = keeps, False, False
+        self.keeps, self.quiet, self.is_restored, self.edited_at = keeps, False, False, 0.0
         settings = settings_of(source)
         self.source, self.kind, self.layout = ObjectReference(source), kind, layout_of(source, kind)
         self.output = settings.output
@@ -79,6 +76,7 @@ class Session(Following):
         )
         self.worker, self.display = None, earlier.display if shown and earlier else None
         self.carrying, self.riding = Carrying(context, source), []
+        self.surface.painted = painted.read(context, source, in_place)
         self.surface.together = self.carrying.solids(context, self.surface.space)
         if keeps or frame_range(source, kind) is None:
             self.frame = scene_frame(context.scene)
@@ -89,7 +87,8 @@ class Session(Following):
         self.reading = self.read(context, follow)
 
     def ready_solver(self):
-        if self.kind != "DEFORM" or not self.surface.in_place or self.surface.together:
+        extras = self.surface.together or any(part is not None for part in self.surface.painted)
+        if self.kind != "DEFORM" or not self.surface.in_place or extras:
             return None
         return warm.take(self.surface, self.energy)
 
@@ -177,30 +176,6 @@ class Session(Following):
             self.is_restored = self.quiet = True
         else:
             self.requested = None
-
-    def read_points(self, context, source):
-        """Where the modifiers before have the points now: the field is evaluated there."""
-        self.may_have_moved = False
-        with modifier_stack.evaluated_mesh(context, source, in_place=True) as mesh:
-            points = mesh_arrays.positions(mesh)
-        if len(points) != len(self.placed):
-            raise Changed
-        if not np.array_equal(points, self.placed):
-            self.placed = points
-
-    def refresh_carried(self, context):
-        """Reads again what of the carried objects may have been edited."""
-        try:
-            self.carrying.refresh(context)
-        except Reshaped:
-            raise Changed from None
-
-    def is_edited(self, source):
-        """Whether the source's mesh is another than when it was read; looked at after an update of it."""
-        if not self.may_be_edited:
-            return False
-        self.may_be_edited = False
-        return mesh_arrays.fingerprint(source.data) != self.fingerprint
 
     def current_request(self, context, source, where=empties.matrix_of, seen=None, depsgraph=None):
         """The Request of what the handles and settings are now.

@@ -8,6 +8,7 @@ follow), and ends it with end(context, source), or end(context, source, keep=Tru
 
 import contextlib
 import functools
+import time
 
 import bpy
 
@@ -143,6 +144,7 @@ def watch(depsgraph):
             continue
         if source.data.session_uid in meshes:
             session.may_be_edited |= source.session_uid not in motion.written
+            session.edited_at = time.monotonic()
         elif session.moves_by_itself and any(moves(item, source) for item, _ in updated):
             session.may_have_moved = True
 

@@ -17,7 +17,8 @@ def energy_weights(settings, kind):
     if kind == "STYLIZE":
         weights["rigidity"], weights["keep_stance"] = group.rigidity, group.keep_stance
     weights = {name: from_single_precision(value) for name, value in weights.items()}
-    return weights | {"bending_unit": group.bending_unit.lower()}
+    weights |= {"bending_unit": group.bending_unit.lower()}
+    return weights | ({"symmetry": group.symmetry.lower()} if kind == "DEFORM" else {})
 
 
 def differ_in_handles(a, b):
@@ -38,7 +39,9 @@ def layout_of(source, kind):
         for e in empties.used(source)
     ]
     style = settings.stylize.region, settings.stylize.region_material
+    stiff = settings.stiffness
     further = (settings.output, settings.target, settings.surface)
+    further += (stiff.group, stiff.times, stiff.bend_group, stiff.bend_times)
     if kind == "STYLIZE":
         further += (*style, settings.stylize.use_handles)
     further += tuple((e.item.session_uid if e.item else 0, e.way) for e in settings.carried)

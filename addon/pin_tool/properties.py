@@ -1,10 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""scene.arapfields: settings of the pin tool."""
+"""scene.arapfields: settings of the pin tool, and kept poses."""
 
 import bpy
 
+from ..poses.properties import ARAPFIELDS_PG_pose
+
 
 class ARAPFIELDS_PG_scene(bpy.types.PropertyGroup):
+    poses: bpy.props.CollectionProperty(
+        type=ARAPFIELDS_PG_pose, name="Poses", description="Fields that are kept with the file"
+    )
+    active_pose: bpy.props.IntProperty(
+        name="Active Pose", description="Row chosen in the list of poses", options={"SKIP_SAVE"}
+    )
     pin_radius: bpy.props.IntProperty(
         name="Radius",
         description="Radius of the region that a new pin holds, on the screen",

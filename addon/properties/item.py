@@ -13,6 +13,7 @@ from ..core.settings.parameters import EXTRACTION
 from ..handles.properties import ARAPFIELDS_PG_handle
 from ..names import PROPERTY
 from ..pin_tool.properties import ARAPFIELDS_PG_scene
+from ..stiffness.properties import ARAPFIELDS_PG_stiffness
 from .settings import ARAPFIELDS_PG_deform, ARAPFIELDS_PG_fit, ARAPFIELDS_PG_stylize
 
 
@@ -75,6 +76,9 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     )
     active_handle: bpy.props.IntProperty(
         name="Active Handle", description="Row chosen in the list of handles", update=row_chosen
+    )
+    stiffness: bpy.props.PointerProperty(
+        type=ARAPFIELDS_PG_stiffness, name="Stiffness", description="Vertex groups that are stiffer or softer"
     )
     carried: bpy.props.CollectionProperty(
         type=ARAPFIELDS_PG_carried, name="Carried Objects", description="Objects that the field moves as well"

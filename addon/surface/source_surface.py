@@ -8,6 +8,7 @@ import numpy as np
 
 from ..blender import mesh_arrays, property_definitions, user_preferences
 from ..blender.object_references import ObjectReference, settings_of
+from ..blender.vertex_groups import NearestVertices
 from ..core.errors import UserError
 from ..core.geometry import rotations
 from ..core.geometry.edges import build_edges
@@ -36,6 +37,7 @@ class SourceSurface:
     has_free_normals: bool = False
     exact: bool = True  # whether the implicit surface is the triangles', or a fit of them
     together: list = field(default_factory=list)  # (vertices, triangles) of what is sampled with it
+    painted: tuple = (None, None)  # (n,) factors of the vertices' stiffness, and of that against bending
     refine_thin: bool = False  # whether extraction cuts its cells up at thin parts
     _sdf: object = None  # the fitted surface, once it was asked for
     _triangles: object = None  # the exact one
@@ -81,10 +83,25 @@ class SourceSurface:
         af = native.library()
         if not own_triangles:
             sdf = self.implicit(tracker, 0.3)
-            return af.sample_surface(sdf, count=count, seed=seed, task=tracker.start("Sampling", 0.15))
+            samples = af.sample_surface(sdf, count=count, seed=seed, task=tracker.start("Sampling", 0.15))
+            return self.painted_samples(samples)
+        weights, bend = self.painted
         if self.together:
-            return af.sample_meshes([(self.vertices, self.triangles), *self.together], count=count, seed=seed)
-        return af.sample_mesh(self.vertices, self.triangles, count=count, seed=seed)
+            meshes, rest = [(self.vertices, self.triangles), *self.together], [None] * len(self.together)
+            painted = {"weights": [weights, *rest], "bend_weights": [bend, *rest]}
+            return af.sample_meshes(meshes, count=count, seed=seed, **painted)
+        painted = {"weights": weights, "bend_weights": bend}
+        return af.sample_mesh(self.vertices, self.triangles, count=count, seed=seed, **painted)
+
+    def painted_samples(self, samples):
+        """Samples of an implicit surface, as stiff as the vertices near them."""
+        if all(factors is None for factors in self.painted):
+            return samples
+        near = NearestVertices(self.vertices, samples.points)
+        painted = [
+            None if factors is None else np.exp(near.blend(np.log(factors))) for factors in self.painted
+        ]
+        return samples.with_weights(*painted)
 
     def turns(self, field, points):
         """(n, 3) how a field turns free custom normals at points in solve space; None: there are none."""

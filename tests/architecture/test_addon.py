@@ -15,6 +15,8 @@ ORDER = [
     "field_modifier",
     "handles",
     "carried",
+    "poses",
+    "stiffness",
     "surface",
     "results",
     "viewport",

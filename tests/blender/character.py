@@ -15,9 +15,16 @@ import arapfields as af
 HEIGHT = 1.8
 EYE, EYES = 0.032, [(side * 0.055, -0.118, 1.68) for side in (-1, 1)]
 LOOSE = 0.02  # of the shirt, from the skin
-PARTS = [((0, 0, 0.85), (0, 0, 1.28), 0.16), ((0, 0, 1.2), (0, 0, 1.55), 0.065), ((0, 0, 1.62), (0, 0, 1.7), 0.14)]
+PARTS = [
+    ((0, 0, 0.85), (0, 0, 1.28), 0.16),
+    ((0, 0, 1.2), (0, 0, 1.55), 0.065),
+    ((0, 0, 1.62), (0, 0, 1.7), 0.14),
+]
 for s in (-1, 1):
-    PARTS += [((s * 0.1, 0, 1.28), (s * 0.78, 0, 1.28), 0.055), ((s * 0.09, 0, 0.82), (s * 0.11, 0, 0.1), 0.08)]
+    PARTS += [
+        ((s * 0.1, 0, 1.28), (s * 0.78, 0, 1.28), 0.055),
+        ((s * 0.09, 0, 0.82), (s * 0.11, 0, 0.1), 0.08),
+    ]
 BONES = {  # name: parent, head, tail
     "Hips": (None, (0, 0, 0.8), (0, 0, 1.0)),
     "Chest": ("Hips", (0, 0, 1.0), (0, 0, 1.36)),
@@ -119,7 +126,9 @@ def hair(body):
     curves.add_curves([6] * len(rows))
     lengths = np.linspace(0, 0.12, 6)[:, None]
     strands = [middles[row] + lengths * out[row] - [0, 0, 1] * lengths**2 * 3 for row in rows]
-    curves.attributes["position"].data.foreach_set("vector", np.concatenate(strands).astype(np.float32).ravel())
+    curves.attributes["position"].data.foreach_set(
+        "vector", np.concatenate(strands).astype(np.float32).ravel()
+    )
     return link("Hair", curves)
 
 

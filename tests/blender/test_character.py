@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A whole character moves by its bones: eyes stay in their sockets, the shirt off the skin, hair on the head."""
+"""A whole character moves by its bones: eyes stay in their sockets, hair on the head."""
 
 import pytest
 from inside import in_blender
@@ -58,7 +58,9 @@ def test_a_character_moves_whole():
     figures["shirt's least distance, of its own"] = (off[1] / off[0]).min()
 
     roots = hair_points(made.hair)[:, 0]
-    figures["hair roots off the scalp, of the size"] = np.abs(distances(*posed, roots)).max() / character.HEIGHT
+    figures["hair roots off the scalp, of the size"] = (
+        np.abs(distances(*posed, roots)).max() / character.HEIGHT
+    )
     figures["hair roots off at rest"] = np.abs(distances(*skin, strands[:, 0])).max() / character.HEIGHT
     on_head = rest["Hat"] @ turn[:3, :3].T + turn[:3, 3]
     figures["hat off the head's motion, of the size"] = (

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bakes of what a source carries, beside the source's own: caches, shape keys, or keyframes.
+
+Meshes go as the source goes: into a cache of their own, or into an object with a key a frame. Curves and
+lattices get a shape key a frame, whole objects and bones keyframes. Hair has nothing that Blender plays.
+"""
+
+import contextlib
+
+from ..blender.language import translated
+from ..carried.carriers import MeshCarrier
+from ..carried.passengers import find
+from ..carried.points import AttributeCarrier, KeyCarrier, drop_key, key_points, put_key
+from ..carried.transforms import BonesCarrier
+from ..core.errors import UserError
+from ..core.runtime.coroutines import Pause
+from ..field_modifier import cache_modifier
+from ..results import result_objects
+from .caches import plain
+
+BAKED_KEY = "ARAP Fields frame "  # how baked keys of curves and lattices begin
+
+
+class CarriedBake:
+    """Given the shapes of each frame in turn by the worker; placed on the main thread.
+
+    `cache_of(name)` is (path, the same as a modifier has it) of an object's cache; None for shape keys.
+    `is_shared`: other processes solve other frames, of the source alone.
+    """
+
+    def __init__(self, carrying, frames, cache_of, fps, is_shared):
+        self.carrying, self.frames, self.fps, self.warnings = carrying, frames, fps, []
+        self.shapes, self.writers, self.places = {}, {}, {}
+        for passenger in list(carrying.passengers):
+            name = passenger.reference.name
+            if is_shared:
+                carrying.leave(passenger, UserError("{name} is not baked in parts; bake it whole", name=name))
+            elif isinstance(passenger.carrier, AttributeCarrier):
+                carrying.leave(passenger, UserError("{name} cannot be baked; live mode plays it", name=name))
+            elif cache_of is not None and isinstance(passenger.carrier, MeshCarrier):
+                self.places[passenger] = cache_of(name)
+
+    def prepare(self):
+        """Opens the caches; on the worker."""
+        from arapfields.point_cache import PointCacheWriter
+
+        frames = {"start": self.frames.start, "step": self.frames.step, "fps": self.fps}
+        for passenger, (path, _) in self.places.items():
+            points = len(passenger.carrier.points)
+            self.writers[passenger] = PointCacheWriter(path, points, self.frames.count, **frames)
+
+    def add(self, shapes):
+        """Takes what one frame's shape carries; on the worker."""
+        for passenger, shape in shapes:
+            if passenger in self.writers:
+                self.writers[passenger].write(shape)
+            else:
+                self.shapes.setdefault(passenger, []).append(shape)
+
+    def finish(self):
+        for writer in self.writers.values():
+            writer.finish()
+
+    def discard(self):
+        for writer in self.writers.values():
+            writer.discard()
+        self.shapes.clear()
+
+    def place(self, context, source, job):
+        """Coroutine: puts all in their places; one that cannot take its motion is named."""
+        moved = []
+        for passenger in self.carrying.passengers:
+            try:
+                item, entry = passenger.reference.get(), find(source, passenger.reference.get())
+                if entry is None:
+                    raise UserError("{name} is no longer carried", name=item.name)
+                if passenger in self.writers:
+                    self.play(passenger, item)
+                elif len(self.shapes.get(passenger, ())) != self.frames.count:
+                    raise UserError("{name} was not there at every frame", name=item.name)
+                elif isinstance(passenger.carrier, MeshCarrier):
+                    yield from self.add_object(context, passenger, item)
+                elif isinstance(passenger.carrier, KeyCarrier):
+                    self.add_keys(passenger, item)
+                else:
+                    moved.append(passenger)
+            except (UserError, OSError, RuntimeError) as error:
+                self.warnings.append(
+                    error if isinstance(error, UserError) else UserError("{error}", error=error)
+                )
+        if moved:
+            yield from self.add_keyframes(context, source, moved, job)
+        self.warnings += self.carrying.take_warnings()
+
+    def play(self, passenger, item):
+        self.writers[passenger].commit()
+        cache_modifier.play(item, self.places[passenger][1], self.frames.start, self.frames.step)
+
+    def add_object(self, context, passenger, item):
+        shapes, frames = self.shapes[passenger], [plain(frame) for frame in self.frames]
+        mesh = result_objects.shown_mesh(context, item, len(shapes[0]))
+        report = {"frames": len(frames)}
+        baked = result_objects.show(context, item, "BAKE", "BAKE", mesh, report, select=False)
+        for number, shape in enumerate(shapes):
+            result_objects.add_frame(baked, frames, number, shape)
+            yield Pause.REDRAW
+        result_objects.hide(item)
+
+    def add_keys(self, passenger, item):
+        """A shape key a frame, in place of those of an earlier bake."""
+        drop_key(item, also_basis=False)
+        if item.data.shape_keys is None:
+            item.shape_key_add(name="Basis", from_mix=False)
+        keys = item.data.shape_keys
+        for key in [key for key in keys.key_blocks if key.name.startswith(BAKED_KEY)]:
+            item.shape_key_remove(key)
+        basis, frames = key_points(keys.reference_key), [plain(frame) for frame in self.frames]
+        for number, shape in enumerate(self.shapes[passenger]):
+            key = item.shape_key_add(name=f"{BAKED_KEY}{frames[number]}", from_mix=False)
+            put_key(key, basis + (shape - passenger.carrier.points))
+            for frame in frames[max(0, number - 1) : number + 2]:
+                key.value = float(frame == frames[number])
+                key.keyframe_insert("value", frame=frame)
+
+    def add_keyframes(self, context, source, moved, job):
+        """Plays the frames: deltas and poses are keyed over what the objects' own animation gives."""
+        scene = context.scene
+        present = scene.frame_current, scene.frame_subframe
+        try:
+            for number, frame in enumerate(self.frames):
+                job.report_main_thread(
+                    number / self.frames.count, translated("Storing frame {frame}", frame=plain(frame))
+                )
+                scene.frame_set(int(frame // 1), subframe=frame - frame // 1)
+                for passenger in moved:
+                    item, entry = passenger.reference.get(), find(source, passenger.reference.get())
+                    passenger.carrier.bind(context, item, entry)
+                    passenger.carrier.write(item, entry, self.shapes[passenger][number])
+                    insert(item, passenger.carrier, frame)
+                yield Pause.REDRAW
+        finally:
+            with contextlib.suppress(ReferenceError):
+                scene.frame_set(present[0], subframe=present[1])
+
+
+def insert(item, carrier, frame):
+    """Keyframes of what a carrier has written."""
+    turned = "rotation_quaternion" if item.rotation_mode == "QUATERNION" else "rotation_euler"
+    if not isinstance(carrier, BonesCarrier):
+        for path in ("delta_location", f"delta_{turned}"):
+            item.keyframe_insert(path, frame=frame)
+        return
+    for bone in item.pose.bones:
+        mode = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
+        for path in ("location", mode.get(bone.rotation_mode, "rotation_euler"), "scale"):
+            bone.keyframe_insert(path, frame=frame)

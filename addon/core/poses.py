@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A field to be kept: with samples of the surface that it was solved on, in one piece of bytes."""
+
+import base64
+import binascii
+import io
+import tempfile
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .errors import UserError
+from .geometry.spaces import inverse, transform
+from .runtime import native
+
+KEPT = 4000  # samples at most that tell where the surface is
+VERSION = 1
+OUTSIDE = 0.15  # of the shape's size: farther from it the field means nothing to another mesh
+FEW = 0.05  # share of the other mesh that may be farther
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A field in solve space, with samples of its shape there; `local_to_solve` is (4, 4)."""
+
+    field: object
+    samples: object
+    local_to_solve: np.ndarray
+
+    def to_solve(self, points):
+        return transform(self.local_to_solve, points)
+
+    def to_local(self, points):
+        return transform(inverse(self.local_to_solve), points)
+
+    def refusal(self, distances, name):
+        """Why a mesh with these (n,) distances of its points from the samples is none for the field, as a
+        UserError; None where it is one."""
+        size = float(np.linalg.norm(np.ptp(self.samples.points, axis=0)))
+        share = float((distances > OUTSIDE * size).mean())
+        if share <= FEW:
+            return None
+        return UserError(
+            "{share} of {name} lie outside of the pose's field; it was saved on another shape, or elsewhere",
+            share=f"{share:.0%}",
+            name=name,
+        )
+
+
+def to_bytes(pose):
+    """The pose as a file's content."""
+    points, normals = pose.samples.points, pose.samples.normals
+    kept = np.arange(0, len(points), max(1, -(-len(points) // KEPT)))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "field"
+        pose.field.save(str(path))
+        written = next(Path(folder).iterdir()).read_bytes()
+    buffer = io.BytesIO()
+    np.savez_compressed(
+        buffer,
+        version=VERSION,
+        field=np.frombuffer(written, np.uint8),
+        points=points[kept],
+        normals=normals[kept],
+        local_to_solve=pose.local_to_solve,
+    )
+    return buffer.getvalue()
+
+
+def from_bytes(content, name):
+    """The pose of a file's content; UserError that names it where that is none."""
+    af = native.library()
+    try:
+        with np.load(io.BytesIO(content), allow_pickle=False) as found:
+            if int(found["version"]) != VERSION:
+                raise UserError("{name} was written by a newer version", name=name)
+            matrix = np.array(found["local_to_solve"], dtype=np.float64).reshape(4, 4)
+            points, normals, written = found["points"], found["normals"], found["field"].tobytes()
+        if not np.isfinite(matrix).all() or not abs(np.linalg.det(matrix)) > 0:
+            raise UserError("{name} holds no pose", name=name)
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "field"
+            path.write_bytes(written)
+            field = af.DeformationField.load(str(path))
+        return Pose(field, af.SurfaceSamples(points, normals, field.frame), matrix)
+    except (KeyError, ValueError, OSError, EOFError, TypeError, zipfile.BadZipFile) as error:
+        raise UserError("{name} holds no pose", name=name) from error
+
+
+def to_text(content):
+    return base64.b85encode(content).decode("ascii")
+
+
+def from_text(text, name):
+    try:
+        return base64.b85decode(text)
+    except (ValueError, binascii.Error) as error:
+        raise UserError("{name} holds no pose", name=name) from error

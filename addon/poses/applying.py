@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A pose puts another mesh, and what that carries, where its field takes them."""
+
+import numpy as np
+from mathutils.kdtree import KDTree
+
+from ..blender import modifier_stack
+from ..blender.mesh_arrays import positions
+from ..blender.object_references import settings_of
+from ..carried.carrying import Carrying
+from ..carried.places import array, depsgraph_of
+from ..core.errors import UserError
+from ..core.geometry import rotations
+from ..core.geometry.spaces import Space
+from ..core.poses import Pose
+from ..core.runtime import native
+from ..field_modifier import motion
+
+LOOKED_AT = 4000  # points of the mesh that are compared with the shape of the pose
+solved = {}  # session_uid of a source → the Pose of its last solve, for it to be saved
+
+
+def note(source, field, samples, space):
+    """Keeps what a source's solve has found, until it is solved anew or the file is left."""
+    solved[source.session_uid] = Pose(field, samples, space.local_to_solve)
+
+
+def apply(context, source, pose, strength):
+    """Moves the source's points by the pose's field, so much of the way; returns UserErrors that are told."""
+    reason = motion.refusal(source)
+    if reason is None and settings_of(source).live_kind:
+        reason = UserError("{name} is live; end live mode first", name=source.name)
+    if reason is not None:
+        raise reason
+    with modifier_stack.evaluated_mesh(context, source, in_place=True) as mesh:
+        points, has_free_normals = positions(mesh), bool(modifier_stack.free_normals(mesh))
+    if not len(points) or not np.isfinite(points).all():
+        raise UserError("{name} has no points, or some that are not finite", name=source.name)
+    rest = pose.to_solve(points)
+    reason = pose.refusal(distances(pose.samples.points, rest), source.name)
+    if reason is not None:
+        raise reason
+    offsets, turns = strength * (pose.to_local(pose.field(rest)) - points), None
+    if has_free_normals:
+        turns = strength * rotations.turns(pose.field.jacobian(rest), pose.local_to_solve)
+    carrying = Carrying(context, source)
+    space = Space(pose.local_to_solve, array(source.matrix_world) @ np.linalg.inv(pose.local_to_solve))
+    frames = carrying.frames(space, depsgraph_of(context))
+    shapes = carrying.moved(native.library(), pose.samples, pose.field, frames, strength)
+    motion.bind(context, source)
+    motion.write(source, motion.Motion(offsets, turns))
+    carrying.put(context, shapes)
+    return carrying.take_warnings()
+
+
+def distances(samples, points):
+    """(k,) from some of the points to the nearest sample."""
+    tree = KDTree(len(samples))
+    for index, sample in enumerate(samples):
+        tree.insert(sample, index)
+    tree.balance()
+    return np.array([tree.find(point)[2] for point in points[:: max(1, len(points) // LOOKED_AT)]])

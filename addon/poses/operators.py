@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+from pathlib import Path
+
+import bpy
+
+from ..blender.guide import Guided
+from ..blender.language import translated
+from ..blender.object_references import refusal, source_of
+from ..core import poses
+from ..core.errors import UserError
+from ..core.poses import Pose
+from ..live import sessions
+from ..names import Op
+from . import applying
+
+SUFFIX = ".arappose"
+
+
+def kept_poses(context):
+    return context.scene.arapfields.poses
+
+
+def chosen(context, name):
+    """The kept pose of that name, or the one chosen in the list; UserError where there is none."""
+    found, group = kept_poses(context), context.scene.arapfields
+    if name:
+        entry = found.get(name)
+    else:
+        entry = found[group.active_pose] if 0 <= group.active_pose < len(found) else None
+    if entry is None:
+        raise UserError("there is no pose {name}", name=name) if name else UserError("Save a pose first")
+    return entry
+
+
+def keep(context, name, content):
+    """Puts a pose on the scene's list, in place of one of the same name."""
+    group = context.scene.arapfields
+    entry = group.poses.get(name) or group.poses.add()
+    entry.name, entry.data = name, poses.to_text(content)
+    group.active_pose = group.poses.find(name)
+
+
+def read(path):
+    try:
+        return Path(bpy.path.abspath(path)).read_bytes()
+    except OSError as error:
+        raise UserError("{path}: {error}", path=path, error=error.strerror) from error
+
+
+class PoseOperator(Guided):
+    """Mixin: runs `change(context)`, which returns the line to report; errors become reports."""
+
+    bl_options = {"REGISTER", "UNDO"}
+    guide = "characters"
+
+    def execute(self, context):
+        try:
+            self.report({"INFO"}, self.change(context))
+        except (UserError, ValueError, OSError) as error:
+            self.report({"ERROR"}, translated(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class OfSource(PoseOperator):
+    """Mixin of those that need a mesh."""
+
+    @classmethod
+    def poll(cls, context):
+        reason = refusal(source_of(context))
+        if reason:
+            cls.poll_message_set(translated(reason))
+        return not reason
+
+
+class ARAPFIELDS_OT_save_pose(OfSource, bpy.types.Operator):
+    """Keep the field that deforms the object, with the file, to apply it to other meshes of this shape"""
+
+    bl_idname = Op.SAVE_POSE
+    bl_label = "Save Pose"
+
+    pose: bpy.props.StringProperty(name="Name", description="Name of the pose", default="Pose")
+
+    def change(self, context):
+        source = source_of(context)
+        session = sessions.live.get(source.session_uid)
+        if session is not None:
+            sessions.update(context, wait=sessions.WAIT, refined=True)
+            pose = Pose(session.solver.field, session.samples, session.surface.space.local_to_solve)
+        else:
+            pose = applying.solved.get(source.session_uid)
+        if pose is None:
+            raise UserError("deform {name} first, or make it live: its field is saved", name=source.name)
+        keep(context, self.pose, poses.to_bytes(pose))
+        return translated("{name} kept", name=self.pose)
+
+    def invoke(self, context, event):
+        return context.window_manager.invoke_props_dialog(self)
+
+
+class ARAPFIELDS_OT_apply_pose(OfSource, bpy.types.Operator):
+    """Put the object where a kept pose's field takes it; other meshes of the same shape do as well"""
+
+    bl_idname = Op.APPLY_POSE
+    bl_label = "Apply Pose"
+
+    pose: bpy.props.StringProperty(name="Name", description="Name of the pose; empty for the chosen one")
+    filepath: bpy.props.StringProperty(
+        name="File", description="A pose's file, in place of a kept pose", subtype="FILE_PATH"
+    )
+    strength: bpy.props.FloatProperty(
+        name="Strength",
+        description="How far of the way the points go",
+        default=1.0,
+        soft_min=0.0,
+        soft_max=1.0,
+    )
+
+    def change(self, context):
+        context.view_layer.update()
+        source = source_of(context)
+        if self.filepath:
+            name = Path(self.filepath).name
+            content = read(self.filepath)
+        else:
+            entry = chosen(context, self.pose)
+            name, content = entry.name, poses.from_text(entry.data, entry.name)
+        told = applying.apply(context, source, poses.from_bytes(content, name), self.strength)
+        for reason in told:
+            self.report({"WARNING"}, translated(reason))
+        return translated("{pose} applied to {name}", pose=name, name=source.name)
+
+
+class OfPose(PoseOperator):
+    """Mixin of those that need a kept pose."""
+
+    @classmethod
+    def poll(cls, context):
+        if not kept_poses(context):
+            cls.poll_message_set(translated("Save a pose first"))
+            return False
+        return True
+
+
+class ARAPFIELDS_OT_remove_pose(OfPose, bpy.types.Operator):
+    """Take the chosen pose off the list; what it was applied to stays"""
+
+    bl_idname = Op.REMOVE_POSE
+    bl_label = "Remove Pose"
+
+    pose: bpy.props.StringProperty(name="Name", description="Name of the pose; empty for the chosen one")
+
+    def change(self, context):
+        group, name = context.scene.arapfields, chosen(context, self.pose).name
+        group.poses.remove(group.poses.find(name))
+        group.active_pose = max(0, min(group.active_pose, len(group.poses) - 1))
+        return translated("{name} removed", name=name)
+
+
+class PoseFile:
+    """Mixin: a file is chosen in a window."""
+
+    filepath: bpy.props.StringProperty(name="File", description="The pose's file", subtype="FILE_PATH")
+    filter_glob: bpy.props.StringProperty(
+        name="Filter", description="Files that are shown", default=f"*{SUFFIX}", options={"HIDDEN"}
+    )
+
+    def invoke(self, context, event):
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+
+class ARAPFIELDS_OT_export_pose(PoseFile, OfPose, bpy.types.Operator):
+    """Write the chosen pose to a file, for other files and scripts"""
+
+    bl_idname = Op.EXPORT_POSE
+    bl_label = "Export Pose"
+
+    def change(self, context):
+        entry = chosen(context, "")
+        path = Path(bpy.path.abspath(self.filepath)).with_suffix(SUFFIX)
+        partial = path.with_name(f"{path.name}.partial")
+        try:
+            partial.write_bytes(poses.from_text(entry.data, entry.name))
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
+        return translated("{name} kept", name=path.name)
+
+
+class ARAPFIELDS_OT_import_pose(PoseFile, PoseOperator, bpy.types.Operator):
+    """Add a pose from a file to the list"""
+
+    bl_idname = Op.IMPORT_POSE
+    bl_label = "Import Pose"
+
+    def change(self, context):
+        content, name = read(self.filepath), Path(self.filepath).stem
+        poses.from_bytes(content, Path(self.filepath).name)
+        keep(context, name, content)
+        return translated("{name} kept", name=name)
+
+
+CLASSES = [
+    ARAPFIELDS_OT_save_pose,
+    ARAPFIELDS_OT_apply_pose,
+    ARAPFIELDS_OT_remove_pose,
+    ARAPFIELDS_OT_export_pose,
+    ARAPFIELDS_OT_import_pose,
+]

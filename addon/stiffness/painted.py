@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Painted stiffness as the library takes it: factors of the vertices."""
+
+import numpy as np
+
+from ..blender import vertex_groups
+from ..blender.object_references import settings_of
+from ..core.runtime.coroutines import run_to_completion
+
+# name, label, tip: (times as stiff, times as stiff against bending)
+PRESETS = {
+    "SKIN": ("Skin", "Gives way: half as stiff, and easily bent", (0.5, 0.2)),
+    "RUBBER": ("Rubber", "Stretches, and bends as the rest", (0.1, 10.0)),
+    "WOOD": ("Wood", "Neither stretches nor bends", (1000.0, 1.0)),
+}
+
+
+def refusal(source):
+    """Why the groups cannot be read, as a UserError; None where they can."""
+    return vertex_groups.missing(source, names(source))
+
+
+def names(source):
+    settings = settings_of(source).stiffness
+    pairs = (settings.group, settings.times), (settings.bend_group, settings.bend_times)
+    return [group for group, times in pairs if group and times != 1.0]
+
+
+def read(context, source, in_place):
+    """((n,) factors of the vertices' stiffness, (n,) of that against bending); None each where all are 1."""
+    settings = settings_of(source).stiffness
+    weights = run_to_completion(vertex_groups.read_weights(context, source, names(source), in_place))
+    pairs = (settings.group, settings.times), (settings.bend_group, settings.bend_times)
+    return tuple(
+        factors(weights[group], times) if group in weights and times != 1.0 else None
+        for group, times in pairs
+    )
+
+
+def factors(weights, times):
+    """From 1 where the weight is 0 to `times` where it is 1, evenly in proportion."""
+    return np.power(float(times), np.asarray(weights, dtype=np.float64))
+
+
+def same(a, b):
+    return all(
+        (one is None) == (other is None) and (one is None or np.array_equal(one, other))
+        for one, other in zip(a, b, strict=True)
+    )

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Carried objects in bakes, renders, and through undo."""
+
+import pytest
+from inside import in_blender
+
+CLOSE = 1e-5  # single precision of positions of size one
+
+
+@pytest.mark.parametrize("format", ["PC2", "KEYS"])
+@in_blender
+def test_all_are_baked_at_once(format):
+    import tempfile
+
+    import bpy
+    import numpy as np
+    import scenes
+    from riders import body, rider, shown
+
+    bar, moving = body()
+    items = [rider(kind) for kind in ("MESH", "CURVE", "EMPTY", "ARMATURE", "CURVES")]
+    bpy.context.view_layer.update()
+    rest = [shown(item) for item in items]
+    scenes.activate(*items, bar)
+    bpy.ops.arapfields.carry()
+    for frame, height in ((1, 0.0), (3, 0.4)):
+        moving.location.z = height
+        moving.keyframe_insert("location", frame=frame)
+    for curve in (moving.animation_data.action.fcurves[2],):
+        for point in curve.keyframe_points:
+            point.interpolation = "LINEAR"
+    scenes.activate(bar)
+    folder = tempfile.mkdtemp()
+    assert bpy.ops.arapfields.bake(format=format, start=1, end=3, folder=folder) == {"FINISHED"}
+    patch = items[0] if format == "PC2" else bpy.data.objects["Patch_baked"]
+    for frame in (3, 1, 2):
+        bpy.context.scene.frame_set(frame)
+        for item, before in zip([patch, *items[1:4]], rest, strict=False):
+            shift = shown(item) - before
+            assert np.abs(shift - [0, 0, 0.2 * (frame - 1)]).max() < 0.08, (item.name, frame)
+    assert np.abs(shown(items[4]) - rest[4]).max() == 0  # hair has nothing that plays it, which is told
+
+
+@in_blender
+def test_undo_and_redo_take_all_along():
+    import bpy
+    import numpy as np
+    import scenes
+    from riders import body, rider, shown
+    from test_carried_kept import CLOSE
+
+    bpy.context.preferences.edit.use_global_undo = True
+    bar, moving = body()
+    names = [rider(kind).name for kind in ("MESH", "CURVES", "CURVE", "EMPTY", "ARMATURE")]
+    bpy.context.view_layer.update()
+    scenes.activate(*(bpy.data.objects[name] for name in names), bar)
+    bpy.ops.arapfields.carry()
+    moving.location.z += 0.4
+    scenes.activate(bar)
+
+    def places():
+        return [shown(bpy.data.objects[name]) for name in names]
+
+    bpy.ops.ed.undo_push(message="before")
+    before = places()
+    assert bpy.ops.arapfields.deform(field="radial", samples=2000) == {"FINISHED"}
+    bpy.ops.ed.undo_push(message="after")
+    after = places()
+    assert all(np.abs(one - other).max() > 0.2 for one, other in zip(before, after, strict=True))
+    for step, expected in ((bpy.ops.ed.undo, before), (bpy.ops.ed.redo, after), (bpy.ops.ed.undo, before)):
+        step()
+        found = places()
+        assert max(np.abs(one - other).max() for one, other in zip(found, expected, strict=True)) < CLOSE
+    bar = bpy.data.objects["Bar"]
+    scenes.activate(bar)
+    assert bpy.ops.arapfields.live() == {"FINISHED"}
+    bpy.ops.arapfields.live()
+    found = places()
+    assert max(np.abs(one - other).max() for one, other in zip(found, before, strict=True)) < CLOSE
+
+
+@in_blender
+def test_renders_show_all_at_the_frame_that_is_rendered():
+    import tempfile
+
+    import bpy
+    import numpy as np
+    import scenes
+    from riders import body, rider, shown
+    from test_live_render import camera
+
+    scene = camera(16)
+    bar, moving = body()
+    items = [rider(kind) for kind in ("MESH", "EMPTY", "CURVES")]
+    bpy.context.view_layer.update()
+    rest = [shown(item) for item in items]
+    scenes.activate(*items, bar)
+    bpy.ops.arapfields.carry()
+    for frame, height in ((1, 0.0), (3, 0.4)):
+        moving.location.z = height
+        moving.keyframe_insert("location", frame=frame)
+    scenes.activate(bar)
+    bpy.ops.arapfields.live()
+    scene.frame_start, scene.frame_end = 3, 3
+    scene.render.filepath = f"{tempfile.mkdtemp()}/"
+    bpy.ops.render.render(animation=True)
+    for item, before in zip(items, rest, strict=True):
+        assert np.abs(shown(item) - before - [0, 0, 0.4]).max() < 0.1, item.name

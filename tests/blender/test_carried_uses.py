@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Carried objects that are edited, lost or refused, that share an armature, and bakes."""
+
+import pytest
+from inside import in_blender
+
+CLOSE = 1e-5  # single precision of positions of size one
+
+
+@in_blender
+def test_what_moves_anyway_is_named_and_left():
+    import bpy
+    import scenes
+    from riders import body, rider
+
+    bar, _ = body()
+    patch, spot, cage = rider("MESH"), rider("EMPTY"), rider("LATTICE")
+    for item in (spot, cage):
+        scenes.activate(item, bar)
+        bpy.ops.arapfields.carry()
+    patch.parent = spot
+    scenes.activate(patch, bar)
+    with pytest.raises(RuntimeError, match="Patch moves with Spot already"):
+        bpy.ops.arapfields.carry()
+    patch.parent = None
+    patch.modifiers.new("Cage", "LATTICE").object = cage
+    with pytest.raises(RuntimeError, match="Patch moves with Cage already"):
+        bpy.ops.arapfields.carry()
+    assert len(bar.arapfields.carried) == 2
+
+
+@in_blender
+def test_bad_ones_are_named_and_the_rest_goes_on():
+    import bpy
+    import numpy as np
+    import scenes
+    from riders import body, link, rider, shown
+    from test_live import step
+
+    from addon.core.runtime import jobs
+    from addon.live import sessions
+
+    bar, moving = body()
+    good = rider("MESH")
+    bad = [link(name, bpy.data.meshes.new(name)) for name in ("Hollow", "Gone", "Dark", "Torn", "Lone")]
+    for item in bad[1:]:
+        item.data.from_pydata([(0.9, 0, 0.3), (1.0, 0, 0.3), (0.9, 0.1, 0.3)], [], [(0, 1, 2)])
+    scenes.activate(good, *bad, bar)
+    bpy.ops.arapfields.carry()
+    assert len(bar.arapfields.carried) == 6
+    bad[2].hide_set(True)
+    bad[3].data.vertices[0].co.x = float("nan")
+    bpy.data.objects.remove(bad[1])
+    before = shown(good)
+    scenes.activate(bar)
+    assert bpy.ops.arapfields.live() == {"FINISHED"}
+    told = "\n".join(text for _, text in jobs.messages())
+    for words in (
+        "Hollow is empty",
+        "Gone, which Bar carries, was deleted",
+        "Dark is hidden",
+        "Torn has points",
+    ):
+        assert words in told, told
+    moving.location.z += 0.4
+    step()
+    assert np.abs(shown(good) - before - [0, 0, 0.4]).max() < 0.1
+    bad[4].data.clear_geometry()
+    bpy.context.view_layer.update()
+    moving.location.z += 0.1
+    for _ in range(3):
+        step()
+    assert sessions.is_live(bar) and np.abs(shown(good) - before - [0, 0, 0.5]).max() < 0.1
+    bpy.data.objects.remove(bad[4])
+    moving.location.z -= 0.1
+    for _ in range(3):
+        step()
+    assert sessions.is_live(bar) and np.abs(shown(good) - before - [0, 0, 0.4]).max() < 0.1
+    scenes.activate(bar)
+    bpy.ops.arapfields.live()
+    assert np.abs(shown(good) - before).max() < 1e-5 and len(bar.arapfields.carried) == 6
+
+
+@in_blender
+def test_a_moved_or_edited_one_follows_from_where_it_is():
+    import bpy
+    import numpy as np
+    import scenes
+    from riders import body, rider, shown, taken
+    from test_carried_uses import CLOSE
+    from test_live import step
+
+    from addon.live import sessions
+
+    bar, moving = body()
+    patch, spot = rider("MESH"), rider("EMPTY")
+    scenes.activate(patch, spot, bar)
+    bpy.ops.arapfields.carry()
+    bpy.ops.arapfields.live()
+    moving.location.z += 0.4
+    step(refined=True)
+    session = sessions.live[bar.session_uid]
+    patch.location.x -= 0.5
+    spot.location.x -= 0.5
+    rest = np.array([v.co for v in patch.data.vertices]) + np.array(patch.location)
+    for _ in range(2):
+        step(refined=True)
+    assert np.abs(shown(patch) - taken(session, rest)).max() < CLOSE
+    assert np.abs(shown(spot)[0] - taken(session, np.array([spot.location]))[0]).max() < 0.02
+    patch.data.vertices[0].co.z += 0.1
+    patch.data.update()
+    rest[0, 2] += 0.1
+    for _ in range(2):
+        step(refined=True)
+    assert sessions.live[bar.session_uid] is session
+    assert np.abs(shown(patch) - taken(session, rest)).max() < CLOSE
+
+
+@in_blender
+def test_a_shirt_of_the_same_armature_is_not_posed_twice():
+    import bpy
+    import numpy as np
+    import scenes
+    from riders import taken
+    from test_bones import rigged_bar
+    from test_carried_uses import CLOSE
+    from test_live import step
+
+    from addon.live import sessions
+
+    bar, rig = rigged_bar()
+    shirt = bar.copy()
+    shirt.data, shirt.name = bar.data.copy(), "Shirt"
+    bpy.context.collection.objects.link(shirt)
+    for vertex in shirt.data.vertices:
+        vertex.co.y *= 1.1
+        vertex.co.z *= 1.1
+    rest = np.array([vertex.co for vertex in shirt.data.vertices])
+    scenes.activate(rig, bar)
+    bpy.ops.arapfields.add_bones()
+    scenes.activate(shirt, bar)
+    bpy.ops.arapfields.carry()
+    bpy.ops.arapfields.live()
+    rig.pose.bones["Second"].rotation_euler.z = 0.7
+    step(refined=True)
+    after = taken(sessions.live[bar.session_uid], rest)
+    assert np.abs(scenes.world_points(shirt) - after).max() < CLOSE
+    assert not shirt.modifiers["Armature"].show_viewport
+    bpy.ops.arapfields.live()
+    assert shirt.modifiers["Armature"].show_viewport and len(shirt.modifiers) == 1
+
+
+@in_blender
+def test_a_group_of_a_bone_that_is_missing_is_named():
+    import bpy
+    import pytest
+    import scenes
+    from test_bones import rigged_bar
+
+    bar, _ = rigged_bar()
+    bpy.ops.arapfields.add_bones()
+    bar.vertex_groups.remove(bar.vertex_groups["Second"])
+    scenes.activate(bar)
+    for run in (bpy.ops.arapfields.deform, bpy.ops.arapfields.live):
+        with pytest.raises(RuntimeError, match="Bar has no vertex group Second"):
+            run()
+    assert len(bar.arapfields.handles) == 2 and bar.modifiers["Armature"].show_viewport
+    assert len(bar.modifiers) == 1

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Poses: a field that was solved on one mesh moves others of the same shape."""
+
+from inside import in_blender
+
+
+def creature(name, cuts):
+    """A wavy body of revolution along x, as finely divided as `cuts` says."""
+    import bpy
+    import numpy as np
+    from riders import link
+
+    across, around = 4 * cuts, 2 * cuts
+    x, a = np.meshgrid(
+        np.linspace(-1, 1, across), np.linspace(0, 2 * np.pi, around, endpoint=False), indexing="ij"
+    )
+    radius = (0.2 + 0.05 * np.cos(7 * x)) * np.sqrt(np.maximum(1e-4, 1 - x**8))
+    points = np.stack([x, radius * np.cos(a), radius * np.sin(a)], axis=-1).reshape(-1, 3)
+    index = np.arange(across * around).reshape(across, around)
+    following = np.roll(index, -1, axis=1)
+    faces = np.stack([index[:-1], index[1:], following[1:], following[:-1]], axis=-1).reshape(-1, 4).tolist()
+    faces += [following[0][::-1].tolist(), following[-1].tolist()]
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(points.tolist(), [], faces)
+    item = link(name, mesh)
+    bpy.context.view_layer.update()
+    return item
+
+
+def saved(source):
+    """Deforms a creature and saves the pose "Bent"; returns how far its points moved."""
+    import bpy
+    import numpy as np
+    import scenes
+
+    rest = scenes.world_points(source)
+    fixed = scenes.cube_empty((-1.0, 0, 0), (0.3, 0.5, 0.5), "Fixed")
+    moving = scenes.cube_empty((1.0, 0, 0), (0.3, 0.5, 0.5), "Moving")
+    bpy.context.view_layer.update()
+    scenes.activate(fixed, moving, source)
+    bpy.ops.arapfields.add_handle()
+    moving.location.z, moving.rotation_euler.y = 0.4, -0.5
+    scenes.activate(source)
+    assert bpy.ops.arapfields.deform(field="radial", samples=3000) == {"FINISHED"}
+    assert bpy.ops.arapfields.save_pose(pose="Bent") == {"FINISHED"}
+    return float(np.linalg.norm(scenes.world_points(source) - rest, axis=1).max())
+
+
+@in_blender
+def test_a_pose_fits_other_resolutions():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_poses import creature, saved
+
+    import arapfields as af
+
+    source = creature("Body", 50)
+    assert len(source.data.vertices) == 20_000
+    others = [creature("Coarse", 16), creature("Fine", 158)]
+    assert [len(item.data.vertices) for item in others] == [2048, 199_712]
+    motion = saved(source)
+    before, after = {}, {}
+    for item in (source, *others):
+        before[item.name] = np.array([vertex.co for vertex in item.data.vertices])
+    for item in others:
+        scenes.activate(item)
+        assert bpy.ops.arapfields.apply_pose(pose="Bent") == {"FINISHED"}
+    for item in (source, *others):
+        after[item.name] = scenes.world_points(item)
+    source.data.calc_loop_triangles()
+    triangles = np.array([triangle.vertices for triangle in source.data.loop_triangles])
+    for item in others:
+        some = slice(None, None, max(1, len(before[item.name]) // 3000))
+        apart = [
+            np.abs(af.signed_distance(points["Body"], triangles, points[item.name][some]))
+            for points in (before, after)
+        ]
+        assert (apart[1] - apart[0]).max() <= 0.01 * motion, item.name
+        assert np.abs(after[item.name] - before[item.name]).max() > 0.3
+
+
+@in_blender
+def test_strength_files_and_refusals():
+    import tempfile
+    from pathlib import Path
+
+    import bpy
+    import numpy as np
+    import pytest
+    import scenes
+    from mathutils import Matrix
+    from riders import rider, shown
+    from test_poses import creature, saved
+
+    source, other = creature("Body", 16), creature("Other", 20)
+    patch = rider("MESH")
+    scenes.activate(patch, other)
+    bpy.ops.arapfields.carry()
+    with pytest.raises(RuntimeError, match="deform Other first"):
+        bpy.ops.arapfields.save_pose()
+    saved(source)
+    rest, of_patch = np.array([v.co for v in other.data.vertices]), shown(patch)
+    scenes.activate(other)
+    shifts, patches = [], []
+    for strength in (1.0, 0.5):
+        bpy.ops.arapfields.apply_pose(strength=strength)
+        shifts.append(scenes.world_points(other) - rest)
+        patches.append(shown(patch) - of_patch)
+    assert np.abs(shifts[0] - 2 * shifts[1]).max() < 1e-5 and np.abs(shifts[0]).max() > 0.3
+    assert np.abs(patches[0] - 2 * patches[1]).max() < 1e-5 and np.abs(patches[0]).max() > 0.3
+
+    path = Path(tempfile.mkdtemp()) / "bent.arappose"
+    assert bpy.ops.arapfields.export_pose(filepath=str(path)) == {"FINISHED"} and path.stat().st_size < 1e6
+    bpy.ops.arapfields.remove_pose()
+    with pytest.raises(RuntimeError, match="Save a pose first"):
+        bpy.ops.arapfields.apply_pose()
+    assert bpy.ops.arapfields.apply_pose(filepath=str(path)) == {"FINISHED"}
+    assert np.abs(scenes.world_points(other) - rest - shifts[0]).max() < 1e-6
+    assert bpy.ops.arapfields.import_pose(filepath=str(path)) == {"FINISHED"}
+    assert bpy.context.scene.arapfields.poses.keys() == ["bent"]
+
+    held = scenes.world_points(other)
+    other.data.transform(Matrix.Translation((0, 3, 0)))
+    bpy.context.view_layer.update()
+    with pytest.raises(RuntimeError, match="100% of Other lie outside of the pose's field"):
+        bpy.ops.arapfields.apply_pose(pose="bent")
+    other.data.transform(Matrix.Translation((0, -3, 0)))
+    assert np.abs(scenes.world_points(other) - held).max() < 1e-5
+    content = path.read_bytes()
+    for broken in (b"", content[: len(content) // 2], b"PK" + content[2:100], b"nonsense" * 50):
+        path.write_bytes(broken)
+        with pytest.raises(RuntimeError, match="holds no pose"):
+            bpy.ops.arapfields.import_pose(filepath=str(path))
+    with pytest.raises(RuntimeError, match=r"none\.arappose: No such file"):
+        bpy.ops.arapfields.import_pose(filepath=str(path.with_name("none.arappose")))
+
+
+@in_blender
+def test_a_live_shape_is_saved():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_live import step
+
+    bar, _, moving = scenes.bar_with_handles()
+    rest = scenes.world_points(bar)
+    bpy.ops.arapfields.live()
+    moving.location.z += 0.4
+    step(refined=True)
+    shown = scenes.world_points(bar)
+    assert bpy.ops.arapfields.save_pose(pose="Raised") == {"FINISHED"}
+    bpy.ops.arapfields.live()
+    assert np.abs(scenes.world_points(bar) - rest).max() < 1e-6
+    bpy.ops.arapfields.apply_pose(pose="Raised")
+    assert np.abs(scenes.world_points(bar) - shown).max() < 1e-4
