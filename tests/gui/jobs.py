@@ -72,7 +72,10 @@ def in_place(found, folder, before):
     """The mesh itself shows what there is so far, and is what it was after Cancel."""
     rest = stage.positions("Bar")
     invoke({**LONG, "target": "MODIFIER"})
-    yield 4.0
+    begin = time.perf_counter()
+    while np.abs(stage.positions("Bar") - rest).max() < 0.3 and time.perf_counter() - begin < 20.0:
+        yield 0.2
+    yield 1.0
     stage.picture(folder, "running")
     found["shown_on_the_mesh"] = round(float(np.abs(stage.positions("Bar") - rest).max()), 3)
     bpy.ops.arapfields.cancel()

@@ -126,6 +126,8 @@ class Meter:
         self.wall, self.own, self._restore = [], [], []
 
     def watch(self, owner, name):
+        """Not for what Blender itself calls on its classes, as draw: it makes room for the arguments that a
+        function names, here none, and stores the first all the same, which damages its memory."""
         original = getattr(owner, name)
 
         def timed(*given, **named):

@@ -29,7 +29,7 @@ MIDDLE = (560, 520)  # of the 3D view
 JAW = ((0.0, -0.35, -0.52), (0.50, 0.62, 0.46))
 EAR = ((1.12, 0.32, 0.17), (0.30, 0.36, 0.40))
 # In the sidebar with one section open alone: the list's + and its rows, Deform and Stylize.
-PLUS, FROM_EMPTIES, SECOND_ROW = (1261, 159), (1180, 187), (1130, 181)
+PLUS, FROM_EMPTIES, SECOND_ROW = (1261, 159), (1340, 180), (1130, 181)
 DEFORM, STYLIZE = (1140, 223), (1140, 313)
 
 
@@ -85,6 +85,10 @@ def found_by_name():
         yield from searched(text)
         yield from shot(f"f3-{text}")
         yield from keys("Escape", "Escape")
+    with stage.override():
+        bpy.ops.wm.call_menu(name="VIEW3D_MT_empty_add")
+    yield from shot("empties")
+    yield from keys("Escape", pause=1.0)
 
 
 def monkey():
@@ -163,6 +167,9 @@ def results():
     suzanne = next(item for item in bpy.data.objects if item.type == "MESH")
     rest = scenes.world_points(suzanne)
     yield from panel.open_alone({"deform"})
+    yield from click(*DEFORM, button=3, pause=1.5)
+    yield from shot("right-click")
+    yield from keys("Escape", pause=1.0)
     yield from click(*DEFORM, pause=0.0)
     yield from until(lambda: "ARAP Fields" in suzanne.modifiers, 10.0)
     yield from shot("deforming")
