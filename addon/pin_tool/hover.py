@@ -77,8 +77,11 @@ class View:
         return self.view.view_rotation @ type(self.view.view_location)((0, 0, 1))
 
 
-def under(context, view):
-    """The Target under the cursor, or None. Handles come first, behind or before the mesh."""
+def under(context, view, lights=False):
+    """The Target under the cursor, or None. Handles come first, behind or before the mesh.
+
+    `lights`: also what of a surface lights up, which takes a while on a large mesh.
+    """
     found = pins.handles_in_view(context)
     spots = screen.project(
         view.perspective, view.size, [e.empty.matrix_world.translation for _, e in found] or np.empty((0, 3))
@@ -92,10 +95,10 @@ def under(context, view):
         away = np.linalg.norm(spot - view.pixel) - RING * view.scale
         if entry.empty == active and not entry.anchor and abs(away) <= RING_REACH * view.scale:
             return Target("RING", ObjectReference(source), ObjectReference(active))
-    return surface(context, view)
+    return surface(context, view, lights)
 
 
-def surface(context, view):
+def surface(context, view, lights):
     """The Target of the first surface along the line of sight; None where that is no mesh to pin."""
     depsgraph = context.evaluated_depsgraph_get()
     met, location, normal, face, item, matrix = context.scene.ray_cast(depsgraph, *view.ray())
@@ -114,7 +117,7 @@ def surface(context, view):
         radius=radius,
         face=face,
         face_count=len(mesh.polygons),
-        lit=lit(mesh, matrix_of(source), location, radius),
+        lit=lit(mesh, matrix_of(source), location, radius) if lights else None,
     )
 
 

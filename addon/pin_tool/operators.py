@@ -49,7 +49,7 @@ class ARAPFIELDS_OT_pin_hover(PinOperator, bpy.types.Operator):
 
     def invoke(self, context, event):
         if context.region_data is not None and hover.drag is None:
-            before, hover.target = hover.target, under(context, View(context, event))
+            before, hover.target = hover.target, under(context, View(context, event), lights=True)
             if before is not None or hover.target is not None:
                 context.region.tag_redraw()
             source = hover.target.source.find() if hover.target is not None else None

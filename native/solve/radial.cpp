@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/parallel.h"
 #include "solve/live_solver.h"
@@ -51,9 +52,10 @@ std::shared_ptr<const RadialField> first_result(LiveSolver& solver, int steps, c
 }
 
 /// Solves until it converges, is out of steps or time, or the observer ends it. The solver's energy is the
-/// loss divided by `rigidity`.
+/// loss divided by `rigidity`. What is worse than `shown`, in its units, is not shown to whoever watches.
 LoopResult run(LiveSolver& live, const TrainingOptions& how, const Progress& progress,
-               const SolveHooks& hooks, double rigidity) {
+               const SolveHooks& hooks, double rigidity,
+               double shown = std::numeric_limits<double>::infinity()) {
   const int iterations = how.iterations;
   const Stopwatch watch;
   LoopResult result;
@@ -75,7 +77,8 @@ LoopResult run(LiveSolver& live, const TrainingOptions& how, const Progress& pro
     const int at_once = std::min(steps_at_once, iterations - result.iterations);
     const double done = static_cast<double>(result.iterations) / iterations;
     live.solve(at_once, 0.0, progress.part(done, done + static_cast<double>(at_once) / iterations));
-    progress.look([&](PointsIn points) { return live.field()->at(points); });
+    if (live.report().value <= shown)
+      progress.look([&](PointsIn points) { return live.field()->at(points); });
     result.iterations += static_cast<int>(live.report().iterations);
     result.history.emplace_back(result.iterations, live.report().value);
     result.seconds = watch.seconds();
@@ -177,8 +180,8 @@ Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const
       first_result(quick, std::min(style_first_steps, options.training.iterations), progress.part(0.1, 0.15));
   LiveSolver solver(samples, handles, live, progress.part(0.15, 0.3), shape);
   solver.set_style(preferred, options.strength, options.sharpness, weights, up);
-  solver.adopt(*first);
-  const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95), hooks, options.rigidity);
+  const LoopResult loop =
+      run(solver, options.training, progress.part(0.3, 0.95), hooks, options.rigidity, quick.report().value);
   ObjectiveTerms terms;
   terms.rigidity = options.rigidity;
   terms.stiffness = SurfaceStiffness(shape->thickness, options.surface);

@@ -52,7 +52,7 @@ def checks(found, folder):
     yield from stage.gaps(6.0, found, "late_with_a_job")
     seconds = time.perf_counter() - begin
     found["running"], found["progress"] = jobs.running() is not None, jobs.progress()
-    stage.picture(folder, "running")
+    stage.picture(folder, "running-apart")
     found["main_thread_at_once"], previews = ours.end(), shown.end()
     found["previews_per_second"] = round(previews["calls"] / seconds, 2)
     found["looks_per_second"] = round(jobs.running().preview_points()[1] / seconds, 2)
@@ -63,8 +63,25 @@ def checks(found, folder):
     found["exact_after_cancel"] = stage.everything() == before
     yield 1.0
     stage.picture(folder, "cancelled")
+    yield from in_place(found, folder, before)
     yield from escape(found, before)
     yield from result(found, folder)
+
+
+def in_place(found, folder, before):
+    """The mesh itself shows what there is so far, and is what it was after Cancel."""
+    rest = stage.positions("Bar")
+    invoke({**LONG, "target": "MODIFIER"})
+    begin = time.perf_counter()
+    while np.abs(stage.positions("Bar") - rest).max() < 0.3 and time.perf_counter() - begin < 20.0:
+        yield 0.2
+    yield 1.0
+    stage.picture(folder, "running")
+    found["shown_on_the_mesh"] = round(float(np.abs(stage.positions("Bar") - rest).max()), 3)
+    bpy.ops.arapfields.cancel()
+    yield from until_idle(30)
+    found["exact_after_cancel_in_place"] = stage.everything() == before
+    yield 1.0
 
 
 def escape(found, before):

@@ -16,6 +16,7 @@ def checks(found, folder):
     bar, moving = bpy.data.objects["Bar"], bpy.data.objects["Moving"]
     bar.modifiers.new("Subdivision", "SUBSURF")
     moving.location.z, moving.rotation_euler.y = 0.45, -0.5
+    bar.arapfields.surface = "FIT"  # which has more to show
     yield 1.0
     stage.picture(folder, "handles")
     yield from sections(folder, "panel")
@@ -31,6 +32,7 @@ def checks(found, folder):
     yield from preferences(folder, "preferences")
     yield from open_alone({"source", "handles", "deform", "stylize"})
     bar.modifiers.clear()
+    bar.arapfields.surface = "EXACT"
     found["sections"] = len(EVERYDAY) + len(WITHIN)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From the press of Deform and of Stylize to a picture, on 50,000 vertices; what is shown before stays nowhere."""
+"""From the press of Deform or Stylize to a picture, at 50,000 vertices; what shows before stays nowhere."""
 
 import time
 

@@ -16,15 +16,17 @@ TAB = (1299, 340)  # where the sidebar's last tab lies in a window of 1600 × 10
 
 
 def start(steps, ended, folder):
-    """Runs the generator `steps()` of pauses in seconds beside Blender's events, with the add-on switched on.
+    """Runs the generator `steps()` of pauses in seconds beside Blender's events, with the add-on switched on
+    unless it is installed.
 
     Then calls `ended(error)`, the error being a traceback or None, and leaves Blender.
     """
-    import addon
+    import addon.names
 
     bpy.context.preferences.view.show_splash = False
     folder.mkdir(parents=True, exist_ok=True)
-    addon.register()
+    if not hasattr(bpy.types.Object, addon.names.PROPERTY):
+        addon.register()
     sequence = steps()
 
     def drive():
@@ -124,6 +126,8 @@ class Meter:
         self.wall, self.own, self._restore = [], [], []
 
     def watch(self, owner, name):
+        """Not for what Blender itself calls on its classes, as draw: it makes room for the arguments that a
+        function names, here none, and stores the first all the same, which damages its memory."""
         original = getattr(owner, name)
 
         def timed(*given, **named):

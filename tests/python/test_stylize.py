@@ -38,6 +38,21 @@ def test_strength_zero_is_the_identity(ball):
     assert np.array_equal(field.jacobian(points), np.broadcast_to(np.eye(3), (200, 3, 3)))
 
 
+def test_strength_zero_is_the_identity_of_a_radial_field_too(ball):
+    field = af.stylize(ball, "cube", af.StylizeOptions(strength=0.0))
+    points = np.random.default_rng(0).uniform(-1, 1, size=(200, 3))
+    assert np.abs(field(points) - points).max() < 1e-6  # coefficients of single precision
+
+
+def test_a_style_shows_a_first_result(ball):
+    """Ten steps are looked at once, at their end; what few centers found is shown before."""
+    task = af.Task()
+    task.watch(ball.points, seconds=0.0)
+    field = af.stylize(ball, "cube", af.StylizeOptions(iterations=10), task=task)
+    off = np.abs(task.watched - field(ball.points)).max()
+    assert task.looks == 2 or (task.looks == 1 and off > 1e-3)
+
+
 def test_strength_grades_the_effect(ball):
     values = [af.stylize(ball, "cube", quick(strength=s)).report.preference for s in (0.0, 0.15, 1.0)]
     assert values[0] + 0.02 < values[1] < values[2] - 0.02
