@@ -49,22 +49,6 @@ def test_every_option_is_a_flag(capsys):
         assert not missing
 
 
-def test_a_preset_sets_what_other_flags_change(made, tmp_path):
-    report = tmp_path / "report.json"
-    few = [*HELD_AND_SHIFTED, "--preset", "paper", *SMALL_SOLVE, "--quiet", "--report", report]
-    assert run("deform", made / "mesh.obj", "-o", tmp_path / "moved.obj", *few) == 0
-    assert json.loads(report.read_text())["iterations"] == 15
-    field = af.DeformOptions.preset("paper")
-    assert (field.field, field.optimizer, field.bending_unit) == ("neural", "adam", "cube")
-    assert field.iterations != 15 and af.DeformOptions.preset("paper", iterations=15).iterations == 15
-    assert af.StylizeOptions.preset("paper").keep_stance == 0.0
-    assert af.FitOptions.preset("good") == af.FitOptions()
-    with pytest.raises(af.InvalidInput, match="known are paper"):
-        af.DeformOptions.preset("cloth")
-    with pytest.raises(af.InvalidInput, match="unknown option 'x'"):
-        af.DeformOptions.preset("paper", x=1)
-
-
 def test_fit_saves_what_the_library_makes(made, tmp_path):
     report, again = tmp_path / "report.json", tmp_path / AGAIN
     assert run("fit", made / "mesh.obj", "-o", again, "--report", report, "--quiet", *SMALL_FIT) == 0
