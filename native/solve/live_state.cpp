@@ -37,8 +37,12 @@ constexpr double worthwhile_gain = 0.1;
 
 LiveSolver::State::State(const SurfaceSamples& samples, const std::vector<Handle>& handles,
                          const LiveOptions& options, const Progress& progress,
-                         std::shared_ptr<const RestShape> shape)
-    : options_(options), frame_(samples.frame), surface_(samples.points), surface_normals_(samples.normals) {
+                         std::shared_ptr<const RestShape> shape, std::shared_ptr<const HandleBlend> blend)
+    : options_(options),
+      frame_(samples.frame),
+      surface_(samples.points),
+      surface_normals_(samples.normals),
+      blend_(std::move(blend)) {
   options.validate();
   const Stopwatch watch;
   const ThreadScope threads(options.threads);
@@ -54,7 +58,8 @@ LiveSolver::State::State(const SurfaceSamples& samples, const std::vector<Handle
   coefficients_ = basis_.identity();
   progress.report(0.2, "centers placed");
   bending_ = SurfaceStiffness(shape->thickness, options.surface).bending(rows_of(surface_, chosen_));
-  stiffness_ = stiffness_matrix(basis_, rows_of(surface_, chosen_), bending_, progress.part(0.2, 0.8));
+  stiffness_ =
+      stiffness_matrix(basis_, rows_of(surface_, chosen_), bending_, progress.part(0.2, 0.8), blend_.get());
   prepare(fast_);
   set_handles(handles);
   report_.setup_seconds = watch.seconds();
@@ -64,6 +69,7 @@ template <class Scalar>
 void LiveSolver::State::prepare(Precision<Scalar>& precision) {
   precision.objective = std::make_unique<LiveObjective<Scalar>>(basis_, rows_of(surface_, chosen_), bending_,
                                                                 options_.handle_weight);
+  if (blend_) precision.objective->set_blend(LiveBlend<Scalar>(*blend_, rows_of(surface_, chosen_)));
   precision.objective->set_barrier(options_.surface.barrier, options_.surface.barrier_threshold);
   if (inverse_factor_.size() > 0) precision.objective->set_handles(pairs_, pair_values_, inverse_factor_);
   precision.objective->set_style(style_);
@@ -240,7 +246,8 @@ void LiveSolver::State::measure(Precision<Scalar>& precision) {
   report_.arap = terms.arap;
   report_.preference.reset();
   if (style_) report_.preference = 1.0 - terms.gauss;
-  report_.distortion = distortion<Scalar>(objective.jets(precision.u));
+  report_.distortion =
+      objective.with_jets(precision.u, [](JetView<const Scalar> jets) { return distortion<Scalar>(jets); });
   report_.notes = notes_on(report_.distortion, far_target(bound_, surface_));
   const Points values = objective.handle_values(precision.u).template cast<double>();
   const Vector distance = (values - pairs_.targets).rowwise().norm();
@@ -278,6 +285,7 @@ void LiveSolver::State::adopt(const DeformationField& field) {
   Points ends(pairs_.sources.rows(), 3);
   field.evaluate(pairs_.sources, {ends.data(), ends.rows(), JetOrder::value});
   VectorF wanted = VectorF::Zero(30 * places.rows() + 3 * ends.rows() + 3 * basis_.center_count());
+  if (blend_) LiveBlend<double>(*blend_, places).multiply(jets.view());
   wanted.head(30 * places.rows()) =
       Eigen::Map<const Vector>(jets.view().data, 30 * places.rows()).cast<float>();
   wanted.segment(30 * places.rows(), 3 * ends.rows()) =

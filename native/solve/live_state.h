@@ -13,7 +13,8 @@ namespace arapfields {
 class LiveSolver::State {
  public:
   State(const SurfaceSamples& samples, const std::vector<Handle>& handles, const LiveOptions& options,
-        const Progress& progress, std::shared_ptr<const RestShape> shape);
+        const Progress& progress, std::shared_ptr<const RestShape> shape,
+        std::shared_ptr<const HandleBlend> blend);
   void set_handles(const std::vector<Handle>& handles);
   void set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights,
                  const Vec3& up);
@@ -59,9 +60,10 @@ class LiveSolver::State {
 
   LiveOptions options_;
   Frame frame_;
-  Points surface_, surface_normals_;  // all samples, cube coordinates
-  std::vector<Index> chosen_;         // those that the energy sees
-  Vector bending_;                    // λ of these
+  Points surface_, surface_normals_;          // all samples, cube coordinates
+  std::shared_ptr<const HandleBlend> blend_;  // null: handles are soft
+  std::vector<Index> chosen_;                 // those that the energy sees
+  Vector bending_;                            // λ of these
   std::vector<Handle> handles_;
   BoundHandles bound_;
   std::vector<Index> pair_rows_;  // rows of bound_ that pull
