@@ -70,6 +70,24 @@ void bind_attributes(py::object cls, const std::vector<OptionAttribute>& attribu
       "__eq__(self, other: object) -> bool");
 }
 
+void bind_presets(py::object cls, const char* values, const char* doc) {
+  py::options text;
+  text.disable_function_signatures();
+  const py::dict presets = py::module_::import("ast").attr("literal_eval")(values);
+  const py::handle kind = cls;  // a class of ours lives as long as its module
+  const py::cpp_function preset(
+      [=](const std::string& name, const py::kwargs& changes) {
+        if (!presets.contains(name))
+          throw InvalidInput(py::cast<std::string>(kind.attr("__name__")), "unknown preset '" + name + "'",
+                             "known are " + py::cast<std::string>(py::str(", ").attr("join")(presets)));
+        py::object options = kind(**py::dict(presets[name.c_str()]));
+        set_attributes(options, changes);
+        return options;
+      },
+      py::name("preset"), py::doc(doc), py::arg("name"));
+  cls.attr("preset") = py::module_::import("builtins").attr("staticmethod")(preset);
+}
+
 void set_attributes(py::handle self, const py::kwargs& given) {
   for (const auto& [key, value] : given) {
     const py::object property = py::getattr(py::type::handle_of(self), key, py::none());

@@ -52,6 +52,9 @@ void write_option(void* member, py::handle value, const std::string& label) {
 
 /// Adds attributes, `fields`, `to_dict()`, repr and equality to a class whose constructor takes keywords.
 void bind_attributes(py::object cls, const std::vector<OptionAttribute>& attributes);
+/// Adds the static method preset(): the options of a name in `values`, a Python literal {name: {option:
+/// value}}.
+void bind_presets(py::object cls, const char* values, const char* doc);
 /// Sets the attributes that the keywords name. An unknown keyword raises InvalidInput that lists what exists.
 void set_attributes(py::handle self, const py::kwargs& given);
 

@@ -18,7 +18,7 @@ constexpr int grid_steps_a_sure_cell = 2;  // where Φ's own bound on |∇Φ| ma
 constexpr int fewest_coarse_cells = 8;     // a side
 constexpr int finest_resolution = 512;     // that can be asked for …
 constexpr int finest_refined = 2048;       // … and to which thin parts are refined
-constexpr Index points_a_thin_cell = 30;   // about, that cutting its edges in three takes
+constexpr Index points_a_thin_cell = 24;   // about, that cutting its edges in three takes
 
 /// Cells of about the same number of grid steps at every resolution.
 TricubicSurrogateOptions model_options(int resolution, bool sure) {

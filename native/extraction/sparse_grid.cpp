@@ -145,6 +145,11 @@ void SparseGrid::predict(Block& block) const {
                 for (int c = 0; c < 4; ++c) value += weights[1][j][b] * weights[2][k][c] * plane[4 * b + c];
               block.value[at] = value;
               block.error[at] = doubt_share * model_->error(cell);
+              if (std::abs(value) > block.error[at]) continue;
+              const int kept = model_->settled_sign(
+                  cell, {coordinate(block.place[0] * side + i), coordinate(block.place[1] * side + j),
+                         coordinate(block.place[2] * side + k)});
+              if (kept != 0 && (value < 0.0f) == (kept < 0)) block.error[at] = 0.0f;
             }
         }
       }
@@ -195,53 +200,88 @@ void SparseGrid::keep_around(const Block& block, const Window& window, int i, in
               entry(block.place[0] + shift(x), block.place[1] + shift(y), block.place[2] + shift(z)));
 }
 
-/// Points of a block to evaluate: ends of edges on which the sign changes, and points whose sign is in doubt.
-/// A doubt is settled without an evaluation where a neighbour's |Φ| is more than the step between them allows
-/// Φ to change.
-void SparseGrid::wish(std::int32_t index, bool first_round, Wish& out) const {
+/// The sign that |Φ| at one of the 26 points beside a point leaves it, to be more than `slack` away from
+/// zero.
+int SparseGrid::settled_sign(const Window& window, int i, int j, int k, double slope, double slack) const {
+  for (int n = 0; n < 27; ++n) {
+    const int x = n / 9 - 1, y = n / 3 % 3 - 1, z = n % 3 - 1, next = Window::at(i + x, j + y, k + z);
+    if (!window.exact[next]) continue;
+    const double reach = slope * spacing_ * std::sqrt(static_cast<double>(x * x + y * y + z * z)) + slack;
+    if (std::abs(window.value[next]) > reach) return window.value[next] < 0.0f ? -1 : 1;
+  }
+  return 0;
+}
+
+/// Points of a block to evaluate: ends of edges on which the sign changes, and points whose sign is in doubt:
+/// every other one of each axis first. A doubt is settled without an evaluation where |Φ| at a point beside
+/// it is more than the way between them allows Φ to change.
+void SparseGrid::wish(std::int32_t index, Round round, Wish& out) const {
   const Block& block = blocks_[static_cast<std::size_t>(index)];
   Window window;
   look(block, window);
-  const auto reach = static_cast<float>(model_ == nullptr ? far : model_->lipschitz() * spacing_);
+  const double slope = model_ == nullptr ? far : model_->lipschitz();
+  // Without p nothing else tells how deep a settled point lies, and thin parts are told by whether it is a
+  // step.
+  const double slack = blind_ ? spacing_ : 0.0;
   for (int i = 0; i < side; ++i)
     for (int j = 0; j < side; ++j)
       for (int k = 0; k < side; ++k) {
         const int at = Window::at(i, j, k);
         const float value = window.value[at];
         if (std::isnan(value)) continue;
-        bool change = false, settled = !(std::abs(value) <= window.error[at]);
+        if (!window.exact[at] && std::abs(value) <= window.error[at]) {
+          const int sign = settled_sign(window, i, j, k, slope, slack);
+          if (sign != 0 && (blind_ || (value < 0.0f) == (sign < 0))) {
+            out.settled.push_back({{index, local(i, j, k)}, sign});
+            continue;
+          }
+          const bool even = ((i | j | k) & 1) == 0;
+          if (round == Round::rest || (round == Round::every_other && even) ||
+              (blind_ && model_ == nullptr)) {
+            out.points.push_back({index, local(i, j, k)});
+            continue;
+          }
+          if (blind_) continue;
+        }
+        bool change = false;
         for (const auto& step : neighbours) {
           const int next = Window::at(i + step[0], j + step[1], k + step[2]);
-          change = change || differs(value, window.value[next]);
-          settled = settled || (window.exact[next] && std::abs(window.value[next]) > reach);
+          const bool unknown = blind_ && !window.exact[next] && window.error[next] > 0.0f;
+          change = change || (!unknown && differs(value, window.value[next]));
         }
         if (change) keep_around(block, window, i, j, k, out.neighbours);
-        if (!window.exact[at] && (change || (!settled && (!first_round || blind_))))
-          out.points.push_back({index, local(i, j, k)});
+        if (change && !window.exact[at]) out.points.push_back({index, local(i, j, k)});
       }
 }
 
 void SparseGrid::refine(EvaluationCounter& function) {
-  for (bool first_round = true;; first_round = false) {
+  for (Round round = blind_ ? Round::every_other : Round::changes;;) {
     const auto count = static_cast<Index>(blocks_.size());
     const Index chunks = (count + blocks_per_chunk - 1) / blocks_per_chunk;
     std::vector<Wish> wishes(static_cast<std::size_t>(chunks));
     parallel_for(0, chunks, 1, [&](Index begin, Index end) {
       for (Index chunk = begin; chunk < end; ++chunk)
         for (Index b = chunk * blocks_per_chunk; b < std::min(count, (chunk + 1) * blocks_per_chunk); ++b)
-          wish(static_cast<std::int32_t>(b), first_round, wishes[static_cast<std::size_t>(chunk)]);
+          wish(static_cast<std::int32_t>(b), round, wishes[static_cast<std::size_t>(chunk)]);
     });
     std::vector<Point> wanted;
     bool grown = false;
     for (const Wish& each : wishes) {
       wanted.insert(wanted.end(), each.points.begin(), each.points.end());
+      for (const auto& [point, sign] : each.settled) {
+        Block& block = blocks_[static_cast<std::size_t>(point.block)];
+        if (blind_) block.value[point.local] = static_cast<float>(sign) * far;
+        block.error[point.local] = 0.0f;
+        grown = true;
+      }
       for (const Index neighbour : each.neighbours)
         if (table_[static_cast<std::size_t>(neighbour)] < 0) {
           keep(neighbour);
           grown = true;
         }
     }
-    if (wanted.empty() && !grown && !first_round) return;
+    if (wanted.empty() && !grown && round == Round::rest) return;
+    round = round == Round::changes ? Round::every_other : Round::rest;
     PointsF places(static_cast<Index>(wanted.size()), 3);
     for (std::size_t row = 0; row < wanted.size(); ++row) {
       const Block& block = blocks_[static_cast<std::size_t>(wanted[row].block)];

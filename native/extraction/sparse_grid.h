@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "sampling/tricubic_surrogate.h"
@@ -54,16 +55,20 @@ class SparseGrid {
   struct Point {
     std::int32_t block, local;
   };
+  /// What is asked for: first, where p tells it, the ends of edges on which the sign changes; then doubts.
+  enum class Round { changes, every_other, rest };
   struct Wish {
-    std::vector<Point> points;      // to evaluate
-    std::vector<Index> neighbours;  // blocks to keep from now on, as indices into table_
+    std::vector<Point> points;                   // to evaluate
+    std::vector<std::pair<Point, int>> settled;  // doubts that need no evaluation, and their signs
+    std::vector<Index> neighbours;               // blocks to keep from now on, as indices into table_
   };
   Index entry(int i, int j, int k) const { return (static_cast<Index>(i) * width_ + j) * width_ + k; }
   void keep(Index entry);
   void predict(Block& block) const;
   void keep_around(const Block& block, const Window& window, int i, int j, int k,
                    std::vector<Index>& missing) const;
-  void wish(std::int32_t block, bool first_round, Wish& out) const;
+  int settled_sign(const Window& window, int i, int j, int k, double slope, double slack) const;
+  void wish(std::int32_t block, Round round, Wish& out) const;
 
   int resolution_;
   int width_;  // blocks a side

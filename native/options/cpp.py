@@ -201,9 +201,23 @@ def bindings(table):
                 f"       &read_option<{kind}>, &write_option<{kind}>}},\n"
             )
         lines.append("  });\n")
+        if block["presets"]:
+            values = {key: preset["values"] for key, preset in block["presets"].items()}
+            lines.append(
+                f"  bind_presets(type, {quoted(repr(values))},\n      {quoted(preset_doc(block))});\n"
+            )
         aliases = [option for option in block["options"] if option["alias"]]
         lines += [f'  type.attr("{o["alias"]}") = type.attr("{o["name"]}");\n' for o in aliases]
     return "".join([*lines, "}\n\n}  // namespace arapfields::python\n"])
+
+
+def preset_doc(block):
+    names = ", ".join(f"'{name}'" for name in block["presets"])
+    sentences = "".join(f"\n'{name}': {preset['sentence']}." for name, preset in block["presets"].items())
+    return (
+        f"preset(name: typing.Literal[{names}], **changes: typing.Any) -> {block['struct']}\n\n"
+        f"Options that go together, with changes. Raises InvalidInput for another name.\n{sentences}"
+    )
 
 
 def quoted(text):

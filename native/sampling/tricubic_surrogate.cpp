@@ -187,10 +187,28 @@ bool TricubicSurrogate::fill(EvaluationCounter& function) {
   return false;
 }
 
+int TricubicSurrogate::settled_sign(Index cell, const Vec3& point) const {
+  const auto place = coordinates(cell);
+  const Vec3 within = ((point.array() + 1.0) / spacing()).matrix() - Vec3(place[0], place[1], place[2]);
+  const auto sign = [&](float value, const Vec3& from) {
+    const bool kept = std::abs(value) > lipschitz_ * spacing() * (within - from).norm();
+    return !kept ? 0 : value < 0.0f ? -1 : 1;
+  };
+  int found = sign(centre_[static_cast<std::size_t>(cell)], Vec3::Constant(0.5));
+  const Index points = resolution_ + 1;
+  for (int c = 0; c < 8 && found == 0; ++c) {
+    const int i = c >> 2, j = (c >> 1) & 1, k = c & 1;
+    const Index at = ((place[0] + i) * points + place[1] + j) * points + place[2] + k;
+    found = sign(values_[static_cast<std::size_t>(at)], Vec3(i, j, k));
+  }
+  return found;
+}
+
 /// Each active cell gets the largest residual of its own and its 26 neighbours' centres, times the safety.
 void TricubicSurrogate::measure_errors() {
   const auto count = static_cast<Index>(active_.size());
   error_.assign(side_.size(), 0.0f);
+  centre_.assign(side_.size(), 0.0f);
   VectorF residual(count), rough(count);
   parallel_for(0, count, 512, [&](Index begin, Index end) {
     for (Index row = begin; row < end; ++row) {
@@ -206,6 +224,7 @@ void TricubicSurrogate::measure_errors() {
   for (Index row = 0; row < count; ++row) {
     const float bound = error_safety * residual[row];
     const auto place = coordinates(active_[static_cast<std::size_t>(row)]);
+    centre_[static_cast<std::size_t>(active_[static_cast<std::size_t>(row)])] = centre_values_[row];
     for (int i = std::max(place[0] - 1, 0); i <= std::min(place[0] + 1, resolution_ - 1); ++i)
       for (int j = std::max(place[1] - 1, 0); j <= std::min(place[1] + 1, resolution_ - 1); ++j)
         for (int k = std::max(place[2] - 1, 0); k <= std::min(place[2] + 1, resolution_ - 1); ++k) {

@@ -50,6 +50,9 @@ class TricubicSurrogate {
   /// The latter from the former.
   float slope_error_of(float error) const;
 
+  /// The sign that Φ at an active cell's centre and corners leaves a point in it, or 0 where both are left.
+  int settled_sign(Index cell, const Vec3& point) const;
+
   /// p's coefficients in an active cell; at(block, …) evaluates them at a point of the cube.
   CubicBlock block(Index cell) const;
   /// First grid point of a cell's 4×4×4 block along an axis; p takes (x + 1) / spacing − that.
@@ -67,6 +70,7 @@ class TricubicSurrogate {
   std::vector<std::int8_t> side_;
   std::vector<Index> active_;
   VectorF centre_values_;      // of active_
+  std::vector<float> centre_;  // the same, resolution³
   std::vector<float> error_;   // resolution³
   std::vector<float> values_;  // (resolution+1)³ grid points, NaN where not needed
 };

@@ -52,25 +52,23 @@ ObjectiveTerms terms_of(const SurfaceSamples& samples, const std::vector<Handle>
   return terms;
 }
 
-/// The radial field that follows the handles closely, blended with their motions in the margins: what is left
-/// for the blend to bend is a hundredth of what soft handles leave. The blend is a neural field's; its
-/// network is zero.
+/// A radial field inside the blend with the handles' motions: a neural field whose network is zero.
 Solution exact_radial(const SurfaceSamples& samples, const std::vector<Handle>& handles,
                       const DeformOptions& options, const Progress& progress, const SolveHooks& hooks) {
-  const ObjectiveTerms terms = terms_of(samples, handles, options);
+  const BoundHandles bound(in_cube(handles, samples.frame), samples.points);
   std::vector<std::string> notes;
-  const auto blend = exact_blend(terms.handles, options.margin, notes);
-  const Solution soft =
-      deform_radial(samples, handles, followed_closely(options), progress.part(0.0, 0.95), hooks);
-  MlpShape shape{options.network, 3};
-  shape.width = shape.layers = shape.octaves = 1;
-  auto field = std::make_shared<NeuralField>(shape, 0);
-  field->set_base(soft.field);
-  field->set_handles(blend);
-  field->set_frame(samples.frame);
-  field->set_rest_points(soft.field->rest_points());
-  progress.report(0.95, "measuring the result");
-  Solution solution = measured(field, samples, terms, soft.report.loop);
+  ExactHandles exact{exact_blend(bound, options.margin, notes), {}};
+  exact.around = [&](std::shared_ptr<const DeformationField> inside) {
+    MlpShape shape{options.network, 3};
+    shape.width = shape.layers = shape.octaves = 1;
+    auto field = std::make_shared<NeuralField>(shape, 0);
+    field->set_base(inside);
+    field->set_handles(exact.blend);
+    field->set_frame(samples.frame);
+    field->set_rest_points(inside->rest_points());
+    return field;
+  };
+  Solution solution = deform_radial(samples, handles, options, progress, hooks, &exact);
   solution.report.notes.insert(solution.report.notes.begin(), notes.begin(), notes.end());
   return solution;
 }

@@ -11,6 +11,19 @@
 namespace arapfields {
 namespace {
 
+/// Away from the surface f may fold or tear space, and there is no inverse to be learnt: a cycle that misses
+/// by more than this counts ever less.
+constexpr double believable = 0.02;
+
+/// (n, 1) what the cycle's gradient at each point counts: 1 near f's inverse where f keeps lengths, and less
+/// where the cycle misses by far or J would magnify what it misses by.
+at::Tensor share_of(const at::Tensor& jets, const at::Tensor& cycle) {
+  const at::Tensor missed = cycle.square().sum(1, true) / (believable * believable);
+  const at::Tensor stretch =
+      jets.slice(0, first_column(0), first_column(3)).square().sum(at::IntArrayRef{0, 2});
+  return 1.0 / ((1.0 + missed) * (stretch / 3.0).clamp_min(1.0).unsqueeze(1));
+}
+
 /// Trains g for a fixed f.
 class CycleObjective final : public Objective {
  public:
@@ -37,7 +50,7 @@ class CycleObjective final : public Objective {
     const at::Tensor cycle = jets[0] - images;
     const at::Tensor direct = back.slice(0, 0, surface) - tensor_like(x, images);
     const double scale = 1.0 / static_cast<double>(batch_);
-    at::Tensor cotangents = 2.0 * scale * transposed_times(jets, cycle);
+    at::Tensor cotangents = 2.0 * scale * share_of(jets, cycle) * transposed_times(jets, cycle);
     cotangents.slice(0, 0, surface).add_(direct, 2.0 * scale);
     inverse.pull_back(cotangents.unsqueeze(0));
     return scale * (cycle.square().sum() + direct.square().sum());

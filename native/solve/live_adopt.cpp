@@ -32,6 +32,7 @@ void LiveSolver::State::adopt(const DeformationField& field) {
   field.evaluate(there(pairs_.sources), {ends.data(), ends.rows(), JetOrder::value});
   ends = here(ends);
   VectorF wanted = VectorF::Zero(30 * places.rows() + 3 * ends.rows() + 3 * basis_.center_count());
+  if (blend_) LiveBlend<double>(*blend_, places).multiply(jets.view());
   wanted.head(30 * places.rows()) =
       Eigen::Map<const Vector>(jets.view().data, 30 * places.rows()).cast<float>();
   wanted.segment(30 * places.rows(), 3 * ends.rows()) =

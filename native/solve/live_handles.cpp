@@ -151,7 +151,8 @@ void LiveSolver::State::stiffen(const Progress& progress) {
     return;
   weights_ = weights;
   bending_ = bending;
-  stiffness_ = stiffness_matrix(basis_, rows_of(surface_, chosen_), bending_, weights_, progress);
+  stiffness_ =
+      stiffness_matrix(basis_, rows_of(surface_, chosen_), bending_, weights_, progress, blend_.get());
   if (mirror_) mirror_->symmetrise_matrix(stiffness_);
   for_each_precision([&](auto& precision) { precision.objective->set_stiffness(bending_, weights_); });
 }

@@ -85,6 +85,7 @@ template <class Scalar>
 void LiveObjective<Scalar>::measure(const RowMatrix<double>& c, Measurements& u) const {
   u.resize(center_offset() + 3 * center_count_);
   samples_.evaluate(c, {u.data(), samples_.size(), JetOrder::second});
+  blend_.multiply({u.data(), samples_.size(), JetOrder::second});
   const PointsOf<Scalar> rounded = c.cast<Scalar>();
   Eigen::Map<PointsOf<Scalar>>(u.data() + handle_offset(), pairs_.sources.rows(), 3) =
       handle_basis_.times(rounded);
@@ -94,24 +95,31 @@ void LiveObjective<Scalar>::measure(const RowMatrix<double>& c, Measurements& u)
 template <class Scalar>
 LiveTerms LiveObjective<Scalar>::evaluate(const Measurements& u, Measurements* cotangents) const {
   if (cotangents != nullptr) cotangents->setZero(u.size());
-  Scalar* out = cotangents != nullptr ? cotangents->data() : nullptr;
+  return with_jets(u, [&](JetView<const Scalar> jets) {
+    return evaluate(jets, u, cotangents != nullptr ? cotangents->data() : nullptr);
+  });
+}
+
+template <class Scalar>
+LiveTerms LiveObjective<Scalar>::evaluate(JetView<const Scalar> jets, const Measurements& u,
+                                          Scalar* out) const {
   const JetView<Scalar> jet_cotangents{out, samples_.size(), JetOrder::second};
   LiveTerms terms;
-  terms.arap = arap_energy<Scalar>(jets(u), 1.0, 1.0, jet_cotangents,
+  terms.arap = arap_energy<Scalar>(jets, 1.0, 1.0, jet_cotangents,
                                    {weights_.size() > 0 ? weights_.data() : nullptr, bending_.data()});
   const Index pairs = pairs_.sources.rows();
   terms.handles =
       handle_energy<Scalar>({u.data() + handle_offset(), pairs, JetOrder::value}, pairs_, handle_weight_,
                             {out != nullptr ? out + handle_offset() : nullptr, pairs, JetOrder::value});
   if (style_)
-    terms.gauss = gauss_energy<Scalar>(jets(u), style_normals_, style_weights_, style_->preference,
+    terms.gauss = gauss_energy<Scalar>(jets, style_normals_, style_weights_, style_->preference,
                                        style_->weight, jet_cotangents);
   if (stance_)
     terms.stance =
-        stance_energy<Scalar>(jets(u), stance_rest_, stance_->stance, stance_->weight, jet_cotangents);
+        stance_energy<Scalar>(jets, stance_rest_, stance_->stance, stance_->weight, jet_cotangents);
   if (barrier_ > 0.0)
-    terms.barrier = fold_barrier<Scalar>(jets(u), barrier_threshold_, barrier_, jet_cotangents);
-  terms.external = external_energies<Scalar>(hooks_.energies, rest_, jets(u), hooks_.weight, jet_cotangents);
+    terms.barrier = fold_barrier<Scalar>(jets, barrier_threshold_, barrier_, jet_cotangents);
+  terms.external = external_energies<Scalar>(hooks_.energies, rest_, jets, hooks_.weight, jet_cotangents);
   return terms;
 }
 
@@ -148,7 +156,13 @@ double LiveObjective<Scalar>::value(const Measurements& u, Measurements* cotange
 template <class Scalar>
 RowMatrix<double> LiveObjective<Scalar>::pull_back(const Measurements& cotangents) const {
   RowMatrix<double> gradient = RowMatrix<double>::Zero(center_count_ + 4, 3);
-  samples_.pull_back({cotangents.data(), samples_.size(), JetOrder::second}, gradient);
+  if (blend_.empty()) {
+    samples_.pull_back({cotangents.data(), samples_.size(), JetOrder::second}, gradient);
+  } else {
+    Measurements own = cotangents.head(handle_offset());
+    blend_.multiply_transposed({own.data(), samples_.size(), JetOrder::second});
+    samples_.pull_back({own.data(), samples_.size(), JetOrder::second}, gradient);
+  }
   gradient += handle_basis_.transpose_times(handle_values(cotangents)).template cast<double>();
   Eigen::Map<Vector>(gradient.data(), 3 * center_count_) +=
       cotangents.tail(3 * center_count_).template cast<double>();

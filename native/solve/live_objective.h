@@ -10,6 +10,7 @@
 #include "energies/stance.h"
 #include "fields/mirror.h"
 #include "fields/radial_evaluator.h"
+#include "solve/live_blend.h"
 #include "solve/live_hooks.h"
 #include "solve/quasi_newton.h"
 
@@ -60,6 +61,8 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
   /// New targets for the pairs in place.
   void set_targets(PointsIn targets);
   void set_style(const std::optional<LiveStyle>& style);
+  /// Exact handles: f is no longer the radial field itself, whose values handles still pull at.
+  void set_blend(LiveBlend<Scalar> blend) { blend_ = std::move(blend); }
   /// `rest` (n,3): the samples.
   void set_hooks(const LiveHooks& hooks, PointsIn rest);
   void set_stance(const std::optional<LiveStance>& stance);
@@ -67,8 +70,14 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
   void set_mirror(const std::optional<Mirror>& mirror) { mirror_ = mirror; }
 
   LiveTerms terms(const Measurements& u) const { return evaluate(u, nullptr); }
-  JetView<const Scalar> jets(const Measurements& u) const {
-    return {u.data(), samples_.size(), JetOrder::second};
+  /// What `call` makes of the jets of f at the samples.
+  template <class Call>
+  auto with_jets(const Measurements& u, Call&& call) const {
+    if (blend_.empty()) return call(JetView<const Scalar>{u.data(), samples_.size(), JetOrder::second});
+    Measurements whole = u.head(handle_offset());
+    const JetView<Scalar> jets{whole.data(), samples_.size(), JetOrder::second};
+    blend_.add_fixed(jets);
+    return call(JetView<const Scalar>(jets));
   }
   /// Where the pairs' sources are.
   Eigen::Map<const PointsOf<Scalar>> handle_values(const Measurements& u) const {
@@ -87,6 +96,7 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
 
  private:
   LiveTerms evaluate(const Measurements& u, Measurements* cotangents) const;
+  LiveTerms evaluate(JetView<const Scalar> jets, const Measurements& u, Scalar* cotangents) const;
   Index handle_offset() const { return 30 * samples_.size(); }
   Index center_offset() const { return handle_offset() + 3 * pairs_.sources.rows(); }
 
@@ -97,10 +107,10 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
   HandleBatch<Scalar> pairs_;
   TallMatrix<Scalar> handle_basis_;   // (pairs, size)
   TallMatrix<float> inverse_factor_;  // L⁻¹ of the preconditioner's matrix L Lᵀ
+  LiveBlend<Scalar> blend_;
   std::optional<LiveStyle> style_;
   std::optional<LiveStance> stance_;
-  PointsOf<Scalar> stance_rest_;
-  PointsOf<Scalar> style_normals_;
+  PointsOf<Scalar> stance_rest_, style_normals_;
   Eigen::VectorX<Scalar> style_weights_;
   std::optional<Mirror> mirror_;
   LiveHooks hooks_;

@@ -7,8 +7,9 @@ namespace arapfields {
 
 LiveSolver::LiveSolver(const SurfaceSamples& samples, const std::vector<Handle>& handles,
                        const LiveOptions& options, const Progress& progress,
-                       std::shared_ptr<const RestShape> shape)
-    : state_(std::make_unique<State>(samples, handles, options, progress, std::move(shape))) {}
+                       std::shared_ptr<const RestShape> shape, std::shared_ptr<const HandleBlend> blend)
+    : state_(
+          std::make_unique<State>(samples, handles, options, progress, std::move(shape), std::move(blend))) {}
 
 LiveSolver::~LiveSolver() = default;
 LiveSolver::LiveSolver(LiveSolver&&) noexcept = default;

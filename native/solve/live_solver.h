@@ -13,6 +13,7 @@
 
 namespace arapfields {
 
+class HandleBlend;
 struct RestShape;
 
 /// Deforms a surface at interactive rates: the energy of deform (and stylize) over a radial field, solved
@@ -20,9 +21,11 @@ struct RestShape;
 class ARAPFIELDS_EXPORT LiveSolver {
  public:
   /// Handles in mesh coordinates; none are needed where a style follows. `shape` (solve/rest_shape.h) is that
-  /// of the samples where several solvers share it. Throws InvalidInput as deform does.
+  /// of the samples where several solvers share it. With a blend (solve/live_blend.h), what is solved for is
+  /// the radial field inside it. Throws InvalidInput as deform does.
   LiveSolver(const SurfaceSamples& samples, const std::vector<Handle>& handles, const LiveOptions& options,
-             const Progress& progress = {}, std::shared_ptr<const RestShape> shape = nullptr);
+             const Progress& progress = {}, std::shared_ptr<const RestShape> shape = nullptr,
+             std::shared_ptr<const HandleBlend> blend = nullptr);
   ~LiveSolver();
   LiveSolver(LiveSolver&&) noexcept;
   LiveSolver& operator=(LiveSolver&&) noexcept;

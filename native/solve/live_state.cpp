@@ -36,13 +36,14 @@ constexpr double worthwhile_gain = 0.1;
 
 LiveSolver::State::State(const SurfaceSamples& samples, const std::vector<Handle>& handles,
                          const LiveOptions& options, const Progress& progress,
-                         std::shared_ptr<const RestShape> shape)
+                         std::shared_ptr<const RestShape> shape, std::shared_ptr<const HandleBlend> blend)
     : options_(options),
       samples_(options.symmetry == SymmetryPlane::none ? samples
                                                        : across(samples, axis_of(options.symmetry))),
       frame_(samples_.frame),
       surface_(samples_.points),
-      surface_normals_(samples_.normals) {
+      surface_normals_(samples_.normals),
+      blend_(std::move(blend)) {
   options.validate();
   require_samples(samples_);
   const Stopwatch watch;
@@ -79,6 +80,7 @@ void LiveSolver::State::prepare(Precision<Scalar>& precision) {
       std::make_unique<LiveObjective<Scalar>>(basis_, rows_of(surface_, chosen_), options_.handle_weight);
   precision.objective->set_stiffness(bending_, weights_);
   precision.objective->set_mirror(mirror_);
+  if (blend_) precision.objective->set_blend(LiveBlend<Scalar>(*blend_, rows_of(surface_, chosen_)));
   precision.objective->set_barrier(options_.surface.barrier, options_.surface.barrier_threshold);
   if (inverse_factor_.size() > 0) precision.objective->set_handles(pairs_, pair_values_, inverse_factor_);
   precision.objective->set_style(style_);
@@ -191,7 +193,8 @@ void LiveSolver::State::measure(Precision<Scalar>& precision) {
   report_.arap = terms.arap;
   report_.preference.reset();
   if (style_) report_.preference = 1.0 - terms.gauss;
-  report_.distortion = distortion<Scalar>(objective.jets(precision.u));
+  report_.distortion =
+      objective.with_jets(precision.u, [](JetView<const Scalar> jets) { return distortion<Scalar>(jets); });
   report_.notes = notes_on(report_.distortion, far_target(bound_, surface_));
   const Points values = objective.handle_values(precision.u).template cast<double>();
   // Those of the handles come first; without handles all count.
@@ -229,7 +232,7 @@ std::unique_ptr<LiveSolver::State> LiveSolver::State::with_symmetry(SymmetryPlan
                                                                     const Progress& progress) const {
   LiveOptions options = options_;
   options.symmetry = symmetry;
-  auto next = std::make_unique<State>(samples_, handles_, options, progress, nullptr);
+  auto next = std::make_unique<State>(samples_, handles_, options, progress, nullptr, nullptr);
   if (style_asked_)
     next->set_style(style_asked_->preferred, style_asked_->strength, style_asked_->sharpness,
                     style_asked_->weights, style_asked_->up);

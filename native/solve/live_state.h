@@ -14,7 +14,8 @@ namespace arapfields {
 class LiveSolver::State {
  public:
   State(const SurfaceSamples& samples, const std::vector<Handle>& handles, const LiveOptions& options,
-        const Progress& progress, std::shared_ptr<const RestShape> shape);
+        const Progress& progress, std::shared_ptr<const RestShape> shape,
+        std::shared_ptr<const HandleBlend> blend);
   void set_handles(const std::vector<Handle>& handles);
   void set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights,
                  const Vec3& up);
@@ -78,11 +79,12 @@ class LiveSolver::State {
   LiveOptions options_;
   SurfaceSamples samples_;
   Frame frame_;
-  Points surface_, surface_normals_;  // all samples, cube coordinates
-  std::vector<Index> chosen_;         // those that the energy sees
-  Vector own_bending_;                // λ of these, without bend weights
-  Vector bending_, weights_;          // λ, and factors of the energy (empty: all 1)
-  std::optional<Mirror> mirror_;      // where the field is symmetric
+  Points surface_, surface_normals_;          // all samples, cube coordinates
+  std::shared_ptr<const HandleBlend> blend_;  // null: handles are soft
+  std::vector<Index> chosen_;                 // those that the energy sees
+  Vector own_bending_;                        // λ of these, without bend weights
+  Vector bending_, weights_;                  // λ, and factors of the energy (empty: all 1)
+  std::optional<Mirror> mirror_;              // where the field is symmetric
   std::vector<Handle> handles_;
   BoundHandles bound_;
   std::vector<Index> pair_rows_;  // rows of bound_ that pull

@@ -43,10 +43,12 @@ RowMatrix<double> mixing_matrix() {
 /// The products of the basis functions' derivatives, weighted, summed over points.
 class Products {
  public:
-  Products(const RadialEvaluator<double>& sites, Vector roots, Vector weight_roots)
+  /// `free` (derivatives + 1, points): the jets of a factor of all functions, or empty.
+  Products(const RadialEvaluator<double>& sites, Vector roots, Vector weight_roots, Vector free)
       : sites_(sites),
         roots_(std::move(roots)),
         weight_roots_(std::move(weight_roots)),
+        free_(std::move(free)),
         mixing_(mixing_matrix()) {}
 
   /// Of the points of blocks first to last−1. Of `sum`, whose rows and columns are the centers, the constant
@@ -57,9 +59,11 @@ class Products {
   void feel(Index first, Index last);
   void add_rows(Index b, Index column);
   void mix(Index b);
+  void multiply(Index b, double* jets) const;
 
   const RadialEvaluator<double>& sites_;
   Vector roots_, weight_roots_;  // √λ and √w of the points; the latter may be empty
+  Vector free_;
   RowMatrix<double> mixing_;
   std::vector<std::int32_t> active_, both_;  // centers that the points feel, ascending
   std::vector<double> jets_;
@@ -92,38 +96,62 @@ void Products::mix(Index b) {
       }
 }
 
+/// The factor, where there is one, times the jets (derivatives + 1, block_size) of a function.
+void Products::multiply(Index b, double* jets) const {
+  if (free_.size() == 0) return;
+  const Index n = sites_.size(), points = std::min(block_size, n - block_size * b);
+  for (Index i = 0; i < points; ++i) {
+    const auto a = [&](int c) { return free_[c * n + block_size * b + i]; };
+    const auto p = [&](int c) -> double& { return jets[c * block_size + i]; };
+    for (int j = 0; j < 3; ++j)
+      for (int k = j; k < 3; ++k) {
+        const int cj = first_column(j), ck = first_column(k), cjk = second_column(j, k);
+        p(cjk) = a(0) * p(cjk) + a(cj) * p(ck) + a(ck) * p(cj) + a(cjk) * p(0);
+      }
+    for (int c = 1; c < 4; ++c) p(c) = a(0) * p(c) + a(c) * p(0);
+  }
+}
+
 void Products::add_rows(Index b, Index column) {
   const RadialBlock<double> block = sites_.block(b);
   jets_.resize(static_cast<std::size_t>(block.active_count * (derivatives + 1) * block_size));
   ARAPFIELDS_DISPATCH(radial_rows(block, derivatives + 1, jets_.data()));
   mix(b);
+  const auto add_mixed = [&](const double* jets, Index row) {
+    const double* factors = mix_.data();
+    for (int m = 0; m < mixtures; ++m) {
+      double* to = &rows_(row, column + m * block_size);
+      for (int c = 1; c <= derivatives; ++c, factors += block_size)
+        for (Index p = 0; p < block_size; ++p) to[p] += factors[p] * jets[c * block_size + p];
+    }
+  };
   auto place = active_.begin();
   for (Index a = 0; a < block.active_count; ++a) {
     place = std::find(place, active_.end(), block.active[a]);
-    const double* jets = &jets_[static_cast<std::size_t>((a * (derivatives + 1) + 1) * block_size)];
-    const double* factors = mix_.data();
-    for (int m = 0; m < mixtures; ++m) {
-      double* to = &rows_(place - active_.begin(), column + m * block_size);
-      for (int c = 0; c < derivatives; ++c, factors += block_size)
-        for (Index p = 0; p < block_size; ++p) to[p] += factors[p] * jets[c * block_size + p];
-    }
+    double* jets = &jets_[static_cast<std::size_t>(a * (derivatives + 1) * block_size)];
+    multiply(b, jets);
+    add_mixed(jets, place - active_.begin());
   }
-  for (int k = 0; k < 3; ++k)
-    for (int m = 0; m < mixtures; ++m)
-      for (Index p = 0; p < block_size; ++p)
-        rows_(rows_.rows() - 3 + k, column + m * block_size + p) =
-            mix_[static_cast<std::size_t>((m * derivatives + k) * block_size + p)];
+  for (int k = 0; k < 4; ++k) {  // the constant, x, y, z
+    std::array<double, (derivatives + 1) * block_size> jets{};
+    for (Index p = 0; p < block_size; ++p) {
+      jets[static_cast<std::size_t>(p)] = k == 0 ? 1.0 : block.points[(k - 1) * block_size + p];
+      if (k > 0) jets[static_cast<std::size_t>(k * block_size + p)] = 1.0;
+    }
+    multiply(b, jets.data());
+    add_mixed(jets.data(), rows_.rows() - 4 + k);
+  }
 }
 
 void Products::add(Index first, Index last, RowMatrix<double>& sum) {
   feel(first, last);
-  const Index count = static_cast<Index>(active_.size()), size = count + 3, centers = sum.rows() - 4;
+  const Index count = static_cast<Index>(active_.size()), size = count + 4, centers = sum.rows() - 4;
   rows_.setZero(size, mixtures * block_size * (last - first));
   for (Index b = first; b < last; ++b) add_rows(b, mixtures * block_size * (b - first));
   products_.resize(size, size);
   lower_gram<double>(Transpose::no, rows_, 0.0, products_);
   const auto place = [&](Index i) {
-    return i < count ? Index{active_[static_cast<std::size_t>(i)]} : centers + 1 + i - count;
+    return i < count ? Index{active_[static_cast<std::size_t>(i)]} : centers + i - count;
   };
   for (Index i = 0; i < size; ++i) {
     double* to = sum.row(place(i)).data();
@@ -134,7 +162,8 @@ void Products::add(Index first, Index last, RowMatrix<double>& sum) {
 }  // namespace
 
 RowMatrix<double> stiffness_matrix(const RadialBasis& basis, PointsIn samples, const Vector& bending,
-                                   const Vector& weights, const Progress& progress) {
+                                   const Vector& weights, const Progress& progress,
+                                   const HandleBlend* blend) {
   const Index wanted = std::max(least_samples, samples_a_center * basis.center_count());
   const Index taken = std::min<Index>(samples.rows(), wanted);
   Points some(taken, 3);
@@ -145,8 +174,10 @@ RowMatrix<double> stiffness_matrix(const RadialBasis& basis, PointsIn samples, c
     if (weights.size() > 0) weight_roots[i] = std::sqrt(weights[i * samples.rows() / taken]);
   }
   const RadialEvaluator<double> sites(basis, some);
+  Vector free(blend != nullptr ? (derivatives + 1) * taken : 0);
+  if (blend != nullptr) blend->free_weight(some, JetOrder::second, free.data());
   std::vector<RowMatrix<double>> sums(parts, RowMatrix<double>::Zero(basis.size(), basis.size()));
-  std::vector<Products> products(parts, Products(sites, roots, weight_roots));
+  std::vector<Products> products(parts, Products(sites, roots, weight_roots, free));
   const Index groups = (sites.blocks() + blocks_at_once - 1) / blocks_at_once;
   for (Index slice = 0; slice < slices; ++slice) {
     parallel_jobs(parts, [&](Index part) {

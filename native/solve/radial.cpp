@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "core/parallel.h"
@@ -20,6 +21,9 @@ constexpr int steps_at_once = 10;
 constexpr int worth_a_first = 600, most_first = 500, first_steps = 12;
 /// What makes the first result of a style.
 constexpr int style_first_centers = 400, style_first_samples = 4000, style_first_steps = 30;
+/// Share of the handles' weight with which exact handles still pull at the radial field inside the blend,
+/// which nothing else holds in their boxes.
+constexpr double share_of_exact = 0.01;
 /// Samples a center that carry it, and that the energy sees: more centers than samples can tell apart would
 /// fit them and fold between them.
 constexpr int samples_a_center = 8;
@@ -44,18 +48,14 @@ void set_centers(LiveOptions& live, int centers, const SurfaceSamples& samples) 
   live.samples = std::max(live.samples, samples_a_center * live.fine_centers);
 }
 
-/// A result of some steps at most, shown to whoever watches: what a finer solver starts from.
-std::shared_ptr<const RadialField> first_result(LiveSolver& solver, int steps, const Progress& progress) {
-  const std::shared_ptr<const RadialField> first = solver.solve(steps, 0.0, progress);
-  progress.look([&](PointsIn points) { return first->at(points); });
-  return first;
-}
+/// The result that there is.
+using Shown = std::function<std::shared_ptr<DeformationField>()>;
 
 /// Solves until it converges, is out of steps or time, or the observer ends it. The solver's energy is the
-/// loss divided by `rigidity`. What is worse than `shown`, in its units, is not shown to whoever watches.
+/// loss divided by `rigidity`. What is worse than `worst`, in its units, is not shown to whoever watches.
 LoopResult run(LiveSolver& live, const TrainingOptions& how, const Progress& progress,
-               const SolveHooks& hooks, double rigidity,
-               double shown = std::numeric_limits<double>::infinity()) {
+               const SolveHooks& hooks, double rigidity, const Shown& shown,
+               double worst = std::numeric_limits<double>::infinity()) {
   const int iterations = how.iterations;
   const Stopwatch watch;
   LoopResult result;
@@ -77,8 +77,7 @@ LoopResult run(LiveSolver& live, const TrainingOptions& how, const Progress& pro
     const int at_once = std::min(steps_at_once, iterations - result.iterations);
     const double done = static_cast<double>(result.iterations) / iterations;
     live.solve(at_once, 0.0, progress.part(done, done + static_cast<double>(at_once) / iterations));
-    if (live.report().value <= shown)
-      progress.look([&](PointsIn points) { return live.field()->at(points); });
+    if (live.report().value <= worst) progress.look([&](PointsIn points) { return shown()->at(points); });
     result.iterations += static_cast<int>(live.report().iterations);
     result.history.emplace_back(result.iterations, live.report().value);
     result.seconds = watch.seconds();
@@ -95,16 +94,17 @@ LoopResult run(LiveSolver& live, const TrainingOptions& how, const Progress& pro
   return result;
 }
 
-Solution finish(const LiveSolver& live, const SurfaceSamples& samples, const ObjectiveTerms& terms,
+Solution finish(const Shown& shown, const SurfaceSamples& samples, const ObjectiveTerms& terms,
                 LoopResult loop, const Progress& progress) {
   progress.report(0.98, "measuring the result");
-  return measured(live.field(), samples, terms, std::move(loop));
+  return measured(shown(), samples, terms, std::move(loop));
 }
 
 }  // namespace
 
 Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& handles,
-                       const DeformOptions& options, const Progress& progress, const SolveHooks& hooks) {
+                       const DeformOptions& options, const Progress& progress, const SolveHooks& hooks,
+                       const ExactHandles* exact) {
   const int axis = axis_of(options.symmetry);
   const SurfaceSamples samples = axis < 0 ? given : across(given, axis);
   require(options.handles.handle_weight > 0.0, "handle_weight", "0", "must be positive for 'radial'");
@@ -112,29 +112,34 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
   LiveOptions fine = live_options(options);
   fine.symmetry = options.symmetry;
   set_centers(fine, options.centers, samples);
-  fine.handle_weight = options.handles.handle_weight;
+  fine.handle_weight = options.handles.handle_weight * (exact != nullptr ? share_of_exact : 1.0);
+  const auto blend = exact != nullptr ? exact->blend : nullptr;
+  const auto around = [&](std::shared_ptr<DeformationField> field) {
+    return exact != nullptr ? exact->around(std::move(field)) : field;
+  };
   const auto shape = std::make_shared<const RestShape>(
       samples, fine.interior, static_cast<std::uint64_t>(options.training.seed), axis);
-  std::shared_ptr<const RadialField> first;
-  if (fine.fine_centers >= worth_a_first) {
+  std::shared_ptr<RadialField> first;
+  if (exact != nullptr || fine.fine_centers >= worth_a_first) {
     LiveOptions few = live_options(options);
     few.symmetry = options.symmetry;
     set_centers(few, std::min(most_first, fine.fine_centers / 2), samples);
-    few.handle_weight = fine.handle_weight;
+    few.handle_weight = (exact != nullptr ? followed_closely(options) : options).handles.handle_weight;
     few.tolerance = LiveOptions().tolerance;
     LiveSolver solver(samples, handles, few, progress.part(0.0, 0.1), shape);
-    first =
-        first_result(solver, std::min(first_steps, options.training.iterations), progress.part(0.1, 0.15));
+    first = solver.solve(std::min(first_steps, options.training.iterations), 0.0, progress.part(0.1, 0.15));
+    progress.look([&](PointsIn points) { return around(first)->at(points); });
   }
   const double done = first ? 0.15 : 0.0;
-  LiveSolver solver(samples, handles, fine, progress.part(done, 0.4), shape);
+  LiveSolver solver(samples, handles, fine, progress.part(done, 0.4), shape, blend);
   if (first) solver.adopt(*first);
-  const LoopResult loop = run(solver, options.training, progress.part(0.4, 0.95), hooks, 1.0);
+  const Shown shown = [&] { return around(solver.field()); };
+  LoopResult loop = run(solver, options.training, progress.part(0.4, 0.95), hooks, 1.0, shown);
   ObjectiveTerms terms;
   terms.stiffness = SurfaceStiffness(shape->thickness, options.surface);
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
   terms.weights = energy_weights(samples, terms.handles);
-  return finish(solver, samples, terms, loop, progress);
+  return finish(shown, samples, terms, std::move(loop), progress);
 }
 
 DeformOptions followed_closely(DeformOptions options) {
@@ -159,9 +164,10 @@ Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const
                         const Vec3& up, const SolveHooks& hooks) {
   // The live solver's energy has weight 1: all other weights are divided by this one's.
   LiveOptions live = live_options(options);
-  live.samples = 6000;
+  live.samples = 8000;
   live.coarse_centers = 200;
-  live.fine_centers = 1000;
+  live.fine_centers = 1300;
+  live.fine_radius_factor = 3.0;
   live.tolerance = 1e-4;
   live.handle_weight = std::max(options.handles.handle_weight, 1e-3) / options.rigidity;
   live.surface.barrier = options.surface.barrier / options.rigidity;
@@ -176,19 +182,21 @@ Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const
   few.coarse_centers = few.fine_centers / 5;
   LiveSolver quick(samples, handles, few, progress.part(0.0, 0.1), shape);
   quick.set_style(preferred, options.strength, options.sharpness, weights, up);
-  const auto first =
-      first_result(quick, std::min(style_first_steps, options.training.iterations), progress.part(0.1, 0.15));
+  const std::shared_ptr<const RadialField> first =
+      quick.solve(std::min(style_first_steps, options.training.iterations), 0.0, progress.part(0.1, 0.15));
+  progress.look([&](PointsIn points) { return first->at(points); });
   LiveSolver solver(samples, handles, live, progress.part(0.15, 0.3), shape);
   solver.set_style(preferred, options.strength, options.sharpness, weights, up);
-  const LoopResult loop =
-      run(solver, options.training, progress.part(0.3, 0.95), hooks, options.rigidity, quick.report().value);
+  const Shown shown = [&] { return solver.field(); };
+  const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95), hooks, options.rigidity,
+                              shown, quick.report().value);
   ObjectiveTerms terms;
   terms.rigidity = options.rigidity;
   terms.stiffness = SurfaceStiffness(shape->thickness, options.surface);
   terms.preference = gauss_preference(preferred, options.sharpness);
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
   terms.weights = energy_weights(samples, terms.handles);
-  return finish(solver, samples, terms, loop, progress);
+  return finish(shown, samples, terms, loop, progress);
 }
 
 }  // namespace arapfields

@@ -2,6 +2,9 @@
 // deform and stylize over a radial field: the live solver's work, brought to its end in one call.
 #pragma once
 
+#include <functional>
+
+#include "fields/handle_blend.h"
 #include "options/deform.h"
 #include "options/stylize.h"
 #include "solve/hooks.h"
@@ -9,10 +12,17 @@
 
 namespace arapfields {
 
+/// Exact handles (fields/handle_blend.h), and the field that they make of a radial one.
+struct ExactHandles {
+  std::shared_ptr<const HandleBlend> blend;
+  std::function<std::shared_ptr<DeformationField>(std::shared_ptr<const DeformationField>)> around;
+};
+
 /// As deform (solve/deform.h) for options.field "radial". `iterations` bounds the quasi-Newton steps; options
-/// of networks do not matter.
+/// of networks do not matter. Handles are soft, or as `exact` has them.
 Solution deform_radial(const SurfaceSamples& samples, const std::vector<Handle>& handles,
-                       const DeformOptions& options, const Progress& progress, const SolveHooks& hooks = {});
+                       const DeformOptions& options, const Progress& progress, const SolveHooks& hooks = {},
+                       const ExactHandles* exact = nullptr);
 
 /// Options of a soft solve that leaves a blend with exact handles hardly anything to bend.
 DeformOptions followed_closely(DeformOptions options);

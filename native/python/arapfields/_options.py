@@ -8,6 +8,11 @@ from typing import Any
 TABLE: dict[str, Any] = json.loads(Path(__file__).with_name("options.json").read_text(encoding="utf-8"))
 
 
+def presets_of(operation: str) -> dict[str, dict[str, Any]]:
+    """Name → label, sentence and values of an operation's presets."""
+    return dict(TABLE[operation]["presets"])
+
+
 def options_of(operation: str) -> dict[str, dict[str, Any]]:
     """Name → declaration (type, default, low, high, sentence, …) of an operation's options, in order."""
     block = TABLE[operation]

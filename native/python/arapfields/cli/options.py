@@ -5,7 +5,7 @@ import argparse
 import re
 
 from .._native import InvalidInput
-from .._options import options_of
+from .._options import options_of, presets_of
 
 NUMBERS = {"int": int, "seed": int, "float": float}
 
@@ -13,6 +13,14 @@ NUMBERS = {"int": int, "seed": int, "float": float}
 def add_option_flags(parser, operation, title):
     """A group with a flag for each option of the operation, `learning_rate` → `--learning-rate`."""
     group = parser.add_argument_group(title)
+    presets = presets_of(operation)
+    if presets:
+        said = "; ".join(f"{name}: {preset['sentence']}" for name, preset in presets.items())
+        group.add_argument(
+            "--preset",
+            choices=list(presets),
+            help=f"options that go together, which other flags change. {said}",
+        )
     for option in options_of(operation).values():
         add_flag(group, option, dest=f"option_{option['name']}", default=None)
 
@@ -63,7 +71,8 @@ def shard(text):
 
 def given_options(structure, arguments):
     """The struct with the values that were given."""
-    options = structure()
+    chosen = getattr(arguments, "preset", None)
+    options = structure.preset(chosen) if chosen else structure()
     for name in structure.fields:
         value = getattr(arguments, f"option_{name}", None)
         if value is not None:

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "fields/handle_blend.h"
+
+namespace arapfields {
+
+/// Exact handles around a radial field r at the samples of a live solve: f = h + a (r − identity) with h and
+/// its free weight a (fields/handle_blend.h). Linear in r but for a part that the targets decide. Only
+/// samples in boxes and margins are touched; empty: f = r.
+template <class Scalar>
+class LiveBlend {
+ public:
+  LiveBlend() = default;
+  LiveBlend(const HandleBlend& blend, PointsIn samples);
+  bool empty() const { return rows_.empty(); }
+  /// Jets of a r from those of r.
+  void multiply(JetView<Scalar> jets) const;
+  /// Cotangents of r's jets from those of a r.
+  void multiply_transposed(JetView<Scalar> cotangents) const;
+  /// Adds the jets of h − a·identity.
+  void add_fixed(JetView<Scalar> jets) const;
+
+ private:
+  std::vector<Index> rows_;    // samples with a < 1
+  std::vector<Scalar> free_;   // (rows, 10) jets of a
+  std::vector<Scalar> fixed_;  // (rows, 10, 3) jets of h − a·identity
+};
+
+}  // namespace arapfields
