@@ -13,7 +13,7 @@ import numpy as np
 import scenes
 import stage
 
-LONG = {**scenes.NEW, "iterations": 100000, "width": 256, "layers": 4, "batch": 300}
+LONG = {**scenes.NEW, "field": "neural", "iterations": 100000, "width": 256, "layers": 4, "batch": 300}
 SECONDS = 4.0
 
 
