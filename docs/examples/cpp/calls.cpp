@@ -100,7 +100,7 @@ int main(int argc, char** argv) {
   const TriangleMesh ball = extract_surface(Ball(), 32);
   std::cout << surface.vertices.rows() << " " << ball.vertices.rows() << " " << moved.rows() << " "
             << held.report.loop.iterations << "\n";
-  std::cout << posed.rows() << " " << two.size() << " " << button_motion.determinant() << "\n";
+  std::cout << posed.rows() << " " << two.size() << " " << button_motion(3, 3) << "\n";
   std::cout << remeshed.vertices.rows() << " " << on_triangles.size() << "\n";
   return 0;
 }
