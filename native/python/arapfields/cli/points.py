@@ -5,7 +5,7 @@ import numpy as np
 
 from .._files import existing_file, write_arrays
 from .._native import InvalidInput
-from .files import MESH_SUFFIXES, OBJ_VERTEX, _readable, _trimesh, moved_obj, read_mesh, write_moved_mesh
+from .files import MESH_SUFFIXES, OBJ_VERTEX, _trimesh, moved_obj, read_mesh, readable, write_moved_mesh
 
 TEXT_SUFFIXES = (".xyz", ".txt", ".csv")
 ARRAY_SUFFIXES = (".npy", ".npz")
@@ -44,7 +44,7 @@ def _with(path, suffixes, what):
 
 
 def _has_faces(path):
-    with _readable(path, "OBJ"), path.open(errors="surrogateescape") as file:
+    with readable(path, "OBJ"), path.open(errors="surrogateescape") as file:
         return any(line.lstrip().startswith("f ") for line in file)
 
 
@@ -62,7 +62,7 @@ def _write_obj(path, source, move):
 def _ply_cloud(path):
     """Points (n, 3) of a PLY file without faces; None for a mesh."""
     trimesh = _trimesh()
-    with _readable(path, "PLY"):
+    with readable(path, "PLY"):
         loaded = trimesh.load(path, process=False)
         return np.array(loaded.vertices, float) if isinstance(loaded, trimesh.PointCloud) else None
 
@@ -70,7 +70,7 @@ def _ply_cloud(path):
 def _rows(path):
     """Points (n, 3) of rows of text, of which normals may follow, or of an array."""
     suffix = path.suffix.lower()
-    with _readable(path, "points"):
+    with readable(path, "points"):
         if suffix == ".npz":
             with np.load(path) as arrays:
                 if "points" not in arrays:
@@ -107,7 +107,7 @@ def _write_points(path, points):
 def read_weights(path, vertices):
     """Numbers (n,) ≥ 0, one for each of so many vertices: rows of a text file, or a .npy array."""
     path = existing_file(path, (*TEXT_SUFFIXES[1:], ".npy"))
-    with _readable(path, "numbers"):
+    with readable(path, "numbers"):
         if path.suffix.lower() == ".npy":
             numbers = np.array(np.lib.format.open_memmap(path, mode="r"), float)
         else:
