@@ -81,7 +81,9 @@ def usd(context, path, frames):
     before = scene.frame_start, scene.frame_end
     scene.frame_start, scene.frame_end = first_frame(frames), last_frame(frames)
     try:
-        bpy.ops.wm.usd_export(filepath=path, selected_objects_only=True, export_animation=True)
+        known = bpy.ops.wm.usd_export.get_rna_type().properties
+        world = {"convert_world_material": False} if "convert_world_material" in known else {}
+        bpy.ops.wm.usd_export(filepath=path, selected_objects_only=True, export_animation=True, **world)
     finally:
         scene.frame_start, scene.frame_end = before
 

@@ -49,6 +49,8 @@ def scene_to_export():
     index.data.foreach_set("value", np.arange(len(bar.data.vertices), dtype=np.float32))
     scene = bpy.context.scene
     scene.render.fps, scene.frame_start, scene.frame_end = 25, 2, 5
+    scene.world = bpy.data.worlds.new("World")  # which is no part of the object
+    scene.world.use_nodes = True
     return bar, folder
 
 

@@ -54,7 +54,7 @@ def test_a_stiff_part_does_not_stretch_and_ones_change_nothing():
     bpy.ops.arapfields.deform(**run)
     stiff = stretch(bar, before, 0.3, 0.7)
     print(f"stretch {soft:.3g}, a thousand times as stiff {stiff:.3g}")
-    assert soft > 0.02 and stiff < 1e-3
+    assert soft > 0.01 and stiff < 1e-3
 
 
 @in_blender

@@ -5,7 +5,7 @@ import numpy as np
 
 from .._files import existing_file, write_arrays
 from .._native import InvalidInput
-from .files import MESH_SUFFIXES, OBJ_VERTEX, readable, _trimesh, moved_obj, read_mesh, write_moved_mesh
+from .files import MESH_SUFFIXES, OBJ_VERTEX, _trimesh, moved_obj, read_mesh, readable, write_moved_mesh
 
 TEXT_SUFFIXES = (".xyz", ".txt", ".csv")
 ARRAY_SUFFIXES = (".npy", ".npz")
