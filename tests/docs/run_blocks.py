@@ -33,14 +33,18 @@ TAKE_OPTIONS = {  # as their third argument
 def shortened(kind):
     """An options class whose instances never ask for much."""
 
-    def make(**given):
-        options = kind(**given)
+    def short(options):
         limits = LIMITS | ({"iterations": FIT_ITERATIONS} if kind.__name__ == "FitOptions" else {})
         for name, most in limits.items():
             if hasattr(options, name) and (getattr(options, name) > most or getattr(options, name) == 0):
                 setattr(options, name, most)
         return options
 
+    def make(**given):
+        return short(kind(**given))
+
+    if hasattr(kind, "preset"):
+        make.preset = lambda name, **given: short(kind.preset(name, **given))
     return make
 
 

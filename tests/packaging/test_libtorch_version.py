@@ -53,7 +53,7 @@ def test_a_missing_torch_is_named(check, tmp_path, monkeypatch):
         raise metadata.PackageNotFoundError(name)
 
     monkeypatch.setattr(metadata, "version", nowhere)
-    with pytest.raises(ImportError, match="not installed: pip install torch==2.8.0"):
+    with pytest.raises(ImportError, match=r"not installed: pip install torch==2\.8\.0"):
         check(beside(tmp_path, "2.8.0"))
 
 
@@ -67,7 +67,10 @@ def test_import_ends_with_that_line(tmp_path):
     beside(tmp_path / "arapfields", "2.8.0")
     made = subprocess.run(
         [sys.executable, "-c", "import arapfields"],
-        cwd=tmp_path, capture_output=True, text=True, env={"PYTHONPATH": str(tmp_path)},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        env={"PYTHONPATH": str(tmp_path)},
     )
     assert made.returncode == 1
     last = made.stderr.strip().splitlines()[-1]

@@ -45,7 +45,7 @@ def test_objects_without_init_are_refused():
 for cls in [v for v in vars(af).values() if isinstance(v, type) and not issubclass(v, BaseException)]:
     for name in dir(cls):
         member = getattr(cls, name)
-        if name.startswith("__") and name not in ("__call__", "__len__", "__repr__", "__eq__"):
+        if name.startswith("_") and name not in ("__call__", "__len__", "__repr__", "__eq__"):
             continue
         for arguments in ((), (ROWS,), (None,)):
             try:

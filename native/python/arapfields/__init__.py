@@ -4,7 +4,7 @@
 Arrays are NumPy, all coordinates are the mesh's own; distances are negative inside.
 """
 
-from . import _libtorch  # noqa: F401: first, since it compares torch's version before anything is loaded
+from . import _libtorch as _libtorch  # first, since it compares torch's version before anything is loaded
 from ._native import (
     Attachment,
     Cancelled,

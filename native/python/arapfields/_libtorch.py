@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether the torch beside this package is the one that its library was built against.
 
-libtorch's C++ interface changes from version to version: with another one the library fails to load at best, and
-crashes at worst. So importing this module compares the versions, before anything is loaded.
+libtorch's C++ interface changes from version to version: with another one the library fails to load at best,
+and crashes at worst. So importing this module compares the versions, before anything is loaded.
 """
 
 from importlib import metadata
@@ -24,12 +24,11 @@ def check(folder: Path = HERE) -> None:
     try:
         installed = metadata.version("torch")
     except metadata.PackageNotFoundError:
-        raise ImportError(f"arapfields needs torch {built_against}, which is not installed: {remedy}") from None
+        needed = f"arapfields needs torch {built_against}, which is not installed"
+        raise ImportError(f"{needed}: {remedy}") from None
     if installed.partition("+")[0] != built_against:
-        raise ImportError(
-            f"arapfields was built against torch {built_against}, and torch {installed} is installed: {remedy}, "
-            "or build arapfields anew"
-        )
+        found = f"arapfields was built against torch {built_against}, and torch {installed} is installed"
+        raise ImportError(f"{found}: {remedy}, or build arapfields anew")
 
 
 check()
