@@ -18,6 +18,8 @@ MOST_UNEVEN = 0.02  # of the height, between feet that stood on a plane
 FINE = {"dodecahedron", "icosahedron"}  # with many faces: their share of the area at least doubles
 # How much less of the area than without stance and with sharpness 5 may lie along the style.
 MOST_LOST = 0.05
+# Free, a figure leans by ten degrees into the faces of this one: standing upright costs area.
+LEANING, LOST_OF_LEANING = "triangular pyramid", 0.09
 QUICK = ["cube", "octahedron", "icosahedron", "square pyramid", "plane pair"]
 
 
@@ -70,4 +72,4 @@ def test_every_style_of_every_figure_stands(name, style):
         return
     _, moved, triangles, _ = styled(name, style, sharpness=5.0, keep_stance=0.0)
     lost = standing.share_along(moved, triangles, af.preferred_normals(style)) - share
-    assert lost <= MOST_LOST
+    assert lost <= (LOST_OF_LEANING if style == LEANING else MOST_LOST)
