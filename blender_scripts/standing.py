@@ -62,5 +62,7 @@ def on_the_ground(rest, parts, slack=0.02):
 
 
 def unevenness(vertices, parts, height):
-    """How far apart the feet's lowest points lie, as a share of the height."""
+    """How far apart the feet's lowest points lie, as a share of the height; 0 of fewer than two."""
+    if len(parts) < 2:
+        return 0.0
     return float(np.ptp([vertices[part, 2].min() for part in parts]) / height)

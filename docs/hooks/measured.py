@@ -78,6 +78,19 @@ def styles(m):
     )
 
 
+def sheet(m):
+    standing = [row for name, row in m.items() if not name.startswith("suzanne")]  # she has no feet
+    fine = [row for name, row in m.items() if name.endswith(("dodecahedron", "icosahedron"))]
+    lean, apart = (max(row[key] for row in standing) for key in ("tilt", "unevenness"))
+    worst = max(row["flipped_share"] for row in m.values())
+    return (
+        f"none leans by more than {lean:.1f}°, no two feet come apart by more than {100 * apart:.1f} % of the "
+        "height; with twelve and twenty faces the share of the area along the style grows to "
+        f"{min(row['share'] / row['share_rest'] for row in fine):.1f} times what it is at rest, or more; at most "
+        f"{100 * worst:.2f} % of the samples folded"
+    )
+
+
 def cubes(m):
     rows = [(name, m[f"{name}, cube"]) for name in ("dog", "suzanne", "octopus")]
     told = [f"{row['preference_rest']:.2f} to {row['preference']:.2f} ({name.title()})" for name, row in rows]
@@ -90,8 +103,12 @@ def live(m):
     )
 
 
-FIGURE = {"inverted": "inverse", "cubes": "styles"}  # whose figures they tell, where not their own name's
-TEXTS = [hero, bending, deformations, exact, inverse, inverted, styles, cubes, live]
+FIGURE = {
+    "inverted": "inverse",
+    "cubes": "styles",
+    "sheet": "style_sheet",
+}  # whose figures they tell, where not their own name's
+TEXTS = [hero, bending, deformations, exact, inverse, inverted, styles, cubes, sheet, live]
 
 
 def refreshed(text):
