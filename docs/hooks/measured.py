@@ -82,11 +82,12 @@ def sheet(m):
     standing = [row for name, row in m.items() if not name.startswith("suzanne")]  # she has no feet
     fine = [row for name, row in m.items() if name.endswith(("dodecahedron", "icosahedron"))]
     lean, apart = (max(row[key] for row in standing) for key in ("tilt", "unevenness"))
+    grown = min(row["share"] / row["share_rest"] for row in fine)
     worst = max(row["flipped_share"] for row in m.values())
     return (
-        f"none leans by more than {lean:.1f}°, no two feet come apart by more than {100 * apart:.1f} % of the "
-        "height; with twelve and twenty faces the share of the area along the style grows to "
-        f"{min(row['share'] / row['share_rest'] for row in fine):.1f} times what it is at rest, or more; at most "
+        f"none leans by more than {lean:.1f}°, no two feet come apart by more than {100 * apart:.1f} % of "
+        "the height; with twelve and twenty faces the share of the area along the style grows to "
+        f"{grown:.1f} times what it is at rest, or more; at most "
         f"{100 * worst:.2f} % of the samples folded"
     )
 
