@@ -138,6 +138,30 @@ def test_the_times_of_a_gltf_are_the_frames_seconds():
 
 
 @in_blender
+def test_the_times_of_an_alembic_are_seconds():
+    """A scene of twice the rate finds each frame at twice its number."""
+    import subprocess
+    import sys
+
+    import bpy
+    import numpy as np
+    from test_export_animation import EXACT, READER, scene_to_export, shown
+
+    bar, folder = scene_to_export()
+    bpy.ops.arapfields.bake()
+    expected = shown(bar, range(2, 6))
+    path, out = folder / "Bar.abc", folder / "found.npz"
+    bpy.ops.arapfields.export_animation(format="ABC", filepath=str(path))
+    command = [sys.executable, "-c", READER, "ABC", str(path), str(out), "50", "4", "10"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 7, done.stdout + done.stderr
+    found = np.load(out)
+    assert found["range"].tolist() == [4, 10]
+    for frame, points in expected.items():
+        assert np.abs(found[str(2 * frame)] - points).max() <= EXACT * np.ptp(points, axis=0).max(), frame
+
+
+@in_blender
 def test_usd_is_what_its_own_library_reads():
     import bpy
     import numpy as np
