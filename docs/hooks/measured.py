@@ -33,7 +33,7 @@ def hero(m):
 
 
 def bending(m):
-    return f"mean bend {listed(m, 'bend', '.2g')}; mean stretch {listed(m, 'stretch', '.3f')}"
+    return f"mean bend {listed(m, 'bend', '.3g')}; mean stretch {listed(m, 'stretch', '.3f')}"
 
 
 def deformations(m):

@@ -152,6 +152,10 @@ void OutputFile::finish() {
   struct stat other{};
   if (stat(beside().c_str(), &other) == 0) partial_ = beside();
   const int arrived = open(partial_.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC);
+  std::error_code ignored;
+  if (arrived < 0)
+    require(fs::exists(fs::path(target_).parent_path(), ignored), path_, "its folder is gone",
+            "bring it back, or choose another");
   require(arrived >= 0, path_, "nothing was written", "the disk may be full");
   struct stat found{}, there{};
   int problem = fstat(arrived, &found) != 0 ? errno : 0;

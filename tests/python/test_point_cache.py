@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """PC2 and MDD: the bytes that the formats say, whole or not at all."""
 
+import shutil
 import struct
 import subprocess
 import sys
@@ -170,3 +171,15 @@ def test_memory_does_not_grow_with_the_frames(tmp_path):
         [sys.executable, "-c", MANY, tmp_path / "x.pc2"], capture_output=True, text=True, check=True
     )
     assert int(said.stdout) < 5000  # kB
+
+
+def test_a_folder_that_goes_while_it_is_written_to_is_named(tmp_path):
+    folder = tmp_path / "gone"
+    folder.mkdir()
+    writer = PointCacheWriter(folder / "a.pc2", points=10, frames=4)
+    for frame in range(4):
+        if frame == 2:
+            shutil.rmtree(folder)
+        writer.write(np.zeros((10, 3)))
+    with pytest.raises(af.InvalidInput, match="its folder is gone"):
+        writer.finish()
