@@ -3,6 +3,13 @@
 
 import bpy
 
+listeners = {}  # name of a property → what is called with its group where the user changes it
+
+
+def tells(name):
+    """The `update` of a property that only its listener understands."""
+    return lambda group, _: listeners[name](group)
+
 
 def annotations(parameters, **extra):
     """Property definitions for a class that shows these parameters."""

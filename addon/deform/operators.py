@@ -4,6 +4,7 @@ import bpy
 from ..blender.object_references import settings_of
 from ..blender.presets import preset_classes
 from ..blender.property_definitions import annotations, effective_values
+from ..core.errors import UserError
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
 from ..core.settings.parameters import DEFORM
@@ -47,11 +48,24 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
         options = build_options(af.DeformOptions, values)
         handles = empties.solve_handles(source, space_of(source.matrix_world, source.name), weights)
 
+        require_reach_heeded(handles, values)
+
         def solve(tracker, rest, samples, weight):
             natives = native_handles(af, handles, rest, samples)
             return af.deform(samples, natives, options, task=tracker.start("Deforming", weight))
 
         return plan_solve_job(context, self, source, "DEFORM", values["samples"], values["seed"], solve)
+
+
+def require_reach_heeded(handles, values):
+    """UserError where a handle has a reach that these settings do not heed."""
+    if values["field"].lower() != "neural" and not values["exact_handles"]:
+        return
+    for handle in handles:
+        if handle.reach > 0:
+            raise UserError(
+                "{name} has a reach; take the method Fast, without Exact Handles", name=handle.name
+            )
 
 
 CLASSES = [ARAPFIELDS_OT_deform, *preset_classes("deform", "Deform", DEFORM)]

@@ -77,7 +77,10 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
         turns = surface.turns(field, before) if placement.keeps_mesh(output, target) else None
         found.append((field, points))
         carried = carrying.moved(native.library(), points, field, frames)
-        return SolvedMesh(surface.space.to_local(after), topology, report, turns, carried)
+        local = surface.space.to_local(after)
+        if output == "WARP":
+            local = surface.space.moved_to_local(after, before, surface.local)
+        return SolvedMesh(local, topology, report, turns, carried)
 
     def apply(solved):
         if preview is not None:

@@ -7,7 +7,7 @@ While it plays, the field's modifier is off; what gives the object a new motion 
 from ..blender import modifier_stack
 from ..blender.object_references import settings_of
 from ..names import CACHE_MODIFIER
-from . import inputs
+from . import inputs, masks
 
 
 def play(source, path, start, step):
@@ -35,8 +35,8 @@ def add(source):
     if field is not None:
         index += 1
         modifier.factor = inputs.get(field, "Factor")
-        group = inputs.get_attribute(field, "Mask")
-        modifier.vertex_group = group if group in source.vertex_groups else ""
+    group = masks.group_of(source)
+    modifier.vertex_group = group if group in source.vertex_groups else ""
     source.modifiers.move(source.modifiers.find(modifier.name), index)
     return source.modifiers[index]
 

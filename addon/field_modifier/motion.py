@@ -13,7 +13,7 @@ import numpy as np
 from ..blender import modifier_stack
 from ..core.errors import UserError
 from ..names import FIELD_MODIFIER, HELPER_SUFFIX, OFFSETS, TURNS
-from . import armatures, cache_modifier, inputs, node_group
+from . import armatures, cache_modifier, inputs, masks, node_group
 
 written = set()  # session_uid of objects that were moved since Blender's last update, which is ours alone
 
@@ -53,6 +53,7 @@ def bind(context, source):
         modifier = add(source, normals)
     else:
         choose_group(modifier, normals)
+    masks.take(source)
     if on_mesh:
         forget_helper(modifier)
     else:

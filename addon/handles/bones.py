@@ -96,9 +96,8 @@ def mirror(context, source, entry):
         raise UserError(
             "the armature {rig} has no bone on the other side of {bone}", rig=entry.rig.name, bone=entry.bone
         )
-    weight, hold_from = entry.weight, entry.hold_from
-    mirrored = add(source, entry.rig, name, holding_groups(context, source))
-    mirrored.weight, mirrored.hold_from = weight, hold_from
+    kept = movers.asked_of(entry)
+    movers.ask(add(source, entry.rig, name, holding_groups(context, source)), kept)
 
 
 def reset(context, source, entries):

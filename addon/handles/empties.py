@@ -7,12 +7,13 @@ from mathutils import Matrix, Vector
 
 from ..blender import mesh_arrays, modifier_stack, vertex_groups
 from ..blender.object_references import in_scene, settings_of
+from ..blender.property_definitions import from_single_precision
 from ..blender.selection import choose_row
 from ..core.errors import UserError
 from ..core.geometry.handles import far_handle, solve_handle
 from ..core.geometry.spaces import transform
 from ..core.runtime.coroutines import run_to_completion
-from . import naming
+from . import movers, naming
 from .movers import box_now, current_box, is_there, matrix_of, name_of
 from .palette import free_colour
 
@@ -80,6 +81,8 @@ def solve_handles(source, space, weights=None, where=matrix_of):
         boxes = rest_box(source, entry, where), box_now(entry, where)
         held = weights[entry.group] if weights and entry.group and entry.kind in ("GROUP", "BONE") else None
         options = {"weights": held, "weight": entry.weight, "hold_from": entry.hold_from}
+        options["reach"] = from_single_precision(entry.reach)
+        options["allow_scale"] = entry.allow_scale and entry.kind != "POINT"
         handles.append(solve_handle(name_of(entry), entry.kind, *boxes, space, **options))
     if not handles:
         raise UserError("{name} has no handle; add one in the panel's Handles section", name=source.name)
@@ -191,11 +194,12 @@ def mirror(context, source, entry, axis):
     current = flip @ np.linalg.inv(world) @ matrix_of(entry.empty) @ flip
     name, size = entry.empty.name, entry.empty.empty_display_size
     flipped = bpy.utils.flip_name(name)
-    weight, kind = entry.weight, entry.kind
+    kept, kind = movers.asked_of(entry), entry.kind
     new_name = flipped if flipped != name else f"{name}_mirrored"
     empty = make_empty(context, source, Matrix((world @ current).tolist()), size, new_name)
     mirrored = add(source, empty, kind)
-    mirrored.rest, mirrored.group, mirrored.weight = rest.ravel(), group, weight
+    mirrored.rest, mirrored.group = rest.ravel(), group
+    movers.ask(mirrored, kept)
     return mirrored
 
 

@@ -48,6 +48,19 @@ def name_of(entry):
     return entry.bone if entry.kind == "BONE" else entry.empty.name
 
 
+ASKED = ("weight", "hold_from", "reach", "allow_scale")
+
+
+def asked_of(entry):
+    """{property: value} of what the user asks of a handle, whatever moves it."""
+    return {name: getattr(entry, name) for name in ASKED}
+
+
+def ask(entry, values):
+    for name, value in values.items():
+        setattr(entry, name, value)
+
+
 def key_of(entry):
     """Tells a source's handles apart, also when they are renamed or others are removed."""
     return mover_of(entry).session_uid, entry.bone

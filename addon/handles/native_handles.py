@@ -5,26 +5,30 @@ from ..blender.vertex_groups import NearestVertices
 from ..core.geometry.handles import far_from, require_held
 
 
-def native_handles(af, handles, rest, samples):
+def native_handles(af, handles, rest, samples, reaches=True):
     """Native handles; UserError that names those without a sample. Runs on the worker.
 
-    `handles` are core.geometry.handles.Handle, `rest` is the source's surface at rest.
+    `handles` are core.geometry.handles.Handle, `rest` is the source's surface at rest. `reaches`: whether the
+    handles' reaches count; a style acts everywhere.
     """
     counts, natives, holding = {}, [], Holding(rest.vertices, samples.points, handles)
     for handle in handles:
+        further = {"weight": handle.weight, "reach": handle.reach if reaches else 0.0}
         if handle.kind == "POINT":
-            natives.append(af.Point(handle.rest[:3, 3], handle.target[:3, 3], weight=handle.weight))
-        elif handle.kind in ("GROUP", "BONE"):
+            natives.append(af.Point(handle.rest[:3, 3], handle.target[:3, 3], **further))
+            continue
+        further["allow_scale"] = handle.allow_scale
+        if handle.kind in ("GROUP", "BONE"):
             held = holding.of(handle)
             counts[handle.name] = len(held)
-            natives.append(region(af, handle, held))
+            natives.append(region(af, handle, held, further))
         elif handle.kind == "PIN":
-            natives.append(region(af, handle, handle.pinned(samples.points)))
+            natives.append(region(af, handle, handle.pinned(samples.points), further))
         elif handle.kind == "FAR":
-            natives.append(region(af, handle, far_from(handles, samples.points)))
+            natives.append(region(af, handle, far_from(handles, samples.points), further))
         else:
             counts[handle.name] = int(handle.inside(samples.points).sum())
-            natives.append(af.Cuboid(handle.rest, handle.target, weight=handle.weight))
+            natives.append(af.Cuboid(handle.rest, handle.target, **further))
     require_held(counts)
     return natives
 
@@ -44,5 +48,5 @@ class Holding:
         return handle.by_weight(self._at_points(handle.weights))
 
 
-def region(af, handle, held):
-    return af.Region(held.tolist(), handle.rest, handle.target, weight=handle.weight)
+def region(af, handle, held, further):
+    return af.Region(held.tolist(), handle.rest, handle.target, **further)

@@ -90,6 +90,9 @@ class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
         if 0 <= settings.active_handle < len(settings.handles):
             entry = settings.handles[settings.active_handle]
             layout.prop(entry, "weight")
+            layout.prop(entry, "reach")
+            if entry.kind != "POINT":
+                layout.prop(entry, "allow_scale")
             if entry.kind in ("GROUP", "BONE"):
                 layout.prop_search(entry, "group", source, "vertex_groups")
             if entry.group:

@@ -41,6 +41,19 @@ class ARAPFIELDS_PG_handle(bpy.types.PropertyGroup):
         min=0.0,
         soft_max=10.0,
     )
+    reach: bpy.props.FloatProperty(
+        name="Reach",
+        description="How far from what it holds the handle moves things, through the inside of the shape, "
+        "in the object's own lengths; beyond, nothing moves at all. 0: as far as the shape goes",
+        subtype="DISTANCE",
+        default=0.0,
+        min=0.0,
+    )
+    allow_scale: bpy.props.BoolProperty(
+        name="Allow Scale",
+        description="What the handle holds is scaled as it is; otherwise only the handle's move and turn "
+        "count",
+    )
     anchor: bpy.props.BoolProperty(
         name="Anchor",
         description="The pin tool does not drag it; while there is one, nothing else is held by itself",

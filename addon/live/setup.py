@@ -35,7 +35,7 @@ def layout_of(source, kind):
     weights are not among it: they may be animated."""
     settings = settings_of(source)
     held = [
-        (movers.key_of(e), e.kind, e.group, e.weight, e.hold_from, tuple(e.rest))
+        (movers.key_of(e), e.kind, e.group, tuple(movers.asked_of(e).values()), tuple(e.rest))
         for e in empties.used(source)
     ]
     style = settings.stylize.region, settings.stylize.region_material

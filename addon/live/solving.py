@@ -69,12 +69,16 @@ class Solving:
             for name in ("barrier", "gauss_weight", "keep_stance", "handle_weight"):
                 options[name] /= rigidity
         self.bound, self.energy, self.style_set = handles, energy, None
-        held = native_handles(af, handles, self.surface, self.samples)
+        held = self.native_handles(handles)
         options["interior"] = bool(held)  # a style alone acts everywhere alike
         options |= supported_options(af.LiveOptions, machine_options())
         self.solver = af.LiveDeformer(self.samples, held, af.LiveOptions(**options))
         if self.rest is not None:
             self.solver.track(self.rest)
+
+    def native_handles(self, handles):
+        reaches = self.kind == "DEFORM"
+        return native_handles(native.library(), handles, self.surface, self.samples, reaches)
 
     def ready_solver(self):
         """(samples, solver) of this surface without handles, where one is set up; or None."""
@@ -110,8 +114,7 @@ class Solving:
         if energy != self.energy:
             self.make_solver(handles, energy)
         if handles is not self.bound:
-            af = native.library()
-            self.solver.set_handles(native_handles(af, handles, self.surface, self.samples))
+            self.solver.set_handles(self.native_handles(handles))
             self.bound = handles
         if style is not None and style[0] != self.style_set:
             directions, strength, sharpness, up = style[1:]
@@ -141,9 +144,12 @@ class Solving:
         turns = self.surface.turns(field, self.rest) if self.surface.in_place else None
         if self.single is None or self.single[0] is not self.points:
             self.single = self.points, np.asarray(self.points, dtype=np.float32)
-        return Shape(self.local(solved), self.single[1], turns, carried=carried)
+        return Shape(self.local(solved, still=True), self.single[1], turns, carried=carried)
 
-    def local(self, solved):
+    def local(self, solved, still=False):
+        """(n, 3) in local coordinates; `still`: of the source's own, what does not move stays bit for bit."""
         if not np.isfinite(solved).all():
             raise UserError("the shape has vertices that are NaN or infinite; move the handles less far")
-        return np.ascontiguousarray(self.surface.space.to_local(solved), dtype=np.float32)
+        space = self.surface.space
+        local = space.moved_to_local(solved, self.rest, self.points) if still else space.to_local(solved)
+        return np.ascontiguousarray(local, dtype=np.float32)

@@ -50,6 +50,7 @@ class Drag:
     def __init__(self, context, before, empty, is_new=False):
         self.before, self.is_new, self.has_moved = before, is_new, False
         self.empty, self.start = ObjectReference(empty), empty.matrix_world.copy()
+        self.reach = pins.entry_of(empty).reach
         self.values = {name: tuple(getattr(empty, name)) for name in TRANSFORMS}
         source = before.source.get()
         if not sessions.is_live(source, "DEFORM"):
@@ -71,6 +72,13 @@ class Drag:
     def put(self, context, matrix):
         self.has_moved = True
         self.empty.get().matrix_world = matrix
+        sessions.update(context)
+
+    def change_reach(self, context, steps):
+        """Has the handle reach so many steps of the wheel farther, or less far where these are negative."""
+        entry = pins.entry_of(self.empty.get())
+        entry.reach = pins.next_reach(self.before.source.get(), entry, steps)
+        self.has_moved = True
         sessions.update(context)
 
     def session(self):
@@ -100,6 +108,7 @@ class Drag:
         elif empty is not None:
             for name, value in self.values.items():
                 setattr(empty, name, value)
+            pins.entry_of(empty).reach = self.reach
         settings = settings_of(source)
         settings.hold_far, settings.active_handle = self.before.hold_far, self.before.row
         self.before.choose(context)

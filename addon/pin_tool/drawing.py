@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the pin tool draws: its pins, the active one's ring, and the surface under the cursor."""
+"""What the pin tool draws: its pins, the active one's ring, and the surface under the cursor.
+
+With symmetry, faint discs where the other side is pinned as well.
+"""
 
 import bpy
 import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
+from ..handles import movers, symmetry
 from ..names import TOOL
 from . import pins, screen
 from .hover import RING, hover
@@ -17,6 +21,7 @@ ANGLES = np.linspace(0, 2 * np.pi, CORNERS, endpoint=False)
 SQUARE = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * 0.9
 CIRCLE = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
 ENOUGH = 8  # triangles within the radius that show it; a disc does where they are fewer
+GHOST = 0.35  # how much of a disc is left on the other side
 LIFT = 1.5  # pixels by which the lit surface is drawn before the shape
 
 
@@ -73,9 +78,23 @@ def draw():
     if target is not None and target.kind == "SURFACE":
         draw_surface(brush, target)
     gpu.state.depth_test_set("NONE")
-    for _, entry in pins.handles_in_view(context):
+    handles = pins.handles_in_view(context)
+    for colour, shape, location in ghosts(handles):
+        brush.area((*colour, GHOST), brush.outline(location, shape, PIN))
+    for _, entry in handles:
         draw_handle(brush, entry, target, entry.empty == pins.chosen(context))
     gpu.state.blend_set("NONE")
+
+
+def ghosts(handles):
+    """((r, g, b), shape, (3,) location) of these [(source, entry)] where Symmetry mirrors them to."""
+    found = []
+    for source, entry in handles:
+        mirror, now = symmetry.mirror_of(source), movers.box_now(entry)
+        if mirror is not None and not symmetry.is_on_plane(mirror, now):
+            shape = SQUARE if entry.anchor else CIRCLE
+            found.append((tuple(entry.colour), shape, (mirror @ now)[:3, 3]))
+    return found
 
 
 def draw_surface(brush, target):

@@ -17,6 +17,17 @@ TICK = 0.05  # seconds between looks at a shape that comes to rest
 NAVIGATION = ("MIDDLEMOUSE", "WHEEL", "TRACKPAD", "NDOF", "NUMPAD")  # types of events that turn the view
 
 
+def reach_steps(event):
+    """By how many steps an event has a handle reach farther; the keys are those of proportional editing."""
+    if event.value != "PRESS":
+        return 0
+    if event.type in ("PAGE_UP", "PAGE_DOWN"):
+        return 1 if event.type == "PAGE_UP" else -1
+    if event.ctrl and event.type in ("WHEELUPMOUSE", "WHEELDOWNMOUSE"):
+        return 1 if event.type == "WHEELDOWNMOUSE" else -1
+    return 0
+
+
 class PinOperator(Guided):
     """Mixin: works in a 3D view in Object Mode."""
 
@@ -78,6 +89,11 @@ class Dragging(PinOperator):
                 return self.end(context, {"FINISHED"})
             self.timer = timers.start_events(context, TICK)
             sessions.update(context)
+            return {"RUNNING_MODAL"}
+        steps = reach_steps(event)
+        if steps:
+            self.drag.change_reach(context, steps)
+            redraw(context, "WINDOW", "UI")
             return {"RUNNING_MODAL"}
         if event.type.startswith(NAVIGATION):
             self.turned = True

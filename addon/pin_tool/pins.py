@@ -16,6 +16,7 @@ from ..live import sessions
 from ..results import placement
 from . import places
 
+REACH_STEP = 1.1  # how many times as far a handle reaches by one step of the wheel
 MAJORITY = 0.5  # mean weight from which a vertex group gives a pin its name
 
 
@@ -64,6 +65,19 @@ def entry_of(empty):
     source = owner_of(empty)
     index = -1 if source is None else empties.find(source, empty)
     return settings_of(source).handles[index] if index >= 0 else None
+
+
+def next_reach(source, entry, steps):
+    """How far a handle reaches after so many steps of the wheel, in the object's lengths.
+
+    Not less than its own size; beyond the object's size it reaches everything, which is 0, and from there one
+    step back is that size.
+    """
+    size = float(np.linalg.norm(np.ptp(np.array(source.bound_box), axis=0)))
+    rest = np.array(entry.rest, dtype=np.float64).reshape(4, 4)
+    least = float(np.linalg.norm(rest[:3, :3], axis=0).max())
+    reach = (entry.reach or size * REACH_STEP) * REACH_STEP**steps
+    return 0.0 if reach > size * 1.001 else max(reach, least)
 
 
 def place(context, source, location, radius, face=None, face_count=None, anchor=False):

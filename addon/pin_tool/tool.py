@@ -19,7 +19,8 @@ class ARAPFIELDS_TOOL_pin(bpy.types.WorkSpaceTool):
     bl_label = "ARAP Pin"
     bl_description = (
         "Pin the surface and drag it: the shape follows, as rigid as it can be. "
-        "Shift-click: anchor. Ctrl-click or X: delete. R or the ring: turn. F: radius"
+        "Shift-click: anchor. Ctrl-click or X: delete. R or the ring: turn. F: radius. "
+        "Ctrl-wheel in a drag: reach"
     )
     bl_icon = ICON
     bl_cursor = "CROSSHAIR"

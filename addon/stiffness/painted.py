@@ -17,7 +17,8 @@ PRESETS = {
 
 def refusal(source):
     """Why the groups cannot be read, as a UserError; None where they can."""
-    return vertex_groups.missing(source, names(source))
+    mask = settings_of(source).stiffness.mask
+    return vertex_groups.missing(source, [*names(source), *filter(None, [mask])])
 
 
 def names(source):
@@ -28,6 +29,8 @@ def names(source):
 
 def read(context, source, in_place):
     """((n,) factors of the vertices' stiffness, (n,) of that against bending); None each where all are 1."""
+    if refusal(source):
+        raise refusal(source)
     settings = settings_of(source).stiffness
     weights = run_to_completion(vertex_groups.read_weights(context, source, names(source), in_place))
     pairs = (settings.group, settings.times), (settings.bend_group, settings.bend_times)

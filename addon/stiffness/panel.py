@@ -22,6 +22,7 @@ class ARAPFIELDS_PT_stiffness(Advanced, bpy.types.Panel):
         row = layout.row()
         row.enabled = bool(group.bend_group)
         row.prop(group, "bend_times")
+        layout.prop_search(group, "mask", source, "vertex_groups")
         note(layout, painted.refusal(source))
 
 

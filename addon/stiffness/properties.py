@@ -3,6 +3,8 @@
 
 import bpy
 
+from ..blender.property_definitions import tells
+
 MOST = 1e4  # how many times as stiff a part may be; single precision bears no more beside soft ones
 
 
@@ -31,6 +33,13 @@ class ARAPFIELDS_PG_stiffness(bpy.types.PropertyGroup):
     )
     bend_times: factor(
         "Times against Bending", "How stiff that group is against bending; below 1 it folds more easily"
+    )
+
+    mask: bpy.props.StringProperty(
+        name="Influence",
+        description="Vertex group that says how far each point goes of the way, nowhere where its weight "
+        "is 0; the modifier's mask",
+        update=tells("mask"),
     )
 
 

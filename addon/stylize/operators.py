@@ -70,7 +70,7 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
                 options,
                 weights=blend,
                 up=style.up,
-                handles=native_handles(af, handles, rest, samples),
+                handles=native_handles(af, handles, rest, samples, reaches=False),
                 task=tracker.start("Stylizing", weight),
             )
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Handles in the viewport: the rest box of each, thin, and where it is now, thick; faint behind the mesh.
 
-Of a pin, whose Empty is a ball on the surface, the way that it has gone.
+Of a pin, whose Empty is a ball on the surface, the way that it has gone. About a selected handle, how far it
+reaches. With symmetry, ghosts of all on the other side.
 """
 
 import bpy
@@ -12,21 +13,31 @@ from mathutils import Matrix
 
 from ..blender import user_preferences
 from ..blender.object_references import settings_of, source_of
-from ..handles import empties, movers
+from ..handles import empties, movers, symmetry
 
 CORNERS = np.array([(x, y, z, 1.0) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 EDGES = [(a, b) for a in range(8) for b in range(a) if (CORNERS[a] != CORNERS[b]).sum() == 1]
+ANGLES = np.linspace(0, 2 * np.pi, 48, endpoint=False)
+CIRCLE_ENDS = 2 * len(ANGLES)
 THIN, THICK, CHOSEN = 1.5, 2.5, 4.0  # widths of lines in pixels: at rest, now, of a selected handle
 HALO, HALO_ALPHA = 2.0, 0.55  # dark pixels around a line in all, which set it off from any mesh
 BEHIND = 0.3  # how much of a line is left behind what hides it
+GHOST = 0.35  # how much of a line is left on the other side
 NEARER = Matrix.Identity(4)  # a little towards the viewer, before the Empty's own lines
 NEARER[2][3] = -2e-4
+FLAT = np.eye(3)[:2]  # right and up of a viewer who looks along z
 
 
 def box_lines(matrix):
     """The 24 ends of a box's edges, in world space."""
     corners = (CORNERS @ matrix.T)[:, :3]
     return [corners[end].tolist() for edge in EDGES for end in edge]
+
+
+def circle_lines(center, radius, across):
+    """The ends of a circle's lines in world space; `across` (2, 3) are the viewer's right and up."""
+    rim = center + radius * (np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1) @ across)
+    return np.stack([rim, np.roll(rim, -1, axis=0)], axis=1).reshape(-1, 3).tolist()
 
 
 def shown_handles(source):
@@ -39,28 +50,70 @@ def shown_handles(source):
             yield entry
 
 
-def segments(source):
+def segments(source, across=FLAT):
     """((r, g, b), width, line ends in world space) of all handles of a source."""
     lines = []
     for entry in shown_handles(source):
         rest, now = empties.rest_box(source, entry), movers.box_now(entry)
-        thick = CHOSEN if entry.kind == "BONE" or entry.empty.select_get() else THICK
-        way = [rest[:3, 3].tolist(), now[:3, 3].tolist()]
-        if entry.kind == "PIN":
-            if not np.allclose(*way, atol=1e-6):
-                lines.append((tuple(entry.colour), thick, way))
-            continue
-        if np.allclose(rest, now, atol=1e-6):
-            lines.append((tuple(entry.colour), thick, box_lines(rest)))
-            continue
-        lines.append((tuple(entry.colour), THIN, box_lines(rest)))
-        lines.append((tuple(entry.colour), thick, box_lines(now) + way))
+        is_chosen = entry.kind == "BONE" or entry.empty.select_get()
+        parts = outline(entry.kind, rest, now, CHOSEN if is_chosen else THICK)
+        if is_chosen and entry.reach > 0:
+            parts.append((THIN, reach_lines(source, entry, rest, across)))
+        lines += [(tuple(entry.colour), width, ends) for width, ends in parts]
     return lines
 
 
-def draw_lines(shader, colour, width, batch):
+def outline(kind, rest, now, thick):
+    """[(width, line ends)] of a handle from its box at rest and now."""
+    way = [rest[:3, 3].tolist(), now[:3, 3].tolist()]
+    if kind == "PIN":
+        return [] if np.allclose(*way, atol=1e-6) else [(thick, way)]
+    if np.allclose(rest, now, atol=1e-6):
+        return [(thick, box_lines(rest))]
+    return [(THIN, box_lines(rest)), (thick, box_lines(now) + way)]
+
+
+def reach_lines(source, entry, rest, across):
+    """How far a handle reaches from where it rests: a larger box about a box, about others a circle."""
+    halves = np.linalg.norm(rest[:3, :3], axis=0)
+    length = entry.reach * np.cbrt(abs(np.linalg.det(movers.matrix_of(source)[:3, :3])))
+    if entry.kind in ("CUBE", "BONE"):
+        wider = rest.copy()
+        wider[:3, :3] *= 1 + length / np.maximum(halves, 1e-12)
+        return box_lines(wider)
+    held = halves.max() if entry.kind == "PIN" else 0.0
+    return circle_lines(rest[:3, 3], length + held, across)
+
+
+def ghosts(source, across=FLAT):
+    """((r, g, b), width, line ends in world space) of the handles on the other side, at rest and now.
+
+    None of those that stand on the plane itself.
+    """
+    mirror = symmetry.mirror_of(source)
+    if mirror is None:
+        return []
+    lines = []
+    for entry in shown_handles(source):
+        rest, now = empties.rest_box(source, entry), movers.box_now(entry)
+        if symmetry.is_on_plane(mirror, rest) and symmetry.is_on_plane(mirror, now):
+            continue
+        rest, now = mirror @ rest, mirror @ now
+        parts = outline(entry.kind, rest, now, THICK)
+        if entry.kind == "PIN":
+            rims = [(THIN, rest), (THICK, now)] if parts else [(THICK, now)]
+            parts += [(width, circle_lines(box[:3, 3], radius_of(box), across)) for width, box in rims]
+        lines += [(tuple(entry.colour), width, ends) for width, ends in parts]
+    return lines
+
+
+def radius_of(box):
+    return np.linalg.norm(box[:3, :3], axis=0).max()
+
+
+def draw_lines(shader, colour, width, batch, strength=1.0):
     """Lines with their halo, bright before what is shown and faint behind it."""
-    for test, alpha in (("GREATER", BEHIND), ("LESS_EQUAL", 1.0)):
+    for test, alpha in (("GREATER", BEHIND * strength), ("LESS_EQUAL", strength)):
         gpu.state.depth_test_set(test)
         for shade, wide in (((0, 0, 0, HALO_ALPHA * alpha), width + HALO), ((*colour, alpha), width)):
             shader.uniform_float("color", shade)
@@ -70,16 +123,19 @@ def draw_lines(shader, colour, width, batch):
 
 def draw():
     context = bpy.context
-    source = source_of(context)
+    source = source_of(context) if context.region_data is not None else None
     if source is None or not context.space_data.overlay.show_overlays or not user_preferences.show_boxes():
         return
+    across = np.array(context.region_data.view_rotation.to_matrix()).T[:2]
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     gpu.state.blend_set("ALPHA")
     gpu.state.depth_mask_set(False)
     shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
     with gpu.matrix.push_pop_projection():
         gpu.matrix.load_projection_matrix(NEARER @ gpu.matrix.get_projection_matrix())
-        for colour, width, ends in segments(source):
-            draw_lines(shader, colour, width, batch_for_shader(shader, "LINES", {"pos": ends}))
+        for strength, lines in ((GHOST, ghosts(source, across)), (1.0, segments(source, across))):
+            for colour, width, ends in lines:
+                batch = batch_for_shader(shader, "LINES", {"pos": ends})
+                draw_lines(shader, colour, width, batch, strength)
     gpu.state.depth_test_set("NONE")
     gpu.state.blend_set("NONE")

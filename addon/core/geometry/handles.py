@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import UserError
-from .spaces import rigid_motion
+from .spaces import inverse, rigid_motion
 
 PIN_SAMPLES = 12  # of the surface that a pin holds at least: those nearest to it
 FAR_SHARE = 0.5  # of the largest distance from all pins: what is farther is far
@@ -14,6 +14,7 @@ FAR_WEIGHT = 0.02  # with which what is far holds its place, relative to a pin
 BONE_GAP = 0.25  # of a bone's width by which what it holds is nearer to it than to any other bone
 BONE_REACH = 4.0  # widths within which a bone that holds nothing takes what is nearest
 ANCHOR_TOLERANCE = 1e-5  # motion, relative to the box, below which a handle is an anchor
+LEAST_VOLUME = 1e-6  # of a box that may scale, relative to a cube as long as its longest side
 MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 
 
@@ -28,6 +29,8 @@ class Handle:
     weights: np.ndarray | None = None  # GROUP, and BONE that has one: (n,) of the source's vertices
     hold_from: float = 0.5  # weight from which they hold
     weight: float = 1.0  # how strictly it is followed, relative to others
+    reach: float = 0.0  # how far it moves things, through the inside; 0: everything
+    allow_scale: bool = False  # whether the motion may be any affine map that keeps the box's orientation
 
     @property
     def is_anchor(self):
@@ -90,13 +93,28 @@ def solve_handle(name, kind, rest_world, now_world, space, **further):
         )
     if np.linalg.det(rest[:3, :3]) < 0:
         rest = rest @ MIRROR  # the same box, right-handed
-    motion = to_solve @ rigid_motion(rest_world, now_world) @ space.solve_to_world
-    motion = rigid_motion(np.eye(4), motion)
+    if further.get("allow_scale"):
+        motion = to_solve @ affine_motion(name, rest_world, now_world) @ space.solve_to_world
+    else:
+        motion = to_solve @ rigid_motion(rest_world, now_world) @ space.solve_to_world
+        motion = rigid_motion(np.eye(4), motion)
     extent = np.linalg.norm(rest[:3, :3], axis=0).max()
     moved = np.abs(motion[:3, :3] - np.eye(3)).max() > ANCHOR_TOLERANCE
     shift = motion[:3, :3] @ rest[:3, 3] + motion[:3, 3] - rest[:3, 3]
     moved = moved or np.abs(shift).max() > ANCHOR_TOLERANCE * extent
     return Handle(name, kind, rest, motion @ rest if moved else rest.copy(), **further)
+
+
+def affine_motion(name, rest, now):
+    """(4, 4) the map that takes one box to the other; UserError where it flattens or mirrors."""
+    motion = now @ inverse(rest)
+    linear = motion[:3, :3]
+    if not np.isfinite(motion).all() or np.linalg.det(linear) <= LEAST_VOLUME * np.abs(linear).max() ** 3:
+        raise UserError(
+            "{name}: its scale flattens or mirrors what it holds; give every axis a scale above zero",
+            name=name,
+        )
+    return motion
 
 
 def require_held(counts):

@@ -29,6 +29,23 @@ class Space:
         """(n, 3) solve → local."""
         return transform(inverse(self.local_to_solve), points)
 
+    def moved_to_local(self, after, before, local):
+        """(n, 3) solve → local of points that were `before` in solve space and `local` in local coordinates.
+
+        Those that have not moved stay bit for bit, which the way there and back would not leave them.
+        """
+        result = self.to_local(after)
+        if not np.array_equal(self.local_to_solve, np.eye(4)):
+            still = (after == np.asarray(before, dtype=after.dtype)).all(axis=1)
+            result[still] = local[still]
+        return result
+
+    def mirror(self, axis):
+        """(4, 4) world → world: across the plane on which that axis (0, 1 or 2) of solve space is 0."""
+        flip = np.eye(4)
+        flip[axis, axis] = -1.0
+        return self.solve_to_world @ flip @ self.world_to_solve
+
     @property
     def world_to_solve(self):
         return inverse(self.solve_to_world)
