@@ -2,10 +2,10 @@
 import bpy
 
 from ..blender import modifier_stack
-from ..blender.guide import Guided
 from ..blender.language import translated
-from ..blender.object_references import refusal, settings_of, source_of
+from ..blender.object_references import settings_of, source_of
 from ..blender.property_definitions import effective_value
+from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError
 from ..field_modifier import cache_modifier
 from ..names import Op
@@ -80,7 +80,7 @@ class ARAPFIELDS_OT_bake(BakeOperator, bpy.types.Operator):
             self.warnings.append(f"{bake.name}: {told}")
 
 
-class ARAPFIELDS_OT_remove_bake(Guided, bpy.types.Operator):
+class ARAPFIELDS_OT_remove_bake(SourceOperator, bpy.types.Operator):
     """Take the modifier that plays the bake away; the cache's file stays"""
 
     bl_idname = Op.REMOVE_BAKE
@@ -89,14 +89,9 @@ class ARAPFIELDS_OT_remove_bake(Guided, bpy.types.Operator):
     guide = "animation"
 
     @classmethod
-    def poll(cls, context):
-        source = source_of(context)
-        reason = refusal(source)
-        if reason is None and modifier_stack.find_cache(source) is None:
-            reason = UserError("{name} plays no bake", name=source.name)
-        if reason:
-            cls.poll_message_set(translated(reason))
-        return not reason
+    def refuses(cls, source):
+        played = modifier_stack.find_cache(source)
+        return UserError("{name} plays no bake", name=source.name) if played is None else None
 
     def execute(self, context):
         cache_modifier.remove(source_of(context))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..blender.guide import Guided
 from ..blender.language import translated
-from ..blender.object_references import owner_of, refusal, settings_of, source_of
+from ..blender.object_references import owner_of, settings_of, source_of
+from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError
 from ..core.settings.choices import CARRYING
 from ..live import sessions
@@ -11,20 +11,12 @@ from ..names import Op
 from . import passengers, refusals
 
 
-class CarriedOperator(Guided):
+class CarriedOperator(SourceOperator):
     """Mixin: works on the list of objects that the panel's source carries."""
 
     bl_options = {"REGISTER", "UNDO"}
     guide = "characters"
     needs_carried = True
-
-    @classmethod
-    def poll(cls, context):
-        source = source_of(context)
-        reason = refusal(source) or cls.refuses(source)
-        if reason:
-            cls.poll_message_set(translated(reason))
-        return not reason
 
     @classmethod
     def refuses(cls, source):

@@ -5,7 +5,8 @@ import bpy
 
 from ..blender.guide import Guided
 from ..blender.language import translated
-from ..blender.object_references import refusal, source_of
+from ..blender.object_references import source_of
+from ..blender.source_operator import SourceOperator
 from ..core import poses
 from ..core.errors import UserError
 from ..core.poses import Pose
@@ -62,15 +63,8 @@ class PoseOperator(Guided):
         return {"FINISHED"}
 
 
-class OfSource(PoseOperator):
+class OfSource(PoseOperator, SourceOperator):
     """Mixin of those that need a mesh."""
-
-    @classmethod
-    def poll(cls, context):
-        reason = refusal(source_of(context))
-        if reason:
-            cls.poll_message_set(translated(reason))
-        return not reason
 
 
 class ARAPFIELDS_OT_save_pose(OfSource, bpy.types.Operator):

@@ -2,9 +2,8 @@
 import bpy
 
 from ..blender import mesh_arrays, modifier_stack
-from ..blender.guide import Guided
-from ..blender.language import translated
-from ..blender.object_references import refusal, settings_of, source_of
+from ..blender.object_references import settings_of, source_of
+from ..blender.source_operator import SourceOperator
 from ..carried import passengers
 from ..core.errors import UserError
 from ..field_modifier import motion
@@ -12,19 +11,11 @@ from ..names import Op
 from . import placement, result_objects
 
 
-class FieldOperator(Guided):
+class FieldOperator(SourceOperator):
     """Mixin: works on the field's modifier of the panel's source."""
 
     bl_options = {"REGISTER", "UNDO"}
     guide = "results"
-
-    @classmethod
-    def poll(cls, context):
-        source = source_of(context)
-        reason = refusal(source) or cls.refuses(source)
-        if reason:
-            cls.poll_message_set(translated(reason))
-        return not reason
 
     @classmethod
     def refuses(cls, source):

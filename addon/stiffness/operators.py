@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..blender.guide import Guided
-from ..blender.language import translated
-from ..blender.object_references import refusal, settings_of, source_of
+from ..blender.object_references import settings_of, source_of
+from ..blender.source_operator import SourceOperator
+from ..core.errors import UserError
 from ..names import Op
 from .painted import PRESETS
 
 
-class ARAPFIELDS_OT_stiffness_preset(Guided, bpy.types.Operator):
+class ARAPFIELDS_OT_stiffness_preset(SourceOperator, bpy.types.Operator):
     """Make the painted part of this material: the active vertex group where none is chosen"""
 
     bl_idname = Op.STIFFNESS_PRESET
@@ -23,14 +23,8 @@ class ARAPFIELDS_OT_stiffness_preset(Guided, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context):
-        source = source_of(context)
-        reason = refusal(source)
-        if not reason and not source.vertex_groups:
-            reason = translated("{name} has no vertex group", name=source.name)
-        if reason:
-            cls.poll_message_set(translated(reason))
-        return not reason
+    def refuses(cls, source):
+        return None if source.vertex_groups else UserError("{name} has no vertex group", name=source.name)
 
     def execute(self, context):
         source = source_of(context)

@@ -2,12 +2,11 @@
 import bpy
 
 from ..blender import vertex_groups
-from ..blender.guide import Guided
 from ..blender.host import has_window
-from ..blender.language import translated
-from ..blender.object_references import refusal, settings_of, source_of
+from ..blender.object_references import settings_of, source_of
 from ..blender.presets import preset_classes
 from ..blender.property_definitions import annotations, effective_values
+from ..blender.source_operator import SourceOperator
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
 from ..core.settings.styles import STYLIZE
@@ -77,7 +76,7 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
         return plan_solve_job(context, self, source, "STYLIZE", values["samples"], values["seed"], solve)
 
 
-class ARAPFIELDS_OT_set_style(Guided, bpy.types.Operator):
+class ARAPFIELDS_OT_set_style(SourceOperator, bpy.types.Operator):
     """Choose this style for the object"""
 
     bl_idname = Op.SET_STYLE
@@ -86,13 +85,6 @@ class ARAPFIELDS_OT_set_style(Guided, bpy.types.Operator):
     bl_options = {"INTERNAL", "UNDO"}
 
     style: style()
-
-    @classmethod
-    def poll(cls, context):
-        reason = refusal(source_of(context))
-        if reason:
-            cls.poll_message_set(translated(reason))
-        return not reason
 
     def execute(self, context):
         settings_of(source_of(context)).stylize.style = self.style

@@ -77,7 +77,8 @@ at::Tensor aten_stance(const at::Tensor& jets, const at::Tensor& rest, const at:
   // inverted.
   const at::Tensor arms = (rest - rest.mean(0, true)).to(at::kDouble), upward = up.to(at::kDouble);
   const at::Tensor size = at::clamp_min((arms * arms).sum(), 1e-30);
-  const at::Tensor inertia = (1.0 + 1e-9) * size * at::eye(3, arms.options()) - at::mm(arms.t(), arms);
+  const at::Tensor inertia =
+      (1.0 + Stance::thinnest) * size * at::eye(3, arms.options()) - at::mm(arms.t(), arms);
   const at::Tensor inverse = at::linalg_inv(inertia);
   const at::Tensor turn = at::mv(inverse, at::linalg_cross(arms, ways.to(at::kDouble)).sum(0));
   const at::Tensor lean = turn - at::dot(turn, upward) * upward;

@@ -12,8 +12,6 @@ namespace {
 
 /// Share of the height within which a figure touches the ground, and what that weighs against all else.
 constexpr double ground_height = 0.05, ground_weight = 128.0;
-/// Of a line, which has no turn about itself: added to its inertia, as a share of its size squared.
-constexpr double thinnest = 1e-9;
 
 /// lean_weight · Σ‖a‖² · ‖ω − (ω·up) up‖² of samples with arms a (n,3) about their mean, ω being the
 /// infinitesimal rotation closest to their ways (n,3); and half its cotangents are arms · slope.
@@ -26,7 +24,7 @@ Lean lean_of(const Points& arms, const Points& ways, const Vec3& up) {
   const Mat3 spread = arms.transpose() * arms, moment = arms.transpose() * ways;
   const double size = spread.trace();
   if (!(size > 0.0)) return {};
-  const Mat3 inertia = (1.0 + thinnest) * size * Mat3::Identity() - spread;
+  const Mat3 inertia = (1.0 + Stance::thinnest) * size * Mat3::Identity() - spread;
   const Vec3 torque(moment(1, 2) - moment(2, 1), moment(2, 0) - moment(0, 2), moment(0, 1) - moment(1, 0));
   const auto solver = inertia.ldlt();
   Vec3 turn = solver.solve(torque);

@@ -11,6 +11,8 @@ struct ARAPFIELDS_EXPORT_TO_TESTS Stance {
   double scale = 1.0;  ///< one over its squared radius of gyration
   Vector ground;       ///< (n) weights of the samples on the ground, above 0 within 5 % of the height
   static constexpr double lean_weight = 20.0;  ///< of a turn of the whole about a horizontal axis
+  /// Of a line, which has no turn about itself: added to its inertia, as a share of its size squared.
+  static constexpr double thinnest = 1e-9;
 
   /// Of samples (n,3). Throws InvalidInput for a zero or non-finite direction.
   static Stance of(PointsIn points, const Vec3& upwards);
