@@ -17,7 +17,7 @@ def check(folder: Path = HERE) -> None:
     Nothing is asked where the package carries libtorch itself, as in Blender's extension.
     """
     noted = folder / "libtorch.txt"
-    built_against = noted.read_text().strip() if noted.is_file() else ""
+    built_against = noted.read_text(encoding="utf-8").strip() if noted.is_file() else ""
     if not built_against or any(folder.glob("*torch_cpu*")):
         return
     remedy = f"pip install torch=={built_against}"
