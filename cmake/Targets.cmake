@@ -16,6 +16,9 @@ if(MINGW)
   # 54412): the assembler makes these moves unaligned ones.
   target_compile_options(arapfields_options INTERFACE -Wa,-muse-unaligned-vector-move)
 endif()
+if(WIN32 AND CMAKE_CXX_COMPILER_ID STREQUAL "Clang" AND NOT MINGW)
+  target_link_options(arapfields_options INTERFACE -rtlib=compiler-rt)  # asks the processor what it can do
+endif()
 if(WIN32)
   target_compile_definitions(arapfields_options INTERFACE NOMINMAX WIN32_LEAN_AND_MEAN _WIN32_WINNT=0x0A00)
 endif()

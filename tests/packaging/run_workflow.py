@@ -14,6 +14,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -117,7 +118,16 @@ class Job:
         environment = self.environment | {
             str(key): filled(value, self.values) for key, value in step.get("env", {}).items()
         }
-        subprocess.run([*shell, script], cwd=self.clone, env=environment, timeout=self.limit, check=True)
+        command = [*shell, str(script)]
+        process = subprocess.Popen(command, cwd=self.clone, env=environment, start_new_session=True)
+        try:
+            code = process.wait(self.limit)
+        except BaseException:
+            os.killpg(process.pid, signal.SIGKILL)  # the shell, and all that it has started
+            process.wait()
+            raise
+        if code:
+            raise subprocess.CalledProcessError(code, command)
         self.take_over()
 
     def take_over(self):
