@@ -17,6 +17,9 @@ from ..handles.native_handles import native_handles
 from ..surface.source_surface import supported_options
 
 SAMPLES = 6000
+# Quasi-Newton steps until a shape is shown, and for a request at most. Three come as near to the best as twelve
+# do while handles go on moving, as each solve begins where the last one ended (docs/performance.md).
+FIRST_STEPS, MOST_STEPS = 3, 12
 REFINEMENTS, STEPS_AT_ONCE, FINE_TOLERANCE = 40, 10, 1e-6
 STYLE = presets("live").get("STYLE")  # label, tip, and options for a style, which acts everywhere
 LEAST_RIGIDITY = 1e-3  # of a live style
@@ -91,9 +94,12 @@ class Solving:
             self.solver.track(self.rest)
 
     def moved(self, request):
-        """The shape for this request, quickly; on the worker."""
-        self.solve(request)
-        return self.shape(self.solver.tracked())
+        """Yields the shape for this request, quickly, and then better ones; on the worker."""
+        for _ in range(0, MOST_STEPS, FIRST_STEPS):
+            taken = self.solve(request, iterations=FIRST_STEPS)
+            yield self.shape(self.solver.tracked())
+            if taken < FIRST_STEPS:
+                break
 
     def twin(self):
         """The same with a solver of its own, for another thread; the samples and the surface are shared."""
@@ -109,6 +115,7 @@ class Solving:
         return self.shape(self.solver.field(self.rest))
 
     def solve(self, request, **further):
+        """Returns the steps that were taken."""
         targets, style, points, handles, energy, self.riding = request
         self.follow_points(points)
         if energy != self.energy:
@@ -120,7 +127,7 @@ class Solving:
             directions, strength, sharpness, up = style[1:]
             self.solver.set_style(directions, strength, sharpness=sharpness, weights=self.weights, up=up)
             self.style_set = style[0]
-        self.solver.solve(targets if handles else None, **further)
+        return self.solver.follow(targets if handles else None, **further)
 
     def refined(self, request, token):
         """Better and better shapes, until the energy falls no more; on the worker. None where another thread
@@ -128,10 +135,10 @@ class Solving:
         if self.follows_animation:
             return
         for _ in range(REFINEMENTS):
-            self.solve(request, iterations=STEPS_AT_ONCE, tolerance=FINE_TOLERANCE)
+            taken = self.solve(request, iterations=STEPS_AT_ONCE, tolerance=FINE_TOLERANCE)
             if token.cancelled:
                 return
-            if self.solver.report.iterations < STEPS_AT_ONCE:
+            if taken < STEPS_AT_ONCE:
                 break
             yield self.shape(self.solver.tracked())
         yield self.shape(self.solver.field(self.rest))

@@ -113,8 +113,7 @@ QuasiNewtonReport LiveSolver::State::descend(Precision<Scalar>& precision, const
   return found;
 }
 
-std::shared_ptr<RadialField> LiveSolver::State::solve(Index iterations, double tolerance,
-                                                      const Progress& progress) {
+Index LiveSolver::State::follow(Index iterations, double tolerance, const Progress& progress) {
   const ThreadScope threads(solve_threads());
   const Stopwatch watch;
   if (iterations <= 0) iterations = options_.iterations;
@@ -134,12 +133,30 @@ std::shared_ptr<RadialField> LiveSolver::State::solve(Index iterations, double t
     fast_.u.resize(0);
   }
   if (handles_.empty() && hooks_.energies.empty()) hold_lowest();
-  if (fast_alone)
-    measure(fast_);
-  else
-    measure(exact_);
+  is_measured_ = false;
+  is_exact_ = !fast_alone;
+  report_.seconds = watch.seconds();
+  return report_.iterations;
+}
+
+std::shared_ptr<RadialField> LiveSolver::State::solve(Index iterations, double tolerance,
+                                                      const Progress& progress) {
+  const Stopwatch watch;
+  follow(iterations, tolerance, progress);
+  report();
   report_.seconds = watch.seconds();
   return field();
+}
+
+const LiveReport& LiveSolver::State::report() {
+  if (is_measured_) return report_;
+  const ThreadScope threads(solve_threads());
+  if (is_exact_)
+    measure(exact_);
+  else
+    measure(fast_);
+  is_measured_ = true;
+  return report_;
 }
 
 /// Where handles moved together, the whole shape moves along first: no energy but theirs feels it.
@@ -187,6 +204,7 @@ void LiveSolver::State::hold_lowest() {
 
 template <class Scalar>
 void LiveSolver::State::measure(Precision<Scalar>& precision) {
+  if (!precision.objective) prepare(precision);
   const LiveObjective<Scalar>& objective = *precision.objective;
   if (precision.u.size() == 0) objective.measure(coefficients_, precision.u);
   const LiveTerms terms = objective.terms(precision.u);
@@ -220,6 +238,7 @@ void LiveSolver::State::reset() {
   const double setup = report_.setup_seconds;
   report_ = {};
   report_.setup_seconds = setup;
+  is_measured_ = true;
 }
 
 void LiveSolver::State::track(PointsIn points) {
