@@ -17,9 +17,9 @@ from ..handles.native_handles import native_handles
 from ..surface.source_surface import supported_options
 
 SAMPLES = 6000
-# Quasi-Newton steps until a shape is shown, and for a request at most. Three come as near to the best as twelve
-# do while handles go on moving, as each solve begins where the last one ended (docs/performance.md).
-FIRST_STEPS, MOST_STEPS = 3, 12
+# Quasi-Newton steps to the first shape of a request, and from there to the next. While handles go on moving three
+# come as near to the best as twelve, as each solve begins where the last one ended (docs/performance.md).
+FIRST_STEPS, FURTHER_STEPS = 3, 9
 REFINEMENTS, STEPS_AT_ONCE, FINE_TOLERANCE = 40, 10, 1e-6
 STYLE = presets("live").get("STYLE")  # label, tip, and options for a style, which acts everywhere
 LEAST_RIGIDITY = 1e-3  # of a live style
@@ -39,6 +39,7 @@ class Shape:
 class Solving:
     """Mixin of a session: all of this runs on its worker, or on another thread than the main one."""
 
+    reached = None  # the request that the last shape was made for
     single = None  # the points that the solver moves, and these in single precision
     follows_animation = False  # whether what is asked for came with another frame, rather than by a drag
 
@@ -94,11 +95,12 @@ class Solving:
             self.solver.track(self.rest)
 
     def moved(self, request):
-        """Yields the shape for this request, quickly, and then better ones; on the worker."""
-        for _ in range(0, MOST_STEPS, FIRST_STEPS):
-            taken = self.solve(request, iterations=FIRST_STEPS)
-            yield self.shape(self.solver.tracked())
-            if taken < FIRST_STEPS:
+        """Yields a shape for this request, quickly, and then a better one; on the worker."""
+        for steps in (FIRST_STEPS, FURTHER_STEPS):
+            taken = self.solve(request, iterations=steps)
+            shape, self.reached = self.shape(self.solver.tracked()), request
+            yield shape
+            if taken < steps:
                 break
 
     def twin(self):

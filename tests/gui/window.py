@@ -2,7 +2,7 @@
 """Run by a real Blender with a window: jobs, live mode, the panel. docs/development.md says how.
 
 blender --factory-startup --python tests/gui/window.py -- OUTPUT_FOLDER [PART ...]
-Parts are panel, use, jobs, stalls, live, press, pins and endings; all where none is named. Writes
+Parts are panel, use, jobs, stalls, live, press, pins, undo and endings; all where none is named. Writes
 checks.json, and pictures where ImageMagick's `import` is at hand; xdotool moves the mouse. Ends with a job
 running, which must not hold it.
 """
@@ -26,6 +26,7 @@ import press  # noqa: E402
 import scenes  # noqa: E402
 import stage  # noqa: E402
 import stalls  # noqa: E402
+import undo  # noqa: E402
 import use  # noqa: E402
 
 import addon  # noqa: E402
@@ -43,6 +44,7 @@ def steps():
         "live": lambda: live.checks(FOUND, OUTPUT),
         "press": lambda: press.checks(FOUND, OUTPUT),
         "pins": lambda: pins.checks(FOUND, OUTPUT),
+        "undo": lambda: undo.checks(FOUND, OUTPUT),
         "endings": lambda: jobs.endings(FOUND),
     }
     stage.empty_file()

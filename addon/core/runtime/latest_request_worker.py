@@ -64,21 +64,8 @@ class LatestRequestWorker:
             self._result = self._error = None
             return found
 
-    def wait_for_result(self, timeout):
-        """Waits for a result or an error that was not polled yet; False where none comes, or takes longer."""
-
-        def reached():
-            return self._has_news() or self._is_idle()
-
-        with self._changed:
-            self._changed.wait_for(reached, timeout)
-            return self._has_news()
-
     def _is_idle(self):
         return self._request is None and not self._working
-
-    def _has_news(self):
-        return self._result is not None or self._error is not None
 
     def wait(self, timeout, refined=False):
         """Waits until the newest request is solved (and `refined`); False when that takes longer."""
