@@ -60,7 +60,9 @@ def test_stylize_works_on_the_rest_shape_of_what_is_live():
     bpy.ops.arapfields.stylize(style="CUBE", **scenes.QUICK)
     bpy.context.view_layer.update()
     assert not sessions.live and not bar.arapfields.live_kind
-    assert abs(scenes.world_points(bar)[:, 2].max() - rest[:, 2].max()) < 0.2  # the lift is the handles' alone
+    assert (
+        abs(scenes.world_points(bar)[:, 2].max() - rest[:, 2].max()) < 0.2
+    )  # the lift is the handles' alone
 
 
 @in_blender

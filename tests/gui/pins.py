@@ -118,6 +118,7 @@ def navigation(found, folder, bar):
     spot, distance = pixel(pin.location), view.view_distance
     yield from drag(spot, (spot[0], spot[1] - 40), hold=True)
     stage.tool("click", 4)
+    yield from until(lambda: view.view_distance != distance, 5.0)
     yield 0.6
     middle = pixel(pin.location)
     stage.tool("mousemove", spot[0] + 30, spot[1] - 40)
@@ -138,7 +139,9 @@ def navigation(found, folder, bar):
         "pin_moves_pixels": [b - a for a, b in zip(middle, after, strict=True)],
         "reach_before_and_after_ctrl": [round(reach, 3), round(nearer, 3)],
     }
+    near = view.view_distance
     stage.tool("click", 5)
+    yield from until(lambda: view.view_distance != near, 5.0)
     yield 0.6
 
 

@@ -34,10 +34,11 @@ class Space:
 
         Those that have not moved stay bit for bit, which the way there and back would not leave them.
         """
+        if np.array_equal(self.local_to_solve, np.eye(4)):
+            return after
         result = self.to_local(after)
-        if not np.array_equal(self.local_to_solve, np.eye(4)):
-            still = (after == np.asarray(before, dtype=after.dtype)).all(axis=1)
-            result[still] = local[still]
+        still = (after == np.asarray(before, dtype=after.dtype)).all(axis=1)
+        result[still] = local[still]
         return result
 
     def mirror(self, axis):

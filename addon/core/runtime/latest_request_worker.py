@@ -5,7 +5,9 @@ import threading
 
 from .threads import start_thread
 
-PAUSE = 0.02  # seconds for which a newer request is awaited before there are better results for the one at hand
+PAUSE = (
+    0.02  # seconds for which a newer request is awaited before there are better results for the one at hand
+)
 REST = 0.4  # seconds without a new request after which the result is refined
 
 
@@ -63,6 +65,13 @@ class LatestRequestWorker:
             found = self._result, self._error or ""
             self._result = self._error = None
             return found
+
+    def wait_for_result(self, timeout):
+        """Until there is something to poll or nothing left to do, so many seconds at most."""
+        with self._changed:
+            self._changed.wait_for(
+                lambda: self._result is not None or self._error or self._is_idle(), timeout
+            )
 
     def _is_idle(self):
         return self._request is None and not self._working
