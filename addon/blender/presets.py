@@ -14,7 +14,7 @@ DEFAULT = ("DEFAULT", "Default", "Every setting of this section as it is at firs
 
 
 def preset_classes(name, label, parameters, further=(), given=True):
-    """The operator that stores presets of one section, the menu that lists them, and that which sets given ones.
+    """What stores presets of one section, the menu that lists them, and what sets given ones.
 
     `further` names settings that are no parameter. `given`: whether the menu begins with the library's own.
     """

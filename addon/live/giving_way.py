@@ -7,10 +7,10 @@ from . import sessions
 
 
 def give_way(context, source, output, target):
-    """Ends live mode before a solve whose result goes there; UserError where the live shape cannot stay.
+    """Ends live mode before a solve whose result goes there.
 
-    Where the result moves the same modifier, the live shape is seen until it comes, and stays if it never does;
-    otherwise the source is what it was before live mode.
+    Where the result moves the same modifier, the live shape is seen until it comes, and stays if it never
+    does; otherwise the source is what it was before live mode.
     """
     session = sessions.live.get(source.session_uid)
     if session is None:

@@ -9,10 +9,7 @@ from ..field_modifier import motion
 from ..live import sessions
 from . import pins
 
-MOMENT, FIRST_MOMENT = (
-    0.015,
-    0.1,
-)  # seconds that a picture waits for the shape, and that of a drag's first move
+MOMENT, FIRST_MOMENT = 0.015, 0.1  # seconds that a picture waits for its shape; that of the first move
 TRANSFORMS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
 
 

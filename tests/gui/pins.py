@@ -112,7 +112,7 @@ def anchor_turn_delete(found, folder, bar):
 
 
 def navigation(found, folder, bar):
-    """The wheel during a drag zooms, and the pin stays under the cursor; with Ctrl it has the pin reach less far."""
+    """The wheel during a drag zooms, and the pin stays under the cursor; with Ctrl it changes its reach."""
     _, area, _ = stage.view()
     view, pin = area.spaces.active.region_3d, bar.arapfields.handles[0].empty
     spot, distance = pixel(pin.location), view.view_distance

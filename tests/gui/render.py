@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An animation rendered in the window while its source is live: each frame shows what the viewport shows there,
-and the dependency graph of the render holds the source once."""
+"""An animation rendered in the window while its source is live: each frame shows what the viewport shows, and
+the dependency graph of the render holds the source once."""
 
 import bpy
 import numpy as np
@@ -71,8 +71,6 @@ def one(found, folder, target):
             for item in shown:
                 rendered[scene.frame_current] = points_of(item)
 
-    from addon import lifecycle
-
     handlers = bpy.app.handlers.frame_change_post
     handlers.append(note)
     scene.frame_start, scene.frame_end = FIRST, LAST
@@ -88,11 +86,8 @@ def one(found, folder, target):
     stage.tool("key", "Escape")
     yield 1.0
     frames = sorted(rendered)
-    away = {
-        f: round(float(np.abs(rendered[f] - viewport[f]).max()), 7)
-        for f in frames
-        if same(rendered, viewport, f)
-    }
+    both = [frame for frame in frames if same(rendered, viewport, frame)]
+    away = {frame: round(float(np.abs(rendered[frame] - viewport[frame]).max()), 7) for frame in both}
     heights = [round(float(rendered[f][:, 2].max()), 3) for f in frames]
     found[f"render_{target}"] = {
         "frames": frames,
@@ -103,7 +98,6 @@ def one(found, folder, target):
         "viewport_away": away,
         "agrees": len(away) == LAST - FIRST + 1 and max(away.values()) < AGREES,
         "still_live": sessions.is_live(bar),
-        "handlers": sorted(lifecycle.HANDLERS),
     }
     with stage.override():
         sessions.end(bpy.context, bar)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What users do to a source, a handle or a result at every stage of their use, in the window: a table.
 
-Each cell is begun in a new file with real jobs and timers, and judged as tests/blender/test_every_stage.py judges
-it. Writes table.md, and a sheet of pictures for each kind of object; a traceback in Blender's output follows the
-cell that it belongs to. A small window will do.
+Each cell is begun in a new file with real jobs and timers, and judged as tests/blender/test_every_stage.py
+judges it. Writes table.md, and a sheet of pictures for each kind of object; a traceback in Blender's output
+follows the cell that it belongs to. A small window will do.
 """
 
 import subprocess
@@ -197,9 +197,8 @@ def seen(said):
         parts += ["live"] if sessions.is_live(item) else []
         parts += ["modifier"] if "ARAP Fields" in item.modifiers else []
     shown = sorted(one.name for one in bpy.context.view_layer.objects if one.visible_get())
-    return f"{', '.join(parts) or 'no source'}; seen: {', '.join(shown)}" + (
-        f"; said: {said}" if said else ""
-    )
+    told = f"; said: {said}" if said else ""
+    return f"{', '.join(parts) or 'no source'}; seen: {', '.join(shown)}{told}"
 
 
 def write(cells, path):
@@ -214,9 +213,8 @@ def write(cells, path):
 
 
 def text(cell):
-    told = (
-        cell.get("seen", "not run") if not cell.get("wrong") else f"WRONG {cell['wrong']}: {cell.get('seen')}"
-    )
+    told = cell.get("seen", "not run")
+    told = f"WRONG {cell['wrong']}: {told}" if cell.get("wrong") else told
     return told.replace("|", "/").replace("\n", " ")
 
 

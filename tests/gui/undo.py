@@ -55,8 +55,8 @@ def rested(found, before, after):
 
 
 def within(found, after):
-    """Keys pressed while the button is down go nowhere; undo right after the release takes that drag back, redo
-    brings it again, and undo takes it back."""
+    """Keys pressed while the button is down go nowhere; undo right after the release takes that drag back,
+    redo brings it again, and undo takes it back."""
     exact = []
     for number in range(ROUNDS):
         spot = pixel(bpy.data.objects["Bar"].arapfields.handles[0].empty.location)

@@ -2,9 +2,9 @@
 """Run by a real Blender with a window: jobs, live mode, the panel. docs/development.md says how.
 
 blender --factory-startup --python tests/gui/window.py -- OUTPUT_FOLDER [PART ...]
-Parts are panel, use, jobs, stalls, live, press, pins, undo, render, table and endings; all where none is named. Writes
-checks.json, and pictures where ImageMagick's `import` is at hand; xdotool moves the mouse. Ends with a job
-running, which must not hold it.
+Parts are panel, use, jobs, stalls, live, press, pins, undo, render, table and endings; all where none is
+named. Writes checks.json, and pictures where ImageMagick's `import` is at hand; xdotool moves the mouse.
+Ends with a job running, which must not hold it.
 """
 
 import json

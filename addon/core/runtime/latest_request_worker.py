@@ -5,9 +5,7 @@ import threading
 
 from .threads import start_thread
 
-PAUSE = (
-    0.02  # seconds for which a newer request is awaited before there are better results for the one at hand
-)
+PAUSE = 0.02  # seconds for which a newer request is awaited before one gets better results
 REST = 0.4  # seconds without a new request after which the result is refined
 
 
