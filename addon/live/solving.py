@@ -17,8 +17,8 @@ from ..handles.native_handles import native_handles
 from ..surface.source_surface import supported_options
 
 SAMPLES = 6000
-# Quasi-Newton steps to the first shape of a request, and from there to the next. While handles go on moving
-# three come as near to the best as twelve: each solve begins where the last one ended (docs/performance.md).
+# Quasi-Newton steps to the first shape of a request, and from there to the next. Each solve begins where the
+# last one ended: after three the shape is behind by a quarter of what the handles moved since then.
 FIRST_STEPS, FURTHER_STEPS = 3, 9
 REFINEMENTS, STEPS_AT_ONCE, FINE_TOLERANCE = 40, 10, 1e-6
 STYLE = presets("live").get("STYLE")  # label, tip, and options for a style, which acts everywhere

@@ -103,8 +103,14 @@ int LiveSolver::State::solve_threads() const {
 template <class Scalar>
 QuasiNewtonReport LiveSolver::State::descend(Precision<Scalar>& precision, const QuasiNewtonOptions& options,
                                              const Progress& progress) {
-  const QuasiNewtonReport found =
-      optimizer_.minimise(*precision.objective, options, coefficients_, precision.u, progress);
+  QuasiNewtonReport found;
+  try {
+    found = optimizer_.minimise(*precision.objective, options, coefficients_, precision.u, progress);
+  } catch (...) {  // cancelled between two steps: the coefficients have gone on
+    precision.u.resize(0);
+    u_before_.resize(0);
+    throw;
+  }
   if (++precision.uses >= most_uses) precision.u.resize(0), precision.uses = 0;
   report_.iterations += found.iterations;
   report_.evaluations += found.evaluations;
