@@ -16,14 +16,15 @@ from mouse import until
 
 WHICH = ("source", "handle", "result")
 STAGES = ("idle", "job", "live", "bake")
-WORK = {"field": "neural", "iterations": 200, "samples": 2000, "batch": 100, "width": 32, "layers": 2}
-FRAMES = 20  # of a bake
-LIMIT = 60.0  # seconds until a stage has to end
+WORK = {"field": "neural", "iterations": 60, "samples": 2000, "batch": 100, "width": 32, "layers": 2}
+FRAMES = 8  # of a bake
+LIMIT = 120.0  # seconds until a stage has to end
 VIEW = ("-resize", "320x")
 
 
 def checks(found, folder):
     cells = {}
+    bpy.context.preferences.system.viewport_aa = "OFF"  # a cell is no sight: its pictures are small
     for which in WHICH:
         for action in ACTIONS:
             for name in STAGES:
@@ -143,6 +144,7 @@ def begin(which, name):
             scenes.activate(bar)
             bar.hide_render = False
         bpy.ops.view3d.view_all()
+        bpy.context.space_data.overlay.show_floor = False
         bpy.ops.ed.undo_push(message="before")
         if name == "live":
             bpy.ops.arapfields.live("INVOKE_DEFAULT")
