@@ -17,6 +17,9 @@ from ..handles.native_handles import native_handles
 from ..surface.source_surface import supported_options
 
 SAMPLES = 6000
+# Quasi-Newton steps to the first shape of a request, and from there to the next. Each solve begins where the
+# last one ended: after three the shape is behind by a quarter of what the handles moved since then.
+FIRST_STEPS, FURTHER_STEPS = 3, 9
 REFINEMENTS, STEPS_AT_ONCE, FINE_TOLERANCE = 40, 10, 1e-6
 STYLE = presets("live").get("STYLE")  # label, tip, and options for a style, which acts everywhere
 LEAST_RIGIDITY = 1e-3  # of a live style
@@ -36,6 +39,7 @@ class Shape:
 class Solving:
     """Mixin of a session: all of this runs on its worker, or on another thread than the main one."""
 
+    reached = None  # the request that the last shape was made for
     single = None  # the points that the solver moves, and these in single precision
     follows_animation = False  # whether what is asked for came with another frame, rather than by a drag
 
@@ -91,9 +95,13 @@ class Solving:
             self.solver.track(self.rest)
 
     def moved(self, request):
-        """The shape for this request, quickly; on the worker."""
-        self.solve(request)
-        return self.shape(self.solver.tracked())
+        """Yields a shape for this request, quickly, and then a better one; on the worker."""
+        for steps in (FIRST_STEPS, FURTHER_STEPS):
+            taken = self.solve(request, iterations=steps)
+            shape, self.reached = self.shape(self.solver.tracked()), request
+            yield shape
+            if taken < steps:
+                break
 
     def twin(self):
         """The same with a solver of its own, for another thread; the samples and the surface are shared."""
@@ -109,6 +117,7 @@ class Solving:
         return self.shape(self.solver.field(self.rest))
 
     def solve(self, request, **further):
+        """Returns the steps that were taken."""
         targets, style, points, handles, energy, self.riding = request
         self.follow_points(points)
         if energy != self.energy:
@@ -120,7 +129,7 @@ class Solving:
             directions, strength, sharpness, up = style[1:]
             self.solver.set_style(directions, strength, sharpness=sharpness, weights=self.weights, up=up)
             self.style_set = style[0]
-        self.solver.solve(targets if handles else None, **further)
+        return self.solver.follow(targets if handles else None, **further)
 
     def refined(self, request, token):
         """Better and better shapes, until the energy falls no more; on the worker. None where another thread
@@ -128,10 +137,10 @@ class Solving:
         if self.follows_animation:
             return
         for _ in range(REFINEMENTS):
-            self.solve(request, iterations=STEPS_AT_ONCE, tolerance=FINE_TOLERANCE)
+            taken = self.solve(request, iterations=STEPS_AT_ONCE, tolerance=FINE_TOLERANCE)
             if token.cancelled:
                 return
-            if self.solver.report.iterations < STEPS_AT_ONCE:
+            if taken < STEPS_AT_ONCE:
                 break
             yield self.shape(self.solver.tracked())
         yield self.shape(self.solver.field(self.rest))

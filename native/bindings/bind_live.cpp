@@ -50,14 +50,26 @@ RadialFieldResult with_report(const LiveSolver& live) {
   return field;
 }
 
-RadialFieldResult solve(LiveSolver& live, const std::optional<ArraysArgument>& targets, Index iterations,
-                        double tolerance, Task* task) {
+void set_out(LiveSolver& live, const std::optional<ArraysArgument>& targets, Index iterations,
+             double tolerance) {
   require(iterations >= 0, "iterations", std::to_string(iterations), "0 (the options') or more is allowed");
   require(tolerance >= 0.0 && tolerance < 1.0, "tolerance", std::to_string(tolerance),
           "0 (the options') or a share below 1 is allowed");
   if (targets) live.set_targets(moved_handles(live, *targets));
+}
+
+RadialFieldResult solve(LiveSolver& live, const std::optional<ArraysArgument>& targets, Index iterations,
+                        double tolerance, Task* task) {
+  set_out(live, targets, iterations, tolerance);
   run_long(task, [&](const Progress& progress) { return live.solve(iterations, tolerance, progress); });
   return with_report(live);
+}
+
+Index follow(LiveSolver& live, const std::optional<ArraysArgument>& targets, Index iterations,
+             double tolerance, Task* task) {
+  set_out(live, targets, iterations, tolerance);
+  return run_long(task,
+                  [&](const Progress& progress) { return live.follow(iterations, tolerance, progress); });
 }
 
 void set_style(LiveSolver& live, const std::optional<NormalsArgument>& normals, double strength,
@@ -103,6 +115,10 @@ void bind_live(py::module_& module) {
            "they are) and returns a DeformationField of its own. `iterations` and `tolerance` replace the "
            "options' for\n"
            "this call, for instance to finish a drag: iterations=100, tolerance=1e-6.")
+      .def("follow", &follow, "targets"_a = py::none(), py::kw_only(), "iterations"_a = 0,
+           "tolerance"_a = 0.0, "task"_a = py::none(),
+           "As solve, for who asks for tracked() alone: makes no field, and measures the report when it is\n"
+           "asked for. Returns the steps taken; fewer than `iterations` where no more are needed.")
       .def(
           "track",
           [](LiveSolver& live, const ArrayArgument& points) {

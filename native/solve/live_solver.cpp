@@ -40,6 +40,10 @@ std::shared_ptr<RadialField> LiveSolver::solve(Index iterations, double toleranc
   return state_->solve(iterations, tolerance, progress);
 }
 
+Index LiveSolver::follow(Index iterations, double tolerance, const Progress& progress) {
+  return state_->follow(iterations, tolerance, progress);
+}
+
 void LiveSolver::reset() { state_->reset(); }
 
 void LiveSolver::adopt(const DeformationField& field) { state_->adopt(field); }

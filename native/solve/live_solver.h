@@ -51,6 +51,9 @@ class ARAPFIELDS_EXPORT LiveSolver {
   /// Improves the field for the targets and the style at hand; 0 iterations or tolerance: the options'.
   std::shared_ptr<RadialField> solve(Index iterations = 0, double tolerance = 0.0,
                                      const Progress& progress = {});
+  /// The same for the shape alone, of which report() is measured when it is asked for; returns the steps
+  /// taken.
+  Index follow(Index iterations = 0, double tolerance = 0.0, const Progress& progress = {});
   /// Back to the identity, and the handles' targets to rest.
   void reset();
   /// Takes another field's shape, as well as its own centers can, as the start of the next solve. In the
@@ -62,6 +65,8 @@ class ARAPFIELDS_EXPORT LiveSolver {
   PointsF tracked() const;
 
   std::shared_ptr<RadialField> field() const;
+  /// What the last solve reached; after follow() it is measured at the first call, against the targets at
+  /// hand.
   const LiveReport& report() const;
   const std::vector<Handle>& handles() const;
 

@@ -103,8 +103,14 @@ int LiveSolver::State::solve_threads() const {
 template <class Scalar>
 QuasiNewtonReport LiveSolver::State::descend(Precision<Scalar>& precision, const QuasiNewtonOptions& options,
                                              const Progress& progress) {
-  const QuasiNewtonReport found =
-      optimizer_.minimise(*precision.objective, options, coefficients_, precision.u, progress);
+  QuasiNewtonReport found;
+  try {
+    found = optimizer_.minimise(*precision.objective, options, coefficients_, precision.u, progress);
+  } catch (...) {  // cancelled between two steps: the coefficients have gone on
+    precision.u.resize(0);
+    u_before_.resize(0);
+    throw;
+  }
   if (++precision.uses >= most_uses) precision.u.resize(0), precision.uses = 0;
   report_.iterations += found.iterations;
   report_.evaluations += found.evaluations;
@@ -113,8 +119,7 @@ QuasiNewtonReport LiveSolver::State::descend(Precision<Scalar>& precision, const
   return found;
 }
 
-std::shared_ptr<RadialField> LiveSolver::State::solve(Index iterations, double tolerance,
-                                                      const Progress& progress) {
+Index LiveSolver::State::follow(Index iterations, double tolerance, const Progress& progress) {
   const ThreadScope threads(solve_threads());
   const Stopwatch watch;
   if (iterations <= 0) iterations = options_.iterations;
@@ -134,12 +139,30 @@ std::shared_ptr<RadialField> LiveSolver::State::solve(Index iterations, double t
     fast_.u.resize(0);
   }
   if (handles_.empty() && hooks_.energies.empty()) hold_lowest();
-  if (fast_alone)
-    measure(fast_);
-  else
-    measure(exact_);
+  is_measured_ = false;
+  is_exact_ = !fast_alone;
+  report_.seconds = watch.seconds();
+  return report_.iterations;
+}
+
+std::shared_ptr<RadialField> LiveSolver::State::solve(Index iterations, double tolerance,
+                                                      const Progress& progress) {
+  const Stopwatch watch;
+  follow(iterations, tolerance, progress);
+  report();
   report_.seconds = watch.seconds();
   return field();
+}
+
+const LiveReport& LiveSolver::State::report() {
+  if (is_measured_) return report_;
+  const ThreadScope threads(solve_threads());
+  if (is_exact_)
+    measure(exact_);
+  else
+    measure(fast_);
+  is_measured_ = true;
+  return report_;
 }
 
 /// Where handles moved together, the whole shape moves along first: no energy but theirs feels it.
@@ -187,6 +210,7 @@ void LiveSolver::State::hold_lowest() {
 
 template <class Scalar>
 void LiveSolver::State::measure(Precision<Scalar>& precision) {
+  if (!precision.objective) prepare(precision);
   const LiveObjective<Scalar>& objective = *precision.objective;
   if (precision.u.size() == 0) objective.measure(coefficients_, precision.u);
   const LiveTerms terms = objective.terms(precision.u);
@@ -220,6 +244,7 @@ void LiveSolver::State::reset() {
   const double setup = report_.setup_seconds;
   report_ = {};
   report_.setup_seconds = setup;
+  is_measured_ = true;
 }
 
 void LiveSolver::State::track(PointsIn points) {

@@ -23,6 +23,7 @@ class LiveSolver::State {
   void set_hooks(const LiveHooks& hooks);
   void set_weights(const Vector& weights, const Vector& bend_weights);
   void set_targets(const std::vector<Handle>& moved);
+  Index follow(Index iterations, double tolerance, const Progress& progress);
   std::shared_ptr<RadialField> solve(Index iterations, double tolerance, const Progress& progress);
   void reset();
   void adopt(const DeformationField& field);
@@ -31,7 +32,7 @@ class LiveSolver::State {
   std::unique_ptr<State> with_symmetry(SymmetryPlane symmetry, const Progress& progress) const;
   PointsF tracked() const { return tracked_.moved(coefficients_); }
   std::shared_ptr<RadialField> field() const;
-  const LiveReport& report() const { return report_; }
+  const LiveReport& report();
   const std::vector<Handle>& handles() const { return handles_; }
   const LiveOptions& options() const { return options_; }
 
@@ -108,6 +109,8 @@ class LiveSolver::State {
   TrackedPoints tracked_;
   Points tracked_rest_;
   LiveReport report_;
+  bool is_measured_ = true;  // whether the report is of the shape at hand
+  bool is_exact_ = false;    // whether that came of double precision
 };
 
 }  // namespace arapfields
