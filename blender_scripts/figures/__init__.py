@@ -32,4 +32,7 @@ FIGURES = [
     Figure("loop_style", "a style's strength from none to all, moving"),
     Figure("published", "the published bunny by three methods", published=True),
     Figure("published_hand", "one finger of the published hand pulled", published=True),
+    Figure(
+        "published_peers", "the paper's comparisons, figures 6 and 7, with its competitor", published=True
+    ),
 ]

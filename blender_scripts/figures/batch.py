@@ -20,5 +20,5 @@ def render(output):
         moved = warped(rest, field)
         results[name] = {"preference": round(field.report.preference, 3)}
         shown.append(add(moved, name, turned(moved, SPACING * column, TURN, 0.85)))
-    stage.photograph(shown, output / "workflow-batch.png", width=1200, elevation=12)
+    stage.photograph(shown, output / "workflow-batch.png", width=1000, samples=16, elevation=12)
     return results

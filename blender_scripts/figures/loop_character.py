@@ -18,7 +18,7 @@ def loop(output):
         names["select"]()
         bpy.ops.arapfields.deform()
 
-    return film(output, "loop-character", pose, width=480)
+    return film(output, "loop-character", pose, width=400)
 
 
 def render(output):

@@ -38,7 +38,7 @@ def render(output):
     item = add(dog, "dog", turned(dog, 0, 48))
     parts = slider()
     stage.set_up(
-        [item, *parts], width=560, elevation=9, margin=0.06, around=[(-0.9, 0, 1.75), (0.9, 0, 1.75)]
+        [item, *parts], width=440, elevation=9, margin=0.06, around=[(-0.9, 0, 1.75), (0.9, 0, 1.75)]
     )
     stage.brighten(1.3)
     preferences = []

@@ -5,28 +5,26 @@ import math
 import tempfile
 from pathlib import Path
 
-import bpy
 import stage
 
 from .workflows import snapshot
 
-FRAMES, MILLISECONDS, REST = 15, 70, 350  # rendered, of one frame, of the ends
-SAMPLES = 12  # a pixel: what moves hides what is left of the noise
+FRAMES, MILLISECONDS, REST = 12, 90, 400  # rendered, of one frame, of the ends
+SAMPLES = 8  # a pixel: what moves hides what is left of the noise
 MOST = 2_000_000  # bytes a loop
 QUALITY = (82, 74, 64, 52)
 
 
-def film(output, name, pose, width=560, frames=FRAMES):
+def film(output, name, pose, width=440, frames=FRAMES):
     """Renders so many shares of the way, 0 to 1, posed by pose(share), eased at both ends; what to note."""
     from PIL import Image
 
     frames = 4 if stage.DRAFT else frames
-    bpy.context.scene.cycles.samples = 6 if stage.DRAFT else SAMPLES
     with tempfile.TemporaryDirectory() as folder:
         taken = []
         for frame in range(frames):
             pose((1 - math.cos(math.pi * frame / (frames - 1))) / 2)
-            path = snapshot(Path(folder) / f"{frame}.png", width)
+            path = snapshot(Path(folder) / f"{frame}.png", width, SAMPLES)
             taken.append(Image.open(path).convert("RGB").copy())
     return {"frames": frames, "bytes": encode(taken, output / f"{name}.webp")}
 

@@ -32,14 +32,11 @@ def in_examples(call):
     import examples
 
     extension()
-    before = Path.cwd()
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
-        try:
-            examples.write(Path("out/examples"))
-            return call()
-        finally:
-            os.chdir(before)
+        os.environ["PWD"] = os.getcwd()  # what Blender takes for the folder it is in
+        examples.write(Path("out/examples"))
+        return call()
 
 
 def followed(page):
@@ -50,8 +47,9 @@ def followed(page):
     return names
 
 
-def snapshot(path, width=960):
+def snapshot(path, width=960, samples=12):
     render = bpy.context.scene.render
+    bpy.context.scene.cycles.samples = 6 if stage.DRAFT else samples
     render.resolution_percentage = round(100 * width / render.resolution_x * (0.4 if stage.DRAFT else 1))
     stage.take(path)
     return path
@@ -104,4 +102,5 @@ def stylize(output):
 
 
 def render(output):
+    output = output.resolve()
     return in_examples(lambda: {call.__name__: call(output) for call in (pins, character, animate, stylize)})

@@ -97,6 +97,14 @@ def methods(problem, checkout):
         )
 
 
+def fingers(problem, moved):
+    """How far the tip of another finger than the index finger goes at the most, of the hand's length."""
+    tips = [place for name, place in shapes.hand()["tips"].items() if name != "index"]
+    rows = [np.linalg.norm(problem.vertices - place, axis=1).argsort()[:20] for place in tips]
+    far = max(np.linalg.norm(moved[near] - problem.vertices[near], axis=1).mean() for near in rows)
+    return {"others_percent": round(100 * far / shapes.hand()["length"], 1)}
+
+
 def constraint_rows(problem, checkout):
     for name, call in methods(problem, checkout):
         try:
@@ -104,13 +112,15 @@ def constraint_rows(problem, checkout):
         except Refused as refusal:
             yield {"what": problem.name, "by": name, "said": str(refusal)}
             continue
-        np.savez(theirs.KEPT / f"{problem.shape}-{name.split(',')[-1].split()[0].lower()}.npz", moved=moved)
+        kept = {"moved": moved, "vertices": problem.vertices, "triangles": problem.triangles}
+        np.savez(theirs.KEPT / f"moved-{problem.shape}-{name.replace(' ', '-')}.npz", **kept)
         yield {
             "what": problem.name,
             "by": name,
             "vertices": len(problem.vertices),
             "cpu_s": round(seconds, 2),
             **yardstick.measured(problem, moved),
+            **(fingers(problem, moved) if problem.shape == "hand" else {}),
             "said": told,
         }
 

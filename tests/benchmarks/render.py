@@ -75,6 +75,7 @@ HEADINGS |= {
     "folded_percent": "folded, %",
     "mean_angle": "mean angle to the style, degrees",
     "within_10_percent": "area within 10°, %",
+    "others_percent": "other fingertips, % of the length",
     "said": "settings",
 }
 HIDDEN = {"ratio", "unit"}  # said by another column

@@ -103,7 +103,7 @@ def test_figures_in_the_pages_are_those_measured():
 
     for page in measured.PAGES:
         text = page.read_text()
-        assert len(measured.MARKED.findall(text)) >= 7
+        assert len(measured.MARKED.findall(text)) >= 1
         assert text == measured.refreshed(text), "run python docs/hooks/measured.py"
 
 

@@ -27,7 +27,8 @@ def place(tmp_path_factory):
 def follow(page, place):
     """Runs the page's script, then the check of its name below."""
     command = [sys.executable, str(Path(__file__)), str(WORKFLOWS / f"{page}.md")]
-    run = subprocess.run(command, cwd=place, capture_output=True, text=True)
+    there = {**os.environ, "PWD": str(place)}  # what Blender takes for the folder it is in
+    run = subprocess.run(command, cwd=place, env=there, capture_output=True, text=True)
     assert run.returncode == 0, run.stdout[-2000:] + run.stderr[-4000:]
 
 

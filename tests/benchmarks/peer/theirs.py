@@ -78,7 +78,7 @@ def given_to_implicit_arap(problem: Problem):
 
 
 def implicit_arap(problem: Problem, checkout, *options):
-    """Its result, a dictionary of arrays; one trained before on the same problem by the same code is taken."""
+    """Its result, a dictionary of arrays; where it was trained on the same problem before, that one."""
     KEPT.mkdir(parents=True, exist_ok=True)
     names = ("given.npz", "implicit-arap.npz", "implicit-arap.key")
     names = ("given.npz", "implicit-arap.npz", "implicit-arap.key")
