@@ -47,7 +47,7 @@ def followed(page):
     return names
 
 
-def snapshot(path, width=960, samples=12):
+def snapshot(path, width=960, samples=8):
     render = bpy.context.scene.render
     bpy.context.scene.cycles.samples = 6 if stage.DRAFT else samples
     render.resolution_percentage = round(100 * width / render.resolution_x * (0.4 if stage.DRAFT else 1))

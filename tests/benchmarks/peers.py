@@ -211,8 +211,7 @@ def awkward_rows(checkout):
 
 
 def run():
-    folder = theirs.folder()
-    arap, style = folder / "implicit-arap", folder / "gaussStylization"
+    arap, style = (theirs.folder() / name for name in theirs.CODES)
     rows = [row for problem in of_figures().values() for row in constraint_rows(problem, arap)]
     rows += style_rows(style)
     rows += awkward_rows(style)

@@ -2,6 +2,7 @@
 """The documentation is true: its code runs, links and pictures exist, the site builds without a warning."""
 
 import ast
+import json
 import re
 import subprocess
 import sys
@@ -105,6 +106,15 @@ def test_figures_in_the_pages_are_those_measured():
         text = page.read_text()
         assert len(measured.MARKED.findall(text)) >= 1
         assert text == measured.refreshed(text), "run python docs/hooks/measured.py"
+
+
+def test_the_tables_of_the_peers_are_those_measured():
+    sys.path.insert(0, str(pages.ROOT))
+    from tests.benchmarks import render
+
+    text, kept = render.PEERS.read_text(), json.loads(render.PEERS.with_suffix(".json").read_text())
+    assert text == render.peers_page(text, kept), "run python -m tests.benchmarks.render"
+    assert {"implicit-arap", "gaussStylization"} == {row["code"] for row in kept["rows"] if "code" in row}
 
 
 @pytest.mark.slow

@@ -83,14 +83,9 @@ def python():
 CHECKS = {check.__name__: check for check in (pins, character, animate, stylize, python)}
 
 
-@pytest.mark.parametrize("page", ["pins", "python"])
+@pytest.mark.slow  # the scenes and a bake take some ten seconds each
+@pytest.mark.parametrize("page", CHECKS)
 def test_the_steps_lead_where_the_page_says(page, place):
-    follow(page, place)
-
-
-@pytest.mark.slow  # a character and a bake take some ten seconds each
-@pytest.mark.parametrize("page", ["character", "animate", "stylize"])
-def test_the_longer_steps_lead_where_the_page_says(page, place):
     follow(page, place)
 
 

@@ -14,6 +14,7 @@ from .problems import Problem
 
 HERE = Path(__file__).resolve().parent
 KEPT = shapes.ROOT / "build" / "bench" / "peers"
+CODES = ("implicit-arap", "gaussStylization")
 POINTS = 20  # of a handle: its own examples have one to some hundred
 
 
@@ -30,6 +31,9 @@ def folder():
     found = os.environ.get("PEERS", "")
     if not found or not Path(found).is_dir():
         raise NoCode("no folder with their code is named: make bench PEERS=path")
+    missing = [name for name in CODES if not (Path(found) / name).is_dir()]
+    if missing:
+        raise NoCode(f"{found} has no checkout {' and no '.join(missing)}")
     return Path(found).resolve()
 
 
