@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tables and the plot of docs/performance.md, from build/bench.json: python -m tests.benchmarks.render"""
+"""The tables and the plot of docs/performance.md, from build/bench.json: python -m tests.benchmarks.render
+
+Where that has the peers, docs/peers.json and the tables of docs/peers.md too.
+"""
 
 import ast
 import html
@@ -12,6 +15,7 @@ ROOT = Path(__file__).resolve().parents[2]
 RESULTS = ROOT / "build" / "bench.json"
 PAGE = ROOT / "docs" / "performance.md"
 PLOT = ROOT / "docs" / "images" / "performance.svg"
+PEERS = ROOT / "docs" / "peers.md"
 BEGIN, END = "<!-- bench: begin -->", "<!-- bench: end -->"
 SECTIONS = {  # titles; a module's first sentence stands below
     "defaults": "From the press to the result",
@@ -64,6 +68,15 @@ HEADINGS = {
     "handle_added_cpu_s": "handle added, processor s",
     "step_cpu_ms": "step, processor ms",
     "uniformity": "non-uniformity (1 is ideal)",
+}
+HEADINGS |= {
+    "by": "",
+    "handle_error_percent": "handle error, % of the size",
+    "folded_percent": "folded, %",
+    "mean_angle": "mean angle to the style, degrees",
+    "within_10_percent": "area within 10°, %",
+    "others_percent": "other fingertips, % of the length",
+    "said": "settings",
 }
 HIDDEN = {"ratio", "unit"}  # said by another column
 
@@ -179,12 +192,35 @@ def page(results, machine):
     return "\n".join(blocks)
 
 
+def peers_page(text, kept):
+    """The page with the tables of docs/peers.json between its markers."""
+    named = ", ".join(f"{key} {value}" for key, value in kept["machine"].items())
+    codes = [f"`{row['code']}` at commit `{row['commit']}`" for row in kept["rows"] if "code" in row]
+    blocks = [f"Measured on: {named}. {', '.join(codes)}.", ""]
+    rows, kinds = [row for row in kept["rows"] if "code" not in row], {}
+    for row in rows:
+        kinds.setdefault(row.get("what", "Meshes that not all take"), []).append(row)
+    for kind, alike in kinds.items():
+        blocks += [f"### {kind[0].upper()}{kind[1:]}", ""]
+        blocks += [table([{key: value for key, value in row.items() if key != "what"} for row in alike]), ""]
+    before, rest = text.split(BEGIN)
+    joined = "\n".join(blocks)
+    return f"{before}{BEGIN}\n{joined}{END}{rest.split(END)[1]}"
+
+
 def main():
     if not RESULTS.exists():
         sys.exit(f"{RESULTS} is not there: run make bench first")
     results = json.loads(RESULTS.read_text())
     machine = results.pop("machine")
+    peers = results.pop("peers", None)
+    if peers:
+        kept = {"machine": machine, "rows": peers}
+        PEERS.with_suffix(".json").write_text(json.dumps(kept, indent=1) + "\n")
+        PEERS.write_text(peers_page(PEERS.read_text(), kept))
     results = {module: rows for module, rows in results.items() if rows}
+    if not results:
+        return
     before, rest = PAGE.read_text().split(BEGIN)
     after = rest.split(END)[1]
     PAGE.write_text(f"{before}{BEGIN}\n{page(results, machine)}{END}{after}")
