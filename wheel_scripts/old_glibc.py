@@ -101,7 +101,13 @@ def link_flags(version, folder):
     run("cc", "-O2", "-fPIC", "-c", folder / "compatible.c", "-o", folder / "compatible.o")
     glibc = glibc_stubs(version, folder)
     libraries = [cxx_stub(folder), compiler_file("libstdc++.a"), *glibc, compiler_file("libgcc_s.so.1")]
-    libraries += [folder / "compatible.o", *glibc[:2], compiler_file("libgcc.a")]
+    # The last: what is linked into each library even of glibc, such as atexit.
+    libraries += [
+        folder / "compatible.o",
+        *glibc[:2],
+        compiler_file("libgcc.a"),
+        compiler_file("libc_nonshared.a"),
+    ]
     flags = "-nodefaultlibs -Wl,--exclude-libs,ALL -Wl,--as-needed"
     return {
         "CMAKE_SHARED_LINKER_FLAGS": flags,
