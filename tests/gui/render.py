@@ -18,8 +18,6 @@ def checks(found, folder):
 
 
 def set_stage(target):
-    from test_live_render import camera
-
     stage.empty_file()
     with stage.override():
         bar, _, moving = scenes.bar_with_handles()
@@ -28,7 +26,7 @@ def set_stage(target):
             moving.keyframe_insert("location", frame=frame)
         bar.arapfields.target = target
         scenes.activate(bar)
-        scene = camera(240)
+        scene = scenes.camera(240)
         scene.frame_set(FIRST)
         bpy.ops.view3d.view_axis(type="FRONT")
         bpy.ops.view3d.view_all()
