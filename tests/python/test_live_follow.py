@@ -6,7 +6,6 @@ import threading
 import numpy as np
 import pytest
 from bar import LEFT, RIGHT, bar_samples, turned
-from test_live import deformer
 from tolerances import LIVE_KEEPS_UP
 
 import arapfields as af
@@ -15,6 +14,11 @@ import arapfields as af
 @pytest.fixture(scope="module")
 def samples():
     return bar_samples()
+
+
+def deformer(surface):
+    quick = af.LiveOptions(samples=800, coarse_centers=30, fine_centers=120)
+    return af.LiveDeformer(surface, [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)], quick)
 
 
 def test_following_is_solving_without_a_field(samples):
