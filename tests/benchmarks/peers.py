@@ -17,9 +17,9 @@ from .peer import gauss_build, theirs, yardstick
 from .peer.problems import awkward, of_figures
 from .peer.theirs import Refused
 
-# Of each training of implicit-arap, whose 2,000 patches a step take 27 s of a processor: processor seconds,
-# and patches on the surface and in space. PEERS_BUDGET=0 is its own settings.
-BUDGET = float(os.environ.get("PEERS_BUDGET", "560"))
+# For each training of implicit-arap, whose 2,000 patches a step take 27 s of a processor, and its patches on
+# the surface and in space. PEERS_MINUTES=0 is its own settings.
+MINUTES = float(os.environ.get("PEERS_MINUTES", "20"))
 PATCHES = (70, 20)
 LAMBDAS = (1.0, 4.0, 16.0)  # of gaussStylization; its own example has 4
 CUBE = np.vstack([np.eye(3), -np.eye(3)])
@@ -76,7 +76,7 @@ def cage_of(problem):
 
 def methods(problem, checkout):
     """(name, call): the moved vertices, processor seconds and what is to be told of the settings."""
-    patient = ("--patches", *PATCHES, "--budget", BUDGET) if BUDGET else ()
+    patient = ("--patches", *PATCHES, "--minutes", MINUTES) if MINUTES else ()
 
     def implicit():
         found = theirs.implicit_arap(problem, checkout, *patient)
