@@ -87,7 +87,6 @@ def methods(problem, checkout):
         return found["moved"], float(found["seconds"][1]), told
 
     yield "ours, default", lambda: (*clocked(lambda: ours(problem)), "")
-    yield "implicit-arap", implicit
     yield "libigl, ARAP of the mesh", lambda: (*clocked(lambda: by_libigl(problem)), "")
     for label, method in METHODS.items():
         cage = cage_of(problem) if method == "surface" else None
@@ -95,6 +94,7 @@ def methods(problem, checkout):
             f"Blender, {label}",
             lambda method=method, cage=cage: (*theirs.blender(problem, method, cage), ""),
         )
+    yield "implicit-arap", implicit
 
 
 def fingers(problem, moved):
@@ -212,8 +212,8 @@ def awkward_rows(checkout):
 
 def run():
     arap, style = (theirs.folder() / name for name in theirs.CODES)
+    quick = [*style_rows(style), *awkward_rows(style)]
     rows = [row for problem in of_figures().values() for row in constraint_rows(problem, arap)]
-    rows += style_rows(style)
-    rows += awkward_rows(style)
+    rows += quick
     rows += [{"code": path.name, "commit": theirs.commit(path)} for path in (arap, style)]
     return rows
