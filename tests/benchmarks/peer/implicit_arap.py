@@ -85,19 +85,19 @@ def distance_network(problem, base):
 
 
 class Spent(Exception):
-    """The budget is."""
+    """The time is."""
 
 
 class Log:
-    """Where its trainer logs to: the losses by step. Ends the training when the budget is spent."""
+    """Where its trainer logs to: the losses by step. Ends the training when the time is over."""
 
-    def __init__(self, folder, budget):
+    def __init__(self, folder, minutes):
         self.dir, self.losses, self.begin = str(folder), [], time.perf_counter()
-        self.end = time.process_time() + budget if budget else float("inf")
+        self.end = self.begin + 60 * minutes if minutes else float("inf")
 
     def log(self, losses):
         self.losses.append([float(loss) for loss in losses.values()])
-        if time.process_time() > self.end:
+        if time.perf_counter() > self.end:
             raise Spent
         if len(self.losses) % 25 == 1:
             took = time.perf_counter() - self.begin
@@ -110,7 +110,7 @@ def main():
         parser.add_argument(name, type=Path)
     parser.add_argument("--steps", type=int, help="else its own")
     parser.add_argument("--patches", type=int, nargs=2, help="on the surface and in space; else its own")
-    parser.add_argument("--budget", type=float, help="processor seconds after which it is stopped")
+    parser.add_argument("--minutes", type=float, help="after which it is stopped")
     given = parser.parse_args()
     torch.set_num_threads(1)  # threads that wait for one another would count as its work
     problem = dict(np.load(given.problem))
@@ -131,7 +131,7 @@ def main():
             settings["num_steps"] = given.steps
         if given.patches:
             settings |= dict(zip(("zero_samples", "space_samples"), given.patches, strict=True))
-        log = Log(folder, given.budget)
+        log = Log(folder, given.minutes)
         trainer.wandb.init = lambda **_: log
         own = defaults.deform_sdf_entrypoint
         config = dataclasses.replace(own, **settings)
