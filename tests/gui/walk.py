@@ -177,8 +177,8 @@ def surface():
     yield from until_idle()
     yield from shot("fitted")
     FOUND["fitted"] = bool(suzanne.arapfields.fit_report)
+    row = panel.rows().index("advanced") + 1  # the section Status has come before it
     yield from panel.press(row, panel.rows(panel.ADVANCED).index("surface"))
-    row = panel.rows().index("advanced") + 1
     y = yield from inner("result", row)
     yield from click(OUTPUT_MENU[0], y + OUTPUT_MENU[1])
     yield from keys("i", pause=1.0)
