@@ -196,7 +196,9 @@ def source():
 
 def is_source(name):
     item = bpy.context.scene.objects.get(name)
-    return item is not None and item.type == "MESH" and item.override_library is None and not item.library
+    if item is None or item.type != "MESH" or item.override_library is not None or item.library:
+        return False
+    return bool(item.arapfields.handles)  # no result that was given the name
 
 
 def after(action, stage, which, said):

@@ -19,7 +19,7 @@ STAGES = ("idle", "job", "live", "bake")
 WORK = {"field": "neural", "iterations": 60, "samples": 2000, "batch": 100, "width": 32, "layers": 2}
 FRAMES = 8  # of a bake
 LIMIT = 120.0  # seconds until a stage has to end
-VIEW = ("-resize", "320x")
+WIDTH = 320  # pixels of a cell's picture
 
 
 def checks(found, folder):
@@ -35,13 +35,24 @@ def checks(found, folder):
                 except Exception as error:  # the next cell is tried all the same
                     cell["wrong"] = f"{type(error).__name__}: {error}"
                 print(cell, flush=True)
-                file = folder / f"cell-{which}-{action}-{name}.png"
-                subprocess.run(["import", "-window", "root", *VIEW, str(file)], check=False)
+                picture(folder / f"cell-{which}-{action}-{name}.png")
         write(cells, folder / "table.md")
         sheet(folder, which)
     wrong = {" ".join(key): cell["wrong"] for key, cell in cells.items() if cell.get("wrong")}
     found["table"] = {"cells": len(cells), "wrong": wrong}
     found["table_not_at_that_stage"] = [" ".join(key) for key, cell in cells.items() if not cell.get("at_it")]
+
+
+def picture(file):
+    """Of the 3D view alone, small."""
+    window, _, region = stage.view()
+    told = subprocess.run(
+        ["xdotool", "getdisplaygeometry"], check=False, capture_output=True, text=True
+    ).stdout
+    top = int(told.split()[1]) - (window.y + region.y + region.height)
+    crop = f"{region.width}x{region.height}+{window.x + region.x}+{top}"
+    command = ["import", "-window", "root", "-crop", crop, "+repage", "-resize", f"{WIDTH}x", str(file)]
+    subprocess.run(command, check=False)
 
 
 def chosen(item):

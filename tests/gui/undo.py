@@ -15,6 +15,7 @@ STRIDE = 10  # rounds from one print to the next
 
 
 def checks(found, folder):
+    bpy.context.preferences.system.viewport_aa = "OFF"  # it is the steps that are looked at
     bar = set_stage()
     yield 0.5
     before, spot = state(), pixel(END)

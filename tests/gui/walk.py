@@ -31,8 +31,7 @@ EAR = ((1.12, 0.32, 0.17), (0.30, 0.36, 0.40))
 # In the sidebar with one section open alone: the list's + and its rows, Deform and Stylize.
 PLUS, FROM_EMPTIES, SECOND_ROW = (1261, 159), (1340, 180), (1130, 181)
 DEFORM, STYLIZE = (1140, 223), (1140, 313)
-# Below the header of Implicit Surface and of Result, within Advanced.
-FIT, FIT_SURFACE, OUTPUT_MENU = (1252, 25), (1130, 80), (1180, 26)
+FIT, FIT_SURFACE = (1252, 25), (1130, 80)  # below the header of Implicit Surface, within Advanced
 
 
 def keys(*names, pause=0.4):
@@ -166,7 +165,7 @@ def handles():
 
 
 def surface():
-    """The tutorial's fifth step: a fit, and its implicit surface moved along as an object of its own."""
+    """The tutorial's fifth step as far as the fit."""
     suzanne = next(item for item in bpy.data.objects if item.type == "MESH")
     yield from panel.open_alone({"advanced"})
     row = panel.rows().index("advanced") + 1
@@ -177,25 +176,6 @@ def surface():
     yield from until_idle()
     yield from shot("fitted")
     FOUND["fitted"] = bool(suzanne.arapfields.fit_report)
-    yield from panel.press(row, panel.rows(panel.ADVANCED).index("surface"))
-    row = panel.rows().index("advanced") + 1
-    y = yield from inner("result", row)
-    yield from click(OUTPUT_MENU[0], y + OUTPUT_MENU[1])
-    yield from keys("i", pause=1.0)
-    FOUND["output"] = suzanne.arapfields.output
-    yield from panel.press(row, panel.rows(panel.ADVANCED).index("result"))
-    yield from panel.open_alone({"deform"})
-    yield from click(*DEFORM, pause=0.5)
-    yield from until_idle()
-    made = bpy.data.objects.get("Suzanne_deformed")
-    FOUND["surface_made"] = made is not None and len(made.data.polygons)
-    FOUND["source_hidden"] = suzanne.hide_get()
-    yield from shot("surface-deformed")
-    yield from over_the_view()
-    yield from keys("x", pause=1.0)
-    yield from keys("Return", pause=1.0)
-    yield from keys("alt+h", pause=1.0)
-    FOUND["seen_again"] = not suzanne.hide_get()
 
 
 def inner(section, row):
