@@ -12,7 +12,7 @@ from .workflows import snapshot
 FRAMES, MILLISECONDS, REST = 12, 90, 400  # rendered, of one frame, of the ends
 SAMPLES = 8  # a pixel: what moves hides what is left of the noise
 MOST = 2_000_000  # bytes a loop
-QUALITY = (82, 74, 64, 52)
+QUALITY = (92, 84, 72, 56)
 
 
 def film(output, name, pose, width=440, frames=FRAMES):

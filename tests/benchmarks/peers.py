@@ -203,7 +203,7 @@ def style_verdict(module, problem):
 def awkward_rows(checkout):
     module = gauss_build.built(checkout)
     for name, problem in awkward().items():
-        row = {"mesh": name, "ours": verdict(problem, ours), "libigl": verdict(problem, by_libigl)}
+        row = {"mesh": name, "ARAP Fields": verdict(problem, ours), "libigl": verdict(problem, by_libigl)}
         row["gaussStylization"] = style_verdict(module, problem)
         for label, method in METHODS.items():
             row[label] = verdict(problem, by_blender(method))

@@ -76,7 +76,6 @@ HEADINGS |= {
     "mean_angle": "mean angle to the style, degrees",
     "within_10_percent": "area within 10°, %",
     "others_percent": "other fingertips, % of the length",
-    "said": "settings",
 }
 HIDDEN = {"ratio", "unit"}  # said by another column
 
@@ -192,6 +191,12 @@ def page(results, machine):
     return "\n".join(blocks)
 
 
+def peers_row(row):
+    """A row as it is shown: the settings beside the method."""
+    said = {"by": f"{row['by']} ({row['said']})"} if row.get("said") else {}
+    return {key: value for key, value in (row | said).items() if key not in ("what", "vertices", "said")}
+
+
 def peers_page(text, kept):
     """The page with the tables of docs/peers.json between its markers."""
     named = ", ".join(f"{key} {value}" for key, value in kept["machine"].items())
@@ -201,8 +206,8 @@ def peers_page(text, kept):
     for row in rows:
         kinds.setdefault(row.get("what", "Meshes that not all take"), []).append(row)
     for kind, alike in kinds.items():
-        blocks += [f"### {kind[0].upper()}{kind[1:]}", ""]
-        blocks += [table([{key: value for key, value in row.items() if key != "what"} for row in alike]), ""]
+        size = f", {alike[0]['vertices']:,} vertices" if "vertices" in alike[0] else ""
+        blocks += [f"### {kind[0].upper()}{kind[1:]}{size}", "", table([peers_row(row) for row in alike]), ""]
     before, rest = text.split(BEGIN)
     joined = "\n".join(blocks)
     return f"{before}{BEGIN}\n{joined}{END}{rest.split(END)[1]}"

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A character of several objects: body with Mirror and Subdivision, eyes, shirt, hair, hat, armature."""
 
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import bmesh
@@ -8,10 +10,12 @@ import bpy
 import numpy as np
 import scenes
 from characters import Capsules
-from dressing import link, rig, seen_mesh, strands, weigh
 from mathutils import Matrix, Vector
 
 import arapfields as af
+
+sys.path.append(str(Path(__file__).resolve().parents[2] / "blender_scripts"))
+from dressing import link, rig, seen_mesh, strands, weigh
 
 HEIGHT = 1.8
 EYE, EYES = 0.032, [(side * 0.055, -0.118, 1.68) for side in (-1, 1)]
