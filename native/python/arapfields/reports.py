@@ -137,6 +137,10 @@ class LiveReport(EnergyReport):
     converged: bool
     """Whether a further step would gain next to nothing."""
     setup_seconds: float
+    kinetic: float = 0.0
+    """Energy of the motion after a step(), in the unit of `value`."""
+    speed: float = 0.0
+    """Root mean square over the samples after a step(), in mesh units a second."""
 
 
 @dataclass(frozen=True, kw_only=True)
