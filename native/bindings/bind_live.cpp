@@ -184,18 +184,18 @@ void bind_live(py::module_& module) {
            "`up` (3,), else z, is against the gravity; `ground` is the height along it that nothing passes. "
            "solve() finds\n"
            "where all would come to rest. None or strength 0: no mass.")
-      .def(
-          "step", &step, "targets"_a = py::none(), "seconds"_a, py::kw_only(), "coordinates"_a = py::none(),
-          "task"_a = py::none(),
-          "Moves the handles to `targets` (as in solve) in so many seconds, 1e-5 to 10, and the surface with "
-          "them, from\n"
-          "where the last step or solve ended; a solve ends at rest. Where the object to which all\n"
-          "coordinates belong has moved meanwhile, `coordinates` (4, 4) takes those of the last step to "
-          "those "
-          "of this one:\n"
-          "the surface feels it. Without set_secondary_motion, "
-          "solve(targets).\n"
-          "The same steps from the same start give the same bits. Where it raises, nothing has moved.")
+      .def("step", &step, "targets"_a, "seconds"_a, py::kw_only(), "coordinates"_a = py::none(),
+           "task"_a = py::none(),
+           "Moves the handles to `targets` (as in solve) in so many seconds, 1e-5 to 10 (None: they hold "
+           "still), and the surface with "
+           "them, from\n"
+           "where the last step or solve ended; a solve ends at rest. Where the object to which all\n"
+           "coordinates belong has moved meanwhile, `coordinates` (4, 4) takes those of the last step to "
+           "those "
+           "of this one:\n"
+           "the surface feels it. Without set_secondary_motion, "
+           "solve(targets).\n"
+           "The same steps from the same start give the same bits. Where it raises, nothing has moved.")
       .def_property("motion_state", &LiveSolver::motion_state, &LiveSolver::set_motion_state,
                     "Where the surface is and how it moves, as a MotionState; set it to go on from there.")
       .def("reset", &LiveSolver::reset, "Back to the identity and to handles at rest.")

@@ -128,7 +128,7 @@ class SolveReport(EnergyReport):
 
 @dataclass(frozen=True, kw_only=True)
 class LiveReport(EnergyReport):
-    """What the last solve of a LiveDeformer reached."""
+    """What the last solve or step of a LiveDeformer reached; `speed`, in mesh units a second, is a step's."""
 
     value: float
     """All that is minimised."""
@@ -138,9 +138,7 @@ class LiveReport(EnergyReport):
     """Whether a further step would gain next to nothing."""
     setup_seconds: float
     kinetic: float = 0.0
-    """Energy of the motion after a step(), in the unit of `value`."""
     speed: float = 0.0
-    """Root mean square over the samples after a step(), in mesh units a second."""
 
 
 @dataclass(frozen=True, kw_only=True)
