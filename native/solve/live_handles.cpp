@@ -162,6 +162,7 @@ void LiveSolver::State::set_handles(const std::vector<Handle>& handles) {
   if (style_) require_no_reach(handles);
   bound_ = BoundHandles(in_cube(handles, frame_), surface_);
   handles_ = handles;
+  body_.motions.clear();
   stiffen({});
   reaches_ = reaches_of_handles();
   choose_influence();
@@ -176,8 +177,7 @@ void LiveSolver::State::factorise() {
   pair_values_ = radial_rows(basis_, pairs_.sources, JetOrder::value);
   RowMatrix<double> values = pair_values_;
   Vector weights = options_.handle_weight * pairs_.weights;
-  if (stance_) {
-    auto [rows, shares] = stance_rows(basis_, stance_->rest, stance_->stance);
+  const auto add = [&](RowMatrix<double> rows, Vector shares) {
     if (mirror_) {
       const RowMatrix<double> other = mirror_->reflected_rows(rows);
       rows.conservativeResize(2 * other.rows(), Eigen::NoChange);
@@ -187,8 +187,15 @@ void LiveSolver::State::factorise() {
     values.conservativeResize(values.rows() + rows.rows(), Eigen::NoChange);
     weights.conservativeResize(values.rows());
     values.bottomRows(rows.rows()) = rows;
-    weights.tail(rows.rows()) = stance_->weight * shares;
+    weights.tail(rows.rows()) = shares;
+  };
+  if (stance_) {
+    auto [rows, shares] = stance_rows(basis_, stance_->rest, stance_->stance);
+    add(std::move(rows), stance_->weight * shares);
   }
+  if (body_.factored_inertia > 0.0)
+    add(radial_rows(basis_, rows_of(surface_, chosen_), JetOrder::value),
+        0.5 * body_.factored_inertia / static_cast<double>(chosen_.size()) * body_.masses);
   inverse_factor_ = inverse_factor(stiffness_, values, weights);
   for_each_precision([&](auto& precision) {
     precision.objective->set_handles(pairs_, pair_values_, inverse_factor_);

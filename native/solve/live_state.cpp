@@ -86,6 +86,7 @@ void LiveSolver::State::prepare(Precision<Scalar>& precision) {
   precision.objective->set_style(style_);
   precision.objective->set_hooks(hooks_, rows_of(surface_, chosen_));
   precision.objective->set_stance(stance_);
+  weigh(precision);
 }
 
 void LiveSolver::State::set_hooks(const LiveHooks& hooks) {
@@ -119,13 +120,16 @@ QuasiNewtonReport LiveSolver::State::descend(Precision<Scalar>& precision, const
   return found;
 }
 
+template QuasiNewtonReport LiveSolver::State::descend<float>(Precision<float>&, const QuasiNewtonOptions&,
+                                                             const Progress&);
+
 Index LiveSolver::State::follow(Index iterations, double tolerance, const Progress& progress) {
   const ThreadScope threads(solve_threads());
   const Stopwatch watch;
   if (iterations <= 0) iterations = options_.iterations;
   if (tolerance <= 0.0) tolerance = options_.tolerance;
   report_.iterations = report_.evaluations = 0;
-  if (inverse_factor_.size() == 0) factorise();
+  precondition(0.0);
   if (!handles_.empty() && !style_) follow_rigidly();
   extrapolate();
   const bool fast_alone = tolerance >= single_tolerance;
@@ -139,6 +143,8 @@ Index LiveSolver::State::follow(Index iterations, double tolerance, const Progre
     fast_.u.resize(0);
   }
   if (handles_.empty() && hooks_.energies.empty()) hold_lowest();
+  rest();
+  report_.kinetic = report_.speed = 0.0;
   is_measured_ = false;
   is_exact_ = !fast_alone;
   report_.seconds = watch.seconds();
@@ -229,6 +235,8 @@ void LiveSolver::State::measure(Precision<Scalar>& precision) {
   report_.handle_max = frame_.scale * distance.maxCoeff();
 }
 
+template void LiveSolver::State::measure<float>(Precision<float>&);
+
 void LiveSolver::State::reset() {
   coefficients_ = basis_.identity();
   u_before_.resize(0);
@@ -241,6 +249,7 @@ void LiveSolver::State::reset() {
     handle.target_point = handle.rest_point;
   }
   set_targets(at_rest);
+  rest();
   const double setup = report_.setup_seconds;
   report_ = {};
   report_.setup_seconds = setup;
@@ -262,6 +271,7 @@ std::unique_ptr<LiveSolver::State> LiveSolver::State::with_symmetry(SymmetryPlan
     next->set_style(style_asked_->preferred, style_asked_->strength, style_asked_->sharpness,
                     style_asked_->weights, style_asked_->up);
   next->set_hooks(hooks_);
+  next->set_secondary_motion(body_.asked);
   if (next->inverse_factor_.size() == 0) next->factorise();
   next->adopt(*field());
   if (tracked_rest_.rows() > 0) next->track(tracked_rest_);

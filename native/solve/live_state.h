@@ -6,6 +6,7 @@
 
 #include "fields/mirror.h"
 #include "fields/tracked_points.h"
+#include "solve/live_body.h"
 #include "solve/live_objective.h"
 #include "solve/live_solver.h"
 
@@ -17,14 +18,18 @@ class LiveSolver::State {
         const Progress& progress, std::shared_ptr<const RestShape> shape,
         std::shared_ptr<const HandleBlend> blend);
   void set_handles(const std::vector<Handle>& handles);
-  void set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights,
-                 const Vec3& up);
+  void set_style(PointsIn normals, double strength, double sharpness, const Vector& weights, const Vec3& up);
   void clear_style();
   void set_hooks(const LiveHooks& hooks);
   void set_weights(const Vector& weights, const Vector& bend_weights);
   void set_targets(const std::vector<Handle>& moved);
   Index follow(Index iterations, double tolerance, const Progress& progress);
   std::shared_ptr<RadialField> solve(Index iterations, double tolerance, const Progress& progress);
+  void set_secondary_motion(const std::optional<SecondaryMotion>& motion);
+  std::shared_ptr<RadialField> step(const std::vector<Handle>& moved, double seconds, const Mat4& coordinates,
+                                    const Progress& progress);
+  MotionState motion_state() const;
+  void set_motion_state(const MotionState& state);
   void reset();
   void adopt(const DeformationField& field);
   void track(PointsIn points);
@@ -46,8 +51,7 @@ class LiveSolver::State {
   template <class Scalar>
   void prepare(Precision<Scalar>& precision);
   template <class Scalar>
-  QuasiNewtonReport descend(Precision<Scalar>& precision, const QuasiNewtonOptions& options,
-                            const Progress& progress);
+  QuasiNewtonReport descend(Precision<Scalar>&, const QuasiNewtonOptions&, const Progress&);
   template <class Scalar>
   void measure(Precision<Scalar>& precision);
   template <class Call>
@@ -68,14 +72,16 @@ class LiveSolver::State {
   void extrapolate();
   void hold_lowest();
   int solve_threads() const;
-
-  /// What set_style was called with.
-  struct StyleAsked {
-    Points preferred;
-    double strength, sharpness;
-    Vector weights;
-    Vec3 up;
-  };
+  template <class S>
+  void weigh(Precision<S>& precision, double inertia = 0.0, PointsOf<S> goal = {});
+  void precondition(double inertia);
+  void forget_past(), rest();
+  Points pair_targets_between(const std::vector<Mat4>& before, double share) const;
+  RowMatrix<double> stage(const RowMatrix<double>& from, const RowMatrix<double>& velocity, double a,
+                          const Twist&, const Progress&);
+  void change_coordinates(const Mat4& motion);
+  void advance(double seconds, const Progress& progress);
+  double kinetic_energy();
 
   LiveOptions options_;
   SurfaceSamples samples_;
@@ -106,6 +112,7 @@ class LiveSolver::State {
   RowMatrix<double> coefficients_;
   RowMatrix<double> coefficients_before_;  // where the solve before the last one ended; empty: not known
   VectorF u_before_;
+  LiveBody body_;
   TrackedPoints tracked_;
   Points tracked_rest_;
   LiveReport report_;

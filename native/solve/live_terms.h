@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What joins the energy of a live solve, at its samples.
+#pragma once
+
+#include <vector>
+
+#include "energies/arap.h"
+#include "energies/body.h"
+#include "energies/gauss.h"
+#include "energies/stance.h"
+
+namespace arapfields {
+
+/// A style's preference at the samples of a live solve.
+struct LiveStyle {
+  GaussPreference preference;
+  Points normals;         ///< (n,3) rest normals of the samples
+  Vector sample_weights;  ///< (n) or empty: all 1
+  double weight = 1.0;    ///< λ_Gauss
+};
+
+/// What LiveSolver::set_style was called with.
+struct StyleAsked {
+  Points preferred;
+  double strength, sharpness;
+  Vector weights;
+  Vec3 up;
+};
+
+/// What keeps a figure's stance at the samples of a live solve.
+struct LiveStance {
+  Stance stance;
+  Points rest;  ///< (n,3) samples
+  double weight = 0.0;
+};
+
+/// What the terms of the energy come to.
+struct LiveTerms {
+  ArapValue arap;
+  double handles = 0.0;          ///< mean squared distance to the targets
+  double gauss = 0.0;            ///< mean(1 − g), where there is a style
+  double barrier = 0.0;          ///< energies/distortion.h
+  double stance = 0.0;           ///< energies/stance.h
+  BodyEnergy body;               ///< energies/body.h, weighted
+  std::vector<double> external;  ///< weighted
+};
+
+}  // namespace arapfields
