@@ -15,6 +15,7 @@ PLOT = ROOT / "docs" / "images" / "performance.svg"
 BEGIN, END = "<!-- bench: begin -->", "<!-- bench: end -->"
 SECTIONS = {  # titles; a module's first sentence stands below
     "defaults": "From the press to the result",
+    "exact": "Exact handles",
     "deform": "Deformation",
     "jets": "The network's sweeps",
     "stylize": "Stylization",
