@@ -137,8 +137,8 @@ void LiveSolver::State::set_weights(const Vector& weights, const Vector& bend_we
   if (!handles_.empty()) factorise();
 }
 
-/// The samples' resistance, where their weights or handles that scale have changed it.
-void LiveSolver::State::stiffen(const Progress& progress) {
+/// w of each sample that the energy sees (empty: all 1), and λ.
+std::pair<Vector, Vector> LiveSolver::State::resistance() const {
   const Vector all = energy_weights(samples_, bound_);
   Vector weights(all.size() > 0 ? static_cast<Index>(chosen_.size()) : 0), bending = own_bending_;
   for (std::size_t i = 0; i < chosen_.size(); ++i) {
@@ -146,6 +146,12 @@ void LiveSolver::State::stiffen(const Progress& progress) {
     if (weights.size() > 0) weights[row] = all[chosen_[i]];
     if (samples_.bend_weights.size() > 0) bending[row] *= samples_.bend_weights[chosen_[i]];
   }
+  return {weights, bending};
+}
+
+/// The samples' resistance, where their weights or handles that scale have changed it.
+void LiveSolver::State::stiffen(const Progress& progress) {
+  const auto [weights, bending] = resistance();
   if (stiffness_.size() > 0 && weights.size() == weights_.size() && weights == weights_ &&
       bending == bending_)
     return;

@@ -61,6 +61,8 @@ void LiveSolver::reset() { state_->reset(); }
 
 void LiveSolver::adopt(const DeformationField& field) { state_->adopt(field); }
 
+Index LiveSolver::watch_folds(double barrier) { return state_->watch_folds(barrier); }
+
 void LiveSolver::track(PointsIn points) { state_->track(points); }
 
 PointsF LiveSolver::tracked() const { return state_->tracked(); }

@@ -75,6 +75,10 @@ class ARAPFIELDS_EXPORT LiveSolver {
   /// samples' frame.
   void adopt(const DeformationField& field);
 
+  /// How many samples the shape at hand folds at. If any, the next solves look at all samples that it folds
+  /// at or nearly does, whether the energy saw them or not, with this weight of the barrier.
+  Index watch_folds(double barrier);
+
   /// Points (n,3) of mesh coordinates whose places tracked() tells cheaply.
   void track(PointsIn points);
   PointsF tracked() const;

@@ -52,7 +52,8 @@ LiveSolver::State::State(const SurfaceSamples& samples, const std::vector<Handle
   const int axis = axis_of(options.symmetry);
   if (!shape) shape = std::make_shared<const RestShape>(samples_, options.interior, seed, axis);
   Random random(seed);
-  chosen_ = stratified(shape->order, options.samples, random);
+  order_ = shape->order;
+  chosen_ = stratified(order_, options.samples, random);
   std::vector<RadialScale> scales;
   if (options.coarse_centers > 0) scales.push_back({options.coarse_centers, options.coarse_radius_factor});
   scales.push_back({options.fine_centers, options.fine_radius_factor, true});
@@ -66,7 +67,8 @@ LiveSolver::State::State(const SurfaceSamples& samples, const std::vector<Handle
   if (options.interior) basis_.set_embedding(shape->embedding);
   coefficients_ = basis_.identity();
   progress.report(0.2, "centers placed");
-  own_bending_ = SurfaceStiffness(shape->thickness, options.surface).bending(rows_of(surface_, chosen_));
+  surface_stiffness_ = SurfaceStiffness(shape->thickness, options.surface);
+  own_bending_ = surface_stiffness_.bending(rows_of(surface_, chosen_));
   bound_ = BoundHandles(in_cube(handles, frame_), surface_);
   stiffen(progress.part(0.2, 0.8));
   prepare(fast_);

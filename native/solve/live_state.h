@@ -9,6 +9,7 @@
 #include "solve/live_body.h"
 #include "solve/live_objective.h"
 #include "solve/live_solver.h"
+#include "solve/surface_stiffness.h"
 
 namespace arapfields {
 
@@ -32,6 +33,7 @@ class LiveSolver::State {
   void set_motion_state(const MotionState& state);
   void reset();
   void adopt(const DeformationField& field);
+  Index watch_folds(double barrier);
   void track(PointsIn points);
   /// The same session, symmetric otherwise: its handles, targets, style, hooks, shape and tracked points.
   std::unique_ptr<State> with_symmetry(SymmetryPlane symmetry, const Progress& progress) const;
@@ -59,6 +61,8 @@ class LiveSolver::State {
     if (fast_.objective) call(fast_);
     if (exact_.objective) call(exact_);
   }
+  std::pair<Vector, Vector> resistance() const;
+  LiveStyle style_at_samples() const;
   void stiffen(const Progress& progress);
   void choose_pairs();
   bool choose_influence();
@@ -88,7 +92,9 @@ class LiveSolver::State {
   Frame frame_;
   Points surface_, surface_normals_;          // all samples, cube coordinates
   std::shared_ptr<const HandleBlend> blend_;  // null: handles are soft
+  std::vector<std::uint32_t> order_;          // of these, neighbours beside each other
   std::vector<Index> chosen_;                 // those that the energy sees
+  SurfaceStiffness surface_stiffness_;        // without weights of the samples
   Vector own_bending_;                        // λ of these, without bend weights
   Vector bending_, weights_;                  // λ, and factors of the energy (empty: all 1)
   std::optional<Mirror> mirror_;              // where the field is symmetric

@@ -26,17 +26,24 @@ void LiveSolver::State::set_style(PointsIn preferred, double strength, double sh
   const bool other_way_up = up != up_, first = !style_;
   style_asked_ = StyleAsked{preferred, strength, sharpness, weights, up};
   up_ = up;
-  style_ = LiveStyle{preference,
-                     rows_of(surface_normals_, chosen_),
-                     {},
-                     strength * options_.gauss_weight * preference.balance};
-  style_->sample_weights = preference.reach(style_->normals);
-  if (weights.size() > 0)
-    for (std::size_t i = 0; i < chosen_.size(); ++i)
-      style_->sample_weights[static_cast<Index>(i)] *= weights[chosen_[i]];
+  const double weight = strength * options_.gauss_weight * preference.balance;
+  style_ = LiveStyle{preference, {}, {}, weight};
+  style_ = style_at_samples();
   for_each_precision([&](auto& precision) { precision.objective->set_style(style_); });
   optimizer_.forget();
   if (handles_.empty() && (first || other_way_up)) stand_otherwise();
+}
+
+/// The style at the samples that the energy sees.
+LiveStyle LiveSolver::State::style_at_samples() const {
+  LiveStyle style = *style_;
+  style.normals = rows_of(surface_normals_, chosen_);
+  style.sample_weights = style.preference.reach(style.normals);
+  const Vector& weights = style_asked_->weights;
+  if (weights.size() > 0)
+    for (std::size_t i = 0; i < chosen_.size(); ++i)
+      style.sample_weights[static_cast<Index>(i)] *= weights[chosen_[i]];
+  return style;
 }
 
 void LiveSolver::State::clear_style() {

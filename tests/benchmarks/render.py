@@ -19,6 +19,7 @@ PEERS = ROOT / "docs" / "peers.md"
 BEGIN, END = "<!-- bench: begin -->", "<!-- bench: end -->"
 SECTIONS = {  # titles; a module's first sentence stands below
     "defaults": "From the press to the result",
+    "exact": "Exact handles",
     "deform": "Deformation",
     "jets": "The network's sweeps",
     "stylize": "Stylization",
