@@ -5,9 +5,9 @@
 
 #include "core/tall_product.h"
 #include "energies/arap.h"
-#include "energies/gauss.h"
 #include "energies/handles.h"
 #include "energies/stance.h"
+#include "energies/style.h"
 #include "fields/mirror.h"
 #include "fields/radial_evaluator.h"
 #include "solve/live_blend.h"
@@ -18,10 +18,9 @@ namespace arapfields {
 
 /// A style's preference at the samples of a live solve.
 struct LiveStyle {
-  GaussPreference preference;
-  Points normals;         ///< (n,3) rest normals of the samples
-  Vector sample_weights;  ///< (n) or empty: all 1
-  double weight = 1.0;    ///< λ_Gauss
+  StyleAtSamples style;
+  Points normals;       ///< (n,3) rest normals of the samples
+  double weight = 1.0;  ///< λ_Gauss
 };
 
 /// What keeps a figure's stance at the samples of a live solve.
@@ -35,7 +34,7 @@ struct LiveStance {
 struct LiveTerms {
   ArapValue arap;
   double handles = 0.0;          ///< mean squared distance to the targets
-  double gauss = 0.0;            ///< mean(1 − g), where there is a style
+  double gauss = 0.0;            ///< style_energy(), where there is a style
   double barrier = 0.0;          ///< energies/distortion.h
   double stance = 0.0;           ///< energies/stance.h
   std::vector<double> external;  ///< weighted
@@ -110,7 +109,7 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
   LiveBlend<Scalar> blend_;
   std::optional<LiveStyle> style_;
   std::optional<LiveStance> stance_;
-  PointsOf<Scalar> stance_rest_, style_normals_;
+  PointsOf<Scalar> stance_rest_, style_normals_, style_targets_;
   Eigen::VectorX<Scalar> style_weights_;
   std::optional<Mirror> mirror_;
   LiveHooks hooks_;

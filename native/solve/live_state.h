@@ -17,7 +17,7 @@ class LiveSolver::State {
         const Progress& progress, std::shared_ptr<const RestShape> shape,
         std::shared_ptr<const HandleBlend> blend);
   void set_handles(const std::vector<Handle>& handles);
-  void set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights,
+  void set_style(const Style& style, double strength, double sharpness, const Vector& weights,
                  const Vec3& up);
   void clear_style();
   void set_hooks(const LiveHooks& hooks);
@@ -70,7 +70,7 @@ class LiveSolver::State {
 
   /// What set_style was called with.
   struct StyleAsked {
-    Points preferred;
+    Style style;
     double strength, sharpness;
     Vector weights;
     Vec3 up;

@@ -9,7 +9,7 @@
 
 namespace arapfields {
 
-void LiveSolver::State::set_style(PointsIn preferred, double strength, double sharpness,
+void LiveSolver::State::set_style(const Style& style, double strength, double sharpness,
                                   const Vector& weights, const Vec3& up) {
   require_range("strength", strength, 0, 1e6);
   require(
@@ -21,19 +21,18 @@ void LiveSolver::State::set_style(PointsIn preferred, double strength, double sh
   require(surface_normals_.rows() == surface_.rows(), "samples", "they have no normals",
           "a style needs samples with normals");
   require_no_reach(handles_);
-  const GaussPreference preference = gauss_preference(preferred, sharpness);
+  const Points normals = rows_of(surface_normals_, chosen_);
+  StyleAtSamples here = StyleAtSamples::of(style, normals, sharpness);
+  if (here.idle(normals)) return clear_style();
   require(up.allFinite() && up.norm() > 0.0, "up", "zero, NaN or infinite", "a finite direction is needed");
   const bool other_way_up = up != up_, first = !style_;
-  style_asked_ = StyleAsked{preferred, strength, sharpness, weights, up};
+  style_asked_ = StyleAsked{style, strength, sharpness, weights, up};
   up_ = up;
-  style_ = LiveStyle{preference,
-                     rows_of(surface_normals_, chosen_),
-                     {},
-                     strength * options_.gauss_weight * preference.balance};
-  style_->sample_weights = preference.reach(style_->normals);
   if (weights.size() > 0)
     for (std::size_t i = 0; i < chosen_.size(); ++i)
-      style_->sample_weights[static_cast<Index>(i)] *= weights[chosen_[i]];
+      here.weights[static_cast<Index>(i)] *= weights[chosen_[i]];
+  const double weight = strength * options_.gauss_weight * here.factor;
+  style_ = LiveStyle{std::move(here), normals, weight};
   for_each_precision([&](auto& precision) { precision.objective->set_style(style_); });
   optimizer_.forget();
   if (handles_.empty() && (first || other_way_up)) stand_otherwise();
