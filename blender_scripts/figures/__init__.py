@@ -21,6 +21,7 @@ FIGURES = [
     Figure("exact", "soft and exact handles"),
     Figure("styles", "six styles of three shapes, with their preferences on a sphere"),
     Figure("style_sheet", "all styles of six shapes, as stylize makes them by default"),
+    Figure("style_objects", "three shapes in the styles of six objects"),
     Figure("live", "six frames of a handle dragged live"),
     Figure("character", "materials and UVs of a deformed and a stylized mesh"),
     Figure("workflows", "the ends of the workflow pages, by the pages' own scripts", pages=WORKFLOWS),

@@ -171,6 +171,17 @@ void bind_testing(py::module_& module) {
       "jets"_a.noconvert(), "normals"_a, "preferred"_a, "sharpness"_a, "weight"_a, "sample_weights"_a,
       "aten"_a = false);
   module.def(
+      "target_energy",
+      [](JetArray<Scalar> jets, const PointsOf<Scalar>& normals, const PointsOf<Scalar>& targets,
+         double weight, const Eigen::VectorX<Scalar>& sample_weights, bool aten) {
+        JetArray<Scalar> cotangents = zeros_like(jets);
+        const auto energy = aten ? &probe_targets<Scalar> : &target_energy<Scalar>;
+        const double value = energy(jet_view<const Scalar>(jets), normals, targets, sample_weights, weight,
+                                    jet_view<Scalar>(cotangents));
+        return py::make_tuple(value, cotangents);
+      },
+      "jets"_a.noconvert(), "normals"_a, "targets"_a, "weight"_a, "sample_weights"_a, "aten"_a = false);
+  module.def(
       "handle_energy",
       [](JetArray<Scalar> jets, const BoundHandles& handles, double weight, bool aten) {
         JetArray<Scalar> cotangents = zeros_like(jets);

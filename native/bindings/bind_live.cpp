@@ -5,7 +5,7 @@
 #include "bindings/handles.h"
 #include "bindings/jet_arrays.h"
 #include "bindings/reports.h"
-#include "energies/styles.h"
+#include "bindings/styles.h"
 #include "options/stylize.h"
 #include "solve/live_solver.h"
 
@@ -95,11 +95,10 @@ void set_style(LiveSolver& live, const std::optional<NormalsArgument>& normals, 
                double sharpness, const std::optional<ArrayArgument>& weights,
                const std::optional<ArrayArgument>& up) {
   if (!normals) return live.clear_style();
-  const Points preferred = py::isinstance<py::str>(*normals)
-                               ? preferred_normals(py::cast<std::string>(*normals))
-                               : as_points(*normals, "normals");
-  live.set_style(preferred, strength, sharpness, weights ? as_vector(*weights, "weights") : Vector(),
-                 up ? as_vec3(*up, "up") : Vec3(Vec3::UnitZ()));
+  const Style style = as_style(*normals);
+  const Vector blend = weights ? as_vector(*weights, "weights") : Vector();
+  const Vec3 upwards = up ? as_vec3(*up, "up") : Vec3(Vec3::UnitZ());
+  run_long(nullptr, [&](const Progress&) { live.set_style(style, strength, sharpness, blend, upwards); });
 }
 
 }  // namespace
@@ -185,8 +184,9 @@ void bind_live(py::module_& module) {
           "'none' each for itself; the shape at hand is the start. Takes as long as a new LiveDeformer.")
       .def("set_style", &set_style, "normals"_a, "strength"_a = StylizeOptions().strength, py::kw_only(),
            "sharpness"_a = StylizeOptions().sharpness, "weights"_a = py::none(), "up"_a = py::none(),
-           "Turns the surface towards preferred normals, (k, 3) or a style's name, from the next solve on; "
-           "None\n"
+           "Turns the surface towards preferred normals, (k, 3), a style's name or an ObjectStyle, from the "
+           "next\n"
+           "solve on; None\n"
            "or strength 0: no style. `weights` (one for each sample given at the start) blend the effect; "
            "`up`\n"
            "(3,), else z, is where the figure's head is: without handles it stands on what lies lowest.")

@@ -40,7 +40,8 @@ Index LiveSolver::State::watch_folds(double barrier) {
   own_bending_ = surface_stiffness_.bending(rows_of(surface_, chosen_));
   std::tie(weights_, bending_) = resistance();
   choose_stance();
-  if (style_) style_ = style_at_samples();
+  if (style_) style_ = style_at_samples(*style_asked_);
+  if (body_.asked) set_secondary_motion(body_.asked);
   exact_ = {};
   prepare(fast_);
   fast_.u.resize(0);

@@ -51,7 +51,8 @@ void LiveObjective<Scalar>::set_style(const std::optional<LiveStyle>& style) {
   style_ = style;
   if (!style) return;
   style_normals_ = style->normals.template cast<Scalar>();
-  style_weights_ = style->sample_weights.template cast<Scalar>();
+  style_targets_ = style->style.targets.template cast<Scalar>();
+  style_weights_ = style->style.weights.template cast<Scalar>();
 }
 
 template <class Scalar>
@@ -113,8 +114,8 @@ LiveTerms LiveObjective<Scalar>::evaluate(JetView<const Scalar> jets, const Meas
       handle_energy<Scalar>({u.data() + handle_offset(), pairs, JetOrder::value}, pairs_, handle_weight_,
                             {out != nullptr ? out + handle_offset() : nullptr, pairs, JetOrder::value});
   if (style_)
-    terms.gauss = gauss_energy<Scalar>(jets, style_normals_, style_weights_, style_->preference,
-                                       style_->weight, jet_cotangents);
+    terms.gauss = style_energy<Scalar>(jets, style_normals_, style_->style.preference, style_targets_,
+                                       style_weights_, style_->weight, jet_cotangents);
   if (stance_)
     terms.stance =
         stance_energy<Scalar>(jets, stance_rest_, stance_->stance, stance_->weight, jet_cotangents);

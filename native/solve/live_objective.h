@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <memory>
 #include <optional>
 
 #include "core/tall_product.h"
@@ -92,11 +93,19 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
   std::optional<LiveStyle> style_;
   std::optional<LiveStance> stance_;
   std::optional<Body<Scalar>> body_;
-  PointsOf<Scalar> stance_rest_, style_normals_;
+  PointsOf<Scalar> stance_rest_, style_normals_, style_targets_;
   Eigen::VectorX<Scalar> style_weights_;
   std::optional<Mirror> mirror_;
   LiveHooks hooks_;
   Points rest_;  // for external energies
+};
+
+/// The objective in one precision, and what it measured last.
+template <class Scalar>
+struct LivePrecision {
+  std::unique_ptr<LiveObjective<Scalar>> objective;
+  Eigen::VectorX<Scalar> u;  // measurements of the coefficients at hand; empty: not known
+  int uses = 0;              // solves since u was measured afresh
 };
 
 }  // namespace arapfields

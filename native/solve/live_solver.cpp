@@ -17,9 +17,9 @@ LiveSolver& LiveSolver::operator=(LiveSolver&&) noexcept = default;
 
 void LiveSolver::set_handles(const std::vector<Handle>& handles) { state_->set_handles(handles); }
 
-void LiveSolver::set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights,
+void LiveSolver::set_style(const Style& style, double strength, double sharpness, const Vector& weights,
                            const Vec3& up) {
-  state_->set_style(preferred, strength, sharpness, weights, up);
+  state_->set_style(style, strength, sharpness, weights, up);
 }
 
 void LiveSolver::clear_style() { state_->clear_style(); }

@@ -5,6 +5,7 @@
 
 #include "core/task.h"
 #include "energies/handles.h"
+#include "energies/style.h"
 #include "fields/radial_field.h"
 #include "mesh/surface_samples.h"
 #include "options/live.h"
@@ -33,10 +34,10 @@ class ARAPFIELDS_EXPORT LiveSolver {
 
   /// Other handles for the same surface; the shape at hand stays the start of the next solve.
   void set_handles(const std::vector<Handle>& handles);
-  /// Preferred normals (k,3), strength ≥ 0 (0 takes the style away), sharpness σ (0: from the normals),
+  /// A style, strength ≥ 0 (0 takes the style away), sharpness σ (0: from the style),
   /// weights (one for each surface sample given to the constructor, or empty); `up` is where the figure's
   /// head is: without handles it stands on what lies lowest.
-  void set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights = {},
+  void set_style(const Style& style, double strength, double sharpness, const Vector& weights = {},
                  const Vec3& up = Vec3::UnitZ());
   void clear_style();
   /// Other weights of the samples (mesh/surface_samples.h), for instance while they are painted. What they

@@ -224,7 +224,7 @@ void LiveSolver::State::measure(Precision<Scalar>& precision) {
   const LiveTerms terms = objective.terms(precision.u);
   report_.arap = terms.arap;
   report_.preference.reset();
-  if (style_) report_.preference = 1.0 - terms.gauss;
+  if (style_) report_.preference = preference_of(style_->style.preference, terms.gauss);
   report_.distortion =
       objective.with_jets(precision.u, [](JetView<const Scalar> jets) { return distortion<Scalar>(jets); });
   report_.notes = notes_on(report_.distortion, far_target(bound_, surface_));
@@ -270,7 +270,7 @@ std::unique_ptr<LiveSolver::State> LiveSolver::State::with_symmetry(SymmetryPlan
   options.symmetry = symmetry;
   auto next = std::make_unique<State>(samples_, handles_, options, progress, nullptr, nullptr);
   if (style_asked_)
-    next->set_style(style_asked_->preferred, style_asked_->strength, style_asked_->sharpness,
+    next->set_style(style_asked_->style, style_asked_->strength, style_asked_->sharpness,
                     style_asked_->weights, style_asked_->up);
   next->set_hooks(hooks_);
   next->set_secondary_motion(body_.asked);

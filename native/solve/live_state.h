@@ -19,7 +19,8 @@ class LiveSolver::State {
         const Progress& progress, std::shared_ptr<const RestShape> shape,
         std::shared_ptr<const HandleBlend> blend);
   void set_handles(const std::vector<Handle>& handles);
-  void set_style(PointsIn normals, double strength, double sharpness, const Vector& weights, const Vec3& up);
+  void set_style(const Style& style, double strength, double sharpness, const Vector& weights,
+                 const Vec3& up);
   void clear_style();
   void set_hooks(const LiveHooks& hooks);
   void set_weights(const Vector& weights, const Vector& bend_weights);
@@ -45,11 +46,7 @@ class LiveSolver::State {
 
  private:
   template <class Scalar>
-  struct Precision {
-    std::unique_ptr<LiveObjective<Scalar>> objective;
-    Eigen::VectorX<Scalar> u;  // measurements of the coefficients; empty: not known
-    int uses = 0;              // solves since u was measured afresh
-  };
+  using Precision = LivePrecision<Scalar>;
   template <class Scalar>
   void prepare(Precision<Scalar>& precision);
   template <class Scalar>
@@ -62,24 +59,17 @@ class LiveSolver::State {
     if (exact_.objective) call(exact_);
   }
   std::pair<Vector, Vector> resistance() const;
-  LiveStyle style_at_samples() const;
+  LiveStyle style_at_samples(const StyleAsked& asked) const;
   void stiffen(const Progress& progress);
-  void choose_pairs();
   bool choose_influence();
   std::shared_ptr<const Influence> reaches_of_handles() const;
   Points pair_targets() const;
-  void reflect_pairs();
-  void choose_stance();
-  void stand_otherwise();
-  void factorise();
-  void follow_rigidly();
-  void extrapolate();
-  void hold_lowest();
   int solve_threads() const;
   template <class S>
   void weigh(Precision<S>& precision, double inertia = 0.0, PointsOf<S> goal = {});
   void precondition(double inertia);
-  void forget_past(), rest();
+  void choose_pairs(), reflect_pairs(), choose_stance(), stand_otherwise(), factorise();
+  void follow_rigidly(), extrapolate(), hold_lowest(), forget_past(), rest();
   Points pair_targets_between(const std::vector<Mat4>& before, double share) const;
   RowMatrix<double> stage(const RowMatrix<double>& from, const RowMatrix<double>& velocity, double a,
                           const Twist&, const Progress&);

@@ -6,22 +6,21 @@
 
 #include "energies/arap.h"
 #include "energies/body.h"
-#include "energies/gauss.h"
 #include "energies/stance.h"
+#include "energies/style.h"
 
 namespace arapfields {
 
 /// A style's preference at the samples of a live solve.
 struct LiveStyle {
-  GaussPreference preference;
-  Points normals;         ///< (n,3) rest normals of the samples
-  Vector sample_weights;  ///< (n) or empty: all 1
-  double weight = 1.0;    ///< λ_Gauss
+  StyleAtSamples style;
+  Points normals;       ///< (n,3) rest normals of the samples
+  double weight = 1.0;  ///< λ_Gauss
 };
 
 /// What LiveSolver::set_style was called with.
 struct StyleAsked {
-  Points preferred;
+  Style style;
   double strength, sharpness;
   Vector weights;
   Vec3 up;
@@ -38,7 +37,7 @@ struct LiveStance {
 struct LiveTerms {
   ArapValue arap;
   double handles = 0.0;          ///< mean squared distance to the targets
-  double gauss = 0.0;            ///< mean(1 − g), where there is a style
+  double gauss = 0.0;            ///< style_energy(), where there is a style
   double barrier = 0.0;          ///< energies/distortion.h
   double stance = 0.0;           ///< energies/stance.h
   BodyEnergy body;               ///< energies/body.h, weighted

@@ -38,7 +38,7 @@ LossProbe::LossProbe(const SurfaceSamples& samples, const std::vector<Handle>& h
   terms.batch = 20;
   terms.external = external;
   terms.stiffness = SurfaceStiffness(bending);
-  if (preferred.rows() > 0) terms.preference = gauss_preference(preferred, 5.0);
+  if (preferred.rows() > 0) terms.style.preference = gauss_preference(preferred, 5.0);
   terms.gauss = gauss;
   terms.keep_stance = keep_stance;
   terms.stance = Stance::of(samples.points, Vec3(0.1, 0.2, 1.0));

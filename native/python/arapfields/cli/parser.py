@@ -9,7 +9,16 @@ import arapfields as af
 
 from . import usd, verbs
 from .animate import animate
-from .flags import MESH, SOURCE, extraction_flags, inverse_flag, report_flag, sdf_flag, solve_flags
+from .flags import (
+    MESH,
+    SOURCE,
+    extraction_flags,
+    inverse_flag,
+    report_flag,
+    sdf_flag,
+    solve_flags,
+    style_flags,
+)
 from .options import add_option_flag, add_option_flags, shard
 
 
@@ -127,21 +136,10 @@ def _stylize(added):
         "turn a shape's normals to those of a style",
         "spot.obj -o cubic.obj --style cube --strength 0.8",
         "spot.safetensors --surface crystal.ply --normals gem.stl",
+        "spot.obj -o rocky.obj --style-object rock.obj --up 0,1,0",
     )
     solve_flags(parser)
-    style = parser.add_mutually_exclusive_group(required=True)
-    style.add_argument("--style", metavar="NAME", help=f"one of {', '.join(af.style_names())}")
-    style.add_argument(
-        "--normals", metavar="FILE", help="rows x y z (.txt, .csv, .npy), or the face normals of a mesh"
-    )
-    parser.add_argument(
-        "--style-turn", nargs=2, metavar=("AXIS", "DEGREES"), help="turns the style's normals"
-    )
-    parser.add_argument(
-        "--up",
-        metavar="X,Y,Z",
-        help="what is up in the file (z without it): the style's axis and the figure's stance",
-    )
+    style_flags(parser)
     add_option_flags(parser, "stylize", "stylization")
     return parser
 
