@@ -222,7 +222,7 @@ void bind_live(py::module_& module) {
 
   testing_module(module).def(
       "field_jets", [](const DeformationField& field, const Points& cube_points, int count) {
-        JetArray<double> jets({static_cast<Index>(count), cube_points.rows(), Index{3}});
+        JetArray<double> jets({py::ssize_t{count}, py::ssize_t{cube_points.rows()}, py::ssize_t{3}});
         field.evaluate(cube_points, jet_view<double>(jets));
         return jets;
       });
