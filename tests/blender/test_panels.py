@@ -200,7 +200,7 @@ def test_the_panel_draws(state):
         assert shown == ["ARAPFIELDS_PT_source"]
     else:
         said = "ARAPFIELDS_PT_status" in shown
-        assert len(shown) == 13 + said and said == (
+        assert len(shown) == 14 + said and said == (
             state in ("fitted", "fit cleared", "running", "a failure")
         )
     if state in EXPECTED:
