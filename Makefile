@@ -73,7 +73,7 @@ test-windows: setup  ## all but the torch sources, compiled for Windows by mingw
 	$(VENV)/bin/cmake -S . -B build/windows -G Ninja -DCMAKE_TOOLCHAIN_FILE=cmake/mingw-w64.cmake -DARAPFIELDS_WITHOUT_TORCH=ON \
 	  -DCMAKE_CXX_FLAGS_RELEASE="-O1 -DNDEBUG" -DPython_EXECUTABLE=$(abspath $(PY)) -DCMAKE_MAKE_PROGRAM=$(abspath $(VENV)/bin/ninja)
 	$(VENV)/bin/cmake --build build/windows
-	WINEPREFIX=$(abspath build/wine) WINEDEBUG=-all $(WINE) $(WINDOWS_TESTS) --color_output=no
+	WINEPREFIX=$(abspath build/wine) WINEDEBUG=-all timeout 900 $(WINE) $(WINDOWS_TESTS) --color_output=no
 
 fuzz: build $(VENV)/.tools  ## the nets, long: 20,000 odd calls and 20,000 damaged files of every kind
 	$(PY) -m tests.fuzz
