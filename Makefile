@@ -13,7 +13,7 @@ PYTEST := $(PY) -m pytest
 ALL_TESTS := $(PYTEST) -n logical --maxprocesses 4 --dist loadfile
 NATIVE_TESTS := build/wheel/tests/native_tests
 
-.PHONY: help setup build demo test test-slow test-windows fuzz bench sanitize format lint wheel workflows extension repository blenders gallery docs clean
+.PHONY: help setup build examples demo test test-slow test-windows fuzz bench sanitize format lint wheel workflows extension repository blenders gallery docs clean
 
 help:  ## this list
 	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/:.*##/ -/'
@@ -53,6 +53,9 @@ $(NATIVE_TESTS): $(VENV)/.installed $(VENV)/.tools $(shell find tests/native -ty
 	$(VENV)/bin/cmake --build build/wheel --target native_tests
 	@touch $@
 
+examples: build $(VENV)/.tools  ## the scenes of the workflow pages: out/examples
+	$(PY) blender_scripts/examples.py --output out/examples
+
 demo: build  ## the main job on Suzanne: out/demo.blend and out/demo.png
 	$(PY) blender_scripts/demo.py --output out
 
@@ -78,9 +81,10 @@ test-windows: setup  ## all but the torch sources, compiled for Windows by mingw
 fuzz: build $(VENV)/.tools  ## the nets, long: 20,000 odd calls and 20,000 damaged files of every kind
 	$(PY) -m tests.fuzz
 
-bench: build $(VENV)/.tools  ## paired benchmarks against the real competitors
+# PEERS=path names a folder with checkouts of implicit-arap and gaussStylization: these are then run, too.
+bench: build $(VENV)/.tools  ## paired benchmarks against the real competitors; PEERS=path: against others' public code
 	$(PIP) -q -r tests/benchmarks/requirements.txt
-	$(PY) -m tests.benchmarks
+	PEERS="$(PEERS)" $(PY) -m tests.benchmarks $(if $(PEERS),peers)
 
 SANITIZED = $(VENV)/bin/cmake -S . -G Ninja -DPython_EXECUTABLE=$(abspath $(PY)) -DCMAKE_MAKE_PROGRAM=$(abspath $(VENV)/bin/ninja) \
   -DCMAKE_BUILD_TYPE=RelWithDebInfo -DARAPFIELDS_NATIVE_TESTS=ON

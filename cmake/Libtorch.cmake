@@ -35,9 +35,10 @@ if(WIN32)  # the wheel has no import library of libiomp5md.dll
   target_link_libraries(libtorch::libtorch INTERFACE "${LIBTORCH_IOMP}.lib")
 else()
 # The OpenMP library that libtorch brings along: a call tells it to keep to one thread (core/torch_threads.h).
-file(GLOB LIBTORCH_OPENMP "${LIBTORCH_DIR}/lib/libgomp*.so*" "${LIBTORCH_DIR}/../torch.libs/libgomp*.so*")
+file(GLOB LIBTORCH_OPENMP "${LIBTORCH_DIR}/lib/libgomp*.so*" "${LIBTORCH_DIR}/../torch.libs/libgomp*.so*"
+  "${LIBTORCH_DIR}/lib/libomp.dylib")
 if(NOT LIBTORCH_OPENMP)
-  message(FATAL_ERROR "no libgomp beside ${LIBTORCH_DIR}/lib/libtorch_cpu.so")
+  message(FATAL_ERROR "no OpenMP library (libgomp, or libomp.dylib) beside libtorch in ${LIBTORCH_DIR}/lib")
 endif()
 list(GET LIBTORCH_OPENMP 0 LIBTORCH_OPENMP)
 target_link_libraries(libtorch::libtorch INTERFACE "${LIBTORCH_OPENMP}")

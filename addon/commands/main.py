@@ -23,7 +23,8 @@ def run(arguments, script=None):
     with interruptible():
         end_with_parent()
         try:
-            native.library()
+            if options.verb != "check":  # which says in its report what is wrong
+                native.library()
             return verb(options.verb)(options, Launch(script))
         except KeyboardInterrupt:
             return fail("interrupted", 130)
@@ -37,6 +38,10 @@ def verb(name):
         from .batch import run_batch
 
         return run_batch
+    if name == "check":
+        from .check import run_check
+
+        return run_check
     if name == "bake":
         from .bake import run_bake
 

@@ -6,6 +6,9 @@
 #else
 #include <sys/resource.h>
 #include <unistd.h>
+#ifdef __APPLE__
+#include <mach/mach.h>
+#endif
 #endif
 
 #include <algorithm>
@@ -49,12 +52,31 @@ double number_in(const char* path) {
   return file >> value ? value : unknown;
 }
 
+#ifdef __APPLE__
+
+/// What is free or can be had at once from files and caches.
+double system_memory() {
+  vm_statistics64_data_t pages{};
+  mach_msg_type_number_t count = HOST_VM_INFO64_COUNT;
+  const mach_port_t host = mach_host_self();
+  const bool known = host_statistics64(host, HOST_VM_INFO64, reinterpret_cast<host_info64_t>(&pages),
+                                       &count) == KERN_SUCCESS;
+  mach_port_deallocate(mach_task_self(), host);
+  if (!known) return unknown;
+  const double there = static_cast<double>(pages.free_count) + pages.inactive_count + pages.purgeable_count;
+  return there * static_cast<double>(sysconf(_SC_PAGESIZE));
+}
+
+#else
+
 double system_memory() {
   std::ifstream file("/proc/meminfo");
   for (std::string name, rest; file >> name && name != "MemAvailable:";) std::getline(file, rest);
   double kilobytes = 0.0;
   return file >> kilobytes ? kilobytes * 1024.0 : unknown;
 }
+
+#endif
 
 double group_memory() {
   const double limit = number_in("/sys/fs/cgroup/memory.max"),

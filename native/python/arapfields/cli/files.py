@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import _native
 from .._files import existing_file, write_arrays
-from .._native import InvalidInput
+from .._native import InvalidInput, ObjectStyle
 from .running import uninterrupted
 
 MESH_SUFFIXES = (".ply", ".obj", ".stl", ".off")
@@ -165,6 +165,15 @@ def read_normals(path):
     if not (np.isfinite(lengths).all() and (lengths > 0).all()):
         raise InvalidInput(f"{path}: a normal is zero or not finite; each must have a direction")
     return normals / lengths
+
+
+def read_style_object(path):
+    """The ObjectStyle of a mesh file; what the mesh lacks is told of the file."""
+    vertices, triangles = read_mesh(existing_file(path, MESH_SUFFIXES))
+    try:
+        return ObjectStyle(vertices, triangles)
+    except InvalidInput as error:
+        raise InvalidInput(f"{path}: {error}") from error
 
 
 def _face_normals(path):
