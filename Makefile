@@ -108,8 +108,8 @@ lint: setup  ## the same, checking alone
 	$(VENV)/bin/ruff format --check -q . && $(VENV)/bin/ruff check .
 
 wheel: $(VENV)/.ready  ## for pip: a manylinux wheel for .venv's Python and the source distribution, in dist
-	$(PIP) -q -r wheel_scripts/requirements.txt
-	$(PY) wheel_scripts/build_wheel.py --output dist
+	$(PIP) -q -r cmake/wheel/requirements.txt
+	$(PY) cmake/wheel/build_wheel.py --output dist
 
 workflows: setup  ## the continuous integration's steps for Linux, run here one by one in fresh clones: build/workflows
 	$(PY) tests/packaging/run_workflow.py .github/workflows/*.yml
