@@ -76,7 +76,7 @@ test-windows: setup  ## all but the torch sources, compiled for Windows by mingw
 	$(VENV)/bin/cmake -S . -B build/windows -G Ninja -DCMAKE_TOOLCHAIN_FILE=cmake/mingw-w64.cmake -DARAPFIELDS_WITHOUT_TORCH=ON \
 	  -DCMAKE_CXX_FLAGS_RELEASE="-O1 -DNDEBUG" -DPython_EXECUTABLE=$(abspath $(PY)) -DCMAKE_MAKE_PROGRAM=$(abspath $(VENV)/bin/ninja)
 	$(VENV)/bin/cmake --build build/windows
-	WINEPREFIX=$(abspath build/wine) WINEDEBUG=-all $(WINE) $(WINDOWS_TESTS) --color_output=no
+	WINEPREFIX=$(abspath build/wine) WINEDEBUG=-all timeout 900 $(WINE) $(WINDOWS_TESTS) --color_output=no
 
 fuzz: build $(VENV)/.tools  ## the nets, long: 20,000 odd calls and 20,000 damaged files of every kind
 	$(PY) -m tests.fuzz
@@ -108,8 +108,8 @@ lint: setup  ## the same, checking alone
 	$(VENV)/bin/ruff format --check -q . && $(VENV)/bin/ruff check .
 
 wheel: $(VENV)/.ready  ## for pip: a manylinux wheel for .venv's Python and the source distribution, in dist
-	$(PIP) -q -r wheel_scripts/requirements.txt
-	$(PY) wheel_scripts/build_wheel.py --output dist
+	$(PIP) -q -r cmake/wheel/requirements.txt
+	$(PY) cmake/wheel/build_wheel.py --output dist
 
 workflows: setup  ## the continuous integration's steps for Linux, run here one by one in fresh clones: build/workflows
 	$(PY) tests/packaging/run_workflow.py .github/workflows/*.yml

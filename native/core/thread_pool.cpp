@@ -68,6 +68,23 @@ struct ThreadPool::Job {
   int helpers;                 // under the pool's mutex
   int begun = 0;               // under the pool's mutex
   std::atomic<int> inside{0};  // helpers that have begun and not ended
+  std::mutex ending;
+  std::condition_variable ended;
+
+  /// Not std::atomic::wait(): without futexes, as on Windows, libstdc++ 12 compares before it locks, and a
+  /// notification in between is lost.
+  void wait() {
+    std::unique_lock lock(ending);
+    ended.wait(lock, [this] { return inside.load(std::memory_order_acquire) == 0; });
+  }
+
+  void leave() {
+    if (inside.fetch_sub(1, std::memory_order_acq_rel) > 1) return;
+    {
+      const std::lock_guard lock(ending);
+    }  // who has compared sleeps by now, and hears it
+    ended.notify_all();
+  }
 };
 
 void ThreadPool::run(int helpers, const std::function<void(int)>& work) {
@@ -93,10 +110,7 @@ void ThreadPool::run(int helpers, const std::function<void(int)>& work) {
     count_open();
   }
   const auto ended = [&] { return job->inside.load(std::memory_order_acquire) == 0; };
-  if (spin_until(ended)) return;
-  for (int inside = job->inside.load(std::memory_order_acquire); inside != 0;
-       inside = job->inside.load(std::memory_order_acquire))
-    job->inside.wait(inside, std::memory_order_acquire);
+  if (!spin_until(ended)) job->wait();
 }
 
 /// As many as the calls that run now ask for together.
@@ -155,7 +169,7 @@ void ThreadPool::serve() {
     int number = 0;
     take_job(job, number);
     (*job->work)(number);
-    if (job->inside.fetch_sub(1, std::memory_order_acq_rel) == 1) job->inside.notify_all();
+    job->leave();
   }
 }
 

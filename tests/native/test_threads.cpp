@@ -174,6 +174,24 @@ BOOST_AUTO_TEST_CASE(calls_at_once_keep_to_their_own_number_of_threads) {
   BOOST_CHECK_EQUAL(elsewhere, before);
 }
 
+BOOST_AUTO_TEST_CASE(a_call_ends_whenever_its_helper_does) {
+  using Clock = std::chrono::steady_clock;
+  for (int round = 0; round < 1000; ++round) {
+    std::atomic<bool> begun{false};
+    thread_pool().run(1, [&](int number) {
+      if (number == 0) {
+        comes([&] { return begun.load(); });
+        return;  // falls asleep some 20 µs later, about when the helper ends
+      }
+      begun = true;
+      const Clock::time_point end = Clock::now() + std::chrono::microseconds(15 + round % 20);
+      while (Clock::now() < end) {
+      }
+    });
+    BOOST_REQUIRE(begun);
+  }
+}
+
 BOOST_AUTO_TEST_CASE(more_threads_than_the_pool_has_are_done_without) {
   const ThreadScope scope(1024);
   BOOST_CHECK_EQUAL(thread_count(), ThreadPool::most_workers + 1);

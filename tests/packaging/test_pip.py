@@ -50,8 +50,8 @@ def built(tmp_path_factory):
     """(wheel, source distribution) as `make wheel` makes them; ARAPFIELDS_DIST names a folder with both."""
     folder = Path(os.environ.get("ARAPFIELDS_DIST", tmp_path_factory.mktemp("dist")))
     if not list(folder.glob("*.whl")):
-        run(sys.executable, "-m", "pip", "install", "-q", "-r", ROOT / "wheel_scripts" / "requirements.txt")
-        run(sys.executable, ROOT / "wheel_scripts" / "build_wheel.py", "--output", folder, cwd=ROOT)
+        run(sys.executable, "-m", "pip", "install", "-q", "-r", ROOT / "cmake" / "wheel" / "requirements.txt")
+        run(sys.executable, ROOT / "cmake" / "wheel" / "build_wheel.py", "--output", folder, cwd=ROOT)
     (wheel,), (source,) = folder.glob("*cp311*.whl"), folder.glob("*.tar.gz")
     return wheel, source
 

@@ -22,7 +22,7 @@ def test_a_workflow_runs_what_there_is(path):
     makefile = (ROOT / "Makefile").read_text()
     for word in re.findall(r"\bmake ([a-z-]+)", commands):
         assert re.search(rf"^{word}:", makefile, flags=re.M), word
-    for name in re.findall(r"\b(?:tests|blender_scripts|wheel_scripts)/[\w/.]+", commands):
+    for name in re.findall(r"\b(?:tests|blender_scripts|cmake/wheel)/[\w/.]+", commands):
         assert (ROOT / name).exists(), name
 
 

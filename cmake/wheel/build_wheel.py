@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Builds what is uploaded to a package index: a manylinux wheel for this Python, and the source distribution.
 
-python wheel_scripts/build_wheel.py --output dist [--glibc 2.28 | --glibc system] [--no-sdist]
+python cmake/wheel/build_wheel.py --output dist [--glibc 2.28 | --glibc system] [--no-sdist]
 """
 
 import argparse
@@ -14,8 +14,8 @@ import tomllib
 import zipfile
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "wheel_scripts"))
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "cmake" / "wheel"))
 
 import old_glibc  # noqa: E402
 
