@@ -23,7 +23,8 @@ def run(arguments, script=None):
     with interruptible():
         end_with_parent()
         try:
-            native.library()
+            if options.verb != "check":  # which says in its report what is wrong
+                native.library()
             return verb(options.verb)(options, Launch(script))
         except KeyboardInterrupt:
             return fail("interrupted", 130)
@@ -37,6 +38,10 @@ def verb(name):
         from .batch import run_batch
 
         return run_batch
+    if name == "check":
+        from .check import run_check
+
+        return run_check
     if name == "bake":
         from .bake import run_bake
 
@@ -54,10 +59,12 @@ def fail(reason, code):
 @contextlib.contextmanager
 def interruptible():
     """Ctrl-C and SIGTERM raise KeyboardInterrupt: Blender catches the former for purposes of its own."""
-    both = (signal.SIGINT, signal.SIGTERM)
-    before = [signal.signal(number, signal.default_int_handler) for number in both]
+    asked = [signal.SIGINT, signal.SIGTERM]
+    if hasattr(signal, "SIGBREAK"):
+        asked.append(signal.SIGBREAK)  # Windows': how a batch asks (children.py)
+    before = [signal.signal(number, signal.default_int_handler) for number in asked]
     try:
         yield
     finally:
-        for number, handler in zip(both, before, strict=True):
+        for number, handler in zip(asked, before, strict=True):
             signal.signal(number, handler if handler is not None else signal.SIG_DFL)

@@ -79,6 +79,9 @@ def parser():
         one.add_argument("--quiet", action="store_true", help="no progress")
     add_batch(verbs)
     add_bake(verbs)
+    text = "say in one report what this is running on, and whether the library works here"
+    check = verbs.add_parser("check", help=text, description=text)
+    check.set_defaults(handles=None)
     return made
 
 

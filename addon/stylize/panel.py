@@ -55,7 +55,7 @@ class ARAPFIELDS_PT_stylize(Section, bpy.types.Panel):
         reason = preference.refusal(source)
         live_buttons(layout, source, "STYLIZE", reason)
         job_button(layout, Op.STYLIZE, "MOD_EDGESPLIT")
-        note(layout, reason, placement_refusal(source, "STYLIZE"))
+        note(layout, reason, placement_refusal(source))
 
 
 class ARAPFIELDS_PT_stylize_settings(Advanced, bpy.types.Panel):

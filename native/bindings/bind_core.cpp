@@ -105,7 +105,8 @@ void bind_core(py::module_& module) {
       "value"_a, "argument"_a, "Real numbers of any shape, from anywhere; InvalidInput names the argument.");
   module.def("require_memory", &require_memory, "argument"_a, "bytes"_a,
              "InvalidInput naming the argument where the machine has less memory to spare than `bytes`.");
-  module.def("simd_level", &simd_level_name, "Instruction set of the kernels: baseline, avx2 or avx512.");
+  module.def("simd_level", &simd_level_name,
+             "Instruction set of the kernels: baseline, neon, avx2 or avx512.");
 }
 
 }  // namespace arapfields::python

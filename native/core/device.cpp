@@ -16,8 +16,8 @@ std::string device_report() {
 }
 
 std::string resolve_device(const std::string& device) {
+  if (device == "auto") return "cpu";  // CUDA is experimental: who wants it names it
   const bool cuda = at::hasCUDA();
-  if (device == "auto") return cuda ? "cuda" : "cpu";
   require(device == "cpu" || device.rfind("cuda", 0) == 0, "device", "'" + device + "'",
           "'auto', 'cpu' or 'cuda' is allowed");
   require(device == "cpu" || cuda, "device", "'" + device + "'", device_report());

@@ -6,6 +6,8 @@
 #include <cstdint>
 #if defined(__AVX2__)
 #include <immintrin.h>
+#elif defined(ARAPFIELDS_NEON)  // the level's own definition: every 64-bit ARM compiler has __ARM_NEON
+#include <arm_neon.h>
 #endif
 
 namespace arapfields::SIMD_LEVEL {
@@ -69,6 +71,8 @@ inline Pack<float> square_root(Pack<float> x) {
   return (Pack<float>)_mm512_maskz_sqrt_ps(0xffff, (__m512)x);
 #elif defined(__AVX2__)
   return (Pack<float>)_mm256_sqrt_ps((__m256)x);
+#elif defined(ARAPFIELDS_NEON)
+  return (Pack<float>)vsqrtq_f32((float32x4_t)x);
 #else
   for (int i = 0; i < lanes<float>; ++i) x[i] = std::sqrt(x[i]);
   return x;
@@ -80,6 +84,8 @@ inline Pack<double> square_root(Pack<double> x) {
   return (Pack<double>)_mm512_maskz_sqrt_pd(0xff, (__m512d)x);
 #elif defined(__AVX2__)
   return (Pack<double>)_mm256_sqrt_pd((__m256d)x);
+#elif defined(ARAPFIELDS_NEON)
+  return (Pack<double>)vsqrtq_f64((float64x2_t)x);
 #else
   for (int i = 0; i < lanes<double>; ++i) x[i] = std::sqrt(x[i]);
   return x;
@@ -91,24 +97,6 @@ inline Scalar sum_of_lanes(Pack<Scalar> x) {
   Scalar result = 0;
   for (int i = 0; i < lanes<Scalar>; ++i) result += x[i];
   return result;
-}
-
-/// Three components of `lanes` points from (n,3) rows starting at `from`; lanes past `valid` repeat the last.
-template <class Scalar>
-inline void load_points(const Scalar* from, std::int64_t valid, Pack<Scalar> (&out)[3]) {
-  Scalar split[3][lanes<Scalar>];
-  const int last = valid < lanes<Scalar> ? static_cast<int>(valid) - 1 : lanes<Scalar> - 1;
-  for (int i = 0; i < lanes<Scalar>; ++i)
-    for (int c = 0; c < 3; ++c) split[c][i] = from[3 * (i < last ? i : last) + c];
-  for (int c = 0; c < 3; ++c) out[c] = load(split[c]);
-}
-
-/// Adds to the rows of the first `valid` lanes.
-template <class Scalar>
-inline void add_points(Scalar* to, std::int64_t valid, const Pack<Scalar> (&values)[3]) {
-  const int count = valid < lanes<Scalar> ? static_cast<int>(valid) : lanes<Scalar>;
-  for (int i = 0; i < count; ++i)
-    for (int c = 0; c < 3; ++c) to[3 * i + c] += values[c][i];
 }
 
 }  // namespace arapfields::SIMD_LEVEL

@@ -18,11 +18,15 @@ SimdLevel detect() {
   if (level == SimdLevel::avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
       __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl"))
     level = SimdLevel::avx512;
+#elif defined(__aarch64__)
+  level = SimdLevel::neon;  // part of the architecture
 #endif
   const char* wanted = std::getenv("ARAPFIELDS_SIMD");
   if (wanted == nullptr) return level;
   const std::string name = wanted;
+#ifndef __APPLE__
   if (name == "baseline") return SimdLevel::baseline;
+#endif
   if (name == "avx2") return std::min(level, SimdLevel::avx2);
   return level;
 }

@@ -20,6 +20,22 @@
   namespace avx512 {                    \
   declaration;                          \
   }
+#elif defined(__aarch64__) && defined(__APPLE__)  // nothing to choose: all of these have NEON
+#define ARAPFIELDS_DISPATCH(call) neon::call
+#define ARAPFIELDS_DECLARE(declaration) \
+  namespace neon {                      \
+  declaration;                          \
+  }
+#elif defined(__aarch64__)
+#define ARAPFIELDS_DISPATCH(call) \
+  (::arapfields::simd_level() == SimdLevel::neon ? neon::call : baseline::call)
+#define ARAPFIELDS_DECLARE(declaration) \
+  namespace baseline {                  \
+  declaration;                          \
+  }                                     \
+  namespace neon {                      \
+  declaration;                          \
+  }
 #else
 #define ARAPFIELDS_DISPATCH(call) baseline::call
 #define ARAPFIELDS_DECLARE(declaration) \

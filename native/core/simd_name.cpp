@@ -7,6 +7,8 @@ const char* compiled_for() {
   return "avx512";
 #elif defined(__AVX2__)
   return "avx2";
+#elif defined(ARAPFIELDS_NEON)
+  return "neon";
 #else
   return "baseline";
 #endif

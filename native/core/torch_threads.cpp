@@ -6,14 +6,20 @@
 // Of the OpenMP library that libtorch itself uses: per thread, as the standard says.
 extern "C" int omp_get_max_threads();
 extern "C" void omp_set_num_threads(int count);
+#if defined(__linux__) && defined(__x86_64__)
 // Exported by a libtorch that is built with MKL; returns the setting before, 0 for "as the process".
 extern "C" __attribute__((weak)) int MKL_Set_Num_Threads_Local(int count);
+#endif
 
 namespace arapfields {
 namespace {
 
-int set_mkl_threads(int count) {
+int set_mkl_threads([[maybe_unused]] int count) {
+#if defined(__linux__) && defined(__x86_64__)
   return MKL_Set_Num_Threads_Local != nullptr ? MKL_Set_Num_Threads_Local(count) : 0;
+#else
+  return 0;
+#endif
 }
 
 }  // namespace

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #if defined(__AVX__)
 #include <immintrin.h>
+#elif defined(ARAPFIELDS_NEON)
+#include <arm_neon.h>
 #endif
 
 #include <bit>
@@ -104,6 +106,13 @@ inline unsigned at_most(const float* values, float limit) {
 #if defined(__AVX__)
   const __m256 v = _mm256_loadu_ps(values);
   return static_cast<unsigned>(_mm256_movemask_ps(_mm256_cmp_ps(v, _mm256_set1_ps(limit), _CMP_LE_OQ)));
+#elif defined(ARAPFIELDS_NEON)
+  static_assert(W == 8, "two vectors of floats");
+  constexpr std::uint32_t low[4] = {1, 2, 4, 8}, high[4] = {16, 32, 64, 128};
+  const float32x4_t most = vdupq_n_f32(limit);
+  const uint32x4_t first = vandq_u32(vcleq_f32(vld1q_f32(values), most), vld1q_u32(low));
+  const uint32x4_t second = vandq_u32(vcleq_f32(vld1q_f32(values + 4), most), vld1q_u32(high));
+  return vaddvq_u32(vorrq_u32(first, second));
 #else
   unsigned mask = 0;
   for (int i = 0; i < W; ++i) mask |= values[i] <= limit ? 1u << i : 0u;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/pack.h"
+#include "core/pack_points.h"
 #include "energies/kernels.h"
 #include "energies/rotation_pack.h"
 

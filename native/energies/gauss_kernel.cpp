@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/pack_exp.h"
+#include "core/pack_points.h"
 #include "energies/kernels.h"
 
 namespace arapfields::SIMD_LEVEL {

@@ -87,7 +87,7 @@ struct InvertibleField::State {
 InvertibleField::InvertibleField(const CouplingShape& shape, std::uint64_t seed, bool double_precision)
     : state_(std::make_unique<State>()) {
   shape.validate();
-  require_range("couplings", shape.couplings, 1, 256);
+  require(shape.couplings > 0, "couplings", std::to_string(shape.couplings), "at least one is needed");
   const ThreadScope scope;
   require_memory("width", static_cast<double>(shape.size()) * (sizeof(double) + 2 * sizeof(float)));
   at::Tensor values = at::zeros({shape.size()}, at::kDouble);

@@ -11,7 +11,7 @@ namespace arapfields {
 /// network knows u alone and gives (s, t): positional encoding, `layers` hidden layers of `width` softplus
 /// units, linear output; s is bent smoothly into (−bound, bound). An offset for all comes last.
 struct CouplingShape : NetworkOptions {
-  int couplings = 9;
+  int couplings = 1;
   static constexpr double bound = 2.0;
 
   int fan_in(int layer) const { return layer == 0 ? 4 * octaves : width; }

@@ -30,7 +30,7 @@ struct Entry {
 /// Adds the nearest of the first `count` places with weights that sum to `whole`.
 void add_nearest(const Points& places, Index count, const Vec3& point, double whole,
                  std::vector<Entry>& entries) {
-  count = std::min(count, places.rows());
+  count = std::min<Index>(count, places.rows());
   std::vector<std::pair<double, Index>> squares(at(count));
   for (Index i = 0; i < count; ++i) squares[at(i)] = {(places.row(i).transpose() - point).squaredNorm(), i};
   double outside = 0.0;  // 1/c²

@@ -102,8 +102,7 @@ Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handle
   if (options.start == StartKind::radial)
     neural->set_base(radial_start(samples, handles, options, progress.part(0.0, share)));
 
-  LoopOptions loop;
-  loop.training = options.training;
+  LoopOptions loop = training_of(options);
   loop.observer = hooks.observer;
   WrapObjective wrap;
   if (options.invertibility > 0.0)

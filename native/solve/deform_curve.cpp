@@ -151,7 +151,7 @@ class CurveProblem final : public MeasuredObjective {
     Rows quadratic = Rows::Zero(rows_.cols(), rows_.cols());
     for (Index begin = 0; begin < rows_.rows(); begin += rows_at_once) {
       progress.check();
-      const Rows block = rows_.middleRows(begin, std::min(rows_at_once, rows_.rows() - begin));
+      const Rows block = rows_.middleRows(begin, std::min<Index>(rows_at_once, rows_.rows() - begin));
       const Rows scaled = weight.segment(begin, block.rows()).asDiagonal() * block;
       gemm<double>(Transpose::yes, Transpose::no, 1.0, block, scaled, 1.0, quadratic);
     }

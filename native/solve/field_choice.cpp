@@ -47,10 +47,23 @@ std::shared_ptr<TrainableField> made_field(const Options& options) {
   return field;
 }
 
+/// What one layer changes, all that follow carry on: steps of coupling layers have to be smaller.
+template <class Options>
+LoopOptions made_training(const Options& options) {
+  LoopOptions loop;
+  loop.training = options.training;
+  if (chosen_field(options) == FieldKind::invertible && loop.training.learning_rate == 0.0)
+    loop.training.learning_rate = TrainingOptions::automatic_learning_rate(options.training.optimizer) / 3.0;
+  return loop;
+}
+
 }  // namespace
 
 std::shared_ptr<TrainableField> trained_field(const DeformOptions& options) { return made_field(options); }
 std::shared_ptr<TrainableField> trained_field(const StylizeOptions& options) { return made_field(options); }
+
+LoopOptions training_of(const DeformOptions& options) { return made_training(options); }
+LoopOptions training_of(const StylizeOptions& options) { return made_training(options); }
 
 FieldKind chosen_field(const DeformOptions& options) {
   if (options.field != FieldKind::automatic) return options.field;

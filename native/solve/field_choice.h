@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "fields/field.h"
+#include "neural/training_loop.h"
 #include "options/deform.h"
 #include "options/stylize.h"
 
@@ -18,5 +19,9 @@ FieldKind chosen_field(const StylizeOptions& options);
 /// kind does not know.
 std::shared_ptr<TrainableField> trained_field(const DeformOptions& options);
 std::shared_ptr<TrainableField> trained_field(const StylizeOptions& options);
+
+/// How the chosen kind is trained: with the options' learning rate, or its own where that is 0.
+LoopOptions training_of(const DeformOptions& options);
+LoopOptions training_of(const StylizeOptions& options);
 
 }  // namespace arapfields

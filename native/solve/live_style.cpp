@@ -21,21 +21,29 @@ void LiveSolver::State::set_style(const Style& style, double strength, double sh
   require(surface_normals_.rows() == surface_.rows(), "samples", "they have no normals",
           "a style needs samples with normals");
   require_no_reach(handles_);
-  const Points normals = rows_of(surface_normals_, chosen_);
-  StyleAtSamples here = StyleAtSamples::of(style, normals, sharpness);
-  if (here.idle(normals)) return clear_style();
+  StyleAsked asked{style, strength, sharpness, weights, up};
+  LiveStyle here = style_at_samples(asked);
+  if (here.style.idle(here.normals)) return clear_style();
   require(up.allFinite() && up.norm() > 0.0, "up", "zero, NaN or infinite", "a finite direction is needed");
   const bool other_way_up = up != up_, first = !style_;
-  style_asked_ = StyleAsked{style, strength, sharpness, weights, up};
+  style_asked_ = std::move(asked);
   up_ = up;
-  if (weights.size() > 0)
-    for (std::size_t i = 0; i < chosen_.size(); ++i)
-      here.weights[static_cast<Index>(i)] *= weights[chosen_[i]];
-  const double weight = strength * options_.gauss_weight * here.factor;
-  style_ = LiveStyle{std::move(here), normals, weight};
+  style_ = std::move(here);
   for_each_precision([&](auto& precision) { precision.objective->set_style(style_); });
   optimizer_.forget();
   if (handles_.empty() && (first || other_way_up)) stand_otherwise();
+}
+
+/// The style at the samples that the energy sees.
+LiveStyle LiveSolver::State::style_at_samples(const StyleAsked& asked) const {
+  LiveStyle here;
+  here.normals = rows_of(surface_normals_, chosen_);
+  here.style = StyleAtSamples::of(asked.style, here.normals, asked.sharpness);
+  if (asked.weights.size() > 0)
+    for (std::size_t i = 0; i < chosen_.size(); ++i)
+      here.style.weights[static_cast<Index>(i)] *= asked.weights[chosen_[i]];
+  here.weight = asked.strength * options_.gauss_weight * here.style.factor;
+  return here;
 }
 
 void LiveSolver::State::clear_style() {

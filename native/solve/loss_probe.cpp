@@ -4,6 +4,7 @@
 #include "core/parallel.h"
 #include "core/tensors.h"
 #include "fields/neural_field.h"
+#include "fields/radial_evaluator.h"
 #include "sampling/canonical_order.h"
 #include "solve/field_objective.h"
 
@@ -98,6 +99,10 @@ Vector probe_thickness(const SurfaceSamples& samples) {
 
 Vector probe_bending(const SurfaceSamples& samples, const SurfaceOptions& options) {
   return SurfaceStiffness(samples, options).bending(samples.points);
+}
+
+RowMatrix<double> probe_radial_rows(const RadialField& field, PointsIn points, JetOrder order) {
+  return radial_rows(field.basis(), points, order);
 }
 
 }  // namespace arapfields

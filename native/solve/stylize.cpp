@@ -72,8 +72,7 @@ Solution stylize(const SurfaceSamples& samples, const Style& style, const Styliz
   }
 
   const std::shared_ptr<TrainableField> field = trained_field(options);
-  LoopOptions loop;
-  loop.training = options.training;
+  LoopOptions loop = training_of(options);
   loop.observer = hooks.observer;
   if (terms.gauss == 0.0 && handles.empty() && hooks.energies.empty()) loop.training.iterations = 0;
   Solution solution = solve_field(field, samples, std::move(terms), loop, progress);

@@ -65,11 +65,15 @@ using NearestKernel = void (*)(const HierarchyView&, const double*, std::int64_t
 
 /// Pairs of hierarchy search and brute force for every instruction set that this processor has.
 std::vector<std::pair<NearestKernel, NearestKernel>> nearest_kernels() {
-  std::vector<std::pair<NearestKernel, NearestKernel>> kernels = {
-      {baseline::nearest, baseline::nearest_of_all}};
+  std::vector<std::pair<NearestKernel, NearestKernel>> kernels;
+#ifndef __APPLE__
+  kernels.emplace_back(baseline::nearest, baseline::nearest_of_all);
+#endif
 #if defined(__x86_64__)
   if (simd_level() >= SimdLevel::avx2) kernels.emplace_back(avx2::nearest, avx2::nearest_of_all);
   if (simd_level() >= SimdLevel::avx512) kernels.emplace_back(avx512::nearest, avx512::nearest_of_all);
+#elif defined(__aarch64__)
+  kernels.emplace_back(neon::nearest, neon::nearest_of_all);
 #endif
   return kernels;
 }

@@ -63,7 +63,7 @@ def test_saved_and_loaded_is_the_same_bit_for_bit(sdf, tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["again.safetensors", "shape.safetensors"]
 
 
-@pytest.mark.parametrize("level", ["baseline", "avx2", "avx512"])
+@pytest.mark.parametrize("level", ["baseline", "neon", "avx2", "avx512"])
 def test_kernels_for_every_instruction_set_agree(level):
     code = (
         "import numpy as np, sys; sys.path.insert(0, 'tests')\n"

@@ -222,6 +222,7 @@ def _animate(added):
         "spot.obj --tracks walk.json -o walk.pc2",
         "spot.obj --tracks walk.npz -o walk.usdc --frames 1 48 --up-axis y",
         "spot.obj --tracks walk.json -o walk.pc2 --shard 2/8",
+        "spot.obj --tracks walk.json -o walk.pc2 --secondary --damping 2",
     )
     parser.add_argument("input", help=MESH)
     parser.add_argument("--tracks", required=True, metavar="FILE", help=".json or .npz, see docs/animate.md")
@@ -239,6 +240,8 @@ def _animate(added):
         "--shard", type=shard, metavar="I/N", help="solve the part I of N; the last part writes the output"
     )
     parser.add_argument("--up-axis", choices=usd.AXES, default="z", help="what USD is told is up [z]")
+    parser.add_argument("--secondary", action="store_true", help="lag behind the handles, and settle")
+    add_option_flags(parser, "secondary", "secondary motion (--secondary)")
     add_option_flags(
         parser, "live", "solve of a frame (300 steps and a tolerance of 1e-6 without these flags)"
     )

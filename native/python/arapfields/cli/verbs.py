@@ -222,7 +222,10 @@ def _report_place(outputs, args):
 
 def _write_report(outputs, place, report):
     if place is not None:
-        outputs.write(place, lambda path: path.write_text(json_text(report.to_dict(), indent=2) + "\n"))
+        outputs.write(
+            place,
+            lambda path: path.write_text(json_text(report.to_dict(), indent=2) + "\n", encoding="utf-8"),
+        )
 
 
 def _print_notes(args, report):

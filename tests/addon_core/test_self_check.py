@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The report that says whether the library works on a machine: right here, and wrong where something is."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from addon.core.runtime import self_check
+
+
+def test_everything_works_here():
+    lines, works = self_check.run()
+    assert works, lines
+    assert sum(": right (" in line for line in lines) == len(self_check.CHECKS)
+
+
+def test_a_failure_is_named_and_the_others_go_on():
+    def broken(library):
+        raise ValueError("no luck")
+
+    lines, works = self_check.run({"broken": broken, "distances": self_check.distances})
+    assert not works
+    assert lines[-2].startswith("broken: ValueError: no luck (") and lines[-1].startswith(
+        "distances: right ("
+    )
+
+
+@pytest.mark.parametrize("answer", [lambda *_: np.zeros(4), lambda *_: np.full(4, np.nan)])
+def test_wrong_figures_are_no_right_answer(answer):
+    with pytest.raises(AssertionError, match="off by"):
+        self_check.distances(SimpleNamespace(signed_distance=answer))
+
+
+def test_what_should_have_been_refused():
+    with pytest.raises(AssertionError, match="not refused"):
+        self_check.refusal(SimpleNamespace(signed_distance=lambda *_: None, InvalidInput=ValueError))
