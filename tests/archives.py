@@ -80,6 +80,7 @@ def make_examples(folder):
         "neural": af.deform(samples, handles, af.DeformOptions(**small)),
         "exact": af.deform(samples, handles, af.DeformOptions(exact_handles=True, **small)),
         "refined": af.deform(samples, handles, af.DeformOptions(start="radial", centers=20, **small)),
+        "invertible": af.deform(samples, handles, af.DeformOptions(field="invertible", couplings=3, **small)),
         "radial": af.LiveDeformer(samples, handles, af.LiveOptions(interior=False, **live)).solve(),
         "embedded": af.LiveDeformer(samples, handles, af.LiveOptions(interior=True, **live)).solve(),
     }

@@ -65,7 +65,7 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
 
 def require_reach_heeded(handles, values):
     """UserError where a handle has a reach that these settings do not heed."""
-    if values["field"].lower() != "neural" and not values["exact_handles"]:
+    if values["field"].lower() not in ("neural", "invertible") and not values["exact_handles"]:
         return
     for handle in handles:
         if handle.reach > 0:

@@ -38,5 +38,6 @@ void bind_live(py::module_& module);
 void bind_attachment(py::module_& module);
 void bind_curves(py::module_& module);
 void bind_solve_testing(py::module_& module);
+void bind_invertible_testing(py::module_& module);
 
 }  // namespace arapfields::python

@@ -25,5 +25,6 @@ PYBIND11_MODULE(_native, module) {
   bind_curves(module);
   bind_io(module);
   bind_solve_testing(module);
+  bind_invertible_testing(module);
   refuse_uninitialised(module);
 }

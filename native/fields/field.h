@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <vector>
+
 #include "core/frame.h"
 #include "core/jets.h"
 #include "core/types.h"
+#include "neural/matrix_place.h"
 
 namespace at {
 class Tensor;
 }
 
 namespace arapfields {
-
-class Mlp;
 
 /// A deformation f: R³ → R³ of the unit cube's space that knows its jets: all that energies, extraction and
 /// results ask of it. The frame says where the cube lies in mesh coordinates.
@@ -30,6 +31,11 @@ class ARAPFIELDS_EXPORT DeformationField {
     evaluate(frame_.to_cube(mesh_points), {values.data(), values.rows(), JetOrder::value});
     return frame_.to_mesh(values);
   }
+
+  /// Whether preimages() knows f⁻¹ in closed form.
+  virtual bool has_preimages() const { return false; }
+  /// f⁻¹ at points (n,3), all in cube coordinates; asked of fields alone that know it.
+  virtual Points preimages(PointsIn points) const { return Points(points.rows(), 3); }
 
   const Frame& frame() const { return frame_; }
   void set_frame(const Frame& frame) { frame_ = frame; }
@@ -55,9 +61,10 @@ class ARAPFIELDS_EXPORT TrainableField : public DeformationField {
   /// All parameters, and their gradient, as one contiguous vector (p).
   virtual at::Tensor& parameters() = 0;
   virtual at::Tensor& gradient() = 0;
-  /// The network that holds the parameters, for optimizers that treat its weight matrices as matrices; null
-  /// where there is none.
-  virtual Mlp* network() { return nullptr; }
+  /// The matrices among the parameters, for optimizers that treat them as such.
+  virtual std::vector<MatrixPlace> matrices() const { return {}; }
+  /// Adds an offset (cube coordinates) to f.
+  virtual void translate(const Vec3& offset) = 0;
 };
 
 }  // namespace arapfields

@@ -148,8 +148,33 @@ struct NewtonInverse::Parts {
   Starts surface, space;
 };
 
+namespace {
+
+/// Of a field that knows its inverse; NaN for targets that are not finite.
+InverseResult exact_inverse(const DeformationField& field, PointsIn targets, const Progress& progress) {
+  constexpr Index chunk = 65536;
+  InverseResult result{Points(targets.rows(), 3), 0, 0.0};
+  for (Index begin = 0; begin < targets.rows(); begin += chunk) {
+    progress.report(static_cast<double>(begin) / static_cast<double>(targets.rows()), "inverting");
+    const Index rows = std::min<Index>(chunk, targets.rows() - begin);
+    result.points.middleRows(begin, rows) = field.preimages(targets.middleRows(begin, rows));
+  }
+  for (Index i = 0; i < targets.rows(); ++i)
+    if (!targets.row(i).allFinite() || !result.points.row(i).allFinite()) {
+      result.points.row(i).setConstant(std::numeric_limits<double>::quiet_NaN());
+      ++result.failures;
+    }
+  progress.report(1.0);
+  return result;
+}
+
+}  // namespace
+
 NewtonInverse::NewtonInverse(const DeformationField& field, Points rest, const Progress& progress)
-    : parts_(new Parts{field, Starts(field, std::move(rest), progress), Starts(field, grid(17), progress)}) {}
+    : parts_(field.has_preimages() ? new Parts{field, Starts(field, Points(0, 3), progress),
+                                               Starts(field, Points(0, 3), progress)}
+                                   : new Parts{field, Starts(field, std::move(rest), progress),
+                                               Starts(field, grid(17), progress)}) {}
 NewtonInverse::~NewtonInverse() = default;
 NewtonInverse::NewtonInverse(NewtonInverse&&) noexcept = default;
 
@@ -158,6 +183,7 @@ InverseResult NewtonInverse::operator()(PointsIn targets, const NewtonInverseOpt
   options.validate();
   constexpr Index chunk = 4096;
   const auto& [field, surface, space] = *parts_;
+  if (field.has_preimages()) return exact_inverse(field, targets, progress);
   InverseResult result{Points::Constant(targets.rows(), 3, std::numeric_limits<double>::quiet_NaN()), 0, 0.0};
   for (Index begin = 0; begin < targets.rows(); begin += chunk) {
     progress.report(static_cast<double>(begin) / static_cast<double>(targets.rows()), "inverting");

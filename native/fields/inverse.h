@@ -12,7 +12,7 @@ namespace arapfields {
 struct InverseResult {
   Points points;  ///< (n,3); NaN where nothing was found
   Index failures = 0;
-  double worst_residual = 0.0;  ///< over the points found
+  double worst_residual = 0.0;  ///< over the points found; 0 where the inverse has a closed form
 };
 
 /// f at points (n,3) in cube coordinates, in pieces between which `progress` may cancel.
@@ -21,7 +21,8 @@ ARAPFIELDS_EXPORT Points values_at(const DeformationField& field, PointsIn point
 /// Solves f(x) = y by Newton's method with the field's own Jacobian, its steps halved until the residual
 /// falls. It starts from that of `rest` whose image is nearest to y, and where that fails from the nearest
 /// image of a grid over [-1,1]³, then from y itself. Where f folds space there are several x: the start then
-/// decides. Built once for many calls; the field must outlive it.
+/// decides. Where the field knows its inverse in closed form, it is asked instead, for whatever lies
+/// however far. Built once for many calls; the field must outlive it.
 class ARAPFIELDS_EXPORT NewtonInverse {
  public:
   NewtonInverse(const DeformationField& field, Points rest, const Progress& progress = {});

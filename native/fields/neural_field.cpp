@@ -62,6 +62,8 @@ NeuralField::NeuralField(const MlpShape& shape, std::uint64_t seed, bool double_
 
 NeuralField::~NeuralField() = default;
 
+std::vector<MatrixPlace> NeuralField::matrices() const { return hidden_matrices(network_.shape()); }
+
 const MlpShape& NeuralField::shape() const { return network_.shape(); }
 
 void NeuralField::fixed_part(PointsIn points, JetView<double> b, Vector& a) const {

@@ -35,10 +35,11 @@ class NeuralField final : public TrainableField {
   void pull_back(const at::Tensor& cotangents) override;
   at::Tensor& parameters() override { return network_.parameters(); }
   at::Tensor& gradient() override { return network_.gradient(); }
-  Mlp* network() override { return &network_; }
+  std::vector<MatrixPlace> matrices() const override;
+  Mlp* network() { return &network_; }
 
   /// Adds an offset to Ψ, by the output layer's bias.
-  void translate(const Vec3& offset);
+  void translate(const Vec3& offset) override;
   /// Weights and biases in the order of Mlp::parameters(), for files.
   VectorF weights() const;
   /// Throws InvalidInput where the count does not fit the shape.

@@ -2,6 +2,7 @@
 #include <deque>
 
 #include "core/errors.h"
+#include "fields/invertible_field.h"
 #include "fields/neural_field.h"
 #include "fields/radial_field.h"
 #include "io/document.h"
@@ -12,6 +13,8 @@ namespace arapfields {
 namespace {
 
 constexpr const char* field_kind = "field";
+constexpr Index most_couplings = 256;
+constexpr const char* field_types = "'neural', 'radial' or 'invertible' is needed";
 constexpr Index most_rows = Index{1} << 40;  ///< declared; what there is of them is the file's size
 
 /// Adds a field's arrays to a file and keeps those that have to be made for it.
@@ -22,6 +25,8 @@ class FieldArrays {
       add_neural(*neural, prefix);
     else if (const auto* radial = dynamic_cast<const RadialField*>(&field))
       add_radial(*radial, prefix);
+    else if (const auto* invertible = dynamic_cast<const InvertibleField*>(&field))
+      add_invertible(*invertible, prefix);
     add_rows(prefix + "rest_points", field.rest_points());
   }
   ArchiveWriter file;
@@ -35,6 +40,10 @@ class FieldArrays {
     add_network(file, prefix, field.shape(), kept_.emplace_back(field.weights()));
     if (field.handles()) add_handles(*field.handles(), prefix + "handles.");
     if (field.base()) add(*field.base(), prefix + "base.");
+  }
+  void add_invertible(const InvertibleField& field, const std::string& prefix) {
+    const VectorF& numbers = kept_.emplace_back(field.weights());
+    file.add(prefix + "parameters", {numbers.size()}, numbers.data());
   }
   void add_handles(const HandleBlend& blend, const std::string& prefix) {
     const Index count = static_cast<Index>(blend.regions().size());
@@ -82,8 +91,13 @@ Json structure_of(const DeformationField& field) {
     if (radial->influence()) structure["influence"] = radial->influence()->places().rows();
     if (const InteriorEmbedding* embedding = radial->basis().embedding.get())
       structure["embedding"] = {{"nodes", embedding->nodes.rows()}, {"width", embedding->width}};
+  } else if (const auto* invertible = dynamic_cast<const InvertibleField*>(&field)) {
+    structure["type"] = "invertible";
+    structure["network"] = network_structure(MlpShape{invertible->shape(), 2});
+    structure["couplings"] = invertible->shape().couplings;
   } else {
-    throw InvalidInput("field", "a kind without a file format", "neural and radial fields can be saved");
+    throw InvalidInput("field", "a kind without a file format",
+                       "neural, invertible and radial fields can be saved");
   }
   return structure;
 }
@@ -120,6 +134,17 @@ std::shared_ptr<DeformationField> read_neural(ArchiveReader& file, const Json& s
   return field;
 }
 
+std::shared_ptr<DeformationField> read_invertible(ArchiveReader& file, const Json& structure,
+                                                  const std::string& name, const std::string& prefix) {
+  const JsonObject object(structure, name, {"type", "frame", "rest_points", "network", "couplings"});
+  CouplingShape shape{read_shape(object.at("network"), object.name("network"), 2)};
+  shape.couplings = static_cast<int>(object.integer("couplings", 1, most_couplings));
+  const VectorF numbers = file.floats(prefix + "parameters", {shape.size()});
+  const auto field = std::make_shared<InvertibleField>(shape, 0);
+  field->set_weights(numbers);
+  return field;
+}
+
 std::shared_ptr<DeformationField> read_radial(ArchiveReader& file, const Json& structure,
                                               const std::string& name, const std::string& prefix) {
   const JsonObject object(structure, name,
@@ -153,15 +178,16 @@ std::shared_ptr<DeformationField> read_radial(ArchiveReader& file, const Json& s
 std::shared_ptr<DeformationField> read_field(ArchiveReader& file, const Json& structure,
                                              const std::string& name, const std::string& prefix) {
   require(structure.is_object() && structure.contains("type") && structure["type"].is_string(), name,
-          "'type' is missing", "'neural' or 'radial' is needed");
+          "'type' is missing", field_types);
   const std::string type = structure["type"].get<std::string>();
-  require(type == "neural" || type == "radial", name + ".type", "'" + type + "'",
-          "'neural' or 'radial' is needed");
-  const auto field = type == "neural" ? read_neural(file, structure, name, prefix)
-                                      : read_radial(file, structure, name, prefix);
-  const JsonObject object(
-      structure, name,
-      {"type", "frame", "rest_points", "network", "handles", "base", "centers", "embedding", "influence"});
+  require(type == "neural" || type == "radial" || type == "invertible", name + ".type", "'" + type + "'",
+          field_types);
+  const auto field = type == "neural"   ? read_neural(file, structure, name, prefix)
+                     : type == "radial" ? read_radial(file, structure, name, prefix)
+                                        : read_invertible(file, structure, name, prefix);
+  const JsonObject object(structure, name,
+                          {"type", "frame", "rest_points", "network", "handles", "base", "centers",
+                           "embedding", "influence", "couplings"});
   field->set_frame(read_frame(object.at("frame"), object.name("frame")));
   field->set_rest_points(file.points(prefix + "rest_points", object.integer("rest_points", 0, most_rows)));
   return field;

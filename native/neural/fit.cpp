@@ -13,6 +13,7 @@
 #include "distance/training_points.h"
 #include "mesh/sample_mesh.h"
 #include "neural/mlp.h"
+#include "neural/parameters.h"
 #include "neural/training_loop.h"
 
 namespace arapfields {
@@ -147,8 +148,8 @@ FitResult fit_sdf(PointsIn vertices, TrianglesIn triangles, const FitOptions& op
   LoopResult loop;
   try {
     Fit fit(options, mlp, examples, held_out);
-    loop = run_training({mlp.parameters(), mlp.gradient(), &mlp}, fit, loop_options(options, observer),
-                        progress.part(0.1, 1.0));
+    loop = run_training({mlp.parameters(), mlp.gradient(), hidden_matrices(mlp.shape())}, fit,
+                        loop_options(options, observer), progress.part(0.1, 1.0));
   } catch (const LoopDiverged& error) {
     diverged = error.what();
     loop = error.result;

@@ -6,6 +6,7 @@
 #include "core/random.h"
 #include "core/tensors.h"
 #include "neural/muon.h"
+#include "neural/parameters.h"
 
 namespace arapfields {
 namespace {
@@ -90,7 +91,7 @@ Layers step_muon(const Layers& layers, const MlpShape& shape, const Vector& grad
   require(gradient.size() == mlp.gradient().numel(), "gradient", std::to_string(gradient.size()) + " numbers",
           "expected " + std::to_string(mlp.gradient().numel()));
   mlp.gradient().copy_(tensor_view(gradient));
-  Muon(mlp).step(mlp, learning_rate);
+  Muon(mlp.parameters(), hidden_matrices(shape)).step(mlp.parameters(), mlp.gradient(), learning_rate);
   return layers_of(mlp);
 }
 

@@ -20,12 +20,8 @@ constexpr double slope = 3.4445, cubic = -4.7750, quintic = 2.0315;
 constexpr Index rows_a_task = 64;
 
 /// One weight matrix. `x` is the momentum with its shorter side as rows.
-struct Matrix {
-  Index begin = 0;  // in the flat vector
-  Index rows = 0, columns = 0;
+struct Matrix : MatrixPlace {
   at::Tensor momentum, x, next, gram, polynomial;
-
-  Index end() const { return begin + rows * columns; }
 };
 
 struct Task {
@@ -72,16 +68,14 @@ void Muon::State::for_each_task(const std::function<void(const Task&)>& body) { 
 
 void Muon::State::for_each_matrix(const std::function<void(Matrix&)>& body) { for_each(matrices, body); }
 
-Muon::Muon(const Mlp& mlp, const MuonOptions& options)
+Muon::Muon(const at::Tensor& parameters, const std::vector<MatrixPlace>& matrices, const MuonOptions& options)
     : state_(std::make_unique<State>(
-          State{options, AdamStep(mlp.parameters(), options.adam), {}, {}, on_aten_path(mlp.parameters())})) {
+          State{options, AdamStep(parameters, options.adam), {}, {}, on_aten_path(parameters)})) {
   const ThreadScope scope;
-  const at::TensorOptions like = mlp.parameters().options();
-  for (int l = 0; l < mlp.shape().layers; ++l) {
-    const at::Tensor weight = mlp.weight(l);
+  const at::TensorOptions like = parameters.options();
+  for (const MatrixPlace& place : matrices) {
     Matrix m;
-    m.begin = weight.storage_offset();
-    m.rows = weight.size(0), m.columns = weight.size(1);
+    static_cast<MatrixPlace&>(m) = place;
     const Index small = std::min(m.rows, m.columns), large = std::max(m.rows, m.columns);
     m.momentum = at::zeros({m.rows, m.columns}, like);
     m.x = at::empty({small, large}, like);
@@ -102,10 +96,9 @@ Muon::~Muon() = default;
 Muon::Muon(Muon&&) noexcept = default;
 Muon& Muon::operator=(Muon&&) noexcept = default;
 
-void Muon::step(Mlp& mlp, double learning_rate) {
+void Muon::step(at::Tensor& parameters, at::Tensor& gradient, double learning_rate) {
   const ThreadScope scope;
   State& s = *state_;
-  at::Tensor &parameters = mlp.parameters(), &gradient = mlp.gradient();
   s.adam.next_step();
   Index done = 0;
   const auto adam_up_to = [&](Index end) {

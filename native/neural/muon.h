@@ -2,9 +2,10 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "neural/adam_step.h"
-#include "neural/mlp.h"
+#include "neural/matrix_place.h"
 
 namespace arapfields {
 
@@ -15,19 +16,21 @@ struct MuonOptions {
   AdamOptions adam;
 };
 
-/// Orthogonalised momentum (Muon; Jordan et al. 2024) for the weights of an Mlp's hidden layers, Adam for its
-/// biases and output layer. The momentum matrix G = U S Vᵀ is replaced by about U Vᵀ through five iterations
+/// Orthogonalised momentum (Muon; Jordan et al. 2024) for the weights of hidden layers, Adam for biases and
+/// output layers. The momentum matrix G = U S Vᵀ is replaced by about U Vᵀ through five iterations
 /// of an odd polynomial, so that all directions of a layer learn at the same pace.
 class Muon {
  public:
-  explicit Muon(const Mlp& mlp, const MuonOptions& options = {});
+  /// `matrices` in the order of the parameters (p), which are all else Adam's.
+  Muon(const at::Tensor& parameters, const std::vector<MatrixPlace>& matrices,
+       const MuonOptions& options = {});
   ~Muon();
   Muon(Muon&&) noexcept;
   Muon& operator=(Muon&&) noexcept;
 
-  /// One step on mlp.parameters() along mlp.gradient(). `learning_rate` is the change of a matrix's singular
+  /// One step along the gradient. `learning_rate` is the change of a matrix's singular
   /// values, times √(rows/columns) where there are more rows.
-  void step(Mlp& mlp, double learning_rate);
+  void step(at::Tensor& parameters, at::Tensor& gradient, double learning_rate);
 
  private:
   struct State;

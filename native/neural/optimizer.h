@@ -2,9 +2,14 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
-#include "neural/mlp.h"
+#include "neural/matrix_place.h"
 #include "options/training.h"
+
+namespace at {
+class Tensor;
+}
 
 namespace arapfields {
 
@@ -16,15 +21,15 @@ struct OptimizerOptions {
 };
 
 /// What a first-order method moves: parameters and their gradient, each one contiguous vector, and the
-/// network that holds them, null where there is none.
+/// matrices of hidden layers among them, in their order.
 struct Trainable {
   at::Tensor& parameters;
   at::Tensor& gradient;
-  Mlp* network = nullptr;
+  std::vector<MatrixPlace> matrices = {};
 };
 
-/// Steps along the gradient: neural/muon.h for the matrices of networks, or neural/adam_step.h. Parameters
-/// that no network holds are moved by Adam, whatever the options say; a learning rate of 0 is the kind's own.
+/// Steps along the gradient: neural/muon.h for the matrices, or neural/adam_step.h. Parameters
+/// without matrices are moved by Adam, whatever the options say; a learning rate of 0 is the kind's own.
 class Optimizer {
  public:
   Optimizer(const Trainable& trained, const TrainingOptions& training, const OptimizerOptions& options);

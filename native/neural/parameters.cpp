@@ -19,6 +19,16 @@ Index parameter_count(const MlpShape& shape) {
   return count;
 }
 
+std::vector<MatrixPlace> hidden_matrices(const MlpShape& shape) {
+  std::vector<MatrixPlace> places;
+  Index begin = 0;
+  for (int l = 0; l < shape.layers; ++l) {
+    places.push_back({begin, shape.fan_out(l), shape.fan_in(l)});
+    begin = places.back().end() + shape.fan_out(l);
+  }
+  return places;
+}
+
 VectorF parameters_of(const Mlp& mlp) {
   const ThreadScope scope;
   const at::Tensor host = mlp.parameters().to(at::kCPU, at::kFloat).contiguous();

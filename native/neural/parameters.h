@@ -3,6 +3,7 @@
 #pragma once
 
 #include "core/types.h"
+#include "neural/matrix_place.h"
 #include "neural/mlp.h"
 
 namespace arapfields {
@@ -11,6 +12,9 @@ namespace arapfields {
 void validate(const MlpShape& shape);
 /// Weights and biases of all layers.
 Index parameter_count(const MlpShape& shape);
+
+/// The weights of the hidden layers, in the order of Mlp::parameters().
+std::vector<MatrixPlace> hidden_matrices(const MlpShape& shape);
 
 /// All numbers in the order of Mlp::parameters(), in single precision, and back. Throws InvalidInput where
 /// their count does not fit the shape.

@@ -94,25 +94,22 @@ Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handle
   ObjectiveTerms terms = terms_of(samples, handles, options);
   terms.external = hooks.energies;
 
-  const MlpShape shape{options.network, 3};
-  const auto seed = static_cast<std::uint64_t>(options.training.seed);
-  const std::string device = resolve_device(options.machine.device);
-  auto field = std::make_shared<NeuralField>(shape, seed, false, device);
-  field->network()->round_products(options.precision == ProductPrecision::bfloat16);
+  const std::shared_ptr<TrainableField> field = trained_field(options);
+  auto* const neural = dynamic_cast<NeuralField*>(field.get());  // other kinds have neither blend nor base
   std::vector<std::string> notes;
-  if (options.exact_handles) field->set_handles(exact_blend(terms.handles, options.margin, notes));
+  if (options.exact_handles) neural->set_handles(exact_blend(terms.handles, options.margin, notes));
   const double share = options.start == StartKind::radial ? 0.1 : 0.0;
   if (options.start == StartKind::radial)
-    field->set_base(radial_start(samples, handles, options, progress.part(0.0, share)));
+    neural->set_base(radial_start(samples, handles, options, progress.part(0.0, share)));
 
-  LoopOptions loop;
-  loop.training = options.training;
+  LoopOptions loop = training_of(options);
   loop.observer = hooks.observer;
   WrapObjective wrap;
   if (options.invertibility > 0.0)
     wrap = [&](Objective& inner) {
       return std::make_unique<InvertibleObjective>(inner, samples, options.training.batch,
-                                                   options.invertibility, shape, loop, device);
+                                                   options.invertibility, neural->shape(), loop,
+                                                   resolve_device(options.machine.device));
     };
   Solution solution = solve_field(field, samples, std::move(terms), loop, progress.part(share, 1.0), wrap);
   solution.report.notes.insert(solution.report.notes.begin(), notes.begin(), notes.end());

@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "solve/field_choice.h"
 
+#include <algorithm>
+
+#include "core/device.h"
+#include "core/errors.h"
+#include "fields/invertible_field.h"
+#include "fields/neural_field.h"
+
 namespace arapfields {
 namespace {
 
@@ -14,7 +21,49 @@ bool names_a_network(const Options& given) {
          given.machine.device.starts_with("cuda");
 }
 
+/// Each coupling layer's network is narrower and shallower than the one of a neural field.
+CouplingShape coupling_shape(NetworkOptions network, int couplings) {
+  network.width = std::max(1, network.width / 2);
+  network.layers = std::max(1, network.layers / 2);
+  CouplingShape shape{network};
+  shape.couplings = couplings;
+  return shape;
+}
+
+template <class Options>
+std::shared_ptr<TrainableField> made_field(const Options& options) {
+  const auto seed = static_cast<std::uint64_t>(options.training.seed);
+  if (chosen_field(options) == FieldKind::invertible) {
+    const std::string with = " with field='invertible'";
+    require(options.precision == ProductPrecision::float32, "precision", name_of(options.precision) + with,
+            "it computes in 'float32'");
+    require(!options.machine.device.starts_with("cuda"), "device", options.machine.device + with,
+            "it computes on the processor: 'auto' or 'cpu'");
+    return std::make_shared<InvertibleField>(coupling_shape(options.network, options.couplings), seed);
+  }
+  auto field = std::make_shared<NeuralField>(MlpShape{options.network, 3}, seed, false,
+                                             resolve_device(options.machine.device));
+  field->network()->round_products(options.precision == ProductPrecision::bfloat16);
+  return field;
+}
+
+/// What one layer changes, all that follow carry on: steps of coupling layers have to be smaller.
+template <class Options>
+LoopOptions made_training(const Options& options) {
+  LoopOptions loop;
+  loop.training = options.training;
+  if (chosen_field(options) == FieldKind::invertible && loop.training.learning_rate == 0.0)
+    loop.training.learning_rate = TrainingOptions::automatic_learning_rate(options.training.optimizer) / 3.0;
+  return loop;
+}
+
 }  // namespace
+
+std::shared_ptr<TrainableField> trained_field(const DeformOptions& options) { return made_field(options); }
+std::shared_ptr<TrainableField> trained_field(const StylizeOptions& options) { return made_field(options); }
+
+LoopOptions training_of(const DeformOptions& options) { return made_training(options); }
+LoopOptions training_of(const StylizeOptions& options) { return made_training(options); }
 
 FieldKind chosen_field(const DeformOptions& options) {
   if (options.field != FieldKind::automatic) return options.field;

@@ -25,7 +25,7 @@ using LoopObserver = std::function<void(int)>;
 
 /// What an optimizer moves of a field.
 inline Trainable trainable(TrainableField& field) {
-  return {field.parameters(), field.gradient(), field.network()};
+  return {field.parameters(), field.gradient(), field.matrices()};
 }
 
 /// Minimises by run_training(), with random numbers of the options' seed.

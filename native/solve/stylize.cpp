@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "solve/stylize.h"
 
-#include "core/device.h"
 #include "core/parallel.h"
-#include "fields/neural_field.h"
 #include "solve/field_choice.h"
 #include "solve/radial.h"
 #include "solve/report.h"
@@ -34,7 +32,7 @@ Handle hold_lowest(const SurfaceSamples& samples, const Vec3& up) {
 }
 
 /// No other term of ours changes by a translation, so the point may be put back exactly.
-void hold(NeuralField& field, const Handle& handle) {
+void hold(TrainableField& field, const Handle& handle) {
   Points value(1, 3);
   field.evaluate(handle.rest_point.transpose(), {value.data(), 1, JetOrder::value});
   field.translate(handle.rest_point - value.row(0).transpose());
@@ -73,12 +71,8 @@ Solution stylize(const SurfaceSamples& samples, const Style& style, const Styliz
     terms.stance = Stance::of(samples.points, up);
   }
 
-  auto field = std::make_shared<NeuralField>(MlpShape{options.network, 3},
-                                             static_cast<std::uint64_t>(options.training.seed), false,
-                                             resolve_device(options.machine.device));
-  field->network()->round_products(options.precision == ProductPrecision::bfloat16);
-  LoopOptions loop;
-  loop.training = options.training;
+  const std::shared_ptr<TrainableField> field = trained_field(options);
+  LoopOptions loop = training_of(options);
   loop.observer = hooks.observer;
   if (terms.gauss == 0.0 && handles.empty() && hooks.energies.empty()) loop.training.iterations = 0;
   Solution solution = solve_field(field, samples, std::move(terms), loop, progress);

@@ -73,7 +73,7 @@ REVEALED = {
     "mesh[0]": ARRAY,
     "mesh.report": "arapfields.reports.ExtractionReport",
     "af.extract_deformed(sdf, field).report": "arapfields.reports.DeformedExtractionReport",
-    "options.field": "Literal['auto', 'radial', 'neural']",
+    "options.field": "Literal['auto', 'radial', 'neural', 'invertible']",
     "options.optimizer": "Literal['muon', 'adam']",
     "options.bending": "float",
     "options.iterations": "int",

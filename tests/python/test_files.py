@@ -29,7 +29,7 @@ def refusal(path, content=None):
     return str(error.value)
 
 
-@pytest.mark.parametrize("name", ["sdf", "neural", "exact", "refined", "radial", "embedded"])
+@pytest.mark.parametrize("name", ["sdf", "neural", "exact", "refined", "invertible", "radial", "embedded"])
 def test_any_reader_of_safetensors_opens_them(name, examples):
     texts, arrays = archives.read(examples[name])
     found = safetensors.numpy.load_file(examples[name])
@@ -40,7 +40,7 @@ def test_any_reader_of_safetensors_opens_them(name, examples):
     assert texts["kind"] == ("sdf" if name == "sdf" else "field")
 
 
-@pytest.mark.parametrize("name", ["sdf", "neural", "exact", "refined", "radial", "embedded"])
+@pytest.mark.parametrize("name", ["sdf", "neural", "exact", "refined", "invertible", "radial", "embedded"])
 def test_what_is_read_is_written_again(name, examples, tmp_path):
     archives.load(examples[name]).save(tmp_path / "again")
     assert (tmp_path / "again").read_bytes() == examples[name].read_bytes()

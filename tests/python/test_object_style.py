@@ -124,6 +124,7 @@ def test_value_and_cotangent_equal_autograd_finite_differences_and_the_compositi
 SMALL = {
     "radial": {"iterations": 25},
     "neural": {"iterations": 60, "width": 32, "layers": 2, "batch": 200},
+    "invertible": {"iterations": 60, "width": 32, "layers": 2, "batch": 200},
 }
 
 

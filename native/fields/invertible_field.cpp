@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fields/invertible_field.h"
+
+#include <ATen/core/LegacyTypeDispatch.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <stdexcept>
+
+#include "core/errors.h"
+#include "core/memory.h"
+#include "core/parallel.h"
+#include "core/random.h"
+#include "core/tensors.h"
+#include "neural/coupling_sweep.h"
+
+namespace arapfields {
+namespace {
+
+/// Points a block holds, and groups of blocks at most, each with a gradient of its own: both fixed, so that
+/// results do not depend on the number of threads.
+constexpr Index block_points = 32, value_block_points = 256, most_groups = 8;
+
+struct Range {
+  Index begin, count;
+};
+
+std::vector<Range> ranges_of(Index n, JetOrder order) {
+  const Index most = order == JetOrder::value ? value_block_points : block_points;
+  const Index blocks = (n + most - 1) / most;
+  std::vector<Range> ranges;
+  for (Index b = 0; b < blocks; ++b) {
+    const Index begin = b * n / blocks;
+    ranges.push_back({begin, (b + 1) * n / blocks - begin});
+  }
+  return ranges;
+}
+
+/// body(range's number, group) for all ranges, groups of consecutive ones in parallel.
+void for_groups(Index ranges, const std::function<void(Index, Index)>& body) {
+  const Index groups = std::min(ranges, most_groups);
+  parallel_jobs(groups, [&](Index g) {
+    const at::AutoDispatchBelowADInplaceOrView quick;
+    for (Index r = g * ranges / groups; r < (g + 1) * ranges / groups; ++r) body(r, g);
+  });
+}
+
+/// The same for independent ranges.
+void for_each_range(const std::vector<Range>& ranges, const std::function<void(const Range&)>& body) {
+  parallel_jobs(static_cast<Index>(ranges.size()), [&](Index r) {
+    const at::AutoDispatchBelowADInplaceOrView quick;
+    body(ranges[static_cast<std::size_t>(r)]);
+  });
+}
+
+}  // namespace
+
+struct InvertibleField::State {
+  CouplingShape shape;
+  at::Tensor parameters, gradient;
+  CouplingViews views;
+  // Of the last forward call:
+  std::vector<Range> ranges;
+  std::vector<std::vector<CouplingMemory>> kept;
+  Index count = -1;
+  JetOrder order = JetOrder::value;
+  bool fresh = false;
+  // Gradients of the groups but the first.
+  std::vector<at::Tensor> parts;
+  std::vector<CouplingViews> part_views;
+
+  void prepare(Index n, JetOrder wanted) {
+    if (n == count && wanted == order) return;
+    const double numbers = static_cast<double>(n) * columns(wanted) * shape.couplings *
+                           (2.0 * shape.layers * shape.width + shape.fan_in(0));
+    kept.clear();
+    require_memory("batch", numbers * static_cast<double>(parameters.element_size()));
+    ranges = ranges_of(n, wanted);
+    for (const Range& range : ranges)
+      kept.push_back(coupling_memory(shape, parameters, range.count, columns(wanted), true));
+    count = n;
+    order = wanted;
+  }
+};
+
+InvertibleField::InvertibleField(const CouplingShape& shape, std::uint64_t seed, bool double_precision)
+    : state_(std::make_unique<State>()) {
+  shape.validate();
+  require(shape.couplings > 0, "couplings", std::to_string(shape.couplings), "at least one is needed");
+  const ThreadScope scope;
+  require_memory("width", static_cast<double>(shape.size()) * (sizeof(double) + 2 * sizeof(float)));
+  at::Tensor values = at::zeros({shape.size()}, at::kDouble);
+  double* next = values.data_ptr<double>();
+  for (int i = 0; i < shape.couplings; ++i)
+    for (int l = 0; l <= shape.layers; ++l) {
+      const Index numbers = static_cast<Index>(shape.fan_out(l)) * (shape.fan_in(l) + 1);
+      Random random(seed, 0x636f7570u + static_cast<std::uint64_t>(i * (shape.layers + 1) + l));
+      const double bound = l < shape.layers ? 1.0 / std::sqrt(shape.fan_in(l)) : 0.0;
+      for (Index k = 0; k < numbers; ++k) *next++ = random.uniform(-bound, bound);
+    }
+  State& s = *state_;
+  s.shape = shape;
+  s.parameters = values.to(double_precision ? at::kDouble : at::kFloat);
+  s.gradient = at::zeros_like(s.parameters);
+  s.views = CouplingViews(shape, s.parameters);
+}
+
+InvertibleField::~InvertibleField() = default;
+
+const CouplingShape& InvertibleField::shape() const { return state_->shape; }
+at::Tensor& InvertibleField::parameters() { return state_->parameters; }
+at::Tensor& InvertibleField::gradient() { return state_->gradient; }
+
+std::vector<MatrixPlace> InvertibleField::matrices() const {
+  const CouplingShape& shape = state_->shape;
+  std::vector<MatrixPlace> places;
+  Index begin = 0;
+  for (int i = 0; i < shape.couplings; ++i)
+    for (int l = 0; l <= shape.layers; ++l) {
+      const Index out = shape.fan_out(l), in = shape.fan_in(l);
+      if (l < shape.layers) places.push_back({begin, out, in});
+      begin += out * (in + 1);
+    }
+  return places;
+}
+
+void InvertibleField::evaluate(PointsIn points, JetView<double> out) const {
+  const ThreadScope scope;
+  require(out.count == points.rows(), "out", std::to_string(out.count) + " jets", "one a point is needed");
+  const State& s = *state_;
+  at::Tensor result = tensor_view(out);
+  result[0].copy_(tensor_view(points));
+  at::Tensor values = result[0];
+  const at::Tensor x =
+      out.order == JetOrder::value ? at::Tensor() : values.to(s.parameters.scalar_type(), false, true);
+  for_each_range(ranges_of(points.rows(), out.order), [&](const Range& range) {
+    move_points(s.shape, s.views, values.narrow(0, range.begin, range.count), false);
+    if (out.order == JetOrder::value) return;
+    const int count = columns(out.order);
+    std::vector<CouplingMemory> memory = coupling_memory(s.shape, s.parameters, range.count, count, false);
+    const at::Tensor jets =
+        couple(s.shape, s.views, x.narrow(0, range.begin, range.count), out.order, memory);
+    result.narrow(0, 1, count - 1).narrow(1, range.begin, range.count).copy_(jets.narrow(0, 1, count - 1));
+  });
+}
+
+Points InvertibleField::preimages(PointsIn points) const {
+  const ThreadScope scope;
+  const State& s = *state_;
+  Points found = points;
+  const at::Tensor x = tensor_view(found);
+  for_each_range(ranges_of(points.rows(), JetOrder::value), [&](const Range& range) {
+    move_points(s.shape, s.views, x.narrow(0, range.begin, range.count), true);
+  });
+  return found;
+}
+
+at::Tensor InvertibleField::forward(const at::Tensor& points, JetOrder order) {
+  const ThreadScope scope;
+  State& s = *state_;
+  require(points.dim() == 2 && points.size(1) == 3 && points.is_cpu() &&
+              points.scalar_type() == s.parameters.scalar_type(),
+          "points", "another shape, dtype or device", "expected an (n,3) tensor like the parameters");
+  s.prepare(points.size(0), order);
+  at::Tensor result = at::empty({columns(order), points.size(0), 3}, s.parameters.options());
+  for_groups(static_cast<Index>(s.ranges.size()), [&](Index r, Index) {
+    const Range& range = s.ranges[static_cast<std::size_t>(r)];
+    result.narrow(1, range.begin, range.count)
+        .copy_(couple(s.shape, s.views, points.narrow(0, range.begin, range.count), order,
+                      s.kept[static_cast<std::size_t>(r)]));
+  });
+  s.fresh = true;
+  return result;
+}
+
+at::Tensor InvertibleField::forward_at(PointsIn points, JetOrder order) {
+  const ThreadScope scope;
+  return forward(tensor_like(points, state_->parameters), order);
+}
+
+void InvertibleField::pull_back(const at::Tensor& cotangents) {
+  const ThreadScope scope;
+  State& s = *state_;
+  if (!s.fresh) throw std::logic_error("InvertibleField::pull_back needs a forward call of its own");
+  require(cotangents.dim() == 3 && cotangents.size(0) == columns(s.order) && cotangents.size(1) == s.count &&
+              cotangents.scalar_type() == s.parameters.scalar_type(),
+          "cotangents", "another shape or dtype than the jets", "they must match");
+  s.fresh = false;
+  const auto ranges = static_cast<Index>(s.ranges.size());
+  const Index groups = std::min(ranges, most_groups);
+  while (static_cast<Index>(s.parts.size()) < groups) {
+    s.parts.push_back(s.parts.empty() ? s.gradient : at::empty_like(s.gradient));
+    s.part_views.emplace_back(s.shape, s.parts.back());
+  }
+  for (Index g = 1; g < groups; ++g) s.parts[static_cast<std::size_t>(g)].zero_();
+  for_groups(ranges, [&](Index r, Index g) {
+    const Range& range = s.ranges[static_cast<std::size_t>(r)];
+    couple_back(s.shape, s.views, cotangents.narrow(1, range.begin, range.count),
+                s.kept[static_cast<std::size_t>(r)], s.part_views[static_cast<std::size_t>(g)]);
+  });
+  for (Index g = 1; g < groups; ++g) s.gradient.add_(s.parts[static_cast<std::size_t>(g)]);
+}
+
+void InvertibleField::translate(const Vec3& offset) {
+  state_->views.offset.add_(tensor_like(offset, state_->parameters));
+}
+
+VectorF InvertibleField::weights() const {
+  const ThreadScope scope;
+  const at::Tensor host = state_->parameters.to(at::kFloat).contiguous();
+  return Eigen::Map<const VectorF>(host.const_data_ptr<float>(), host.numel());
+}
+
+void InvertibleField::set_weights(const VectorF& weights) {
+  const ThreadScope scope;
+  at::Tensor& own = state_->parameters;
+  require(weights.size() == own.numel(), "weights", std::to_string(weights.size()) + " numbers",
+          "this field has " + std::to_string(own.numel()));
+  own.copy_(tensor_view(weights));
+}
+
+}  // namespace arapfields

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "fields/field.h"
+#include "neural/coupling_shape.h"
+
+namespace arapfields {
+
+/// f as coupling layers in turns over the axes (neural/coupling_shape.h): det J > 0 everywhere, and f⁻¹ in
+/// closed form, by construction. The identity before training. Computed in main memory; values, there and
+/// back, keep their coordinates in double precision, so that preimages() of evaluate() comes back to some
+/// 1e-6 and better.
+class InvertibleField final : public TrainableField {
+ public:
+  /// Throws InvalidInput for a shape out of range.
+  InvertibleField(const CouplingShape& shape, std::uint64_t seed, bool double_precision = false);
+  ~InvertibleField() override;
+
+  const CouplingShape& shape() const;
+  void evaluate(PointsIn points, JetView<double> out) const override;
+  bool has_preimages() const override { return true; }
+  Points preimages(PointsIn points) const override;
+  at::Tensor forward(const at::Tensor& points, JetOrder order) override;
+  at::Tensor forward_at(PointsIn points, JetOrder order) override;
+  void pull_back(const at::Tensor& cotangents) override;
+  at::Tensor& parameters() override;
+  at::Tensor& gradient() override;
+  std::vector<MatrixPlace> matrices() const override;
+  void translate(const Vec3& offset) override;
+
+  /// All parameters, for files. set_weights() throws InvalidInput where the count does not fit the shape.
+  VectorF weights() const;
+  void set_weights(const VectorF& weights);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace arapfields

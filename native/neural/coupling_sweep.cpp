@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "neural/coupling_sweep.h"
+
+#include <ATen/ATen.h>
+
+#include <cmath>
+
+#include "neural/column_kernels.h"
+#include "neural/jet_algebra.h"
+
+namespace arapfields {
+namespace {
+
+std::size_t at_(int i) { return static_cast<std::size_t>(i); }
+
+/// Columns of a plane-by-plane block as jets of single numbers: entry i of row p, of `stride` entries a row.
+template <class Scalar>
+NumberJet<Scalar> gather(const Scalar* data, Index count, Index stride, Index p, Index i, int columns) {
+  NumberJet<Scalar> jet;
+  for (int c = 0; c < columns; ++c) jet[c] = data[(c * count + p) * stride + i];
+  return jet;
+}
+
+template <class Scalar>
+void scatter(const NumberJet<Scalar>& jet, Scalar* data, Index count, Index stride, Index p, Index i,
+             int columns) {
+  for (int c = 0; c < columns; ++c) data[(c * count + p) * stride + i] = jet[c];
+}
+
+/// exp(bound·tanh(s / bound)).
+template <class Scalar>
+Derivatives<Scalar> bounded_exp(Scalar s) {
+  constexpr Scalar bound = Scalar(CouplingShape::bound);
+  const Scalar t = std::tanh(s / bound), value = std::exp(bound * t);
+  const Scalar g1 = 1 - t * t, g2 = -2 * t * g1 / bound, g3 = -2 * g1 * (1 - 3 * t * t) / (bound * bound);
+  return {value, value * g1, value * (g1 * g1 + g2), value * (g1 * g1 * g1 + 3 * g1 * g2 + g3)};
+}
+
+/// Calls use(index of the encoding's entry, derivatives of that entry) for one coordinate.
+template <class Scalar, class Use>
+void each_entry(const CouplingShape& shape, Scalar x, int which, Use&& use) {
+  double f = shape.frequency, c = std::cos(f * static_cast<double>(x)),
+         s = std::sin(f * static_cast<double>(x));
+  for (int k = 0; k < shape.octaves; ++k, f *= 2) {
+    const Index entry = 2 * (which * shape.octaves + k);
+    const auto at = [](double a) { return static_cast<Scalar>(a); };
+    use(entry, Derivatives<Scalar>{at(c), at(-f * s), at(-f * f * c), at(f * f * f * s)});
+    use(entry + 1, Derivatives<Scalar>{at(s), at(f * c), at(-f * f * s), at(-f * f * f * c)});
+    const double twice = 2 * s * c;
+    c = (c - s) * (c + s);
+    s = twice;
+  }
+}
+
+template <class Scalar>
+ColumnBlock<Scalar> block_of(const CouplingShape& shape, const CouplingMemory& memory, int l,
+                             const at::Tensor& bias) {
+  const at::Tensor& slope = memory.slope[at_(l)];
+  ColumnBlock<Scalar> block;
+  block.z = memory.pre[at_(l)].const_data_ptr<Scalar>();
+  block.h = memory.activations[at_(l)].data_ptr<Scalar>();
+  block.slope = slope.data_ptr<Scalar>();
+  block.bias = bias.const_data_ptr<Scalar>();
+  block.sharpness = static_cast<Scalar>(shape.softplus_sharpness);
+  block.points = slope.size(0);
+  block.width = slope.size(1);
+  block.columns = static_cast<int>(memory.pre[at_(l)].size(0) / slope.size(0));
+  return block;
+}
+
+/// (s, t) of coupling layer i, from memory.jets.
+template <class Scalar>
+void condition(const CouplingShape& shape, const CouplingViews& views, int i, CouplingMemory& memory) {
+  const CouplingViews::Network& network = views.networks[at_(i)];
+  const Index count = memory.jets.size(1), entries = shape.fan_in(0);
+  const int columns = static_cast<int>(memory.jets.size(0));
+  const auto* jets = memory.jets.const_data_ptr<Scalar>();
+  auto* encoding = memory.encoding.data_ptr<Scalar>();
+  for (Index p = 0; p < count; ++p)
+    for (int which = 0; which < 2; ++which) {
+      const NumberJet<Scalar> u = gather(jets, count, 3, p, (i + 1 + which) % 3, columns);
+      each_entry(shape, u[0], which, [&](Index entry, const Derivatives<Scalar>& phi) {
+        scatter(chain(phi, u, columns), encoding, count, entries, p, entry, columns);
+      });
+    }
+  for (int l = 0; l < shape.layers; ++l) {
+    at::mm_out(memory.pre[at_(l)], l == 0 ? memory.encoding : memory.activations[at_(l - 1)],
+               network.weights[at_(l)].t());
+    ARAPFIELDS_DISPATCH(activate_columns(block_of<Scalar>(shape, memory, l, network.biases[at_(l)])));
+  }
+  at::mm_out(memory.output, memory.activations.back(), network.weights.back().t());
+  memory.output.narrow(0, 0, count).add_(network.biases.back());
+}
+
+template <class Scalar>
+at::Tensor couple_as(const CouplingShape& shape, const CouplingViews& views, const at::Tensor& points,
+                     JetOrder order, std::vector<CouplingMemory>& memory) {
+  const Index count = points.size(0);
+  const int columns_here = columns(order);
+  at::Tensor jets = memory.front().jets;
+  jets.zero_();
+  jets[0].copy_(points);
+  for (int k = 0; k < 3 && columns_here > 1; ++k) jets[first_column(k)].select(1, k).fill_(1.0);
+  for (int i = 0; i < shape.couplings; ++i) {
+    CouplingMemory& here = memory[at_(i) % memory.size()];
+    condition<Scalar>(shape, views, i, here);
+    at::Tensor next = i + 1 < shape.couplings && memory.size() > 1 ? memory[at_(i + 1)].jets : jets;
+    if (i + 1 == shape.couplings && memory.size() > 1) next = at::empty_like(jets);
+    if (!next.is_same(here.jets)) next.copy_(here.jets);
+    auto* moved = next.data_ptr<Scalar>();
+    const auto* output = here.output.const_data_ptr<Scalar>();
+    const int axis = i % 3;
+    for (Index p = 0; p < count; ++p) {
+      const NumberJet<Scalar> s = gather(output, count, 2, p, 0, columns_here);
+      NumberJet<Scalar> y = product(chain(bounded_exp(s[0]), s, columns_here),
+                                    gather(moved, count, 3, p, axis, columns_here), columns_here);
+      for (int c = 0; c < columns_here; ++c) y[c] += output[(c * count + p) * 2 + 1];
+      scatter(y, moved, count, 3, p, axis, columns_here);
+    }
+    jets = next;
+  }
+  at::Tensor result = memory.size() > 1 && shape.couplings > 0 ? jets : jets.clone();
+  result[0].add_(views.offset);
+  return result;
+}
+
+template <class Scalar>
+void couple_back_as(const CouplingShape& shape, const CouplingViews& views, const at::Tensor& cotangents,
+                    std::vector<CouplingMemory>& memory, CouplingViews& gradient) {
+  at::Tensor given = cotangents.clone(at::MemoryFormat::Contiguous);
+  const Index count = given.size(1), entries = shape.fan_in(0);
+  const int columns_here = static_cast<int>(given.size(0));
+  gradient.offset.add_(given[0].sum(0));
+  auto* pull = given.data_ptr<Scalar>();
+  const at::Tensor upper = at::empty({columns_here * count, 2}, given.options());
+  at::Tensor wide = at::empty({columns_here * count, shape.width}, given.options());
+  at::Tensor spare = at::empty_like(wide);
+  const at::Tensor encoded = at::empty({columns_here * count, entries}, given.options());
+  for (int i = shape.couplings - 1; i >= 0; --i) {
+    CouplingMemory& here = memory[at_(i)];
+    const CouplingViews::Network& network = views.networks[at_(i)];
+    CouplingViews::Network& into = gradient.networks[at_(i)];
+    const auto* jets = here.jets.const_data_ptr<Scalar>();
+    const auto* output = here.output.const_data_ptr<Scalar>();
+    auto* of_output = upper.data_ptr<Scalar>();
+    const int axis = i % 3;
+    for (Index p = 0; p < count; ++p) {
+      const NumberJet<Scalar> g = gather<Scalar>(pull, count, 3, p, axis, columns_here);
+      const NumberJet<Scalar> s = gather(output, count, 2, p, 0, columns_here);
+      const Derivatives<Scalar> phi = bounded_exp(s[0]);
+      NumberJet<Scalar> of_x, of_e, of_s;
+      product_back(chain(phi, s, columns_here), g, of_x, columns_here);
+      product_back(gather(jets, count, 3, p, axis, columns_here), g, of_e, columns_here);
+      chain_back(phi, s, of_e, of_s, columns_here);
+      scatter(of_x, pull, count, 3, p, axis, columns_here);
+      scatter(of_s, of_output, count, 2, p, 0, columns_here);
+      scatter(g, of_output, count, 2, p, 1, columns_here);
+    }
+    into.biases.back().add_(upper.narrow(0, 0, count).sum(0));
+    into.weights.back().addmm_(upper.t(), here.activations.back());
+    at::mm_out(wide, upper, network.weights.back());
+    for (int l = shape.layers - 1; l >= 0; --l) {
+      ARAPFIELDS_DISPATCH(activate_columns_back(block_of<Scalar>(shape, here, l, network.biases[at_(l)]),
+                                                wide.data_ptr<Scalar>(),
+                                                into.biases[at_(l)].data_ptr<Scalar>()));
+      into.weights[at_(l)].addmm_(wide.t(), l == 0 ? here.encoding : here.activations[at_(l - 1)]);
+      at::Tensor below = l == 0 ? encoded : spare;
+      at::mm_out(below, wide, network.weights[at_(l)]);
+      if (l > 0) std::swap(wide, spare);
+    }
+    const auto* of_entries = encoded.const_data_ptr<Scalar>();
+    for (Index p = 0; p < count; ++p)
+      for (int which = 0; which < 2; ++which) {
+        const Index coordinate = (i + 1 + which) % 3;
+        const NumberJet<Scalar> u = gather(jets, count, 3, p, coordinate, columns_here);
+        NumberJet<Scalar> back = gather<Scalar>(pull, count, 3, p, coordinate, columns_here);
+        each_entry(shape, u[0], which, [&](Index entry, const Derivatives<Scalar>& phi) {
+          chain_back(phi, u, gather(of_entries, count, entries, p, entry, columns_here), back, columns_here);
+        });
+        scatter(back, pull, count, 3, p, coordinate, columns_here);
+      }
+  }
+}
+
+/// Coordinates stay in double precision whatever the networks have: the way back meets the same u to
+/// rounding, and so nearly the same numbers.
+template <class Scalar>
+void move_as(const CouplingShape& shape, const CouplingViews& views, at::Tensor points, bool back) {
+  CouplingMemory here = coupling_memory(shape, views.offset, points.size(0), 1, false).front();
+  auto* moved = points.data_ptr<double>();
+  const at::Tensor offset = views.offset.to(at::kDouble);
+  if (back) points.sub_(offset);
+  for (int step = 0; step < shape.couplings; ++step) {
+    const int i = back ? shape.couplings - 1 - step : step;
+    here.jets[0].copy_(points);
+    condition<Scalar>(shape, views, i, here);
+    const auto* output = here.output.const_data_ptr<Scalar>();
+    for (Index p = 0; p < points.size(0); ++p) {
+      double& x = moved[3 * p + i % 3];
+      const double e = bounded_exp(static_cast<double>(output[2 * p])).value, t = output[2 * p + 1];
+      x = back ? (x - t) / e : x * e + t;
+    }
+  }
+  if (!back) points.add_(offset);
+}
+
+}  // namespace
+
+CouplingViews::CouplingViews(const CouplingShape& shape, const at::Tensor& flat) {
+  Index begin = 0;
+  for (int i = 0; i < shape.couplings; ++i) {
+    Network& network = networks.emplace_back();
+    for (int l = 0; l <= shape.layers; ++l) {
+      const Index out = shape.fan_out(l), in = shape.fan_in(l);
+      network.weights.push_back(flat.narrow(0, begin, out * in).view({out, in}));
+      network.biases.push_back(flat.narrow(0, begin + out * in, out));
+      begin += out * (in + 1);
+    }
+  }
+  offset = flat.narrow(0, begin, 3);
+}
+
+std::vector<CouplingMemory> coupling_memory(const CouplingShape& shape, const at::Tensor& like, Index count,
+                                            int columns, bool keep) {
+  std::vector<CouplingMemory> memory(keep ? static_cast<std::size_t>(shape.couplings) : 1);
+  const auto make = [&](Index rows, Index width) { return at::empty({rows, width}, like.options()); };
+  for (CouplingMemory& layer : memory) {
+    layer.jets = at::empty({columns, count, 3}, like.options());
+    layer.encoding = make(columns * count, shape.fan_in(0));
+    layer.output = make(columns * count, 2);
+    for (int l = 0; l < shape.layers; ++l) {
+      layer.pre.push_back(make(columns * count, shape.width));
+      layer.activations.push_back(make(columns * count, shape.width));
+      layer.slope.push_back(make(count, shape.width));
+    }
+  }
+  return memory;
+}
+
+at::Tensor couple(const CouplingShape& shape, const CouplingViews& views, const at::Tensor& points,
+                  JetOrder order, std::vector<CouplingMemory>& memory) {
+  return points.scalar_type() == at::kDouble ? couple_as<double>(shape, views, points, order, memory)
+                                             : couple_as<float>(shape, views, points, order, memory);
+}
+
+void couple_back(const CouplingShape& shape, const CouplingViews& views, const at::Tensor& cotangents,
+                 std::vector<CouplingMemory>& memory, CouplingViews& gradient) {
+  if (cotangents.scalar_type() == at::kDouble)
+    couple_back_as<double>(shape, views, cotangents, memory, gradient);
+  else
+    couple_back_as<float>(shape, views, cotangents, memory, gradient);
+}
+
+void move_points(const CouplingShape& shape, const CouplingViews& views, at::Tensor points, bool back) {
+  if (views.offset.scalar_type() == at::kDouble)
+    move_as<double>(shape, views, points, back);
+  else
+    move_as<float>(shape, views, points, back);
+}
+
+}  // namespace arapfields
