@@ -15,9 +15,6 @@ POSIX = re.compile(r"#include <(sys/|unistd|fcntl|pthread|dlfcn|sched|poll|diren
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    reason="threads/calls_at_once… does not end under Wine (docs/development.md)", strict=False
-)
 @pytest.mark.skipif(
     not all(map(shutil.which, TOOLS)) or not WINE, reason="mingw-w64 or Wine is not installed"
 )
