@@ -53,6 +53,8 @@ def set_positions(mesh, points):
 
 def triangles(mesh):
     """(m, 3) corners of the mesh's triangles, its larger faces split as Blender draws them."""
+    if not len(mesh.loops):  # nor is there an attribute of corners then
+        return np.empty((0, 3), dtype=np.int32)
     mesh.calc_loop_triangles()
     corners = np.empty(len(mesh.loops), dtype=np.int32)
     mesh.attributes[".corner_vert"].data.foreach_get("value", corners)

@@ -34,6 +34,7 @@ from ._native import (
     StylizeOptions,
     SurfaceSamples,
     Task,
+    WrapOptions,
     __version__,
     arap_energy,
     deform,
@@ -58,6 +59,7 @@ from ._native import (
     thread_count,
     train_inverse,
     winding_number,
+    wrap,
 )
 from .arrays import ArrayLike
 from .cmake import cmake_dir
@@ -77,6 +79,7 @@ from .reports import (
     Report,
     SampleReport,
     SolveReport,
+    WrapReport,
 )
 
 # The shorter and the older names.
@@ -136,6 +139,8 @@ __all__ = [
     "StylizeOptions",
     "SurfaceSamples",
     "Task",
+    "WrapOptions",
+    "WrapReport",
     "__version__",
     "arap_energy",
     "cmake_dir",
@@ -163,4 +168,5 @@ __all__ = [
     "thread_count",
     "train_inverse",
     "winding_number",
+    "wrap",
 ]

@@ -7,7 +7,7 @@ import sys
 
 import arapfields as af
 
-from . import usd, verbs
+from . import usd, verbs, wrapping
 from .animate import animate
 from .flags import MESH, SOURCE, extraction_flags, inverse_flag, report_flag, sdf_flag, solve_flags
 from .options import add_option_flag, add_option_flags, shard
@@ -47,7 +47,7 @@ def _parser():
         "--cmake-dir", action=CMakeDir, nargs=0, help="print where CMake finds the C++ package, and exit"
     )
     added = parser.add_subparsers(dest="verb", metavar="VERB", required=True, parser_class=OneLineParser)
-    for add in (_fit, _sample, _deform, _stylize, _extract, _warp, _grid, _animate):
+    for add in (_fit, _sample, _deform, _stylize, _wrap, _extract, _warp, _grid, _animate):
         verb = add(added)
         verb.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
     return parser
@@ -55,13 +55,8 @@ def _parser():
 
 def _verb(added, name, run, summary, *examples):
     shown = "examples:\n" + "\n".join(f"  arapfields {name} {example}" for example in examples)
-    parser = added.add_parser(
-        name,
-        help=summary,
-        description=summary,
-        epilog=shown,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = added.add_parser(name, help=summary, description=summary, epilog=shown, formatter_class=raw)
     parser.set_defaults(run=run)
     return parser
 
@@ -143,6 +138,12 @@ def _stylize(added):
         help="what is up in the file (z without it): the style's axis and the figure's stance",
     )
     add_option_flags(parser, "stylize", "stylization")
+    return parser
+
+
+def _wrap(added):
+    parser = _verb(added, "wrap", wrapping.wrap, wrapping.SUMMARY, *wrapping.EXAMPLES)
+    wrapping.wrap_flags(parser)
     return parser
 
 
