@@ -30,6 +30,8 @@ class ARAPFIELDS_MT_object(bpy.types.Menu):
         layout.operator(Op.STYLIZE, icon="MOD_EDGESPLIT")
         icon = "PAUSE" if sessions.is_live(source, "STYLIZE") else "PLAY"
         layout.operator(Op.LIVE, text="Live Stylize", icon=icon).kind = "STYLIZE"
+        layout.operator(Op.WRAP, icon="MOD_SHRINKWRAP")
+        layout.operator(Op.CLICK_LANDMARKS, icon="PINNED")
         layout.operator(Op.LIVE_KEEP, icon="CHECKMARK")
         layout.operator(Op.BAKE, icon="REC")
         layout.operator_menu_enum(Op.EXPORT, "format", text="Export Animation", icon="EXPORT")

@@ -21,6 +21,7 @@ RESULT_SUFFIX = {
     "EXTRACT": "_implicit",
     "LIVE": "_live",
     "BAKE": "_baked",
+    "WRAP": "_wrapped",
 }
 HELPER_SUFFIX = "_offsets"  # of the mesh that carries offsets where the source cannot
 
@@ -39,6 +40,10 @@ class Op(StrEnum):
     EXTRACT = "arapfields.extract"
     STYLIZE = "arapfields.stylize"
     SET_STYLE = "arapfields.set_style"
+    WRAP = "arapfields.wrap"
+    ADD_LANDMARK = "arapfields.add_landmark"
+    CLICK_LANDMARKS = "arapfields.click_landmarks"
+    REMOVE_LANDMARK = "arapfields.remove_landmark"
     CARRY = "arapfields.carry"
     RELEASE = "arapfields.release"
     STIFFNESS_PRESET = "arapfields.stiffness_preset"

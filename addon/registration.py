@@ -13,13 +13,14 @@ from .properties import item
 CONTENTS = [  # modules with CLASSES
     # what is stored in the .blend: object.arapfields
     *("handles.properties", "carried.properties", "poses.properties", "pin_tool.properties"),
-    *("stiffness.properties", "live.properties", "animation.properties"),
+    *("stiffness.properties", "live.properties", "animation.properties", "wrap.properties"),
     *("properties.settings", "properties.item"),
     # features
     *("surface.operators", "surface.panel"),
     *("handles.operators", "handles.resizing", "handles.panel"),
     *("deform.operators", "deform.panel"),
     *("stylize.operators", "stylize.panel"),
+    *("wrap.operators", "wrap.clicking", "wrap.panel"),
     *("carried.operators", "carried.panel", "poses.operators", "poses.panel"),
     *("stiffness.operators", "stiffness.panel"),
     *("live.operators", "live.panel", "pin_tool.operators", "animation.operators"),

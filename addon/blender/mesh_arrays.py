@@ -70,6 +70,8 @@ def triangles_of(mesh, face):
 
 def triangles(mesh):
     """(m, 3) corners of the mesh's triangles, its larger faces split as Blender draws them."""
+    if not len(mesh.loops):  # nor is there an attribute of corners then
+        return np.empty((0, 3), dtype=np.int32)
     mesh.calc_loop_triangles()
     corners = corner_vertices(mesh)
     if len(mesh.loops) == 3 * len(mesh.polygons):  # nothing but triangles: what follows would take its time

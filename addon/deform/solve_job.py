@@ -130,6 +130,9 @@ def describe(item, report):
         figures.append(
             translated("handles off by {value} on average", value=f"{report['handle_error_mean']:.2g}")
         )
+    if "from_target_mean" in report:
+        near = max(report["to_target_mean"], report["from_target_mean"])
+        figures.append(translated("{share} of the target's size off on average", share=f"{near:.2%}"))
     if report.get("flipped_share"):
         share, worst = f"{report['flipped_share']:.1%}", f"{report['min_determinant']:.2g}"
         figures.append(translated("{share} folded (det J down to {worst})", share=share, worst=worst))

@@ -15,6 +15,7 @@ from ..live.properties import ARAPFIELDS_PG_secondary
 from ..names import PROPERTY
 from ..pin_tool.properties import ARAPFIELDS_PG_scene
 from ..stiffness.properties import ARAPFIELDS_PG_stiffness
+from ..wrap.properties import ARAPFIELDS_PG_wrap
 from .settings import ARAPFIELDS_PG_deform, ARAPFIELDS_PG_fit, ARAPFIELDS_PG_stylize
 
 
@@ -61,6 +62,9 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     )
     stylize: bpy.props.PointerProperty(
         type=ARAPFIELDS_PG_stylize, name="Stylize", description="Settings of the stylization"
+    )
+    wrap: bpy.props.PointerProperty(
+        type=ARAPFIELDS_PG_wrap, name="Wrap", description="Settings of the wrap, its target and landmarks"
     )
     bake: bpy.props.PointerProperty(
         type=ARAPFIELDS_PG_bake, name="Bake", description="Settings of bakes, and what the last one is"

@@ -37,6 +37,9 @@ ARAPFIELDS_PYTHON_TYPE(NormalsArgument,
 ARAPFIELDS_PYTHON_TYPE(StyleArgument, "arapfields._native.StyleName")
 ARAPFIELDS_PYTHON_TYPE(HandlesArgument, "collections.abc.Iterable[arapfields._native.Handle]")
 ARAPFIELDS_PYTHON_TYPE(CurveHandlesArgument, "collections.abc.Iterable[arapfields._native.CurveHandle]")
+ARAPFIELDS_PYTHON_TYPE(
+    LandmarksArgument,
+    "collections.abc.Iterable[tuple[arapfields.arrays.ArrayLike, arapfields.arrays.ArrayLike]]")
 ARAPFIELDS_PYTHON_TYPE(PathArgument, "str | bytes | os.PathLike[str] | os.PathLike[bytes]")
 ARAPFIELDS_PYTHON_TYPE(CallbackArgument, "collections.abc.Callable[[arapfields.reports.Iteration], object]")
 ARAPFIELDS_PYTHON_TYPE(EnergiesArgument,
@@ -49,6 +52,7 @@ ARAPFIELDS_PYTHON_TYPE(SurfaceSamplesResult, "arapfields._native.SurfaceSamples"
 ARAPFIELDS_PYTHON_TYPE(NeuralSdfResult, "arapfields._native.NeuralSdf")
 ARAPFIELDS_PYTHON_TYPE(FieldResult, "arapfields._native.DeformationField[arapfields.reports.SolveReport]")
 ARAPFIELDS_PYTHON_TYPE(RadialFieldResult, "arapfields._native.RadialField")
+ARAPFIELDS_PYTHON_TYPE(WrapResult, "arapfields._native.DeformationField[arapfields.reports.WrapReport]")
 ARAPFIELDS_PYTHON_TYPE(InverseResult, "arapfields._native.DeformationField[arapfields.reports.InverseReport]")
 ARAPFIELDS_PYTHON_TYPE(ExtractionResult, "arapfields.reports.Extraction[arapfields.reports.ExtractionReport]")
 ARAPFIELDS_PYTHON_TYPE(DeformedExtractionResult,

@@ -33,6 +33,7 @@ void bind_fields(py::module_& module);
 void bind_energies(py::module_& module);
 void bind_object_style(py::module_& module);
 void bind_solve(py::module_& module);
+void bind_wrap(py::module_& module);
 void bind_extraction(py::module_& module);
 void bind_live(py::module_& module);
 void bind_attachment(py::module_& module);

@@ -21,6 +21,7 @@ PYBIND11_MODULE(_native, module) {
   bind_solve(module);
   bind_extraction(module);
   bind_live(module);
+  bind_wrap(module);
   bind_attachment(module);
   bind_curves(module);
   bind_io(module);

@@ -27,6 +27,8 @@ Points unit_normals(PointsIn vertices, TrianglesIn triangles) {
 
 MeshSdf::MeshSdf(PointsIn vertices, TrianglesIn triangles, const Progress& progress)
     : frame_(mesh_frame(vertices, triangles)),
+      vertices_(vertices),
+      triangles_(triangles),
       distance_(vertices, triangles, progress),
       normals_(unit_normals(frame_.to_cube(vertices), triangles)) {}
 

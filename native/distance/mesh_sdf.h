@@ -22,6 +22,9 @@ class ARAPFIELDS_EXPORT MeshSdf final : public ImplicitFunction {
   /// jumps from one sign to the other.
   bool continuous() const override { return distance_.is_closed(); }
 
+  /// The soup itself.
+  const Points& vertices() const { return vertices_; }
+  const Triangles& triangles() const { return triangles_; }
   /// Distances (p) at points (p,3), all in mesh units, anywhere in space.
   Vector distances(PointsIn points, const Progress& progress = {}) const;
   /// ∂distance/∂point (p,3) of the same: unit length, pointing outwards; on a triangle its normal.
@@ -31,6 +34,8 @@ class ARAPFIELDS_EXPORT MeshSdf final : public ImplicitFunction {
   Vector evaluate(PointsIn points, Points* gradients, const Progress& progress) const;
 
   Frame frame_;
+  Points vertices_;
+  Triangles triangles_;
   SignedDistance distance_;
   Points normals_;  // of the triangles, unit length; 0 of degenerate ones
 };

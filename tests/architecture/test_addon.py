@@ -24,6 +24,7 @@ ORDER = [
     "stylize",
     "live",
     "pin_tool",
+    "wrap",
 ]
 ORDER += ["animation", "commands"]
 TOP = {

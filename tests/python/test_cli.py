@@ -30,7 +30,9 @@ def made(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("verb", ["", "fit", "sample", "deform", "stylize", "extract", "warp", "grid"])
+@pytest.mark.parametrize(
+    "verb", ["", "fit", "sample", "deform", "stylize", "wrap", "extract", "warp", "grid"]
+)
 def test_help_has_examples(verb, capsys):
     assert run(*([verb] if verb else []), "--help") == 0
     text = capsys.readouterr().out
@@ -38,11 +40,8 @@ def test_help_has_examples(verb, capsys):
 
 
 def test_every_option_is_a_flag(capsys):
-    for verb, structure in {
-        "fit": af.FitOptions,
-        "deform": af.DeformOptions,
-        "stylize": af.StylizeOptions,
-    }.items():
+    structures = {"fit": af.FitOptions, "deform": af.DeformOptions, "stylize": af.StylizeOptions}
+    for verb, structure in {**structures, "wrap": af.WrapOptions}.items():
         run(verb, "--help")
         text = capsys.readouterr().out
         missing = [name for name in structure.fields if "--" + name.replace("_", "-") not in text]

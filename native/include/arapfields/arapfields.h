@@ -19,3 +19,4 @@
 #include "arapfields/stylize.h"
 #include "arapfields/task.h"
 #include "arapfields/types.h"
+#include "arapfields/wrap.h"

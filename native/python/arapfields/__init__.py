@@ -37,6 +37,7 @@ from ._native import (
     StylizeOptions,
     SurfaceSamples,
     Task,
+    WrapOptions,
     __version__,
     arap_energy,
     deform,
@@ -61,6 +62,7 @@ from ._native import (
     thread_count,
     train_inverse,
     winding_number,
+    wrap,
 )
 from .arrays import ArrayLike
 from .cmake import cmake_dir
@@ -80,6 +82,7 @@ from .reports import (
     Report,
     SampleReport,
     SolveReport,
+    WrapReport,
 )
 
 # The shorter and the older names.
@@ -142,6 +145,8 @@ __all__ = [
     "StylizeOptions",
     "SurfaceSamples",
     "Task",
+    "WrapOptions",
+    "WrapReport",
     "__version__",
     "arap_energy",
     "cmake_dir",
@@ -169,4 +174,5 @@ __all__ = [
     "thread_count",
     "train_inverse",
     "winding_number",
+    "wrap",
 ]

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What calls measure on the way: a frozen class for each kind of report.
 
-Energies are those of the unit cube, lengths are the mesh's. `report.stretch` and `report["stretch"]` read the
-same number; to_dict() gives plain numbers, texts and lists, for JSON.
+Energies are the unit cube's, lengths the mesh's. `report["bend"]` reads report.bend; to_dict() is for JSON.
 """
 
 import dataclasses
@@ -248,3 +247,6 @@ class Iteration:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "terms", MappingProxyType(dict(self.terms)))
+
+
+from .wrap_report import WrapReport as WrapReport  # noqa: E402  it needs Report

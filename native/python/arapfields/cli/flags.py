@@ -20,11 +20,7 @@ def solve_flags(parser):
     extraction_flags(parser)
     inverse_flag(parser)
     sdf_flag(parser)
-    stiffness = parser.add_argument_group(
-        "stiffness: a number for each of the mesh's vertices (.txt, .csv or .npy), 1 for what is not painted"
-    )
-    stiffness.add_argument("--weights", metavar="FILE", help="how much it resists all change of shape")
-    stiffness.add_argument("--bend-weights", metavar="FILE", help="how much it resists bending")
+    stiffness_flags(parser)
     handles = parser.add_argument_group(
         "handles (x, y, z in the mesh's coordinates; inf and -inf leave a side of a box open)"
     )
@@ -82,6 +78,14 @@ def solve_flags(parser):
         **settings,
         help="one point of the surface goes there",
     )
+
+
+def stiffness_flags(parser):
+    stiffness = parser.add_argument_group(
+        "stiffness: a number for each of the mesh's vertices (.txt, .csv or .npy), 1 for what is not painted"
+    )
+    stiffness.add_argument("--weights", metavar="FILE", help="how much it resists all change of shape")
+    stiffness.add_argument("--bend-weights", metavar="FILE", help="how much it resists bending")
 
 
 def extraction_flags(parser):

@@ -7,7 +7,7 @@ import sys
 
 import arapfields as af
 
-from . import usd, verbs
+from . import usd, verbs, wrapping
 from .animate import animate
 from .flags import (
     MESH,
@@ -56,7 +56,7 @@ def _parser():
         "--cmake-dir", action=CMakeDir, nargs=0, help="print where CMake finds the C++ package, and exit"
     )
     added = parser.add_subparsers(dest="verb", metavar="VERB", required=True, parser_class=OneLineParser)
-    for add in (_fit, _sample, _deform, _stylize, _extract, _warp, _grid, _animate):
+    for add in (_fit, _sample, _deform, _stylize, _wrap, _extract, _warp, _grid, _animate):
         verb = add(added)
         verb.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
     return parser
@@ -64,13 +64,8 @@ def _parser():
 
 def _verb(added, name, run, summary, *examples):
     shown = "examples:\n" + "\n".join(f"  arapfields {name} {example}" for example in examples)
-    parser = added.add_parser(
-        name,
-        help=summary,
-        description=summary,
-        epilog=shown,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = added.add_parser(name, help=summary, description=summary, epilog=shown, formatter_class=raw)
     parser.set_defaults(run=run)
     return parser
 
@@ -141,6 +136,12 @@ def _stylize(added):
     solve_flags(parser)
     style_flags(parser)
     add_option_flags(parser, "stylize", "stylization")
+    return parser
+
+
+def _wrap(added):
+    parser = _verb(added, "wrap", wrapping.wrap, wrapping.SUMMARY, *wrapping.EXAMPLES)
+    wrapping.wrap_flags(parser)
     return parser
 
 

@@ -21,27 +21,27 @@ SOURCES = (*files.MESH_SUFFIXES, *files.STATE_SUFFIXES)
 def fit(args):
     with Outputs() as outputs:
         output = outputs.check(args.output, files.STATE_SUFFIXES, "--output")
-        report = _report_place(outputs, args)
+        report = report_place(outputs, args)
         options = given_options(af.FitOptions, args)
         vertices, triangles = files.read_mesh(args.input)
         sdf = _fitted(vertices, triangles, options, args)
         outputs.write(output, sdf.save)
-        _write_report(outputs, report, sdf.report)
-    _summary(args, f"wrote {args.output}", sdf.report)
+        write_report(outputs, report, sdf.report)
+    summary(args, f"wrote {args.output}", sdf.report)
 
 
 def sample(args):
     with Outputs() as outputs:
         output = outputs.check(args.output, files.CLOUD_SUFFIXES, "--output")
         field = files.read_field(args.deformed_by) if args.deformed_by else None
-        samples = _samples(_Source(args), args.count, args.seed, args)
-        rows, normals = samples.points, samples.normals
+        drawn = samples(Source(args), args.count, args.seed, args)
+        rows, normals = drawn.points, drawn.normals
         if field is not None:
             normals = np.linalg.solve(np.swapaxes(field.jacobian(rows), 1, 2), normals[..., None])[..., 0]
             normals /= np.linalg.norm(normals, axis=1, keepdims=True)
             rows = field(rows)
         outputs.write(output, lambda path: files.write_cloud(path, rows, normals))
-    _summary(args, f"wrote {len(rows)} points to {args.output}")
+    summary(args, f"wrote {len(rows)} points to {args.output}")
 
 
 def deform(args):
@@ -89,9 +89,9 @@ def extract(args):
     with Outputs() as outputs:
         output = outputs.check(args.output, files.MESH_SUFFIXES, "--output")
         field = files.read_field(args.deformed_by) if args.deformed_by else None
-        vertices, triangles = _extracted(_Source(args).sdf(), args, field)
+        vertices, triangles = _extracted(Source(args).sdf(), args, field)
         outputs.write(output, lambda path: files.write_mesh(path, vertices, triangles))
-    _summary(args, f"wrote {len(vertices)} vertices and {len(triangles)} triangles to {args.output}")
+    summary(args, f"wrote {len(vertices)} vertices and {len(triangles)} triangles to {args.output}")
 
 
 def warp(args):
@@ -107,7 +107,7 @@ def warp(args):
             return rest + args.share * (af.Attachment(body, rest).positions(field) - rest)
 
         outputs.write(output, lambda path: write(path, move))
-    _summary(args, f"wrote {args.output}")
+    summary(args, f"wrote {args.output}")
 
 
 def grid(args):
@@ -115,16 +115,16 @@ def grid(args):
         output = outputs.check(args.output, grids.SUFFIXES, "--output")
         if output.suffix.lower() == ".vdb":
             grids.openvdb_module()
-        function = _Source(args).distances()
+        function = Source(args).distances()
         made = with_progress(
             "grid", lambda task: grids.sdf_grid(function, args.resolution, task=task), args.quiet
         )
         outputs.write(output, lambda path: grids.save_grid(path, *made))
     shape = " × ".join(map(str, made[0].shape))
-    _summary(args, f"wrote {shape} distances, {made[2]:.4g} apart, to {args.output}")
+    summary(args, f"wrote {shape} distances, {made[2]:.4g} apart, to {args.output}")
 
 
-class _Source:
+class Source:
     """A verb's input: a mesh or a saved signed distance, and what can be made of each."""
 
     def __init__(self, args):
@@ -147,7 +147,7 @@ def _fitted(vertices, triangles, options, args):
     return with_progress("fit", lambda task: af.fit_sdf(vertices, triangles, options, task=task), args.quiet)
 
 
-def _samples(source, count, seed, args):
+def samples(source, count, seed, args):
     painted = {name: getattr(args, name) for name in ("weights", "bend_weights") if getattr(args, name, None)}
     if source.mesh:
         count_of = len(source.mesh[0])
@@ -193,15 +193,15 @@ def _solve(args, solve, seed, needs_handles):
         }
         if not places:
             raise af.InvalidInput("no output: give --output, --surface or --save-field")
-        report = _report_place(outputs, args)
+        report = report_place(outputs, args)
         described = (read_handles(args.handles) if args.handles else []) + (args.flagged or [])
-        source = _Source(args)
+        source = Source(args)
         if source.mesh is None and "--output" in places:
             raise af.InvalidInput(f"--output: {source.path} holds no mesh to move; use --surface")
-        samples = _samples(source, given(args, args.verb, "samples"), seed, args)
-        bounds = np.array([samples.points.min(0), samples.points.max(0)])
+        points_on = samples(source, given(args, args.verb, "samples"), seed, args)
+        bounds = np.array([points_on.points.min(0), points_on.points.max(0)])
         handles = build_handles(described, bounds) if described or needs_handles else []
-        field = with_progress(args.verb, lambda task: solve(samples, handles, task), args.quiet)
+        field = with_progress(args.verb, lambda task: solve(points_on, handles, task), args.quiet)
         if "--output" in places:
             outputs.write(
                 places["--output"],
@@ -212,15 +212,15 @@ def _solve(args, solve, seed, needs_handles):
             outputs.write(places["--surface"], lambda path: files.write_mesh(path, *surface))
         if "--save-field" in places:
             outputs.write(places["--save-field"], field.save)
-        _write_report(outputs, report, field.report)
-    _summary(args, "wrote " + ", ".join(str(path) for path in places.values()), field.report)
+        write_report(outputs, report, field.report)
+    summary(args, "wrote " + ", ".join(str(path) for path in places.values()), field.report)
 
 
-def _report_place(outputs, args):
+def report_place(outputs, args):
     return outputs.check(args.report, (".json",), "--report") if args.report else None
 
 
-def _write_report(outputs, place, report):
+def write_report(outputs, place, report):
     if place is not None:
         outputs.write(
             place,
@@ -233,7 +233,7 @@ def _print_notes(args, report):
         print(f"note: {note}", file=sys.stderr)
 
 
-def _summary(args, text, report=None):
+def summary(args, text, report=None):
     if args.quiet:
         return
     _print_notes(args, report)

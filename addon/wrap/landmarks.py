@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Landmarks: pairs of Empties, one on the source at rest and one on the target, which move with these."""
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ..blender.object_references import in_scene, settings_of
+from ..core.errors import UserError
+from ..core.geometry.spaces import transform
+from ..handles.empties import make_empty, matrix_of
+from ..pin_tool import places
+
+SIZE = 0.02  # of an Empty, as a share of the object's
+
+
+def target_of(source, name=""):
+    """The object that a source is wrapped onto; UserError where there is none that will do."""
+    target = bpy.data.objects.get(name) if name else settings_of(source).wrap.onto
+    if name and target is None:
+        raise UserError("there is no object {name}", name=name)
+    if not in_scene(target):
+        raise UserError("choose the object to wrap {name} onto", name=source.name)
+    if target.type != "MESH" or target == source:
+        raise UserError("{name} is no other mesh object to wrap onto", name=target.name)
+    return target
+
+
+def refusal(source):
+    """Why there is nothing to wrap onto, as a UserError; None where there is."""
+    try:
+        target_of(source)
+    except UserError as error:
+        return error
+    return None
+
+
+def used(source):
+    """The entries whose Empties are both there."""
+    return [e for e in settings_of(source).wrap.landmarks if in_scene(e.rest) and in_scene(e.on_target)]
+
+
+def read(source, space):
+    """[(rest, on_target)] in solve space, (3,) each."""
+    found = []
+    for entry in used(source):
+        ends = [matrix_of(item)[:3, 3][None] for item in (entry.rest, entry.on_target)]
+        found.append(tuple(transform(space.world_to_solve, end)[0] for end in ends))
+    return found
+
+
+def place(context, source, target, rest, on_target):
+    """A new pair at the places of both surfaces that are nearest to two in the world, (3,) each."""
+    number = len(settings_of(source).wrap.landmarks) + 1
+    ends = [
+        stand(context, source, places.find(context, source, rest, 0.0).rest, f"Landmark {number}"),
+        stand(
+            context,
+            target,
+            places.find(context, target, on_target, 0.0).now,
+            f"Landmark {number} {target.name}",
+        ),
+    ]
+    entry = settings_of(source).wrap.landmarks.add()
+    entry.rest, entry.on_target = ends
+    return entry
+
+
+def stand(context, owner, where, name):
+    """An Empty at a place in the world that moves with its owner."""
+    world = matrix_of(owner)
+    corners = transform(world, np.array(owner.bound_box))
+    size = SIZE * float(np.linalg.norm(np.ptp(corners, axis=0))) or 1.0
+    empty = make_empty(context, owner, Matrix.Translation(where.tolist()), size, name)
+    empty.empty_display_type, empty.show_in_front = "SPHERE", True
+    matrix = empty.matrix_world.copy()
+    empty.parent = owner
+    empty.matrix_world = matrix
+    return empty
+
+
+def remove(source, index):
+    """Removes a pair with its Empties."""
+    entries = settings_of(source).wrap.landmarks
+    for item in (entries[index].rest, entries[index].on_target):
+        if item is not None:
+            bpy.data.objects.remove(item)
+    entries.remove(index)

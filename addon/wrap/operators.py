@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+import numpy as np
+
+from ..blender import mesh_arrays
+from ..blender.host import has_window
+from ..blender.language import translated
+from ..blender.object_references import settings_of, source_of
+from ..blender.presets import preset_classes
+from ..blender.property_definitions import annotations, effective_values
+from ..blender.source_operator import SourceOperator
+from ..core.errors import UserError
+from ..core.geometry.spaces import space_of, transform
+from ..core.runtime import native
+from ..core.settings.wrapping import WRAP
+from ..deform.solve_job import SolveOperator, plan_solve_job
+from ..handles.empties import matrix_of
+from ..names import Op
+from ..properties.item import output, refine_thin, resolution, surface, target
+from ..surface.source_surface import build_options
+from . import landmarks
+
+onto = bpy.props.StringProperty(
+    name="Onto",
+    description="Name of the mesh object to wrap onto; empty for the one in the settings",
+    options={"SKIP_SAVE"},
+)
+
+
+class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
+    """Lay the object onto another, as rigidly as possible; UVs, groups and shape keys come along"""
+
+    bl_idname = Op.WRAP
+    bl_label = "Wrap"
+    bl_options = {"UNDO"}
+    title = "Wrap"
+    guide = "wrap"
+
+    __annotations__ = {
+        **annotations(WRAP, options={"SKIP_SAVE"}),
+        "onto": onto,
+        "output": output(options={"SKIP_SAVE"}),
+        "surface": surface(options={"SKIP_SAVE"}),
+        "target": target(options={"SKIP_SAVE"}),
+        "resolution": resolution(options={"SKIP_SAVE"}),
+        "refine_thin": refine_thin(options={"SKIP_SAVE"}),
+    }
+
+    @classmethod
+    def refuses(cls, source):
+        """As the settings ask; a script may name another target."""
+        return super().refuses(source) or (landmarks.refusal(source) if has_window() else None)
+
+    def plan(self, context, source, weights):
+        context.view_layer.update()
+        values = effective_values(WRAP, settings_of(source).wrap, self)
+        af = native.library()
+        options = build_options(af.WrapOptions, values)
+        space = space_of(source.matrix_world, source.name)
+        other = landmarks.target_of(source, self.onto)
+        pairs = landmarks.read(source, space)
+        vertices, triangles = read_target(context, other, space)
+
+        def solve(tracker, rest, samples, weight):
+            task = tracker.start("Wrapping", weight)
+            field = af.wrap(samples, af.MeshSdf(vertices, triangles), pairs, options, task=task)
+            tracker.warnings += [UserError("note: {text}", text=text) for text in field.report.notes]
+            return field
+
+        return plan_solve_job(context, self, source, "WRAP", values["samples"], values["seed"], solve)
+
+
+def read_target(context, target, space):
+    """(n, 3) vertices and (m, 3) triangles of the target as it is shown, in solve space."""
+    mesh = mesh_arrays.read(context, target)
+    to_solve = space.world_to_solve @ matrix_of(target)
+    mirrored = np.linalg.det(to_solve[:3, :3]) < 0
+    return transform(to_solve, mesh.vertices), mesh.triangles[:, ::-1] if mirrored else mesh.triangles
+
+
+class ARAPFIELDS_OT_add_landmark(SourceOperator, bpy.types.Operator):
+    """Add a pair of landmarks, at the places of both surfaces that are nearest to two locations"""
+
+    bl_idname = Op.ADD_LANDMARK
+    bl_label = "Add Landmark"
+    bl_options = {"REGISTER", "UNDO"}
+    guide = "wrap"
+
+    rest: bpy.props.FloatVectorProperty(
+        name="Landmark", description="Place on the object, in the world", subtype="TRANSLATION"
+    )
+    on_target: bpy.props.FloatVectorProperty(
+        name="On the Target", description="Place on the target, in the world", subtype="TRANSLATION"
+    )
+
+    def execute(self, context):
+        source = source_of(context)
+        try:
+            target = landmarks.target_of(source)
+            landmarks.place(context, source, target, np.array(self.rest), np.array(self.on_target))
+        except (UserError, ValueError) as error:
+            self.report({"ERROR"}, translated(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class ARAPFIELDS_OT_remove_landmark(SourceOperator, bpy.types.Operator):
+    """Remove a pair of landmarks with its Empties"""
+
+    bl_idname = Op.REMOVE_LANDMARK
+    bl_label = "Remove Landmark"
+    bl_options = {"INTERNAL", "UNDO"}
+    guide = "wrap"
+
+    index: bpy.props.IntProperty(name="Row", description="Which of them, the first is 0", min=0)
+
+    def execute(self, context):
+        source = source_of(context)
+        if self.index >= len(settings_of(source).wrap.landmarks):
+            return {"CANCELLED"}
+        landmarks.remove(source, self.index)
+        return {"FINISHED"}
+
+
+CLASSES = [
+    ARAPFIELDS_OT_wrap,
+    ARAPFIELDS_OT_add_landmark,
+    ARAPFIELDS_OT_remove_landmark,
+    *preset_classes("wrap", "Wrap", WRAP),
+]

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+
+from ..blender import modifier_stack
+from ..blender.section import Advanced, Section, job_button, note, presets, settings_column
+from ..core.settings.wrapping import WRAP
+from ..deform.solve_job import placement_refusal
+from ..field_modifier import inputs
+from ..names import Op
+from . import landmarks
+
+
+class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
+    bl_label = "Wrap"
+    bl_idname = "ARAPFIELDS_PT_wrap"
+    bl_order = 4
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header_preset(self, context):
+        presets(self.layout, "wrap")
+
+    def fill(self, context, source, settings):
+        layout, wrap = self.layout, settings.wrap
+        layout.prop(wrap, "onto")
+        layout.operator(Op.CLICK_LANDMARKS, icon="PINNED")
+        for index, entry in enumerate(wrap.landmarks):
+            row = layout.row(align=True)
+            row.use_property_split = False
+            row.prop(entry, "rest", text="")
+            row.prop(entry, "on_target", text="")
+            row.operator(Op.REMOVE_LANDMARK, text="", icon="X").index = index
+        settings_column(layout, wrap, WRAP, advanced=False)
+        job_button(layout, Op.WRAP, "MOD_SHRINKWRAP")
+        factor_slider(layout, source)
+        note(layout, landmarks.refusal(source), placement_refusal(source, "WRAP"))
+
+
+def factor_slider(layout, source):
+    """How far the field's modifier takes the object, from rest to the result."""
+    modifier = modifier_stack.find(source)
+    if modifier is None:
+        return
+    found = inputs.slot(modifier, "Factor")
+    if found is not None:
+        layout.prop(found, "value", text="Factor", slider=True)
+    else:
+        layout.prop(modifier, f'["{inputs.identifier(modifier, "Factor")}"]', text="Factor", slider=True)
+
+
+class ARAPFIELDS_PT_wrap_settings(Advanced, bpy.types.Panel):
+    bl_label = "Wrap Settings"
+    bl_idname = "ARAPFIELDS_PT_wrap_settings"
+    bl_order = 3
+
+    def fill(self, context, source, settings):
+        settings_column(self.layout, settings.wrap, WRAP, advanced=True)
+
+
+CLASSES = [ARAPFIELDS_PT_wrap, ARAPFIELDS_PT_wrap_settings]

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a source's wrap is: its target, pairs of landmarks, settings."""
+
+import bpy
+
+from ..blender.property_definitions import annotations
+from ..core.settings.wrapping import WRAP
+
+
+def is_target(group, item):
+    return item.type == "MESH" and item != group.id_data
+
+
+class ARAPFIELDS_PG_landmark(bpy.types.PropertyGroup):
+    rest: bpy.props.PointerProperty(
+        type=bpy.types.Object, name="Landmark", description="Empty on the object at rest"
+    )
+    on_target: bpy.props.PointerProperty(
+        type=bpy.types.Object, name="On the Target", description="Empty where it belongs on the target"
+    )
+
+
+class ARAPFIELDS_PG_wrap(bpy.types.PropertyGroup):
+    __annotations__ = {
+        "onto": bpy.props.PointerProperty(
+            type=bpy.types.Object,
+            poll=is_target,
+            name="Onto",
+            description="Mesh object that this one is wrapped onto; it may be open and broken, as scans are",
+        ),
+        "landmarks": bpy.props.CollectionProperty(
+            type=ARAPFIELDS_PG_landmark,
+            name="Landmarks",
+            description="Pairs of places that belong together",
+        ),
+        **annotations(WRAP),
+    }
+
+
+CLASSES = [ARAPFIELDS_PG_landmark, ARAPFIELDS_PG_wrap]

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The verb wrap: a mesh onto a target, with pairs of landmarks from flags or a file."""
+
+import json
+
+import numpy as np
+
+import arapfields as af
+
+from .._files import existing_file
+from . import files, verbs
+from .flags import SOURCE, report_flag, sdf_flag, stiffness_flags
+from .handles import triple
+from .options import add_option_flags, given, given_options
+from .running import Outputs, with_progress
+
+SUMMARY = "lay a shape onto another, as rigidly as possible"
+EXAMPLES = (
+    "template.obj scan.ply -o wrapped.obj",
+    "shirt.obj body.obj -o worn.obj --landmark 0,0,1.4 0,0.02,1.5 --landmark 0.3,0,1.3 0.35,0,1.4",
+    "template.obj scan.safetensors --save-field wrap.safetensors --landmarks pairs.json",
+)
+LANDMARKS = (".json", ".txt", ".csv", ".npy")
+
+
+def wrap_flags(parser):
+    parser.add_argument("input", help=SOURCE)
+    parser.add_argument("target", help=f"what it is laid onto; {SOURCE}; a mesh may be open and broken")
+    outputs = parser.add_argument_group("outputs (one or more)")
+    outputs.add_argument("-o", "--output", metavar="FILE", help="the input mesh with its vertices moved")
+    outputs.add_argument("--save-field", metavar="FILE", help=".safetensors with the deformation field")
+    report_flag(outputs)
+    landmarks = parser.add_argument_group("landmarks: places of both that belong together")
+    landmarks.add_argument(
+        "--landmark",
+        nargs=2,
+        type=triple,
+        metavar=("REST", "ON_TARGET"),
+        action="append",
+        help="a pair of places as x,y,z",
+    )
+    landmarks.add_argument(
+        "--landmarks",
+        metavar="FILE",
+        help="pairs, six numbers each: .json, .npy, or rows of text (.txt, .csv)",
+    )
+    sdf_flag(parser)
+    stiffness_flags(parser)
+    add_option_flags(parser, "wrap", "wrap")
+
+
+def wrap(args):
+    options = given_options(af.WrapOptions, args)
+    with Outputs() as outputs:
+        places = {
+            flag: outputs.check(path, suffixes, flag)
+            for flag, path, suffixes in (
+                ("--output", args.output, files.MESH_SUFFIXES),
+                ("--save-field", args.save_field, files.STATE_SUFFIXES),
+            )
+            if path is not None
+        }
+        if not places:
+            raise af.InvalidInput("no output: give --output or --save-field")
+        report = verbs.report_place(outputs, args)
+        pairs = (read_landmarks(args.landmarks) if args.landmarks else []) + (args.landmark or [])
+        source = verbs.Source(args)
+        if source.mesh is None and "--output" in places:
+            raise af.InvalidInput(f"--output: {source.path} holds no mesh to move; use --save-field")
+        target = read_target(args.target)
+        samples = verbs.samples(source, given(args, "wrap", "samples"), options.seed, args)
+        field = with_progress(
+            "wrap", lambda task: af.wrap(samples, target, pairs, options, task=task), args.quiet
+        )
+        if "--output" in places:
+            outputs.write(
+                places["--output"],
+                lambda path: files.write_moved_mesh(path, source.path, source.mesh, field),
+            )
+        if "--save-field" in places:
+            outputs.write(places["--save-field"], field.save)
+        verbs.write_report(outputs, report, field.report)
+    verbs.summary(args, "wrote " + ", ".join(str(path) for path in places.values()), field.report)
+
+
+def read_target(path):
+    """A mesh's exact distance, or a signed distance that fit saved."""
+    path = existing_file(path, verbs.SOURCES)
+    return af.MeshSdf(*files.read_mesh(path)) if files.is_mesh(path) else files.read_sdf(path)
+
+
+def read_landmarks(path):
+    """Pairs of places (3,): rows of six numbers, or JSON [[[x, y, z], [x, y, z]], …]."""
+    path = existing_file(path, LANDMARKS)
+    with files.readable(path, "pairs of places"):
+        if path.suffix.lower() == ".json":
+            rows = np.array(json.loads(path.read_text()), float)
+        elif path.suffix.lower() == ".npy":
+            rows = np.array(np.lib.format.open_memmap(path, mode="r"), float)
+        else:
+            rows = np.loadtxt(path.read_text().replace(",", " ").splitlines(), ndmin=2)
+    if rows.size == 0:
+        return []
+    if rows.shape[1:] not in ((2, 3), (6,)):
+        raise af.InvalidInput(
+            f"{path}: holds an array of shape {rows.shape}; pairs of places are needed, six numbers each"
+        )
+    return list(rows.reshape(-1, 2, 3))

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The verb wrap."""
+
+import json
+
+import numpy as np
+import pytest
+import trimesh
+import wrap_cases as cases
+from cli_cases import run
+
+import arapfields as af
+
+SMALL = ["--centers", "50", "--stages", "2", "--iterations", "5", "--samples", "1000", "--quiet"]
+
+
+@pytest.fixture
+def pair(tmp_path):
+    v, f = cases.figure(2)
+    there = cases.moved(v)
+    trimesh.Trimesh(v, f, process=False).export(tmp_path / "template.obj")
+    trimesh.Trimesh(there, f, process=False).export(tmp_path / "scan.ply")
+    rows = [(v[i], there[i]) for i in (0, 1, 20, 50)]
+    (tmp_path / "pairs.json").write_text(json.dumps(np.array(rows).tolist()))
+    np.savetxt(tmp_path / "pairs.txt", np.array(rows).reshape(-1, 6))
+    np.save(tmp_path / "pairs.npy", np.array(rows))
+    return tmp_path
+
+
+@pytest.mark.parametrize("landmarks", ["json", "txt", "npy"])
+def test_a_mesh_goes_onto_another(pair, landmarks):
+    arguments = [
+        "-o",
+        pair / "out.obj",
+        "--save-field",
+        pair / "wrap.safetensors",
+        "--report",
+        pair / "r.json",
+    ]
+    flags = ["--landmarks", pair / f"pairs.{landmarks}", *SMALL]
+    assert run("wrap", pair / "template.obj", pair / "scan.ply", *arguments, *flags) == 0
+    out, scan = (trimesh.load(pair / name, process=False) for name in ("out.obj", "scan.ply"))
+    report = json.loads((pair / "r.json").read_text())
+    away = np.abs(af.MeshSdf(scan.vertices, scan.faces)(out.vertices)).mean()
+    assert away < 0.01 * report["diagonal"]
+    assert len(report["landmarks"]) == 4 and report["to_target_mean"] < 0.01
+    template = trimesh.load(pair / "template.obj", process=False)
+    field = af.DeformationField.load(pair / "wrap.safetensors")
+    assert np.abs(field(template.vertices) - out.vertices).max() < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ([], "no output"),
+        (["-o", "out.obj", "--landmarks", "gone.json"], "gone.json"),
+        (["-o", "out.obj", "--landmarks", "bad.json"], "pairs of places"),
+        (["-o", "out.obj", "--landmark", "99,0,0", "0,0,0"], "landmarks[0]"),
+        (["-o", "out.obj", "--closeness", "-1"], "closeness"),
+    ],
+)
+def test_bad_input_is_named_and_nothing_is_written(pair, arguments, said, capsys, monkeypatch):
+    monkeypatch.chdir(pair)
+    (pair / "bad.json").write_text("[[1, 2, 3]]")
+    assert run("wrap", "template.obj", "scan.ply", *arguments, "--quiet") == 2
+    assert said in capsys.readouterr().err
+    assert not (pair / "out.obj").exists()

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One surface wrapped onto another: found again, partly there, refused; small shapes."""
+
+import numpy as np
+import pytest
+import wrap_cases as cases
+
+import arapfields as af
+
+# Known fields are found again, in % of the target's diagonal: what the coarse triangles of the shapes leave.
+FOUND_AGAIN = 0.5
+
+
+@pytest.fixture(scope="module")
+def figure():
+    return cases.figure(3)
+
+
+@pytest.fixture(scope="module")
+def samples(figure):
+    return af.sample_mesh(*figure, 1500)
+
+
+@pytest.mark.parametrize("landmarks", [0, 4])
+def test_a_moved_scaled_and_bent_shape_is_found_again(figure, samples, landmarks):
+    v, f = figure
+    there = cases.moved(v)
+    chosen = np.linspace(0, len(v) - 1, landmarks, dtype=int)
+    options = af.WrapOptions(**cases.SMALL)
+    field = af.wrap(samples, af.MeshSdf(there, f), [(v[i], there[i]) for i in chosen], options)
+    (mean, _), (back, _) = cases.distances(field(v), f, there, f, 2000)
+    assert max(mean, back) < FOUND_AGAIN
+    report = field.report
+    assert report.flipped_share == 0 and report.matched_share == 1 and not report.notes
+    assert abs(report.scale - 3) < 0.2 and len(report.landmarks) == landmarks
+    assert abs(report.diagonal / np.linalg.norm(np.ptp(there, axis=0)) - 1) < 0.02
+    away = np.linalg.norm(field(v) - there, axis=1).mean() / report.diagonal
+    assert away < 0.08  # its points too, nearly: nothing but rigidity keeps them from sliding along it
+
+
+def test_any_implicit_function_is_a_target(samples):
+    class Ball(af.ImplicitFunction):
+        def __call__(self, points):
+            return np.linalg.norm(points, axis=1) - 0.6
+
+    field = af.wrap(samples, Ball(), [], af.WrapOptions(alignment="similar", **cases.SMALL))
+    places = field(samples.points)
+    assert abs(np.linalg.norm(places, axis=1) - 0.6).mean() < 0.02
+    assert any("not alike" in note for note in field.report.notes)
+
+
+def test_what_an_open_target_lacks_keeps_its_shape(figure, samples):
+    v, f = figure
+    half = f[(v[f].mean(1)[:, 0] < 0.2)]
+    grown = v * [1, 1.1, 1.1]
+    options = af.WrapOptions(alignment="none", **cases.SMALL)
+    field = af.wrap(samples, af.MeshSdf(grown, half), [], options)
+    report = field.report
+    assert 0.3 < report.matched_share < 0.8
+    assert report.from_target_mean < 0.01
+    nose = v[v[:, 0] > 1.0]
+    after = field(nose)
+    rest, now = nose - nose.mean(0), after - after.mean(0)
+    turned = rest @ af.rigid_motion(rest, now)[:3, :3].T
+    assert np.abs(turned - now).max() < 0.1 * np.abs(rest).max()
+
+
+def test_no_alignment_leaves_the_surface_where_it_lies(figure, samples):
+    v, f = figure
+    field = af.wrap(samples, af.MeshSdf(v, f), [], af.WrapOptions(alignment="none", **cases.SMALL))
+    assert np.linalg.norm(field(v) - v, axis=1).max() < 0.1 and field.report.scale == pytest.approx(1)
+
+
+def test_a_field_is_saved_and_read(figure, samples, tmp_path):
+    v, f = figure
+    field = af.wrap(samples, af.MeshSdf(cases.moved(v), f), [], af.WrapOptions(**cases.SMALL))
+    field.save(tmp_path / "wrap.safetensors")
+    again = af.DeformationField.load(tmp_path / "wrap.safetensors")
+    assert np.array_equal(again(v), field(v))
+
+
+def test_landmarks_that_cannot_be_meant_are_named(figure, samples):
+    v, f = figure
+    sdf, options = af.MeshSdf(v, f), af.WrapOptions(**cases.SMALL)
+    far = [1.0, 9.0, 0.0]
+    for landmarks, named in (
+        ([(v[0], v[0]), (far, v[1])], r"landmarks\[1\]: its place at rest"),
+        ([(v[0], far)], r"landmarks\[0\]: its place on the target"),
+        ([(v[0], [np.nan, 0, 0])], r"landmarks\[0\]"),
+        ([(v[0], v[0]), (v[0], v[1])], r"landmarks\[0\] and landmarks\[1\].*one place at rest"),
+        ([(v[0], v[0]), (v[1], v[0])], r"landmarks\[0\] and landmarks\[1\].*two places at rest"),
+        ([(v[0],)], r"landmarks\[0\]"),
+        ([v[0]], r"landmarks\[0\]"),
+        (5, "landmarks"),
+    ):
+        with pytest.raises(af.InvalidInput, match=named):
+            af.wrap(samples, sdf, landmarks, options)
+
+
+def test_exchanged_sides_are_noted(figure, samples):
+    v, f = figure
+    ahead, up, aside = np.array([1, 0, 0]), np.array([0, 0.6, 0.8]), np.array([0, 0.8, -0.6])
+    ends = [v[np.argmax(v @ d)] for d in (ahead, -ahead, up, -up, aside, -aside)]
+    exchanged = [*ends[:4], ends[5], ends[4]]
+    options = af.WrapOptions(centers=20, stages=1, iterations=1)
+    field = af.wrap(samples, af.MeshSdf(v, f), list(zip(ends, exchanged, strict=True)), options)
+    assert any("mirror" in note for note in field.report.notes)
+
+
+def test_targets_without_a_surface_are_named(samples):
+    class Nothing(af.ImplicitFunction):
+        def __call__(self, points):
+            return np.ones(len(points))
+
+    with pytest.raises(af.InvalidInput, match="target"):
+        af.wrap(samples, Nothing(), [], af.WrapOptions(**cases.SMALL))
+    with pytest.raises(af.InvalidInput, match="target"):
+        af.wrap(samples, "scan.ply")
+    with pytest.raises(af.InvalidInput, match="vertices"):
+        af.MeshSdf(np.zeros((0, 3)), np.zeros((0, 3), int))
+
+
+def test_cancel_and_progress(figure, samples):
+    v, f = figure
+    task = af.Task()
+    task.cancel()
+    with pytest.raises(af.Cancelled):
+        af.wrap(samples, af.MeshSdf(v, f), task=task)
+    task = af.Task()
+    af.wrap(samples, af.MeshSdf(v, f), [], af.WrapOptions(**cases.SMALL), task=task)
+    assert task.progress == 1
+
+
+def test_the_number_of_threads_changes_nothing(figure, samples):
+    v, f = figure
+    target = af.MeshSdf(cases.moved(v), f)
+    found = [af.wrap(samples, target, [], af.WrapOptions(threads=n, **cases.SMALL))(v) for n in (1, 2)]
+    assert np.array_equal(*found)

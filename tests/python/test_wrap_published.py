@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Wraps of published shapes onto each other, by at most eight rough landmarks and defaults."""
+
+import numpy as np
+import pytest
+import wrap_cases as cases
+from network_oracle import Network
+
+import arapfields as af
+
+# By pair, in % of the target's diagonal: largest mean distance either way, and what 95 % keep. The aim is
+# 0.3 and 1.5; limbs that have to grow out of a trunk stay beyond. Then the share of crossing triangles:
+# parts that the target lacks are laid onto it.
+REACHED = {
+    "shiba spot": (0.3, 1.5, 0.05),
+    "spot shiba": (0.3, 1.5, 0.03),
+    "bunny frog": (1.2, 5.0, 0.16),
+    "whale spot": (0.8, 4.0, 0.09),
+}
+UPRIGHT = 0.99  # share of samples with det J > 0
+
+FACING = {"shiba": (1, 0, 0), "spot": (0, 1, 0), "bunny": (-1, 0, 0), "frog": (1, 0, 0), "whale": (0, -1, 0)}
+
+pytestmark = pytest.mark.slow
+
+
+def surface(data_dir, name, resolution=128):
+    """The published function, and its surface's vertices and triangles."""
+    layers = Network.published(data_dir / "neural_sdf" / f"{name}.pt").layers
+    sdf = af.NeuralSdf.from_layers(*layers)
+    return sdf, *af.extract_surface(sdf, resolution=resolution)
+
+
+def nearest(points, place):
+    return points[((points - place) ** 2).sum(1).argmin()]
+
+
+def clicks(v, facing):
+    """Rough places by name: feet, nose, tail, ears, as far as a shape of four legs has them."""
+    ahead = np.array(facing, float)
+    left = np.cross([0, 0, 1], ahead)
+    along, aside, up = v @ ahead, v @ left, v[:, 2]
+    low, middle = up < up.min() + 0.1 * np.ptp(up), np.median(aside)
+    amid = (along[low].min() + along[low].max()) / 2
+    found = {"nose": v[along.argmax()], "tail": v[along.argmin()]}
+    for side, sign in (("left", 1), ("right", -1)):
+        for place, way in (("front", 1), ("hind", -1)):
+            foot = low & ((along - amid) * way > 0) & ((aside - middle) * sign > 0)
+            found[f"{place} {side}"] = nearest(v, v[foot].mean(0) - [0, 0, 0.05])
+        half = (aside - middle) * sign > 0.02
+        found[f"ear {side}"] = v[half][up[half].argmax()]
+    return found
+
+
+def whale_clicks(v):
+    """Fins stand for front feet, flukes for hind ones."""
+    found = {"nose": v[v[:, 1].argmin()], "tail": nearest(v, [0, 0.6, 0.05])}
+    for side, sign in (("left", 1), ("right", -1)):
+        fin = (v[:, 1] < 0.1) & (v[:, 0] * sign > 0.1)
+        found[f"front {side}"] = v[fin][v[fin][:, 2].argmin()]
+        fluke = (v[:, 1] > v[:, 1].max() - 0.25) & (v[:, 0] * sign > 0)
+        found[f"hind {side}"] = v[fluke][(v[fluke][:, 0] * sign).argmax()]
+    return found
+
+
+def landmarks(name, v):
+    return whale_clicks(v) if name == "whale" else clicks(v, FACING[name])
+
+
+@pytest.mark.parametrize("pair", REACHED)
+def test_published_shapes_onto_each_other(data_dir, pair):
+    name, onto = pair.split()
+    _, v, f = surface(data_dir, name)
+    target, onto_v, onto_f = surface(data_dir, onto)
+    here, there = landmarks(name, v), landmarks(onto, onto_v)
+    pairs = [(here[place], there[place]) for place in here if place in there]
+    field = af.wrap(af.sample_mesh(v, f), target, pairs)
+    wrapped = field(v)
+    largest, farthest, crossing = REACHED[pair]
+    for mean, most in cases.distances(wrapped, f, onto_v, onto_f, 20000):
+        assert mean <= largest and most <= farthest
+    assert cases.crossing_share(wrapped, f) <= crossing
+    assert 1 - field.report.flipped_share >= UPRIGHT
+
+
+def test_a_cow_moved_scaled_and_bent_is_found_again_without_landmarks(data_dir):
+    _, v, f = surface(data_dir, "spot")
+    there = cases.moved(v)
+    field = af.wrap(af.sample_mesh(v, f), af.MeshSdf(there, f))
+    (mean, _), (back, _) = cases.distances(field(v), f, there, f, 20000)
+    assert max(mean, back) < 0.5 and not field.report.notes
+
+
+def test_half_a_cow_leaves_the_other_half_its_shape(data_dir):
+    _, v, f = surface(data_dir, "spot")
+    grown = v * [1.05, 1.05, 1.1]
+    half = f[v[f].mean(1)[:, 0] < 0]
+    field = af.wrap(af.sample_mesh(v, f), af.MeshSdf(grown, half), [], af.WrapOptions(alignment="rigid"))
+    other = v[v[:, 0] > 0.1]
+    after = field(other)
+    motion = af.rigid_motion(other, after)
+    away = np.linalg.norm(other @ motion[:3, :3].T + motion[:3, 3] - after, axis=1).mean()
+    assert away < 0.05 * np.linalg.norm(np.ptp(v, axis=0))
+    assert field.report.matched_share < 0.75 and field.report.from_target_mean < 0.005
+
+
+def test_unlike_shapes_without_landmarks_are_noted(data_dir):
+    _, v, f = surface(data_dir, "whale")
+    target, *_ = surface(data_dir, "spot")
+    field = af.wrap(af.sample_mesh(v, f), target, [], af.WrapOptions(stages=1, iterations=1))
+    assert any("not alike" in note for note in field.report.notes)

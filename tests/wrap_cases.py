@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shapes that are wrapped onto each other, and how far the results are from their targets."""
+
+import numpy as np
+from meshes import sphere
+
+import arapfields as af
+
+SMALL = {"centers": 60, "stages": 3, "iterations": 10}
+
+
+def figure(subdivisions=4):
+    """(n, 3), (m, 3): a closed shape with a long nose and a hump, like no turn of itself."""
+    v, f = sphere(1.0, subdivisions)
+    nose = 0.9 * np.exp(-8 * ((v - [1, 0, 0]) ** 2).sum(1, keepdims=True))
+    hump = 0.5 * np.exp(-6 * ((v - [0, 0.6, 0.8]) ** 2).sum(1, keepdims=True))
+    return v * (1 + nose + hump) * [1.0, 0.7, 0.6], f
+
+
+def rotation(axis, angle):
+    axis = np.asarray(axis, float) / np.linalg.norm(axis)
+    cross = np.cross(np.eye(3), axis)
+    return np.eye(3) + np.sin(angle) * cross.T + (1 - np.cos(angle)) * cross @ cross
+
+
+def bend(points, rate=0.25):
+    """A known field: bends space about the z axis, more the farther out along x."""
+    angle = rate * points[:, 0]
+    c, s = np.cos(angle), np.sin(angle)
+    x, y, z = points.T
+    return np.stack([c * x - s * y, s * x + c * y, z], 1)
+
+
+def moved(points, scale=3.0, angle=2.0):
+    return scale * bend(points) @ rotation([1, 2, 3], angle).T + [5.0, -2.0, 1.0]
+
+
+def distances(vertices, triangles, onto_vertices, onto_triangles, count=5000):
+    """((mean, 95 %) to the target, (mean, 95 %) from it), exact, in % of the target's diagonal."""
+    diagonal = np.linalg.norm(np.ptp(onto_vertices, axis=0))
+    found = []
+    for mesh, other in (
+        ((vertices, triangles), (onto_vertices, onto_triangles)),
+        ((onto_vertices, onto_triangles), (vertices, triangles)),
+    ):
+        points = af.sample_mesh(*mesh, count).points
+        away = 100 * np.abs(af.MeshSdf(*other)(points)) / diagonal
+        found.append((away.mean(), np.quantile(away, 0.95)))
+    return tuple(found)
+
+
+def crossing_share(vertices, triangles):
+    """Share of the triangles that pass through another one with which they share no vertex."""
+    from scipy.spatial import cKDTree
+
+    corners = vertices[triangles]
+    low, high = corners.min(1), corners.max(1)
+    reach = np.linalg.norm(high - low, axis=1).max() / 2
+    pairs = cKDTree((low + high) / 2).query_pairs(2 * reach, output_type="ndarray")
+    i, j = pairs.T
+    near = ((low[i] <= high[j]) & (low[j] <= high[i])).all(1)
+    i, j = i[near], j[near]
+    apart = ~(triangles[i][:, :, None] == triangles[j][:, None, :]).any((1, 2))
+    i, j = i[apart], j[apart]
+    hit = np.zeros(len(i), bool)
+    for k in range(3):
+        hit |= pierced(corners[i], corners[j][:, k], corners[j][:, (k + 1) % 3])
+        hit |= pierced(corners[j], corners[i][:, k], corners[i][:, (k + 1) % 3])
+    return len(np.unique(np.concatenate([i[hit], j[hit]]))) / len(triangles)
+
+
+def pierced(triangles, start, end):
+    """Whether the ways from start to end, (n, 3) each, go through the triangles (n, 3, 3)."""
+    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    normal = np.cross(b - a, c - a)
+    before, after = ((start - a) * normal).sum(1), ((end - a) * normal).sum(1)
+    through = before * after < 0
+    share = before / np.where(through, before - after, 1.0)
+    place = start + share[:, None] * (end - start)
+    for u, w in ((a, b), (b, c), (c, a)):
+        through &= (np.cross(w - u, place - u) * normal).sum(1) > 0
+    return through
