@@ -13,10 +13,10 @@ PYTEST := $(PY) -m pytest
 ALL_TESTS := $(PYTEST) -n logical --maxprocesses 4 --dist loadfile
 NATIVE_TESTS := build/wheel/tests/native_tests
 
-.PHONY: help setup build demo test test-slow fuzz bench sanitize format lint extension repository blenders gallery docs clean
+.PHONY: help setup build demo test test-slow test-arm64 fuzz bench sanitize format lint extension repository blenders gallery docs clean
 
 help:  ## this list
-	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/:.*##/ -/'
+	@grep -E '^[a-z0-9-]+:.*##' Makefile | sed -E 's/:.*##/ -/'
 
 $(VENV)/.ready: requirements.txt
 	@test -x $(PY) || $(PYTHON) -m venv $(VENV) || { echo "Python 3.11 with the venv module is needed (Debian: python3.11-venv)"; exit 1; }
@@ -62,6 +62,10 @@ test: build $(NATIVE_TESTS)  ## all tests but the slow ones
 test-slow: build $(NATIVE_TESTS)  ## every test
 	$(ALL_TESTS) tests
 
+# Slow, and needs root: docs/development.md. ARGUMENTS="--all" runs more, "--only reference" less.
+test-arm64: build $(VENV)/.tools  ## the library built for 64-bit ARM, and its tests under qemu
+	$(PY) -m tests.arm64 $(ARGUMENTS)
+
 fuzz: build $(VENV)/.tools  ## the nets, long: 20,000 odd calls and 20,000 damaged files of every kind
 	$(PY) -m tests.fuzz
 
@@ -91,9 +95,11 @@ lint: setup  ## the same, checking alone
 	$(VENV)/bin/ruff format --check -q . && $(VENV)/bin/ruff check .
 
 # PYTHONS="3.11 3.13" makes those a must; else 3.11 and whatever headers are at hand or to be had.
-extension: build  ## dist/arapfields-<version>-linux-x64.zip for Blender
+PLATFORM := linux-x64
+extension: build  ## dist/arapfields-<version>-linux-x64.zip for Blender; PLATFORM=macos-arm64 for a Mac
+	@$(if $(filter macos-%,$(PLATFORM)),$(PIP) -q -r blender_scripts/extension/macos-requirements.txt)
 	$(PY) blender_scripts/python_headers.py
-	$(PY) blender_scripts/build_extension.py --output dist $(if $(PYTHONS),--python $(PYTHONS))
+	$(PY) blender_scripts/build_extension.py --output dist --platform $(PLATFORM) $(if $(PYTHONS),--python $(PYTHONS))
 
 repository: build  ## the same, and dist/index.json: a repository of extensions to serve
 	$(PY) blender_scripts/python_headers.py
