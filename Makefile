@@ -13,7 +13,7 @@ PYTEST := $(PY) -m pytest
 ALL_TESTS := $(PYTEST) -n logical --maxprocesses 4 --dist loadfile
 NATIVE_TESTS := build/wheel/tests/native_tests
 
-.PHONY: help setup build demo test test-slow test-arm64 fuzz bench sanitize format lint extension repository blenders gallery docs clean
+.PHONY: help setup build examples demo test test-slow test-windows fuzz bench sanitize format lint wheel workflows extension repository blenders gallery docs clean
 
 help:  ## this list
 	@grep -E '^[a-z0-9-]+:.*##' Makefile | sed -E 's/:.*##/ -/'
@@ -53,6 +53,9 @@ $(NATIVE_TESTS): $(VENV)/.installed $(VENV)/.tools $(shell find tests/native -ty
 	$(VENV)/bin/cmake --build build/wheel --target native_tests
 	@touch $@
 
+examples: build $(VENV)/.tools  ## the scenes of the workflow pages: out/examples
+	$(PY) blender_scripts/examples.py --output out/examples
+
 demo: build  ## the main job on Suzanne: out/demo.blend and out/demo.png
 	$(PY) blender_scripts/demo.py --output out
 
@@ -62,16 +65,26 @@ test: build $(NATIVE_TESTS)  ## all tests but the slow ones
 test-slow: build $(NATIVE_TESTS)  ## every test
 	$(ALL_TESTS) tests
 
-# Slow, and needs root: docs/development.md. ARGUMENTS="--all" runs more, "--only reference" less.
-test-arm64: build $(VENV)/.tools  ## the library built for 64-bit ARM, and its tests under qemu
-	$(PY) -m tests.arm64 $(ARGUMENTS)
+# Debian: g++-mingw-w64-x86-64-posix and wine64. The torch sources are left out: only MSVC's own compiler can use that
+# torch's C++ interface.
+WINE := $(shell command -v wine64 || ls /usr/lib/wine/wine64 2> /dev/null)
+WINDOWS_TESTS := build/windows/tests/native_tests_without_torch.exe
+
+test-windows: setup  ## all but the torch sources, compiled for Windows by mingw-w64, and their native tests under Wine
+	@command -v x86_64-w64-mingw32-g++-posix > /dev/null || { echo "A compiler for Windows is needed (Debian: g++-mingw-w64-x86-64-posix)"; exit 1; }
+	@test -n "$(WINE)" || { echo "Wine is needed (Debian: wine64)"; exit 1; }
+	$(VENV)/bin/cmake -S . -B build/windows -G Ninja -DCMAKE_TOOLCHAIN_FILE=cmake/mingw-w64.cmake -DARAPFIELDS_WITHOUT_TORCH=ON \
+	  -DCMAKE_CXX_FLAGS_RELEASE="-O1 -DNDEBUG" -DPython_EXECUTABLE=$(abspath $(PY)) -DCMAKE_MAKE_PROGRAM=$(abspath $(VENV)/bin/ninja)
+	$(VENV)/bin/cmake --build build/windows
+	WINEPREFIX=$(abspath build/wine) WINEDEBUG=-all $(WINE) $(WINDOWS_TESTS) --color_output=no
 
 fuzz: build $(VENV)/.tools  ## the nets, long: 20,000 odd calls and 20,000 damaged files of every kind
 	$(PY) -m tests.fuzz
 
-bench: build $(VENV)/.tools  ## paired benchmarks against the real competitors
+# PEERS=path names a folder with checkouts of implicit-arap and gaussStylization: these are then run, too.
+bench: build $(VENV)/.tools  ## paired benchmarks against the real competitors; PEERS=path: against others' public code
 	$(PIP) -q -r tests/benchmarks/requirements.txt
-	$(PY) -m tests.benchmarks
+	PEERS="$(PEERS)" $(PY) -m tests.benchmarks $(if $(PEERS),peers)
 
 SANITIZED = $(VENV)/bin/cmake -S . -G Ninja -DPython_EXECUTABLE=$(abspath $(PY)) -DCMAKE_MAKE_PROGRAM=$(abspath $(VENV)/bin/ninja) \
   -DCMAKE_BUILD_TYPE=RelWithDebInfo -DARAPFIELDS_NATIVE_TESTS=ON
@@ -93,6 +106,13 @@ format: setup  ## clang-format and ruff over our files
 lint: setup  ## the same, checking alone
 	git ls-files '*.h' '*.cpp' | xargs $(VENV)/bin/clang-format --dry-run --Werror
 	$(VENV)/bin/ruff format --check -q . && $(VENV)/bin/ruff check .
+
+wheel: $(VENV)/.ready  ## for pip: a manylinux wheel for .venv's Python and the source distribution, in dist
+	$(PIP) -q -r wheel_scripts/requirements.txt
+	$(PY) wheel_scripts/build_wheel.py --output dist
+
+workflows: setup  ## the continuous integration's steps for Linux, run here one by one in fresh clones: build/workflows
+	$(PY) tests/packaging/run_workflow.py .github/workflows/*.yml
 
 # PYTHONS="3.11 3.13" makes those a must; else 3.11 and whatever headers are at hand or to be had.
 PLATFORM := linux-x64

@@ -13,7 +13,8 @@ from .properties import item
 CONTENTS = [  # modules with CLASSES
     # what is stored in the .blend: object.arapfields
     *("handles.properties", "carried.properties", "poses.properties", "pin_tool.properties"),
-    *("stiffness.properties", "animation.properties", "properties.settings", "properties.item"),
+    *("stiffness.properties", "live.properties", "animation.properties"),
+    *("properties.settings", "properties.item"),
     # features
     *("surface.operators", "surface.panel"),
     *("handles.operators", "handles.resizing", "handles.panel"),
@@ -21,7 +22,7 @@ CONTENTS = [  # modules with CLASSES
     *("stylize.operators", "stylize.panel"),
     *("carried.operators", "carried.panel", "poses.operators", "poses.panel"),
     *("stiffness.operators", "stiffness.panel"),
-    *("live.operators", "pin_tool.operators", "animation.operators"),
+    *("live.operators", "live.panel", "pin_tool.operators", "animation.operators"),
     *("animation.export_operators", "animation.panel"),
     *("results.operators", "results.panel", "jobs.operators", "jobs.panel"),
     *("menus", "preferences"),

@@ -27,6 +27,7 @@ sys.path[:0] = [str(HERE)]
 from figures import FIGURES  # noqa: E402
 
 SHARED = ["stage.py", "shapes.py", "creatures.py", "menagerie.py", "figures/common.py"]
+OF_PAGES = ["examples.py", "child.py", "dressing.py"]  # of figures that run a page's script
 LIBRARY = [
     path
     for path in sorted((ROOT / "native").rglob("*"))
@@ -48,7 +49,10 @@ def with_imports(name, found=()):
 def content_hash(figure):
     """Of what a picture is made from: the library's sources, stage and shapes, and its own modules."""
     digest = hashlib.sha256(b"draft" if "STAGE_DRAFT" in os.environ else b"")
+    further = [*(HERE / name for name in OF_PAGES), *(ROOT / "docs" / page for page in figure.pages)]
     for path in [*LIBRARY, *(HERE / name for name in SHARED), *with_imports(figure.name)]:
+        digest.update(path.read_bytes())
+    for path in further if figure.pages else ():
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
@@ -57,12 +61,17 @@ def data_folder():
     return Path(os.environ.get("ARAPFIELDS_DATA", ROOT.parent / "shared" / "data"))
 
 
+def pictures(folder):
+    """Those of a figure: sheets, and loops with the frame that stands for each."""
+    return [path for path in folder.iterdir() if path.suffix in (".png", ".webp", ".jpg")]
+
+
 def draw(name, folder):
     """In the figure's own process: renders, and leaves the measured figures beside the pictures."""
     folder.mkdir(parents=True, exist_ok=True)
-    before = {path: path.stat().st_mtime_ns for path in folder.glob("*.png")}
+    before = {path: path.stat().st_mtime_ns for path in pictures(folder)}
     figures = importlib.import_module(f"figures.{name}").render(folder)
-    files = sorted(p.name for p in folder.glob("*.png") if before.get(p) != p.stat().st_mtime_ns)
+    files = sorted(p.name for p in pictures(folder) if before.get(p) != p.stat().st_mtime_ns)
     (folder / f".{name}.json").write_text(json.dumps({"files": files, "measured": figures}))
 
 

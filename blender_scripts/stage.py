@@ -39,6 +39,16 @@ def material(name, colour, roughness=0.45, alpha=1.0):
     return made
 
 
+def vertex_paint(name, roughness=0.45):
+    """A material that shows the colour attribute `colour`."""
+    made = material(name, (1, 1, 1), roughness)
+    node = made.node_tree.nodes.new("ShaderNodeVertexColor")
+    node.layer_name = "colour"
+    shader = made.node_tree.nodes["Principled BSDF"]
+    made.node_tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
+    return made
+
+
 def paint(target, colour):
     target.data.materials.clear()
     target.data.materials.append(material(f"{target.name} paint", colour))
@@ -78,15 +88,16 @@ def caption(text, location, size=0.22):
     return made
 
 
-def bounds(objects):
-    """Low and high corner of the world-space boxes of what is drawn."""
-    corners = [item.matrix_world @ Vector(c) for item in objects for c in item.bound_box]
+def bounds(objects, turn=None):
+    """Low and high corner of the world-space boxes of what is drawn; `turn`: (4, 4) taken off before."""
+    back = (turn or Matrix.Identity(4)).inverted()
+    corners = [back @ item.matrix_world @ Vector(c) for item in objects for c in item.bound_box]
     low = Vector(min(c[axis] for c in corners) for axis in range(3))
     return low, Vector(max(c[axis] for c in corners) for axis in range(3))
 
 
-def backdrop(floor_z, depth, width):
-    """A floor that bends up into a wall: no horizon line in the picture."""
+def backdrop(floor_z, depth, width, turn):
+    """A floor that bends up into a wall behind +y, then turned: no horizon line in the picture."""
     radius, steps = 3.0, 24
     profile = (
         [(-40.0, 0.0)]
@@ -103,6 +114,7 @@ def backdrop(floor_z, depth, width):
     mesh.polygons.foreach_set("use_smooth", [True] * len(faces))
     mesh.materials.append(material("backdrop", (0.93, 0.85, 0.71), roughness=0.9))
     made = bpy.data.objects.new("backdrop", mesh)
+    made.matrix_world = turn
     bpy.context.collection.objects.link(made)
 
 
@@ -143,25 +155,25 @@ def frame(camera, points, margin):
 
 
 def set_up(objects, width=1200, samples=24, elevation=12.0, azimuth=0.0, threads=0, margin=0.025, around=()):
-    """Backdrop, lights and a camera that looks at the objects along +y and frames them.
+    """Backdrop, lights and a camera that looks along +y and frames the objects; `azimuth` turns all three.
 
     `around`: further points to be in the picture; rows of a sheet that share them are drawn to one scale.
     """
     bpy.context.view_layer.update()
-    low, high = bounds(objects)
-    middle, extent = (low + high) / 2, high - low
+    turn = Matrix.Rotation(math.radians(azimuth), 4, "Z")
+    low, high = bounds(objects, turn)
+    middle, extent = turn @ ((low + high) / 2), high - low
     span = extent.x
-    backdrop(low.z - 0.002 * extent.z, high.y + 0.6 * span, 20 * span)
-    light(
-        "key", middle + Vector((-0.55, -0.9, 0.9)) * span, middle, 8.5 * span**2, 0.35 * span, (1, 0.96, 0.9)
-    )
-    light(
-        "fill", middle + Vector((0.9, -0.7, 0.35)) * span, middle, 1.8 * span**2, 0.6 * span, (0.88, 0.94, 1)
-    )
-    light("rim", middle + Vector((0.3, 0.5, 0.9)) * span, middle, 4 * span**2, 0.4 * span)
+    backdrop(low.z - 0.002 * extent.z, high.y + 0.6 * span, 20 * span, turn)
+    for name, where, energy, size, colour in (
+        ("key", (-0.55, -0.9, 0.9), 8.5, 0.35, (1, 0.96, 0.9)),
+        ("fill", (0.9, -0.7, 0.35), 1.8, 0.6, (0.88, 0.94, 1)),
+        ("rim", (0.3, 0.5, 0.9), 4, 0.4, (1, 1, 1)),
+    ):
+        light(name, middle + turn @ (Vector(where) * span), middle, energy * span**2, size * span, colour)
 
     data = bpy.data.cameras.new("camera")
-    data.lens = 70
+    data.lens, data.sensor_fit = 70, "HORIZONTAL"  # the picture may be higher than wide
     camera = bpy.data.objects.new("camera", data)
     bpy.context.collection.objects.link(camera)
     a, e = math.radians(azimuth), math.radians(elevation)
@@ -188,6 +200,13 @@ def set_up(objects, width=1200, samples=24, elevation=12.0, azimuth=0.0, threads
     scene.cycles.adaptive_threshold, scene.cycles.adaptive_min_samples = 0.1, 6
     scene.cycles.max_bounces, scene.cycles.diffuse_bounces, scene.cycles.glossy_bounces = 3, 2, 2
     scene.view_settings.view_transform, scene.view_settings.look = "Standard", "Medium High Contrast"
+
+
+def brighten(times):
+    """More light from everywhere: for one figure alone, whose wall is far away."""
+    for data in bpy.data.lights:
+        data.energy *= times
+    bpy.context.scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value *= times
 
 
 def take(path):

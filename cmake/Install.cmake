@@ -6,10 +6,16 @@ include(CMakePackageConfigHelpers)
 # arapfields_install(library headers cmake_files component [EXCLUDE_FROM_ALL]): the library, its public headers and
 # what find_package(arapfields) reads.
 function(arapfields_install library_dir include_dir cmake_dir component)
-  install(TARGETS arapfields LIBRARY DESTINATION ${library_dir} COMPONENT ${component} ${ARGN})
-  set(made "${CMAKE_BINARY_DIR}/cmake/${component}")
+  set(places "")
+  foreach(kind LIBRARY RUNTIME ARCHIVE)  # Windows has the library as the two last
+    list(APPEND places ${kind} DESTINATION ${library_dir} COMPONENT ${component} ${ARGN})
+  endforeach()
+  install(TARGETS arapfields ${places})
+  set(library_file "${library_dir}/${CMAKE_SHARED_LIBRARY_PREFIX}arapfields${CMAKE_SHARED_LIBRARY_SUFFIX}")
+  set(import_file "${library_dir}/${CMAKE_IMPORT_LIBRARY_PREFIX}arapfields${CMAKE_IMPORT_LIBRARY_SUFFIX}")
+  set(made "${PROJECT_BINARY_DIR}/cmake/${component}")
   configure_package_config_file("${PROJECT_SOURCE_DIR}/cmake/arapfieldsConfig.cmake.in"
-    "${made}/arapfieldsConfig.cmake" INSTALL_DESTINATION ${cmake_dir} PATH_VARS library_dir include_dir)
+    "${made}/arapfieldsConfig.cmake" INSTALL_DESTINATION ${cmake_dir} PATH_VARS library_file import_file include_dir)
   write_basic_package_version_file("${made}/arapfieldsConfigVersion.cmake" COMPATIBILITY SameMinorVersion)
   install(FILES "${made}/arapfieldsConfig.cmake" "${made}/arapfieldsConfigVersion.cmake"
     DESTINATION ${cmake_dir} COMPONENT ${component} ${ARGN})
@@ -30,6 +36,9 @@ file(CREATE_LINK \"${from}\" \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/lib/arapfi
   endif()
 endforeach()
 
+if(NOT ARAPFIELDS_PYTHON)
+  return()
+endif()
 arapfields_install(arapfields arapfields/include arapfields/share/cmake/arapfields python EXCLUDE_FROM_ALL)
 install(TARGETS _native LIBRARY DESTINATION arapfields COMPONENT python EXCLUDE_FROM_ALL)
 install(FILES "${ARAPFIELDS_GENERATED}/options.json" "${ARAPFIELDS_GENERATED}/libtorch.txt"

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Options shared by all our targets, and arapfields_sources(), by which each folder lists its files.
 add_library(arapfields_options INTERFACE)
-set(ARAPFIELDS_GENERATED "${CMAKE_BINARY_DIR}/generated")  # what native/options/generate.py writes
+set(ARAPFIELDS_GENERATED "${PROJECT_BINARY_DIR}/generated")  # what native/options/generate.py writes
 target_include_directories(arapfields_options INTERFACE "${PROJECT_SOURCE_DIR}/native" "${ARAPFIELDS_GENERATED}")
 target_link_libraries(arapfields_options INTERFACE arapfields_eigen)
 target_compile_options(arapfields_options INTERFACE -Wall -Wextra -Wshadow -Wno-unknown-pragmas
@@ -10,6 +10,17 @@ target_compile_options(arapfields_options INTERFACE -Wall -Wextra -Wshadow -Wno-
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # STB_GNU_UNIQUE symbols are shared by the whole process: two libtorch copies would then clash.
   target_compile_options(arapfields_options INTERFACE -fno-gnu-unique)
+endif()
+if(MINGW)
+  # GCC keeps the stack aligned to 16 bytes on Windows, and moves wider vectors to it as if it were to 32 (its bug
+  # 54412): the assembler makes these moves unaligned ones.
+  target_compile_options(arapfields_options INTERFACE -Wa,-muse-unaligned-vector-move)
+endif()
+if(WIN32 AND CMAKE_CXX_COMPILER_ID STREQUAL "Clang" AND NOT MINGW)
+  target_link_options(arapfields_options INTERFACE -rtlib=compiler-rt)  # asks the processor what it can do
+endif()
+if(WIN32)
+  target_compile_definitions(arapfields_options INTERFACE NOMINMAX WIN32_LEAN_AND_MEAN _WIN32_WINNT=0x0A00)
 endif()
 if(ARAPFIELDS_WERROR)
   target_compile_options(arapfields_options INTERFACE -Werror)
@@ -20,21 +31,30 @@ if(ARAPFIELDS_SANITIZE)
   target_link_options(arapfields_options INTERFACE -fsanitize=${ARAPFIELDS_SANITIZE})
 endif()
 
+# For the library's own sources, beside those of bindings: what the headers mark is theirs to export.
+add_library(arapfields_own INTERFACE)
+target_link_libraries(arapfields_own INTERFACE arapfields_options)
+if(WIN32)
+  target_compile_definitions(arapfields_own INTERFACE ARAPFIELDS_BUILDING)
+endif()
+
 # Four object libraries make up the one shared library: sources that need only Eigen, those that need JSON too,
 # those that need libtorch, and kernels compiled once per instruction set. Precompiled headers save more than half of the
 # compiler's time; what each source includes is complete without them (tests/packaging).
 set(ARAPFIELDS_STANDARD_HEADERS <algorithm> <array> <cmath> <cstdint> <functional> <memory> <optional> <string>
   <utility> <vector>)
 add_library(arapfields_plain OBJECT)
-target_link_libraries(arapfields_plain PRIVATE arapfields_options)
+target_link_libraries(arapfields_plain PRIVATE arapfields_own)
 target_precompile_headers(arapfields_plain PRIVATE <Eigen/Dense> ${ARAPFIELDS_STANDARD_HEADERS})
 target_compile_options(arapfields_plain PRIVATE -fpch-preprocess)  # lets ccache see through the header
 add_library(arapfields_io OBJECT)
-target_link_libraries(arapfields_io PRIVATE arapfields_options arapfields_json)
-add_library(arapfields_torch OBJECT)
-target_link_libraries(arapfields_torch PRIVATE arapfields_options libtorch::libtorch)
-target_precompile_headers(arapfields_torch PRIVATE <ATen/ATen.h> <ATen/Parallel.h> <Eigen/Dense>)
-target_compile_options(arapfields_torch PRIVATE -fpch-preprocess)
+target_link_libraries(arapfields_io PRIVATE arapfields_own arapfields_json)
+if(NOT ARAPFIELDS_WITHOUT_TORCH)
+  add_library(arapfields_torch OBJECT)
+  target_link_libraries(arapfields_torch PRIVATE arapfields_own libtorch::libtorch)
+  target_precompile_headers(arapfields_torch PRIVATE <ATen/ATen.h> <ATen/Parallel.h> <Eigen/Dense>)
+  target_compile_options(arapfields_torch PRIVATE -fpch-preprocess)
+endif()
 
 set(ARAPFIELDS_SIMD_baseline "")
 set(ARAPFIELDS_SIMD_neon -DARAPFIELDS_NEON)
@@ -50,7 +70,7 @@ elseif(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
 endif()
 foreach(level ${ARAPFIELDS_SIMD_LEVELS})
   add_library(arapfields_simd_${level} OBJECT)
-  target_link_libraries(arapfields_simd_${level} PRIVATE arapfields_options)
+  target_link_libraries(arapfields_simd_${level} PRIVATE arapfields_own)
   # Kernels live in the namespace arapfields::SIMD_LEVEL; Eigen, where one uses it, is renamed likewise,
   # so that no inline function compiled for a newer processor can be picked by the linker for all.
   target_compile_definitions(arapfields_simd_${level} PRIVATE SIMD_LEVEL=${level} Eigen=Eigen_${level})
@@ -67,7 +87,9 @@ function(arapfields_sources)
   list(TRANSFORM arg_SIMD PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/")
   target_sources(arapfields_plain PRIVATE ${arg_PLAIN})
   target_sources(arapfields_io PRIVATE ${arg_JSON})
-  target_sources(arapfields_torch PRIVATE ${arg_TORCH})
+  if(NOT ARAPFIELDS_WITHOUT_TORCH)
+    target_sources(arapfields_torch PRIVATE ${arg_TORCH})
+  endif()
   foreach(level ${ARAPFIELDS_SIMD_LEVELS})
     target_sources(arapfields_simd_${level} PRIVATE ${arg_SIMD})
   endforeach()

@@ -35,6 +35,8 @@ LIVE_IDENTITY = 1e-8
 LIVE_DRIFT = 1e-4
 # Share of the minimised value by which rounding may raise it: the first steps are taken in single precision.
 LIVE_ROUNDING = 1e-5
+# Share of one step of a drag by which shapes of three iterations may be behind: less than a picture's delay.
+LIVE_KEEPS_UP = 0.5
 # Single-precision fields against differences of fourth order with step 2e-3: rounding over the step, and
 # truncation where the encoding's highest octave bends most.
 FLOAT_FIELD_DIFFERENCES = 1e-3

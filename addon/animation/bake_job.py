@@ -9,6 +9,7 @@ from ..core.errors import UserError
 from ..core.runtime.coroutines import Pause
 from ..core.runtime.jobs import Item
 from ..core.runtime.progress import JobCancelled
+from ..live.simulation import played
 from .frames import FrameFeed
 
 AHEAD = 8  # frames that are read before they are solved, where each has positions of its own
@@ -23,8 +24,11 @@ class BakePass:
 
     def __init__(self, bakes, frames):
         self.bakes, self.frames = bakes, frames
+        starts = [bake.session.start for bake in bakes if bake.simulation is not None]
+        # With secondary motion, also the frames that lead to those that are baked.
+        self.played = played(frames, min(starts)) if starts else list(frames)
         moving = any(bake.session.moves_by_itself or bake.session.carrying.passengers for bake in bakes)
-        self.feed = FrameFeed(AHEAD if moving else frames.count)
+        self.feed = FrameFeed(AHEAD if moving else len(self.played))
 
     def item(self, context, job, failures):
         names = ", ".join(bake.name for bake in self.bakes)
@@ -35,7 +39,7 @@ class BakePass:
         scene = context.scene
         present = scene.frame_current, scene.frame_subframe
         try:
-            for frame in self.frames:
+            for frame in self.played:
                 while self.feed.is_full and not job.done:
                     yield Pause.WORKER
                 if job.done:  # cancelled, or every object failed
@@ -51,17 +55,18 @@ class BakePass:
 
     def work(self, tracker):
         """On the worker."""
-        task, count = tracker.start("Solving", 1.0), self.frames.count
+        task, count = tracker.start("Solving", 1.0), len(self.played)
+        wanted = set(self.frames)
         try:
             for bake in self.bakes:
                 bake.attempt(bake.prepare)
-            for number, frame in enumerate(self.frames):
+            for number, frame in enumerate(self.played):
                 requests = self.feed.take(task)
                 task.report(number / count, translated("frame {frame}", frame=f"{frame:g}"))
                 for bake, request in zip(self.bakes, requests, strict=True):
                     if task.cancelled:
                         raise JobCancelled
-                    bake.attempt(bake.add, request)
+                    bake.attempt(bake.add, frame, request, frame in wanted)
                 if all(bake.error is not None for bake in self.bakes):
                     break
             for bake in self.bakes:

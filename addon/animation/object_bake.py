@@ -13,8 +13,9 @@ from ..core.errors import UserError
 from ..core.runtime.coroutines import Pause
 from ..field_modifier import cache_modifier
 from ..handles import empties
-from ..live import animated, sessions
+from ..live import animated, body, sessions
 from ..live.session import Session
+from ..live.simulation import Simulation
 from ..results import placement, result_objects
 from .caches import cache_beside, keys_weight, plain, size_text
 from .carried_bake import CarriedBake
@@ -53,6 +54,13 @@ class ObjectBake:
             self.session.carrying, frames, beside, self.fps, is_shared=part is not None
         )
         self.part, self.shared, self.missing, self.begun = part, None, 0, time.time()
+        self.simulation = None
+        if body.is_body(source):
+            if part is not None:
+                raise UserError(
+                    "{name}: secondary motion is not baked in parts; bake it whole", name=source.name
+                )
+            self.simulation = Simulation(self.session, self.session.start, self.fps)
 
     @property
     def name(self):
@@ -86,14 +94,21 @@ class ObjectBake:
             self.path, points, frames.count, start=frames.start, step=frames.step, fps=self.fps
         )
 
-    def add(self, request):
-        """Solves one frame and puts it where it goes."""
+    def add(self, frame, request, wanted=True):
+        """Solves one frame and puts it where it goes; one that is not wanted may only lead to others."""
         if isinstance(request, Exception):
             raise request
+        if not wanted and self.simulation is None:
+            return
         if self.shared is not None:
             self.shared.add(self.session, request)
             return
-        shape = self.session.solve_from_rest(request)
+        if self.simulation is None:
+            shape = self.session.solve_from_rest(request)
+        else:
+            shape = self.simulation.shape(frame, request)
+            if not wanted:
+                return
         points = shape.points
         self.carried.add(shape.carried)
         if self.writer is not None:

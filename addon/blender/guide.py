@@ -17,6 +17,7 @@ SETTINGS = {  # class of properties → page
     "ARAPFIELDS_PG_scene": "pins",
     "ARAPFIELDS_PG_carried": "characters",
     "ARAPFIELDS_PG_stiffness": "characters",
+    "ARAPFIELDS_PG_secondary": "motion",
     "ARAPFIELDS_PG_bake": "animation",
     "ARAPFIELDS_PG_object": "results",
 }
@@ -29,6 +30,7 @@ LABELS = {
     "stylize": "Stylize",
     "results": "Result",
     "animation": "Animation",
+    "motion": "Secondary Motion",
     "jobs": "Status",
 }
 pages = {}  # pattern of Blender's names → page, while the extension is on

@@ -2,6 +2,7 @@
 """Meshes as arrays: what Blender shows of an object (modifiers, shape keys), and meshes from arrays."""
 
 import hashlib
+from bisect import bisect_left
 from dataclasses import dataclass
 
 import bpy
@@ -34,9 +35,7 @@ def positions(mesh):
 def fingerprint(mesh):
     """Equal for a mesh whose own vertices and faces are where they were; modifiers and shape keys aside."""
     digest = hashlib.blake2b(positions(mesh).tobytes(), digest_size=16)
-    corners = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corners)
-    digest.update(corners.tobytes())
+    digest.update(corner_vertices(mesh).tobytes())
     return digest.digest(), len(mesh.polygons)
 
 
@@ -51,11 +50,28 @@ def set_positions(mesh, points):
     mesh.update()
 
 
+def corner_vertices(mesh):
+    """(c,) the vertex of each corner of a mesh's faces."""
+    corners = np.empty(len(mesh.loops), dtype=np.int32)
+    attribute = mesh.attributes.get(".corner_vert")
+    if attribute is not None:
+        attribute.data.foreach_get("value", corners)
+    return corners
+
+
+def triangles_of(mesh, face):
+    """(k, 3) corners of the triangles of one of the mesh's faces, as Blender draws it."""
+    mesh.calc_loop_triangles()
+    found = mesh.loop_triangles  # in the faces' order
+    first = bisect_left(range(len(found)), face, key=lambda index: found[index].polygon_index)
+    count = mesh.polygons[face].loop_total - 2
+    return np.array([found[first + index].vertices for index in range(count)]).reshape(-1, 3)
+
+
 def triangles(mesh):
     """(m, 3) corners of the mesh's triangles, its larger faces split as Blender draws them."""
     mesh.calc_loop_triangles()
-    corners = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.attributes[".corner_vert"].data.foreach_get("value", corners)
+    corners = corner_vertices(mesh)
     if len(mesh.loops) == 3 * len(mesh.polygons):  # nothing but triangles: what follows would take its time
         return corners.reshape(-1, 3)
     flat = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)

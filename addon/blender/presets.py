@@ -1,16 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings under a name of the user's own, by Blender's preset system."""
+"""Settings under a name: the user's own, by Blender's preset system, and those that the library gives."""
 
 import bpy
 from bl_operators.presets import AddPresetBase
 
+from ..core.settings.parameters import presets
 from ..names import PROPERTY
+from .guide import SETTINGS
+from .object_references import settings_of, source_of
+from .source_operator import SourceOperator
+
+DEFAULT = ("DEFAULT", "Default", "Every setting of this section as it is at first")
 
 
-def preset_classes(name, label, parameters, further=()):
-    """The operator that stores presets of one section, and the menu that lists them.
+def preset_classes(name, label, parameters, further=(), given=True):
+    """What stores presets of one section, the menu that lists them, and what sets given ones.
 
-    `further` names settings that are no parameter.
+    `further` names settings that are no parameter. `given`: whether the menu begins with the library's own.
     """
     menu_name, folder = f"ARAPFIELDS_MT_{name}_presets", f"arapfields/{name}"
     operator = type(
@@ -26,6 +32,14 @@ def preset_classes(name, label, parameters, further=()):
             "preset_values": [f"settings.{key}" for key in (*further, *(p.name for p in parameters))],
         },
     )
+    setters = [given_presets(name, label, parameters)] if given else []
+
+    def draw(self, context):
+        for setter in setters:
+            self.layout.operator_enum(setter.bl_idname, "preset")
+            self.layout.separator()
+        bpy.types.Menu.draw_preset(self, context)
+
     menu = type(
         menu_name,
         (bpy.types.Menu,),
@@ -33,7 +47,37 @@ def preset_classes(name, label, parameters, further=()):
             "bl_label": f"{label} Presets",
             "preset_subdir": folder,
             "preset_operator": "script.execute_preset",
-            "draw": bpy.types.Menu.draw_preset,
+            "draw": draw,
         },
     )
-    return operator, menu
+    return operator, menu, *setters
+
+
+def given_presets(name, label, parameters):
+    """The operator that sets a section to what the library's table of options calls a preset."""
+    table = presets(name)
+
+    def execute(self, context):
+        group = getattr(settings_of(source_of(context)), name)
+        for parameter in parameters:
+            group.property_unset(parameter.name)
+        if self.preset in table:
+            for option, value in table[self.preset][2].items():
+                setattr(group, option, value)
+        return {"FINISHED"}
+
+    items = (DEFAULT, *((key, text, tip) for key, (text, tip, _) in table.items()))
+    annotated = {"preset": bpy.props.EnumProperty(items=items, name="Preset")}
+    return type(
+        f"ARAPFIELDS_OT_{name}_given_preset",
+        (SourceOperator, bpy.types.Operator),
+        {
+            "__doc__": "Set this section to a preset",
+            "__annotations__": annotated,
+            "bl_idname": f"arapfields.{name}_given_preset",
+            "bl_label": f"Set {label} Preset",
+            "bl_options": {"REGISTER", "UNDO"},
+            "guide": SETTINGS[f"ARAPFIELDS_PG_{name}"],
+            "execute": execute,
+        },
+    )

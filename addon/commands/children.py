@@ -11,6 +11,8 @@ from pathlib import Path
 
 from .launch import PARENT
 
+WINDOWS = os.name == "nt"
+
 
 class Children:
     """The Blenders at work; leaving the block ends those that still are."""
@@ -18,7 +20,8 @@ class Children:
     def __init__(self, environment, limit):
         self.limit, self.running, self.stopped = limit, set(), False
         self.pipe, self.alive = os.pipe()  # nothing is ever written; the system closes it with this process
-        self.environment = {**environment, PARENT: str(self.pipe)}
+        # Windows gives a child no descriptors but the three of every program.
+        self.environment = {**environment, PARENT: "0" if WINDOWS else str(self.pipe)}
 
     def __enter__(self):
         return self
@@ -40,10 +43,16 @@ class Children:
             report, log = Path(folder) / "report.json", Path(folder) / "log"
             with log.open("wb") as stream:
                 code = self.wait([*command, "--report", str(report)], stream)
-            outcome = understand(code, report, log.read_text(errors="replace"))
+            outcome = understand(code, report, log.read_text(encoding="utf-8", errors="replace"))
         if code is None:
             outcome["message"] = f"given up after {self.limit:g} s"
         return {**outcome, "seconds": round(time.perf_counter() - begin, 2)}
+
+    def ties(self):
+        """A Ctrl-C reaches the batch alone, which ends its children; its pipe reaches them."""
+        if WINDOWS:
+            return {"stdin": self.pipe, "creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
+        return {"stdin": subprocess.DEVNULL, "pass_fds": (self.pipe,), "start_new_session": True}
 
     def wait(self, command, stream):
         """The child's exit code; None when it took too long."""
@@ -53,10 +62,8 @@ class Children:
             command,
             stdout=stream,
             stderr=subprocess.STDOUT,
-            stdin=subprocess.DEVNULL,
             env=self.environment,
-            pass_fds=(self.pipe,),
-            start_new_session=True,  # a Ctrl-C reaches the batch, which ends its children
+            **self.ties(),
         )
         self.running.add(process)
         try:
@@ -70,7 +77,7 @@ class Children:
 
 def end(process):
     """Asks a child to stop, which leaves no partial files; one that does not listen is killed."""
-    process.send_signal(signal.SIGINT)
+    process.send_signal(signal.CTRL_BREAK_EVENT if WINDOWS else signal.SIGINT)
     try:
         process.wait(5.0)
     except subprocess.TimeoutExpired:
@@ -81,7 +88,7 @@ def end(process):
 def read_objects(report):
     """What a child says of its objects; nothing where it did not come to that."""
     try:
-        objects = json.loads(report.read_text())["objects"]
+        objects = json.loads(report.read_text(encoding="utf-8"))["objects"]
         return [{**o, "status": str(o["status"]), "message": str(o["message"])} for o in objects]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return []

@@ -66,7 +66,7 @@ def write(path, items):
             raise UserError(f"{path}: Blender could not write all of it; the disk may be full")
         materials = partial.with_suffix(".mtl")
         if materials.exists():
-            text = materials.read_text(errors="surrogateescape")
+            text = materials.read_text(encoding="utf-8", errors="surrogateescape")
             write_text(path.with_suffix(".mtl"), relative_textures(text, path.parent))
 
 

@@ -26,7 +26,11 @@ def end_with_parent():
                 pass
         except OSError:
             return  # not a batch's child after all
-        os.kill(os.getpid(), signal.SIGTERM)  # an interruption, which leaves no partial file
+        # An interruption, which leaves no partial file; os.kill would end the process at once on Windows.
+        if os.name == "nt":
+            signal.raise_signal(signal.SIGTERM)
+        else:
+            os.kill(os.getpid(), signal.SIGTERM)
         time.sleep(PATIENCE)
         os._exit(130)
 

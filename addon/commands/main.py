@@ -59,10 +59,12 @@ def fail(reason, code):
 @contextlib.contextmanager
 def interruptible():
     """Ctrl-C and SIGTERM raise KeyboardInterrupt: Blender catches the former for purposes of its own."""
-    both = (signal.SIGINT, signal.SIGTERM)
-    before = [signal.signal(number, signal.default_int_handler) for number in both]
+    asked = [signal.SIGINT, signal.SIGTERM]
+    if hasattr(signal, "SIGBREAK"):
+        asked.append(signal.SIGBREAK)  # Windows': how a batch asks (children.py)
+    before = [signal.signal(number, signal.default_int_handler) for number in asked]
     try:
         yield
     finally:
-        for number, handler in zip(both, before, strict=True):
+        for number, handler in zip(asked, before, strict=True):
             signal.signal(number, handler if handler is not None else signal.SIG_DFL)

@@ -2,7 +2,6 @@
 """What a batch has done: a file an input, by which the next run, or another machine, knows what to skip."""
 
 import contextlib
-import fcntl
 import hashlib
 import json
 import os
@@ -20,7 +19,7 @@ def described(verb, settings, version):
     """What is done to an input, as JSON; of files among the settings the content counts, not their names."""
     told = {"version": version, "verb": verb}
     for name, value in sorted(settings.items()):
-        told[name] = digest(Path(value).read_text()) if isinstance(value, Path) else value
+        told[name] = digest(Path(value).read_text(encoding="utf-8")) if isinstance(value, Path) else value
     return told
 
 
@@ -89,8 +88,10 @@ class Record:
         and reaches other machines where their folder is shared with locks. Without locks all claims are
         granted: an input may then be done twice, with one result.
         """
+        from arapfields._locks import lock
+
         try:
-            fcntl.lockf(self._locks(), fcntl.LOCK_EX | fcntl.LOCK_NB, 1, byte_of(name))
+            lock(self._locks(), byte_of(name), wait=False)
         except (BlockingIOError, PermissionError):
             return False
         except OSError:
@@ -98,8 +99,9 @@ class Record:
         return True
 
     def release(self, name):
-        with contextlib.suppress(OSError):
-            fcntl.lockf(self._locks(), fcntl.LOCK_UN, 1, byte_of(name))
+        from arapfields._locks import unlock
+
+        unlock(self._locks(), byte_of(name))
 
     def _locks(self):
         if self._lock is None:
@@ -114,8 +116,10 @@ class Record:
 
     def agree(self, told, anew):
         """What differs between these settings and those of the folder, which become these where `anew`."""
+        from arapfields._locks import lock
+
         with contextlib.suppress(OSError):
-            fcntl.lockf(self._locks(), fcntl.LOCK_EX, 1, byte_of(BATCH))
+            lock(self._locks(), byte_of(BATCH))
         try:
             there = self.settings()
             other = differences(there, told) if there else ""

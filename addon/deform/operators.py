@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
+from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..blender.presets import preset_classes
 from ..blender.property_definitions import annotations, effective_values
@@ -8,12 +9,13 @@ from ..core.errors import UserError
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
 from ..core.settings.parameters import DEFORM
-from ..handles import empties
+from ..handles import empties, scaling
 from ..handles.native_handles import native_handles
+from ..live.giving_way import give_way
 from ..names import Op
 from ..properties.item import output, refine_thin, resolution, surface, target
 from ..surface.source_surface import build_options
-from .solve_job import SolveOperator, plan_solve_job
+from .solve_job import SolveOperator, destination, plan_solve_job
 
 
 class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
@@ -42,6 +44,7 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
         return empties.group_names(source)
 
     def plan(self, context, source, weights):
+        give_way(context, source, *destination(settings_of(source), self))
         context.view_layer.update()
         values = effective_values(DEFORM, settings_of(source).deform, self)
         af = native.library()
@@ -49,6 +52,9 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
         handles = empties.solve_handles(source, space_of(source.matrix_world, source.name), weights)
 
         require_reach_heeded(handles, values)
+        scaled = scaling.ignored(source)
+        if scaled is not None:
+            self.warnings.append(f"{source.name}: {translated(scaled)}")
 
         def solve(tracker, rest, samples, weight):
             natives = native_handles(af, handles, rest, samples)

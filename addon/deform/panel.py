@@ -23,7 +23,7 @@ class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
         live_buttons(layout, source, "DEFORM", empties.require_handles(source))
         job_button(layout, Op.DEFORM, "MOD_SIMPLEDEFORM")
         settings_column(layout, settings.deform, DEFORM, advanced=False)
-        note(layout, empties.require_handles(source), placement_refusal(source, "DEFORM"))
+        note(layout, empties.require_handles(source), placement_refusal(source))
         if empties.holding_nothing(source):
             note(layout, nothing_held(empties.holding_nothing(source)))
 

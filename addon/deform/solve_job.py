@@ -103,14 +103,9 @@ def destination(settings, operator):
     return output, placement.effective_target(output, effective_value("target", settings, operator))
 
 
-def placement_refusal(source, kind=""):
-    """Why a result cannot go where the object's settings say, as a UserError; None where it can.
-
-    `kind`: the section that tells it, DEFORM or STYLIZE; that the object is live stands in one of them alone.
-    """
+def placement_refusal(source):
+    """Why a result cannot go where the object's settings say, as a UserError; None where it can."""
     settings = settings_of(source)
-    if kind and settings.live_kind not in ("", kind):
-        return None
     target = placement.effective_target(settings.output, settings.target)
     return placement.refusal(source, settings.output, target)
 

@@ -11,7 +11,7 @@ from ..blender.property_definitions import from_single_precision
 from ..blender.selection import choose_row
 from ..core.errors import UserError
 from ..core.geometry.handles import far_handle, solve_handle
-from ..core.geometry.spaces import transform
+from ..core.geometry.spaces import inverse, transform
 from ..core.runtime.coroutines import run_to_completion
 from . import movers, naming
 from .movers import box_now, current_box, is_there, matrix_of, name_of
@@ -25,7 +25,7 @@ def rest_box(source, entry, where=matrix_of):
 
 def store_rest(source, entry):
     """Makes where the handle's Empty or bone is now its rest pose."""
-    relative = np.linalg.inv(matrix_of(source)) @ box_now(entry)
+    relative = inverse(matrix_of(source)) @ box_now(entry)
     entry.rest = relative.ravel()
 
 
@@ -191,7 +191,7 @@ def mirror(context, source, entry, axis):
     if group and group not in source.vertex_groups:
         raise UserError("{name} has no vertex group {group}", name=source.name, group=group)
     rest = flip @ np.array(entry.rest, dtype=np.float64).reshape(4, 4) @ flip
-    current = flip @ np.linalg.inv(world) @ matrix_of(entry.empty) @ flip
+    current = flip @ inverse(world) @ matrix_of(entry.empty) @ flip
     name, size = entry.empty.name, entry.empty.empty_display_size
     flipped = bpy.utils.flip_name(name)
     kept, kind = movers.asked_of(entry), entry.kind

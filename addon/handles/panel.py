@@ -3,9 +3,9 @@ import bpy
 
 from ..blender.language import translated
 from ..blender.object_references import source_of
-from ..blender.section import Section, wrapped
+from ..blender.section import Section, note, wrapped
 from ..names import Op
-from . import empties, movers
+from . import empties, movers, scaling
 
 ICONS = {"CUBE": "CUBE", "POINT": "DOT", "GROUP": "GROUP_VERTEX", "PIN": "PINNED", "BONE": "BONE_DATA"}
 
@@ -93,6 +93,7 @@ class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
             layout.prop(entry, "reach")
             if entry.kind != "POINT":
                 layout.prop(entry, "allow_scale")
+            note(layout, scaling.ignored(source))
             if entry.kind in ("GROUP", "BONE"):
                 layout.prop_search(entry, "group", source, "vertex_groups")
             if entry.group:

@@ -3,9 +3,11 @@
 from the shape before."""
 
 from ..blender.host import has_window
-from .frames import SolvedFrames
+from .frames import SimulatedFrames, SolvedFrames
 from .request import alike
 from .solving import Solving
+
+PATIENCE = 1.0  # seconds at most that playback waits for a frame of secondary motion
 
 
 class Following(Solving):
@@ -17,19 +19,32 @@ class Following(Solving):
 
     def take(self, request, frame):
         """Goes for this request, which was read at that frame of the scene."""
-        if self.requested is None or not alike(request, self.requested):
+        swings = request.body is not None and frame != self.frame  # also while its handles hold still
+        if self.requested is None or swings or not alike(request, self.requested):
             self.requested, self.quiet = request, self.is_restored
             self.follows_animation, self.exact = frame != self.frame, None
             kept = None if self.frames is None else self.frames.get(frame, request)
             self.is_asked = kept is not None and self.follows_animation
-            if not self.is_asked:
+            if swings:
+                self.clock = None  # a drag that follows begins at rest
+            elif not self.is_asked:
                 self.worker.request(request)
         self.frame = frame
         if self.follows_animation and not self.is_asked and self.rest is not None:  # the solver is set up
             if self.frames is None:
-                self.frames = SolvedFrames(self.twin, low_priority=has_window())
+                self.frames = self.new_frames(request)
             self.frames.ask(frame, self.requested)
             self.is_asked = True
+
+    @property
+    def swings(self):
+        """Whether what is asked for has secondary motion."""
+        return self.requested is not None and self.requested.body is not None
+
+    def new_frames(self, request):
+        if request.body is None:
+            return SolvedFrames(self.twin, low_priority=has_window())
+        return SimulatedFrames(self.twin, self.start, self.fps, low_priority=has_window())
 
     def wait_for_frame(self, seconds):
         """Until the frame at hand is solved, so many seconds at most; None: however long that takes."""
@@ -47,6 +62,15 @@ class Following(Solving):
             return shape
         shape, self.exact = None if exact is self.exact else exact, exact
         return shape
+
+    def show_frame(self, context):
+        """Shows a frame that is solved already, or one of secondary motion, which is waited for."""
+        if self.frames is None and not self.swings:
+            return
+        self.look(context)
+        if self.swings:
+            self.wait_for_frame(PATIENCE)
+        self.show()
 
     def stop_frames(self):
         if self.frames is not None:

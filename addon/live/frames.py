@@ -12,6 +12,7 @@ from ..core.errors import UserError
 from ..core.runtime import native
 from ..core.runtime.threads import start_thread
 from .request import alike
+from .simulation import Simulation
 
 LARGEST = 1 << 30  # bytes of shapes that one source keeps
 
@@ -75,6 +76,12 @@ class SolvedFrames:
             self._changed.notify_all()
         self._thread.join()
 
+    def _next(self):
+        return self._wanted.popitem()
+
+    def _solve(self, frame, request):
+        return self._solving.solve_from_rest(request, self._task)
+
     def _drop(self, frame):
         self._bytes -= size(self._kept.pop(frame)[1])
 
@@ -84,24 +91,66 @@ class SolvedFrames:
                 self._changed.wait_for(lambda: self._wanted or self._ended)
                 if self._ended:
                     return
-                frame, request = self._wanted.popitem()
+                frame, request = self._next()
                 edition = self._edition
             try:
                 self._solving = self._solving or self._make()
-                shape = self._solving.solve_from_rest(request, self._task)
+                shape = self._solve(frame, request)
             except Exception as error:  # told where the frame is shown
                 shape = error
             with self._changed:
                 if self._ended:
                     return
                 if frame in self._kept:
-                    self._drop(frame)
+                    self._bytes -= size(self._kept.pop(frame)[1])
                 while self._kept and self._bytes + size(shape) > LARGEST:
                     self._drop(next(iter(self._kept)))  # the one that was solved first
                 self._kept[frame] = request, shape, edition
                 self._bytes += size(shape)
                 self.has_news = True
                 self._changed.notify_all()
+
+
+class SimulatedFrames(SolvedFrames):
+    """The same for a source with secondary motion, whose frames follow from those before them.
+
+    A frame that was made without all that lead to it is made again once those are there.
+    """
+
+    def __init__(self, make, start, fps, low_priority=False):
+        self._simulation = Simulation(None, start, fps)
+        self._rough = set()  # frames that were made without all that lead to them
+        super().__init__(make, low_priority)
+
+    def get(self, frame, request):
+        with self._changed:
+            kept = self._kept.get(frame)
+            if kept is not None and not alike(kept[0], request):
+                for later in [one for one in self._kept if one > frame]:
+                    self._drop(later)
+                self._simulation.forget(frame)
+            elif frame in self._rough and self._simulation.could_be_exact(frame):
+                self._drop(frame)
+        return super().get(frame, request)
+
+    def _next(self):
+        frame = min(self._wanted)
+        return frame, self._wanted.pop(frame)
+
+    def _solve(self, frame, request):
+        simulation = self._simulation
+        simulation.solving = self._solving
+        edition, is_exact = simulation.edition, simulation.could_be_exact(frame)
+        try:
+            return simulation.shape(frame, request, self._task)
+        finally:
+            with self._changed:
+                if not is_exact or edition != simulation.edition:  # or edited meanwhile
+                    self._rough.add(frame)
+
+    def _drop(self, frame):
+        super()._drop(frame)
+        self._rough.discard(frame)
 
 
 def size(shape):

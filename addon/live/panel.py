@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The buttons of live mode, which the sections of deforming and stylizing show."""
+"""The buttons of live mode, which the sections of deforming and stylizing show, and secondary motion."""
 
 import bpy
 
+from ..blender import vertex_groups
 from ..blender.language import translated
+from ..blender.section import Advanced, note, settings_column
 from ..names import Op
-from . import sessions
+from . import body, sessions
+from .properties import SECONDARY
 
 
 def live_buttons(layout, source, kind, refusal):
@@ -23,3 +26,27 @@ def live_buttons(layout, source, kind, refusal):
         layout.progress(factor=count / max(1, total), text=text)
     if on:
         row.operator(Op.LIVE_KEEP, icon="CHECKMARK")
+
+
+class ARAPFIELDS_PT_secondary(Advanced, bpy.types.Panel):
+    bl_label = "Secondary Motion"
+    bl_idname = "ARAPFIELDS_PT_secondary"
+    bl_order = 3
+
+    def fill(self, context, source, settings):
+        group = settings.secondary
+        self.layout.prop(group, "use")
+        layout = self.layout.column()
+        layout.enabled = group.use
+        settings_column(layout, group, SECONDARY, advanced=False)
+        layout.prop_search(group, "group", source, "vertex_groups")
+        layout.prop(group, "start")
+        row = layout.row(heading="Ground")
+        row.prop(group, "use_ground", text="")
+        height = row.row()
+        height.enabled = group.use_ground
+        height.prop(group, "ground", text="")
+        note(layout, vertex_groups.missing(source, body.group_names(source)))
+
+
+CLASSES = [ARAPFIELDS_PT_secondary]

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..carried.passengers import Frame
+from .body import Body
 
 
 class Request(NamedTuple):
@@ -17,13 +18,14 @@ class Request(NamedTuple):
     handles: list  # at rest
     energy: dict  # weights of the energy's terms, by name
     carried: list  # carried.passengers.Frame of what goes along
+    body: Body | None = None  # what has secondary motion
 
 
 def alike(a, b):
     """Whether two requests ask for the same."""
     if (a.style and a.style[0]) != (b.style and b.style[0]) or a.energy != b.energy:
         return False
-    if a.handles is not b.handles or not same_points(a.points, b.points):
+    if a.body != b.body or a.handles is not b.handles or not same_points(a.points, b.points):
         return False
     if len(a.carried) != len(b.carried) or not all(map(Frame.same, a.carried, b.carried)):
         return False

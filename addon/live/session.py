@@ -15,13 +15,14 @@ from ..core.errors import UserError
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
 from ..core.runtime.coroutines import run_to_completion, step_for
-from ..core.runtime.latest_request_worker import LatestRequestWorker
+from ..core.runtime.latest_request_worker import REST, LatestRequestWorker
 from ..field_modifier import motion
 from ..handles import empties
 from ..results import placement
 from ..stiffness import painted
 from ..stylize import preference
 from ..surface.source_surface import read_surface
+from . import body
 from .animated import frame_range
 from .edits import Changed, Edits
 from .following import Following, scene_frame
@@ -29,6 +30,7 @@ from .live_modifier import PAUSING, LiveModifier
 from .live_object import LiveObject
 from .request import Request
 from .setup import differ_in_handles, energy_weights, has_motion_before, layout_of
+from .swinging import PACE
 from .warm import warm
 
 PREVIEW_CELLS = 96  # at most, of the implicit surface that is shown while it moves
@@ -55,7 +57,8 @@ class Session(Edits, Following):
     ):
         self.keeps, self.quiet, self.is_restored, self.edited_at = keeps, False, False, 0.0
         settings = settings_of(source)
-        self.source, self.kind, self.layout = ObjectReference(source), kind, layout_of(source, kind)
+        self.source, self.kind = ObjectReference(source), kind
+        self.layout = layout_of(source, kind, context.scene)
         self.output = settings.output
         if in_place is None:
             in_place = shown and placement.in_place(self.output, settings.target)
@@ -66,6 +69,7 @@ class Session(Edits, Following):
         self.may_be_edited = self.may_have_moved = False
         self.cells = min(settings.resolution, PREVIEW_CELLS)
         self.handles, self.weights = [], None
+        self.start, self.fps = settings.secondary.start, body.frame_rate(context.scene)
         self.energy = energy_weights(settings, kind)
         self.requested = self.solver = self.samples = self.topology = self.style_set = None
         self.placed = (
@@ -106,9 +110,12 @@ class Session(Edits, Following):
         source = self.source.get()
         style = settings_of(source).stylize if self.kind == "STYLIZE" else None
         names = preference.group_names(source, style) if style else empties.group_names(source)
+        names = [*names, *body.group_names(source)]
         in_place = self.surface.in_place
         weights = yield from vertex_groups.read_weights(context, source, names, in_place)
         source = self.source.get()
+        for name in body.group_names(source):
+            self.masses = weights[name]
         if style is None or settings_of(source).stylize.use_handles:
             self.handles = empties.solve_handles(source, self.surface.space, weights)
         if style is not None:
@@ -116,7 +123,11 @@ class Session(Edits, Following):
             self.weights = preference.region_weights(context, source, style, weights, in_place)
         if follow:
             self.worker = LatestRequestWorker(
-                self.moved, self.prepare, self.refined, low_priority=has_window()
+                self.moved,
+                self.prepare,
+                self.refined,
+                rest=PACE if body.is_body(source) else REST,
+                low_priority=has_window(),
             )
 
     def advance(self):
@@ -131,7 +142,7 @@ class Session(Edits, Following):
             run_to_completion(self.reading)
         self.look(bpy.context)
         self.worker.wait(seconds, refined)
-        if refined:
+        if refined or self.swings:
             self.wait_for_frame(seconds)
 
     def stop(self):
@@ -151,7 +162,7 @@ class Session(Edits, Following):
             return
         if self.is_restored:
             context.view_layer.update()
-        layout = layout_of(source, self.kind)
+        layout = layout_of(source, self.kind, context.scene)
         if layout != self.layout:
             if not differ_in_handles(layout, self.layout):
                 raise Changed
@@ -185,12 +196,13 @@ class Session(Edits, Following):
         """
         space, settings = space_of(where(source), source.name), settings_of(seen or source).stylize
         energy, targets = energy_weights(settings_of(seen or source), self.kind), []
+        swings = body.body_of(settings_of(seen or source), space)
         if self.handles:
             current = empties.solve_handles(source, space, where=where)
             targets = [h.target[:3, 3] if h.kind == "POINT" else h.target for h in current]
         frames = self.carrying.frames(space, depsgraph or depsgraph_of(context))
         if self.kind != "STYLIZE":
-            return Request(targets, None, self.placed, self.handles, energy, frames)
+            return Request(targets, None, self.placed, self.handles, energy, frames, swings)
         style = preference.requested_style(settings, space, where=where)
         strength, sharpness = (
             from_single_precision(settings.strength),
@@ -199,7 +211,7 @@ class Session(Edits, Following):
         directions = style.directions(native.library())
         key = (*style.key(), strength, sharpness)
         further = key, directions, strength, sharpness, style.up
-        return Request(targets, further, self.placed, self.handles, energy, frames)
+        return Request(targets, further, self.placed, self.handles, energy, frames, swings)
 
     def show(self):
         """Shows the newest shape; True when there was one."""

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Live mode: while handles move or a style's sliders change, shapes follow; off, all is as it was.
 
-A tool or script makes an object live with begin(context, source), has it look at its handles and show the
-newest shape with update(context) (a timer does it by itself in a window; `wait` seconds for the shape to
-follow), and ends it with end(context, source), or end(context, source, keep=True) where the shape shall stay.
+A tool or script makes an object live with begin(context, source), has it look and show the newest shape with
+update(context) (in a window a timer does; `wait` seconds for the shape to follow), and ends it with
+end(context, source), or end(context, source, keep=True) where the shape shall stay.
 """
 
 import contextlib
@@ -27,7 +27,7 @@ from .following import scene_frame
 from .session import Changed, Session
 from .setup import moves
 
-INTERVAL = 1 / 60  # seconds between looks at the handles
+INTERVAL = 1 / 60  # seconds between looks
 WAIT = 30.0  # seconds at most that a script waits for the first shape
 
 
@@ -204,12 +204,10 @@ def follow_frame(depsgraph):
 
 
 def show_frame():
-    """Shows frames that are solved already as the scene comes to them, in the same picture."""
+    """Shows what is known at the frame that the scene has come to, in the same picture."""
     for session in list(live.values()):
-        if session.frames is not None:
-            with contextlib.suppress(Changed, UserError, ValueError, ReferenceError):  # the timer tells
-                session.look(bpy.context)
-                session.show()
+        with contextlib.suppress(Changed, UserError, ValueError, ReferenceError):  # the timer tells
+            session.show_frame(bpy.context)
 
 
 def warn_of_hidden(source, session, depsgraph):
@@ -231,8 +229,7 @@ def rendered_matrix(item, bone="", *, depsgraph):
 
 
 def recover():
-    """After a file is loaded or a step undone: takes away live objects that no session moves any more, and
-    ends sessions whose source is not live in that step."""
+    """After a load or an undone step: ends what no session or no source knows as live any more."""
     for uid, session in list(live.items()):
         source = session.source.find()
         if source is None or not settings_of(source).live_kind:

@@ -7,6 +7,7 @@ from ..blender import modifier_stack
 from ..blender.object_references import settings_of
 from ..blender.property_definitions import from_single_precision
 from ..handles import empties, movers
+from . import body
 
 
 def energy_weights(settings, kind):
@@ -30,7 +31,7 @@ def uses_handles(settings, kind):
     return kind == "DEFORM" or settings.stylize.use_handles
 
 
-def layout_of(source, kind):
+def layout_of(source, kind, scene):
     """What the solver was set up for: the handles and their rest regions, and what is shown. The energy's
     weights are not among it: they may be animated."""
     settings = settings_of(source)
@@ -46,6 +47,7 @@ def layout_of(source, kind):
         further += (*style, settings.stylize.use_handles)
     further += tuple((e.item.session_uid if e.item else 0, e.way) for e in settings.carried)
     used = uses_handles(settings, kind)
+    further += (body.layout_of(source, scene),)
     return (held if used else [], used and empties.holds_far(source), further, stack_of(source))
 
 

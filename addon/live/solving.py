@@ -15,8 +15,12 @@ from ..core.runtime.progress import ProgressTracker
 from ..core.settings.parameters import presets
 from ..handles.native_handles import native_handles
 from ..surface.source_surface import supported_options
+from .swinging import Swinging
 
 SAMPLES = 6000
+# Quasi-Newton steps to the first shape of a request, and from there to the next. Each solve begins where the
+# last one ended: after three the shape is behind by a quarter of what the handles moved since then.
+FIRST_STEPS, FURTHER_STEPS = 3, 9
 REFINEMENTS, STEPS_AT_ONCE, FINE_TOLERANCE = 40, 10, 1e-6
 STYLE = presets("live").get("STYLE")  # label, tip, and options for a style, which acts everywhere
 LEAST_RIGIDITY = 1e-3  # of a live style
@@ -33,9 +37,11 @@ class Shape:
     carried: list = field(default_factory=list)  # what Carrying.moved made
 
 
-class Solving:
+class Solving(Swinging):
     """Mixin of a session: all of this runs on its worker, or on another thread than the main one."""
 
+    reached = None  # the request that the last shape was made for
+    body = None  # the Body that the solver knows
     single = None  # the points that the solver moves, and these in single precision
     follows_animation = False  # whether what is asked for came with another frame, rather than by a drag
 
@@ -46,9 +52,11 @@ class Solving:
         if ready is not None:
             self.samples, self.solver = ready
             self.bound, self.points, self.rest = (), surface.local, surface.vertices
+            self.place_masses()
             return
         own_triangles = surface.exact and self.output == "WARP"
         self.samples = surface.samples(ProgressTracker(af.Task), SAMPLES, 0, own_triangles)
+        self.place_masses()
         if self.kind == "STYLIZE" and self.weights is not None:
             self.weights = vertex_groups.at_points(surface.vertices, self.weights, self.samples.points)
         self.make_solver(self.handles, self.energy)
@@ -68,7 +76,7 @@ class Solving:
             options["gauss_weight"] = af.LiveOptions().gauss_weight
             for name in ("barrier", "gauss_weight", "keep_stance", "handle_weight"):
                 options[name] /= rigidity
-        self.bound, self.energy, self.style_set = handles, energy, None
+        self.bound, self.energy, self.style_set, self.body = handles, energy, None, None
         held = self.native_handles(handles)
         options["interior"] = bool(held)  # a style alone acts everywhere alike
         options |= supported_options(af.LiveOptions, machine_options())
@@ -91,9 +99,18 @@ class Solving:
             self.solver.track(self.rest)
 
     def moved(self, request):
-        """The shape for this request, quickly; on the worker."""
-        self.solve(request)
-        return self.shape(self.solver.tracked())
+        """Yields a shape for this request, quickly, and then a better one; on the worker."""
+        if request.body is not None:
+            self.swing(request)
+            self.reached = request
+            yield self.shape(self.solver.tracked())
+            return
+        for steps in (FIRST_STEPS, FURTHER_STEPS):
+            taken = self.solve(request, iterations=steps)
+            shape, self.reached = self.shape(self.solver.tracked()), request
+            yield shape
+            if taken < steps:
+                break
 
     def twin(self):
         """The same with a solver of its own, for another thread; the samples and the surface are shared."""
@@ -108,8 +125,9 @@ class Solving:
         self.solve(request, iterations=steps, tolerance=FINE_TOLERANCE, task=task)
         return self.shape(self.solver.field(self.rest))
 
-    def solve(self, request, **further):
-        targets, style, points, handles, energy, self.riding = request
+    def aim(self, request):
+        """Has the solver know all of the request but where its handles are; returns that."""
+        targets, style, points, handles, energy, self.riding, body = request
         self.follow_points(points)
         if energy != self.energy:
             self.make_solver(handles, energy)
@@ -120,18 +138,27 @@ class Solving:
             directions, strength, sharpness, up = style[1:]
             self.solver.set_style(directions, strength, sharpness=sharpness, weights=self.weights, up=up)
             self.style_set = style[0]
-        self.solver.solve(targets if handles else None, **further)
+        if body != self.body:
+            self.set_body(body)
+        return targets if handles else None
+
+    def solve(self, request, **further):
+        """Returns the steps that were taken."""
+        return self.solver.follow(self.aim(request), **further)
 
     def refined(self, request, token):
         """Better and better shapes, until the energy falls no more; on the worker. None where another thread
         solves the frame from rest."""
         if self.follows_animation:
             return
+        if request.body is not None:
+            yield from self.settle(request, token)
+            return
         for _ in range(REFINEMENTS):
-            self.solve(request, iterations=STEPS_AT_ONCE, tolerance=FINE_TOLERANCE)
+            taken = self.solve(request, iterations=STEPS_AT_ONCE, tolerance=FINE_TOLERANCE)
             if token.cancelled:
                 return
-            if self.solver.report.iterations < STEPS_AT_ONCE:
+            if taken < STEPS_AT_ONCE:
                 break
             yield self.shape(self.solver.tracked())
         yield self.shape(self.solver.field(self.rest))

@@ -9,6 +9,7 @@ from ..field_modifier import motion
 from ..live import sessions
 from . import pins
 
+MOMENT, FIRST_MOMENT = 0.015, 0.1  # seconds that a picture waits for its shape; that of the first move
 TRANSFORMS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
 
 
@@ -70,9 +71,14 @@ class Drag:
         self.put(context, turn @ Matrix.Translation(-middle) @ self.start)
 
     def put(self, context, matrix):
-        self.has_moved = True
+        """Moves the Empty, and the shape in the same picture where that is done in a moment."""
+        session = self.session()
         self.empty.get().matrix_world = matrix
         sessions.update(context)
+        if session is not None and session.worker is not None:
+            session.worker.wait_for_result(MOMENT if self.has_moved else FIRST_MOMENT)
+            sessions.update(context)
+        self.has_moved = True
 
     def change_reach(self, context, steps):
         """Has the handle reach so many steps of the wheel farther, or less far where these are negative."""

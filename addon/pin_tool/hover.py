@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from bpy_extras import view3d_utils
 
+from ..blender import mesh_arrays
 from ..blender.object_references import ObjectReference
-from ..core.geometry.spaces import transform
+from ..core.geometry.spaces import inverse, transform
 from ..handles.empties import matrix_of
 from . import pins, screen
 
@@ -123,16 +124,11 @@ def surface(context, view, lights):
 
 def lit(mesh, world, location, radius):
     """(k, 3, 3) the triangles of a mesh with a corner within the radius of the location, in world space."""
-    flat = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-    mesh.attributes["position"].data.foreach_get("vector", flat)
-    points = flat.reshape(-1, 3)
+    points = mesh_arrays.positions(mesh).astype(np.float32)
     least = np.linalg.svd(world[:3, :3], compute_uv=False).min()  # local lengths are so much shorter
-    middle = transform(np.linalg.inv(world), location[None])[0]
+    middle = transform(inverse(world), location[None])[0]
     kept = ((points - middle.astype(np.float32)) ** 2).sum(axis=1) <= (radius / least) ** 2
-    mesh.calc_loop_triangles()
-    corners = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
-    mesh.loop_triangles.foreach_get("vertices", corners)
-    corners = corners.reshape(-1, 3)
+    corners = mesh_arrays.triangles(mesh)
     chosen = transform(world, points[corners[kept[corners].any(axis=1)]].reshape(-1, 3)).reshape(-1, 3, 3)
     near = np.linalg.norm(chosen - location, axis=2).min(axis=1) <= radius
     return chosen[near].astype(np.float32)

@@ -10,6 +10,7 @@ from ..blender.object_references import owner_of, settings_of
 from ..carried import passengers
 from ..core.errors import UserError
 from ..core.geometry.handles import box_matrix
+from ..core.geometry.spaces import inverse
 from ..field_modifier import motion
 from ..handles import empties, naming
 from ..live import sessions
@@ -96,7 +97,7 @@ def place(context, source, location, radius, face=None, face_count=None, anchor=
     now[:3, :3], now[:3, 3], rest[:3, 3] = found.turn, found.now, found.rest
     empty = empties.make_empty(context, source, Matrix(now.tolist()), radius, name(source, found.weights))
     entry = empties.add(source, empty, "PIN")
-    entry.rest = (np.linalg.inv(empties.matrix_of(source)) @ box_matrix(rest, radius)).ravel()
+    entry.rest = (inverse(empties.matrix_of(source)) @ box_matrix(rest, radius)).ravel()
     entry.anchor = anchor
     select(context, empty)
     return entry

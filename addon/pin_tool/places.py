@@ -36,18 +36,15 @@ def find(context, source, location, radius, face=None, face_count=None):
     world = matrix_of(source)
     with modifier_stack.moved_mesh(context, source) as mesh:
         now = transform(world, mesh_arrays.positions(mesh))
-        mesh.calc_loop_triangles()
-        corners = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
-        mesh.loop_triangles.foreach_get("vertices", corners)
-        faces = np.empty(len(mesh.loop_triangles), dtype=np.int32)
-        mesh.loop_triangles.foreach_get("polygon_index", faces)
         known = face is not None and face_count == len(mesh.polygons)
         rest = now
         if modifier_stack.find(source) is not None:
             with modifier_stack.evaluated_mesh(context, source, in_place=True) as still:
                 rest = transform(world, mesh_arrays.positions(still))
-        triangles = corners.reshape(-1, 3)
-        chosen = triangles[faces == face] if known else near(now, triangles, location)
+        if known:
+            chosen = mesh_arrays.triangles_of(mesh, face)
+        else:
+            chosen = near(now, mesh_arrays.triangles(mesh), location)
         at_rest, there = map_back(now, rest, chosen, location)
         about = around(rest, at_rest, radius)
         weights = group_weights(source, mesh, about)

@@ -11,6 +11,7 @@ from ..carried.properties import ARAPFIELDS_PG_carried
 from ..core.settings.choices import NORMALS, OUTPUTS, PLACEMENT_NUMBERS, PLACEMENTS, SURFACES
 from ..core.settings.parameters import EXTRACTION
 from ..handles.properties import ARAPFIELDS_PG_handle
+from ..live.properties import ARAPFIELDS_PG_secondary
 from ..names import PROPERTY
 from ..pin_tool.properties import ARAPFIELDS_PG_scene
 from ..stiffness.properties import ARAPFIELDS_PG_stiffness
@@ -79,6 +80,9 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     )
     stiffness: bpy.props.PointerProperty(
         type=ARAPFIELDS_PG_stiffness, name="Stiffness", description="Vertex groups that are stiffer or softer"
+    )
+    secondary: bpy.props.PointerProperty(
+        type=ARAPFIELDS_PG_secondary, name="Secondary Motion", description="How the surface swings"
     )
     carried: bpy.props.CollectionProperty(
         type=ARAPFIELDS_PG_carried, name="Carried Objects", description="Objects that the field moves as well"

@@ -73,7 +73,7 @@ ARAPFIELDS_PG_stylize = group(
     style_object=bpy.props.PointerProperty(
         type=bpy.types.Object,
         name="Normals Of",
-        description="Object whose axes or faces the surface turns towards, for styles of that kind",
+        description="Object whose axes or shape the surface turns towards, for styles of that kind",
     ),
     region_material=bpy.props.PointerProperty(
         type=bpy.types.Material,

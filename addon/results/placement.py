@@ -89,8 +89,6 @@ def refusal(source, output, target):
         )
     else:
         reason = None
-    if reason is None and settings_of(source).live_kind:
-        reason = UserError("{name} is live; end live mode first", name=source.name)
     if reason is None and target == "REPLACE" and settings_of(source).carried:
         reason = UserError("{name} carries other objects; choose Modifier for the result", name=source.name)
     if reason is None and output != "WARP" and target == "KEY":

@@ -10,9 +10,10 @@ from ..blender.source_operator import SourceOperator
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
 from ..core.settings.styles import STYLIZE
-from ..deform.solve_job import SolveOperator, plan_solve_job
+from ..deform.solve_job import SolveOperator, destination, plan_solve_job
 from ..handles import empties
 from ..handles.native_handles import native_handles
+from ..live.giving_way import give_way
 from ..names import Op
 from ..properties.item import output, refine_thin, resolution, surface, target
 from ..properties.settings import frame, style
@@ -49,6 +50,7 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
         return preference.group_names(source, settings_of(source).stylize)
 
     def plan(self, context, source, of_groups):
+        give_way(context, source, *destination(settings_of(source), self))
         context.view_layer.update()
         settings = settings_of(source).stylize
         values = effective_values(STYLIZE, settings, self)

@@ -2,13 +2,24 @@
 import bpy
 
 from ..blender.icons import icon
+from ..blender.object_references import settings_of, source_of
 from ..blender.section import Advanced, Section, job_button, note, presets, settings_column
 from ..core.settings.styles import CUSTOM, STYLIZE
 from ..deform.solve_job import placement_refusal
 from ..live.panel import live_buttons
 from ..names import Op
 from ..properties.settings import STYLE_ITEMS
-from . import preference
+from . import ball, preference
+
+PLAIN = {"AXES": "EMPTY_AXIS", "OBJECT": "MESH_MONKEY"}  # icons of styles that have no picture
+
+
+def picture_of(identifier, chosen):
+    """A style's picture as keywords of a layout's call: of an object's, a ball that is styled by it."""
+    number = icon(identifier)
+    if identifier == "OBJECT" and chosen is not None:
+        number = ball.icon(chosen)
+    return {"icon_value": number} if number else {"icon": PLAIN.get(identifier, "NONE")}
 
 
 class ARAPFIELDS_MT_styles(bpy.types.Menu):
@@ -18,10 +29,11 @@ class ARAPFIELDS_MT_styles(bpy.types.Menu):
 
     def draw(self, context):
         row = self.layout.row()
+        source = source_of(context)
+        chosen = settings_of(source).stylize.style_object if source else None
         columns, half = (row.column(), row.column()), (len(STYLE_ITEMS) + 1) // 2
         for number, (identifier, label, _) in enumerate(STYLE_ITEMS):
-            plain = "EMPTY_AXIS" if identifier in CUSTOM else "NONE"
-            picture = {"icon_value": icon(identifier)} if icon(identifier) else {"icon": plain}
+            picture = picture_of(identifier, chosen)
             columns[number // half].operator(Op.SET_STYLE, text=label, **picture).style = identifier
 
 
@@ -36,15 +48,14 @@ class ARAPFIELDS_PT_stylize(Section, bpy.types.Panel):
     def fill(self, context, source, settings):
         layout, style = self.layout, settings.stylize
         label = next(label for identifier, label, _ in STYLE_ITEMS if identifier == style.style)
-        picture = {"icon_value": icon(style.style)} if icon(style.style) else {"icon": "EMPTY_AXIS"}
-        layout.menu("ARAPFIELDS_MT_styles", text=label, **picture)
+        layout.menu("ARAPFIELDS_MT_styles", text=label, **picture_of(style.style, style.style_object))
         if style.style in CUSTOM:
             layout.prop(style, "style_object")
         settings_column(layout, style, STYLIZE, advanced=False)
         reason = preference.refusal(source)
         live_buttons(layout, source, "STYLIZE", reason)
         job_button(layout, Op.STYLIZE, "MOD_EDGESPLIT")
-        note(layout, reason, placement_refusal(source, "STYLIZE"))
+        note(layout, reason, placement_refusal(source))
 
 
 class ARAPFIELDS_PT_stylize_settings(Advanced, bpy.types.Panel):

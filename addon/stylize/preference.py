@@ -13,27 +13,27 @@ from ..core.geometry.spaces import pose, upright
 from ..core.settings.styles import CUSTOM, style_name
 from ..handles import empties
 from ..handles.empties import matrix_of
-
-MOST_NORMALS = 64  # of a custom style; more are no preference
+from . import style_object
 
 
 @dataclass(frozen=True)
 class Style:
-    """A native style's name or (k, 3) normals, the (3, 3) turn of them into solve space, what is up there."""
+    """A native style's name, (k, 3) normals or an ObjectStyle; its (3, 3) turn into solve space; what is up
+    there; and what is equal for equal styles before the turn."""
 
-    normals: str | np.ndarray
+    normals: object
     turn: np.ndarray
     up: np.ndarray
+    identity: object
 
     def directions(self, af):
-        """(k, 3) preferred normals in solve space."""
+        """(k, 3) preferred normals in solve space, or the ObjectStyle there."""
         plain = af.preferred_normals(self.normals) if isinstance(self.normals, str) else self.normals
-        return plain @ self.turn.T
+        return plain @ self.turn.T if isinstance(plain, np.ndarray) else plain.turned(self.turn)
 
     def key(self):
         """Equal for equal styles."""
-        normals = self.normals if isinstance(self.normals, str) else self.normals.tobytes()
-        return normals, self.turn.tobytes(), self.up.tobytes()
+        return self.identity, self.turn.tobytes(), self.up.tobytes()
 
 
 def refusal(source):
@@ -50,6 +50,8 @@ def missing_object(which, frame, settings):
     if which in CUSTOM:
         if settings.style_object is None:
             return UserError("choose the object that gives the style its normals")
+        if which == "OBJECT":
+            return style_object.refusal(settings.style_object)
     elif frame == "EMPTY" and settings.frame_object is None:
         return UserError("choose the object along whose axes the style stands")
     return None
@@ -68,12 +70,16 @@ def requested_style(settings, space, operator=None, where=matrix_of):
     to_solve = pose(space.world_to_solve)[:3, :3]
     up = to_solve[:, 2]
     if which in CUSTOM:
-        normals, turn = custom(which, settings.style_object, where)
-        return Style(normals, to_solve @ turn, up)
+        if which == "OBJECT":
+            normals, key = style_object.style_of(settings.style_object, where)
+            return Style(normals, to_solve, up, key)
+        turn = pose(where(settings.style_object))[:3, :3]
+        return Style(np.concatenate([np.eye(3), -np.eye(3)]), to_solve @ turn, up, which)
+    name = style_name(which)
     if setting("frame") == "OBJECT":
-        return Style(style_name(which), np.eye(3), up)
+        return Style(name, np.eye(3), up, name)
     turn = axes(setting("frame"), space, settings.frame_object, where)
-    return Style(style_name(which), to_solve @ turn, up)
+    return Style(name, to_solve @ turn, up, name)
 
 
 def axes(which, space, item, where=matrix_of):
@@ -83,28 +89,6 @@ def axes(which, space, item, where=matrix_of):
     if which == "WORLD":
         return np.eye(3)
     return pose(where(item))[:3, :3]
-
-
-def custom(which, item, where=matrix_of):
-    """(k, 3) normals that an object gives, and the (3, 3) turn of them into the world."""
-    if which == "AXES":
-        return np.concatenate([np.eye(3), -np.eye(3)]), pose(where(item))[:3, :3]
-    if item.type != "MESH" or not len(item.data.polygons):
-        raise UserError("{name} has no faces that could give the style its normals", name=item.name)
-    normals = np.empty(3 * len(item.data.polygons), dtype=np.float32)
-    item.data.polygons.foreach_get("normal", normals)
-    across = np.linalg.inv(where(item)[:3, :3]).T  # normals transform by the inverse transpose
-    turned = normals.reshape(-1, 3).astype(np.float64) @ across.T
-    turned = turned[np.linalg.norm(turned, axis=1) > 0]
-    turned = np.unique(np.round(turned / np.linalg.norm(turned, axis=1, keepdims=True), 3), axis=0)
-    if not 0 < len(turned) <= MOST_NORMALS:
-        raise UserError(
-            "{name} has {count} different face normals; from 1 to {most} make a style",
-            name=item.name,
-            count=len(turned),
-            most=MOST_NORMALS,
-        )
-    return turned / np.linalg.norm(turned, axis=1, keepdims=True), np.eye(3)
 
 
 def group_names(source, settings):

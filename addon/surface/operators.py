@@ -114,5 +114,5 @@ CLASSES = [
     ARAPFIELDS_OT_fit,
     ARAPFIELDS_OT_extract,
     ARAPFIELDS_OT_clear_cache,
-    *preset_classes("fit", "Fit", FIT),
+    *preset_classes("fit", "Fit", FIT, given=False),
 ]

@@ -4,9 +4,10 @@
 python blender_scripts/extension/macos_check.py dist/arapfields-<version>-macos-arm64.zip
 
 Every symbol that our files ask for is found: in what ships, in ziglang's list of libSystem's symbols, among
-those of libc++ that torch's own library takes from it, or, for Python's, in the headers they were compiled
-with. Every file is for ARM alone and for macOS 14, loads only what ships beside it and what belongs to the
-system, and its signature's hashes are recomputed.
+those of libc++ that torch's own library takes from it, in a list kept by hand (macos_symbols.txt; its lines
+are counted apart, since nothing here proves them), or, for Python's, in the headers they were compiled with.
+Every file is for ARM alone and for macOS 14, loads only what ships beside it and what belongs to the system,
+and its signature's hashes are recomputed.
 """
 
 import io
@@ -79,7 +80,8 @@ def sources(path, images, proven, python):
             place = owner.removeprefix(BESIDE)
             found = macho.exports(images[place], symbol)
         elif symbol in macos_tools.ALSO_THERE:
-            place, found = "libc++ by a list of ours", True
+            seen = macos_tools.ALSO_THERE[symbol][0]
+            place, found = "libc++ as others ask" if seen else "libc++ by expectation alone", True
         elif owner in known:
             place, found = Path(owner).name, symbol in known[owner]
         elif owner is None:  # any library's: the first that has it, among those that ship, else the system's

@@ -8,7 +8,6 @@ guess.
 """
 
 import re
-import shutil
 from pathlib import Path
 
 SIZES = {  # by the compiler's own macros, or by types that are checked while compiling
@@ -80,9 +79,17 @@ def macos_config(folder):
 
 
 def macos_headers(folder, output):
-    """Copies the headers in `folder` into `output`, with macOS's pyconfig.h; the copy's path."""
-    copy = Path(output) / Path(folder).name
-    shutil.rmtree(copy, ignore_errors=True)
-    shutil.copytree(folder, copy)
-    (copy / "pyconfig.h").write_text(macos_config(Path(folder)))
+    """Copies the headers in `folder` into `output`, with macOS's pyconfig.h; the copy's path. Files that are
+    there with the same content stay, so that nothing is compiled anew for them."""
+    folder = Path(folder)
+    copy = Path(output) / folder.name
+    files = {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*.h")}
+    files[Path("pyconfig.h")] = macos_config(folder).encode()
+    for path in set(copy.rglob("*.h")) - {copy / name for name in files}:
+        path.unlink()
+    for name, content in files.items():
+        path = copy / name
+        if not path.is_file() or path.read_bytes() != content:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
     return copy

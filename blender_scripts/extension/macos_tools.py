@@ -24,28 +24,11 @@ SYSTEM = (14, 0)  # the oldest macOS, of torch's wheel
 TRIPLE = "aarch64-macos.{}.{}".format(*SYSTEM)
 LINKER = "smol-clang==0.0.14"
 LIBCXX = "/usr/lib/libc++.1.dylib"
-# What our sources also take from libc++, and who else, built for macOS 14 or older, asks for it.
+# Of libc++ by hand: {symbol: (whether another library is known to ask for it, which one or why else)}.
 ALSO_THERE = {
-    "__ZNSt3__120__libcpp_atomic_waitEPVKvx": "torch's module for Python",
-    "__ZNSt3__123__cxx_atomic_notify_allEPVKv": "torch's module for Python",
-    "__ZNSt3__123__libcpp_atomic_monitorEPVKv": "torch's module for Python",
-    "__ZNSt3__113basic_istreamIcNS_11char_traitsIcEEErsERd": "Blender's module for Python",
-    "__ZNKSt11logic_error4whatEv": "libigl's module for Python",
-    "__ZNKSt3__14__fs10filesystem18directory_iterator13__dereferenceEv": "libOpenImageIO_Util.dylib",
-    "__ZNSt3__14__fs10filesystem18directory_iterator11__incrementEPNS_10error_codeE": "libOpenImageIO_Util.dylib",
-    "__ZNSt3__14__fs10filesystem18directory_iteratorC1ERKNS1_4pathEPNS_10error_codeENS1_17directory_optionsE": "libOpenImageIO_Util.dylib",
-    "__ZNSt3__14__fs10filesystem14__read_symlinkERKNS1_4pathEPNS_10error_codeE": "nobody found: of std::filesystem, in macOS since 10.15",
-    "__ZNKSt3__14__fs10filesystem4path11__extensionEv": "libOpenImageIO_Util.dylib",
-    "__ZNSt3__14__fs10filesystem8__removeERKNS1_4pathEPNS_10error_codeE": "libOpenImageIO_Util.dylib",
-    "__ZTISt16nested_exception": "nobody looked for: of the exceptions of the standard",
-    "__ZTISt14overflow_error": "nobody looked for: of the exceptions of the standard",
-    "__ZTISt12domain_error": "nobody looked for: of the exceptions of the standard",
-    "__ZTISt9type_info": "nobody looked for: of the exceptions of the standard",
-    "__ZNSt12domain_errorD1Ev": "nobody looked for: of the exceptions of the standard",
-    "__ZTVSt12domain_error": "nobody looked for: of the exceptions of the standard",
-    "__ZNSt16invalid_argumentD2Ev": "nobody found: a destructor of a class of C++98",
-    "__ZnamSt11align_val_t": "nobody found: the array form of an operator that torch takes",
-    "__ZdaPvSt11align_val_t": "nobody found: its counterpart",
+    line.split(" ", 2)[0]: (line.split(" ", 2)[1] == "seen", line.split(" ", 2)[2])
+    for line in Path(__file__).with_name("macos_symbols.txt").read_text().splitlines()
+    if not line.startswith("#")
 }
 STUB = """--- !tapi-tbd
 tbd-version: 4

@@ -8,8 +8,10 @@ class Figure(NamedTuple):
     name: str  # module of this package
     shows: str
     published: bool = False  # needs the published networks or meshes; written outside the repository
+    pages: tuple = ()  # of docs, whose scripts it runs
 
 
+WORKFLOWS = tuple(f"workflows/{name}.md" for name in ("pins", "character", "animate", "stylize"))
 FIGURES = [
     Figure("hero", "a shape at rest, deformed, and in two styles"),
     Figure("shapes", "our own shapes"),
@@ -19,8 +21,19 @@ FIGURES = [
     Figure("exact", "soft and exact handles"),
     Figure("styles", "six styles of three shapes, with their preferences on a sphere"),
     Figure("style_sheet", "all styles of six shapes, as stylize makes them by default"),
+    Figure("style_objects", "three shapes in the styles of six objects"),
     Figure("live", "six frames of a handle dragged live"),
     Figure("character", "materials and UVs of a deformed and a stylized mesh"),
+    Figure("workflows", "the ends of the workflow pages, by the pages' own scripts", pages=WORKFLOWS),
+    Figure("batch", "a folder of meshes in one style"),
+    Figure("loop_pins", "a creature posed by pins, moving", pages=WORKFLOWS[:1]),
+    Figure(
+        "loop_character", "a character that waves, eyes, shirt and hair carried, moving", pages=WORKFLOWS[1:2]
+    ),
+    Figure("loop_style", "a style's strength from none to all, moving"),
     Figure("published", "the published bunny by three methods", published=True),
     Figure("published_hand", "one finger of the published hand pulled", published=True),
+    Figure(
+        "published_peers", "the paper's comparisons, figures 6 and 7, with its competitor", published=True
+    ),
 ]

@@ -65,15 +65,11 @@ def add(shape, name, place=None, colour=None, roughness=0.42):
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(shape.vertices.tolist(), [], shape.triangles.tolist())
     mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
-    paint = stage.material(name, colour or (1, 1, 1), roughness)
+    paint = stage.material(name, colour, roughness) if colour else stage.vertex_paint(name, roughness)
     if colour is None:
         attribute = mesh.color_attributes.new("colour", "FLOAT_COLOR", "POINT")
         rgba = np.c_[shape.colours, np.ones(len(shape.vertices))].astype(np.float32)
         attribute.data.foreach_set("color", rgba.ravel())
-        node = paint.node_tree.nodes.new("ShaderNodeVertexColor")
-        node.layer_name = "colour"
-        shader = paint.node_tree.nodes["Principled BSDF"]
-        paint.node_tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
     mesh.materials.append(paint)
     item = bpy.data.objects.new(name, mesh)
     bpy.context.collection.objects.link(item)

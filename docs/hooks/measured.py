@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Puts the figures that `make gallery` measured into the pages: python docs/hooks/measured.py
+"""Puts figures that commands measured into the pages: python docs/hooks/measured.py
 
-In a page, <!-- NAME -->…<!-- end --> holds what NAME below says of docs/gallery/manifest.json (tested).
+In a page, <!-- NAME -->…<!-- end --> holds what NAME below says (tested) of docs/gallery/manifest.json, which
+`make gallery` writes, or of the tables of docs/performance.md, which `make bench` fills.
 """
 
 import json
@@ -9,7 +10,7 @@ import re
 from pathlib import Path
 
 DOCS = Path(__file__).resolve().parents[1]
-PAGES = [DOCS / "paper-figures.md", DOCS / "gallery.md"]
+PAGES = [DOCS / "paper-figures.md", DOCS / "gallery.md", DOCS / "index.md", DOCS.parent / "README.md"]
 MARKED = re.compile(r"(<!-- (\w+) -->).*?(<!-- end -->)", re.S)
 
 
@@ -104,18 +105,74 @@ def live(m):
     )
 
 
+def median(m):
+    return f"{m['median_solve_ms']:.0f} ms"
+
+
+def table_rows(start):
+    """Cells of the rows of docs/performance.md whose first cell begins so."""
+    lines = (DOCS / "performance.md").read_text().splitlines()
+    return [
+        [cell.strip() for cell in line.strip("| ").split("|")]
+        for line in lines
+        if line.startswith(f"| {start}")
+    ]
+
+
+def faster():
+    (row,) = table_rows("energy and gradient, N = 1000, 4x256, against iarap")
+    return f"{float(row[-1]):.3g} times faster a step"
+
+
+def fingers():
+    """Of the neighbours of a finger that is bent, by field."""
+    rows = [row for row in table_rows("hand, middle forward 20 degrees") if "straight" not in row[1]]
+    shares = [float(cell.split()[0]) for row in rows for cell in (row[4], row[6])]
+    return f"{min(shares):.1f} to {max(shares):.1f} %"
+
+
+def beside(start, further=""):
+    """Ours and implicit-arap's in the rows of docs/peers.json whose problem begins so."""
+    rows = json.loads((DOCS / "peers.json").read_text())["rows"]
+    told = []
+    for by in ("ours, default", "implicit-arap"):
+        (row,) = [row for row in rows if row.get("by") == by and row["what"].startswith(start)]
+        if "mesh_energy" not in row:
+            told.append(f"{by}: {row['said']}")
+            continue
+        others = f", other fingertips {row['others_percent']:.1f} % of the length" if further else ""
+        spent = f" ({row['said']})" if row["said"] else ""
+        told.append(
+            f"{by}{spent}: energy of the mesh {row['mesh_energy']:.3f}, handles off by "
+            f"{row['handle_error_percent']:.2g} % of the size{others}, volume {row['volume_ratio']:.2f}, "
+            f"{row['folded_percent']:.2g} % folded, {row['cpu_s']:.2g} processor seconds"
+        )
+    return "; ".join(told)
+
+
+def figure6():
+    return beside("hand", further="fingers")
+
+
+def figure7():
+    return beside("bunny")
+
+
 FIGURE = {
+    "median": "live",
     "inverted": "inverse",
     "cubes": "styles",
     "sheet": "style_sheet",
 }  # whose figures they tell, where not their own name's
-TEXTS = [hero, bending, deformations, exact, inverse, inverted, styles, cubes, sheet, live]
+TEXTS = [hero, bending, deformations, exact, inverse, inverted, styles, cubes, sheet, live, median]
+OTHERS = [faster, fingers, figure6, figure7]  # of other files than the manifest
 
 
 def refreshed(text):
     """The page's text with today's figures."""
     manifest = json.loads((DOCS / "gallery" / "manifest.json").read_text())
     told = {f.__name__: f(manifest[FIGURE.get(f.__name__, f.__name__)]["measured"]) for f in TEXTS}
+    told |= {f.__name__: f() for f in OTHERS}
     return MARKED.sub(lambda found: found[1] + told[found[2]] + found[3], text)
 
 

@@ -31,7 +31,9 @@ ARAPFIELDS_PYTHON_TYPE(
     MeshesArgument,
     "collections.abc.Iterable[tuple[arapfields.arrays.ArrayLike, arapfields.arrays.ArrayLike]]")
 ARAPFIELDS_PYTHON_TYPE(OptionalArraysArgument, "collections.abc.Iterable[arapfields.arrays.ArrayLike | None]")
-ARAPFIELDS_PYTHON_TYPE(NormalsArgument, "arapfields.arrays.ArrayLike | arapfields._native.StyleName")
+ARAPFIELDS_PYTHON_TYPE(NormalsArgument,
+                       "arapfields.arrays.ArrayLike | arapfields._native.ObjectStyle | "
+                       "arapfields._native.StyleName")
 ARAPFIELDS_PYTHON_TYPE(StyleArgument, "arapfields._native.StyleName")
 ARAPFIELDS_PYTHON_TYPE(HandlesArgument, "collections.abc.Iterable[arapfields._native.Handle]")
 ARAPFIELDS_PYTHON_TYPE(CurveHandlesArgument, "collections.abc.Iterable[arapfields._native.CurveHandle]")

@@ -109,6 +109,14 @@ Mat4 as_matrix4(const py::handle& value, const std::string& argument) {
   return matrix;
 }
 
+Mat3 as_rotation(const py::handle& value, const std::string& argument) {
+  const Eigen::MatrixXd turn = as_matrix(value, argument);
+  require(turn.rows() == 3 && turn.cols() == 3 && turn.allFinite() &&
+              (turn.transpose() * turn - Eigen::MatrixXd::Identity(3, 3)).norm() < 1e-4,
+          argument, "not an orthogonal 3×3 matrix", "a rotation is needed");
+  return turn;
+}
+
 Vec3 as_vec3(const py::handle& value, const std::string& argument) {
   const Vector vector = as_vector(value, argument);
   require(vector.size() == 3, argument, std::to_string(vector.size()) + " numbers", "expected three");

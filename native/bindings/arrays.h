@@ -17,6 +17,8 @@ Points as_points(const py::handle& value, const std::string& argument);
 Triangles as_triangles(const py::handle& value, const std::string& argument);
 Vector as_vector(const py::handle& value, const std::string& argument);
 Mat4 as_matrix4(const py::handle& value, const std::string& argument);
+/// (3,3), orthogonal to 1e-4.
+Mat3 as_rotation(const py::handle& value, const std::string& argument);
 Vec3 as_vec3(const py::handle& value, const std::string& argument);
 /// Any real array as (rows, cols) doubles.
 Eigen::MatrixXd as_matrix(const py::handle& value, const std::string& argument);

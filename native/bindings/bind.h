@@ -31,6 +31,7 @@ void bind_sampling(py::module_& module);
 void bind_fit(py::module_& module);
 void bind_fields(py::module_& module);
 void bind_energies(py::module_& module);
+void bind_object_style(py::module_& module);
 void bind_solve(py::module_& module);
 void bind_extraction(py::module_& module);
 void bind_live(py::module_& module);

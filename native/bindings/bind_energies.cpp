@@ -5,6 +5,7 @@
 #include "bindings/jet_arrays.h"
 #include "energies/arap.h"
 #include "energies/aten_probe.h"
+#include "energies/body.h"
 #include "energies/distortion.h"
 #include "energies/gauss.h"
 #include "energies/handles.h"
@@ -170,6 +171,17 @@ void bind_testing(py::module_& module) {
       "jets"_a.noconvert(), "normals"_a, "preferred"_a, "sharpness"_a, "weight"_a, "sample_weights"_a,
       "aten"_a = false);
   module.def(
+      "target_energy",
+      [](JetArray<Scalar> jets, const PointsOf<Scalar>& normals, const PointsOf<Scalar>& targets,
+         double weight, const Eigen::VectorX<Scalar>& sample_weights, bool aten) {
+        JetArray<Scalar> cotangents = zeros_like(jets);
+        const auto energy = aten ? &probe_targets<Scalar> : &target_energy<Scalar>;
+        const double value = energy(jet_view<const Scalar>(jets), normals, targets, sample_weights, weight,
+                                    jet_view<Scalar>(cotangents));
+        return py::make_tuple(value, cotangents);
+      },
+      "jets"_a.noconvert(), "normals"_a, "targets"_a, "weight"_a, "sample_weights"_a, "aten"_a = false);
+  module.def(
       "handle_energy",
       [](JetArray<Scalar> jets, const BoundHandles& handles, double weight, bool aten) {
         JetArray<Scalar> cotangents = zeros_like(jets);
@@ -190,6 +202,20 @@ void bind_testing(py::module_& module) {
         return py::make_tuple(value, cotangents);
       },
       "jets"_a.noconvert(), "rest"_a, "stance"_a, "weight"_a = 1.0, "aten"_a = false);
+  module.def(
+      "body_energy",
+      [](JetArray<Scalar> jets, const Points& rest, const Points& goal, const Vector& masses, double inertia,
+         const Vec3& gravity, const Vec3& up, double ground, double ground_stiffness) {
+        JetArray<Scalar> cotangents = zeros_like(jets);
+        const Body<Scalar> body{
+            masses.cast<Scalar>(), rest.cast<Scalar>(), goal.cast<Scalar>(), inertia, gravity, up, ground,
+            ground_stiffness};
+        const BodyEnergy energy =
+            body_energy(jet_view<const Scalar>(jets), body, jet_view<Scalar>(cotangents));
+        return py::make_tuple(energy.sum(), cotangents);
+      },
+      "jets"_a.noconvert(), "rest"_a, "goal"_a, "masses"_a, "inertia"_a, "gravity"_a, "up"_a, "ground"_a,
+      "ground_stiffness"_a);
   module.def(
       "fold_barrier",
       [](JetArray<Scalar> jets, double threshold, double weight, bool aten) {

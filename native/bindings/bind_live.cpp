@@ -5,7 +5,7 @@
 #include "bindings/handles.h"
 #include "bindings/jet_arrays.h"
 #include "bindings/reports.h"
-#include "energies/styles.h"
+#include "bindings/styles.h"
 #include "options/stylize.h"
 #include "solve/live_solver.h"
 
@@ -41,7 +41,7 @@ LiveReportResult report(const LiveSolver& live) {
                "min_stretch"_a = r.distortion.min_stretch, "iterations"_a = r.iterations,
                "evaluations"_a = r.evaluations, "converged"_a = r.converged, "seconds"_a = r.seconds,
                "setup_seconds"_a = r.setup_seconds, "notes"_a = py::tuple(py::cast(r.notes)),
-               "preference"_a = r.preference));
+               "preference"_a = r.preference, "kinetic"_a = r.kinetic, "speed"_a = r.speed));
 }
 
 RadialFieldResult with_report(const LiveSolver& live) {
@@ -50,25 +50,55 @@ RadialFieldResult with_report(const LiveSolver& live) {
   return field;
 }
 
-RadialFieldResult solve(LiveSolver& live, const std::optional<ArraysArgument>& targets, Index iterations,
-                        double tolerance, Task* task) {
+void set_out(LiveSolver& live, const std::optional<ArraysArgument>& targets, Index iterations,
+             double tolerance) {
   require(iterations >= 0, "iterations", std::to_string(iterations), "0 (the options') or more is allowed");
   require(tolerance >= 0.0 && tolerance < 1.0, "tolerance", std::to_string(tolerance),
           "0 (the options') or a share below 1 is allowed");
   if (targets) live.set_targets(moved_handles(live, *targets));
+}
+
+RadialFieldResult solve(LiveSolver& live, const std::optional<ArraysArgument>& targets, Index iterations,
+                        double tolerance, Task* task) {
+  set_out(live, targets, iterations, tolerance);
   run_long(task, [&](const Progress& progress) { return live.solve(iterations, tolerance, progress); });
   return with_report(live);
+}
+
+Index follow(LiveSolver& live, const std::optional<ArraysArgument>& targets, Index iterations,
+             double tolerance, Task* task) {
+  set_out(live, targets, iterations, tolerance);
+  return run_long(task,
+                  [&](const Progress& progress) { return live.follow(iterations, tolerance, progress); });
+}
+
+RadialFieldResult step(LiveSolver& live, const std::optional<ArraysArgument>& targets, double seconds,
+                       const std::optional<ArrayArgument>& coordinates, Task* task) {
+  const Mat4 motion = coordinates ? as_matrix4(*coordinates, "coordinates") : Mat4(Mat4::Identity());
+  const std::vector<Handle> moved = targets ? moved_handles(live, *targets) : live.handles();
+  run_long(task, [&](const Progress& progress) { return live.step(moved, seconds, progress, motion); });
+  return with_report(live);
+}
+
+void set_secondary_motion(LiveSolver& live, const std::optional<SecondaryMotionOptions>& options,
+                          const std::optional<ArrayArgument>& masses, const std::optional<ArrayArgument>& up,
+                          const std::optional<double>& ground) {
+  if (!options) return live.set_secondary_motion(std::nullopt);
+  SecondaryMotion motion{*options};
+  if (masses) motion.masses = as_vector(*masses, "masses");
+  if (up) motion.up = as_vec3(*up, "up");
+  motion.ground = ground;
+  live.set_secondary_motion(motion);
 }
 
 void set_style(LiveSolver& live, const std::optional<NormalsArgument>& normals, double strength,
                double sharpness, const std::optional<ArrayArgument>& weights,
                const std::optional<ArrayArgument>& up) {
   if (!normals) return live.clear_style();
-  const Points preferred = py::isinstance<py::str>(*normals)
-                               ? preferred_normals(py::cast<std::string>(*normals))
-                               : as_points(*normals, "normals");
-  live.set_style(preferred, strength, sharpness, weights ? as_vector(*weights, "weights") : Vector(),
-                 up ? as_vec3(*up, "up") : Vec3(Vec3::UnitZ()));
+  const Style style = as_style(*normals);
+  const Vector blend = weights ? as_vector(*weights, "weights") : Vector();
+  const Vec3 upwards = up ? as_vec3(*up, "up") : Vec3(Vec3::UnitZ());
+  run_long(nullptr, [&](const Progress&) { live.set_style(style, strength, sharpness, blend, upwards); });
 }
 
 }  // namespace
@@ -78,6 +108,11 @@ void bind_live(py::module_& module) {
       module, "RadialField", "A deformation as a sum of compact centers and an affine map.")
       .def_property_readonly(
           "centers", [](const RadialField& f) { return f.basis().center_count(); }, "Number of centers.");
+  py::class_<MotionState>(module, "MotionState",
+                          "All that the next step of a LiveDeformer depends on beside its targets. It fits a "
+                          "solver of the\nsame samples, options and number of handles.")
+      .def_readonly("coefficients", &MotionState::coefficients, "(n, 3), of the centers and an affine map.")
+      .def_readonly("velocities", &MotionState::velocities, "(n, 3), a second.");
   py::class_<LiveSolver>(
       module, "LiveDeformer",
       "Deforms a surface at interactive rates: handles move, solve() follows from the last shape.\n\n"
@@ -103,6 +138,10 @@ void bind_live(py::module_& module) {
            "they are) and returns a DeformationField of its own. `iterations` and `tolerance` replace the "
            "options' for\n"
            "this call, for instance to finish a drag: iterations=100, tolerance=1e-6.")
+      .def("follow", &follow, "targets"_a = py::none(), py::kw_only(), "iterations"_a = 0,
+           "tolerance"_a = 0.0, "task"_a = py::none(),
+           "As solve, for who asks for tracked() alone: makes no field, and measures the report when it is\n"
+           "asked for. Returns the steps taken; fewer than `iterations` where no more are needed.")
       .def(
           "track",
           [](LiveSolver& live, const ArrayArgument& points) {
@@ -145,11 +184,36 @@ void bind_live(py::module_& module) {
           "'none' each for itself; the shape at hand is the start. Takes as long as a new LiveDeformer.")
       .def("set_style", &set_style, "normals"_a, "strength"_a = StylizeOptions().strength, py::kw_only(),
            "sharpness"_a = StylizeOptions().sharpness, "weights"_a = py::none(), "up"_a = py::none(),
-           "Turns the surface towards preferred normals, (k, 3) or a style's name, from the next solve on; "
-           "None\n"
+           "Turns the surface towards preferred normals, (k, 3), a style's name or an ObjectStyle, from the "
+           "next\n"
+           "solve on; None\n"
            "or strength 0: no style. `weights` (one for each sample given at the start) blend the effect; "
            "`up`\n"
            "(3,), else z, is where the figure's head is: without handles it stands on what lies lowest.")
+      .def("set_secondary_motion", &set_secondary_motion,
+           py::arg_v("options", SecondaryMotionOptions(), "SecondaryMotionOptions()"), py::kw_only(),
+           "masses"_a = py::none(), "up"_a = py::none(), "ground"_a = py::none(),
+           "From the next step() on the surface has a mass: it lags behind its handles, overshoots and "
+           "settles. `masses`\n"
+           "(one for each sample given at the start, none negative) say how much of it each place has; 0 "
+           "follows at once.\n"
+           "`up` (3,), else z, is against the gravity; `ground` is the height along it that nothing passes. "
+           "solve() finds\n"
+           "where all would come to rest. None or strength 0: no mass.")
+      .def("step", &step, "targets"_a, "seconds"_a, py::kw_only(), "coordinates"_a = py::none(),
+           "task"_a = py::none(),
+           "Moves the handles to `targets` (as in solve) in so many seconds, 1e-5 to 10 (None: they hold "
+           "still), and the surface with "
+           "them, from\n"
+           "where the last step or solve ended; a solve ends at rest. Where the object to which all\n"
+           "coordinates belong has moved meanwhile, `coordinates` (4, 4) takes those of the last step to "
+           "those "
+           "of this one:\n"
+           "the surface feels it. Without set_secondary_motion, "
+           "solve(targets).\n"
+           "The same steps from the same start give the same bits. Where it raises, nothing has moved.")
+      .def_property("motion_state", &LiveSolver::motion_state, &LiveSolver::set_motion_state,
+                    "Where the surface is and how it moves, as a MotionState; set it to go on from there.")
       .def("reset", &LiveSolver::reset, "Back to the identity and to handles at rest.")
       .def_property_readonly("field", &with_report, "The deformation at hand, as a DeformationField.")
       .def_property_readonly(

@@ -5,8 +5,8 @@
 #include "bindings/handles.h"
 #include "bindings/python_function.h"
 #include "bindings/reports.h"
+#include "bindings/styles.h"
 #include "core/device.h"
-#include "energies/styles.h"
 #include "solve/deform.h"
 #include "solve/field_measures.h"
 #include "solve/inverse_training.h"
@@ -63,15 +63,12 @@ FieldResult deform_samples(const SurfaceSamples& samples, const HandlesArgument&
   return solve(task, [&](const Progress& p) { return deform(samples, held, options, p, hooks); });
 }
 
-Points preferred_from(const NormalsArgument& style, const std::optional<ArrayArgument>& orientation) {
-  const Points normals = py::isinstance<py::str>(style) ? preferred_normals(py::cast<std::string>(style))
-                                                        : as_points(style, "normals");
-  if (!orientation) return normals;
-  const Eigen::MatrixXd turn = as_matrix(*orientation, "orientation");
-  require(turn.rows() == 3 && turn.cols() == 3 && turn.allFinite() &&
-              (turn.transpose() * turn - Mat3::Identity()).norm() < 1e-4,
-          "orientation", "not an orthogonal 3×3 matrix", "a rotation is needed");
-  return normals * turn.transpose();
+Style turned_style(const NormalsArgument& normals, const std::optional<ArrayArgument>& orientation) {
+  Style style = as_style(normals);
+  if (!orientation) return style;
+  const Mat3 turn = as_rotation(*orientation, "orientation");
+  if (style.object) return style.object->turned(turn);
+  return Points(style.preferred * turn.transpose());
 }
 
 FieldResult stylize_samples(const SurfaceSamples& samples, const NormalsArgument& normals,
@@ -80,13 +77,13 @@ FieldResult stylize_samples(const SurfaceSamples& samples, const NormalsArgument
                             const std::optional<ArrayArgument>& orientation,
                             const std::optional<ArrayArgument>& up, const EnergiesArgument& energies,
                             const std::optional<CallbackArgument>& callback, Task* task) {
-  const Points preferred = preferred_from(normals, orientation);
+  const Style style = turned_style(normals, orientation);
   const Vector blend = weights ? as_vector(*weights, "weights") : Vector();
   const Vec3 upwards = up ? as_vec3(*up, "up") : Vec3(Vec3::UnitZ());
   const auto held = as_handles(handles);
   const SolveHooks hooks{as_energies(energies, samples.frame), as_observer(callback.value_or(py::none()))};
   return solve(task, [&](const Progress& p) {
-    return stylize(samples, preferred, options, p, blend, held, upwards, hooks);
+    return stylize(samples, style, options, p, blend, held, upwards, hooks);
   });
 }
 
@@ -139,9 +136,9 @@ void bind_solve(py::module_& module) {
       py::arg_v("options", StylizeOptions(), "StylizeOptions()"), py::kw_only(), "handles"_a = py::tuple(),
       "weights"_a = py::none(), "orientation"_a = py::none(), "up"_a = py::none(), "energies"_a = py::tuple(),
       "callback"_a = py::none(), "task"_a = py::none(),
-      "The DeformationField that turns the surface's normals to preferred ones: `normals` (k, 3) or a "
-      "style's\n"
-      "name, turned by `orientation` (3, 3). `weights` (n,) blend the effect sample by sample. Without "
+      "The DeformationField that turns the surface's normals to preferred ones: `normals` (k, 3), a style's\n"
+      "name, or an ObjectStyle, turned by `orientation` (3, 3). `weights` (n,) blend the effect sample by "
+      "sample. Without "
       "handles\n"
       "the figure keeps its stance (options.keep_stance) and the lowest sample stays in place (nearly, "
       "beside\n"

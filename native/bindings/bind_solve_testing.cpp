@@ -13,6 +13,15 @@ void bind_solve_testing(py::module_& module) {
   testing.def(
       "bending", [](const SurfaceSamples& s, const DeformOptions& o) { return probe_bending(s, o.surface); },
       "samples"_a, "options"_a);
+  testing.def(
+      "radial_rows",
+      [](const RadialField& field, const Points& cube_points, int count) {
+        require(count == 1 || count == 4 || count == 10, "columns", std::to_string(count),
+                "1, 4 or 10 are needed");
+        return probe_radial_rows(field, cube_points, static_cast<JetOrder>(count));
+      },
+      "field"_a, "cube_points"_a, "columns"_a,
+      "Jets of the field's own basis functions: (columns·n, size), column by column.");
   py::class_<LossProbe>(testing, "LossProbe")
       .def(py::init([](const SurfaceSamples& samples, const std::vector<Handle>& handles, int width,
                        double bending, const Points& preferred, double gauss, double barrier, double margin,

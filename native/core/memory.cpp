@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/memory.h"
 
+#ifdef _WIN32
+#include <windows.h>
+#else
 #include <sys/resource.h>
 #include <unistd.h>
 #ifdef __APPLE__
 #include <mach/mach.h>
+#endif
 #endif
 
 #include <algorithm>
@@ -17,8 +21,29 @@
 namespace arapfields {
 namespace {
 
-constexpr double unknown = std::numeric_limits<double>::infinity();
 constexpr double gib = 1024.0 * 1024.0 * 1024.0;
+
+#ifdef _WIN32
+
+MEMORYSTATUSEX status() {
+  MEMORYSTATUSEX result{};
+  result.dwLength = sizeof result;
+  if (GlobalMemoryStatusEx(&result) == 0)
+    result.ullAvailPhys = result.ullAvailPageFile = result.ullAvailVirtual = ~0ull;
+  return result;
+}
+
+double system_memory() { return static_cast<double>(status().ullAvailPhys); }
+
+/// What the page file, or the job that the process belongs to, still backs.
+double group_memory() { return static_cast<double>(status().ullAvailPageFile); }
+
+/// What the process's addresses leave.
+double process_memory() { return static_cast<double>(status().ullAvailVirtual); }
+
+#else
+
+constexpr double unknown = std::numeric_limits<double>::infinity();
 
 /// The one number in a file; infinity where there is none ("max" included).
 double number_in(const char* path) {
@@ -66,6 +91,8 @@ double process_memory() {
   const double used = number_in("/proc/self/statm") * static_cast<double>(sysconf(_SC_PAGESIZE));
   return used < unknown ? std::max(0.0, static_cast<double>(limit.rlim_cur) - used) : unknown;
 }
+
+#endif
 
 std::string in_gib(double bytes) {
   char text[32];

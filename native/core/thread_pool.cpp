@@ -10,7 +10,9 @@
 #ifdef __linux__
 #include <sys/resource.h>
 #endif
-#ifndef _WIN32
+#ifdef _WIN32
+#include <windows.h>
+#else
 #include <pthread.h>
 #endif
 
@@ -43,6 +45,20 @@ bool spin_until(const Ready& ready) {
     }
   } while (Clock::now() < end);
   return ready();
+}
+
+/// As debuggers and monitors show it.
+void name_thread() {
+#if defined(__linux__)
+  pthread_setname_np(pthread_self(), "arapfields");
+#elif defined(__APPLE__)
+  pthread_setname_np("arapfields");
+#elif defined(_WIN32)
+  using Describe = HRESULT(WINAPI*)(HANDLE, const wchar_t*);  // of Windows 10 and later
+  const auto found = GetProcAddress(GetModuleHandleW(L"kernel32.dll"), "SetThreadDescription");
+  if (const auto describe = reinterpret_cast<Describe>(reinterpret_cast<void*>(found)))
+    describe(GetCurrentThread(), L"arapfields");
+#endif
 }
 
 }  // namespace
@@ -129,9 +145,7 @@ void ThreadPool::take_job(std::shared_ptr<Job>& job, int& number) {
 }
 
 void ThreadPool::serve() {
-#ifdef __linux__
-  pthread_setname_np(pthread_self(), "arapfields");
-#endif
+  name_thread();
   {
     const std::lock_guard lock(starting_);
     on_start_();
@@ -151,19 +165,19 @@ namespace {
 std::array<std::atomic<ThreadPool*>, 40> pools{};
 
 std::size_t priority() {
-#ifdef __linux__
+#if defined(__linux__)
   return static_cast<std::size_t>(std::clamp(getpriority(PRIO_PROCESS, 0) + 20, 0, 39));
-#else
+#else  // threads of macOS and Windows inherit nothing of the kind
   return 20;
 #endif
 }
 
+#ifndef _WIN32  // which has no fork()
 /// Of a parent's pools a child has the memory but not the threads: it leaves them alone.
 void forget_pools() {
   for (auto& pool : pools) pool.store(nullptr, std::memory_order_relaxed);
 }
 
-#ifndef _WIN32
 [[maybe_unused]] const int watching_forks = pthread_atfork(nullptr, nullptr, forget_pools);
 #endif
 

@@ -14,7 +14,9 @@ std::uint64_t mixed(std::uint64_t x) {
   return x ^ (x >> 29);
 }
 
-/// The first vertex at each vertex's position, through an open hash table.
+}  // namespace
+
+/// Through an open hash table.
 std::vector<std::int32_t> first_at_position(PointsIn vertices) {
   const auto count = static_cast<std::size_t>(vertices.rows());
   const std::size_t size = std::bit_ceil(2 * count + 1);
@@ -30,8 +32,6 @@ std::vector<std::int32_t> first_at_position(PointsIn vertices) {
   }
   return first;
 }
-
-}  // namespace
 
 bool is_closed(PointsIn vertices, TrianglesIn triangles) {
   const std::vector<std::int32_t> first = first_at_position(vertices);

@@ -45,6 +45,10 @@ at::Tensor aten_arap(const at::Tensor& jets, double bending, double weight, cons
 at::Tensor aten_gauss(const at::Tensor& jets, const at::Tensor& normals, const at::Tensor& sample_weights,
                       const at::Tensor& preferred, double sharpness, double weight,
                       const EnergyTables& tables, at::Tensor cotangents);
+/// The same with unit targets (n,3) of the samples: gauss.h's target_energy.
+at::Tensor aten_targets(const at::Tensor& jets, const at::Tensor& normals, const at::Tensor& sample_weights,
+                        const at::Tensor& targets, double weight, const EnergyTables& tables,
+                        at::Tensor cotangents);
 at::Tensor aten_barrier(const at::Tensor& jets, double threshold, double weight, const EnergyTables& tables,
                         at::Tensor cotangents);
 /// Targets (n,3) and weights (n) as in HandleBatch.

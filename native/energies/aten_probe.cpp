@@ -33,6 +33,18 @@ double probe_gauss(JetView<const Scalar> jets, ConstPointsRef<Scalar> normals,
 }
 
 template <class Scalar>
+double probe_targets(JetView<const Scalar> jets, ConstPointsRef<Scalar> normals,
+                     ConstPointsRef<Scalar> targets,
+                     const Eigen::Ref<const Eigen::VectorX<Scalar>>& sample_weights, double weight,
+                     JetView<Scalar> cotangents) {
+  const at::Tensor given = tensor_view(jets);
+  const at::Tensor weights = sample_weights.size() > 0 ? tensor_view(sample_weights) : at::Tensor();
+  return aten_targets(given, tensor_view(normals), weights, tensor_view(targets), weight, EnergyTables(given),
+                      tensor_view(cotangents))
+      .template item<double>();
+}
+
+template <class Scalar>
 double probe_barrier(JetView<const Scalar> jets, double threshold, double weight,
                      JetView<Scalar> cotangents) {
   const at::Tensor given = tensor_view(jets);
@@ -65,6 +77,9 @@ double probe_stance(JetView<const Scalar> jets, ConstPointsRef<Scalar> rest, con
   template double probe_gauss<Scalar>(JetView<const Scalar>, ConstPointsRef<Scalar>,                         \
                                       const Eigen::Ref<const Eigen::VectorX<Scalar>>&,                       \
                                       const GaussPreference&, double, JetView<Scalar>);                      \
+  template double probe_targets<Scalar>(                                                                     \
+      JetView<const Scalar>, ConstPointsRef<Scalar>, ConstPointsRef<Scalar>,                                 \
+      const Eigen::Ref<const Eigen::VectorX<Scalar>>&, double, JetView<Scalar>);                             \
   template double probe_barrier<Scalar>(JetView<const Scalar>, double, double, JetView<Scalar>);             \
   template double probe_handles<Scalar>(JetView<const Scalar>, const HandleBatch<Scalar>&, double,           \
                                         JetView<Scalar>);                                                    \

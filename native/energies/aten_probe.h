@@ -18,6 +18,11 @@ ARAPFIELDS_EXPORT_TO_TESTS double probe_gauss(JetView<const Scalar> jets, ConstP
                                               const GaussPreference& preference, double weight,
                                               JetView<Scalar> cotangents);
 template <class Scalar>
+ARAPFIELDS_EXPORT_TO_TESTS double probe_targets(
+    JetView<const Scalar> jets, ConstPointsRef<Scalar> normals, ConstPointsRef<Scalar> targets,
+    const Eigen::Ref<const Eigen::VectorX<Scalar>>& sample_weights, double weight,
+    JetView<Scalar> cotangents);
+template <class Scalar>
 ARAPFIELDS_EXPORT_TO_TESTS double probe_barrier(JetView<const Scalar> jets, double threshold, double weight,
                                                 JetView<Scalar> cotangents);
 template <class Scalar>

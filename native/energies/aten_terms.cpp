@@ -17,11 +17,16 @@ at::Tensor minors_of(const at::Tensor& jets, const EnergyTables& tables) {
                           at::index_select(jets, 0, tables.last));
 }
 
-}  // namespace
+/// What a style makes of unit normals (n,3): its loss (n,1), whose gradient is −factor · slope (n,3).
+struct NormalLoss {
+  at::Tensor loss, slope;
+  double factor;
+};
 
-at::Tensor aten_gauss(const at::Tensor& jets, const at::Tensor& normals, const at::Tensor& sample_weights,
-                      const at::Tensor& preferred, double sharpness, double weight,
-                      const EnergyTables& tables, at::Tensor cotangents) {
+/// Mean of a loss of the deformed unit normals, and its cotangents.
+template <class Loss>
+at::Tensor of_normals(const at::Tensor& jets, const at::Tensor& normals, const at::Tensor& sample_weights,
+                      double weight, const EnergyTables& tables, at::Tensor cotangents, const Loss& loss_of) {
   const double share = 1.0 / static_cast<double>(std::max<int64_t>(jets.size(1), 1));
   const at::Tensor minors = minors_of(jets, tables);
   const at::Tensor orientation = dots(jets[1], minors[0]);
@@ -31,15 +36,11 @@ at::Tensor aten_gauss(const at::Tensor& jets, const at::Tensor& normals, const a
   const at::Tensor length = at::sqrt(dots(image, image));
   const at::Tensor inverse = at::clamp_min(length, shortest).reciprocal();
   const at::Tensor unit = image * inverse;
-  const at::Tensor directions = preferred.slice(1, 0, 3);
-  const at::Tensor terms =
-      at::exp(sharpness * at::mm(unit, directions.t())) * preferred.select(1, 3).unsqueeze(0);  // (n, k)
-  at::Tensor loss = 1.0 - terms.sum(1, true);
-  if (sample_weights.defined()) loss = loss * sample_weights.unsqueeze(1);
+  NormalLoss made = loss_of(unit);
+  if (sample_weights.defined()) made.loss = made.loss * sample_weights.unsqueeze(1);
   if (cotangents.defined()) {
-    const at::Tensor by_normal = at::mm(terms, directions);
-    const at::Tensor along = at::where(length > shortest, dots(unit, by_normal), at::zeros_like(length));
-    at::Tensor h = (by_normal - along * unit) * sign * inverse * (-weight * share * sharpness);
+    const at::Tensor along = at::where(length > shortest, dots(unit, made.slope), at::zeros_like(length));
+    at::Tensor h = (made.slope - along * unit) * sign * inverse * (-weight * share * made.factor);
     if (sample_weights.defined()) h = h * sample_weights.unsqueeze(1);
     // Of j_k: h × (n_{k+1} j_{k+2} − n_{k+2} j_{k+1}).
     const at::Tensor arms =
@@ -47,7 +48,31 @@ at::Tensor aten_gauss(const at::Tensor& jets, const at::Tensor& normals, const a
         at::index_select(columns, 0, tables.last - 1) * at::index_select(jets, 0, tables.next_column);
     cotangents.slice(0, 1, 4).add_(at::linalg_cross(h.unsqueeze(0).expand_as(arms), arms));
   }
-  return loss.sum() * share;
+  return made.loss.sum() * share;
+}
+
+}  // namespace
+
+at::Tensor aten_gauss(const at::Tensor& jets, const at::Tensor& normals, const at::Tensor& sample_weights,
+                      const at::Tensor& preferred, double sharpness, double weight,
+                      const EnergyTables& tables, at::Tensor cotangents) {
+  const at::Tensor directions = preferred.slice(1, 0, 3);
+  return of_normals(jets, normals, sample_weights, weight, tables, cotangents,
+                    [&](const at::Tensor& unit) -> NormalLoss {
+                      const at::Tensor terms = at::exp(sharpness * at::mm(unit, directions.t())) *
+                                               preferred.select(1, 3).unsqueeze(0);  // (n, k)
+                      return {1.0 - terms.sum(1, true), at::mm(terms, directions), sharpness};
+                    });
+}
+
+at::Tensor aten_targets(const at::Tensor& jets, const at::Tensor& normals, const at::Tensor& sample_weights,
+                        const at::Tensor& targets, double weight, const EnergyTables& tables,
+                        at::Tensor cotangents) {
+  return of_normals(jets, normals, sample_weights, weight, tables, cotangents,
+                    [&](const at::Tensor& unit) -> NormalLoss {
+                      const at::Tensor off = targets - unit;
+                      return {dots(off, off), off, 2.0};
+                    });
 }
 
 at::Tensor aten_barrier(const at::Tensor& jets, double threshold, double weight, const EnergyTables& tables,

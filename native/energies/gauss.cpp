@@ -22,19 +22,6 @@ constexpr double one_face = 0.9659258262890683;
 /// Cosines of 60° and 80°: between them a style loses its hold.
 constexpr double reach_full = 0.5, reach_none = 0.17364817766693036;
 
-Points unit_normals(PointsIn normals) {
-  require(normals.rows() > 0, "normals", "none were given", "at least one is needed");
-  Points unit = normals;
-  for (Index i = 0; i < unit.rows(); ++i) {
-    const double length = unit.row(i).stableNorm();
-    require(std::isfinite(length) && length > 0.0, "normals",
-            "row " + std::to_string(i) + (length == 0.0 ? " is zero" : " is NaN or infinite"),
-            "finite directions of any positive length are allowed");
-    unit.row(i) /= length;
-  }
-  return unit;
-}
-
 Points different_normals(PointsIn normals) {
   const Points unit = unit_normals(normals);
   for (Index i = 0; i < unit.rows(); ++i)
@@ -96,6 +83,19 @@ double cube_angle() {
 
 }  // namespace
 
+Points unit_normals(PointsIn normals) {
+  require(normals.rows() > 0, "normals", "none were given", "at least one is needed");
+  Points unit = normals;
+  for (Index i = 0; i < unit.rows(); ++i) {
+    const double length = unit.row(i).stableNorm();
+    require(std::isfinite(length) && length > 0.0, "normals",
+            "row " + std::to_string(i) + (length == 0.0 ? " is zero" : " is NaN or infinite"),
+            "finite directions of any positive length are allowed");
+    unit.row(i) /= length;
+  }
+  return unit;
+}
+
 double style_sharpness(PointsIn normals) {
   const Points unit = unit_normals(normals);
   const Eigen::MatrixXd cosines = unit * unit.transpose();
@@ -126,17 +126,24 @@ Vector GaussPreference::reach(PointsIn directions) const {
   if (!automatic) return result;
   for_ranges(directions.rows(), [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
-      const double cosine = (normals * directions.row(i).transpose()).maxCoeff();
-      const double t = std::clamp((cosine - reach_none) / (reach_full - reach_none), 0.0, 1.0);
-      result[i] = t * t * (3.0 - 2.0 * t);
+      result[i] = reach_at((normals * directions.row(i).transpose()).maxCoeff());
     }
   });
   return result;
 }
 
-GaussPreference gauss_preference(PointsIn normals, double sharpness) {
+double reach_at(double cosine) {
+  const double t = std::clamp((cosine - reach_none) / (reach_full - reach_none), 0.0, 1.0);
+  return t * t * (3.0 - 2.0 * t);
+}
+
+void require_sharpness(double sharpness) {
   require(sharpness >= 0.0 && sharpness <= 100.0, "sharpness", std::to_string(sharpness),
-          "0 (from the normals) to 100 is allowed");
+          "0 (from the style) to 100 is allowed");
+}
+
+GaussPreference gauss_preference(PointsIn normals, double sharpness) {
+  require_sharpness(sharpness);
   GaussPreference result{different_normals(normals), {}, sharpness};
   if (sharpness == 0.0) {
     result.sharpness = sharpness = style_sharpness(normals);
@@ -160,10 +167,12 @@ GaussPreference gauss_preference(PointsIn normals, double sharpness) {
   return result;
 }
 
+namespace {
+
 template <class Scalar>
-double gauss_energy(JetView<const Scalar> jets, ConstPointsRef<Scalar> normals,
-                    const Eigen::Ref<const Eigen::VectorX<Scalar>>& sample_weights,
-                    const GaussPreference& preference, double weight, JetView<Scalar> cotangents) {
+double normal_energy(GaussBlock<Scalar> block, JetView<const Scalar> jets, ConstPointsRef<Scalar> normals,
+                     const Eigen::Ref<const Eigen::VectorX<Scalar>>& sample_weights, double weight,
+                     JetView<Scalar> cotangents) {
   require(jets.order != JetOrder::value, "jets", "values alone", "first derivatives are needed");
   require(normals.rows() == jets.count, "normals", std::to_string(normals.rows()) + " rows",
           "one for each of the " + std::to_string(jets.count) + " samples is needed");
@@ -173,24 +182,50 @@ double gauss_energy(JetView<const Scalar> jets, ConstPointsRef<Scalar> normals,
       cotangents.data == nullptr || (cotangents.count == jets.count && cotangents.order != JetOrder::value),
       "cotangents", "another shape than the jets'", "as many points and first derivatives are needed");
   if (jets.count == 0) return 0.0;
-  RowMatrix<Scalar> preferred(preference.normals.rows(), 4);
-  preferred << preference.normals.cast<Scalar>(), preference.weights.cast<Scalar>();
-  const GaussBlock<Scalar> block{jets.data,
-                                 cotangents.data,
-                                 jets.count,
-                                 normals.data(),
-                                 sample_weights.size() == 0 ? nullptr : sample_weights.data(),
-                                 preferred.data(),
-                                 preferred.rows(),
-                                 static_cast<Scalar>(preference.sharpness),
-                                 static_cast<Scalar>(weight / static_cast<double>(jets.count))};
+  block.jets = jets.data;
+  block.cotangents = cotangents.data;
+  block.count = jets.count;
+  block.normals = normals.data();
+  block.sample_weights = sample_weights.size() == 0 ? nullptr : sample_weights.data();
+  block.weight = static_cast<Scalar>(weight / static_cast<double>(jets.count));
   const auto sums = sum_over_ranges<1>(jets.count, [&](Index begin, Index end, double* out) {
     out[0] += ARAPFIELDS_DISPATCH(gauss_range(block, begin, end));
   });
   return sums[0] / static_cast<double>(jets.count);
 }
 
+}  // namespace
+
+template <class Scalar>
+double target_energy(JetView<const Scalar> jets, ConstPointsRef<Scalar> normals,
+                     ConstPointsRef<Scalar> targets,
+                     const Eigen::Ref<const Eigen::VectorX<Scalar>>& sample_weights, double weight,
+                     JetView<Scalar> cotangents) {
+  require(targets.rows() == jets.count, "targets", std::to_string(targets.rows()) + " rows",
+          "one for each of the " + std::to_string(jets.count) + " samples is needed");
+  GaussBlock<Scalar> block{};
+  block.targets = targets.data();
+  block.sharpness = Scalar(2);
+  return normal_energy<Scalar>(block, jets, normals, sample_weights, weight, cotangents);
+}
+
+template <class Scalar>
+double gauss_energy(JetView<const Scalar> jets, ConstPointsRef<Scalar> normals,
+                    const Eigen::Ref<const Eigen::VectorX<Scalar>>& sample_weights,
+                    const GaussPreference& preference, double weight, JetView<Scalar> cotangents) {
+  RowMatrix<Scalar> preferred(preference.normals.rows(), 4);
+  preferred << preference.normals.cast<Scalar>(), preference.weights.cast<Scalar>();
+  GaussBlock<Scalar> block{};
+  block.preferred = preferred.data();
+  block.preferred_count = preferred.rows();
+  block.sharpness = static_cast<Scalar>(preference.sharpness);
+  return normal_energy<Scalar>(block, jets, normals, sample_weights, weight, cotangents);
+}
+
 #define ARAPFIELDS_GAUSS(Scalar)                                                        \
+  template double target_energy<Scalar>(                                                \
+      JetView<const Scalar>, ConstPointsRef<Scalar>, ConstPointsRef<Scalar>,            \
+      const Eigen::Ref<const Eigen::VectorX<Scalar>>&, double, JetView<Scalar>);        \
   template double gauss_energy<Scalar>(JetView<const Scalar>, ConstPointsRef<Scalar>,   \
                                        const Eigen::Ref<const Eigen::VectorX<Scalar>>&, \
                                        const GaussPreference&, double, JetView<Scalar>);

@@ -26,6 +26,15 @@ struct ARAPFIELDS_EXPORT GaussPreference {
   Vector reach(PointsIn directions) const;
 };
 
+/// 1 from a cosine of 60° between a normal and where it is to turn, 0 to 80°: a style's hold.
+double reach_at(double cosine);
+
+/// Rows (n,3) brought to unit length. Throws InvalidInput for none, non-finite or zero ones.
+Points unit_normals(PointsIn normals);
+
+/// Throws InvalidInput outside [0, 100].
+void require_sharpness(double sharpness);
+
 /// σ = 5 (1 − cos 45°) / (1 − cos θ/2), so that neighbours at the angle θ, the smallest of the style, overlap
 /// midway as the cube's do at 5; from 5 to 25. Normals within 15° of each other belong to one curved face,
 /// and count as one. Throws InvalidInput for none, non-finite or zero normals.
@@ -46,5 +55,12 @@ ARAPFIELDS_EXPORT double gauss_energy(JetView<const Scalar> jets, ConstPointsRef
                                       const Eigen::Ref<const Eigen::VectorX<Scalar>>& sample_weights,
                                       const GaussPreference& preference, double weight,
                                       JetView<Scalar> cotangents);
+
+/// mean of u·‖ñ − t‖² with unit targets t (n,3), one a sample; the rest as of gauss_energy.
+template <class Scalar>
+ARAPFIELDS_EXPORT_TO_TESTS double target_energy(
+    JetView<const Scalar> jets, ConstPointsRef<Scalar> normals, ConstPointsRef<Scalar> targets,
+    const Eigen::Ref<const Eigen::VectorX<Scalar>>& sample_weights, double weight,
+    JetView<Scalar> cotangents);
 
 }  // namespace arapfields

@@ -45,16 +45,20 @@ double run(const GaussBlock<Scalar>& block, std::int64_t begin, std::int64_t end
     const P inverse_length = one / (length > shortest ? length : shortest);
     for (auto& x : unit) x *= inverse_length;
 
-    P g = zero, by_normal[3] = {zero, zero, zero};
+    P loss = one, by_normal[3] = {zero, zero, zero};
+    if (block.targets != nullptr) {
+      load_points(block.targets + point * 3, valid, by_normal);
+      for (int i = 0; i < 3; ++i) by_normal[i] -= unit[i];
+      loss = dot<Scalar>(by_normal, by_normal);
+    }
     for (std::int64_t k = 0; k < block.preferred_count; ++k) {
       const Scalar* row = block.preferred + 4 * k;
       const P dots = unit[0] * row[0] + unit[1] * row[1] + unit[2] * row[2];
       const P term = row[3] * exponential<Scalar>(block.sharpness * dots);
-      g += term;
+      loss -= term;
       for (int i = 0; i < 3; ++i) by_normal[i] += term * row[i];
     }
-    for (int i = 0; i < lanes<Scalar> && i < valid; ++i)
-      sum += static_cast<double>(weights[i] * (one - g)[i]);
+    for (int i = 0; i < lanes<Scalar> && i < valid; ++i) sum += static_cast<double>(weights[i] * loss[i]);
     if (block.cotangents == nullptr) continue;
 
     const P scale = -block.weight * block.sharpness * weights * sign * inverse_length;

@@ -23,7 +23,8 @@ struct ArapBlock {
 };
 
 /// Same blocks, with rest normals (count,3), per-sample weights (count; null: ones), and the preference as k
-/// rows (normal, weight); adds Σ u (1 − g) to the result.
+/// rows (normal, weight); adds Σ u (1 − g) to the result. With targets (count,3; else null) Σ u ‖ñ − t‖², and
+/// the sharpness is 2.
 template <class Scalar>
 struct GaussBlock {
   const Scalar* jets;
@@ -33,6 +34,7 @@ struct GaussBlock {
   const Scalar* sample_weights;
   const Scalar* preferred;
   std::int64_t preferred_count;
+  const Scalar* targets;
   Scalar sharpness, weight;
 };
 

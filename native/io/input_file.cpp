@@ -1,36 +1,42 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/input_file.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <cerrno>
+#include <system_error>
 
 #include "core/errors.h"
 #include "core/file_error.h"
+#include "io/path_text.h"
+#include "io/system_file.h"
 
 namespace arapfields {
+namespace {
 
-InputFile::InputFile(const std::string& path)
-    : path_(path), file_(open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {
-  if (file_ < 0) throw FileError(path, errno);
-  struct stat found{};
-  const int problem = fstat(file_, &found) != 0 ? errno : S_ISDIR(found.st_mode) ? EISDIR : 0;
-  const bool regular = S_ISREG(found.st_mode);
-  if (problem != 0 || !regular) close(file_);
-  if (problem != 0) throw FileError(path, problem);
-  require(regular, "file", "is not a regular file", "pipes, devices and sockets cannot be read");
-  size_ = static_cast<std::size_t>(found.st_size);
+int opened(const std::string& path) {
+  try {
+    const int file = system_file::open_to_read(path_of(path));
+    if (file < 0) throw FileError(path, errno);
+    return file;
+  } catch (const std::system_error&) {  // the name is no text of the system's
+    throw FileError(path, EILSEQ);
+  }
 }
 
-InputFile::~InputFile() { close(file_); }
+}  // namespace
+
+InputFile::InputFile(const std::string& path) : path_(path), file_(opened(path)) {
+  const bool regular = system_file::is_regular(file_);
+  if (!regular) system_file::close_file(file_);
+  require(regular, "file", "is not a regular file", "pipes, devices and sockets cannot be read");
+  size_ = static_cast<std::size_t>(system_file::size(file_));
+}
+
+InputFile::~InputFile() { system_file::close_file(file_); }
 
 void InputFile::read(std::size_t offset, void* to, std::size_t bytes) const {
   for (std::size_t done = 0; done < bytes;) {
-    const ssize_t count =
-        pread(file_, static_cast<char*>(to) + done, bytes - done, static_cast<off_t>(offset + done));
-    if (count < 0 && errno == EINTR) continue;
+    const std::ptrdiff_t count =
+        system_file::read_at(file_, static_cast<char*>(to) + done, bytes - done, offset + done);
     if (count < 0) throw FileError(path_, errno);
     require(count > 0, "file", "it has become shorter while it was read", "it is being written to");
     done += static_cast<std::size_t>(count);

@@ -1,17 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/output_file.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <cerrno>
 #include <filesystem>
 #include <random>
+#include <system_error>
 
 #include "core/errors.h"
 #include "core/file_error.h"
+#include "io/path_text.h"
+#include "io/system_file.h"
 
 namespace arapfields {
 namespace {
@@ -33,32 +31,23 @@ std::string random_token() {
 }
 
 /// What temporary names of this file begin with, up to the token.
-std::string temporary_prefix(const fs::path& target) {
-  std::string prefix(1, '.');
-  return prefix.append(target.filename().string(), 0, kept_name).append(1, '.');
-}
-
-/// Opens and locks a temporary folder; −1 where that fails: EWOULDBLOCK where another holds it or it is gone.
-int lock_folder(const fs::path& folder) {
-  const int descriptor = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
-  if (descriptor < 0) return -1;
-  struct stat found{};
-  const bool locked = flock(descriptor, LOCK_EX | LOCK_NB) == 0;
-  const int problem = locked ? EWOULDBLOCK : errno;
-  if (locked && fstat(descriptor, &found) == 0 && found.st_nlink > 0 && found.st_uid == geteuid())
-    return descriptor;
-  close(descriptor);
-  errno = problem;
-  return -1;
+fs::path temporary_prefix(const fs::path& target) {
+  std::string name = text_of(target.filename());
+  if (name.size() > kept_name) {
+    std::size_t end = kept_name;  // between two letters of UTF-8
+    while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xc0) == 0x80) --end;
+    name.resize(end);
+  }
+  return path_of("." + name + ".");
 }
 
 /// Removes a temporary folder and what lies beside it under a name that continues the folder's.
 void remove_temporary(const fs::path& folder) noexcept {
   std::error_code ignored;
-  const std::string name = folder.filename().string();
+  const fs::path::string_type name = folder.filename().native();
   for (fs::directory_iterator entry(folder.parent_path(), ignored), end; !ignored && entry != end;
        entry.increment(ignored)) {
-    const std::string other = entry->path().filename().string();
+    const fs::path::string_type other = entry->path().filename().native();
     std::error_code kept;
     if (other.size() > name.size() && other.starts_with(name)) fs::remove(entry->path(), kept);
   }
@@ -66,24 +55,25 @@ void remove_temporary(const fs::path& folder) noexcept {
 }
 
 /// Removes what processes that live no more have left of this output.
-void remove_stale(const fs::path& target) noexcept {
+void remove_stale(const fs::path& target) {
   std::error_code ignored;
-  const std::string prefix = temporary_prefix(target);
-  const std::size_t length = prefix.size() + token_length + std::string(ending).size();
+  const fs::path prefix = temporary_prefix(target), last(ending);
+  const std::size_t length = prefix.native().size() + token_length + last.native().size();
   for (fs::directory_iterator entry(target.parent_path(), ignored), end; !ignored && entry != end;
        entry.increment(ignored)) {
-    const std::string name = entry->path().filename().string();
-    if (name.size() != length || !name.starts_with(prefix) || !name.ends_with(ending)) continue;
-    const int lock = lock_folder(entry->path());
+    const fs::path::string_type name = entry->path().filename().native();
+    if (name.size() != length || !name.starts_with(prefix.native()) || !name.ends_with(last.native()))
+      continue;
+    const int lock = system_file::lock_folder(entry->path());
     if (lock < 0) continue;
     remove_temporary(entry->path());
-    close(lock);
+    system_file::close_file(lock);
   }
 }
 
 /// The file behind the links, which need not exist.
 fs::path followed(const std::string& given) {
-  fs::path path = given;
+  fs::path path = path_of(given);
   for (int link = 0; link < most_links; ++link) {
     std::error_code none;
     const fs::path next = fs::read_symlink(path, none);
@@ -93,55 +83,55 @@ fs::path followed(const std::string& given) {
   throw FileError(given, ELOOP);
 }
 
-void sync_folder(const fs::path& folder) {
-  const int descriptor = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return;
-  fsync(descriptor);  // not all file systems can; the file itself is on the disk
-  close(descriptor);
-}
-
 }  // namespace
 
 OutputFile::OutputFile(const std::string& path) : path_(path) {
   require(!path.empty() && path.find('\0') == std::string::npos, "path",
           std::string("'").append(path.c_str()).append("'"), "the name of a file is needed");
-  const fs::path target = followed(path);
-  target_ = target.string();
-  const std::string name = target.filename().string();
-  struct stat there{};
-  const bool exists = stat(target_.c_str(), &there) == 0;
-  if (name.empty() || name == "." || name == ".." || (exists && S_ISDIR(there.st_mode)))
-    throw FileError(path, EISDIR);
-  require(!exists || S_ISREG(there.st_mode), path, "is not a regular file",
-          "pipes, devices and sockets cannot be written to");
-  if (exists && access(target_.c_str(), W_OK) != 0) throw FileError(path, errno);
-  remove_stale(target);
-  for (int tries = 0; lock_ < 0; ++tries) {
-    folder_ =
-        (target.parent_path() / temporary_prefix(target).append(random_token()).append(ending)).string();
-    if (mkdir(folder_.c_str(), 0700) != 0) {
-      if (errno == EEXIST && tries < most_tries) continue;
-      throw FileError(path, errno);
-    }
-    lock_ = lock_folder(folder_);
-    // Either who sweeps has taken it at once, or the file system has no locks, and then nobody sweeps.
-    if (lock_ < 0 && errno != EWOULDBLOCK && errno != ENOENT)
-      lock_ = open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (lock_ < 0 && tries >= most_tries) throw FileError(path, EBUSY);
+  try {
+    open_folder(followed(path));
+  } catch (const std::system_error&) {  // a name that is no text of the system's
+    throw FileError(path, EILSEQ);
   }
-  partial_ = (fs::path(folder_) / name).string();
+}
+
+void OutputFile::open_folder(const fs::path& target) {
+  target_ = text_of(target);
+  const fs::path name = target.filename();
+  std::error_code none;
+  const fs::file_status there = fs::status(target, none);
+  const bool exists = fs::exists(there);
+  if (name.empty() || name == "." || name == ".." || fs::is_directory(there)) throw FileError(path_, EISDIR);
+  require(!exists || fs::is_regular_file(there), path_, "is not a regular file",
+          "pipes, devices and sockets cannot be written to");
+  if (exists && !system_file::may_write(target)) throw FileError(path_, errno);
+  remove_stale(target);
+  const fs::path prefix = temporary_prefix(target);
+  for (int tries = 0; lock_ < 0; ++tries) {
+    fs::path folder = target.parent_path() / prefix;
+    folder += random_token() + ending;
+    if (!system_file::make_folder(folder)) {
+      if (errno == EEXIST && tries < most_tries) continue;
+      throw FileError(path_, errno);
+    }
+    folder_ = text_of(folder);
+    lock_ = system_file::lock_folder(folder);
+    // Either who sweeps has taken it at once, or the file system has no locks, and then nobody sweeps.
+    if (lock_ < 0 && errno != EWOULDBLOCK && errno != ENOENT) lock_ = system_file::hold_folder(folder);
+    if (lock_ < 0 && tries >= most_tries) throw FileError(path_, EBUSY);
+  }
+  partial_ = text_of(path_of(folder_) / name);
 }
 
 OutputFile::~OutputFile() { discard(); }
 
-std::string OutputFile::beside() const { return folder_ + ".new" + fs::path(target_).extension().string(); }
+std::string OutputFile::beside() const { return folder_ + ".new" + text_of(path_of(target_).extension()); }
 
 void OutputFile::write(const void* data, std::size_t bytes) {
-  if (file_ < 0) file_ = open(partial_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (file_ < 0) file_ = system_file::create(path_of(partial_));
   if (file_ < 0) throw FileError(path_, errno);
   for (const char *next = static_cast<const char*>(data), *end = next + bytes; next < end;) {
-    const ssize_t done = ::write(file_, next, static_cast<std::size_t>(end - next));
-    if (done < 0 && errno == EINTR) continue;
+    const std::ptrdiff_t done = system_file::append(file_, next, static_cast<std::size_t>(end - next));
     if (done < 0) throw FileError(path_, errno);
     next += done;
     written_ += static_cast<std::size_t>(done);
@@ -149,43 +139,44 @@ void OutputFile::write(const void* data, std::size_t bytes) {
 }
 
 void OutputFile::finish() {
-  struct stat other{};
-  if (stat(beside().c_str(), &other) == 0) partial_ = beside();
-  const int arrived = open(partial_.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC);
+  const fs::path target = path_of(target_);
   std::error_code ignored;
+  if (fs::exists(path_of(beside()), ignored)) partial_ = beside();
+  const int arrived = system_file::open_written(path_of(partial_));
   if (arrived < 0)
-    require(fs::exists(fs::path(target_).parent_path(), ignored), path_, "its folder is gone",
+    require(fs::exists(target.parent_path(), ignored), path_, "its folder is gone",
             "bring it back, or choose another");
   require(arrived >= 0, path_, "nothing was written", "the disk may be full");
-  struct stat found{}, there{};
-  int problem = fstat(arrived, &found) != 0 ? errno : 0;
-  if (problem == 0 && stat(target_.c_str(), &there) == 0) {
-    if (fchmod(arrived, there.st_mode & 07777) != 0) problem = errno;
-    if (there.st_uid != found.st_uid || there.st_gid != found.st_gid)
-      if (fchown(arrived, there.st_uid, there.st_gid) != 0) errno = 0;  // another's file becomes ours
-  }
-  if (problem == 0 && fsync(arrived) != 0) problem = errno;
-  close(arrived);
+  const bool done = system_file::take_permissions(arrived, target) && system_file::to_disk(arrived);
+  const int problem = done ? 0 : errno;
+  const bool regular = system_file::is_regular(arrived);
+  const std::uint64_t size = system_file::size(arrived);
+  system_file::close_file(arrived);
   if (problem != 0) throw FileError(path_, problem);
-  const bool whole = S_ISREG(found.st_mode) && found.st_size > 0 &&
-                     (file_ < 0 || static_cast<std::size_t>(found.st_size) == written_);
-  require(whole, path_, std::to_string(found.st_size) + " bytes arrived", "the disk may be full");
+  require(regular && size > 0 && (file_ < 0 || size == written_), path_,
+          std::to_string(size) + " bytes arrived", "the disk may be full");
   finished_ = true;
 }
 
 void OutputFile::commit() {
   if (!finished_) finish();
-  if (rename(partial_.c_str(), target_.c_str()) != 0) throw FileError(path_, errno);
-  sync_folder(fs::path(target_).parent_path());
+  close_written();  // Windows moves no file that somebody has open
+  const fs::path target = path_of(target_);
+  if (!system_file::replace(path_of(partial_), target)) throw FileError(path_, errno);
+  system_file::folder_to_disk(target.parent_path());
   discard();
 }
 
-void OutputFile::discard() noexcept {
-  if (file_ >= 0) close(file_);
+void OutputFile::close_written() noexcept {
+  if (file_ >= 0) system_file::close_file(file_);
   file_ = -1;
+}
+
+void OutputFile::discard() noexcept {
+  close_written();
   if (lock_ < 0) return;
-  remove_temporary(folder_);
-  close(lock_);
+  remove_temporary(path_of(folder_));
+  system_file::close_file(lock_);
   lock_ = -1;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <string>
 
 #include "core/export.h"
@@ -11,7 +12,8 @@ namespace arapfields {
 /// A regular file that takes its place whole or not at all. It is written under its own name in a temporary
 /// folder ".NAME.xxxxxxxx.tmp" beside its place (by write(), or by another library's exporter at partial()),
 /// then brought to the disk, looked at, and renamed. Symbolic links are followed: what they point to is
-/// replaced. Permissions of a file that was there stay. What a killed process left is removed by the next
+/// replaced. Permissions of a file that was there stay (on Windows they are the folder's). Names are UTF-8 on
+/// Windows, elsewhere the system's bytes. What a killed process left is removed by the next
 /// output of the same name: a lock on the folder tells whether its maker still lives.
 class ARAPFIELDS_EXPORT OutputFile {
  public:
@@ -41,6 +43,9 @@ class ARAPFIELDS_EXPORT OutputFile {
   void discard() noexcept;
 
  private:
+  void open_folder(const std::filesystem::path& target);
+  void close_written() noexcept;
+
   std::string path_;     ///< as it was given
   std::string target_;   ///< behind all symbolic links
   std::string folder_;   ///< temporary

@@ -36,9 +36,10 @@ struct HostJets {
 
 struct FieldObjective::Constants {
   Constants(const ObjectiveTerms& terms, const at::Tensor& like) : tables(like) {
-    if (!terms.preference) return;
-    RowMatrix<double> rows(terms.preference->normals.rows(), 4);
-    rows << terms.preference->normals, terms.preference->weights;
+    const std::optional<GaussPreference>& preference = terms.style.preference;
+    if (!preference) return;
+    RowMatrix<double> rows(preference->normals.rows(), 4);
+    rows << preference->normals, preference->weights;
     preferred = tensor_like(rows, like);
   }
   EnergyTables tables;
@@ -72,9 +73,10 @@ FieldObjective::Batch FieldObjective::draw(Random& random) {
   const Index available = samples_.size(), count = std::min(terms_.batch, available);
   Batch batch{Points(count, 3),
               Points(styled() ? count : 0, 3),
+              Points(styled() && terms_.style.targets.rows() > 0 ? count : 0, 3),
               Vector(count),
               Vector(terms_.weights.size() > 0 ? count : 0),
-              Vector(styled() && terms_.preference_weights.size() > 0 ? count : 0),
+              Vector(styled() && terms_.style.weights.size() > 0 ? count : 0),
               terms_.stance};
   batch.stance.ground.setZero(stands() ? count : 0);
   // Fresh samples stand evenly among the others: stretch b has one where b·fresh/count steps up.
@@ -85,7 +87,7 @@ FieldObjective::Batch FieldObjective::draw(Random& random) {
       batch.bending[b] = pool_bending_[i];
       if (styled()) batch.normals.row(b) = pool_.normals.row(i);
       if (batch.weights.size() > 0) batch.weights[b] = pool_.weights.size() > 0 ? pool_.weights[i] : 1.0;
-      if (batch.preference_weights.size() > 0) batch.preference_weights[b] = 1.0;
+      if (batch.style_weights.size() > 0) batch.style_weights[b] = batch.targets.rows() > 0 ? 0.0 : 1.0;
       continue;
     }
     const double place = (static_cast<double>(b) + random.uniform()) * static_cast<double>(available) /
@@ -95,7 +97,8 @@ FieldObjective::Batch FieldObjective::draw(Random& random) {
     batch.bending[b] = bending_[i];
     if (styled()) batch.normals.row(b) = samples_.normals.row(i);
     if (batch.weights.size() > 0) batch.weights[b] = terms_.weights[i];
-    if (batch.preference_weights.size() > 0) batch.preference_weights[b] = terms_.preference_weights[i];
+    if (batch.targets.rows() > 0) batch.targets.row(b) = terms_.style.targets.row(i);
+    if (batch.style_weights.size() > 0) batch.style_weights[b] = terms_.style.weights[i];
     if (stands()) batch.stance.ground[b] = terms_.stance.ground[i];
   }
   return batch;
@@ -125,10 +128,10 @@ double FieldObjective::by_kernels(TrainableField& field, Random& random) {
   add("stretch", terms_.rigidity * arap.stretch_energy);
   if (terms_.stiffness.bends()) add("bend", terms_.rigidity * (arap.energy - arap.stretch_energy));
   if (styled())
-    add("style",
-        terms_.gauss * gauss_energy<Scalar>(jets.view(), batch.normals.cast<Scalar>(),
-                                            batch.preference_weights.cast<Scalar>(), *terms_.preference,
-                                            terms_.gauss, jets.cotangent_view()));
+    add("style", terms_.gauss * style_energy<Scalar>(jets.view(), batch.normals.cast<Scalar>(),
+                                                     terms_.style.preference, batch.targets.cast<Scalar>(),
+                                                     batch.style_weights.cast<Scalar>(), terms_.gauss,
+                                                     jets.cotangent_view()));
   if (stands())
     add("stance",
         terms_.keep_stance * stance_energy<Scalar>(jets.view(), batch.points.cast<Scalar>(), batch.stance,
@@ -170,13 +173,16 @@ at::Tensor FieldObjective::by_compositions(TrainableField& field, Random& random
   };
   add("stretch", terms_.rigidity * arap[3]);
   if (terms_.stiffness.bends()) add("bend", terms_.rigidity * (arap[2] - arap[3]));
-  if (styled())
+  if (styled()) {
+    const at::Tensor normals = tensor_like(batch.normals, like);
+    const at::Tensor held = batch.style_weights.size() > 0 ? tensor_like(batch.style_weights, like) : none;
+    const auto& preference = terms_.style.preference;
     add("style",
-        terms_.gauss *
-            aten_gauss(
-                jets, tensor_like(batch.normals, like),
-                batch.preference_weights.size() > 0 ? tensor_like(batch.preference_weights, like) : none,
-                constants_->preferred, terms_.preference->sharpness, terms_.gauss, tables, cotangents));
+        terms_.gauss * (preference ? aten_gauss(jets, normals, held, constants_->preferred,
+                                                preference->sharpness, terms_.gauss, tables, cotangents)
+                                   : aten_targets(jets, normals, held, tensor_like(batch.targets, like),
+                                                  terms_.gauss, tables, cotangents)));
+  }
   if (stands()) {
     const double weight = terms_.keep_stance * batch.stance.scale;
     add("stance", weight * aten_stance(jets, tensor_like(batch.points, like),

@@ -5,9 +5,9 @@
 #include <optional>
 
 #include "energies/external_energy.h"
-#include "energies/gauss.h"
 #include "energies/handles.h"
 #include "energies/stance.h"
+#include "energies/style.h"
 #include "mesh/surface_samples.h"
 #include "options/handles.h"
 #include "solve/objective.h"
@@ -16,7 +16,7 @@
 namespace arapfields {
 
 /// What a deformation is asked for, as weights of the terms:
-///   rigidity·mean w(stretch + λ·bend) + gauss·mean(1 − g) + keep_stance·stance + barrier·fold_barrier +
+///   rigidity·mean w(stretch + λ·bend) + gauss·style + keep_stance·stance + barrier·fold_barrier +
 ///   handles + external.
 struct ObjectiveTerms {
   Index batch = 0;  ///< samples an iteration
@@ -25,9 +25,8 @@ struct ObjectiveTerms {
   SurfaceStiffness stiffness;  ///< λ
   Vector weights;              ///< w, one a sample; empty: all 1
   double barrier = 0.0, barrier_threshold = 0.1;
-  std::optional<GaussPreference> preference;
-  double gauss = 0.0;
-  Vector preference_weights;  ///< a weight a sample; empty: all 1
+  StyleAtSamples style;  ///< its weights: one a sample, or empty: all 1
+  double gauss = 0.0;    ///< weight of the style
   double keep_stance = 0.0;
   Stance stance;  ///< of the samples
   BoundHandles handles;
@@ -48,17 +47,18 @@ class FieldObjective final : public Objective {
   const ObjectiveTerms& asked() const { return terms_; }
 
  private:
-  /// Samples of one iteration: λ and w, and normals and the preference's weights where the terms use them.
+  /// Samples of one iteration: λ and w, and normals and the style's targets and weights where the terms use
+  /// them.
   struct Batch {
-    Points points, normals;
-    Vector bending, weights, preference_weights;
+    Points points, normals, targets;
+    Vector bending, weights, style_weights;
     Stance stance;
   };
   /// What the terms need on a device, beside each batch.
   struct Constants;
 
   Batch draw(Random& random);
-  bool styled() const { return terms_.preference && terms_.gauss > 0.0; }
+  bool styled() const { return terms_.style.any() && terms_.gauss > 0.0; }
   bool stands() const { return terms_.keep_stance > 0.0; }
   bool pulled() const { return terms_.handles.count() > 0 && terms_.pull.handle_weight != 0.0; }
   JetOrder order_of_terms() const {

@@ -12,7 +12,7 @@ namespace arapfields {
 void LiveSolver::State::adopt(const DeformationField& field) {
   constexpr int rounds = 8;
   const ThreadScope threads(options_.threads);
-  if (inverse_factor_.size() == 0) factorise();
+  precondition(0.0);
   const LiveObjective<float>& objective = *fast_.objective;
   const Points places = rows_of(surface_, chosen_);
   // Fields of another frame: the reflections' plane may have moved it.
@@ -59,10 +59,8 @@ void LiveSolver::State::adopt(const DeformationField& field) {
     direction = image + next / square * direction;
     square = next;
   }
-  fast_.u.resize(0);
-  exact_.u.resize(0);
-  u_before_.resize(0);
-  optimizer_.forget();
+  forget_past();
+  rest();
 }
 
 }  // namespace arapfields

@@ -137,8 +137,8 @@ void LiveSolver::State::set_weights(const Vector& weights, const Vector& bend_we
   if (!handles_.empty()) factorise();
 }
 
-/// The samples' resistance, where their weights or handles that scale have changed it.
-void LiveSolver::State::stiffen(const Progress& progress) {
+/// w of each sample that the energy sees (empty: all 1), and λ.
+std::pair<Vector, Vector> LiveSolver::State::resistance() const {
   const Vector all = energy_weights(samples_, bound_);
   Vector weights(all.size() > 0 ? static_cast<Index>(chosen_.size()) : 0), bending = own_bending_;
   for (std::size_t i = 0; i < chosen_.size(); ++i) {
@@ -146,6 +146,12 @@ void LiveSolver::State::stiffen(const Progress& progress) {
     if (weights.size() > 0) weights[row] = all[chosen_[i]];
     if (samples_.bend_weights.size() > 0) bending[row] *= samples_.bend_weights[chosen_[i]];
   }
+  return {weights, bending};
+}
+
+/// The samples' resistance, where their weights or handles that scale have changed it.
+void LiveSolver::State::stiffen(const Progress& progress) {
+  const auto [weights, bending] = resistance();
   if (stiffness_.size() > 0 && weights.size() == weights_.size() && weights == weights_ &&
       bending == bending_)
     return;
@@ -162,6 +168,7 @@ void LiveSolver::State::set_handles(const std::vector<Handle>& handles) {
   if (style_) require_no_reach(handles);
   bound_ = BoundHandles(in_cube(handles, frame_), surface_);
   handles_ = handles;
+  body_.motions.clear();
   stiffen({});
   reaches_ = reaches_of_handles();
   choose_influence();
@@ -176,8 +183,7 @@ void LiveSolver::State::factorise() {
   pair_values_ = radial_rows(basis_, pairs_.sources, JetOrder::value);
   RowMatrix<double> values = pair_values_;
   Vector weights = options_.handle_weight * pairs_.weights;
-  if (stance_) {
-    auto [rows, shares] = stance_rows(basis_, stance_->rest, stance_->stance);
+  const auto add = [&](RowMatrix<double> rows, Vector shares) {
     if (mirror_) {
       const RowMatrix<double> other = mirror_->reflected_rows(rows);
       rows.conservativeResize(2 * other.rows(), Eigen::NoChange);
@@ -187,8 +193,15 @@ void LiveSolver::State::factorise() {
     values.conservativeResize(values.rows() + rows.rows(), Eigen::NoChange);
     weights.conservativeResize(values.rows());
     values.bottomRows(rows.rows()) = rows;
-    weights.tail(rows.rows()) = stance_->weight * shares;
+    weights.tail(rows.rows()) = shares;
+  };
+  if (stance_) {
+    auto [rows, shares] = stance_rows(basis_, stance_->rest, stance_->stance);
+    add(std::move(rows), stance_->weight * shares);
   }
+  if (body_.factored_inertia > 0.0)
+    add(radial_rows(basis_, rows_of(surface_, chosen_), JetOrder::value),
+        0.5 * body_.factored_inertia / static_cast<double>(chosen_.size()) * body_.masses);
   inverse_factor_ = inverse_factor(stiffness_, values, weights);
   for_each_precision([&](auto& precision) {
     precision.objective->set_handles(pairs_, pair_values_, inverse_factor_);

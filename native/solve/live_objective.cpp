@@ -51,7 +51,8 @@ void LiveObjective<Scalar>::set_style(const std::optional<LiveStyle>& style) {
   style_ = style;
   if (!style) return;
   style_normals_ = style->normals.template cast<Scalar>();
-  style_weights_ = style->sample_weights.template cast<Scalar>();
+  style_targets_ = style->style.targets.template cast<Scalar>();
+  style_weights_ = style->style.weights.template cast<Scalar>();
 }
 
 template <class Scalar>
@@ -69,6 +70,7 @@ bool LiveObjective<Scalar>::accepted(const Measurements& u) const {
   if (style_) told.push_back({"style", style_->weight * terms.gauss});
   if (stance_) told.push_back({"stance", stance_->weight * terms.stance});
   if (barrier_ > 0.0) told.push_back({"barrier", barrier_ * terms.barrier});
+  if (body_) told.push_back({"motion", terms.body.sum()});
   told.push_back({"handles", handle_weight_ * terms.handles});
   for (std::size_t i = 0; i < terms.external.size(); ++i)
     told.push_back({"energies[" + std::to_string(i) + "]", terms.external[i]});
@@ -112,13 +114,14 @@ LiveTerms LiveObjective<Scalar>::evaluate(JetView<const Scalar> jets, const Meas
       handle_energy<Scalar>({u.data() + handle_offset(), pairs, JetOrder::value}, pairs_, handle_weight_,
                             {out != nullptr ? out + handle_offset() : nullptr, pairs, JetOrder::value});
   if (style_)
-    terms.gauss = gauss_energy<Scalar>(jets, style_normals_, style_weights_, style_->preference,
-                                       style_->weight, jet_cotangents);
+    terms.gauss = style_energy<Scalar>(jets, style_normals_, style_->style.preference, style_targets_,
+                                       style_weights_, style_->weight, jet_cotangents);
   if (stance_)
     terms.stance =
         stance_energy<Scalar>(jets, stance_rest_, stance_->stance, stance_->weight, jet_cotangents);
   if (barrier_ > 0.0)
     terms.barrier = fold_barrier<Scalar>(jets, barrier_threshold_, barrier_, jet_cotangents);
+  if (body_) terms.body = body_energy<Scalar>(jets, *body_, jet_cotangents);
   terms.external = external_energies<Scalar>(hooks_.energies, rest_, jets, hooks_.weight, jet_cotangents);
   return terms;
 }
@@ -149,6 +152,7 @@ double LiveObjective<Scalar>::value(const Measurements& u, Measurements* cotange
   if (cotangents != nullptr) cotangents->tail(3 * center_count_) = Scalar(2.0 * coefficient_weight) * centers;
   return terms.arap.energy + handle_weight_ * terms.handles + (style_ ? style_->weight * terms.gauss : 0.0) +
          (stance_ ? stance_->weight * terms.stance : 0.0) + barrier_ * terms.barrier +
+         (body_ ? terms.body.sum() : 0.0) +
          std::accumulate(terms.external.begin(), terms.external.end(), 0.0) +
          coefficient_weight * static_cast<double>(centers.squaredNorm());
 }

@@ -1,50 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <memory>
 #include <optional>
 
 #include "core/tall_product.h"
-#include "energies/arap.h"
-#include "energies/gauss.h"
 #include "energies/handles.h"
-#include "energies/stance.h"
 #include "fields/mirror.h"
 #include "fields/radial_evaluator.h"
 #include "solve/live_blend.h"
 #include "solve/live_hooks.h"
+#include "solve/live_terms.h"
 #include "solve/quasi_newton.h"
 
 namespace arapfields {
 
-/// A style's preference at the samples of a live solve.
-struct LiveStyle {
-  GaussPreference preference;
-  Points normals;         ///< (n,3) rest normals of the samples
-  Vector sample_weights;  ///< (n) or empty: all 1
-  double weight = 1.0;    ///< λ_Gauss
-};
-
-/// What keeps a figure's stance at the samples of a live solve.
-struct LiveStance {
-  Stance stance;
-  Points rest;  ///< (n,3) samples
-  double weight = 0.0;
-};
-
-/// What the terms of the energy come to.
-struct LiveTerms {
-  ArapValue arap;
-  double handles = 0.0;          ///< mean squared distance to the targets
-  double gauss = 0.0;            ///< mean(1 − g), where there is a style
-  double barrier = 0.0;          ///< energies/distortion.h
-  double stance = 0.0;           ///< energies/stance.h
-  std::vector<double> external;  ///< weighted
-};
-
-/// mean (stretch + λ·bend) + weight·handles + λ_Gauss·gauss + stance + barrier + external + a vanishing pull
-/// of all centers towards zero, of the fields of one radial basis. Measurements: jets at the samples, values
-/// at the handles' sources, centers. In single precision a step costs half, and the value is good to some
-/// 1e-6 of itself.
+/// mean (stretch + λ·bend) + weight·handles + λ_Gauss·gauss + stance + barrier + body + external + a
+/// vanishing pull of all centers towards zero, of the fields of one radial basis. Measurements: jets at the
+/// samples, values at the handles' sources, centers. In single precision a step costs half, and the value is
+/// good to some 1e-6 of itself.
 template <class Scalar>
 class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
  public:
@@ -66,6 +40,8 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
   /// `rest` (n,3): the samples.
   void set_hooks(const LiveHooks& hooks, PointsIn rest);
   void set_stance(const std::optional<LiveStance>& stance);
+  /// What a body with mass feels; none: the solve is one of shapes alone.
+  void set_body(std::optional<Body<Scalar>> body) { body_ = std::move(body); }
   /// Gradients and steps are those of symmetric fields alone.
   void set_mirror(const std::optional<Mirror>& mirror) { mirror_ = mirror; }
 
@@ -78,6 +54,12 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
     const JetView<Scalar> jets{whole.data(), samples_.size(), JetOrder::second};
     blend_.add_fixed(jets);
     return call(JetView<const Scalar>(jets));
+  }
+  /// Where the samples are.
+  PointsOf<Scalar> sample_values(const Measurements& u) const {
+    return with_jets(u, [](JetView<const Scalar> jets) {
+      return PointsOf<Scalar>(Eigen::Map<const PointsOf<Scalar>>(jets.data, jets.count, 3));
+    });
   }
   /// Where the pairs' sources are.
   Eigen::Map<const PointsOf<Scalar>> handle_values(const Measurements& u) const {
@@ -110,11 +92,20 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
   LiveBlend<Scalar> blend_;
   std::optional<LiveStyle> style_;
   std::optional<LiveStance> stance_;
-  PointsOf<Scalar> stance_rest_, style_normals_;
+  std::optional<Body<Scalar>> body_;
+  PointsOf<Scalar> stance_rest_, style_normals_, style_targets_;
   Eigen::VectorX<Scalar> style_weights_;
   std::optional<Mirror> mirror_;
   LiveHooks hooks_;
   Points rest_;  // for external energies
+};
+
+/// The objective in one precision, and what it measured last.
+template <class Scalar>
+struct LivePrecision {
+  std::unique_ptr<LiveObjective<Scalar>> objective;
+  Eigen::VectorX<Scalar> u;  // measurements of the coefficients at hand; empty: not known
+  int uses = 0;              // solves since u was measured afresh
 };
 
 }  // namespace arapfields

@@ -17,7 +17,9 @@ struct LiveReport {
   ArapValue arap;      ///< arap.energy with the samples' own stiffness
   double value = 0.0;  ///< all that is minimised
   double handle_mean = 0.0, handle_max = 0.0;
-  std::optional<double> preference;  ///< mean g of the deformed normals, where there is a style
+  std::optional<double> preference;  ///< preference_of() a style, where there is one
+  double kinetic = 0.0;              ///< energy of the motion, in the unit of `value`; 0 after a solve
+  double speed = 0.0;                ///< root mean square over the samples, mesh units a second
   Distortion distortion;
   Index iterations = 0, evaluations = 0;
   bool converged = false;

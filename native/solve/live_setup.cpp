@@ -31,4 +31,10 @@ Points rows_of(PointsIn points, const std::vector<Index>& rows) {
   return result;
 }
 
+Vector entries_of(const Vector& numbers, const std::vector<Index>& rows) {
+  Vector result(static_cast<Index>(rows.size()));
+  for (std::size_t i = 0; i < rows.size(); ++i) result[static_cast<Index>(i)] = numbers[rows[i]];
+  return result;
+}
+
 }  // namespace arapfields

@@ -18,5 +18,6 @@ std::vector<Index> random_subset(Index n, Index count, Random& random);
 std::vector<Index> stratified(const std::vector<std::uint32_t>& list, Index count, Random& random);
 
 Points rows_of(PointsIn points, const std::vector<Index>& rows);
+Vector entries_of(const Vector& numbers, const std::vector<Index>& rows);
 
 }  // namespace arapfields

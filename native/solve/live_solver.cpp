@@ -17,9 +17,9 @@ LiveSolver& LiveSolver::operator=(LiveSolver&&) noexcept = default;
 
 void LiveSolver::set_handles(const std::vector<Handle>& handles) { state_->set_handles(handles); }
 
-void LiveSolver::set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights,
+void LiveSolver::set_style(const Style& style, double strength, double sharpness, const Vector& weights,
                            const Vec3& up) {
-  state_->set_style(preferred, strength, sharpness, weights, up);
+  state_->set_style(style, strength, sharpness, weights, up);
 }
 
 void LiveSolver::clear_style() { state_->clear_style(); }
@@ -40,9 +40,28 @@ std::shared_ptr<RadialField> LiveSolver::solve(Index iterations, double toleranc
   return state_->solve(iterations, tolerance, progress);
 }
 
+Index LiveSolver::follow(Index iterations, double tolerance, const Progress& progress) {
+  return state_->follow(iterations, tolerance, progress);
+}
+
+void LiveSolver::set_secondary_motion(const std::optional<SecondaryMotion>& motion) {
+  state_->set_secondary_motion(motion);
+}
+
+std::shared_ptr<RadialField> LiveSolver::step(const std::vector<Handle>& moved, double seconds,
+                                              const Progress& progress, const Mat4& coordinates) {
+  return state_->step(moved, seconds, coordinates, progress);
+}
+
+MotionState LiveSolver::motion_state() const { return state_->motion_state(); }
+
+void LiveSolver::set_motion_state(const MotionState& state) { state_->set_motion_state(state); }
+
 void LiveSolver::reset() { state_->reset(); }
 
 void LiveSolver::adopt(const DeformationField& field) { state_->adopt(field); }
+
+Index LiveSolver::watch_folds(double barrier) { return state_->watch_folds(barrier); }
 
 void LiveSolver::track(PointsIn points) { state_->track(points); }
 

@@ -5,11 +5,13 @@
 
 #include "core/task.h"
 #include "energies/handles.h"
+#include "energies/style.h"
 #include "fields/radial_field.h"
 #include "mesh/surface_samples.h"
 #include "options/live.h"
 #include "solve/live_hooks.h"
 #include "solve/live_report.h"
+#include "solve/secondary_motion.h"
 
 namespace arapfields {
 
@@ -32,10 +34,10 @@ class ARAPFIELDS_EXPORT LiveSolver {
 
   /// Other handles for the same surface; the shape at hand stays the start of the next solve.
   void set_handles(const std::vector<Handle>& handles);
-  /// Preferred normals (k,3), strength ≥ 0 (0 takes the style away), sharpness σ (0: from the normals),
+  /// A style, strength ≥ 0 (0 takes the style away), sharpness σ (0: from the style),
   /// weights (one for each surface sample given to the constructor, or empty); `up` is where the figure's
   /// head is: without handles it stands on what lies lowest.
-  void set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights = {},
+  void set_style(const Style& style, double strength, double sharpness, const Vector& weights = {},
                  const Vec3& up = Vec3::UnitZ());
   void clear_style();
   /// Other weights of the samples (mesh/surface_samples.h), for instance while they are painted. What they
@@ -51,17 +53,40 @@ class ARAPFIELDS_EXPORT LiveSolver {
   /// Improves the field for the targets and the style at hand; 0 iterations or tolerance: the options'.
   std::shared_ptr<RadialField> solve(Index iterations = 0, double tolerance = 0.0,
                                      const Progress& progress = {});
+  /// The same for the shape alone, of which report() is measured when it is asked for; returns the steps
+  /// taken.
+  Index follow(Index iterations = 0, double tolerance = 0.0, const Progress& progress = {});
+  /// Gives the surface a mass, from the next step on; none, or strength 0: it has none. Solves then find
+  /// where it would come to rest. Throws InvalidInput for what cannot be, masses of zero alone among it.
+  void set_secondary_motion(const std::optional<SecondaryMotion>& motion);
+  /// Moves the handles to other targets in so many seconds (1e-5 to 10), and the body with them, from where
+  /// the last step or solve ended (a solve ends at rest). Where the object to which all coordinates belong
+  /// has moved meanwhile, `coordinates` is the rigid motion that takes those of the last step to those of
+  /// this one: the body feels it. Without a mass, set_targets() and solve(). Where it throws, nothing has
+  /// moved.
+  std::shared_ptr<RadialField> step(const std::vector<Handle>& moved, double seconds,
+                                    const Progress& progress = {},
+                                    const Mat4& coordinates = Mat4::Identity());
+  /// All that the next step depends on: the same steps from it are the same, bit for bit.
+  MotionState motion_state() const;
+  void set_motion_state(const MotionState& state);
   /// Back to the identity, and the handles' targets to rest.
   void reset();
   /// Takes another field's shape, as well as its own centers can, as the start of the next solve. In the
   /// samples' frame.
   void adopt(const DeformationField& field);
 
+  /// How many samples the shape at hand folds at. If any, the next solves look at all samples that it folds
+  /// at or nearly does, whether the energy saw them or not, with this weight of the barrier.
+  Index watch_folds(double barrier);
+
   /// Points (n,3) of mesh coordinates whose places tracked() tells cheaply.
   void track(PointsIn points);
   PointsF tracked() const;
 
   std::shared_ptr<RadialField> field() const;
+  /// What the last solve reached; after follow() it is measured at the first call, against the targets at
+  /// hand.
   const LiveReport& report() const;
   const std::vector<Handle>& handles() const;
 

@@ -52,7 +52,8 @@ LiveSolver::State::State(const SurfaceSamples& samples, const std::vector<Handle
   const int axis = axis_of(options.symmetry);
   if (!shape) shape = std::make_shared<const RestShape>(samples_, options.interior, seed, axis);
   Random random(seed);
-  chosen_ = stratified(shape->order, options.samples, random);
+  order_ = shape->order;
+  chosen_ = stratified(order_, options.samples, random);
   std::vector<RadialScale> scales;
   if (options.coarse_centers > 0) scales.push_back({options.coarse_centers, options.coarse_radius_factor});
   scales.push_back({options.fine_centers, options.fine_radius_factor, true});
@@ -66,7 +67,8 @@ LiveSolver::State::State(const SurfaceSamples& samples, const std::vector<Handle
   if (options.interior) basis_.set_embedding(shape->embedding);
   coefficients_ = basis_.identity();
   progress.report(0.2, "centers placed");
-  own_bending_ = SurfaceStiffness(shape->thickness, options.surface).bending(rows_of(surface_, chosen_));
+  surface_stiffness_ = SurfaceStiffness(shape->thickness, options.surface);
+  own_bending_ = surface_stiffness_.bending(rows_of(surface_, chosen_));
   bound_ = BoundHandles(in_cube(handles, frame_), surface_);
   stiffen(progress.part(0.2, 0.8));
   prepare(fast_);
@@ -86,6 +88,7 @@ void LiveSolver::State::prepare(Precision<Scalar>& precision) {
   precision.objective->set_style(style_);
   precision.objective->set_hooks(hooks_, rows_of(surface_, chosen_));
   precision.objective->set_stance(stance_);
+  weigh(precision);
 }
 
 void LiveSolver::State::set_hooks(const LiveHooks& hooks) {
@@ -103,8 +106,14 @@ int LiveSolver::State::solve_threads() const {
 template <class Scalar>
 QuasiNewtonReport LiveSolver::State::descend(Precision<Scalar>& precision, const QuasiNewtonOptions& options,
                                              const Progress& progress) {
-  const QuasiNewtonReport found =
-      optimizer_.minimise(*precision.objective, options, coefficients_, precision.u, progress);
+  QuasiNewtonReport found;
+  try {
+    found = optimizer_.minimise(*precision.objective, options, coefficients_, precision.u, progress);
+  } catch (...) {  // cancelled between two steps: the coefficients have gone on
+    precision.u.resize(0);
+    u_before_.resize(0);
+    throw;
+  }
   if (++precision.uses >= most_uses) precision.u.resize(0), precision.uses = 0;
   report_.iterations += found.iterations;
   report_.evaluations += found.evaluations;
@@ -113,14 +122,16 @@ QuasiNewtonReport LiveSolver::State::descend(Precision<Scalar>& precision, const
   return found;
 }
 
-std::shared_ptr<RadialField> LiveSolver::State::solve(Index iterations, double tolerance,
-                                                      const Progress& progress) {
+template QuasiNewtonReport LiveSolver::State::descend<float>(Precision<float>&, const QuasiNewtonOptions&,
+                                                             const Progress&);
+
+Index LiveSolver::State::follow(Index iterations, double tolerance, const Progress& progress) {
   const ThreadScope threads(solve_threads());
   const Stopwatch watch;
   if (iterations <= 0) iterations = options_.iterations;
   if (tolerance <= 0.0) tolerance = options_.tolerance;
   report_.iterations = report_.evaluations = 0;
-  if (inverse_factor_.size() == 0) factorise();
+  precondition(0.0);
   if (!handles_.empty() && !style_) follow_rigidly();
   extrapolate();
   const bool fast_alone = tolerance >= single_tolerance;
@@ -134,12 +145,32 @@ std::shared_ptr<RadialField> LiveSolver::State::solve(Index iterations, double t
     fast_.u.resize(0);
   }
   if (handles_.empty() && hooks_.energies.empty()) hold_lowest();
-  if (fast_alone)
-    measure(fast_);
-  else
-    measure(exact_);
+  rest();
+  report_.kinetic = report_.speed = 0.0;
+  is_measured_ = false;
+  is_exact_ = !fast_alone;
+  report_.seconds = watch.seconds();
+  return report_.iterations;
+}
+
+std::shared_ptr<RadialField> LiveSolver::State::solve(Index iterations, double tolerance,
+                                                      const Progress& progress) {
+  const Stopwatch watch;
+  follow(iterations, tolerance, progress);
+  report();
   report_.seconds = watch.seconds();
   return field();
+}
+
+const LiveReport& LiveSolver::State::report() {
+  if (is_measured_) return report_;
+  const ThreadScope threads(solve_threads());
+  if (is_exact_)
+    measure(exact_);
+  else
+    measure(fast_);
+  is_measured_ = true;
+  return report_;
 }
 
 /// Where handles moved together, the whole shape moves along first: no energy but theirs feels it.
@@ -187,12 +218,13 @@ void LiveSolver::State::hold_lowest() {
 
 template <class Scalar>
 void LiveSolver::State::measure(Precision<Scalar>& precision) {
+  if (!precision.objective) prepare(precision);
   const LiveObjective<Scalar>& objective = *precision.objective;
   if (precision.u.size() == 0) objective.measure(coefficients_, precision.u);
   const LiveTerms terms = objective.terms(precision.u);
   report_.arap = terms.arap;
   report_.preference.reset();
-  if (style_) report_.preference = 1.0 - terms.gauss;
+  if (style_) report_.preference = preference_of(style_->style.preference, terms.gauss);
   report_.distortion =
       objective.with_jets(precision.u, [](JetView<const Scalar> jets) { return distortion<Scalar>(jets); });
   report_.notes = notes_on(report_.distortion, far_target(bound_, surface_));
@@ -204,6 +236,8 @@ void LiveSolver::State::measure(Precision<Scalar>& precision) {
       frame_.scale * distance.dot(pairs_.weights.head(own)) / pairs_.weights.head(own).sum();
   report_.handle_max = frame_.scale * distance.maxCoeff();
 }
+
+template void LiveSolver::State::measure<float>(Precision<float>&);
 
 void LiveSolver::State::reset() {
   coefficients_ = basis_.identity();
@@ -217,9 +251,11 @@ void LiveSolver::State::reset() {
     handle.target_point = handle.rest_point;
   }
   set_targets(at_rest);
+  rest();
   const double setup = report_.setup_seconds;
   report_ = {};
   report_.setup_seconds = setup;
+  is_measured_ = true;
 }
 
 void LiveSolver::State::track(PointsIn points) {
@@ -234,9 +270,10 @@ std::unique_ptr<LiveSolver::State> LiveSolver::State::with_symmetry(SymmetryPlan
   options.symmetry = symmetry;
   auto next = std::make_unique<State>(samples_, handles_, options, progress, nullptr, nullptr);
   if (style_asked_)
-    next->set_style(style_asked_->preferred, style_asked_->strength, style_asked_->sharpness,
+    next->set_style(style_asked_->style, style_asked_->strength, style_asked_->sharpness,
                     style_asked_->weights, style_asked_->up);
   next->set_hooks(hooks_);
+  next->set_secondary_motion(body_.asked);
   if (next->inverse_factor_.size() == 0) next->factorise();
   next->adopt(*field());
   if (tracked_rest_.rows() > 0) next->track(tracked_rest_);

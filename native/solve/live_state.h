@@ -6,8 +6,10 @@
 
 #include "fields/mirror.h"
 #include "fields/tracked_points.h"
+#include "solve/live_body.h"
 #include "solve/live_objective.h"
 #include "solve/live_solver.h"
+#include "solve/surface_stiffness.h"
 
 namespace arapfields {
 
@@ -17,36 +19,38 @@ class LiveSolver::State {
         const Progress& progress, std::shared_ptr<const RestShape> shape,
         std::shared_ptr<const HandleBlend> blend);
   void set_handles(const std::vector<Handle>& handles);
-  void set_style(PointsIn preferred, double strength, double sharpness, const Vector& weights,
+  void set_style(const Style& style, double strength, double sharpness, const Vector& weights,
                  const Vec3& up);
   void clear_style();
   void set_hooks(const LiveHooks& hooks);
   void set_weights(const Vector& weights, const Vector& bend_weights);
   void set_targets(const std::vector<Handle>& moved);
+  Index follow(Index iterations, double tolerance, const Progress& progress);
   std::shared_ptr<RadialField> solve(Index iterations, double tolerance, const Progress& progress);
+  void set_secondary_motion(const std::optional<SecondaryMotion>& motion);
+  std::shared_ptr<RadialField> step(const std::vector<Handle>& moved, double seconds, const Mat4& coordinates,
+                                    const Progress& progress);
+  MotionState motion_state() const;
+  void set_motion_state(const MotionState& state);
   void reset();
   void adopt(const DeformationField& field);
+  Index watch_folds(double barrier);
   void track(PointsIn points);
   /// The same session, symmetric otherwise: its handles, targets, style, hooks, shape and tracked points.
   std::unique_ptr<State> with_symmetry(SymmetryPlane symmetry, const Progress& progress) const;
   PointsF tracked() const { return tracked_.moved(coefficients_); }
   std::shared_ptr<RadialField> field() const;
-  const LiveReport& report() const { return report_; }
+  const LiveReport& report();
   const std::vector<Handle>& handles() const { return handles_; }
   const LiveOptions& options() const { return options_; }
 
  private:
   template <class Scalar>
-  struct Precision {
-    std::unique_ptr<LiveObjective<Scalar>> objective;
-    Eigen::VectorX<Scalar> u;  // measurements of the coefficients; empty: not known
-    int uses = 0;              // solves since u was measured afresh
-  };
+  using Precision = LivePrecision<Scalar>;
   template <class Scalar>
   void prepare(Precision<Scalar>& precision);
   template <class Scalar>
-  QuasiNewtonReport descend(Precision<Scalar>& precision, const QuasiNewtonOptions& options,
-                            const Progress& progress);
+  QuasiNewtonReport descend(Precision<Scalar>&, const QuasiNewtonOptions&, const Progress&);
   template <class Scalar>
   void measure(Precision<Scalar>& precision);
   template <class Call>
@@ -54,34 +58,33 @@ class LiveSolver::State {
     if (fast_.objective) call(fast_);
     if (exact_.objective) call(exact_);
   }
+  std::pair<Vector, Vector> resistance() const;
+  LiveStyle style_at_samples(const StyleAsked& asked) const;
   void stiffen(const Progress& progress);
-  void choose_pairs();
   bool choose_influence();
   std::shared_ptr<const Influence> reaches_of_handles() const;
   Points pair_targets() const;
-  void reflect_pairs();
-  void choose_stance();
-  void stand_otherwise();
-  void factorise();
-  void follow_rigidly();
-  void extrapolate();
-  void hold_lowest();
   int solve_threads() const;
-
-  /// What set_style was called with.
-  struct StyleAsked {
-    Points preferred;
-    double strength, sharpness;
-    Vector weights;
-    Vec3 up;
-  };
+  template <class S>
+  void weigh(Precision<S>& precision, double inertia = 0.0, PointsOf<S> goal = {});
+  void precondition(double inertia);
+  void choose_pairs(), reflect_pairs(), choose_stance(), stand_otherwise(), factorise();
+  void follow_rigidly(), extrapolate(), hold_lowest(), forget_past(), rest();
+  Points pair_targets_between(const std::vector<Mat4>& before, double share) const;
+  RowMatrix<double> stage(const RowMatrix<double>& from, const RowMatrix<double>& velocity, double a,
+                          const Twist&, const Progress&);
+  void change_coordinates(const Mat4& motion);
+  void advance(double seconds, const Progress& progress);
+  double kinetic_energy();
 
   LiveOptions options_;
   SurfaceSamples samples_;
   Frame frame_;
   Points surface_, surface_normals_;          // all samples, cube coordinates
   std::shared_ptr<const HandleBlend> blend_;  // null: handles are soft
+  std::vector<std::uint32_t> order_;          // of these, neighbours beside each other
   std::vector<Index> chosen_;                 // those that the energy sees
+  SurfaceStiffness surface_stiffness_;        // without weights of the samples
   Vector own_bending_;                        // λ of these, without bend weights
   Vector bending_, weights_;                  // λ, and factors of the energy (empty: all 1)
   std::optional<Mirror> mirror_;              // where the field is symmetric
@@ -105,9 +108,12 @@ class LiveSolver::State {
   RowMatrix<double> coefficients_;
   RowMatrix<double> coefficients_before_;  // where the solve before the last one ended; empty: not known
   VectorF u_before_;
+  LiveBody body_;
   TrackedPoints tracked_;
   Points tracked_rest_;
   LiveReport report_;
+  bool is_measured_ = true;  // whether the report is of the shape at hand
+  bool is_exact_ = false;    // whether that came of double precision
 };
 
 }  // namespace arapfields

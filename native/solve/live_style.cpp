@@ -9,7 +9,7 @@
 
 namespace arapfields {
 
-void LiveSolver::State::set_style(PointsIn preferred, double strength, double sharpness,
+void LiveSolver::State::set_style(const Style& style, double strength, double sharpness,
                                   const Vector& weights, const Vec3& up) {
   require_range("strength", strength, 0, 1e6);
   require(
@@ -21,22 +21,29 @@ void LiveSolver::State::set_style(PointsIn preferred, double strength, double sh
   require(surface_normals_.rows() == surface_.rows(), "samples", "they have no normals",
           "a style needs samples with normals");
   require_no_reach(handles_);
-  const GaussPreference preference = gauss_preference(preferred, sharpness);
+  StyleAsked asked{style, strength, sharpness, weights, up};
+  LiveStyle here = style_at_samples(asked);
+  if (here.style.idle(here.normals)) return clear_style();
   require(up.allFinite() && up.norm() > 0.0, "up", "zero, NaN or infinite", "a finite direction is needed");
   const bool other_way_up = up != up_, first = !style_;
-  style_asked_ = StyleAsked{preferred, strength, sharpness, weights, up};
+  style_asked_ = std::move(asked);
   up_ = up;
-  style_ = LiveStyle{preference,
-                     rows_of(surface_normals_, chosen_),
-                     {},
-                     strength * options_.gauss_weight * preference.balance};
-  style_->sample_weights = preference.reach(style_->normals);
-  if (weights.size() > 0)
-    for (std::size_t i = 0; i < chosen_.size(); ++i)
-      style_->sample_weights[static_cast<Index>(i)] *= weights[chosen_[i]];
+  style_ = std::move(here);
   for_each_precision([&](auto& precision) { precision.objective->set_style(style_); });
   optimizer_.forget();
   if (handles_.empty() && (first || other_way_up)) stand_otherwise();
+}
+
+/// The style at the samples that the energy sees.
+LiveStyle LiveSolver::State::style_at_samples(const StyleAsked& asked) const {
+  LiveStyle here;
+  here.normals = rows_of(surface_normals_, chosen_);
+  here.style = StyleAtSamples::of(asked.style, here.normals, asked.sharpness);
+  if (asked.weights.size() > 0)
+    for (std::size_t i = 0; i < chosen_.size(); ++i)
+      here.style.weights[static_cast<Index>(i)] *= asked.weights[chosen_[i]];
+  here.weight = asked.strength * options_.gauss_weight * here.style.factor;
+  return here;
 }
 
 void LiveSolver::State::clear_style() {

@@ -4,6 +4,7 @@
 #include "core/parallel.h"
 #include "core/tensors.h"
 #include "fields/neural_field.h"
+#include "fields/radial_evaluator.h"
 #include "sampling/canonical_order.h"
 #include "solve/field_objective.h"
 
@@ -37,7 +38,7 @@ LossProbe::LossProbe(const SurfaceSamples& samples, const std::vector<Handle>& h
   terms.batch = 20;
   terms.external = external;
   terms.stiffness = SurfaceStiffness(bending);
-  if (preferred.rows() > 0) terms.preference = gauss_preference(preferred, 5.0);
+  if (preferred.rows() > 0) terms.style.preference = gauss_preference(preferred, 5.0);
   terms.gauss = gauss;
   terms.keep_stance = keep_stance;
   terms.stance = Stance::of(samples.points, Vec3(0.1, 0.2, 1.0));
@@ -98,6 +99,10 @@ Vector probe_thickness(const SurfaceSamples& samples) {
 
 Vector probe_bending(const SurfaceSamples& samples, const SurfaceOptions& options) {
   return SurfaceStiffness(samples, options).bending(samples.points);
+}
+
+RowMatrix<double> probe_radial_rows(const RadialField& field, PointsIn points, JetOrder order) {
+  return radial_rows(field.basis(), points, order);
 }
 
 }  // namespace arapfields

@@ -7,6 +7,7 @@
 #include "core/random.h"
 #include "energies/external_energy.h"
 #include "energies/handles.h"
+#include "fields/radial_field.h"
 #include "mesh/surface_samples.h"
 #include "options/surface.h"
 
@@ -52,5 +53,9 @@ class ARAPFIELDS_EXPORT_TO_TESTS EnergyTrial {
 /// Local thickness at the samples, in mesh units; λ there, in the samples' cube.
 ARAPFIELDS_EXPORT_TO_TESTS Vector probe_thickness(const SurfaceSamples& samples);
 ARAPFIELDS_EXPORT_TO_TESTS Vector probe_bending(const SurfaceSamples& samples, const SurfaceOptions& options);
+
+/// Jets of a field's own basis functions at points (n,3) of the cube: (columns·n, size), column by column.
+ARAPFIELDS_EXPORT_TO_TESTS RowMatrix<double> probe_radial_rows(const RadialField& field, PointsIn points,
+                                                               JetOrder order);
 
 }  // namespace arapfields

@@ -21,6 +21,10 @@ constexpr int steps_at_once = 10;
 constexpr int worth_a_first = 600, most_first = 500, first_steps = 12;
 /// What makes the first result of a style.
 constexpr int style_first_centers = 400, style_first_samples = 4000, style_first_steps = 30;
+/// A style that folds between the samples that were looked at goes on so many times, with so many more times
+/// the barrier's weight, in so many steps at most.
+constexpr int unfolding_rounds = 5, unfolding_steps = 15;
+constexpr double unfolding = 10.0;
 /// Share of the handles' weight with which exact handles still pull at the radial field inside the blend,
 /// which nothing else holds in their boxes.
 constexpr double share_of_exact = 0.01;
@@ -159,7 +163,7 @@ std::shared_ptr<const DeformationField> radial_start(const SurfaceSamples& sampl
   return deform_radial(samples, handles, options, progress).field;
 }
 
-Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const StylizeOptions& options,
+Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const StylizeOptions& options,
                         const Progress& progress, const Vector& weights, const std::vector<Handle>& handles,
                         const Vec3& up, const SolveHooks& hooks) {
   // The live solver's energy has weight 1: all other weights are divided by this one's.
@@ -181,19 +185,25 @@ Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const
   few.fine_centers = style_first_centers;
   few.coarse_centers = few.fine_centers / 5;
   LiveSolver quick(samples, handles, few, progress.part(0.0, 0.1), shape);
-  quick.set_style(preferred, options.strength, options.sharpness, weights, up);
+  quick.set_style(style, options.strength, options.sharpness, weights, up);
   const std::shared_ptr<const RadialField> first =
       quick.solve(std::min(style_first_steps, options.training.iterations), 0.0, progress.part(0.1, 0.15));
   progress.look([&](PointsIn points) { return first->at(points); });
   LiveSolver solver(samples, handles, live, progress.part(0.15, 0.3), shape);
-  solver.set_style(preferred, options.strength, options.sharpness, weights, up);
+  solver.set_style(style, options.strength, options.sharpness, weights, up);
   const Shown shown = [&] { return solver.field(); };
   const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95), hooks, options.rigidity,
                               shown, quick.report().value);
+  solver.set_hooks({hooks.energies, 1.0 / options.rigidity, {}});
+  const bool ended = loop.stopped_by == StopReason::observer || loop.stopped_by == StopReason::time_budget;
+  for (int round = 0; round < unfolding_rounds && options.surface.barrier > 0.0 && !ended; ++round) {
+    if (solver.watch_folds(unfolding * live.surface.barrier) == 0) break;
+    solver.solve(std::min(unfolding_steps, options.training.iterations), 0.0, progress.part(0.95, 0.98));
+  }
   ObjectiveTerms terms;
   terms.rigidity = options.rigidity;
   terms.stiffness = SurfaceStiffness(shape->thickness, options.surface);
-  terms.preference = gauss_preference(preferred, options.sharpness);
+  terms.style = StyleAtSamples::of(style, samples.normals, options.sharpness);
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
   terms.weights = energy_weights(samples, terms.handles);
   return finish(shown, samples, terms, loop, progress);

@@ -4,6 +4,7 @@
 
 #include <functional>
 
+#include "energies/style.h"
 #include "fields/handle_blend.h"
 #include "options/deform.h"
 #include "options/stylize.h"
@@ -34,7 +35,7 @@ std::shared_ptr<const DeformationField> radial_start(const SurfaceSamples& sampl
                                                      DeformOptions options, const Progress& progress);
 
 /// As stylize (solve/stylize.h) for options.field "radial".
-Solution stylize_radial(const SurfaceSamples& samples, PointsIn preferred, const StylizeOptions& options,
+Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const StylizeOptions& options,
                         const Progress& progress, const Vector& weights, const std::vector<Handle>& handles,
                         const Vec3& up, const SolveHooks& hooks = {});
 

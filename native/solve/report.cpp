@@ -37,7 +37,9 @@ void measure_handles(const DeformationField& field, const BoundHandles& handles,
 SolveReport measure(const DeformationField& field, const SurfaceSamples& samples, const ObjectiveTerms& terms,
                     Index max_samples) {
   const Index count = std::min(samples.size(), max_samples);
-  Points points(count, 3), normals(terms.preference ? count : 0, 3);
+  const bool styled = terms.style.any();
+  Points points(count, 3), normals(styled ? count : 0, 3);
+  Points targets(terms.style.targets.rows() > 0 ? count : 0, 3);
   Vector weights(terms.weights.size() > 0 ? count : 0);
   Vector bend_weights = Vector::Ones(count);
   for (Index i = 0; i < count; ++i) {
@@ -45,7 +47,8 @@ SolveReport measure(const DeformationField& field, const SurfaceSamples& samples
     points.row(i) = samples.points.row(pick);
     if (weights.size() > 0) weights[i] = terms.weights[pick];
     if (samples.bend_weights.size() > 0) bend_weights[i] = samples.bend_weights[pick];
-    if (terms.preference) normals.row(i) = samples.normals.row(pick);
+    if (styled) normals.row(i) = samples.normals.row(pick);
+    if (targets.rows() > 0) targets.row(i) = terms.style.targets.row(pick);
   }
   SolveReport report;
   double preference = 0.0;
@@ -69,12 +72,15 @@ SolveReport measure(const DeformationField& field, const SurfaceSamples& samples
     if (!first) merge(part, report.distortion);
     report.distortion = part;
     first = false;
-    if (terms.preference) {
+    if (styled) {
       const Points rest = normals.middleRows(begin, rows);
-      preference += share * (1.0 - gauss_energy<double>(jets, rest, Vector(), *terms.preference, 0.0, {}));
+      const Points wanted = targets.middleRows(targets.rows() > 0 ? begin : 0, targets.rows() > 0 ? rows : 0);
+      const auto& by = terms.style.preference;
+      preference +=
+          share * preference_of(by, style_energy<double>(jets, rest, by, wanted, Vector(), 0.0, {}));
     }
   }
-  if (terms.preference) report.preference = preference;
+  if (styled) report.preference = preference;
   measure_handles(field, terms.handles, samples.frame.scale, report);
   return report;
 }

@@ -20,7 +20,7 @@ struct SolveReport {
   ArapValue arap;                               ///< arap.energy with the samples' own stiffness
   std::vector<double> handle_mean, handle_max;  ///< distances ‖f(x) − C x‖ of each handle
   std::optional<double> far_target;  ///< sizes of the shape to the farthest target, where that is far
-  std::optional<double> preference;  ///< mean g of the deformed normals
+  std::optional<double> preference;  ///< mean g of the deformed normals, or mean ñ·t of an object's style
   Distortion distortion;
   LoopResult loop;
   std::vector<std::string> notes;  ///< sentences: folds, far targets, margins that were reduced

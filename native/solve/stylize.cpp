@@ -42,14 +42,14 @@ void hold(NeuralField& field, const Handle& handle) {
 
 }  // namespace
 
-Solution stylize(const SurfaceSamples& samples, PointsIn preferred, const StylizeOptions& options,
+Solution stylize(const SurfaceSamples& samples, const Style& style, const StylizeOptions& options,
                  const Progress& progress, const Vector& weights, const std::vector<Handle>& handles,
                  const Vec3& up, const SolveHooks& hooks) {
   options.validate();
   check_samples(samples, weights);
   require_no_reach(handles);
   if (chosen_field(options) == FieldKind::radial)
-    return stylize_radial(samples, preferred, options, progress, weights, handles, up, hooks);
+    return stylize_radial(samples, style, options, progress, weights, handles, up, hooks);
   const ThreadScope threads(options.machine.threads);
   ObjectiveTerms terms;
   terms.batch = options.training.batch;
@@ -57,10 +57,10 @@ Solution stylize(const SurfaceSamples& samples, PointsIn preferred, const Styliz
   terms.stiffness = SurfaceStiffness(samples, options.surface);
   terms.barrier = options.surface.barrier;
   terms.barrier_threshold = options.surface.barrier_threshold;
-  terms.preference = gauss_preference(preferred, options.sharpness);
-  terms.gauss = options.strength * options.gauss_weight * terms.preference->balance;
-  terms.preference_weights = terms.preference->reach(samples.normals);
-  if (weights.size() > 0) terms.preference_weights = terms.preference_weights.cwiseProduct(weights);
+  terms.style = StyleAtSamples::of(style, samples.normals, options.sharpness);
+  if (!terms.style.idle(samples.normals))
+    terms.gauss = options.strength * options.gauss_weight * terms.style.factor;
+  if (weights.size() > 0) terms.style.weights = terms.style.weights.cwiseProduct(weights);
   terms.external = hooks.energies;
   const Handle lowest = hold_lowest(samples, up);
   terms.handles = handles.empty() ? BoundHandles({lowest}, samples.points)

@@ -3,6 +3,7 @@
 
 #include "core/task.h"
 #include "energies/handles.h"
+#include "energies/style.h"
 #include "mesh/surface_samples.h"
 #include "options/stylize.h"
 #include "solve/hooks.h"
@@ -10,17 +11,18 @@
 
 namespace arapfields {
 
-/// Deforms a surface so that its normals turn to the preferred ones (k,3), as rigidly as possible:
-///   strength·gauss_weight·mean u(1 − g(ñ)) + rigidity·(stretch + bending·bend) + keep_stance·stance +
+/// Deforms a surface so that its normals turn to preferred ones, or to an object's, as rigidly as possible:
+///   strength·gauss_weight·style + rigidity·(stretch + bending·bend) + keep_stance·stance +
 ///   handles,
-/// ñ the unit normals of the deformed surface. (The paper's text has the sign of the first term reversed and
-/// leaves the normals without unit length, which a collapsing surface would win.) Without handles the lowest
-/// sample, against the direction `up`, is held in place; with handles, there is no stance. `weights` (one u ≥
-/// 0 a sample, or empty) blend the effect. Strength 0 is the identity. External energies may feel where
-/// the surface is: beside them the lowest sample is held by its spring alone. An observer is told of deform's
+/// ñ the unit normals of the deformed surface, and style the mean of u(1 − g(ñ)), or of 3 u‖ñ − T(n)‖².
+/// (The paper's text has the sign of the first term reversed and leaves the normals without unit length,
+/// which a collapsing surface would win.) Without handles the lowest sample, against the direction `up`, is
+/// held in place; with handles, there is no stance. `weights` (one u ≥ 0 a sample, or empty) blend the
+/// effect. Strength 0 is the identity, and so is a sphere's style. External energies may feel where the
+/// surface is: beside them the lowest sample is held by its spring alone. An observer is told of deform's
 /// terms, of style and of stance. Throws InvalidInput for bad options,
 /// samples without normals, weights or handles that do not fit; SolveDiverged; Cancelled.
-ARAPFIELDS_EXPORT Solution stylize(const SurfaceSamples& samples, PointsIn preferred,
+ARAPFIELDS_EXPORT Solution stylize(const SurfaceSamples& samples, const Style& style,
                                    const StylizeOptions& options, const Progress& progress = {},
                                    const Vector& weights = {}, const std::vector<Handle>& handles = {},
                                    const Vec3& up = Vec3::UnitZ(), const SolveHooks& hooks = {});

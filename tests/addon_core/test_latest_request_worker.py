@@ -14,7 +14,7 @@ def test_requests_between_are_skipped():
     def solve(request):
         seen.append(request)
         gate.wait(LIMIT)
-        return request
+        yield request
 
     worker = LatestRequestWorker(solve)
     worker.request(0)
@@ -39,7 +39,7 @@ def test_a_request_at_rest_is_refined_and_a_new_one_cancels_that():
             yield f"{request}{step}"
         last.append(request)
 
-    worker = LatestRequestWorker(lambda request: request, refine=refine, rest=0.01)
+    worker = LatestRequestWorker(lambda request: [request], refine=refine, rest=0.01)
     worker.request("a")
     assert begun.wait(LIMIT)
     worker.request("b")
@@ -61,7 +61,7 @@ def test_a_token_cancels_the_tasks_of_a_refinement():
         cancelled.wait(LIMIT)
         yield request
 
-    worker = LatestRequestWorker(lambda request: request, refine=refine, rest=0.01)
+    worker = LatestRequestWorker(lambda request: [request], refine=refine, rest=0.01)
     worker.request(1)
     assert ready.wait(LIMIT)
     worker.stop()
@@ -79,4 +79,27 @@ def test_preparing_comes_first_and_errors_are_handed_over():
     worker.request(1)
     assert worker.wait(LIMIT) and order == ["prepare", "solve"]
     assert worker.poll() == (None, "no such pose")
+    worker.stop()
+
+
+def test_a_newer_request_ends_the_better_results_of_the_one_before():
+    seen, first = [], threading.Event()
+
+    def solve(request):
+        for step in range(3):
+            seen.append((request, step))
+            yield request, step
+            assert first.wait(LIMIT)
+
+    worker = LatestRequestWorker(solve)
+    worker.request("a")
+    found = (None, "")
+    while found[0] is None:
+        found = worker.poll()
+    assert found == (("a", 0), "")
+    worker.request("b")
+    first.set()
+    assert worker.wait(LIMIT) and worker.poll() == (("b", 2), "")
+    assert seen[0] == ("a", 0) and len([1 for request, _ in seen if request == "a"]) <= 2
+    assert seen[-3:] == [("b", 0), ("b", 1), ("b", 2)]
     worker.stop()

@@ -24,7 +24,7 @@ FOLDERS = [
     "io",
 ]
 LINE_LIMITS = {".cpp": 350, ".h": 120, ".py": 250}
-SOURCE_FOLDERS = ["native", "addon", "blender_scripts", "tests"]
+SOURCE_FOLDERS = ["native", "addon", "blender_scripts", "wheel_scripts", "tests"]
 
 
 def sources(*suffixes):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """make bench: every benchmark module's run(), as one table on the screen and in build/bench.json.
 
-python -m tests.benchmarks [module ...]
+python -m tests.benchmarks [module ...]; `peers` needs PEERS, a folder with their code.
 
 Without the published networks (ARAPFIELDS_DATA) it runs on shapes of our own. A section that cannot run is
 left out and says why; what it found at an earlier run stays in the file.
@@ -24,7 +24,7 @@ from . import shapes
 
 FOLDER = Path(__file__).parent
 TARGET = shapes.ROOT / "build" / "bench.json"
-HELPERS = {"__main__", "timing", "render", "live_cases", "live_picture", "shapes"}
+HELPERS = {"__main__", "timing", "render", "live_cases", "live_picture", "shapes", "peer"}
 
 
 def machine():
@@ -63,6 +63,8 @@ def run(name):
     except ModuleNotFoundError as error:
         if (error.name or "").split(".")[0] in ("tests", "arapfields"):
             raise
+        if error.name is None:
+            return None, str(error), False
         return None, f"needs the package {error.name}, which is not installed", False
     except Exception as error:
         traceback.print_exc()

@@ -21,28 +21,7 @@ from .live_cases import (
     targets,
     volume,
 )
-
-
-def mesh_energy(vertices, triangles, moved):
-    """Sum over vertices of the cotangent-weighted squared misfit of their edges to the best rotation."""
-    corners = [triangles, np.roll(triangles, -1, 1), np.roll(triangles, -2, 1)]
-    total_i, total_j, weights = [], [], []
-    for k in range(3):
-        a, b, c = (corners[m][:, k] for m in range(3))
-        u, v = vertices[a] - vertices[c], vertices[b] - vertices[c]
-        cot = (u * v).sum(1) / np.maximum(np.linalg.norm(np.cross(u, v), axis=1), 1e-12) / 2
-        cot = np.maximum(cot, 0)  # marching cubes leave slivers
-        total_i += [a, b]
-        total_j += [b, a]
-        weights += [cot, cot]
-    i, j, w = np.concatenate(total_i), np.concatenate(total_j), np.concatenate(weights)
-    before, after = vertices[j] - vertices[i], moved[j] - moved[i]
-    spread = np.zeros((len(vertices), 3, 3))
-    np.add.at(spread, i, w[:, None, None] * after[:, :, None] * before[:, None, :])
-    left, _, right = np.linalg.svd(spread)
-    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
-    rotation = left @ right
-    return float((w * ((after - np.einsum("nij,nj->ni", rotation[i], before)) ** 2).sum(1)).sum())
+from .peer.yardstick import rotations
 
 
 def igl_arap(vertices, triangles, boxes, poses, tolerance=1e-4, most=2000):
@@ -88,7 +67,7 @@ def compare_rows(name, resolution=96):
             "setup_cpu_s": round(our_setup.cpu, 3),
             "steps": live.report.iterations,
             "cpu_s": round(our_clock.cpu, 3),
-            "mesh_energy": round(mesh_energy(vertices, triangles, ours), 3),
+            "mesh_energy": round(rotations(vertices, triangles, ours)[1], 3),
             "volume_ratio": round(volume(ours, triangles) / whole, 3),
         },
         {
@@ -97,7 +76,7 @@ def compare_rows(name, resolution=96):
             "setup_cpu_s": round(setup.cpu, 3),
             "steps": iterations,
             "cpu_s": round(clock.cpu, 3),
-            "mesh_energy": round(mesh_energy(vertices, triangles, theirs), 3),
+            "mesh_energy": round(rotations(vertices, triangles, theirs)[1], 3),
             "volume_ratio": round(volume(theirs, triangles) / whole, 3),
         },
     ]

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tables and the plot of docs/performance.md, from build/bench.json: python -m tests.benchmarks.render"""
+"""The tables and the plot of docs/performance.md, from build/bench.json: python -m tests.benchmarks.render
+
+Where that has the peers, docs/peers.json and the tables of docs/peers.md too.
+"""
 
 import ast
 import html
@@ -12,9 +15,11 @@ ROOT = Path(__file__).resolve().parents[2]
 RESULTS = ROOT / "build" / "bench.json"
 PAGE = ROOT / "docs" / "performance.md"
 PLOT = ROOT / "docs" / "images" / "performance.svg"
+PEERS = ROOT / "docs" / "peers.md"
 BEGIN, END = "<!-- bench: begin -->", "<!-- bench: end -->"
 SECTIONS = {  # titles; a module's first sentence stands below
     "defaults": "From the press to the result",
+    "exact": "Exact handles",
     "deform": "Deformation",
     "jets": "The network's sweeps",
     "stylize": "Stylization",
@@ -64,6 +69,14 @@ HEADINGS = {
     "handle_added_cpu_s": "handle added, processor s",
     "step_cpu_ms": "step, processor ms",
     "uniformity": "non-uniformity (1 is ideal)",
+}
+HEADINGS |= {
+    "by": "",
+    "handle_error_percent": "handle error, % of the size",
+    "folded_percent": "folded, %",
+    "mean_angle": "mean angle to the style, degrees",
+    "within_10_percent": "area within 10°, %",
+    "others_percent": "other fingertips, % of the length",
 }
 HIDDEN = {"ratio", "unit"}  # said by another column
 
@@ -179,12 +192,41 @@ def page(results, machine):
     return "\n".join(blocks)
 
 
+def peers_row(row):
+    """A row as it is shown: the settings beside the method."""
+    said = {"by": f"{row['by']} ({row['said']})"} if row.get("said") else {}
+    return {key: value for key, value in (row | said).items() if key not in ("what", "vertices", "said")}
+
+
+def peers_page(text, kept):
+    """The page with the tables of docs/peers.json between its markers."""
+    named = ", ".join(f"{key} {value}" for key, value in kept["machine"].items())
+    codes = [f"`{row['code']}` at commit `{row['commit']}`" for row in kept["rows"] if "code" in row]
+    blocks = [f"Measured on: {named}. {', '.join(codes)}.", ""]
+    rows, kinds = [row for row in kept["rows"] if "code" not in row], {}
+    for row in rows:
+        kinds.setdefault(row.get("what", "Meshes that not all take"), []).append(row)
+    for kind, alike in kinds.items():
+        size = f", {alike[0]['vertices']:,} vertices" if "vertices" in alike[0] else ""
+        blocks += [f"### {kind[0].upper()}{kind[1:]}{size}", "", table([peers_row(row) for row in alike]), ""]
+    before, rest = text.split(BEGIN)
+    joined = "\n".join(blocks)
+    return f"{before}{BEGIN}\n{joined}{END}{rest.split(END)[1]}"
+
+
 def main():
     if not RESULTS.exists():
         sys.exit(f"{RESULTS} is not there: run make bench first")
     results = json.loads(RESULTS.read_text())
     machine = results.pop("machine")
+    peers = results.pop("peers", None)
+    if peers:
+        kept = {"machine": machine, "rows": peers}
+        PEERS.with_suffix(".json").write_text(json.dumps(kept, indent=1) + "\n")
+        PEERS.write_text(peers_page(PEERS.read_text(), kept))
     results = {module: rows for module, rows in results.items() if rows}
+    if not results:
+        return
     before, rest = PAGE.read_text().split(BEGIN)
     after = rest.split(END)[1]
     PAGE.write_text(f"{before}{BEGIN}\n{page(results, machine)}{END}{after}")

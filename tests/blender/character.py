@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A character of several objects: body with Mirror and Subdivision, eyes, shirt, hair, hat, armature."""
 
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import bmesh
@@ -11,6 +13,9 @@ from characters import Capsules
 from mathutils import Matrix, Vector
 
 import arapfields as af
+
+sys.path.append(str(Path(__file__).resolve().parents[2] / "blender_scripts"))
+from dressing import link, rig, seen_mesh, strands, weigh
 
 HEIGHT = 1.8
 EYE, EYES = 0.032, [(side * 0.055, -0.118, 1.68) for side in (-1, 1)]
@@ -37,12 +42,6 @@ for s, side in ((1, "L"), (-1, "R")):
     BONES[f"Leg.{side}"] = ("Hips", (s * 0.1, 0, 0.72), (s * 0.11, 0, 0.05))
 
 
-def link(name, data):
-    item = bpy.data.objects.new(name, data)
-    bpy.context.collection.objects.link(item)
-    return item
-
-
 def half_body():
     """The mesh of the half with x ≥ 0, open along the middle."""
     shape = Capsules(PARTS, af.Frame([0, 0, 0.9], 1.0))
@@ -63,50 +62,6 @@ def half_body():
     return mesh
 
 
-def rig():
-    item = link("Rig", bpy.data.armatures.new("Rig"))
-    bpy.context.view_layer.objects.active = item
-    bpy.ops.object.mode_set(mode="EDIT")
-    for name, (parent, head, tail) in BONES.items():
-        bone = item.data.edit_bones.new(name)
-        bone.head, bone.tail = head, tail
-        if parent:
-            bone.parent = item.data.edit_bones[parent]
-    bpy.ops.object.mode_set(mode="OBJECT")
-    for bone in item.pose.bones:
-        bone.rotation_mode = "XYZ"
-    return item
-
-
-def weigh(item):
-    """Vertex groups of the bones, which blend where two are about as near."""
-    points = np.array([vertex.co for vertex in item.data.vertices])
-    away = []
-    for _, head, tail in BONES.values():
-        head, way = np.array(head), np.array(tail) - head
-        share = np.clip((points - head) @ way / (way @ way), 0, 1)
-        away.append(np.linalg.norm(points - head - share[:, None] * way, axis=1))
-    weights = np.exp(-((np.array(away) - np.min(away, axis=0)) / 0.04))
-    weights /= weights.sum(axis=0)
-    for name, row in zip(BONES, weights, strict=True):
-        group = item.vertex_groups.new(name=name)
-        for index in np.flatnonzero(row > 0.02).tolist():
-            group.add([index], float(row[index]), "REPLACE")
-
-
-def seen_mesh(item):
-    """(vertices (n, 3) in the world, their normals, triangles) of an object as it is shown."""
-    bpy.context.view_layer.update()
-    seen = item.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    mesh, world = seen.to_mesh(), np.array(seen.matrix_world)
-    mesh.calc_loop_triangles()
-    points = np.array([vertex.co for vertex in mesh.vertices]) @ world[:3, :3].T + world[:3, 3]
-    normals = np.array([vertex.normal for vertex in mesh.vertices]) @ world[:3, :3].T
-    triangles = np.array([triangle.vertices for triangle in mesh.loop_triangles])
-    seen.to_mesh_clear()
-    return points, normals, triangles
-
-
 def shirt(body):
     points, normals, triangles = seen_mesh(body)
     inside = (points[:, 2] > 0.9) & (points[:, 2] < 1.37) & (np.abs(points[:, 0]) < 0.4)
@@ -115,21 +70,6 @@ def shirt(body):
     mesh = bpy.data.meshes.new("Shirt")
     mesh.from_pydata((points + LOOSE * normals)[used].tolist(), [], corners.reshape(kept.shape).tolist())
     return link("Shirt", mesh)
-
-
-def hair(body):
-    """Strands that grow from the upper head."""
-    points, normals, triangles = seen_mesh(body)
-    middles, out = points[triangles].mean(axis=1), normals[triangles].mean(axis=1)
-    rows = np.flatnonzero((middles[:, 2] > 1.66) & (middles[:, 1] > -0.05))[::7]
-    curves = bpy.data.hair_curves.new("Hair")
-    curves.add_curves([6] * len(rows))
-    lengths = np.linspace(0, 0.12, 6)[:, None]
-    strands = [middles[row] + lengths * out[row] - [0, 0, 1] * lengths**2 * 3 for row in rows]
-    curves.attributes["position"].data.foreach_set(
-        "vector", np.concatenate(strands).astype(np.float32).ravel()
-    )
-    return link("Hair", curves)
 
 
 def hat():
@@ -149,8 +89,8 @@ def hat():
 def build():
     """The character at rest, in T-pose, its bones handles of the body, all else carried."""
     body = link("Body", half_body())
-    made = SimpleNamespace(body=body, rig=rig())
-    weigh(body)
+    made = SimpleNamespace(body=body, rig=rig(BONES))
+    weigh(body, BONES)
     mirror = body.modifiers.new("Mirror", "MIRROR")
     mirror.use_clip = True
     body.modifiers.new("Armature", "ARMATURE").object = made.rig
@@ -161,7 +101,8 @@ def build():
         bpy.ops.mesh.primitive_uv_sphere_add(segments=16, ring_count=12, radius=EYE, location=place)
         bpy.context.object.name = f"Eye.{side}"
         made.eyes.append(bpy.context.object)
-    made.shirt, made.hair = shirt(body), hair(body)
+    made.shirt = shirt(body)
+    made.hair = strands(body, lambda middles: (middles[:, 2] > 1.66) & (middles[:, 1] > -0.05))
     made.hat, made.cage = hat()
     scenes.activate(made.rig, body)
     bpy.ops.arapfields.add_bones()

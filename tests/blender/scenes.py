@@ -56,6 +56,23 @@ def bar_with_handles(name="Bar"):
     return item, fixed, moving
 
 
+def camera(size=48):
+    """A small picture by Cycles, which needs no graphics card, from the front."""
+    scene = bpy.context.scene
+    lens = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    lens.data.type, lens.data.ortho_scale = "ORTHO", 3.2
+    lens.location, lens.rotation_euler = (0, -5, 0), (1.5707963, 0, 0)
+    scene.collection.objects.link(lens)
+    scene.camera, scene.render.engine = lens, "CYCLES"
+    scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.device = 1, False, "CPU"
+    scene.render.resolution_x = scene.render.resolution_y = size
+    scene.world = bpy.data.worlds.new("World")
+    scene.world.use_nodes = True
+    scene.world.node_tree.nodes["Background"].inputs[0].default_value = (0, 0, 0, 1)
+    scene.render.image_settings.file_format, scene.render.film_transparent = "PNG", True
+    return scene
+
+
 def world_points(item):
     """(n, 3) vertices of an object as shown, in world space."""
     depsgraph = bpy.context.evaluated_depsgraph_get()

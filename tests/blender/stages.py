@@ -14,6 +14,7 @@ from addon.live import sessions
 
 LIFT = 0.4  # of the moving handle, in the height of the world
 WAIT = 30  # seconds for a live shape
+ENDS_WORK = {"undone", "redone", "reloaded"}  # whatever works on the file, as before_undo and before_load say
 
 
 @contextlib.contextmanager
@@ -167,9 +168,14 @@ def redone(_):
     bpy.ops.ed.redo()
 
 
-def reloaded(_):
+def saved(_):
     path = tempfile.mktemp(suffix=".blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
+    return path
+
+
+def reloaded(item):
+    path = saved(item)
     bpy.ops.wm.open_mainfile(filepath=path)
 
 
@@ -177,6 +183,64 @@ ACTIONS = {
     function.__name__: function
     for function in (
         *(deleted, duplicated, renamed, hidden, linked),
-        *(overridden, undone, redone, reloaded),
+        *(overridden, undone, redone, saved, reloaded),
     )
 }
+
+
+def source():
+    """The object with the handles that is in the scene and not a copy, or None."""
+    names = ("Other Name", "Bar")
+    return next((bpy.context.scene.objects[name] for name in names if is_source(name)), None)
+
+
+def is_source(name):
+    item = bpy.context.scene.objects.get(name)
+    if item is None or item.type != "MESH" or item.override_library is not None or item.library:
+        return False
+    return bool(item.arapfields.handles)  # no result that was given the name
+
+
+def after(action, stage, which, said):
+    """What must have come of it."""
+    item, gone = source(), which == "source" and action in ("deleted", "overridden")
+    if stage == "idle":
+        return
+    if stage == "live":
+        if gone:
+            assert not sessions.live and "live mode ended" in said
+        elif action != "reloaded":
+            assert sessions.is_live(item), said
+        else:
+            assert not sessions.live and not item.arapfields.live_kind
+        if item is not None and sessions.is_live(item) and action not in ("deleted", "overridden"):
+            assert scenes.world_points(item)[:, 2].max() > 0.4, said  # it still follows the handle
+        return
+    if action in ENDS_WORK:
+        assert said == "ended" and "Bar_baked" not in bpy.data.objects
+    elif gone:
+        assert "was deleted while it was worked on" in said and "Bar_baked" not in bpy.data.objects
+    elif stage == "job":
+        assert item.modifiers and scenes.world_points(item)[:, 2].max() > 0.4, said
+    else:
+        assert any(one.name.endswith("_baked") for one in bpy.data.objects), said
+
+
+def again():
+    """Live mode goes off, and what is left of the source can be deformed, or says why not."""
+    for uid in list(sessions.live):
+        sessions.end(bpy.context, sessions.live[uid].source.get())
+    item = source()
+    if item is None:
+        return
+    item.hide_set(False)
+    scenes.activate(item)
+    assert bpy.ops.arapfields.deform(**scenes.QUICK) == {"FINISHED"}
+
+
+def stray():
+    """Names of what nobody sees: live objects, scenes and helper meshes of ours."""
+    found = [item.name for item in bpy.data.objects if item.name.endswith("_live")]
+    found += [scene.name for scene in bpy.data.scenes if scene.name.startswith("ARAP")]
+    used = {group.name for group in bpy.data.node_groups if group.users == 0 and "ARAP" in group.name}
+    return [*found, *used, *(str(uid) for uid in sessions.live)]

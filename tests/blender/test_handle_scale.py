@@ -72,3 +72,30 @@ def test_a_flat_or_mirrored_scale_is_refused_by_name_and_by_axis_it_may_differ()
     assert abs(np.ptp(after[:, 2]) - 1.0) < 0.1 and abs(np.ptp(after[:, 1]) - 0.5) < 0.1
     bpy.ops.arapfields.mirror_handle(axis="X")
     assert all(entry.allow_scale for entry in bar.arapfields.handles[1:])
+
+
+@in_blender
+def test_a_scale_that_counts_for_nothing_is_said():
+    import bpy
+    from test_handle_reach import RUN
+    from test_handle_scale import enlarged
+    from test_panels import drawn
+
+    from addon.core.runtime import jobs
+
+    said = "Moving is scaled, which counts only with Allow Scale"
+
+    def told():
+        return said in " ".join(drawn()["ARAPFIELDS_PT_handles"])
+
+    bar, moving = enlarged(False)
+    assert told()
+    assert bpy.ops.arapfields.deform(**RUN) == {"FINISHED"}
+    assert any(level == "WARNING" and said in text for level, text in jobs.messages())
+    bar.arapfields.handles[1].allow_scale = True
+    assert not told()
+    bar.arapfields.handles[1].allow_scale = False
+    moving.scale = [s / 1.5 for s in moving.scale]
+    moving.rotation_euler = (0.3, 0.2, 0.1)
+    bpy.context.view_layer.update()
+    assert not told()

@@ -64,7 +64,7 @@ def test_what_a_button_would_refuse_is_said_before(case):
         bpy.context.view_layer.update()
         bpy.ops.arapfields.add_handle()
     elif case == "no style object":
-        ours.stylize.style = "FACES"
+        ours.stylize.style = "OBJECT"
     elif case == "no axes":
         ours.stylize.frame = "EMPTY"
     elif case == "no region":

@@ -147,7 +147,7 @@ def prepared(state):
         if state == "fit cleared":
             bpy.ops.arapfields.clear_cache()
     elif state == "custom style":
-        ours.stylize.style = "FACES"
+        ours.stylize.style = "OBJECT"
     elif state == "live":
         bpy.ops.arapfields.live()
     elif state == "running":

@@ -50,3 +50,42 @@ def test_each_style_has_its_picture():
     assert all(
         path.read_bytes()[:4] == b"\x89PNG" and path.stat().st_size < 8000 for path in folder.glob("*.png")
     )
+
+
+@pytest.mark.parametrize("section", ["deform", "stylize"])
+@in_blender
+def test_the_papers_own_settings_are_a_preset_and_the_defaults_come_back(section):
+    import bpy
+    import scenes
+
+    import arapfields as af
+
+    bar = scenes.bar()
+    group = getattr(bar.arapfields, section)
+    options = {"deform": af.DeformOptions, "stylize": af.StylizeOptions}[section]
+    wanted = options.preset("paper")
+    group.width = 100
+    operator = getattr(bpy.ops.arapfields, f"{section}_given_preset")
+    before = bar.arapfields.target
+    assert operator(preset="PAPER") == {"FINISHED"}
+    shown = [name for name in group.__annotations__ if hasattr(wanted, name)]
+    assert {"field", "optimizer", "learning_rate", "iterations", "bending_unit"} <= {*shown}
+    for name in shown:
+        value = getattr(group, name)
+        assert value == (pytest.approx(getattr(wanted, name)) if isinstance(value, float) else value), name
+        assert isinstance(value, float) or value == getattr(wanted, name), name
+    assert operator(preset="DEFAULT") == {"FINISHED"} and bar.arapfields.target == before
+    assert group.width == options().width and group.optimizer == options().optimizer
+
+
+@in_blender
+def test_a_result_as_in_the_paper():
+    import bpy
+    import scenes
+
+    bar, _, moving = scenes.bar_with_handles()
+    moving.location.z += 0.3
+    bpy.ops.arapfields.deform_given_preset(preset="PAPER")
+    bar.arapfields.deform.iterations = 30
+    assert bpy.ops.arapfields.deform() == {"FINISHED"}
+    assert scenes.world_points(bar)[:, 2].max() > 0.4

@@ -122,7 +122,7 @@ def test_the_menu_lists_the_librarys_styles():
 
 
 @in_blender
-def test_an_objects_axes_and_a_meshs_faces_are_styles():
+def test_an_objects_axes_and_its_shape_are_styles():
     """A box turned by 30°: both kinds flatten the ball along the box's axes."""
     import math
 
@@ -134,7 +134,7 @@ def test_an_objects_axes_and_a_meshs_faces_are_styles():
     item = ball()
     bpy.ops.mesh.primitive_cube_add(location=(5, 0, 0), rotation=(0, 0, math.radians(30)))
     box = bpy.context.object
-    for kind in ("AXES", "FACES"):
+    for kind in ("AXES", "OBJECT"):
         scenes.activate(item)
         item.arapfields.stylize.style_object = box
         bpy.ops.arapfields.stylize(style=kind, **SETTINGS)
@@ -147,20 +147,27 @@ def test_an_objects_axes_and_a_meshs_faces_are_styles():
 @in_blender
 def test_custom_styles_that_give_no_normals_are_named():
     import bpy
+    import numpy as np
     import pytest
     import scenes
     from test_stylize import SETTINGS, ball
 
     item = ball()
-    for chosen, message in ((None, "choose the object"), (item, "different face normals")):
+    cloud = bpy.data.meshes.new("Cloud")
+    rng = np.random.default_rng(0)
+    cloud.from_pydata(rng.normal(size=(300, 3)).tolist(), [], np.arange(300).reshape(-1, 3).tolist())
+    for chosen, message in (
+        (None, "choose the object"),
+        (bpy.data.objects.new("Cloud", cloud), "encloses no volume, and has 100 different face normals"),
+        (bpy.data.objects.new("Empty Mesh", bpy.data.meshes.new("Empty Mesh")), "the mesh is empty"),
+        (scenes.cube_empty((0, 0, 0), (1, 1, 1), "Axes"), "Axes is no mesh"),
+    ):
+        if chosen is not None and chosen.name not in bpy.context.collection.objects:
+            bpy.context.collection.objects.link(chosen)
         scenes.activate(item)
         item.arapfields.stylize.style_object = chosen
         with pytest.raises(RuntimeError, match=message):
-            bpy.ops.arapfields.stylize(style="FACES", **SETTINGS)
-    item.arapfields.stylize.style_object = scenes.cube_empty((0, 0, 0), (1, 1, 1))
-    scenes.activate(item)
-    with pytest.raises(RuntimeError, match="has no faces"):
-        bpy.ops.arapfields.stylize(style="FACES", **SETTINGS)
+            bpy.ops.arapfields.stylize(style="OBJECT", **SETTINGS)
 
 
 @in_blender

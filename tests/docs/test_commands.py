@@ -103,6 +103,7 @@ EXAMPLE = pages.ROOT / "docs" / "examples" / "cpp"
 COMPILED = {  # pages, and the sources that their blocks are parts of, which tests compile and run
     "development.md": [pages.ROOT / "tests" / "native" / "test_foreign_field.cpp"],
     "cpp.md": sorted(EXAMPLE.glob("*.cpp")),
+    "README.md": [EXAMPLE / "bend.cpp"],
 }
 
 
@@ -116,7 +117,8 @@ def test_cpp_blocks_are_compiled():
 
 
 def test_cmake_blocks_are_the_examples():
-    source = (EXAMPLE / "CMakeLists.txt").read_text()
+    places = (EXAMPLE, EXAMPLE.with_name("cpp_from_source"))
+    source = "\n".join((place / "CMakeLists.txt").read_text() for place in places)
     assert all(block in source for page in pages.PAGES for block in blocks(page, "cmake"))
 
 

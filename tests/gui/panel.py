@@ -4,8 +4,7 @@
 import bpy
 import stage
 
-EVERYDAY = ("source", "handles", "deform", "stylize")
-WITHIN = ("surface", "deform-settings", "stylize-settings", "result")  # within Advanced
+PANEL, ADVANCED = "ARAPFIELDS_PT_", "ARAPFIELDS_PT_advanced"
 HEADER, STEP = (1120, 97), 28.4  # the sidebar's first header, and from one closed section to the next
 INNER = 26.0  # from one closed section within Advanced to the next
 STYLES = (1150, 127)  # the menu of styles below the header of its section, were that the first
@@ -33,15 +32,18 @@ def checks(found, folder):
     yield from open_alone({"source", "handles", "deform", "stylize"})
     bar.modifiers.clear()
     bar.arapfields.surface = "EXACT"
-    found["sections"] = len(EVERYDAY) + len(WITHIN)
+    found["sections"] = len(rows()) + len(rows(ADVANCED))
 
 
-def rows():
-    """The sections that are always there, top to bottom; the status where there is something to say."""
-    from addon.core.runtime import jobs
+def rows(parent=None):
+    """The sections that are drawn now, top to bottom: all, or those within another."""
+    from addon.registration import CLASSES
 
-    said = ("status",) if jobs.messages() or jobs.running() else ()
-    return (*EVERYDAY, *said, "advanced")
+    with stage.override():
+        found = [c for c in CLASSES if c.__name__.startswith(PANEL) and c.poll(bpy.context)]
+    found = [c for c in found if getattr(c, "bl_parent_id", None) == parent]
+    found.sort(key=lambda c: c.bl_order)
+    return [c.__name__[len(PANEL) :].replace("_", "-") for c in found]
 
 
 def sections(folder, name):
@@ -70,7 +72,7 @@ def picture(folder, name):
 
 def within(folder, name, row):
     """The sections in Advanced, which is open at that row, one by one."""
-    for number, section in enumerate(WITHIN):
+    for number, section in enumerate(rows(ADVANCED)):
         yield from press(row + 1, number)
         yield from picture(folder, f"{name}-{section}")
         yield from press(row + 1, number)

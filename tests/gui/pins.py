@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pin tool by mouse and keys: first pin, drags, Esc, anchors, deleting, undo, a view that turns."""
+"""The pin tool by mouse and keys: first pin, drags, Esc, anchors, deleting, a view that turns."""
 
 import subprocess
 import time
@@ -8,16 +8,14 @@ import bpy
 import numpy as np
 import scenes
 import stage
-from mouse import drag, hover, pixel, release, until
+from mouse import drag, hover, is_followed, pixel, release, until
 
 SECONDS = 5.0
-ROUNDS = 100
 END = (0.9, -0.25, 0.0)  # on the bar's front
 
 
 def checks(found, folder):
     yield from by_hand(found, folder)
-    yield from undo(found)
     yield from first_and_rate(found, folder)
 
 
@@ -98,74 +96,53 @@ def anchor_turn_delete(found, folder, bar):
     yield 0.8
     found["pins_r_turns_degrees"] = round(float(np.degrees(pin.rotation_euler.y - before.y) - turned), 1)
     stage.picture(folder, "pins-turned")
-    yield from navigation(found, bar)
+    yield from navigation(found, folder, bar)
     count = len(bpy.data.objects)
     yield from hover(pixel(bar.arapfields.handles[1].empty.location))
-    stage.tool("keydown", "ctrl", "click", 1)
-    yield 0.5
+    stage.tool("keydown", "ctrl")
+    yield 0.2
+    stage.tool("click", 1)
+    yield from until(lambda: len(bar.arapfields.handles) == 1, 5.0)
     stage.tool("keyup", "ctrl")
     found["pins_ctrl_click_deletes"] = len(bar.arapfields.handles) == 1 and len(bpy.data.objects) == count - 1
     stage.tool("key", "x")
-    yield 0.5
+    yield from until(lambda: not bar.arapfields.handles, 5.0)
     found["pins_x_deletes_the_last"] = not bar.arapfields.handles and not bar.modifiers
     found["pins_no_stray_object"] = [item.name for item in bpy.data.objects] == ["Bar"]
 
 
-def navigation(found, bar):
-    """The wheel during a drag zooms, and the pin stays under the cursor."""
+def navigation(found, folder, bar):
+    """The wheel during a drag zooms, and the pin stays under the cursor; with Ctrl it changes its reach."""
     _, area, _ = stage.view()
     view, pin = area.spaces.active.region_3d, bar.arapfields.handles[0].empty
     spot, distance = pixel(pin.location), view.view_distance
     yield from drag(spot, (spot[0], spot[1] - 40), hold=True)
     stage.tool("click", 4)
+    yield from until(lambda: view.view_distance != distance, 5.0)
     yield 0.6
     middle = pixel(pin.location)
     stage.tool("mousemove", spot[0] + 30, spot[1] - 40)
     yield 0.6
     after = pixel(pin.location)
+    reach = bar.arapfields.handles[0].reach
+    stage.tool("keydown", "ctrl")
+    yield 0.2
+    stage.tool("click", 4)
+    yield from until(lambda: bar.arapfields.handles[0].reach != reach, 5.0)
+    stage.tool("keyup", "ctrl")
+    yield from until(is_followed)
+    stage.picture(folder, "pins-reach")
+    nearer = bar.arapfields.handles[0].reach
     yield from release()
     found["pins_wheel_during_a_drag"] = {
         "zooms": view.view_distance < distance,
         "pin_moves_pixels": [b - a for a, b in zip(middle, after, strict=True)],
+        "reach_before_and_after_ctrl": [round(reach, 3), round(nearer, 3)],
     }
+    near = view.view_distance
     stage.tool("click", 5)
+    yield from until(lambda: view.view_distance != near, 5.0)
     yield 0.6
-
-
-def undo(found):
-    """One step a drag; rounds of undo and redo after, right after and during drags."""
-    bar = set_stage()
-    yield 0.5
-    before, spot = state(), pixel(END)
-    yield from drag(spot, (spot[0], spot[1] - 100))
-    after = state()
-    exact = []
-    for _ in range(ROUNDS):
-        stage.tool("key", "ctrl+z")
-        yield from until(lambda: len(bpy.data.objects) == 1, 3.0)
-        exact.append(state() == before)
-        stage.tool("key", "ctrl+shift+z")
-        yield from until(lambda: len(bpy.data.objects) == 2, 3.0)
-        exact.append(state() == after)
-        counts = {"undone": sum(exact[::2]), "redone": sum(exact[1::2]), "of": len(exact) // 2}
-        found["pins_undo_rounds"] = counts
-    exact = []
-    for number in range(ROUNDS // 10):
-        bar = bpy.data.objects["Bar"]
-        spot = pixel(bar.arapfields.handles[0].empty.location)
-        end = spot[0] + (-1) ** number * 20, spot[1] + 10 * (-1) ** number
-        yield from drag(spot, end, steps=3, pause=0.03, hold=True)
-        stage.tool("key", "ctrl+z")  # goes nowhere while the button is down
-        yield 0.05
-        stage.tool("mouseup", 1)
-        yield 0.05 * (number % 4)
-        stage.tool("key", "ctrl+z")
-        yield 0.4
-        exact.append(state() == after)
-    found["pins_undo_in_and_after_drags"] = {"exact": sum(exact), "of": len(exact)}
-    stage.tool("key", "ctrl+z")
-    yield 0.6
-    found["pins_undo_to_the_start"] = state() == before
 
 
 def first_and_rate(found, folder):

@@ -31,6 +31,7 @@ EAR = ((1.12, 0.32, 0.17), (0.30, 0.36, 0.40))
 # In the sidebar with one section open alone: the list's + and its rows, Deform and Stylize.
 PLUS, FROM_EMPTIES, SECOND_ROW = (1261, 159), (1340, 180), (1130, 181)
 DEFORM, STYLIZE = (1140, 223), (1140, 313)
+FIT, FIT_SURFACE = (1252, 25), (1130, 80)  # below the header of Implicit Surface, within Advanced
 
 
 def keys(*names, pause=0.4):
@@ -163,6 +164,27 @@ def handles():
         yield from number(value)
 
 
+def surface():
+    """The tutorial's fifth step as far as the fit."""
+    suzanne = next(item for item in bpy.data.objects if item.type == "MESH")
+    yield from panel.open_alone({"advanced"})
+    row = panel.rows().index("advanced") + 1
+    y = yield from inner("surface", row)
+    yield from click(FIT[0], y + FIT[1])
+    yield from shot("surface")
+    yield from click(FIT_SURFACE[0], y + FIT_SURFACE[1], pause=0.5)
+    yield from until_idle()
+    yield from shot("fitted")
+    FOUND["fitted"] = bool(suzanne.arapfields.fit_report)
+
+
+def inner(section, row):
+    """Opens a section within Advanced; where its header is, from the top."""
+    place = panel.rows(panel.ADVANCED).index(section)
+    yield from panel.press(row, place)
+    return round(panel.HEADER[1] + panel.STEP * row + panel.INNER * place)
+
+
 def results():
     suzanne = next(item for item in bpy.data.objects if item.type == "MESH")
     rest = scenes.world_points(suzanne)
@@ -187,7 +209,7 @@ def results():
 
 def until_idle():
     yield 1.0
-    yield from until(lambda: not bpy.ops.arapfields.cancel.poll(), 60.0)
+    yield from until(lambda: not bpy.ops.arapfields.cancel.poll(), 300.0)
     yield 1.5
 
 
@@ -196,6 +218,7 @@ def steps():
     yield from monkey()
     yield from handles()
     yield from results()
+    yield from surface()
 
 
 def ended(error):

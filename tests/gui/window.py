@@ -2,9 +2,9 @@
 """Run by a real Blender with a window: jobs, live mode, the panel. docs/development.md says how.
 
 blender --factory-startup --python tests/gui/window.py -- OUTPUT_FOLDER [PART ...]
-Parts are panel, use, jobs, stalls, live, press, pins and endings; all where none is named. Writes
-checks.json, and pictures where ImageMagick's `import` is at hand; xdotool moves the mouse. Ends with a job
-running, which must not hold it.
+Parts are panel, use, jobs, stalls, live, press, pins, undo, render, table and endings; all where none is
+named. Writes checks.json, and pictures where ImageMagick's `import` is at hand; xdotool moves the mouse.
+Ends with a job running, which must not hold it.
 """
 
 import json
@@ -23,9 +23,12 @@ import live  # noqa: E402
 import panel  # noqa: E402
 import pins  # noqa: E402
 import press  # noqa: E402
+import render  # noqa: E402
 import scenes  # noqa: E402
 import stage  # noqa: E402
 import stalls  # noqa: E402
+import table  # noqa: E402
+import undo  # noqa: E402
 import use  # noqa: E402
 
 import addon  # noqa: E402
@@ -43,6 +46,9 @@ def steps():
         "live": lambda: live.checks(FOUND, OUTPUT),
         "press": lambda: press.checks(FOUND, OUTPUT),
         "pins": lambda: pins.checks(FOUND, OUTPUT),
+        "undo": lambda: undo.checks(FOUND, OUTPUT),
+        "render": lambda: render.checks(FOUND, OUTPUT),
+        "table": lambda: table.checks(FOUND, OUTPUT),
         "endings": lambda: jobs.endings(FOUND),
     }
     stage.empty_file()

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#ifndef _WIN32
 #include <sys/wait.h>
 #include <unistd.h>
+#endif
 
 #include <atomic>
 #include <boost/test/unit_test.hpp>
@@ -48,6 +50,7 @@ bool meet(int threads, int jobs) {
   return met && most == threads;
 }
 
+#ifndef _WIN32
 /// The exit status of a child process that runs `body`; −1 where it hangs.
 template <class Body>
 int in_child(const Body& body) {
@@ -59,6 +62,7 @@ int in_child(const Body& body) {
   waitpid(child, &status, 0);
   return -1;
 }
+#endif
 
 Index sum_of_chunks(Index count) {
   std::atomic<Index> sum{0};
@@ -176,6 +180,7 @@ BOOST_AUTO_TEST_CASE(more_threads_than_the_pool_has_are_done_without) {
   BOOST_CHECK_EQUAL(sum_of_chunks(100000), 4999950000);
 }
 
+#ifndef _WIN32  // which has no fork()
 BOOST_AUTO_TEST_CASE(a_forked_child_works, *boost::unit_test::label("fork")) {
   BOOST_CHECK(meet(3, 6));
   BOOST_CHECK_EQUAL(in_child([] { return meet(3, 6) && sum_of_chunks(1000) == 499500; }), 0);
@@ -193,6 +198,7 @@ BOOST_AUTO_TEST_CASE(a_child_forked_during_another_thread_s_loop_works, *boost::
   over = true;
   busy.join();
 }
+#endif
 
 BOOST_AUTO_TEST_CASE(libtorch_s_own_number_of_threads_comes_back) {
   const int before = torch_threads();

@@ -81,13 +81,8 @@ def bent(vertices, triangles):
     return af.deform(samples, handles, af.DeformOptions(field="radial"))(vertices)
 
 
-@pytest.mark.parametrize("place", ["prefix", "wheel"])
-def test_the_example_gives_what_python_gives(place, prefix, tmp_path):
-    if place == "prefix":
-        found = f"-DCMAKE_PREFIX_PATH={prefix}"
-    else:
-        found = f"-Darapfields_DIR={run(sys.executable, '-m', 'arapfields', '--cmake-dir').strip()}"
-    program = build_example(tmp_path, found)
+def check_example(program, tmp_path):
+    """The program bends a pillar as Python does."""
     vertices, triangles = pillar()
     rest, moved = tmp_path / "rest.obj", tmp_path / "moved.obj"
     lines = [f"v {x} {y} {z}\n" for x, y, z in vertices] + [f"f {a} {b} {c}\n" for a, b, c in triangles + 1]
@@ -98,6 +93,30 @@ def test_the_example_gives_what_python_gives(place, prefix, tmp_path):
     assert np.abs(ours - bent(vertices, triangles)).max() < PRINTED
     refused = subprocess.run([program, rest], capture_output=True, text=True)
     assert refused.returncode == 2 and "arguments" in refused.stderr  # what the library throws is caught
+
+
+@pytest.mark.parametrize("place", ["prefix", "wheel"])
+def test_the_example_gives_what_python_gives(place, prefix, tmp_path):
+    if place == "prefix":
+        found = f"-DCMAKE_PREFIX_PATH={prefix}"
+    else:
+        found = f"-Darapfields_DIR={run(sys.executable, '-m', 'arapfields', '--cmake-dir').strip()}"
+    check_example(build_example(tmp_path, found), tmp_path)
+
+
+@pytest.mark.slow
+def test_the_example_builds_the_library_along(tmp_path):
+    """By FetchContent from the sources alone; optimised a little, since all of the library is compiled."""
+    shutil.copytree(EXAMPLE, tmp_path / "cpp")
+    shutil.copytree(EXAMPLE.with_name("cpp_from_source"), tmp_path / "source")
+    ninja = ["-G", "Ninja", f"-DCMAKE_MAKE_PROGRAM={cached('CMAKE_MAKE_PROGRAM')}"]
+    given = [f"-DPython_EXECUTABLE={sys.executable}", f"-DARAPFIELDS_SOURCE={ROOT}"]
+    given += ["-DCMAKE_CXX_FLAGS_RELEASE=-O1", "-DCMAKE_BUILD_TYPE=Release"]
+    run(CMAKE, "-S", tmp_path / "source", "-B", tmp_path / "build", *ninja, *given)
+    run(CMAKE, "--build", tmp_path / "build", "--target", "bend")
+    headers = sorted(path.name for path in (tmp_path / "build").rglob("include/arapfields/*.h"))
+    assert headers == [path.name for path in PUBLIC]
+    check_example(tmp_path / "build" / "bend", tmp_path)
 
 
 def compiler():

@@ -238,3 +238,18 @@ def test_a_disk_that_is_full_for_usd_is_named(tmp_path):
 def test_wrong_flags_are_named(flags, text, place, capsys):
     assert animate(place, "x.pc2", *flags) == 2
     assert text in said(capsys) and names(place) == ["bar.ply", "tracks.json"]
+
+
+def test_secondary_motion_follows_frame_by_frame(place, capsys):
+    animate(place, "still.pc2")
+    animate(place, "swing.pc2", "--secondary", "--damping", "1")
+    animate(place, "part.pc2", "--secondary", "--damping", "1", "--frames", "4", "6")
+    still, swing = frames(place / "still.pc2"), frames(place / "swing.pc2")
+    assert np.abs(swing[0] - still[0]).max() < 1e-3 < np.abs(swing[3] - still[3]).max()
+    assert np.array_equal(frames(place / "part.pc2"), swing[3:])
+    for further, name in (
+        (["--damping", "1"], "--secondary"),
+        (["--secondary", "--shard", "1/2"], "--shard"),
+    ):
+        assert animate(place, "none.pc2", *further) != 0
+        assert name in capsys.readouterr().err

@@ -34,10 +34,11 @@ class Space:
 
         Those that have not moved stay bit for bit, which the way there and back would not leave them.
         """
+        if np.array_equal(self.local_to_solve, np.eye(4)):
+            return after
         result = self.to_local(after)
-        if not np.array_equal(self.local_to_solve, np.eye(4)):
-            still = (after == np.asarray(before, dtype=after.dtype)).all(axis=1)
-            result[still] = local[still]
+        still = (after == np.asarray(before, dtype=after.dtype)).all(axis=1)
+        result[still] = local[still]
         return result
 
     def mirror(self, axis):
@@ -60,7 +61,7 @@ def transform(matrix, points):
 
 
 def inverse(matrix):
-    """The inverse of a 4×4 affine matrix.
+    """The inverse of a 4×4 affine matrix; LinAlgError where it has none.
 
     By cofactors: NumPy's solver wakes its threads even for this, which costs milliseconds on a busy machine.
     """
@@ -70,11 +71,12 @@ def inverse(matrix):
         (f * g - d * i, a * i - c * g, c * d - a * f),
         (d * h - e * g, b * g - a * h, a * e - b * d),
     )
+    determinant = sum(x * row[0] for x, row in zip((a, b, c), cofactors, strict=True))
+    if determinant == 0.0:
+        raise np.linalg.LinAlgError("a matrix that flattens has no inverse")
     result = np.eye(4)
-    result[:3, :3] = np.array(cofactors) / sum(
-        x * row[0] for x, row in zip((a, b, c), cofactors, strict=True)
-    )
-    result[:3, 3] = -result[:3, :3] @ matrix[:3, 3]
+    result[:3, :3] = np.array(cofactors) / determinant
+    result[:3, 3] = -(result[:3, :3] * matrix[:3, 3]).sum(axis=1)
     return result
 
 

@@ -5,6 +5,7 @@ import threading
 
 from .threads import start_thread
 
+PAUSE = 0.02  # seconds for which a newer request is awaited before one gets better results
 REST = 0.4  # seconds without a new request after which the result is refined
 
 
@@ -37,6 +38,7 @@ class CancellationToken:
 class LatestRequestWorker:
     """Runs `prepare()` once, then `solve(request)` for the newest request, skipping those between.
 
+    `solve` yields better and better results, of which no more are asked for once a newer request is there.
     After `rest` seconds without a new request, `refine(request, token)` yields better and better results
     until the token is cancelled. `poll` returns the newest result, or the error.
     """
@@ -46,6 +48,7 @@ class LatestRequestWorker:
         self._changed = threading.Condition()
         self._request = self._result = self._error = self._token = None
         self._working, self._ended, self._refined = prepare is not None, False, True
+        self._waiting = 0  # callers that wait for all that a request can have
         self._thread = start_thread("live", self._run, low_priority)
 
     def request(self, request):
@@ -61,21 +64,35 @@ class LatestRequestWorker:
             self._result = self._error = None
             return found
 
+    def wait_for_result(self, timeout):
+        """Until there is something to poll or nothing left to do, so many seconds at most."""
+        with self._changed:
+            self._changed.wait_for(
+                lambda: self._result is not None or self._error or self._is_idle(), timeout
+            )
+
+    def _is_idle(self):
+        return self._request is None and not self._working
+
     def wait(self, timeout, refined=False):
         """Waits until the newest request is solved (and `refined`); False when that takes longer."""
 
         def reached():
-            idle = self._request is None and not self._working
-            return idle and (self._refined or not refined or self._refine is None)
+            return self._is_idle() and (self._refined or not refined or self._refine is None)
 
         with self._changed:
-            return self._changed.wait_for(reached, timeout)
+            self._waiting += 1
+            self._changed.notify_all()
+            try:
+                return self._changed.wait_for(reached, timeout)
+            finally:
+                self._waiting -= 1
 
     @property
     def resting(self):
         """Whether nothing is left to do for the newest request."""
         with self._changed:
-            return self._request is None and not self._working and (self._refined or self._refine is None)
+            return self._is_idle() and (self._refined or self._refine is None)
 
     def stop(self):
         """Ends the thread and waits for it."""
@@ -109,7 +126,21 @@ class LatestRequestWorker:
             if due:
                 self._improve(request, self._token)
             else:
-                self._attempt(lambda request=request: self._solve(request))
+                self._attempt(lambda request=request: self._follow(request))
+
+    def _follow(self, request):
+        """Publishes one result after another, until a newer request comes."""
+
+        def is_over():
+            return self._request is not None or self._ended
+
+        for result in self._solve(request):
+            with self._changed:
+                self._result = result
+                self._changed.notify_all()
+                self._changed.wait_for(lambda: is_over() or self._waiting, PAUSE)
+                if is_over():
+                    break
 
     def _improve(self, request, token):
         def steps():
@@ -125,14 +156,12 @@ class LatestRequestWorker:
             self._changed.notify_all()
 
     def _attempt(self, call):
-        result = error = None
+        error = None
         try:
-            result = call()
+            call()
         except Exception as caught:
             if type(caught).__name__ != "Cancelled":
                 error = str(caught) or type(caught).__name__
         with self._changed:
-            if result is not None:
-                self._result = result
             self._error, self._working = error or self._error, False
             self._changed.notify_all()

@@ -24,7 +24,8 @@ STYLES = [  # as the native library names them, and how the menu does
 
 CUSTOM = {  # styles whose normals an object of the scene gives: identifier → label, tip
     "AXES": ("Axes of an Object", "Turns the surface along the axes of an object of your choice"),
-    "FACES": ("Faces of a Mesh", "Turns the surface towards the faces of a mesh object of your choice"),
+    # Last, as Faces of a Mesh was: Blender's files hold its number.
+    "OBJECT": ("Object", "Turns the surface towards what a mesh object of your choice has in each direction"),
 }
 
 

@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <iostream>
+#include <numbers>
 
 #include "obj.h"
 
@@ -27,7 +28,7 @@ int main(int argc, char** argv) try {
   af::Handle held, turned;  // boxes at rest, and where they shall be
   held.rest = held.target = slab(mesh, 0.0, 1.0 / 3);
   turned.rest = slab(mesh, 2.0 / 3, 1.0);
-  const Eigen::AngleAxisd turn(M_PI / 3, af::Vec3::UnitX());
+  const Eigen::AngleAxisd turn(std::numbers::pi / 3, af::Vec3::UnitX());
   turned.target = (Eigen::Affine3d(turn) * Eigen::Affine3d(turned.rest)).matrix();
 
   const af::SurfaceSamples samples = af::sample_mesh(mesh.vertices, mesh.triangles, 20000, 0);

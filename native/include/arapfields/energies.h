@@ -6,6 +6,7 @@
 #include "energies/distortion.h"
 #include "energies/external_energy.h"
 #include "energies/gauss.h"
+#include "energies/object_style.h"
 #include "energies/rotation.h"
 #include "energies/styles.h"
 #include "solve/field_measures.h"

@@ -2,5 +2,6 @@
 // Gauss stylization: stylize.
 #pragma once
 
+#include "energies/object_style.h"
 #include "energies/styles.h"
 #include "solve/stylize.h"

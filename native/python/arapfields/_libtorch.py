@@ -5,6 +5,9 @@ libtorch's C++ interface changes from version to version: with another one the l
 and crashes at worst. So importing this module compares the versions, before anything is loaded.
 """
 
+import importlib.util
+import os
+import sys
 from importlib import metadata
 from pathlib import Path
 
@@ -17,7 +20,7 @@ def check(folder: Path = HERE) -> None:
     Nothing is asked where the package carries libtorch itself, as in Blender's extension.
     """
     noted = folder / "libtorch.txt"
-    built_against = noted.read_text().strip() if noted.is_file() else ""
+    built_against = noted.read_text(encoding="utf-8").strip() if noted.is_file() else ""
     if not built_against or any(folder.glob("*torch_cpu*")):
         return
     remedy = f"pip install torch=={built_against}"
@@ -31,4 +34,13 @@ def check(folder: Path = HERE) -> None:
         raise ImportError(f"{found}: {remedy}, or build arapfields anew")
 
 
+def show_libraries() -> None:
+    """Tells Windows where torch's libraries are; elsewhere ours knows that itself. torch is not imported."""
+    if sys.platform == "win32":
+        found = importlib.util.find_spec("torch")
+        if found is not None and found.origin is not None:
+            os.add_dll_directory(str(Path(found.origin).parent / "lib"))
+
+
 check()
+show_libraries()

@@ -128,7 +128,7 @@ class SolveReport(EnergyReport):
 
 @dataclass(frozen=True, kw_only=True)
 class LiveReport(EnergyReport):
-    """What the last solve of a LiveDeformer reached."""
+    """What the last solve or step of a LiveDeformer reached; `speed`, in mesh units a second, is a step's."""
 
     value: float
     """All that is minimised."""
@@ -137,6 +137,8 @@ class LiveReport(EnergyReport):
     converged: bool
     """Whether a further step would gain next to nothing."""
     setup_seconds: float
+    kinetic: float = 0.0
+    speed: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

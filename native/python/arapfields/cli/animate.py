@@ -2,6 +2,7 @@
 """The verb animate: a mesh under handles that move from frame to frame, solved frame by frame."""
 
 import errno
+import hashlib
 import sys
 import time
 from pathlib import Path
@@ -33,10 +34,11 @@ def animate(args):
     tracks = read_tracks(args.tracks)
     wanted = frames_wanted(args, tracks)
     vertices, triangles = files.read_mesh(args.input)
-    solver = FrameSolver(vertices, triangles, tracks, options, solve_limits(args))
+    secondary = secondary_motion(args)
+    solver = FrameSolver(vertices, triangles, tracks, options, solve_limits(args), secondary)
     solver.check(wanted)
     store = FrameStore(output, len(vertices), solver.description(wanted[0]))
-    places = {index: store.place(tracks.start + index, tracks.targets(index)) for index in wanted}
+    places = {index: store.place(tracks.start + index, solver.key(index)) for index in wanted}
     number, shards = args.shard or (1, 1)
     mine = [index for index in wanted[number - 1 :: shards] if not store.has(places[index])]
     store.require_room(len(mine), Layout(".pc2", len(vertices), len(wanted)).size)
@@ -71,6 +73,17 @@ def frames_wanted(args, tracks):
     return list(range(first - tracks.start, last - tracks.start + 1))
 
 
+def secondary_motion(args):
+    """The options of --secondary; None where frames are to be solved each for itself."""
+    options = given_options(af.SecondaryMotionOptions, args)
+    given = [name for name in options.fields if getattr(args, f"option_{name}") is not None]
+    if given and not args.secondary:
+        raise af.InvalidInput(f"--{given[0].replace('_', '-')}: it is for --secondary")
+    if args.secondary and args.shard:
+        raise af.InvalidInput("--shard: with --secondary each frame follows from the one before")
+    return options if args.secondary else None
+
+
 def solve_limits(args):
     """What a solve from rest may take: more than the options' own, which are for a drag."""
     return {
@@ -80,15 +93,17 @@ def solve_limits(args):
 
 
 class FrameSolver:
-    """Shapes of a mesh, each from rest: a function of its own frame alone."""
+    """Shapes of a mesh: each from rest, a function of its own frame alone; or with secondary motion, each
+    from the one before, the tracks' first at rest."""
 
-    def __init__(self, vertices, triangles, tracks, options, limits):
+    def __init__(self, vertices, triangles, tracks, options, limits, secondary=None):
         self._vertices, self._triangles, self._tracks = vertices, triangles, tracks
-        self._options, self._limits = options, limits
+        self._options, self._limits, self._secondary = options, limits, secondary
         self._samples = af.sample_mesh(vertices, triangles, seed=options.seed)
         points = self._samples.points
         self._bounds = np.array([points.min(0), points.max(0)])
-        self._live = None
+        self._live = self._at = None  # the frame that was stepped to
+        self._digests = []
 
     def _handles(self, index):
         return self._tracks.handles(index, self._bounds)
@@ -102,16 +117,37 @@ class FrameSolver:
         """Bytes that stand for all that the frames have in common; `index` is any frame's."""
         options = {name: value for name, value in self._options.to_dict().items() if name != "threads"}
         rest = [(type(h).__name__, np.asarray(h.rest).tolist(), h.weight) for h in self._handles(index)]
-        text = repr([af.__version__, options, self._limits, rest])
+        further = [] if self._secondary is None else [self._tracks.fps, self._secondary.to_dict()]
+        text = repr([af.__version__, options, self._limits, rest, *further])
         return text.encode() + self._vertices.tobytes() + self._triangles.tobytes()
 
-    def positions(self, index, task=None):
+    def key(self, index):
+        """Arrays that tell the frame's shape from others."""
+        if self._secondary is None:
+            return self._tracks.targets(index)
+        while len(self._digests) <= index:  # of a frame's targets, and of all before
+            targets = [
+                np.asarray(target, float).tobytes() for target in self._tracks.targets(len(self._digests))
+            ]
+            self._digests.append(hashlib.blake2b(b"".join([*self._digests[-1:], *targets])).digest())
+        return [np.frombuffer(self._digests[index], np.uint8)]
+
+    def positions(self, index, task=None, is_cancelled=bool):
         """(n, 3)"""
         if self._live is None:
             self._live = af.LiveDeformer(self._samples, self._handles(index), self._options, task=task)
-        self._live.reset()
-        targets = [handle.target for handle in self._handles(index)]
-        return self._live.solve(targets, **self._limits)(self._vertices)
+            self._live.set_secondary_motion(self._secondary)
+        if self._secondary is None or self._at is None or index < self._at:
+            self._live.reset()
+            self._at = index if self._secondary is None else 0
+            self._live.solve(self._targets(self._at), **self._limits)
+        while self._at < index and not is_cancelled():
+            self._at += 1
+            self._live.step(self._targets(self._at), 1.0 / self._tracks.fps)
+        return self._live.field(self._vertices)
+
+    def _targets(self, index):
+        return [handle.target for handle in self._handles(index)]
 
 
 def _solve(solver, store, places, mine, task, args):
@@ -123,7 +159,10 @@ def _solve(solver, store, places, mine, task, args):
         name = f"frame {int(place.name[:7])}"
         task.report(done / len(mine), name)
         if not store.has(place):  # another run may have made it meanwhile
-            store.put(place, solver.positions(index, task if done == 0 else None))
+            positions = solver.positions(index, task if done == 0 else None, lambda: task.cancelled)
+            if task.cancelled:
+                raise af.Cancelled("cancelled")
+            store.put(place, positions)
         if not args.quiet and not sys.stderr.isatty() and time.monotonic() - said > LINES:
             said = time.monotonic()
             print(f"{name}: {done + 1} of {len(mine)} solved", file=sys.stderr, flush=True)

@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import _native
 from .._files import existing_file, write_arrays
-from .._native import InvalidInput
+from .._native import InvalidInput, ObjectStyle
 from .running import uninterrupted
 
 MESH_SUFFIXES = (".ply", ".obj", ".stl", ".off")
@@ -98,7 +98,7 @@ def write_moved_mesh(path, source, mesh, move):
     if path.suffix.lower() == Path(source).suffix.lower() == ".obj":
         moved = moved_obj(source, move)
         if moved is not None:
-            path.write_text(moved, errors="surrogateescape")
+            path.write_text(moved, encoding="utf-8", newline="\n", errors="surrogateescape")
             return
     vertices, triangles = mesh
     write_mesh(path, move(vertices), triangles)
@@ -106,7 +106,7 @@ def write_moved_mesh(path, source, mesh, move):
 
 def moved_obj(source, move):
     """The text of an OBJ file, its vertices moved; None where one is not finite."""
-    text = Path(source).read_text(errors="surrogateescape")
+    text = Path(source).read_text(encoding="utf-8", errors="surrogateescape")
     text = re.sub(r"\\\r?\n", "", text)  # lines that go on in the next
     with readable(source, "OBJ"):
         before = np.array([[float(c) for c in m.groups()[1:]] for m in OBJ_VERTEX.finditer(text)])
@@ -156,7 +156,7 @@ def read_normals(path):
         if path.suffix.lower() == ".npy":  # mapped: its size is compared with the file's
             normals = np.array(np.lib.format.open_memmap(path, mode="r"), float)
         else:
-            normals = np.loadtxt(path.read_text().replace(",", " ").splitlines(), ndmin=2)
+            normals = np.loadtxt(path.read_text(encoding="utf-8").replace(",", " ").splitlines(), ndmin=2)
     if normals.ndim != 2 or normals.shape[1] != 3 or len(normals) == 0:
         raise InvalidInput(
             f"{path}: holds an array of shape {normals.shape}; rows of three numbers are needed"
@@ -165,6 +165,15 @@ def read_normals(path):
     if not (np.isfinite(lengths).all() and (lengths > 0).all()):
         raise InvalidInput(f"{path}: a normal is zero or not finite; each must have a direction")
     return normals / lengths
+
+
+def read_style_object(path):
+    """The ObjectStyle of a mesh file; what the mesh lacks is told of the file."""
+    vertices, triangles = read_mesh(existing_file(path, MESH_SUFFIXES))
+    try:
+        return ObjectStyle(vertices, triangles)
+    except InvalidInput as error:
+        raise InvalidInput(f"{path}: {error}") from error
 
 
 def _face_normals(path):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Flags that several verbs share."""
 
+import arapfields as af
+
 from .handles import AddHandle, MoveHandle, triple
 from .options import add_option_flag
 
@@ -109,3 +111,23 @@ def sdf_flag(parser):
 
 def report_flag(parser):
     parser.add_argument("--report", metavar="FILE", help=".json with what was measured")
+
+
+def style_flags(parser):
+    """Which style, and how it stands."""
+    style = parser.add_mutually_exclusive_group(required=True)
+    style.add_argument("--style", metavar="NAME", help=f"one of {', '.join(af.style_names())}")
+    style.add_argument(
+        "--normals", metavar="FILE", help="rows x y z (.txt, .csv, .npy), or the face normals of a mesh"
+    )
+    style.add_argument(
+        "--style-object",
+        metavar="FILE",
+        help="a closed mesh, as upright as the input: normals turn to what it has in their direction",
+    )
+    parser.add_argument("--style-turn", nargs=2, metavar=("AXIS", "DEGREES"), help="turns the style")
+    parser.add_argument(
+        "--up",
+        metavar="X,Y,Z",
+        help="what is up in the file (z without it): the style's axis and the figure's stance",
+    )

@@ -3,7 +3,6 @@
 
 import contextlib
 import errno
-import fcntl
 import hashlib
 import os
 import shutil
@@ -12,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from .._files import whole_file
+from .._locks import lock
 from .._native import InvalidInput
 
 TYPE = np.dtype("<f4")
@@ -79,7 +79,7 @@ class FrameStore:
         self.folder.mkdir(exist_ok=True)
         with open(self.folder / "lock", "ab") as file:
             with contextlib.suppress(OSError):
-                fcntl.lockf(file, fcntl.LOCK_EX)
+                lock(file)
             yield
 
     def remove(self, places=None):

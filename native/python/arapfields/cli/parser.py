@@ -9,7 +9,16 @@ import arapfields as af
 
 from . import usd, verbs
 from .animate import animate
-from .flags import MESH, SOURCE, extraction_flags, inverse_flag, report_flag, sdf_flag, solve_flags
+from .flags import (
+    MESH,
+    SOURCE,
+    extraction_flags,
+    inverse_flag,
+    report_flag,
+    sdf_flag,
+    solve_flags,
+    style_flags,
+)
 from .options import add_option_flag, add_option_flags, shard
 
 
@@ -127,21 +136,10 @@ def _stylize(added):
         "turn a shape's normals to those of a style",
         "spot.obj -o cubic.obj --style cube --strength 0.8",
         "spot.safetensors --surface crystal.ply --normals gem.stl",
+        "spot.obj -o rocky.obj --style-object rock.obj --up 0,1,0",
     )
     solve_flags(parser)
-    style = parser.add_mutually_exclusive_group(required=True)
-    style.add_argument("--style", metavar="NAME", help=f"one of {', '.join(af.style_names())}")
-    style.add_argument(
-        "--normals", metavar="FILE", help="rows x y z (.txt, .csv, .npy), or the face normals of a mesh"
-    )
-    parser.add_argument(
-        "--style-turn", nargs=2, metavar=("AXIS", "DEGREES"), help="turns the style's normals"
-    )
-    parser.add_argument(
-        "--up",
-        metavar="X,Y,Z",
-        help="what is up in the file (z without it): the style's axis and the figure's stance",
-    )
+    style_flags(parser)
     add_option_flags(parser, "stylize", "stylization")
     return parser
 
@@ -224,6 +222,7 @@ def _animate(added):
         "spot.obj --tracks walk.json -o walk.pc2",
         "spot.obj --tracks walk.npz -o walk.usdc --frames 1 48 --up-axis y",
         "spot.obj --tracks walk.json -o walk.pc2 --shard 2/8",
+        "spot.obj --tracks walk.json -o walk.pc2 --secondary --damping 2",
     )
     parser.add_argument("input", help=MESH)
     parser.add_argument("--tracks", required=True, metavar="FILE", help=".json or .npz, see docs/animate.md")
@@ -241,6 +240,8 @@ def _animate(added):
         "--shard", type=shard, metavar="I/N", help="solve the part I of N; the last part writes the output"
     )
     parser.add_argument("--up-axis", choices=usd.AXES, default="z", help="what USD is told is up [z]")
+    parser.add_argument("--secondary", action="store_true", help="lag behind the handles, and settle")
+    add_option_flags(parser, "secondary", "secondary motion (--secondary)")
     add_option_flags(
         parser, "live", "solve of a frame (300 steps and a tolerance of 1e-6 without these flags)"
     )

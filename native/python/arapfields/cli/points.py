@@ -44,19 +44,21 @@ def _with(path, suffixes, what):
 
 
 def _has_faces(path):
-    with readable(path, "OBJ"), path.open(errors="surrogateescape") as file:
+    with readable(path, "OBJ"), path.open(encoding="utf-8", errors="surrogateescape") as file:
         return any(line.lstrip().startswith("f ") for line in file)
 
 
 def _write_obj(path, source, move):
     """Lines, curves and points of an OBJ file, which has no faces."""
-    text = source.read_text(errors="surrogateescape")
+    text = source.read_text(encoding="utf-8", errors="surrogateescape")
     if not OBJ_VERTEX.search(text):
         raise InvalidInput(f"{source}: has no vertices; points, curves or a mesh are needed")
     moved = moved_obj(source, move)
     if moved is None:
         raise InvalidInput(f"{source}: a vertex is NaN or infinite; coordinates must be finite")
-    _with(path, (".obj",), "curves").write_text(moved, errors="surrogateescape")
+    _with(path, (".obj",), "curves").write_text(
+        moved, encoding="utf-8", newline="\n", errors="surrogateescape"
+    )
 
 
 def _ply_cloud(path):
@@ -79,7 +81,7 @@ def _rows(path):
         elif suffix == ".npy":
             rows = np.array(np.lib.format.open_memmap(path, mode="r"), float)
         else:
-            rows = np.loadtxt(path.read_text().replace(",", " ").splitlines(), ndmin=2)
+            rows = np.loadtxt(path.read_text(encoding="utf-8").replace(",", " ").splitlines(), ndmin=2)
     if rows.ndim != 2 or rows.shape[1] not in (3, 6):
         raise InvalidInput(
             f"{path}: holds an array of shape {rows.shape}; rows of three numbers, or of six with normals, "
@@ -111,7 +113,7 @@ def read_weights(path, vertices):
         if path.suffix.lower() == ".npy":
             numbers = np.array(np.lib.format.open_memmap(path, mode="r"), float)
         else:
-            numbers = np.loadtxt(path.read_text().replace(",", " ").split(), ndmin=1)
+            numbers = np.loadtxt(path.read_text(encoding="utf-8").replace(",", " ").split(), ndmin=1)
     if numbers.shape != (vertices,):
         raise InvalidInput(
             f"{path}: holds {numbers.size} numbers; one for each of the {vertices} vertices is needed"

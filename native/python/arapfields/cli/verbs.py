@@ -59,23 +59,28 @@ def stylize(args):
         raise af.InvalidInput(
             f"--style: unknown style {args.style!r}; known are {', '.join(af.style_names())}"
         )
-    normals = af.preferred_normals(args.style) if args.style else files.read_normals(args.normals)
-    up = None
+    if args.style_object:
+        normals = files.read_style_object(args.style_object)
+    else:
+        normals = af.preferred_normals(args.style) if args.style else files.read_normals(args.normals)
+    up, orientation = None, np.eye(3)
     if args.up:
         try:
             up = np.array(triple(args.up))
-            normals = normals @ turn_upright(up).T
+            orientation = np.eye(3) if args.style_object else turn_upright(up)
         except (ValueError, argparse.ArgumentTypeError) as error:
             raise af.InvalidInput(f"--up: expected a direction as x,y,z ({error})") from error
     if args.style_turn:
         try:
             turn = {"axis": triple(args.style_turn[0]), "degrees": float(args.style_turn[1])}
-            normals = normals @ rotation(turn).T
+            orientation = rotation(turn) @ orientation
         except (ValueError, argparse.ArgumentTypeError) as error:
             raise af.InvalidInput(f"--style-turn: expected AXIS as x,y,z and DEGREES ({error})") from error
 
     def solve(samples, handles, task):
-        return af.stylize(samples, normals, options, handles=handles, up=up, task=task)
+        return af.stylize(
+            samples, normals, options, handles=handles, orientation=orientation, up=up, task=task
+        )
 
     _solve(args, solve, options.seed, needs_handles=False)
 
@@ -217,7 +222,10 @@ def _report_place(outputs, args):
 
 def _write_report(outputs, place, report):
     if place is not None:
-        outputs.write(place, lambda path: path.write_text(json_text(report.to_dict(), indent=2) + "\n"))
+        outputs.write(
+            place,
+            lambda path: path.write_text(json_text(report.to_dict(), indent=2) + "\n", encoding="utf-8"),
+        )
 
 
 def _print_notes(args, report):

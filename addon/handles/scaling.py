@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Handles that are scaled without having been asked to scale what they hold."""
+
+import numpy as np
+
+from ..core.errors import UserError
+from . import empties, movers
+
+LEAST = 1e-3  # share by which a box differs from its rest size from where on it counts as scaled
+
+
+def ignored(source):
+    """The error that names the handles whose scale counts for nothing; None where there is none."""
+    names = [movers.name_of(entry) for entry in empties.used(source) if is_ignored(source, entry)]
+    if not names:
+        return None
+    return UserError("{names} is scaled, which counts only with Allow Scale", names=", ".join(names))
+
+
+def is_ignored(source, entry):
+    if entry.allow_scale or entry.kind == "POINT":
+        return False
+    rest, now = empties.rest_box(source, entry)[:3, :3], movers.box_now(entry)[:3, :3]
+    if not np.isfinite(now).all() or abs(np.linalg.det(rest)) == 0.0:
+        return False  # refused elsewhere
+    stretches = np.linalg.svd(now @ np.linalg.inv(rest), compute_uv=False)
+    return bool(np.abs(stretches - 1.0).max() > LEAST)

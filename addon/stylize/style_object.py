@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A mesh object as a style: the map that the library reads off it, kept while the object stays as it is."""
+
+import bmesh
+import bpy
+import numpy as np
+
+from ..blender import mesh_arrays, modifier_stack
+from ..carried.places import depsgraph_of
+from ..core.errors import UserError
+from ..core.runtime import native
+from ..handles.empties import matrix_of
+
+MOST_NORMALS = 64  # of an object without a volume; more are no preference
+KEPT = 8  # objects, or placings of one, whose styles are remembered
+_kept = {}  # key → ObjectStyle or (k, 3) normals
+
+
+def refusal(item):
+    """The UserError of an object that can be no style, as far as it is seen without reading; else None."""
+    if item.type != "MESH":
+        return UserError("{name} is no mesh; a mesh object is needed as a style", name=item.name)
+    return None
+
+
+def style_of(item, where=matrix_of):
+    """(style, key): an ObjectStyle in the world's directions, or the (k, 3) face normals of an object without
+    a volume; equal keys for equal styles. UserError that names the object where it gives neither."""
+    reason = refusal(item)
+    if reason is not None:
+        raise reason
+    linear = np.asarray(where(item), dtype=np.float64)[:3, :3]
+    seen = item if modifier_stack.find(item) else item.evaluated_get(depsgraph_of(bpy.context))
+    mesh = seen.to_mesh()
+    try:
+        key = mesh_arrays.fingerprint(mesh), linear.tobytes()
+        if key not in _kept:
+            while len(_kept) >= KEPT:
+                del _kept[next(iter(_kept))]
+            _kept[key] = _read(item.name, mesh, linear)
+        return _kept[key], key
+    finally:
+        seen.to_mesh_clear()
+
+
+def _read(name, mesh, linear):
+    reason = mesh_arrays.nothing_in(name, len(mesh.vertices), len(mesh.polygons))
+    if reason is not None:
+        raise reason
+    af = native.library()
+    points, corners = mesh_arrays.positions(mesh) @ linear.T, mesh_arrays.triangles(mesh)
+    for close in (False, True):
+        if close:
+            points, corners = _closed(points, corners)
+        try:
+            return af.ObjectStyle(points, corners)
+        except af.InvalidInput:
+            continue
+    return _face_normals(name, mesh, linear)
+
+
+def _closed(points, corners):
+    """The same with what lies at one place as one, and its holes filled."""
+    points, which = np.unique(points, axis=0, return_inverse=True)
+    made = bmesh.new()
+    vertices = [made.verts.new(point) for point in points]
+    for a, b, c in which.reshape(-1)[corners]:
+        if len({a, b, c}) == 3 and not made.faces.get((vertices[a], vertices[b], vertices[c])):
+            made.faces.new((vertices[a], vertices[b], vertices[c]))
+    bmesh.ops.holes_fill(made, edges=[edge for edge in made.edges if edge.is_boundary], sides=0)
+    bmesh.ops.recalc_face_normals(made, faces=made.faces)
+    bmesh.ops.triangulate(made, faces=made.faces)
+    made.verts.index_update()
+    points = np.array([vertex.co for vertex in made.verts], dtype=np.float64).reshape(-1, 3)
+    corners = np.array([[v.index for v in face.verts] for face in made.faces], dtype=np.int64).reshape(-1, 3)
+    made.free()
+    return points, corners
+
+
+def _face_normals(name, mesh, linear):
+    """(k, 3) different unit normals of the faces in the world."""
+    normals = np.empty(3 * len(mesh.polygons), dtype=np.float32)
+    mesh.polygons.foreach_get("normal", normals)
+    turned = normals.reshape(-1, 3).astype(np.float64) @ np.linalg.pinv(linear)  # by the inverse transpose
+    turned = turned[np.linalg.norm(turned, axis=1) > 0]
+    turned = np.unique(np.round(turned / np.linalg.norm(turned, axis=1, keepdims=True), 3), axis=0)
+    if not 0 < len(turned) <= MOST_NORMALS:
+        raise UserError(
+            "{name} encloses no volume, and has {count} different face normals; a closed object, or from 1 "
+            "to {most} normals, make a style",
+            name=name,
+            count=len(turned),
+            most=MOST_NORMALS,
+        )
+    return turned / np.linalg.norm(turned, axis=1, keepdims=True)

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The scenes that the workflow pages start from, with everything set up.
+
+    python blender_scripts/examples.py [--output out/examples]
+
+Writes pins.blend, character.blend, animate.blend and stylize.blend, a folder of meshes, and dinosaur.obj.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "blender_scripts")]
+
+import bpy  # noqa: E402
+import child  # noqa: E402
+import menagerie  # noqa: E402
+import stage  # noqa: E402
+from mathutils import Vector  # noqa: E402
+
+MESHES = ("dinosaur", "dog", "lizard", "octopus", "mug", "chapel")
+HANDLES = {  # of animate.blend: place and half-extents
+    "Feet": ((0, -0.02, 0.14), (0.45, 0.26, 0.17)),
+    "Head": ((0, -0.72, 1.40), (0.28, 0.36, 0.30)),
+    "Tail": ((0, 1.27, 0.82), (0.16, 0.26, 0.18)),
+}
+LAST = 48  # frame; the motion repeats after it
+
+
+def figure(name, shape, turn):
+    """The shape as an object that stands on the floor, turned about the vertical by degrees."""
+    item = child.coloured(name, menagerie.load(shape))
+    item.rotation_euler.z = turn
+    item.location.z = -min(vertex.co.z for vertex in item.data.vertices)
+    return item
+
+
+def in_studio(shown, width=960, azimuth=55, elevation=10, around=()):
+    """Light, floor and camera, in a collection that no click selects."""
+    before = set(bpy.data.objects)
+    stage.set_up(shown, width=width, azimuth=azimuth, elevation=elevation, margin=0.06, around=around)
+    stage.brighten(1.4)
+    studio = bpy.data.collections.new("Studio")
+    bpy.context.scene.collection.children.link(studio)
+    for item in set(bpy.data.objects) - before:
+        for collection in item.users_collection:
+            collection.objects.unlink(item)
+        studio.objects.link(item)
+    studio.hide_select = True
+
+
+def chosen(item):
+    bpy.ops.object.select_all(action="DESELECT")
+    item.select_set(True)
+    bpy.context.view_layer.objects.active = item
+
+
+def pins():
+    """A creature without a rig."""
+    dinosaur = figure("Dinosaur", "dinosaur", 0)
+    in_studio([dinosaur], around=[(0, -1.15, 1.95), (0, 1.45, 1.5)])
+    chosen(dinosaur)
+
+
+def character():
+    """A rigged child with eyes, a shirt and hair, each an object of its own."""
+    made = child.build_scene()
+    in_studio([made.body], azimuth=18, elevation=6, around=[(-0.95, 0, 1.9), (0.95, 0, 1.9)])
+    chosen(made.body)
+
+
+def animate():
+    """A creature whose handles have keys."""
+    dinosaur = figure("Dinosaur", "dinosaur", 0)
+    empties = {name: handle(name, *place) for name, place in HANDLES.items()}
+    bpy.context.view_layer.update()
+    chosen(dinosaur)
+    for empty in empties.values():
+        empty.select_set(True)
+    bpy.ops.arapfields.add_handle()
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, LAST
+    half = 1 + LAST // 2
+    for name, turn, shift in (
+        ("Head", (-0.30, 0.10, 0.45), (0.10, 0.05, 0.22)),
+        ("Tail", (0.55, 0.0, -0.35), (-0.35, -0.15, 0.45)),
+    ):
+        empty = empties[name]
+        rest = empty.location.copy()
+        for frame, share in ((1, 0.0), (half, 1.0), (LAST + 1, 0.0)):
+            empty.location = rest + share * Vector(shift)
+            empty.rotation_euler = share * Vector(turn)
+            empty.keyframe_insert("location", frame=frame)
+            empty.keyframe_insert("rotation_euler", frame=frame)
+    scene.frame_set(1)
+    in_studio([dinosaur], around=[(0, -1.15, 1.9), (0, 1.5, 1.5)])
+    chosen(dinosaur)
+
+
+def handle(name, place, half):
+    empty = bpy.data.objects.new(name, None)
+    empty.empty_display_type, empty.location, empty.scale = "CUBE", place, half
+    bpy.context.collection.objects.link(empty)
+    return empty
+
+
+def stylize():
+    """A dog to be turned towards a solid."""
+    dog = figure("Dog", "dog", 0)
+    in_studio([dog], azimuth=40, around=[(0, -1.2, 1.7), (0, 0.9, 1.7)])
+    chosen(dog)
+
+
+SCENES = (pins, character, animate, stylize)
+
+
+def comfortable():
+    """Viewports that show the colours, through the camera, with the sidebar open."""
+    for screen in bpy.data.screens:
+        for area in screen.areas:
+            for space in area.spaces:
+                if space.type == "VIEW_3D":
+                    space.shading.color_type = "VERTEX"
+                    space.show_region_ui = True
+                    space.region_3d.view_perspective = "CAMERA"
+
+
+def write(folder):
+    """All of them; the files' names."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for scene in SCENES:
+        bpy.ops.wm.read_homefile(use_factory_startup=True)
+        stage.clear()
+        scene()
+        comfortable()
+        bpy.context.preferences.filepaths.save_version = 0
+        bpy.ops.wm.save_as_mainfile(
+            filepath=str((folder / f"{scene.__name__}.blend").resolve()), compress=True
+        )
+    (folder / "meshes").mkdir(exist_ok=True)
+    for name in MESHES:
+        export(menagerie.load(name), folder / "meshes" / f"{name}.ply")
+    export(menagerie.load("dinosaur"), folder / "dinosaur.obj")
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+
+
+def export(shape, path):
+    import trimesh
+
+    colours = (255 * shape.colours.clip(0, 1) ** (1 / 2.2)).astype("uint8")
+    mesh = trimesh.Trimesh(shape.vertices, shape.triangles, vertex_colors=colours, process=False)
+    mesh.export(path, **({"include_color": False, "header": None} if path.suffix == ".obj" else {}))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--output", type=Path, default=Path("out/examples"))
+    options = parser.parse_args(sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else None)
+    import addon
+
+    addon.register()
+    from demo import alone
+
+    with alone():
+        files = write(options.output)
+    print("\n".join(str(options.output / name) for name in files))
+
+
+if __name__ == "__main__":
+    import os
+
+    main()
+    sys.stdout.flush()
+    os._exit(0)  # bpy 4.5 may wait forever for a thread of its own while the process ends

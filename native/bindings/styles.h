@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "bindings/arguments.h"
+#include "bindings/arrays.h"
+#include "energies/style.h"
+#include "energies/styles.h"
+
+namespace arapfields::python {
+
+/// A style's name, preferred normals (k,3), or an ObjectStyle.
+inline Style as_style(const NormalsArgument& style, const std::string& name = "normals") {
+  if (py::isinstance<py::str>(style)) return preferred_normals(py::cast<std::string>(style));
+  if (py::isinstance<ObjectStyle>(style)) return py::cast<ObjectStyle>(style);
+  return as_points(style, name);
+}
+
+}  // namespace arapfields::python

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "energies/body.h"
+
+#include <algorithm>
+#include <string>
+
+#include "core/errors.h"
+
+namespace arapfields {
+
+template <class Scalar>
+BodyEnergy body_energy(JetView<const Scalar> jets, const Body<Scalar>& body, JetView<Scalar> cotangents) {
+  const Index n = jets.count;
+  const bool moves = body.inertia > 0.0;
+  require(
+      body.masses.size() == n && body.rest.rows() == n && (!moves || body.goal.rows() == n), "body",
+      std::to_string(body.masses.size()) + " masses",
+      "one, with a place at rest and a goal, for each of the " + std::to_string(n) + " samples is needed");
+  BodyEnergy energy;
+  if (n == 0) return energy;
+  const double share = 1.0 / static_cast<double>(n);
+  for (Index i = 0; i < n; ++i) {
+    const double mass = body.masses[i];
+    const Vec3 place = Eigen::Map<const Eigen::Vector3<Scalar>>(jets.at(0, i)).template cast<double>();
+    Vec3 slope = -share * mass * body.gravity;
+    energy.weight += slope.dot(place - body.rest.row(i).transpose().template cast<double>());
+    if (moves) {
+      const Vec3 way = place - body.goal.row(i).transpose().template cast<double>();
+      energy.inertia += 0.5 * body.inertia * share * mass * way.squaredNorm();
+      slope += body.inertia * share * mass * way;
+    }
+    if (body.ground_stiffness > 0.0) {
+      const double depth = std::max(0.0, body.ground - body.up.dot(place));
+      energy.ground += body.ground_stiffness * share * depth * depth;
+      slope -= 2.0 * body.ground_stiffness * share * depth * body.up;
+    }
+    if (cotangents.data != nullptr)
+      Eigen::Map<Eigen::Vector3<Scalar>>(cotangents.at(0, i)) += slope.template cast<Scalar>();
+  }
+  return energy;
+}
+
+#define ARAPFIELDS_BODY(Scalar) \
+  template BodyEnergy body_energy<Scalar>(JetView<const Scalar>, const Body<Scalar>&, JetView<Scalar>);
+ARAPFIELDS_BODY(float)
+ARAPFIELDS_BODY(double)
+
+}  // namespace arapfields

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/jets.h"
+
+namespace arapfields {
+
+/// What a body of mass m feels beside its own resistance, at samples (n): the inertia of an implicit time
+/// step, its weight, and a ground that it cannot pass.
+template <class Scalar>
+struct Body {
+  Eigen::VectorX<Scalar> masses;  ///< (n) none negative
+  PointsOf<Scalar> rest;          ///< (n,3) where the weight's potential is 0
+  PointsOf<Scalar> goal;          ///< (n,3) where the samples would go without forces
+  double inertia = 0.0;           ///< weight of the way from there; 0: none
+  Vec3 gravity = Vec3::Zero();    ///< force on a unit of mass
+  Vec3 up = Vec3::UnitZ();        ///< unit normal of the ground
+  double ground = 0.0;            ///< the ground's height along `up`
+  double ground_stiffness = 0.0;  ///< 0: no ground
+};
+
+struct BodyEnergy {
+  double inertia = 0.0;  ///< ½ inertia · mean m ‖f − goal‖²
+  double weight = 0.0;   ///< −mean m gravity·(f − rest)
+  double ground = 0.0;   ///< ground_stiffness · mean max(0, ground − up·f)²
+  double sum() const { return inertia + weight + ground; }
+};
+
+/// For jets of f at the samples; adds the cotangents of the sum on the value column (data may be null).
+template <class Scalar>
+ARAPFIELDS_EXPORT_TO_TESTS BodyEnergy body_energy(JetView<const Scalar> jets, const Body<Scalar>& body,
+                                                  JetView<Scalar> cotangents);
+
+}  // namespace arapfields

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <optional>
+
+#include "energies/gauss.h"
+#include "energies/object_style.h"
+
+namespace arapfields {
+
+/// What normals are to turn to: preferred ones (k,3), or what an object has in their direction.
+struct ARAPFIELDS_EXPORT Style {
+  Style(Points normals) : preferred(std::move(normals)) {}
+  Style(ObjectStyle of) : object(std::move(of)) {}
+
+  Points preferred;
+  std::optional<ObjectStyle> object;
+};
+
+/// A style at n samples.
+struct StyleAtSamples {
+  std::optional<GaussPreference> preference;  ///< none: targets
+  Points targets;                             ///< (n,3) unit normals that an object asks for; or none
+  Vector weights;                             ///< (n) how much each sample is to follow
+  double factor = 1.0;                        ///< of the style's weight
+
+  /// At samples with these rest normals (n,3). Of an object's style the sharpness says how little it is
+  /// smoothed; 0 is as 5. Throws InvalidInput as gauss_preference() does.
+  static StyleAtSamples of(const Style& style, PointsIn normals, double sharpness);
+  bool any() const { return preference.has_value() || targets.rows() > 0; }
+  /// Whether the normals are as they should be already: a sphere's style, or none.
+  bool idle(PointsIn normals) const;
+};
+
+/// gauss_energy of a preference, target_energy without one.
+template <class Scalar>
+double style_energy(JetView<const Scalar> jets, ConstPointsRef<Scalar> normals,
+                    const std::optional<GaussPreference>& preference, ConstPointsRef<Scalar> targets,
+                    const Eigen::Ref<const Eigen::VectorX<Scalar>>& sample_weights, double weight,
+                    JetView<Scalar> cotangents) {
+  if (preference) return gauss_energy<Scalar>(jets, normals, sample_weights, *preference, weight, cotangents);
+  return target_energy<Scalar>(jets, normals, targets, sample_weights, weight, cotangents);
+}
+
+/// What reports call the preference: the mean of g, or the mean of ñ·t, from style_energy() with weights 1.
+inline double preference_of(const std::optional<GaussPreference>& preference, double style_energy) {
+  return 1.0 - (preference ? 1.0 : 0.5) * style_energy;
+}
+
+}  // namespace arapfields

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What POSIX systems and Windows call differently about files. Descriptors are the C library's; where the
+// system refuses, the answer is −1 or false, and errno says why.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+
+namespace arapfields::system_file {
+
+/// For reading; never waits for the other end of a pipe. A folder is refused by EISDIR.
+int open_to_read(const std::filesystem::path& path);
+/// A new file, which nobody had before.
+int create(const std::filesystem::path& path);
+/// What has been written there, to be looked at and brought to the disk; no link is followed.
+int open_written(const std::filesystem::path& path);
+void close_file(int file) noexcept;
+
+bool is_regular(int file);
+std::uint64_t size(int file);
+/// Bytes that came; 0 at the end of the file.
+std::ptrdiff_t read_at(int file, void* to, std::size_t bytes, std::uint64_t offset);
+std::ptrdiff_t append(int file, const void* from, std::size_t bytes);
+bool to_disk(int file);
+/// Gives the file the permissions and, where we may, the owner of the one at `path`, if there is one.
+bool take_permissions(int file, const std::filesystem::path& path);
+
+bool may_write(const std::filesystem::path& path);
+/// In one step, in place of what may be there.
+bool replace(const std::filesystem::path& from, const std::filesystem::path& to);
+/// For us alone where the system knows such folders; EEXIST where there is something of the name.
+bool make_folder(const std::filesystem::path& folder);
+/// A lock on a folder that ends with the process: to be closed. EWOULDBLOCK where another holds it, or the
+/// folder is gone or someone else's.
+int lock_folder(const std::filesystem::path& folder);
+/// The same descriptor without the lock, where the file system has no locks.
+int hold_folder(const std::filesystem::path& folder);
+/// The folder's entries, as far as its file system can.
+void folder_to_disk(const std::filesystem::path& folder);
+
+}  // namespace arapfields::system_file

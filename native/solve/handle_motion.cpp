@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "solve/handle_motion.h"
+
+#include <Eigen/Geometry>
+
+namespace arapfields {
+namespace {
+
+/// Of a line, which has no turn about itself, and of a point: a share of the inertia, and a size squared.
+constexpr double thinnest = 1e-6, smallest = 1e-12;
+/// How far a motion may be from a rotation to be turned as one.
+constexpr double rotation_error = 1e-6;
+
+bool is_rotation(const Mat3& m) {
+  return (m.transpose() * m - Mat3::Identity()).norm() < rotation_error && m.determinant() > 0.0;
+}
+
+Mat3 linear_between(const Mat3& a, const Mat3& b, double share) {
+  if (!is_rotation(a) || !is_rotation(b)) return (1.0 - share) * a + share * b;
+  return Eigen::Quaterniond(a).slerp(share, Eigen::Quaterniond(b)).toRotationMatrix();
+}
+
+}  // namespace
+
+RowMatrix<double> Twist::of(const RowMatrix<double>& coefficients, Index centers) const {
+  Mat3 cross;
+  cross << 0.0, -turn.z(), turn.y(), turn.z(), 0.0, -turn.x(), -turn.y(), turn.x(), 0.0;
+  RowMatrix<double> result = coefficients * cross.transpose();
+  result.row(centers) += velocity.transpose();
+  return result;
+}
+
+Twist twist_between(const Points& from, const Points& to, const Vector& weights, double seconds) {
+  Twist twist;
+  const double total = weights.sum();
+  if (from.rows() == 0 || !(total > 0.0)) return twist;
+  const Points middle = 0.5 * (from + to), ways = (to - from) / seconds;
+  const Vec3 center = middle.transpose() * weights / total, mean = ways.transpose() * weights / total;
+  Mat3 inertia = Mat3::Zero();
+  Vec3 moment = Vec3::Zero();
+  for (Index i = 0; i < middle.rows(); ++i) {
+    const Vec3 arm = middle.row(i).transpose() - center;
+    inertia += weights[i] / total * (arm.squaredNorm() * Mat3::Identity() - arm * arm.transpose());
+    moment += weights[i] / total * arm.cross(ways.row(i).transpose() - mean);
+  }
+  inertia += (thinnest * inertia.trace() + smallest) * Mat3::Identity();
+  twist.turn = inertia.ldlt().solve(moment);
+  twist.velocity = mean - twist.turn.cross(center);
+  return twist;
+}
+
+std::vector<Mat4> motions_of(const BoundHandles& handles) {
+  std::vector<Mat4> motions;
+  for (Index i = 0; i < handles.count(); ++i) motions.push_back(handles.motion(i));
+  return motions;
+}
+
+Points targets_between(const BoundHandles& handles, const std::vector<Mat4>& before, double share,
+                       const std::vector<Index>& rows) {
+  Points targets(static_cast<Index>(rows.size()), 3);
+  Index row = 0;
+  for (Index i = 0; i < handles.count(); ++i) {
+    const Index begin = handles.begin(i), end = handles.begin(i + 1);
+    const Vec3 pivot = handles.sources().middleRows(begin, end - begin).colwise().mean();
+    const Mat4 &a = before[static_cast<std::size_t>(i)], &b = handles.motion(i);
+    const Mat3 linear = linear_between(a.topLeftCorner<3, 3>(), b.topLeftCorner<3, 3>(), share);
+    const Vec3 from = a.topLeftCorner<3, 3>() * pivot + a.topRightCorner<3, 1>();
+    const Vec3 to = b.topLeftCorner<3, 3>() * pivot + b.topRightCorner<3, 1>();
+    const Vec3 middle = (1.0 - share) * from + share * to;
+    for (; row < targets.rows() && rows[static_cast<std::size_t>(row)] < end; ++row) {
+      const Vec3 source = handles.sources().row(rows[static_cast<std::size_t>(row)]);
+      targets.row(row) = middle + linear * (source - pivot);
+    }
+  }
+  return targets;
+}
+
+}  // namespace arapfields

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a live solver knows of its surface as a body that moves.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "solve/handle_motion.h"
+#include "solve/secondary_motion.h"
+
+namespace arapfields {
+
+struct LiveBody {
+  std::optional<SecondaryMotion> asked;  // `up` of length 1
+  Vector masses;                         // of the samples that the energy sees
+  RowMatrix<double> velocities;          // of the coefficients; empty: at rest
+  std::vector<Mat4> motions;      // of the handles where the last step or solve ended; empty: not known
+  double factored_inertia = 0.0;  // in the preconditioner
+
+  /// Mass at strength 1, in seconds²/cube unit² against the energy of the surface.
+  static constexpr double unit_mass = 1.0 / 300.0;
+  bool has_mass() const { return asked && asked->options.strength > 0.0; }
+  double mass() const { return unit_mass * asked->options.strength; }
+};
+
+}  // namespace arapfields

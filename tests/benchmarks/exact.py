@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Exact handles: their energy against the least under the same constraints.
+
+The oracle eliminates the constraints: among the fields of a radial basis of many centers, those that meet
+them are c₀ + N z, with N an orthonormal basis of the null space, and L-BFGS finds the z of least energy, in
+double precision and from a soft solution. Two kinds of constraints, at points of the surface in the boxes:
+where they go, and that together with how their surroundings turn, as whole boxes that move ask.
+"""
+
+import numpy as np
+from scipy import linalg, optimize
+
+import arapfields as af
+from arapfields._native import testing
+
+from . import shapes
+from .shapes import cases
+
+CENTERS = 1200  # of the oracle's fine scale
+SAMPLES_A_CENTER = 8
+FRESH, FRESH_SEED = 20_000, 7
+MOST_POINTS = {"places": 300, "boxes": 90}  # a handle
+NEGLIGIBLE = 1e-9  # of the largest singular value of the constraints
+STEPS = 120
+SINGLE = 1e-7  # what single precision leaves of the largest curvature
+VALUE, FIRST, SECOND = 1, 4, 10  # columns of jets
+
+
+def inside(handle, points):
+    local = (points - handle.rest[:3, 3]) @ np.linalg.inv(handle.rest[:3, :3]).T
+    return np.abs(local).max(1) <= 1
+
+
+def energy_of(jets, bending):
+    """Mean energy of jets (10, n, 3), and its cotangents."""
+    return testing.arap_energy_by_points(np.ascontiguousarray(jets), 1.0, np.ones(len(bending)), bending)
+
+
+def energy_at(field, points, bending):
+    return energy_of(testing.field_jets(field, points, SECOND), bending)[0]
+
+
+class Oracle:
+    """Least energies under constraints, of surface samples whose frame is the identity."""
+
+    def __init__(self, samples, handles, fresh, seed=0):
+        self.handles, self.rng = handles, np.random.default_rng(seed)
+        options = af.DeformOptions(field="radial", centers=CENTERS, handle_weight=1e4)
+        self.soft = af.deform(samples, handles, options)
+        size = self.soft.centers + 4
+        chosen = self.rng.choice(
+            len(samples.points), min(len(samples.points), SAMPLES_A_CENTER * size), False
+        )
+        self.points = samples.points
+        self.bending = testing.bending(samples, options)[chosen]
+        self.rows = testing.radial_rows(self.soft, samples.points[chosen], SECOND).astype(np.float32)
+        self.fresh, self.fresh_bending = fresh.points, testing.bending(fresh, options)
+        # Of the soft solution: its values and slopes decide them.
+        wanted = testing.field_jets(self.soft, samples.points[chosen], SECOND)[:4].reshape(-1, 3)
+        known = self.rows[: len(wanted)].astype(float)
+        normal = known.T @ known
+        normal[np.diag_indices_from(normal)] += 1e-9 * np.diag(normal).mean()
+        self.start = linalg.solve(normal, known.T @ wanted, assume_a="pos")
+
+    def constraints(self, kind):
+        """Rows (k, size) and their targets (k, 3)."""
+        rows, targets = [], []
+        for handle in self.handles:
+            members = self.points[inside(handle, self.points)]
+            taken = self.rng.choice(len(members), min(len(members), MOST_POINTS[kind]), False)
+            points, motion = np.ascontiguousarray(members[taken]), handle.motion
+            order = VALUE if kind == "places" else FIRST
+            rows.append(testing.radial_rows(self.soft, points, order))
+            targets.append(points @ motion[:3, :3].T + motion[:3, 3])
+            for k in range(order - 1):
+                targets.append(np.tile(motion[:3, k], (len(points), 1)))
+        return np.concatenate(rows), np.concatenate(targets)
+
+    def least(self, kind):
+        """Energy at fresh samples, and the largest violation of a constraint."""
+        rows, targets = self.constraints(kind)
+        left, values, right = linalg.svd(rows, full_matrices=True)
+        rank = int((values > NEGLIGIBLE * values[0]).sum())
+        fixed = right[:rank].T @ ((left[:, :rank].T @ targets) / values[:rank, None])
+        free = right[rank:].T
+        count = len(self.bending)
+        basis = (self.rows @ free.astype(np.float32)).reshape(SECOND, count, -1)
+        offset = (self.rows.astype(float) @ fixed).reshape(SECOND, count, 3)
+        # Whitened by the energy's second derivatives at rest.
+        scale = np.array([1, 1, 1, 1, 1, 1, 2, 2, 2], np.float32)[:, None] * np.ones(count, np.float32)
+        scale[3:] *= self.bending
+        weighted = (np.sqrt(scale / count)[..., None] * basis[1:]).reshape(-1, free.shape[1])
+        gram = 2 * (weighted.T @ weighted).astype(float)
+        curvatures, axes = linalg.eigh(gram)
+        roots = np.sqrt(np.maximum(curvatures, SINGLE * curvatures[-1]))
+        whitened = axes / roots
+        del weighted
+        flat = basis[1:].reshape(-1, free.shape[1])
+
+        def loss(y):
+            z = whitened @ y.reshape(-1, 3)
+            jets = offset.copy()
+            jets[1:] += (flat @ z.astype(np.float32)).reshape(SECOND - 1, count, 3)
+            energy, cotangents = energy_of(jets, self.bending)
+            pulled = flat.T @ cotangents[1:].reshape(-1, 3).astype(np.float32)
+            return energy, (whitened.T @ pulled).ravel()
+
+        start = (roots[:, None] * (axes.T @ (free.T @ (self.start - fixed)))).ravel()
+        found = optimize.minimize(loss, start, jac=True, method="L-BFGS-B", options={"maxiter": STEPS})
+        c = fixed + free @ (whitened @ found.x.reshape(-1, 3))
+        total = 0.0
+        for part in np.array_split(np.arange(len(self.fresh)), 20):
+            jets = testing.radial_rows(self.soft, self.fresh[part], SECOND) @ c
+            total += len(part) * energy_of(jets.reshape(SECOND, -1, 3), self.fresh_bending[part])[0]
+        return total / len(self.fresh), float(np.abs(rows @ c - targets).max()), found
+
+
+def random_pair(points, seed):
+    """A box about one place of the surface that stays, and one about another that turns and moves."""
+    rng = np.random.default_rng(seed)
+    a, b = points[rng.integers(len(points), size=2)]
+    while np.abs(a - b).max() < 0.6:
+        a, b = points[rng.integers(len(points), size=2)]
+    extents = rng.uniform(0.12, 0.25, (2, 3))
+    motion = cases.turn(rng.normal(size=3), rng.uniform(20, 50), b)
+    motion[:3, 3] += rng.uniform(-0.1, 0.1, 3)
+    held, moved = (cases.box(c - e, c + e) for c, e in zip((a, b), extents, strict=True))
+    return [cases.moved(held), cases.moved(moved, motion)]
+
+
+def row(what, samples, fresh, handles):
+    field = af.deform(samples, handles, af.DeformOptions(exact_handles=True))
+    bending = testing.bending(fresh, af.DeformOptions())
+    exact = energy_at(field, fresh.points, bending)
+    oracle = Oracle(samples, handles, fresh)
+    result = {
+        "what": what,
+        "energy": round(exact, 5),
+        "handle_error": field.report.handle_error_max,
+        "soft_energy": round(energy_at(oracle.soft, fresh.points, bending), 5),
+    }
+    for kind in MOST_POINTS:
+        least, violation, found = oracle.least(kind)
+        result |= {
+            f"least_{kind}": round(least, 5),
+            f"over_{kind}": round(exact / least, 3),
+            f"violation_{kind}": violation,
+            f"steps_{kind}": found.nit,
+        }
+    return result
+
+
+def run(pairs=10):
+    bar, fresh_bar = (cases.bar_samples(count, seed) for count, seed in ((20_000, 0), (FRESH, FRESH_SEED)))
+    rows = [row("bar", bar, fresh_bar, cases.bar_handles())]
+    bunny, fresh = (
+        shapes.samples("bunny"),
+        af.sample_surface(shapes.sdf("bunny"), count=FRESH, seed=FRESH_SEED),
+    )
+    rows.append(row(shapes.label("bunny"), bunny, fresh, shapes.handles("bunny", shapes.FULL)))
+    for seed in range(pairs):
+        rows.append(row(f"random pair {seed}", bunny, fresh, random_pair(bunny.points, seed)))
+    return rows

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Deform and Stylize pressed while an object is live: they take the pose, live mode ends by itself."""
+
+import pytest
+from inside import in_blender
+
+FINE = 0.03  # of the bar, by which a live shape and the solve of its pose may differ
+
+
+def lifted(target="MODIFIER"):
+    """(bar, its points at rest): live, its end lifted and the shape there."""
+    import bpy
+    import scenes
+    from test_live import step
+
+    bar, _, moving = scenes.bar_with_handles()
+    bar.arapfields.target = target
+    rest = scenes.world_points(bar)
+    bpy.ops.arapfields.live()
+    moving.location.z += 0.4
+    step(refined=True)
+    scenes.activate(bar)
+    return bar, rest
+
+
+@pytest.mark.parametrize("target", ["MODIFIER", "NEW", "REPLACE", "KEY"])
+@in_blender
+def test_deform_takes_the_live_pose(target):
+    import bpy
+    import numpy as np
+    import scenes
+    from test_live_gives_way import FINE, lifted
+
+    from addon.deform.solve_job import placement_refusal
+    from addon.live import sessions
+
+    bar, rest = lifted(target)
+    assert placement_refusal(bar) is None
+    live = scenes.world_points(bar if target != "NEW" else bpy.data.objects["Bar_live"])
+    assert bpy.ops.arapfields.deform() == {"FINISHED"}
+    bpy.context.view_layer.update()
+    assert not sessions.live and not bar.arapfields.live_kind
+    result = bpy.data.objects["Bar_deformed"] if target == "NEW" else bar
+    shape = scenes.world_points(result)
+    assert np.abs(shape - live).max() < FINE and shape[:, 2].max() > 0.5
+    assert [m.name for m in bar.modifiers] == (["ARAP Fields"] if target == "MODIFIER" else [])
+    assert "Bar_live" not in bpy.data.objects and len(shape) == len(rest)
+
+
+@in_blender
+def test_stylize_works_on_the_rest_shape_of_what_is_live():
+    import bpy
+    import scenes
+    from test_live_gives_way import lifted
+
+    from addon.live import sessions
+
+    bar, rest = lifted()
+    bpy.ops.arapfields.stylize(style="CUBE", **scenes.QUICK)
+    bpy.context.view_layer.update()
+    assert not sessions.live and not bar.arapfields.live_kind
+    lift = scenes.world_points(bar)[:, 2].max() - rest[:, 2].max()
+    assert abs(lift) < 0.2  # which is the handles' alone
+
+
+@in_blender
+def test_a_job_that_is_cancelled_leaves_the_live_shape():
+    import bpy
+    import numpy as np
+    import scenes
+    import stages
+    from test_live_gives_way import lifted
+
+    from addon.core.runtime import jobs
+    from addon.live import sessions
+
+    bar, _ = lifted()
+    live = scenes.world_points(bar)
+    present = stages.Stage("job")
+    present.start(present.operator())
+    assert not sessions.live
+    jobs.stop()
+    present.coroutine.close()
+    bpy.context.view_layer.update()
+    assert np.array_equal(scenes.world_points(bar), live) and not bar.arapfields.live_kind
+    bpy.ops.arapfields.live()  # and goes on from there
+    assert sessions.is_live(bar)
+
+
+@in_blender
+def test_pins_are_dragged_again_after_deform():
+    import bpy
+    import numpy as np
+    import scenes
+    from test_live import step
+
+    from addon.live import sessions
+    from addon.pin_tool import drag
+
+    bar = scenes.bar()
+    bpy.ops.ed.undo_push(message="bar")
+    dragged = drag.of_new_pin(bpy.context, bar, np.array([0.9, -0.25, 0.0]), 0.1)
+    dragged.move(bpy.context, (0.9, -0.25, 0.4))
+    step()
+    dragged.end(bpy.context)
+    live = scenes.world_points(bar)
+    bpy.ops.ed.undo_push(message="drag")
+    scenes.activate(bar)
+    assert bpy.ops.arapfields.deform() == {"FINISHED"}
+    bpy.ops.ed.undo_push(message="deform")
+    assert not sessions.live and np.abs(scenes.world_points(bar) - live).max() < 0.1
+    empty = bar.arapfields.handles[0].empty
+    again = drag.of_entry(bpy.context, bar, bar.arapfields.handles[0])
+    again.move(bpy.context, empty.location)
+    step()
+    again.end(bpy.context)
+    assert sessions.is_live(bar)
+    bpy.ops.ed.undo()
+    bpy.context.view_layer.update()
+    assert np.abs(scenes.world_points(bpy.data.objects["Bar"]) - live).max() < 1e-6

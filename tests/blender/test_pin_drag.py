@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is seen of a drag with the pin tool while it goes on."""
+
+from inside import in_blender
+
+
+@in_blender
+def test_the_shape_moves_with_the_pin_in_the_same_picture():
+    import bpy
+    import numpy as np
+    import scenes
+
+    from addon.live import sessions
+    from addon.pin_tool import drag
+
+    bar = scenes.bar()
+    dragged = drag.of_new_pin(bpy.context, bar, np.array([0.9, -0.25, 0.0]), 0.1)
+    sessions.update(bpy.context, wait=30)
+    moved = []
+    for height in (0.1, 0.2, 0.3, 0.4):
+        before = scenes.world_points(bar)
+        dragged.move(bpy.context, (0.9, -0.25, height))
+        moved.append(float(np.abs(scenes.world_points(bar) - before).max()))
+    assert sum(way > 0.02 for way in moved) >= 3, moved  # a busy machine may be late for one
+    dragged.cancel(bpy.context)

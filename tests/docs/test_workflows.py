@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The steps of the workflow pages, by each page's own script on the scene that make examples writes."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pages
+import pytest
+
+WORKFLOWS = pages.ROOT / "docs" / "workflows"
+HERE = Path(__file__).parent
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """A folder with out/examples."""
+    folder = tmp_path_factory.mktemp("workflows")
+    command = [sys.executable, str(pages.ROOT / "blender_scripts/examples.py"), "--output", "out/examples"]
+    made = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    assert made.returncode == 0, made.stderr[-3000:]
+    return folder
+
+
+def follow(page, place):
+    """Runs the page's script, then the check of its name below."""
+    command = [sys.executable, str(Path(__file__)), str(WORKFLOWS / f"{page}.md")]
+    there = {**os.environ, "PWD": str(place)}  # what Blender takes for the folder it is in
+    run = subprocess.run(command, cwd=place, env=there, capture_output=True, text=True)
+    assert run.returncode == 0, run.stdout[-2000:] + run.stderr[-4000:]
+
+
+def seen(name):
+    """(at rest, as shown) of an object's points."""
+    import bpy
+
+    item = bpy.data.objects[name]
+    mesh = item.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    return [np.array([vertex.co for vertex in data.vertices]) for data in (item.data, mesh)]
+
+
+def pins():
+    rest, now = seen("Dinosaur")
+    off, size = np.linalg.norm(now - rest, axis=1), np.ptp(rest[:, 2])
+    feet = (rest[:, 2] < 0.08 * size) & (np.abs(rest[:, 1] - 0.02) < 0.1)
+    head = (rest[:, 1] < -0.7) & (rest[:, 2] > 1.3)
+    assert off[feet].max() < 0.02 * size and off[head].min() > 0.1 * size, (off[feet].max(), off[head].min())
+
+
+def character():
+    rest, now = seen("Body")
+    hand = rest[:, 0] > 0.75
+    assert (now - rest)[hand, 2].mean() > 0.2
+    rest_shirt, shirt = (points[: len(seen("Shirt")[0])] for points in seen("Shirt"))
+    assert np.linalg.norm(shirt - rest_shirt, axis=1).max() > 0.05
+    assert len(__import__("bpy").data.objects["Body"].arapfields.carried) == 4
+
+
+def animate():
+    import bpy
+
+    assert Path("out/examples/dinosaur.abc").stat().st_size > 100_000
+    assert len(list(Path("out/examples/cache").glob("*.pc2"))) == 1
+    bpy.context.scene.frame_set(25)
+    rest, now = seen("Dinosaur")
+    assert np.linalg.norm(now - rest, axis=1).max() > 0.2
+
+
+def stylize():
+    rest, now = seen("Dog")
+    assert len(rest) == len(now) and np.linalg.norm(now - rest, axis=1).max() > 0.05
+
+
+def python():
+    import trimesh
+
+    raised = trimesh.load("raised.obj", process=False).vertices
+    assert raised[:, 2].max() > 1.75
+
+
+CHECKS = {check.__name__: check for check in (pins, character, animate, stylize, python)}
+
+
+@pytest.mark.slow  # the scenes and a bake take some ten seconds each
+@pytest.mark.parametrize("page", CHECKS)
+def test_the_steps_lead_where_the_page_says(page, place):
+    follow(page, place)
+
+
+@pytest.mark.slow
+def test_the_batch_does_the_folder_and_goes_on(place):
+    command = "blender_scripts/batch.py --style cube --input out/examples/meshes --output out/cubic"
+    (word,) = [
+        line
+        for line in (WORKFLOWS / "batch.md").read_text().splitlines()
+        if line.strip().startswith("python")
+    ]
+    assert command in word
+    call = [sys.executable, str(pages.ROOT / "blender_scripts/batch.py"), *word.split()[2:]]
+    for told in ("6 done", "6 skipped"):
+        run = subprocess.run(call, cwd=place, capture_output=True, text=True)
+        assert run.returncode == 0 and told in run.stdout, run.stdout[-2000:] + run.stderr[-2000:]
+    assert len(list((place / "out/cubic").glob("*.ply"))) == 6
+
+
+def test_each_workflow_has_a_picture_and_starts_from_what_is_shipped():
+    for page in WORKFLOWS.glob("*.md"):
+        if page.stem not in ("index", "python", "cpp"):
+            assert "gallery/workflow-" in page.read_text()
+        assert "make examples" in page.read_text()
+
+
+def main(page):
+    sys.path[:0] = [str(HERE), str(pages.ROOT)]
+    if "import bpy" in page.read_text():
+        import bpy  # noqa: F401
+
+        import addon
+
+        addon.register()
+    names = {}
+    for line, code in pages.python_blocks(page):
+        exec(compile("\n" * (line - 1) + code, pages.name(page), "exec"), names)
+    CHECKS[page.stem]()
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
+    sys.stdout.flush()
+    os._exit(0)  # bpy 4.5 may wait forever for a thread of its own while the process ends

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rounds of undo and redo with the pin tool in hand: after drags, right after and during them, Esc in others.
+
+Each state is compared with what it was, bit for bit: names of all that is in the file, positions, places, the
+handles and the shape.
+"""
+
+import bpy
+import stage
+from mouse import drag, is_dragging, pixel, release, until
+from pins import END, set_stage, state
+
+ROUNDS = 100
+STRIDE = 10  # rounds from one print to the next
+
+
+def checks(found, folder):
+    bpy.context.preferences.system.viewport_aa = "OFF"  # it is the steps that are looked at
+    bar = set_stage()
+    yield 0.5
+    before, spot = state(), pixel(END)
+    yield from drag(spot, (spot[0], spot[1] - 100))
+    after = state()
+    kinds = {name: set(getattr(bpy.data, name).keys()) for name in KINDS}
+    yield from rested(found, before, after)
+    yield from within(found, after)
+    yield from escaped(found, after)
+    for name, names in kinds.items():
+        found[f"undo_stray_{name}"] = sorted(set(getattr(bpy.data, name).keys()) - names)
+    stage.picture(folder, "undo")
+    stage.tool("key", "ctrl+z")
+    yield from until(lambda: state() == before, 5.0)
+    found["undo_to_the_start"] = state() == before
+    bar = bpy.data.objects["Bar"]
+    found["undo_leaves"] = [item.name for item in bpy.data.objects], [m.name for m in bar.modifiers]
+
+
+KINDS = ("objects", "meshes", "node_groups", "scenes", "collections")
+
+
+def told(found, name, exact):
+    found[f"undo_{name}"] = {"exact": sum(exact), "of": len(exact)}
+    if len(exact) % (2 * STRIDE) == 0:
+        print(name, found[f"undo_{name}"], flush=True)
+
+
+def rested(found, before, after):
+    """Undo and redo of a drag that has come to rest."""
+    exact = []
+    for _ in range(ROUNDS):
+        for key, wanted in (("ctrl+z", before), ("ctrl+shift+z", after)):
+            stage.tool("key", key)
+            yield from until(lambda wanted=wanted: state() == wanted, 5.0)
+            exact.append(state() == wanted)
+            told(found, "after_drags", exact)
+
+
+def within(found, after):
+    """Keys pressed while the button is down go nowhere; undo right after the release takes that drag back,
+    redo brings it again, and undo takes it back."""
+    exact = []
+    for number in range(ROUNDS):
+        spot = pixel(bpy.data.objects["Bar"].arapfields.handles[0].empty.location)
+        end = spot[0] + (-1) ** number * 20, spot[1] + 10 * (-1) ** number
+        yield from drag(spot, end, steps=3, pause=0.03, hold=True)
+        held = is_dragging()
+        stage.tool("key", "ctrl+z")
+        yield 0.05
+        stage.tool("key", "ctrl+shift+z")
+        yield 0.05
+        held = held and is_dragging()
+        stage.tool("mouseup", 1)
+        yield 0.05 * (number % 4)  # also before the shape has come to rest
+        stage.tool("key", "ctrl+z")
+        yield from until(lambda: state() == after and not is_dragging(), 5.0)
+        exact.append(held and state() == after)
+        told(found, "within_drags", exact)
+        stage.tool("key", "ctrl+shift+z")
+        yield from until(lambda: state() != after, 5.0)
+        again = state()
+        stage.tool("key", "ctrl+z")
+        yield from until(lambda: state() == after, 5.0)
+        exact.append(again != after and len(bpy.data.objects) == 2 and state() == after)
+        told(found, "within_drags", exact)
+
+
+def escaped(found, after):
+    """Esc in the midst of a drag."""
+    exact = []
+    for number in range(ROUNDS):
+        spot = pixel(bpy.data.objects["Bar"].arapfields.handles[0].empty.location)
+        end = spot[0] - 30 + number % 7 * 10, spot[1] + 25
+        yield from drag(spot, end, steps=3, pause=0.03, hold=number % 2 == 0)
+        if number % 2 == 0:
+            stage.tool("key", "Escape")
+            yield from release()
+        else:
+            stage.tool("key", "ctrl+z")
+        yield from until(lambda: state() == after, 5.0)
+        exact.append(state() == after)
+        told(found, "escaped", exact)

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What can be checked of Windows without one: all but the torch sources by mingw-w64, their tests by Wine."""
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+TOOLS = ("x86_64-w64-mingw32-g++-posix", "make")
+WINE = shutil.which("wine64") or shutil.which("/usr/lib/wine/wine64")
+POSIX = re.compile(r"#include <(sys/|unistd|fcntl|pthread|dlfcn|sched|poll|dirent)")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    not all(map(shutil.which, TOOLS)) or not WINE, reason="mingw-w64 or Wine is not installed"
+)
+def test_the_parts_without_torch_pass_under_wine():
+    done = subprocess.run(["make", "test-windows"], cwd=ROOT, capture_output=True, text=True)
+    said = done.stdout + done.stderr
+    assert done.returncode == 0, said[-4000:]
+    assert "No errors detected" in said
+
+
+def test_posix_stands_only_where_windows_has_a_twin():
+    """By the files that include its headers: of each there is another one for Windows, or a branch within."""
+    for path in sorted((ROOT / "native").rglob("*.[ch]*")):
+        text = path.read_text(encoding="utf-8") if path.suffix in (".cpp", ".h") else ""
+        if POSIX.search(text) and not path.stem.endswith("_windows"):
+            twin = path.with_name(path.name.replace("_posix", "_windows"))
+            assert "_WIN32" in text or (twin != path and twin.is_file()), path
+
+
+def test_python_names_the_encoding_of_every_text_file():
+    """Windows' default is not UTF-8."""
+    for folder in ("native/python/arapfields", "addon"):
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            text = path.read_text(encoding="utf-8")
+            for match in re.finditer(r"\.(?:read_text|write_text)\(", text):
+                call = text[match.start() : text.find("\n", match.start()) + 120]
+                assert "encoding=" in call, f"{path}: {call.splitlines()[0]}"
+            assert not re.search(r"^\s*import fcntl", text.split("else:")[0], flags=re.M), path

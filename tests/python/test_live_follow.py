@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Following a drag: shapes without fields, few steps each, and solves that are cancelled."""
+
+import threading
+
+import numpy as np
+import pytest
+from bar import LEFT, RIGHT, bar_samples, turned
+from tolerances import LIVE_KEEPS_UP
+
+import arapfields as af
+
+
+@pytest.fixture(scope="module")
+def samples():
+    return bar_samples()
+
+
+def deformer(surface):
+    quick = af.LiveOptions(samples=800, coarse_centers=30, fine_centers=120)
+    return af.LiveDeformer(surface, [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)], quick)
+
+
+def test_following_is_solving_without_a_field(samples):
+    solved, followed = deformer(samples), deformer(samples)
+    points = samples.points[:200]
+    for live in (solved, followed):
+        live.track(points)
+    for degrees in (10, 25, 40):
+        field = solved.solve([LEFT, turned(degrees) @ RIGHT])
+        taken = followed.follow([LEFT, turned(degrees) @ RIGHT])
+        assert taken == field.report.iterations > 0
+        assert np.array_equal(solved.tracked(), followed.tracked())
+    a, b = solved.report.to_dict(), followed.report.to_dict()
+    assert {k: v for k, v in a.items() if "seconds" not in k} == {
+        k: v for k, v in b.items() if "seconds" not in k
+    }
+    with pytest.raises(af.InvalidInput, match="iterations"):
+        followed.follow(iterations=-1)
+
+
+def test_three_steps_a_pose_keep_up_with_a_drag(samples):
+    """Each begins where the last one ended: they are behind by a part of what one step of it moves."""
+    points = samples.points[::40]
+    fine, live = deformer(samples), deformer(samples)
+    behind, steps, before = [], [], points
+    for degrees in range(2, 62, 2):
+        pose = [LEFT, turned(degrees) @ RIGHT]
+        best = fine.solve(pose, iterations=100, tolerance=1e-6)(points)
+        live.follow(pose, iterations=3)
+        behind.append(np.abs(live.field(points) - best).max())
+        steps.append(np.abs(best - before).max())
+        before = best
+    assert np.mean(behind) < LIVE_KEEPS_UP * np.mean(steps)
+
+
+def test_a_solve_goes_on_rightly_after_one_that_was_cancelled(samples):
+    """Between two steps the coefficients have moved: what was measured before must not serve again."""
+    live = af.LiveDeformer(
+        samples, [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)], af.LiveOptions(samples=6000)
+    )
+    live.solve()
+    task = af.Task()
+
+    def cancel():
+        while task.progress < 2 / 400:
+            pass
+        task.cancel()
+
+    watcher = threading.Thread(target=cancel)
+    watcher.start()
+    with pytest.raises(af.Cancelled):
+        while True:
+            for degrees in (60, -60):
+                live.solve([LEFT, turned(degrees) @ RIGHT], iterations=400, tolerance=1e-4, task=task)
+    watcher.join()
+    field = live.solve([LEFT, turned(40) @ RIGHT], tolerance=1e-4)
+    stretch, _ = af.arap_energy(field, samples.points)
+    assert field.report.stretch == pytest.approx(stretch, rel=0.05)

@@ -1,0 +1,250 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Secondary motion on a bar that is held at one end: how it swings does not depend on how it is solved."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+import torch
+from bar import LEFT, RIGHT, bar_samples, box, turned
+from energy_oracles import gradient_of
+from tolerances import FLOAT32_ENERGY, FLOAT64_GRADIENT
+
+import arapfields as af
+from arapfields._native import testing
+
+QUICK = {"samples": 600, "coarse_centers": 20, "fine_centers": 80}
+TIP = np.array([[2.0, 0.0, 0.0]])
+# The agreed limits: of the total energy's rise, and of changes of period and decay.
+ENERGY_RISE, ALIKE = 0.01, 0.05
+# Of a rate of decay against what was asked for: energy falls in turns, as it is kinetic or not.
+DECAY = 0.15
+
+
+@pytest.fixture(scope="module")
+def samples():
+    return bar_samples(3000)
+
+
+def released(samples, angle=35.0, further=(), **options):
+    """A bar that was bent by so many degrees, and of which one end is let go."""
+    live = af.LiveDeformer(
+        samples, [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)], af.LiveOptions(**(QUICK | options))
+    )
+    live.solve([LEFT, turned(angle) @ RIGHT], iterations=300, tolerance=1e-6)
+    live.set_handles([af.Cuboid(LEFT, LEFT)])
+    live.set_secondary_motion(af.SecondaryMotionOptions(**({"damping": 0.0} | dict(further))))
+    return live
+
+
+def held(samples, **options):
+    """A bar of which one end is held."""
+    return af.LiveDeformer(samples, [af.Cuboid(LEFT, LEFT)], af.LiveOptions(**(QUICK | options)))
+
+
+def swung(live, seconds, rate):
+    """(times, heights of the tip, total energies) at so many steps a second."""
+    heights, energies = [live.field(TIP)[0, 2]], []
+    for _ in range(round(seconds * rate)):
+        heights.append(live.step([LEFT], 1 / rate)(TIP)[0, 2])
+        energies.append(live.report.value + live.report.kinetic)
+    return np.arange(len(heights)) / rate, np.array(heights), np.array(energies)
+
+
+def period_of(times, heights):
+    down = np.flatnonzero(heights[:-1] * heights[1:] < 0)
+    crossings = times[down] - heights[down] * (times[1] - times[0]) / (heights[down + 1] - heights[down])
+    assert len(crossings) >= 3
+    return 2 * np.diff(crossings).mean()
+
+
+def decay_of(times, energies):
+    """How fast swings die down, 1/s: half the rate at which the total energy falls."""
+    return -0.5 * np.polyfit(times[1:], np.log(energies), 1)[0]
+
+
+def test_without_strength_steps_are_solves_bit_for_bit(samples):
+    handles = [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)]
+    plain, stepped = (af.LiveDeformer(samples, handles, af.LiveOptions(**QUICK)) for _ in range(2))
+    stepped.set_secondary_motion(af.SecondaryMotionOptions(strength=0.0, gravity=9.81))
+    for angle in (5, 10, 40, 20):
+        targets = [LEFT, turned(angle) @ RIGHT]
+        assert np.array_equal(plain.solve(targets)(TIP), stepped.step(targets, 1 / 24)(TIP))
+    assert plain.report.value == stepped.report.value and stepped.report.kinetic == 0.0
+
+
+def test_the_total_energy_does_not_rise(samples):
+    _, _, energies = swung(released(samples), 3.0, 24)
+    assert energies.max() <= (1 + ENERGY_RISE) * energies[0]
+    assert energies[-1] > 0.5 * energies[0]  # nor does the scheme eat it
+
+
+def test_frame_rates_change_neither_period_nor_decay(samples):
+    found = {}
+    for rate in (24, 60):
+        times, heights, energies = swung(released(samples, further={"damping": 1.0}), 2.5, rate)
+        found[rate] = period_of(times, heights), decay_of(times, energies)
+    assert found[24][0] == pytest.approx(found[60][0], rel=ALIKE)
+    assert found[24][1] == pytest.approx(found[60][1], rel=ALIKE)
+    assert found[60][1] == pytest.approx(1.0, rel=DECAY)  # what was asked for
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("damping", [0.0, 2.0])
+def test_periods_hold_from_360_to_1500_centers_and_from_24_to_240_frames_a_second(damping):
+    found = []
+    for fine, coarse, rate in ((300, 60, 24), (300, 60, 240), (1250, 250, 60)):
+        live = released(
+            bar_samples(12000),
+            further={"damping": damping},
+            samples=6000,
+            fine_centers=fine,
+            coarse_centers=coarse,
+        )
+        times, heights, energies = swung(live, 3.0, rate)
+        found.append((period_of(times, heights), decay_of(times, energies)))
+    for period, decay in found[1:]:
+        assert period == pytest.approx(found[0][0], rel=ALIKE)
+        assert decay == pytest.approx(found[0][1], rel=ALIKE, abs=ALIKE)
+
+
+@pytest.mark.slow
+def test_the_total_energy_does_not_rise_in_a_thousand_frames():
+    live = released(bar_samples(6000), samples=2000, fine_centers=300, coarse_centers=60)
+    _, _, energies = swung(live, 1000 / 24, 24)
+    assert energies.max() <= (1 + ENERGY_RISE) * energies[0]
+
+
+def test_the_same_steps_from_a_state_are_the_same_bits(samples):
+    live = released(samples)
+    swung(live, 0.25, 24)
+    state = live.motion_state
+    first = swung(live, 0.25, 24)[1]
+    live.solve([turned(80) @ LEFT])
+    live.motion_state = state
+    assert np.array_equal(swung(live, 0.25, 24)[1], first)
+    other = released(samples, threads=1)
+    other.motion_state = state
+    assert np.array_equal(swung(other, 0.25, 24)[1], first)
+
+
+def test_gravity_bends_it_down_and_the_ground_holds_it(samples):
+    live = held(samples)
+    options = af.SecondaryMotionOptions(gravity=20.0, damping=5.0)
+    live.set_secondary_motion(options)
+    hanging = live.solve(None, iterations=200, tolerance=1e-6)(TIP)[0, 2]
+    assert hanging < -0.1
+    live.reset()
+    for _ in range(60):
+        moved = live.step(None, 1 / 24)
+    assert moved(TIP)[0, 2] == pytest.approx(hanging, rel=ALIKE)  # where a solve says that it comes to rest
+    assert live.report.speed < 0.05
+    live.set_secondary_motion(options, ground=-0.6)
+    for _ in range(40):
+        moved = live.step(None, 1 / 24)
+    lowest = moved(samples.points)[:, 2].min()
+    assert -0.65 < lowest < -0.55  # the bar's half height is 0.5; the ground gives way a little
+
+
+def test_handles_that_jump_do_not_tear_it(samples):
+    live = held(samples)
+    live.set_secondary_motion(af.SecondaryMotionOptions(damping=3.0))
+    live.solve()
+    for target in (turned(170) @ LEFT, turned(0, shift=(30, 0, 0)) @ LEFT, turned(-120, axis=0) @ LEFT):
+        for _ in range(12):
+            assert np.isfinite(live.step([target], 1 / 24)(samples.points)).all()
+    for _ in range(72):
+        live.step(None, 1 / 24)
+    assert live.report.speed < 0.2 and live.report.energy < 0.01
+
+
+def test_places_without_mass_follow_at_once(samples):
+    masses = np.where(samples.points[:, 0] > 1.0, 1.0, 0.0)
+    live = held(samples)
+    live.set_secondary_motion(af.SecondaryMotionOptions(), masses=masses)
+    live.solve()
+    away = live.step([turned(0, shift=(0, 0, 0.3)) @ LEFT], 1 / 24)
+    near, far = away(np.array([[-1.0, 0.0, 0.0]]))[0, 2], away(TIP)[0, 2]
+    assert near > 0.2 and far < 0.2
+
+
+def test_an_object_that_moves_drags_its_surface_along(samples):
+    """The same motion, told by handles and by coordinates."""
+    turn = turned(15.0, shift=(0.1, 0.0, 0.2))
+    world, local = (held(samples) for _ in range(2))
+    for live in (world, local):
+        live.set_secondary_motion(af.SecondaryMotionOptions())
+        live.solve()
+    there = world.step([turn @ LEFT], 1 / 24)(TIP)
+    here = local.step([LEFT], 1 / 24, coordinates=np.linalg.inv(turn))(TIP)
+    assert np.abs(here @ turn[:3, :3].T + turn[:3, 3] - there).max() < 0.01
+    assert np.abs(here - TIP).max() > 0.1
+
+
+def test_what_cannot_be_is_named_and_nothing_moves(samples):
+    live = released(samples)
+    live.step(None, 1 / 24)
+    state = live.motion_state
+    options = af.SecondaryMotionOptions
+    for call, name in (
+        (lambda: live.set_secondary_motion(options(damping=-1.0)), "damping"),
+        (lambda: live.set_secondary_motion(options(strength=float("nan"))), "strength"),
+        (lambda: live.set_secondary_motion(options(), masses=np.zeros(len(samples.points))), "masses"),
+        (lambda: live.set_secondary_motion(options(), masses=-np.ones(len(samples.points))), "masses"),
+        (lambda: live.set_secondary_motion(options(), masses=np.ones(3)), "masses"),
+        (lambda: live.set_secondary_motion(options(), up=np.zeros(3)), "up"),
+        (lambda: live.set_secondary_motion(options(), ground=float("inf")), "ground"),
+        (lambda: live.step(None, float("nan")), "seconds"),
+        (lambda: live.step(None, 0.0), "seconds"),
+        (lambda: live.step([box([0, 0, 0], [np.nan] * 3)], 0.1), "targets"),
+        (lambda: live.step(None, 0.1, coordinates=2.0 * np.eye(4)), "coordinates"),
+    ):
+        with pytest.raises(af.InvalidInput, match=name):
+            call()
+    other = af.LiveDeformer(
+        samples, [af.Cuboid(LEFT, LEFT)], af.LiveOptions(**(QUICK | {"fine_centers": 40}))
+    )
+    with pytest.raises(af.InvalidInput, match="state"):
+        other.motion_state = state
+    assert np.array_equal(live.motion_state.coefficients, state.coefficients)
+    assert np.array_equal(live.motion_state.velocities, state.velocities)
+
+
+def test_a_cancelled_step_leaves_the_body_where_it_was(samples):
+    live = released(samples)
+    live.step(None, 1 / 24)
+    state, task = live.motion_state, af.Task()
+    timer = threading.Timer(0.1, task.cancel)
+    timer.start()
+    begun = time.monotonic()
+    with pytest.raises(af.Cancelled):
+        live.step([turned(40) @ LEFT], 10.0, task=task)
+    assert time.monotonic() - begun < 2.0
+    timer.join()
+    assert np.array_equal(live.motion_state.coefficients, state.coefficients)
+    assert np.array_equal(live.step(None, 1 / 24)(TIP), after(live, state))
+
+
+def after(live, state):
+    live.motion_state = state
+    return live.step(None, 1 / 24)(TIP)
+
+
+@pytest.mark.parametrize("kind", [np.float64, np.float32])
+def test_the_bodys_cotangents_are_those_of_its_formula(kind):
+    rng = np.random.default_rng(3)
+    jets, rest, goal = (rng.normal(size=shape) for shape in ((10, 40, 3), (40, 3), (40, 3)))
+    jets = jets.astype(kind)
+    masses, gravity, up = rng.uniform(size=40), np.array([0.3, -0.2, -2.0]), np.array([0.0, 0.6, 0.8])
+
+    def oracle(places):
+        inertia = 0.5 * 7.0 * (torch.tensor(masses) * ((places - torch.tensor(goal)) ** 2).sum(1)).mean()
+        weight = (torch.tensor(masses) * ((places - torch.tensor(rest)) @ torch.tensor(gravity))).mean()
+        return inertia - weight + 50.0 * (torch.relu(0.1 - places @ torch.tensor(up)) ** 2).mean()
+
+    value, cotangents = testing.body_energy(jets, rest, goal, masses, 7.0, gravity, up, 0.1, 50.0)
+    expected, gradient = gradient_of(lambda leaf: oracle(leaf[0]), jets.astype(np.float64))
+    relative = FLOAT64_GRADIENT if kind is np.float64 else FLOAT32_ENERGY
+    assert value == pytest.approx(expected, rel=relative)
+    assert np.abs(cotangents - gradient).max() < relative * np.abs(gradient).max()
