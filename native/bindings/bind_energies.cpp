@@ -205,7 +205,7 @@ void bind_testing(py::module_& module) {
   module.def(
       "body_energy",
       [](JetArray<Scalar> jets, const Points& rest, const Points& goal, const Vector& masses, double inertia,
-         const Vec3& gravity, const Vec3& up, double ground, double ground_stiffness) {
+         const Vector& gravity, const Vector& up, double ground, double ground_stiffness) {
         JetArray<Scalar> cotangents = zeros_like(jets);
         const Body<Scalar> body{
             masses.cast<Scalar>(), rest.cast<Scalar>(), goal.cast<Scalar>(), inertia, gravity, up, ground,

@@ -9,7 +9,7 @@
 namespace arapfields {
 
 /// What normals are to turn to: preferred ones (k,3), or what an object has in their direction.
-struct ARAPFIELDS_EXPORT Style {
+struct Style {
   Style(Points normals) : preferred(std::move(normals)) {}
   Style(ObjectStyle of) : object(std::move(of)) {}
 

@@ -30,7 +30,7 @@ def commands(page):
     return list(filter(None, (shlex.split(line, comments=True) for line in text.splitlines())))
 
 
-PROGRAMS = {"make", "arapfields", "blender", "python", ".venv/bin/python", "sbatch", "openjd"}
+PROGRAMS = {"make", "pip", "arapfields", "blender", "python", ".venv/bin/python", "sbatch", "openjd"}
 ALL = [(page, command) for page in pages.PAGES for command in commands(page)]
 
 

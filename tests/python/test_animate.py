@@ -229,10 +229,7 @@ def test_a_disk_that_is_full_for_usd_is_named(tmp_path):
         (["--frames", "5", "4"], "--frames: 5 to 4 holds no frame"),
         (["--frames", "0", "4"], "has 1 to 6"),
         (["--frames", "6", "7"], "has 1 to 6"),
-        (["--shard", "0/3"], "is not I/N"),
-        (["--shard", "4/3"], "is not I/N"),
-        (["--shard", "x"], "is not I/N"),
-        (["--shard", "2147483649/2147483650"], "is not I/N"),
+        *[(["--shard", it], "is not I/N") for it in ("0/3", "4/3", "x", "2147483649/2147483650")],
     ],
 )
 def test_wrong_flags_are_named(flags, text, place, capsys):
@@ -247,9 +244,6 @@ def test_secondary_motion_follows_frame_by_frame(place, capsys):
     still, swing = frames(place / "still.pc2"), frames(place / "swing.pc2")
     assert np.abs(swing[0] - still[0]).max() < 1e-3 < np.abs(swing[3] - still[3]).max()
     assert np.array_equal(frames(place / "part.pc2"), swing[3:])
-    for further, name in (
-        (["--damping", "1"], "--secondary"),
-        (["--secondary", "--shard", "1/2"], "--shard"),
-    ):
+    for further in (["--damping", "1"], ["--secondary", "--shard", "1/2"]):
         assert animate(place, "none.pc2", *further) != 0
-        assert name in capsys.readouterr().err
+        assert further[-2] in capsys.readouterr().err
