@@ -16,7 +16,7 @@ NATIVE_TESTS := build/wheel/tests/native_tests
 .PHONY: help setup build examples demo test test-slow test-windows fuzz bench sanitize format lint wheel workflows extension repository blenders gallery docs clean
 
 help:  ## this list
-	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/:.*##/ -/'
+	@grep -E '^[a-z0-9-]+:.*##' Makefile | sed -E 's/:.*##/ -/'
 
 $(VENV)/.ready: requirements.txt
 	@test -x $(PY) || $(PYTHON) -m venv $(VENV) || { echo "Python 3.11 with the venv module is needed (Debian: python3.11-venv)"; exit 1; }
@@ -115,9 +115,11 @@ workflows: setup  ## the continuous integration's steps for Linux, run here one 
 	$(PY) tests/packaging/run_workflow.py .github/workflows/*.yml
 
 # PYTHONS="3.11 3.13" makes those a must; else 3.11 and whatever headers are at hand or to be had.
-extension: build  ## dist/arapfields-<version>-linux-x64.zip for Blender
+PLATFORM := linux-x64
+extension: build  ## dist/arapfields-<version>-linux-x64.zip for Blender; PLATFORM=macos-arm64 for a Mac
+	@$(if $(filter macos-%,$(PLATFORM)),$(PIP) -q -r blender_scripts/extension/macos-requirements.txt)
 	$(PY) blender_scripts/python_headers.py
-	$(PY) blender_scripts/build_extension.py --output dist $(if $(PYTHONS),--python $(PYTHONS))
+	$(PY) blender_scripts/build_extension.py --output dist --platform $(PLATFORM) $(if $(PYTHONS),--python $(PYTHONS))
 
 repository: build  ## the same, and dist/index.json: a repository of extensions to serve
 	$(PY) blender_scripts/python_headers.py

@@ -3,6 +3,7 @@
 the add-on takes from PyPI.
 
 python blender_scripts/build_extension.py --output dist [--build build/wheel] [--python 3.11 3.13]
+                                          [--platform macos-arm64]
 """
 
 import argparse
@@ -13,16 +14,28 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "blender_scripts"))
 
-from extension import archive, bindings, check, dependencies, guide, libraries, wheel  # noqa: E402
+from extension import (  # noqa: E402
+    archive,
+    bindings,
+    check,
+    dependencies,
+    guide,
+    libraries,
+    macos,
+    macos_check,
+    wheel,
+)
 from extension.blender import extension_tool  # noqa: E402
 
-WHEEL_TAG = "py3-none-linux_x86_64"
+WHEEL_TAGS = {"linux-x64": "py3-none-linux_x86_64", "macos-arm64": macos.WHEEL_TAG}
 
 
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--output", type=Path, default=ROOT / "dist")
     parser.add_argument("--build", type=Path, default=ROOT / "build/wheel", help="CMake build folder to take")
+    parser.add_argument("--platform", choices=WHEEL_TAGS, default="linux-x64", help="whom the zip is for")
+    parser.add_argument("--jobs", type=int, help="compilers at a time for another platform's library")
     parser.add_argument(
         "--python",
         nargs="+",
@@ -58,7 +71,8 @@ def wanted_headers(options):
     return found
 
 
-def build_wheel(options, version, headers, work):
+def linux_files(options, headers, work):
+    """Paths of the library, of what it needs of libtorch, and of a binding for each of the Pythons."""
     package = options.build / "python/arapfields"
     torch = libraries.library_folder(bindings.cached(options.build, "LIBTORCH_DIR"))
     shipped = libraries.prepare_libraries(package / "libarapfields.so", torch, work / "libraries")
@@ -76,12 +90,22 @@ def build_wheel(options, version, headers, work):
     if foreign:
         raise RuntimeError(f"the libraries need what would not be shipped: {', '.join(foreign)}")
     print("needs glibc {}.{} or newer".format(*libraries.glibc_floor([shipped[0], *modules])))
-    files = {f"arapfields/{path.name}": path for path in [*shipped, *modules]}
+    return [*shipped, *modules]
+
+
+def build_wheel(options, version, headers):
+    if options.platform == "linux-x64":
+        native = linux_files(options, headers, ROOT / "build/extension")
+    else:
+        native = macos.build_files(options.build, headers, ROOT / "build/macos", options.jobs)
+    package = options.build / "python/arapfields"
+    files = {f"arapfields/{path.name}": path for path in native}
     for path in package.rglob("*"):
         if path.suffix in (".py", ".pyi", ".json") or path.name == "py.typed":
             files[f"arapfields/{path.relative_to(package).as_posix()}"] = path
     licence = (ROOT / "LICENSE").read_text()
-    return wheel.write_wheel(options.output / "wheels", "arapfields", version, WHEEL_TAG, files, licence)
+    tag = WHEEL_TAGS[options.platform]
+    return wheel.write_wheel(options.output / "wheels", "arapfields", version, tag, files, licence)
 
 
 def build(options):
@@ -98,14 +122,15 @@ def build(options):
     folder = options.output / "wheels"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    wheels = [build_wheel(options, version, headers, ROOT / "build/extension")]
-    check.check_platforms(manifest, [wheel.name for wheel in wheels])
+    wheels = [build_wheel(options, version, headers)]
     wheels += dependencies.dependency_wheels((ROOT / "requirements.txt").read_text(), folder)
-    path = options.output / f"arapfields-{version}-linux-x64.zip"
+    path = options.output / f"arapfields-{version}-{options.platform}.zip"
     options_table = options.build / "python/arapfields/options.json"
     licence, pages = (ROOT / "LICENSE").read_text(), guide.guide_files(ROOT / "docs")
-    archive.write_extension(addon, options_table, wheels, licence, pages, path)
+    archive.write_extension(addon, options_table, wheels, licence, pages, path, options.platform)
     check.check_zip(path, headers)
+    if options.platform == "macos-arm64":
+        print("\n".join(macos_check.report(path, headers)))
     extension_tool("validate", path)
     print(f"{path} ({path.stat().st_size / 1e6:.0f} MB)")
     if options.repository:

@@ -1,10 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The extension's zip: manifest, add-on and wheel."""
 
+import re
 import tomllib
 import zipfile
 
 from .wheel import entry
+
+# Of platforms that were built and have not been run: what the manifest says of it, to readers and to users.
+NOT_RUN = {
+    "macos-arm64": (
+        "Built on Linux, and not yet run on a Mac: docs/install.md has a checklist",
+        " (not yet run)",
+    )
+}
 
 OPTIONS = "core/settings/options.json"  # where addon/core/settings/parameters.py looks for it
 
@@ -21,15 +30,26 @@ def addon_files(addon):
     return names
 
 
-def write_extension(addon, options, wheels, licence, guide, path):
-    """Writes the extension's zip to `path`; `options` is the library's options.json, which makes the panel;
-    `guide` the user's guide, archive name → bytes.
+def platform_manifest(text, platform):
+    """The manifest's text for one platform alone."""
+    text = re.sub(r"^platforms = .*$", f'platforms = ["{platform}"]', text, flags=re.M)
+    if platform in NOT_RUN:
+        remark, mark = NOT_RUN[platform]
+        text = re.sub(r'^(tagline = ".*)"$', rf'# {remark}.\n\1{mark}"', text, flags=re.M)
+    return text
+
+
+def write_extension(addon, options, wheels, licence, guide, path, platform=None):
+    """Writes the extension's zip for `platform` to `path`; `options` is the library's options.json, that
+    makes the panel; `guide` the user's guide, archive name → bytes. Without a platform: the manifest's own.
 
     Wheels, compressed already, are stored.
     """
     lines = "".join(f'  "./wheels/{wheel.name}",\n' for wheel in wheels)
     # Keys after a table would belong to it: the wheels go before the first one.
-    head, table, tail = (addon / "blender_manifest.toml").read_text().partition("\n[")
+    text = (addon / "blender_manifest.toml").read_text()
+    text = platform_manifest(text, platform) if platform else text
+    head, table, tail = text.partition("\n[")
     manifest = f"{head}\nwheels = [\n{lines}]\n{table}{tail}"
     tomllib.loads(manifest)
     partial = path.with_suffix(".partial")

@@ -11,8 +11,8 @@ from . import dependencies
 from .archive import OPTIONS
 
 LIMIT = 200e6
-PLATFORM_TAGS = {"linux-x64": r"(many)?linux.*_x86_64"}
-LIBRARY = "arapfields/libarapfields.so"
+PLATFORM_TAGS = {"linux-x64": r"(many)?linux.*_x86_64", "macos-arm64": r"macosx_\d+_\d+_arm64"}
+LIBRARY = re.compile(r"arapfields/libarapfields\.(so|dylib)")
 
 
 def check_platforms(manifest, names):
@@ -49,8 +49,9 @@ def check_zip(path, pythons):
 
 def check_wheel(wheel, names, pythons):
     """A wheel has the library once, and a binding for each Python."""
-    if names.count(LIBRARY) != 1:
-        raise RuntimeError(f"{wheel} has {names.count(LIBRARY)} copies of {LIBRARY}")
+    copies = sum(1 for name in names if LIBRARY.fullmatch(name))
+    if copies != 1:
+        raise RuntimeError(f"{wheel} has {copies} copies of libarapfields")
     for major, minor in pythons:
         if not any(name.startswith(f"arapfields/_native.cpython-{major}{minor}-") for name in names):
             raise RuntimeError(f"{wheel} has no binding for Python {major}.{minor}")

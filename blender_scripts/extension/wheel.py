@@ -36,7 +36,7 @@ def write_wheel(folder, name, version, tag, files, licence):
         contents += [(target, lambda text=text: text) for target, text in texts.items()]
         for target, read in contents:
             data = read()
-            archive.writestr(entry(target, executable=".so" in target), data)
+            archive.writestr(entry(target, executable=".so" in target or target.endswith(".dylib")), data)
             digest = base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()
             record.append(f"{target},sha256={digest},{len(data)}")
         record.append(f"{info}/RECORD,,")

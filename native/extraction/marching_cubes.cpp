@@ -81,7 +81,6 @@ class Tile {
  public:
   Tile(const SparseGrid& grid, const std::vector<Numbers>& numbers, Index block)
       : grid_(grid),
-        numbers_(numbers),
         block_(grid.blocks()[static_cast<std::size_t>(block)]),
         own_(numbers[static_cast<std::size_t>(block)]) {
     grid.look(block_, window_);
@@ -157,7 +156,6 @@ class Tile {
   }
 
   const SparseGrid& grid_;
-  const std::vector<Numbers>& numbers_;
   const SparseGrid::Block& block_;
   const Numbers& own_;
   const Numbers* around_[8];

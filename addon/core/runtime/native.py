@@ -49,7 +49,7 @@ def is_loading():
 
 def _load():
     with contextlib.suppress(Exception):
-        for path in sorted(_folder().glob("libarapfields*.so")):
+        for path in sorted(_folder().glob("libarapfields.*")):
             ctypes.CDLL(str(path))  # waits for the disk while other threads run
     _state.problem = _try_import()
 
