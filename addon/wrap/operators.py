@@ -13,8 +13,9 @@ from ..core.errors import UserError
 from ..core.geometry.spaces import space_of, transform
 from ..core.runtime import native
 from ..core.settings.wrapping import WRAP
-from ..deform.solve_job import SolveOperator, plan_solve_job
+from ..deform.solve_job import SolveOperator, destination, plan_solve_job
 from ..handles.empties import matrix_of
+from ..live.giving_way import give_way
 from ..names import Op
 from ..properties.item import output, refine_thin, resolution, surface, target
 from ..surface.source_surface import build_options
@@ -52,6 +53,7 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
         return super().refuses(source) or (landmarks.refusal(source) if has_window() else None)
 
     def plan(self, context, source, weights):
+        give_way(context, source, *destination(settings_of(source), self))
         context.view_layer.update()
         values = effective_values(WRAP, settings_of(source).wrap, self)
         af = native.library()

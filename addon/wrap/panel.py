@@ -32,7 +32,7 @@ class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
         settings_column(layout, wrap, WRAP, advanced=False)
         job_button(layout, Op.WRAP, "MOD_SHRINKWRAP")
         factor_slider(layout, source)
-        note(layout, landmarks.refusal(source), placement_refusal(source, "WRAP"))
+        note(layout, landmarks.refusal(source), placement_refusal(source))
 
 
 def factor_slider(layout, source):

@@ -88,6 +88,8 @@ def test_commands_of_the_package_run(tmp_path):
     mesh = trimesh.Trimesh(np.asarray(vertices) * (0.5, 0.9, 0.9), triangles, process=False)
     mesh.export(tmp_path / "spot.obj")
     mesh.export(tmp_path / "spot_lod2.obj")
+    mesh.export(tmp_path / "template.obj")
+    mesh.copy().apply_scale(1.1).export(tmp_path / "scan.ply")
     (tmp_path / "hair.obj").write_text("v 0 0.9 0\nv 0 1.1 0\nv 0.1 1.4 0\nl 1 2 3\n")
     done = [words for path, words in ALL if path == page and words[0] == "arapfields"]
     assert len(done) >= 7

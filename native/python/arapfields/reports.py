@@ -216,10 +216,7 @@ class Extraction(_Mesh, Generic[ExtractionReportT]):
     report: ExtractionReportT
 
     def __new__(
-        cls,
-        vertices: npt.NDArray[np.float64],
-        triangles: npt.NDArray[np.int32],
-        report: ExtractionReportT,
+        cls, vertices: npt.NDArray[np.float64], triangles: npt.NDArray[np.int32], report: ExtractionReportT
     ) -> Self:
         made = super().__new__(cls, vertices, triangles)
         object.__setattr__(made, "report", report)
