@@ -13,7 +13,7 @@ from . import landmarks
 class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
     bl_label = "Wrap"
     bl_idname = "ARAPFIELDS_PT_wrap"
-    bl_order = 4
+    bl_order = 3
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw_header_preset(self, context):

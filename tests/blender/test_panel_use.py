@@ -20,10 +20,11 @@ def test_everyday_sections_come_first_and_numbers_are_under_advanced():
     jobs.board.messages.clear()
     panels = {name: getattr(bpy.types, name) for name in found if "_PT_" in name}
     first = {n: cls.bl_order for n, cls in panels.items() if not hasattr(cls, "bl_parent_id")}
-    order = ["source", "handles", "deform", "stylize", "carried", "status", "advanced"]
+    order = ["source", "handles", "deform", "stylize", "wrap", "carried", "status", "advanced"]
     assert sorted(first, key=first.get) == [f"ARAPFIELDS_PT_{name}" for name in order]
     closed = {name for name, cls in panels.items() if "DEFAULT_CLOSED" in getattr(cls, "bl_options", ())}
-    assert closed == {*panels} - {*first} | {"ARAPFIELDS_PT_advanced", "ARAPFIELDS_PT_carried"}
+    folded = {f"ARAPFIELDS_PT_{name}" for name in ("advanced", "carried", "wrap")}
+    assert closed == {*panels} - {*first} | folded
     jargon = {"Samples", "Iterations", "Network Width", "Handle Weight", "Output", "Resolution", "Time Limit"}
     for name, texts in found.items():
         if name in first:

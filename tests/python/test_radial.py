@@ -121,7 +121,7 @@ def test_stylize_radial_turns_normals_and_holds_the_lowest_sample(samples):
 def test_what_a_radial_field_cannot_do_is_named(samples, handles):
     with pytest.raises(af.InvalidInput, match=r"needs? field='neural'"):
         af.deform(samples, handles, af.DeformOptions(field="radial", invertibility=1.0))
-    with pytest.raises(af.InvalidInput, match="'radial' or 'neural'"):
+    with pytest.raises(af.InvalidInput, match="'radial', 'neural' or 'invertible'"):
         af.stylize(samples, "cube", af.StylizeOptions(field="splines"))
 
 

@@ -94,11 +94,11 @@ def read_landmarks(path):
     path = existing_file(path, LANDMARKS)
     with files.readable(path, "pairs of places"):
         if path.suffix.lower() == ".json":
-            rows = np.array(json.loads(path.read_text()), float)
+            rows = np.array(json.loads(path.read_text(encoding="utf-8")), float)
         elif path.suffix.lower() == ".npy":
             rows = np.array(np.lib.format.open_memmap(path, mode="r"), float)
         else:
-            rows = np.loadtxt(path.read_text().replace(",", " ").splitlines(), ndmin=2)
+            rows = np.loadtxt(path.read_text(encoding="utf-8").replace(",", " ").splitlines(), ndmin=2)
     if rows.size == 0:
         return []
     if rows.shape[1:] not in ((2, 3), (6,)):
