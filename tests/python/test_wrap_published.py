@@ -13,7 +13,7 @@ import arapfields as af
 # parts that the target lacks are laid onto it.
 REACHED = {
     "shiba spot": (0.3, 1.5, 0.05),
-    "spot shiba": (0.3, 1.5, 0.03),
+    "spot shiba": (0.3, 1.5, 0.015),
     "bunny frog": (1.2, 5.0, 0.16),
     "whale spot": (0.8, 4.0, 0.09),
 }
