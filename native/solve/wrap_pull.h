@@ -12,7 +12,7 @@ struct WrapPull {
   double coverage = 1.0;  ///< of the distances from the target's side beside those from the surface's
   double turn = 0.3;      ///< what normals count in what belongs to what, beside cube units
   double slack = 0.1;     ///< share of ways along the target in the squared distances
-  double contact = 1.0;  ///< weight, beside those, of sheets that have passed through each other
+  double contact = 1.0;   ///< weight, beside those, of sheets that have passed through each other
 };
 
 /// weight · (mean of squared distances from the samples to what belongs to them on the target, and coverage ·
