@@ -13,7 +13,7 @@ from ..handles import empties, scaling
 from ..handles.native_handles import native_handles
 from ..live.giving_way import give_way
 from ..names import Op
-from ..properties.item import output, refine_thin, resolution, surface, target
+from ..properties.item import result_properties
 from ..surface.source_surface import build_options
 from .solve_job import SolveOperator, destination, plan_solve_job
 
@@ -29,11 +29,7 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
 
     __annotations__ = {
         **annotations(DEFORM, options={"SKIP_SAVE"}),
-        "output": output(options={"SKIP_SAVE"}),
-        "surface": surface(options={"SKIP_SAVE"}),
-        "target": target(options={"SKIP_SAVE"}),
-        "resolution": resolution(options={"SKIP_SAVE"}),
-        "refine_thin": refine_thin(options={"SKIP_SAVE"}),
+        **result_properties(),
     }
 
     @classmethod

@@ -49,6 +49,18 @@ def refine_thin(**extra):
     return annotations(EXTRACTION, **extra).get("refine_thin")
 
 
+def result_properties():
+    """What is made and where it goes, as a call of an operator may say it otherwise than the settings."""
+    kinds = {
+        "output": output,
+        "surface": surface,
+        "target": target,
+        "resolution": resolution,
+        "refine_thin": refine_thin,
+    }
+    return {name: kind(options={"SKIP_SAVE"}) for name, kind in kinds.items()}
+
+
 class ARAPFIELDS_PG_result(bpy.types.PropertyGroup):
     item: bpy.props.PointerProperty(type=bpy.types.Object, name="Object", description="The result object")
     kind: bpy.props.StringProperty(name="Kind", description="DEFORM, STYLIZE or EXTRACT")

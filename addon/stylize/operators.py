@@ -15,7 +15,7 @@ from ..handles import empties
 from ..handles.native_handles import native_handles
 from ..live.giving_way import give_way
 from ..names import Op
-from ..properties.item import output, refine_thin, resolution, surface, target
+from ..properties.item import result_properties
 from ..properties.settings import frame, style
 from ..surface.source_surface import build_options
 from . import preference
@@ -34,11 +34,7 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
         **annotations(STYLIZE, options={"SKIP_SAVE"}),
         "style": style(options={"SKIP_SAVE"}),
         "frame": frame(options={"SKIP_SAVE"}),
-        "output": output(options={"SKIP_SAVE"}),
-        "surface": surface(options={"SKIP_SAVE"}),
-        "target": target(options={"SKIP_SAVE"}),
-        "resolution": resolution(options={"SKIP_SAVE"}),
-        "refine_thin": refine_thin(options={"SKIP_SAVE"}),
+        **result_properties(),
     }
 
     @classmethod

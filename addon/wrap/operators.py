@@ -17,7 +17,7 @@ from ..deform.solve_job import SolveOperator, destination, plan_solve_job
 from ..handles.empties import matrix_of
 from ..live.giving_way import give_way
 from ..names import Op
-from ..properties.item import output, refine_thin, resolution, surface, target
+from ..properties.item import result_properties
 from ..surface.source_surface import build_options
 from . import landmarks
 
@@ -40,11 +40,7 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
     __annotations__ = {
         **annotations(WRAP, options={"SKIP_SAVE"}),
         "onto": onto,
-        "output": output(options={"SKIP_SAVE"}),
-        "surface": surface(options={"SKIP_SAVE"}),
-        "target": target(options={"SKIP_SAVE"}),
-        "resolution": resolution(options={"SKIP_SAVE"}),
-        "refine_thin": refine_thin(options={"SKIP_SAVE"}),
+        **result_properties(),
     }
 
     @classmethod
