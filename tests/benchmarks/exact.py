@@ -2,9 +2,10 @@
 """Exact handles: their energy against the least under the same constraints.
 
 The oracle eliminates the constraints: among the fields of a radial basis of many centers, those that meet
-them are c₀ + N z, with N an orthonormal basis of the null space, and L-BFGS finds the z of least energy, in
-double precision and from a soft solution. Two kinds of constraints, at points of the surface in the boxes:
-where they go, and that together with how their surroundings turn, as whole boxes that move ask.
+them are c₀ + N z, with N an orthonormal basis of the null space, and L-BFGS finds the z of least energy, from
+a soft solution; products with the basis are in single precision. Two kinds of constraints, at points of the
+surface in the boxes: where they go, and that together with how their surroundings turn, as whole boxes that
+move ask.
 """
 
 import numpy as np
