@@ -40,7 +40,8 @@ $(VENV)/.installed: $(VENV)/.ready $(SOURCES)
 	@command -v c++ > /dev/null || { echo "A C++20 compiler is needed (Debian: g++)"; exit 1; }
 	@echo "Step 2 of 2: compiling the native library. Some minutes the first time; all output: build/build.log"
 	@mkdir -p build
-	@$(PIP) -v --no-build-isolation --no-deps --force-reinstall -C build-dir=build/wheel . 2>&1 | tee build/build.log | \
+	@$(PIP) -v --no-build-isolation --no-deps --force-reinstall -C build-dir=build/wheel \
+	  -C cmake.define.ARAPFIELDS_WERROR=ON . 2>&1 | tee build/build.log | \
 	  while read -r line; do case "$$line" in "["*/*"]"*) printf '\r  %s]' "$${line%%]*}";; esac; done \
 	  || { tail -n 60 build/build.log; exit 1; }
 	@echo
@@ -74,6 +75,7 @@ test-windows: setup  ## all but the torch sources, compiled for Windows by mingw
 	@command -v x86_64-w64-mingw32-g++-posix > /dev/null || { echo "A compiler for Windows is needed (Debian: g++-mingw-w64-x86-64-posix)"; exit 1; }
 	@test -n "$(WINE)" || { echo "Wine is needed (Debian: wine64)"; exit 1; }
 	$(VENV)/bin/cmake -S . -B build/windows -G Ninja -DCMAKE_TOOLCHAIN_FILE=cmake/mingw-w64.cmake -DARAPFIELDS_WITHOUT_TORCH=ON \
+	  -DARAPFIELDS_WERROR=ON \
 	  -DCMAKE_CXX_FLAGS_RELEASE="-O1 -DNDEBUG" -DPython_EXECUTABLE=$(abspath $(PY)) -DCMAKE_MAKE_PROGRAM=$(abspath $(VENV)/bin/ninja)
 	$(VENV)/bin/cmake --build build/windows
 	WINEPREFIX=$(abspath build/wine) WINEDEBUG=-all timeout 900 $(WINE) $(WINDOWS_TESTS) --color_output=no
@@ -87,7 +89,7 @@ bench: build $(VENV)/.tools  ## paired benchmarks against the real competitors; 
 	PEERS="$(PEERS)" $(PY) -m tests.benchmarks $(if $(PEERS),peers)
 
 SANITIZED = $(VENV)/bin/cmake -S . -G Ninja -DPython_EXECUTABLE=$(abspath $(PY)) -DCMAKE_MAKE_PROGRAM=$(abspath $(VENV)/bin/ninja) \
-  -DCMAKE_BUILD_TYPE=RelWithDebInfo -DARAPFIELDS_NATIVE_TESTS=ON
+  -DCMAKE_BUILD_TYPE=RelWithDebInfo -DARAPFIELDS_NATIVE_TESTS=ON -DARAPFIELDS_WERROR=ON
 
 # Neither sanitizer follows forks (a child may inherit the address sanitizer's allocator locked): the tests that make
 # them are left out.
