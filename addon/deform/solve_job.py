@@ -18,7 +18,7 @@ from ..core.runtime import native
 from ..core.runtime.jobs import Item
 from ..jobs.job_operator import JobOperator
 from ..poses import applying
-from ..results import placement
+from ..results import placement, visibility
 from ..stiffness import painted
 from ..surface.source_surface import read_surface
 from ..viewport.previews import Preview
@@ -90,8 +90,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
         applying.note(owner, *found[-1], surface.space)
         carrying.put(bpy.context, solved.carried)
         operator.warnings += [f"{owner.name}: {translated(reason)}" for reason in carrying.take_warnings()]
-        said = describe(item, solved.report)
-        hidden = translated("{name} is hidden", name=owner.name) if item != owner else ""
+        said, hidden = describe(item, solved.report), visibility.told(visibility.show_alone(owner, item))
         return f"{said}, {hidden}" if hidden else said
 
     return Item(source.name, work, apply, preview)
