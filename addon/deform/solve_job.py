@@ -90,8 +90,8 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
         applying.note(owner, *found[-1], surface.space)
         carrying.put(bpy.context, solved.carried)
         operator.warnings += [f"{owner.name}: {translated(reason)}" for reason in carrying.take_warnings()]
-        said, hidden = describe(item, solved.report), visibility.told(visibility.show_alone(owner, item))
-        return f"{said}, {hidden}" if hidden else said
+        shown = item.name + visibility.told(visibility.show_alone(owner, item))
+        return describe(shown, solved.report)
 
     return Item(source.name, work, apply, preview)
 
@@ -121,8 +121,8 @@ class SolveOperator(JobOperator):
         return placement.in_place(*destination(settings_of(source), self))
 
 
-def describe(item, report):
-    figures = [item.name]
+def describe(shown, report):
+    figures = [shown]
     if "energy" in report:
         figures.append(translated("energy {value}", value=f"{report['energy']:.4g}"))
     if report.get("handle_error_mean"):

@@ -32,10 +32,11 @@ def show_alone(source, shown, for_now=False):
 
 
 def told(names):
-    """That these are hidden now, for a report; empty where none is."""
-    if len(names) < 2:
-        return translated("{name} is hidden", name=names[0]) if names else ""
-    return translated("{names} are hidden", names=", ".join(names))
+    """That these are hidden now, to be put behind the name of a result; empty where none is."""
+    if not names:
+        return ""
+    one = translated("{name} is hidden", name=names[0])
+    return f" ({translated('{names} are hidden', names=', '.join(names)) if names[1:] else one})"
 
 
 def is_where(shown, item):

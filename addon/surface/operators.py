@@ -87,7 +87,7 @@ class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):
                 bpy.context, owner, "EXTRACT", "SURFACE", result_objects.surface_mesh(owner, *mesh), report
             )
             said = translated("{name} with {count} triangles", name=item.name, count=f"{len(mesh[1]):,}")
-            return ", ".join(filter(None, (said, visibility.told(visibility.show_alone(owner, item)))))
+            return said + visibility.told(visibility.show_alone(owner, item))
 
         return Item(source.name, work, apply)
 

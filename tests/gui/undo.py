@@ -11,13 +11,18 @@ from mouse import drag, is_dragging, pixel, release, until
 from pins import END, set_stage, state
 
 ROUNDS = 100
-STRIDE = 10  # rounds from one print to the next
+STRIDE = 5  # states from one print to the next
 
 
 def checks(found, folder, kinds=("rested", "within", "escaped")):
     """`kinds`: which rounds are played, of these."""
     bpy.context.preferences.system.viewport_aa = "OFF"  # it is the steps that are looked at
     bar = set_stage()
+    with stage.override():
+        bpy.ops.screen.screen_full_area(use_hide_panels=True)  # less to draw
+    yield 1.0
+    with stage.override():
+        bpy.ops.view3d.view_all()
     yield 0.5
     before, spot = state(), pixel(END)
     yield from drag(spot, (spot[0], spot[1] - 100))
@@ -44,7 +49,7 @@ KINDS = ("objects", "meshes", "node_groups", "scenes", "collections")
 
 def told(found, name, exact):
     found[f"undo_{name}"] = {"exact": sum(exact), "of": len(exact)}
-    if len(exact) % (2 * STRIDE) == 0:
+    if len(exact) % STRIDE == 0:
         print(name, found[f"undo_{name}"], flush=True)
 
 
