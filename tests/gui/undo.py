@@ -18,11 +18,6 @@ def checks(found, folder, kinds=("rested", "within", "escaped")):
     """`kinds`: which rounds are played, of these."""
     bpy.context.preferences.system.viewport_aa = "OFF"  # it is the steps that are looked at
     bar = set_stage()
-    with stage.override():
-        bpy.ops.screen.screen_full_area(use_hide_panels=True)  # less to draw
-    yield 1.0
-    with stage.override():
-        bpy.ops.view3d.view_all()
     yield 0.5
     before, spot = state(), pixel(END)
     yield from drag(spot, (spot[0], spot[1] - 100))
