@@ -15,7 +15,7 @@ from ..carried.transforms import BonesCarrier
 from ..core.errors import UserError
 from ..core.runtime.coroutines import Pause
 from ..field_modifier import cache_modifier
-from ..results import result_objects
+from ..results import result_objects, visibility
 from .caches import plain
 
 BAKED_KEY = "ARAP Fields frame "  # how baked keys of curves and lattices begin
@@ -104,7 +104,7 @@ class CarriedBake:
         for number, shape in enumerate(shapes):
             result_objects.add_frame(baked, frames, number, shape)
             yield Pause.REDRAW
-        result_objects.hide(item)
+        visibility.show_alone(item, baked)
 
     def add_keys(self, passenger, item):
         """A shape key a frame, in place of those of an earlier bake."""

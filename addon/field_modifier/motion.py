@@ -101,7 +101,7 @@ def take_helper(source, modifier, mesh):
     mesh.materials.clear()
     helper = inputs.get(modifier, "Offsets")
     mesh.name = f"{source.name}{HELPER_SUFFIX}"
-    if helper is None or helper.users > 1 or helper.library is not None:  # a copied object shares it
+    if helper is None or users_of(helper) > 1 or helper.library is not None:  # a copied object shares it
         inputs.put(modifier, "Offsets", bpy.data.objects.new(mesh.name, mesh))
         return
     old, count = helper.data, len(mesh.vertices)
@@ -119,8 +119,13 @@ def forget_helper(modifier):
         discard_helper(helper)
 
 
+def users_of(helper):
+    """How many use it; `users` counts too many of what an input of a modifier names, in Blender 5.2."""
+    return len(bpy.data.user_map(subset=[helper])[helper])
+
+
 def discard_helper(helper):
-    if helper.users == 0 and helper.library is None:
+    if users_of(helper) == 0 and helper.library is None:
         mesh = helper.data
         bpy.data.objects.remove(helper)
         if mesh.users == 0:

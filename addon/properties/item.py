@@ -135,6 +135,9 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
         name="Hidden before Live",
         description="Whether the object was hidden in viewport and renders, as JSON",
     )
+    set_aside: bpy.props.BoolProperty(
+        name="Set Aside", description="Hidden since what was made of it lies in its place"
+    )
     fit_key: bpy.props.StringProperty(name="Fit", description="Name of the object's last fit in the cache")
     fit_options: bpy.props.StringProperty(
         name="Fit Settings", description="Settings of the object's last fit, as JSON"
