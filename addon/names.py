@@ -46,6 +46,7 @@ class Op(StrEnum):
     WRAP = "arapfields.wrap"
     ADD_LANDMARK = "arapfields.add_landmark"
     CLICK_LANDMARKS = "arapfields.click_landmarks"
+    RESET_BONES = "arapfields.reset_bones"
     REMOVE_LANDMARK = "arapfields.remove_landmark"
     CARRY = "arapfields.carry"
     RELEASE = "arapfields.release"

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from ..blender import modifier_stack
+from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..names import FIELD_MODIFIER, HELPER_SUFFIX, OFFSETS, TURNS
 from . import armatures, cache_modifier, inputs, masks, node_group
@@ -212,5 +213,7 @@ def discard(source):
             discard_helper(helper)
         if group.users == 0:
             bpy.data.node_groups.remove(group)
+    if settings_of(source).under_rig:  # a write counts as a change of the object
+        settings_of(source).under_rig = False
     if source.data.library is None and source.data.users == 1:
         write_to(source.data, Motion(None))

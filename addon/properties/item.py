@@ -113,6 +113,14 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
         name="Armatures Switched Off",
         description="Armature modifiers that the field replaces, and whether they were on, as JSON",
     )
+    under_rig: bpy.props.BoolProperty(
+        name="Before Armatures",
+        description="Whether the field works on the shape at rest, which armatures pose afterwards",
+    )
+    rest_bones: bpy.props.StringProperty(
+        name="Bones at Rest",
+        description="Where an armature's bones were before they were fitted to a wrapped shape, as JSON",
+    )
     handle_of: bpy.props.PointerProperty(
         type=bpy.types.Object, name="Handle Of", description="The object that this Empty is a handle of"
     )

@@ -25,6 +25,7 @@ FIGURES = [
     Figure("live", "six frames of a handle dragged live"),
     Figure("character", "materials and UVs of a deformed and a stylized mesh"),
     Figure("workflows", "the ends of the workflow pages, by the pages' own scripts", pages=WORKFLOWS),
+    Figure("wrapping", "a rigged template wrapped onto a scan, and posed"),
     Figure("batch", "a folder of meshes in one style"),
     Figure("loop_pins", "a creature posed by pins, moving", pages=WORKFLOWS[:1]),
     Figure(
