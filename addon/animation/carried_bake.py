@@ -8,10 +8,11 @@ objects and bones keyframes.
 
 import contextlib
 
+from ..blender import modifier_stack
 from ..blender.language import translated
 from ..carried import played_points
 from ..carried.carriers import MeshCarrier
-from ..carried.passengers import find
+from ..carried.passengers import KINDS, find
 from ..carried.points import AttributeCarrier, KeyCarrier, drop_key, key_points, own_key, put_key
 from ..carried.transforms import BonesCarrier
 from ..core.errors import UserError
@@ -154,6 +155,15 @@ class CarriedBake:
         finally:
             with contextlib.suppress(ReferenceError):
                 scene.frame_set(present[0], subframe=present[1])
+
+
+def remove(item):
+    """Takes the modifier off that plays a carried object's bake; keys stay."""
+    if item.type == "MESH":
+        if modifier_stack.find_cache(item) is not None:
+            cache_modifier.remove(item)
+    elif KINDS.get(item.type) is AttributeCarrier:
+        played_points.remove(item)
 
 
 def insert(item, carrier, frame):

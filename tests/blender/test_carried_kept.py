@@ -40,6 +40,11 @@ def test_all_are_baked_at_once(format):
         for item, before in zip([patch, *items[1:]], rest, strict=True):
             shift = shown(item) - before
             assert np.abs(shift - [0, 0, 0.2 * (frame - 1)]).max() < 0.08, (item.name, frame)
+    if format == "PC2":
+        scenes.activate(bar)
+        assert bpy.ops.arapfields.remove_bake() == {"FINISHED"}
+        kinds = [modifier.name for item in (bar, items[0], *items[4:]) for modifier in item.modifiers]
+        assert not any("Cache" in name for name in kinds), kinds
     assert bpy.ops.arapfields.live() == {"FINISHED"}  # shown in place of the bake
     moving.location.z = 0.3
     step(refined=True)
