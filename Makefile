@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # One word a purpose. Every word sets up what it needs in .venv (dependencies from PyPI).
-PYTHON ?= $(shell command -v python3.11 || command -v python3)
-PYTHON313 ?= $(shell command -v python3.13)
+# A Python that starts: names of pyenv's may lie in PATH and lead to none.
+PATH_OF = $(shell $(1) -c 'import sys; print(sys.executable)' 2> /dev/null)
+PYTHON ?= $(or $(call PATH_OF,python3.11),$(call PATH_OF,python3))
+PYTHON313 ?= $(call PATH_OF,python3.13)
 SHELL := /bin/bash
 .SHELLFLAGS := -o pipefail -c
 VENV := .venv

@@ -10,7 +10,7 @@ from pathlib import Path
 import pybind11
 
 SERVED = [(3, 11), (3, 13), (3, 14)]  # Pythons of the Blenders that the manifest admits
-AS_THE_LIBRARY = [  # of its CMake cache; the last three link for an older C library (cmake/wheel/old_glibc.py)
+AS_THE_LIBRARY = [  # of its CMake cache; the last three link for an older glibc (cmake/wheel/old_glibc.py)
     "CMAKE_CXX_COMPILER",
     "CMAKE_CXX_COMPILER_LAUNCHER",
     "CMAKE_MAKE_PROGRAM",
