@@ -28,7 +28,7 @@ from mathutils import Matrix, Vector  # noqa: E402
 
 import addon  # noqa: E402
 
-SPACING, TURN = 1.75, 38.0  # from one to the next along x, and degrees by which each faces the camera
+SPACING, TURN = 1.85, 38.0  # from one to the next along x, and degrees by which each faces the camera
 # On the dog at rest: (place, radius) of what stays; of pins also the shift and the turn about x of each.
 ANCHORS = [((0.17, 0.45, 0.06), 0.17), ((-0.17, 0.45, 0.06), 0.17), ((-0.17, -0.48, 0.06), 0.17)]
 PINS = [
@@ -198,10 +198,14 @@ def main():
     with alone(), timed("wrap onto a scan"):
         wrap(dogs["Wrapped"], scan)
     with alone(), timed("picture", lambda: (0.0, "Cycles at work")):
+        wrapped = dogs.pop("Wrapped")  # what counts for the frame is where its own shape would be: beyond it
         shown = [*dogs.values(), scan, *hats, *draw_pins(dogs["Mesh"]), *draw_pins(dogs["Posed"])]
         for column, text in enumerate(CAPTIONS):
             shown.append(stage.caption(text, ((column - 2) * SPACING, -1.3, -0.05), 0.2))
-        stage.photograph(shown, options.output / "demo.png", width=1600, elevation=8, samples=12, margin=0.02)
+        end = (wrapped.location.x - SPACING + 1.1, 0, 1.75)
+        stage.photograph(
+            shown, options.output / "demo.png", width=1600, elevation=8, samples=12, around=[end]
+        )
     with alone():
         bpy.ops.wm.save_as_mainfile(filepath=str((options.output / "demo.blend").resolve()))
     print(f"{'total':26} {time.perf_counter() - begin:6.1f} s")
