@@ -73,7 +73,7 @@ $(NATIVE_TESTS): $(VENV)/.installed $(VENV)/.tools $(shell find tests/native -ty
 examples: build $(VENV)/.tools  ## the scenes of the workflow pages: out/examples
 	$(PY) blender_scripts/examples.py --output out/examples
 
-demo: build  ## the main job on Suzanne: out/demo.blend and out/demo.png
+demo: build $(VENV)/.tools  ## pins, a hat carried, a style and a wrap on a dog: out/demo.png and out/demo.blend
 	$(PY) blender_scripts/demo.py --output out
 
 test: build $(NATIVE_TESTS)  ## all tests but the slow ones
