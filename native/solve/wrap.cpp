@@ -72,7 +72,7 @@ void measure_distances(const WrapPlaces& end, const WrapTarget& target, WrapRepo
 
 /// Beside the scale of the alignment.
 ArapValue measure_energy(const RadialBasis& basis, const RowMatrix<double>& coefficients, PointsIn samples) {
-  Points some(std::min(samples.rows(), kept_rest_points), 3);
+  Points some(std::min<Index>(samples.rows(), kept_rest_points), 3);
   for (Index i = 0; i < some.rows(); ++i) some.row(i) = samples.row(i * samples.rows() / some.rows());
   JetBlock<double> jets(some.rows(), JetOrder::second);
   RadialEvaluator<double>(basis, some).evaluate(coefficients, jets.view());

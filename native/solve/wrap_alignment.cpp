@@ -66,7 +66,7 @@ double residual(const WrapSource& source, const Similarity& placement) {
 }
 
 Points some_rows(PointsIn points, Index count) {
-  const Index taken = std::min(count, points.rows());
+  const Index taken = std::min<Index>(count, points.rows());
   Points result(taken, 3);
   for (Index i = 0; i < taken; ++i) result.row(i) = points.row(i * points.rows() / taken);
   return result;

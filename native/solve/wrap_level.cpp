@@ -76,7 +76,7 @@ WrapLevel::WrapLevel(const SurfaceSamples& samples, const RestShape& shape, cons
   objective_->set_hooks({{terms_}, 1.0, {}}, points_);
   landmark_values_ = landmarks_.rows() > 0 ? radial_rows(basis_, landmarks_, JetOrder::value)
                                            : RowMatrix<double>(0, basis_.size());
-  Points some(std::min(pulled_samples, points_.rows()), 3);
+  Points some(std::min<Index>(pulled_samples, points_.rows()), 3);
   for (Index i = 0; i < some.rows(); ++i) some.row(i) = points_.row(i * points_.rows() / some.rows());
   place_values_ = radial_rows(basis_, some, JetOrder::value);
 }

@@ -2,10 +2,12 @@
 """macOS's libraries, edited and signed on Linux: a small file made here, and the zip where it was built."""
 
 import os
+import re
 import shutil
 import struct
 import subprocess
 import sys
+from itertools import accumulate
 from pathlib import Path
 
 import pytest
@@ -137,6 +139,16 @@ def test_pyconfig_answers_what_the_headers_ask_and_nothing_else(tmp_path):
     (folder / "Python.h").write_text("#ifdef HAVE_ODD\n#endif\n")
     with pytest.raises(RuntimeError, match="not known to have HAVE_ODD"):
         macos_headers.macos_config(folder)
+
+
+def test_sizes_of_matrices_are_compared_as_one_type():
+    """Eigen's sizes are long, ours int64_t: on a Mac two types, which std::min and std::max do not take."""
+    compared = re.compile(r"std::(?:min|max)\((?=[^;]*?\.(?:rows|cols)\(\))([^;{]*)")
+    for path in sorted((ROOT / "native").rglob("*.[ch]*")):
+        for match in compared.finditer(path.read_text(encoding="utf-8")):
+            depths = list(accumulate((c == "(") - (c == ")") for c in match[1]))
+            given = match[1][: depths.index(-1)] if -1 in depths else match[1]
+            assert not re.search(r"\.(rows|cols)\(\)", given), f"{path}: std::min<Index>({given})"
 
 
 def test_the_manifest_says_that_it_was_not_run():
