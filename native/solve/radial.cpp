@@ -27,7 +27,7 @@ constexpr int style_first_centers = 400, style_first_samples = 4000, style_first
 /// A style that folds between the samples that were looked at goes on so many times, with so many more times
 /// the barrier's weight, in so many steps at most.
 constexpr int unfolding_rounds = 5, unfolding_steps = 15;
-constexpr double unfolding = 10.0;
+constexpr double unfolding = 3.0;
 /// Share of the handles' weight with which exact handles still pull at the radial field inside the blend,
 /// which nothing else holds in their boxes.
 constexpr double share_of_exact = 0.01;
