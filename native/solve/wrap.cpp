@@ -8,6 +8,7 @@
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "fields/radial_evaluator.h"
+#include "solve/live_setup.h"
 #include "solve/notes.h"
 #include "solve/setup.h"
 #include "solve/wrap_alignment.h"
@@ -131,9 +132,13 @@ WrapSolution wrap(const SurfaceSamples& samples, const ImplicitFunction& functio
   }
   progress.report(0.95, "measuring the result");
   solution.field = placed(level.basis(), coefficients, placement, samples);
-  const WrapPlaces end(level.basis(), coefficients, samples.points, samples.normals);
+  // Neighbours beside each other: blocks of points then see few centers.
+  const std::vector<Index> order(shape.order.begin(), shape.order.end());
+  const Points points = rows_of(samples.points, order);
+  const RadialEvaluator<double> everywhere(level.basis(), points, JetOrder::first);
+  const WrapPlaces end(everywhere, coefficients, rows_of(samples.normals, order));
   report.distortion = end.distortion;
-  report.arap = measure_energy(level.basis(), coefficients, samples.points);
+  report.arap = measure_energy(level.basis(), coefficients, points);
   report.diagonal = there.diagonal;
   report.scale = placement.scale / samples.frame.scale;
   report.matched_share = level.matched_share();
