@@ -25,8 +25,9 @@ constexpr Index pulled_samples = 2000;
 constexpr Index steps_at_once = 6;
 constexpr double tolerance = 1e-4, floor = 1e-12;
 
-Points deformed_normals(JetView<const double> jets, PointsIn normals) {
+Points deformed_normals(JetView<const double> jets, PointsIn normals, Vector& growth) {
   Points result(jets.count, 3);
+  growth.resize(jets.count);
   for (Index i = 0; i < jets.count; ++i) {
     Mat3 jacobian, cofactors;
     for (int k = 0; k < 3; ++k) jacobian.col(k) = Eigen::Map<const Vec3>(jets.at(first_column(k), i));
@@ -34,6 +35,7 @@ Points deformed_normals(JetView<const double> jets, PointsIn normals) {
     const Vec3 normal = cofactors * normals.row(i).transpose();
     const double length = normal.norm();
     result.row(i) = normals.row(i);
+    growth[i] = length;
     if (length > 0.0) result.row(i) = normal.transpose() / length;
   }
   return result;
@@ -46,7 +48,7 @@ WrapPlaces::WrapPlaces(const RadialEvaluator<double>& field, const RowMatrix<dou
   JetBlock<double> jets(field.size(), JetOrder::first);
   field.evaluate(coefficients, jets.view());
   places = Eigen::Map<const Points>(jets.view().data, field.size(), 3);
-  normals = deformed_normals(jets.view(), rest_normals);
+  normals = deformed_normals(jets.view(), rest_normals, growth);
   distortion = arapfields::distortion<double>(jets.view());
 }
 

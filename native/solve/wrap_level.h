@@ -16,6 +16,7 @@ namespace arapfields {
 /// Where points and their unit normals come to by a field, and how far it is from a fold there.
 struct WrapPlaces {
   Points places, normals;
+  Vector growth;  ///< of areas there, against those at rest
   Distortion distortion;
   /// `field` evaluates at points with these normals at rest, at first order or more.
   WrapPlaces(const RadialEvaluator<double>& field, const RowMatrix<double>& coefficients,
