@@ -13,7 +13,7 @@ PYTEST := $(PY) -m pytest
 ALL_TESTS := $(PYTEST) -n logical --maxprocesses 4 --dist loadfile
 NATIVE_TESTS := build/wheel/tests/native_tests
 
-.PHONY: help setup build examples demo test test-slow test-windows fuzz bench sanitize format lint wheel workflows extension repository blenders gallery docs clean
+.PHONY: help setup build examples demo test test-slow test-windows test-arm64 fuzz bench sanitize format lint wheel workflows extension repository blenders gallery docs clean
 
 help:  ## this list
 	@grep -E '^[a-z0-9-]+:.*##' Makefile | sed -E 's/:.*##/ -/'
@@ -77,6 +77,11 @@ test-windows: setup  ## all but the torch sources, compiled for Windows by mingw
 	  -DCMAKE_CXX_FLAGS_RELEASE="-O1 -DNDEBUG" -DPython_EXECUTABLE=$(abspath $(PY)) -DCMAKE_MAKE_PROGRAM=$(abspath $(VENV)/bin/ninja)
 	$(VENV)/bin/cmake --build build/windows
 	WINEPREFIX=$(abspath build/wine) WINEDEBUG=-all timeout 900 $(WINE) $(WINDOWS_TESTS) --color_output=no
+
+# Debian: debootstrap, g++-aarch64-linux-gnu and qemu-user-static; and root, for debootstrap and chroot. ARM64 takes
+# arguments: ARM64="--only reference", "--all", "--jobs 1".
+test-arm64: build $(VENV)/.tools  ## slow: the library and its tests on 64-bit ARM, compiled here and run under qemu
+	$(PY) -m tests.arm64 $(ARM64)
 
 fuzz: build $(VENV)/.tools  ## the nets, long: 20,000 odd calls and 20,000 damaged files of every kind
 	$(PY) -m tests.fuzz
