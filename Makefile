@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # One word a purpose. Every word sets up what it needs in .venv (dependencies from PyPI).
-PYTHON ?= $(shell command -v python3.11 || command -v python3)
-PYTHON313 ?= $(shell command -v python3.13)
+# A Python that starts: names of pyenv's may lie in PATH and lead to none.
+PATH_OF = $(shell $(1) -c 'import sys; print(sys.executable)' 2> /dev/null)
+PYTHON ?= $(or $(call PATH_OF,python3.11),$(call PATH_OF,python3))
+PYTHON313 ?= $(call PATH_OF,python3.13)
 SHELL := /bin/bash
 .SHELLFLAGS := -o pipefail -c
 VENV := .venv
@@ -18,8 +20,22 @@ NATIVE_TESTS := build/wheel/tests/native_tests
 help:  ## this list
 	@grep -E '^[a-z0-9-]+:.*##' Makefile | sed -E 's/:.*##/ -/'
 
+# What is not at hand is said in one line, before anything is fetched.
+lacks = { echo "$(1)"; exit 1; }
+BASE = $(or $(wildcard $(PY)),$(PYTHON))
+GIT = @git rev-parse --git-dir > /dev/null 2>&1 || $(call lacks,A clone made by git is needed: this word asks git for its files)
+define COMPILER
+	@command -v c++ > /dev/null || $(call lacks,A C++20 compiler is needed (Debian: g++))
+	@test -e "$$($(BASE) -c 'import sysconfig; print(sysconfig.get_path("include"))')/Python.h" || \
+	  $(call lacks,The headers of Python 3.11 are needed (Debian: python3.11-dev))
+endef
+
 $(VENV)/.ready: requirements.txt
-	@test -x $(PY) || $(PYTHON) -m venv $(VENV) || { echo "Python 3.11 with the venv module is needed (Debian: python3.11-venv)"; exit 1; }
+	@$(or $(BASE),false) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' 2> /dev/null || \
+	  $(call lacks,Python 3.11 is needed: Blender's module is for no other (Debian: python3.11; PYTHON=path names one))
+	$(COMPILER)
+	@test -x $(PY) || $(PYTHON) -m venv $(VENV) > /dev/null || { rm -rf $(VENV); \
+	  echo "Python's venv module is needed (Debian: python3.11-venv)"; exit 1; }
 	@echo "Step 1 of 2: fetching libtorch, Blender as a module and the tools from PyPI into $(VENV). Large, once."
 	@$(PIP) -q --upgrade "pip>=24"
 	@$(PIP) -r requirements.txt
@@ -37,10 +53,11 @@ setup: $(VENV)/.tools  ## .venv with all that building and testing needs
 
 # The wheel's build folder is kept, so a rebuild compiles only what changed.
 $(VENV)/.installed: $(VENV)/.ready $(SOURCES)
-	@command -v c++ > /dev/null || { echo "A C++20 compiler is needed (Debian: g++)"; exit 1; }
+	$(COMPILER)
 	@echo "Step 2 of 2: compiling the native library. Some minutes the first time; all output: build/build.log"
 	@mkdir -p build
-	@$(PIP) -v --no-build-isolation --no-deps --force-reinstall -C build-dir=build/wheel . 2>&1 | tee build/build.log | \
+	@$(PIP) -v --no-build-isolation --no-deps --force-reinstall -C build-dir=build/wheel \
+	  -C cmake.define.ARAPFIELDS_WERROR=ON . 2>&1 | tee build/build.log | \
 	  while read -r line; do case "$$line" in "["*/*"]"*) printf '\r  %s]' "$${line%%]*}";; esac; done \
 	  || { tail -n 60 build/build.log; exit 1; }
 	@echo
@@ -56,7 +73,7 @@ $(NATIVE_TESTS): $(VENV)/.installed $(VENV)/.tools $(shell find tests/native -ty
 examples: build $(VENV)/.tools  ## the scenes of the workflow pages: out/examples
 	$(PY) blender_scripts/examples.py --output out/examples
 
-demo: build  ## the main job on Suzanne: out/demo.blend and out/demo.png
+demo: build $(VENV)/.tools  ## pins, a hat carried, a style and a wrap on a dog: out/demo.png and out/demo.blend
 	$(PY) blender_scripts/demo.py --output out
 
 test: build $(NATIVE_TESTS)  ## all tests but the slow ones
@@ -70,13 +87,18 @@ test-slow: build $(NATIVE_TESTS)  ## every test
 WINE := $(shell command -v wine64 || ls /usr/lib/wine/wine64 2> /dev/null)
 WINDOWS_TESTS := build/windows/tests/native_tests_without_torch.exe
 
-test-windows: setup  ## all but the torch sources, compiled for Windows by mingw-w64, and their native tests under Wine
-	@command -v x86_64-w64-mingw32-g++-posix > /dev/null || { echo "A compiler for Windows is needed (Debian: g++-mingw-w64-x86-64-posix)"; exit 1; }
-	@test -n "$(WINE)" || { echo "Wine is needed (Debian: wine64)"; exit 1; }
+.PHONY: windows-tools
+windows-tools:
+	@command -v x86_64-w64-mingw32-g++-posix > /dev/null || \
+	  $(call lacks,A compiler for Windows is needed (Debian: g++-mingw-w64-x86-64-posix))
+	@test -n "$(WINE)" || $(call lacks,Wine is needed (Debian: wine64))
+
+test-windows: windows-tools setup  ## all but the torch sources, compiled for Windows by mingw-w64, and their native tests under Wine
 	$(VENV)/bin/cmake -S . -B build/windows -G Ninja -DCMAKE_TOOLCHAIN_FILE=cmake/mingw-w64.cmake -DARAPFIELDS_WITHOUT_TORCH=ON \
+	  -DARAPFIELDS_WERROR=ON \
 	  -DCMAKE_CXX_FLAGS_RELEASE="-O1 -DNDEBUG" -DPython_EXECUTABLE=$(abspath $(PY)) -DCMAKE_MAKE_PROGRAM=$(abspath $(VENV)/bin/ninja)
 	$(VENV)/bin/cmake --build build/windows
-	WINEPREFIX=$(abspath build/wine) WINEDEBUG=-all timeout 900 $(WINE) $(WINDOWS_TESTS) --color_output=no
+	WINEPREFIX=$(abspath build/wine) WINEDEBUG=-all timeout 900 $(WINE) $(WINDOWS_TESTS) --color_output=no --report_level=short
 
 # Debian: debootstrap, g++-aarch64-linux-gnu and qemu-user-static; and root, for debootstrap and chroot. ARM64 takes
 # arguments: ARM64="--only reference", "--all", "--jobs 1".
@@ -92,11 +114,12 @@ bench: build $(VENV)/.tools  ## paired benchmarks against the real competitors; 
 	PEERS="$(PEERS)" $(PY) -m tests.benchmarks $(if $(PEERS),peers)
 
 SANITIZED = $(VENV)/bin/cmake -S . -G Ninja -DPython_EXECUTABLE=$(abspath $(PY)) -DCMAKE_MAKE_PROGRAM=$(abspath $(VENV)/bin/ninja) \
-  -DCMAKE_BUILD_TYPE=RelWithDebInfo -DARAPFIELDS_NATIVE_TESTS=ON
+  -DCMAKE_BUILD_TYPE=RelWithDebInfo -DARAPFIELDS_NATIVE_TESTS=ON -DARAPFIELDS_WERROR=ON
 
 # Neither sanitizer follows forks (a child may inherit the address sanitizer's allocator locked): the tests that make
 # them are left out.
 sanitize: setup  ## the native tests under the address and undefined-behaviour sanitizers, those of threads and the live solver under the thread sanitizer
+	$(COMPILER)
 	$(SANITIZED) -B build/sanitize -DARAPFIELDS_SANITIZE=address,undefined
 	$(VENV)/bin/cmake --build build/sanitize --target native_tests
 	ASAN_OPTIONS=detect_leaks=0:detect_odr_violation=0 UBSAN_OPTIONS=print_stacktrace=1 build/sanitize/tests/native_tests --run_test='!@fork'
@@ -105,30 +128,41 @@ sanitize: setup  ## the native tests under the address and undefined-behaviour s
 	build/sanitize-thread/tests/native_tests --run_test=threads,live_threads --run_test='!@fork'
 
 format: setup  ## clang-format and ruff over our files
+	$(GIT)
 	git ls-files '*.h' '*.cpp' | xargs $(VENV)/bin/clang-format -i
 	$(VENV)/bin/ruff format -q . && $(VENV)/bin/ruff check -q --fix .
 
 lint: setup  ## the same, checking alone
+	$(GIT)
 	git ls-files '*.h' '*.cpp' | xargs $(VENV)/bin/clang-format --dry-run --Werror
 	$(VENV)/bin/ruff format --check -q . && $(VENV)/bin/ruff check .
 
+# GLIBC=2.28, as if nothing is said: the oldest C library to run with.
+GLIBC :=
 wheel: $(VENV)/.ready  ## for pip: a manylinux wheel for .venv's Python and the source distribution, in dist
+	$(COMPILER)
+	$(GIT)
 	$(PIP) -q -r cmake/wheel/requirements.txt
-	$(PY) cmake/wheel/build_wheel.py --output dist
+	$(PY) cmake/wheel/build_wheel.py --output dist $(if $(GLIBC),--glibc $(GLIBC))
 
+# KEEP="NAME …" hands variables of this shell on to the steps, such as a compiler's cache.
 workflows: setup  ## the continuous integration's steps for Linux, run here one by one in fresh clones: build/workflows
-	$(PY) tests/packaging/run_workflow.py .github/workflows/*.yml
+	$(GIT)
+	$(PY) tests/packaging/run_workflow.py .github/workflows/*.yml $(if $(KEEP),--keep $(KEEP))
 
-# PYTHONS="3.11 3.13" makes those a must; else 3.11 and whatever headers are at hand or to be had.
+# PYTHONS="3.11 3.13" makes those a must; else 3.11 and whatever headers are at hand or to be had. GLIBC=2.28 takes
+# the library that `make wheel` links for systems that old; else the zip needs a C library as new as this system's.
 PLATFORM := linux-x64
-extension: build  ## dist/arapfields-<version>-linux-x64.zip for Blender; PLATFORM=macos-arm64 for a Mac
+BUILD_EXTENSION = $(PY) blender_scripts/build_extension.py --output dist $(if $(PYTHONS),--python $(PYTHONS)) \
+  $(if $(GLIBC),--build build/wheel-$(GLIBC))
+extension: $(if $(GLIBC),wheel,build)  ## dist/arapfields-<version>-linux-x64.zip for Blender; PLATFORM=macos-arm64 for a Mac
 	@$(if $(filter macos-%,$(PLATFORM)),$(PIP) -q -r blender_scripts/extension/macos-requirements.txt)
 	$(PY) blender_scripts/python_headers.py
-	$(PY) blender_scripts/build_extension.py --output dist --platform $(PLATFORM) $(if $(PYTHONS),--python $(PYTHONS))
+	$(BUILD_EXTENSION) --platform $(PLATFORM)
 
-repository: build  ## the same, and dist/index.json: a repository of extensions to serve
+repository: $(if $(GLIBC),wheel,build)  ## the same, and dist/index.json: a repository of extensions to serve
 	$(PY) blender_scripts/python_headers.py
-	$(PY) blender_scripts/build_extension.py --output dist --repository $(if $(PYTHONS),--python $(PYTHONS))
+	$(BUILD_EXTENSION) --repository
 
 # What PyPI has of other Blenders, for tests/blender/test_extension.py; the 5.2 needs a Python 3.13.
 blenders: build/blenders/4.2/.ready $(if $(PYTHON313),build/blenders/5.2/.ready)  ## other Blenders to test the extension in: build/blenders

@@ -14,7 +14,7 @@ from .deform import first_result
 from .field_modifier import motion
 from .handles import counts, rows
 from .jobs.display import display
-from .live import sessions
+from .live import leftovers, sessions
 from .live.warm import warm
 from .pin_tool import drawing as pin_drawing
 from .pin_tool import tool
@@ -31,6 +31,7 @@ def before_load(*_):
     for state in (*passing, applying.solved, first_result.steps):
         state.clear()
     sessions.stop_all()
+    jobs.forget_messages()
 
 
 @persistent
@@ -45,8 +46,15 @@ def before_save(*_):
 
 
 @persistent
+def after_load(*_):
+    hover.clear()
+    first_result.steps.recover()
+    sessions.recover(leave=leftovers.adopt)
+
+
+@persistent
 def after_restore(*_):
-    """A file was loaded, or a step undone or redone."""
+    """A step was undone or redone."""
     hover.clear()
     first_result.steps.recover()
     sessions.recover()
@@ -82,7 +90,7 @@ def after_frame(scene, depsgraph):
 
 HANDLERS = {  # of bpy.app.handlers
     "load_pre": before_load,
-    "load_post": after_restore,
+    "load_post": after_load,
     "save_pre": before_save,
     "undo_pre": before_undo,
     "undo_post": after_restore,

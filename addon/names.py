@@ -23,6 +23,9 @@ RESULT_SUFFIX = {
     "BAKE": "_baked",
     "WRAP": "_wrapped",
 }
+PLAYED_GROUP = "arapfields_played"  # custom property of the node group that plays baked points
+PLAYED_SUFFIX = "_played"  # of the mesh that has baked points of hair, point clouds and Grease Pencil
+ROWS = "ARAP Fields Rows"  # point attribute: which of these points each is
 HELPER_SUFFIX = "_offsets"  # of the mesh that carries offsets where the source cannot
 
 
@@ -43,6 +46,7 @@ class Op(StrEnum):
     WRAP = "arapfields.wrap"
     ADD_LANDMARK = "arapfields.add_landmark"
     CLICK_LANDMARKS = "arapfields.click_landmarks"
+    RESET_BONES = "arapfields.reset_bones"
     REMOVE_LANDMARK = "arapfields.remove_landmark"
     CARRY = "arapfields.carry"
     RELEASE = "arapfields.release"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The main job from end to end, headless: Suzanne is fitted, deformed under three handles and rendered.
+"""What there is, end to end, headless: a dog is posed by pins with a hat carried, stylized, and wrapped.
 
     python blender_scripts/demo.py [--output out]
 
@@ -20,18 +20,37 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "blender_scripts")]
 
 import bpy  # noqa: E402
+import child  # noqa: E402
+import menagerie  # noqa: E402
+import scanned  # noqa: E402
 import stage  # noqa: E402
 from mathutils import Matrix, Vector  # noqa: E402
 
 import addon  # noqa: E402
 
-# Name, centre, half-extents, turn about y at `pivot` (degrees): the muzzle stays, the ears turn up.
-HANDLES = [
-    ("muzzle", (0.0, -0.30, -0.50), (0.58, 0.75, 0.52), 0.0, (0.0, 0.0, 0.0)),
-    ("left ear", (1.14, 0.30, 0.14), (0.27, 0.32, 0.44), -60.0, (0.80, 0.0, 0.20)),
-    ("right ear", (-1.14, 0.30, 0.14), (0.27, 0.32, 0.44), 60.0, (-0.80, 0.0, 0.20)),
+SPACING, TURN = 1.85, 38.0  # from one to the next along x, and degrees by which each faces the camera
+# On the dog at rest: (place, radius) of what stays; of pins also the shift and the turn about x of each.
+ANCHORS = [((0.17, 0.45, 0.06), 0.17), ((-0.17, 0.45, 0.06), 0.17), ((-0.17, -0.48, 0.06), 0.17)]
+PINS = [
+    ((0.17, -0.48, 0.10), 0.17, (0.06, -0.42, 0.42), 0.9),  # gives the paw
+    ((0.0, -0.78, 1.20), 0.34, (-0.10, 0.04, 0.10), -0.30),  # looks up
+    ((0.05, 0.70, 1.20), 0.20, (0.0, 0.14, 0.10), -0.5),  # and wags
 ]
-SPACING = 3.3
+COLUMNS = {0: "Mesh", 1: "Posed", 2: "Styled", 4: "Wrapped"}
+CAPTIONS = [
+    "a mesh,\npins on it",
+    "posed in place,\nhat carried",
+    "in the style\nof a cube",
+    "the scan\nof another",
+    "wrapped\nonto it",
+]
+LANDMARKS = [  # on the dog, on the scan; and those with x of the other side
+    ((0, -1.12, 1.15), (0, -1.36, 1.30)),
+    ((0.08, 0.50, 1.18), (0, 1.22, 1.24)),
+    ((0.20, -0.58, 1.57), (0.24, -0.66, 1.76)),
+    ((0.17, -0.62, 0.05), (0.19, -0.72, 0.05)),
+    ((0.17, 0.36, 0.05), (0.19, 0.42, 0.05)),
+]
 SCREEN = os.fdopen(os.dup(1), "w")  # stays when Blender's own lines are sent away
 
 
@@ -85,64 +104,76 @@ def alone():
                 os.close(stream)
 
 
-def suzanne():
-    """Suzanne with a UV map, two materials and a subdivision modifier: the artist's mesh."""
-    bpy.ops.mesh.primitive_monkey_add()
-    monkey = bpy.context.object
-    monkey.name = "Suzanne"
-    monkey.modifiers.new("Subdivision", "SUBSURF").levels = 2
-    monkey.modifiers["Subdivision"].render_levels = 2
-    mesh = monkey.data
-    mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
-    mesh.materials.append(stage.material("skin", stage.CLAY))
-    return monkey
-
-
-def add_handles(monkey):
-    """Empties as handles; the turned ones are moved after their rest pose has been stored."""
-    empties = []
-    for name, centre, half, _, _ in HANDLES:
-        bpy.ops.object.empty_add(type="CUBE", radius=1.0, location=centre)
-        empty = bpy.context.object
-        empty.name, empty.scale = name, half
-        empties.append(empty)
+def stand(name, shape, column):
+    """The shape as an object in its column, on the floor."""
+    item = child.coloured(name, shape)
+    item.location = ((column - 2) * SPACING, 0, -float(shape.vertices[:, 2].min()))
+    item.rotation_euler.z = math.radians(TURN)
     bpy.context.view_layer.update()
-    for empty in empties:
-        empty.select_set(True)
-    bpy.context.view_layer.objects.active = monkey
-    bpy.ops.arapfields.add_handle()
-    rest = [empty.matrix_world.copy() for empty in empties]
-    for empty, (_, _, _, angle, pivot) in zip(empties, HANDLES, strict=True):
-        there = Matrix.Translation(Vector(pivot))
-        empty.matrix_world = (
-            there @ Matrix.Rotation(math.radians(angle), 4, "Y") @ there.inverted() @ empty.matrix_world
-        )
-    bpy.context.view_layer.update()
-    return rest, [empty.matrix_world.copy() for empty in empties]
+    return item
 
 
-def activate(item):
+def hat(dog):
+    """A party hat between the ears: an object of its own."""
+    bpy.ops.mesh.primitive_cone_add(vertices=48, radius1=0.15, radius2=0.01, depth=0.36)
+    item = bpy.context.object
+    item.name = "Hat"
+    bpy.ops.object.shade_smooth()
+    item.data.materials.append(stage.material("Hat", (0.03, 0.20, 0.55)))
+    lean = Matrix.Translation((0, -0.60, 1.58)) @ Matrix.Rotation(0.12, 4, "X")
+    item.matrix_world = dog.matrix_world @ lean
+    return item
+
+
+def activate(item, *others):
     bpy.ops.object.select_all(action="DESELECT")
-    item.select_set(True)
+    for chosen in (item, *others):
+        chosen.select_set(True)
     bpy.context.view_layer.objects.active = item
 
 
-def arrange(monkey, results, rest, targets, path):
-    """Rest shape and results side by side, each with its boxes, and a picture of them."""
-    shown = []
-    columns = [("rest shape, handles", monkey, rest, None)]
-    columns += [(text, item, targets, colour) for text, item, colour in results]
-    for column, (text, item, boxes, colour) in enumerate(columns):
-        shift = Matrix.Translation(((column - 1) * SPACING, 0, 0))
-        item.matrix_world = shift @ item.matrix_world
-        if colour:
-            stage.paint(item, colour)
-        shown.append(item)
-        for number, matrix in enumerate(boxes):
-            colour_of_box = stage.BOX_COLOURS[number % len(stage.BOX_COLOURS)]
-            shown.append(stage.box(f"{text} {HANDLES[number][0]}", shift @ matrix, colour_of_box))
-        shown.append(stage.caption(text, ((column - 1) * SPACING, -1.0, -1.5)))
-    stage.photograph(shown, path, width=1440)
+def add_pins(dog):
+    """Anchors and pins by the tool's operator; the pins' Empties."""
+    activate(dog)
+    for place, radius in ANCHORS:
+        bpy.ops.arapfields.pin_add(location=dog.matrix_world @ Vector(place), radius=radius, anchor=True)
+    for place, radius, *_ in PINS:
+        bpy.ops.arapfields.pin_add(location=dog.matrix_world @ Vector(place), radius=radius)
+    return [handle.empty for handle in dog.arapfields.handles[len(ANCHORS) :]]
+
+
+def draw_pins(dog):
+    """Balls and cubes before the surface, where the pins and anchors are."""
+    towards = Vector((0, -0.3, 0.06))
+    return [stage.pin(h.empty.matrix_world.translation + towards, h.anchor) for h in dog.arapfields.handles]
+
+
+def pose(dog, hats):
+    """In place: a modifier of the dog; the hat goes along as a whole."""
+    turn = dog.matrix_world.to_3x3()
+    for empty, (_, _, shift, angle) in zip(add_pins(dog), PINS, strict=True):
+        there = dog.matrix_world @ Matrix.Rotation(angle, 4, "X") @ dog.matrix_world.inverted()
+        place = empty.matrix_world.translation + turn @ Vector(shift)
+        empty.matrix_world = (
+            Matrix.Translation(place) @ (there.to_3x3() @ empty.matrix_world.to_3x3()).to_4x4()
+        )
+    activate(dog, *hats)
+    bpy.ops.arapfields.carry(way="RIGID")
+    activate(dog)
+    bpy.ops.arapfields.deform()
+
+
+def wrap(dog, scan):
+    """The dog on the scan, and then one column aside."""
+    dog.arapfields.wrap.onto = scan
+    activate(dog)
+    for on_dog, on_scan in LANDMARKS:
+        for side in (1, -1) if on_scan[0] else (1,):
+            ends = [Vector((side * x, y, z)) for x, y, z in (on_dog, on_scan)]
+            rest, there = (at.matrix_world @ end for at, end in zip((dog, scan), ends, strict=True))
+            bpy.ops.arapfields.add_landmark(rest=rest, on_target=there)
+    bpy.ops.arapfields.wrap()
+    dog.location.x += dog.location.x - scan.location.x
 
 
 def main():
@@ -153,27 +184,28 @@ def main():
     begin = time.perf_counter()
     addon.register()
     stage.clear()
-    monkey = suzanne()
-    activate(monkey)
-    fit = monkey.arapfields.fit
-    fit.iterations, fit.octaves = 800, 5  # the eyes need more than the default
-    with alone(), timed("neural surface (fit)"):
-        bpy.ops.arapfields.fit(again=True)
+    dogs = {name: stand(name, menagerie.load("dog"), column) for column, name in COLUMNS.items()}
+    scan = stand("Scan", scanned.hound(), 3)
+    hats = [hat(dogs["Mesh"]), hat(dogs["Posed"])]
     with alone():
-        rest, targets = add_handles(monkey)
-    results = []
-    for output, text, colour in (
-        ("WARP", "original mesh warped", stage.RESULT),
-        ("SURFACE", "implicit surface", stage.SURFACE),
-    ):
-        activate(monkey)
-        with alone(), timed(f"deform, {text}"):
-            bpy.ops.arapfields.deform(output=output, target="NEW")
-        results.append((text, bpy.context.view_layer.objects.active, colour))
-    monkey.hide_render = False  # the picture shows it beside its results
-    monkey.hide_set(False)
+        add_pins(dogs["Mesh"])
+    with alone(), timed("pose by pins, hat carried"):
+        pose(dogs["Posed"], hats[1:])
+    with alone(), timed("style"):
+        activate(dogs["Styled"])
+        dogs["Styled"].arapfields.stylize.strength = 0.9
+        bpy.ops.arapfields.stylize(style="CUBE")
+    with alone(), timed("wrap onto a scan"):
+        wrap(dogs["Wrapped"], scan)
     with alone(), timed("picture", lambda: (0.0, "Cycles at work")):
-        arrange(monkey, results, rest, targets, options.output / "demo.png")
+        wrapped = dogs.pop("Wrapped")  # what counts for the frame is where its own shape would be: beyond it
+        shown = [*dogs.values(), scan, *hats, *draw_pins(dogs["Mesh"]), *draw_pins(dogs["Posed"])]
+        for column, text in enumerate(CAPTIONS):
+            shown.append(stage.caption(text, ((column - 2) * SPACING, -1.3, -0.05), 0.2))
+        end = (wrapped.location.x - SPACING + 1.1, 0, 1.75)
+        stage.photograph(
+            shown, options.output / "demo.png", width=1600, elevation=8, samples=12, around=[end]
+        )
     with alone():
         bpy.ops.wm.save_as_mainfile(filepath=str((options.output / "demo.blend").resolve()))
     print(f"{'total':26} {time.perf_counter() - begin:6.1f} s")

@@ -3,7 +3,7 @@
 
     python blender_scripts/examples.py [--output out/examples]
 
-Writes pins.blend, character.blend, animate.blend and stylize.blend, a folder of meshes, and dinosaur.obj.
+Writes a .blend for each of SCENES, a folder of meshes, and dinosaur.obj.
 """
 
 import argparse
@@ -16,7 +16,9 @@ sys.path[:0] = [str(ROOT), str(ROOT / "blender_scripts")]
 import bpy  # noqa: E402
 import child  # noqa: E402
 import menagerie  # noqa: E402
+import scanned  # noqa: E402
 import stage  # noqa: E402
+import walking  # noqa: E402
 from mathutils import Vector  # noqa: E402
 
 MESHES = ("dinosaur", "dog", "lizard", "octopus", "mug", "chapel")
@@ -25,6 +27,7 @@ HANDLES = {  # of animate.blend: place and half-extents
     "Head": ((0, -0.72, 1.40), (0.28, 0.36, 0.30)),
     "Tail": ((0, 1.27, 0.82), (0.16, 0.26, 0.18)),
 }
+APART = 1.7  # the scan from the dog, along x
 LAST = 48  # frame; the motion repeats after it
 
 
@@ -73,12 +76,7 @@ def character():
 def animate():
     """A creature whose handles have keys."""
     dinosaur = figure("Dinosaur", "dinosaur", 0)
-    empties = {name: handle(name, *place) for name, place in HANDLES.items()}
-    bpy.context.view_layer.update()
-    chosen(dinosaur)
-    for empty in empties.values():
-        empty.select_set(True)
-    bpy.ops.arapfields.add_handle()
+    empties = held(dinosaur, HANDLES)
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, LAST
     half = 1 + LAST // 2
@@ -105,6 +103,38 @@ def handle(name, place, half):
     return empty
 
 
+def held(item, places):
+    """Empties by name as handles of an object; places: name -> middle and half-extents."""
+    empties = {name: handle(name, *place) for name, place in places.items()}
+    bpy.context.view_layer.update()
+    chosen(item)
+    for empty in empties.values():
+        empty.select_set(True)
+    bpy.ops.arapfields.add_handle()
+    return empties
+
+
+def walk():
+    """A creature that walks on the spot by keys of its feet and hips: neck, head and tail are nobody's."""
+    dinosaur = figure("Dinosaur", "dinosaur", 0)
+    walking.set_keys(held(dinosaur, walking.HANDLES))
+    in_studio(
+        [dinosaur],
+        azimuth=52,
+        around=[(-0.45, -1.2, 1.6), (0.4, 1.6, 0.9), (-0.4, 1.6, 1.3), (0.76, -0.6, 0)],
+    )
+    chosen(dinosaur)
+
+
+def wrap():
+    """A dog to be laid onto the scan of another: rough, and open where no scanner looks."""
+    dog = figure("Dog", "dog", 0)
+    scan = child.coloured("Scan", scanned.hound(), roughness=0.8)
+    scan.location.x = APART
+    in_studio([dog, scan], azimuth=28, elevation=11, around=[(0, -1.4, 1.3), (0, -0.7, 1.8)])
+    chosen(dog)
+
+
 def stylize():
     """A dog to be turned towards a solid."""
     dog = figure("Dog", "dog", 0)
@@ -112,7 +142,7 @@ def stylize():
     chosen(dog)
 
 
-SCENES = (pins, character, animate, stylize)
+SCENES = (pins, character, animate, walk, stylize, wrap)
 
 
 def comfortable():

@@ -5,7 +5,8 @@
 
 A picture is up to date when its modules, those that all share and the library's sources are what it was made
 with (manifest.json in the output folder, which also holds the figures measured on the way). Figures of
-published shapes need ../shared/data (or ARAPFIELDS_DATA) and go to out/gallery, outside the repository.
+published shapes need ../shared/data (or ARAPFIELDS_DATA) and go to out/gallery, outside the repository; those
+of a window need a Blender that has one (windowed.py). What is not at hand is said and left as it is.
 """
 
 import argparse
@@ -24,10 +25,17 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 sys.path[:0] = [str(HERE)]
 
+import windowed  # noqa: E402
 from figures import FIGURES  # noqa: E402
 
 SHARED = ["stage.py", "shapes.py", "creatures.py", "menagerie.py", "figures/common.py"]
-OF_PAGES = ["examples.py", "child.py", "dressing.py"]  # of figures that run a page's script
+OF_PAGES = [
+    "examples.py",
+    "child.py",
+    "dressing.py",
+    "scanned.py",
+    "walking.py",
+]  # of figures that run a page's script
 LIBRARY = [
     path
     for path in sorted((ROOT / "native").rglob("*"))
@@ -52,6 +60,7 @@ def content_hash(figure):
     further = [*(HERE / name for name in OF_PAGES), *(ROOT / "docs" / page for page in figure.pages)]
     for path in [*LIBRARY, *(HERE / name for name in SHARED), *with_imports(figure.name)]:
         digest.update(path.read_bytes())
+    further += [HERE / "windowed.py", *windowed.SCRIPTS] if figure.window else []
     for path in further if figure.pages else ():
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
@@ -130,6 +139,9 @@ def main():
             continue
         if figure.published and not data_folder().is_dir():
             print(f"{figure.name:16} skipped: no published shapes at {data_folder()}", flush=True)
+            continue
+        if figure.window and windowed.missing():
+            print(f"{figure.name:16} skipped: {windowed.missing()}", flush=True)
             continue
         folder = ROOT / "out" / "gallery" if figure.published else options.output
         folder.mkdir(parents=True, exist_ok=True)

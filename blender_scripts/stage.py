@@ -13,6 +13,7 @@ DRAFT = "STAGE_DRAFT" in os.environ  # smaller pictures of fewer rays, for tryin
 CLAY = (0.62, 0.60, 0.56)
 RESULT = (0.93, 0.55, 0.20)
 SURFACE = (0.30, 0.52, 0.75)
+PIN, ANCHOR = (0.95, 0.30, 0.02), (0.02, 0.16, 0.75)
 BOX_COLOURS = [
     (0.05, 0.25, 0.85),
     (0.85, 0.06, 0.05),
@@ -85,6 +86,17 @@ def caption(text, location, size=0.22):
     made.rotation_euler = (math.radians(90), 0, 0)
     made.visible_shadow = False
     bpy.context.collection.objects.link(made)
+    return made
+
+
+def pin(place, anchor):
+    """A ball that stands for a pin, or a cube for an anchor."""
+    if anchor:
+        bpy.ops.mesh.primitive_cube_add(size=0.09, location=place)
+    else:
+        bpy.ops.mesh.primitive_uv_sphere_add(radius=0.06, location=place)
+    made = bpy.context.object
+    made.data.materials.append(material("Anchor" if anchor else "Pin", ANCHOR if anchor else PIN, 0.3))
     return made
 
 

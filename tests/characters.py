@@ -40,12 +40,16 @@ def trousers():
     return Capsules(parts, af.Frame([0, 0, 0.6], 0.8))
 
 
-def ring(half_width, half_depth, heights, around):
-    """A skirt: vertices (heights · around, 3) of an elliptic tube about z, and its edges (e, 2)."""
+def ring(half_width, half_depth, heights, around, flare=0.0):
+    """A skirt: vertices (heights · around, 3) of an elliptic tube about z, and its edges (e, 2).
+
+    `flare`: by how much of its width at the highest it is wider at the lowest.
+    """
     angles = np.linspace(0, 2 * np.pi, around, endpoint=False)
+    wider = 1 + flare * (np.max(heights) - heights) / np.ptp(heights)
     layers = [
-        np.column_stack([half_width * np.cos(angles), half_depth * np.sin(angles), 0 * angles + z])
-        for z in heights
+        np.column_stack([w * half_width * np.cos(angles), w * half_depth * np.sin(angles), 0 * angles + z])
+        for w, z in zip(wider, heights, strict=True)
     ]
     index = np.arange(len(heights) * around).reshape(len(heights), around)
     rounds = np.column_stack([index.ravel(), np.roll(index, -1, axis=1).ravel()])

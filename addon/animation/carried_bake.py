@@ -1,21 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bakes of what a source carries, beside the source's own: caches, shape keys, or keyframes.
 
-Meshes go as the source goes: into a cache of their own, or into an object with a key a frame. Curves and
-lattices get a shape key a frame, whole objects and bones keyframes. Hair has nothing that Blender plays.
+Meshes go as the source goes: into a cache of their own, or into an object with a key a frame. So do hair,
+point clouds and Grease Pencil, by a mesh of their points. Curves and lattices get a shape key a frame, whole
+objects and bones keyframes.
 """
 
 import contextlib
 
+from ..blender import modifier_stack
 from ..blender.language import translated
+from ..carried import played_points
 from ..carried.carriers import MeshCarrier
-from ..carried.passengers import find
-from ..carried.points import AttributeCarrier, KeyCarrier, drop_key, key_points, put_key
+from ..carried.passengers import KINDS, find
+from ..carried.points import AttributeCarrier, KeyCarrier, drop_key, key_points, own_key, put_key
 from ..carried.transforms import BonesCarrier
 from ..core.errors import UserError
 from ..core.runtime.coroutines import Pause
 from ..field_modifier import cache_modifier
-from ..results import result_objects
+from ..results import result_objects, visibility
 from .caches import plain
 
 BAKED_KEY = "ARAP Fields frame "  # how baked keys of curves and lattices begin
@@ -35,9 +38,7 @@ class CarriedBake:
             name = passenger.reference.name
             if is_shared:
                 carrying.leave(passenger, UserError("{name} is not baked in parts; bake it whole", name=name))
-            elif isinstance(passenger.carrier, AttributeCarrier):
-                carrying.leave(passenger, UserError("{name} cannot be baked; live mode plays it", name=name))
-            elif cache_of is not None and isinstance(passenger.carrier, MeshCarrier):
+            elif cache_of is not None and isinstance(passenger.carrier, (MeshCarrier, AttributeCarrier)):
                 self.places[passenger] = cache_of(name)
 
     def prepare(self):
@@ -78,6 +79,8 @@ class CarriedBake:
                     self.play(passenger, item)
                 elif len(self.shapes.get(passenger, ())) != self.frames.count:
                     raise UserError("{name} was not there at every frame", name=item.name)
+                elif isinstance(passenger.carrier, AttributeCarrier):
+                    yield from self.add_points(passenger, item)
                 elif isinstance(passenger.carrier, MeshCarrier):
                     yield from self.add_object(context, passenger, item)
                 elif isinstance(passenger.carrier, KeyCarrier):
@@ -94,6 +97,8 @@ class CarriedBake:
 
     def play(self, passenger, item):
         self.writers[passenger].commit()
+        if isinstance(passenger.carrier, AttributeCarrier):
+            item = played_points.play(item, passenger.carrier.points, passenger.carrier.counts)
         cache_modifier.play(item, self.places[passenger][1], self.frames.start, self.frames.step)
 
     def add_object(self, context, passenger, item):
@@ -104,10 +109,18 @@ class CarriedBake:
         for number, shape in enumerate(shapes):
             result_objects.add_frame(baked, frames, number, shape)
             yield Pause.REDRAW
-        result_objects.hide(item)
+        visibility.show_alone(item, baked)
+
+    def add_points(self, passenger, item):
+        played = played_points.play(item, passenger.carrier.points, passenger.carrier.counts)
+        frames = [plain(frame) for frame in self.frames]
+        for number, shape in enumerate(self.shapes[passenger]):
+            result_objects.add_frame(played, frames, number, shape)
+            yield Pause.REDRAW
 
     def add_keys(self, passenger, item):
         """A shape key a frame, in place of those of an earlier bake."""
+        mask = own_key(item).vertex_group if own_key(item) is not None else ""
         drop_key(item, also_basis=False)
         if item.data.shape_keys is None:
             item.shape_key_add(name="Basis", from_mix=False)
@@ -117,6 +130,7 @@ class CarriedBake:
         basis, frames = key_points(keys.reference_key), [plain(frame) for frame in self.frames]
         for number, shape in enumerate(self.shapes[passenger]):
             key = item.shape_key_add(name=f"{BAKED_KEY}{frames[number]}", from_mix=False)
+            key.vertex_group = mask
             put_key(key, basis + (shape - passenger.carrier.points))
             for frame in frames[max(0, number - 1) : number + 2]:
                 key.value = float(frame == frames[number])
@@ -141,6 +155,15 @@ class CarriedBake:
         finally:
             with contextlib.suppress(ReferenceError):
                 scene.frame_set(present[0], subframe=present[1])
+
+
+def remove(item):
+    """Takes the modifier off that plays a carried object's bake; keys stay."""
+    if item.type == "MESH":
+        if modifier_stack.find_cache(item) is not None:
+            cache_modifier.remove(item)
+    elif KINDS.get(item.type) is AttributeCarrier:
+        played_points.remove(item)
 
 
 def insert(item, carrier, frame):

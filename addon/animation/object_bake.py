@@ -16,7 +16,7 @@ from ..handles import empties
 from ..live import animated, body, sessions
 from ..live.session import Session
 from ..live.simulation import Simulation
-from ..results import placement, result_objects
+from ..results import placement, result_objects, visibility
 from .caches import cache_beside, keys_weight, plain, size_text
 from .carried_bake import CarriedBake
 from .parts import SharedFrames
@@ -183,7 +183,7 @@ class ObjectBake:
             player = result_objects.show(
                 context, source, "BAKE", "BAKE", self.mesh(context, source), {"frames": self.frames.count}
             )
-            result_objects.hide(source)
+        visibility.show_alone(source, player)
         self.play(player)
         digest, faces = mesh_arrays.fingerprint(player.data)
         record = {"mesh": digest.hex(), "faces": faces, "start": self.frames.start, "step": self.frames.step}
@@ -237,7 +237,7 @@ class ObjectBake:
                 self.shapes[number] = None  # the key has it
                 yield Pause.REDRAW
             context.scene.frame_set(context.scene.frame_current)  # else the key stored last stays on
-            result_objects.hide(source)
+            visibility.show_alone(source, item)
             kept = True
         finally:
             if not kept:

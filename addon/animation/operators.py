@@ -9,7 +9,7 @@ from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError
 from ..field_modifier import cache_modifier
 from ..names import Op
-from . import caches
+from . import caches, carried_bake
 from .bake_operator import BakeOperator, effective_kind
 from .object_bake import ObjectBake
 from .properties import folder, settings
@@ -81,7 +81,7 @@ class ARAPFIELDS_OT_bake(BakeOperator, bpy.types.Operator):
 
 
 class ARAPFIELDS_OT_remove_bake(SourceOperator, bpy.types.Operator):
-    """Take the modifier that plays the bake away; the cache's file stays"""
+    """Take the modifiers that play the bake away, of carried objects too; the caches' files stay"""
 
     bl_idname = Op.REMOVE_BAKE
     bl_label = "Remove Bake"
@@ -94,7 +94,11 @@ class ARAPFIELDS_OT_remove_bake(SourceOperator, bpy.types.Operator):
         return UserError("{name} plays no bake", name=source.name) if played is None else None
 
     def execute(self, context):
-        cache_modifier.remove(source_of(context))
+        source = source_of(context)
+        cache_modifier.remove(source)
+        for entry in settings_of(source).carried:
+            if entry.item is not None and entry.item.library is None:
+                carried_bake.remove(entry.item)
         return {"FINISHED"}
 
 

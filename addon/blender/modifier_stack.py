@@ -45,11 +45,13 @@ def is_field(modifier):
 
 def place(source):
     """Where the field modifier is in the stack, or would come: at the cache that plays in its place, else
-    before what only refines the shape."""
+    before what only refines the shape, or before the armatures where its rest shape is worked on."""
     stack = list(source.modifiers)
     found = next((index for index, one in enumerate(stack) if is_field(one) or is_cache(one)), None)
     if found is not None:
         return found
+    if settings_of(source).under_rig:
+        return next((index for index, one in enumerate(stack) if is_posing(source, one)), len(stack))
     end = len(stack)
     while end and (stack[end - 1].type in REFINING or getattr(stack[end - 1], "use_pin_to_last", False)):
         end -= 1
@@ -76,6 +78,15 @@ def handle_rigs(source):
 def is_replaced(modifier, rigs):
     """Whether a modifier poses by one of these armatures."""
     return modifier.type == "ARMATURE" and modifier.object in rigs
+
+
+def is_posing(source, modifier):
+    """Whether an armature poses the object by this modifier, rather than the field by its bones."""
+    return (
+        modifier.type == "ARMATURE"
+        and modifier.object is not None
+        and not is_replaced(modifier, handle_rigs(source))
+    )
 
 
 def shown_before(source, in_place):

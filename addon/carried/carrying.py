@@ -7,7 +7,7 @@ from ..blender import mesh_arrays, modifier_stack
 from ..blender.object_references import ObjectReference, settings_of
 from ..core.errors import UserError
 from ..core.geometry.spaces import transform
-from ..field_modifier import motion
+from ..field_modifier import masks, motion
 from . import refusals
 from .carriers import MeshCarrier
 from .passengers import Frame, Passenger, find, give_back, is_carried_otherwise
@@ -137,6 +137,7 @@ class Carrying:
                     uid, (passenger, passenger.carrier.snapshot(item, entry))
                 )
                 passenger.carrier.bind(context, item, entry)
+                masks.lend(source, item)
             except (UserError, RuntimeError) as error:
                 self.leave(passenger, error)
 

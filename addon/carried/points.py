@@ -8,7 +8,9 @@ from ..blender import modifier_stack
 from ..core.errors import UserError
 from ..field_modifier import motion, node_group
 from ..names import FIELD_MODIFIER, OFFSETS, WARP_KEY
+from . import played_points
 from .carriers import Carrier
+from .drawings import layers_of
 
 SURFACE_NODE = "GeometryNodeDeformCurvesOnSurface"  # of modifiers that move hair with its surface
 
@@ -32,6 +34,7 @@ class AttributeCarrier(Carrier):
         return np.concatenate([vectors(layer["position"]) for layer in layers] or [np.zeros((0, 3))])
 
     def bind(self, context, item, entry):
+        played_points.set_playing(item, False)
         if modifier_stack.find(item) is None:
             made = item.modifiers.new(FIELD_MODIFIER, "NODES")
             made.node_group = node_group.find_or_make()
@@ -63,6 +66,7 @@ class AttributeCarrier(Carrier):
 
     @staticmethod
     def release(item, entry):
+        played_points.remove(item)
         modifier = modifier_stack.find(item)
         if modifier is not None:
             group = modifier.node_group
@@ -78,14 +82,6 @@ class AttributeCarrier(Carrier):
 def follows_surface(modifier):
     nodes = modifier.node_group.nodes if modifier.type == "NODES" and modifier.node_group else ()
     return modifier.show_viewport and any(node.bl_idname == SURFACE_NODE for node in nodes)
-
-
-def layers_of(item):
-    """The collections of attributes on which an object's points lie; Grease Pencil has one a drawing."""
-    if item.type != "GREASEPENCIL":
-        return [item.data.attributes]
-    drawings = [frame.drawing for layer in item.data.layers for frame in layer.frames]
-    return [drawing.attributes for drawing in drawings if "position" in drawing.attributes]
 
 
 def vectors(attribute):

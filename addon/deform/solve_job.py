@@ -18,7 +18,7 @@ from ..core.runtime import native
 from ..core.runtime.jobs import Item
 from ..jobs.job_operator import JobOperator
 from ..poses import applying
-from ..results import placement
+from ..results import placement, visibility
 from ..stiffness import painted
 from ..surface.source_surface import read_surface
 from ..viewport.previews import Preview
@@ -90,9 +90,8 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
         applying.note(owner, *found[-1], surface.space)
         carrying.put(bpy.context, solved.carried)
         operator.warnings += [f"{owner.name}: {translated(reason)}" for reason in carrying.take_warnings()]
-        said = describe(item, solved.report)
-        hidden = translated("{name} is hidden", name=owner.name) if item != owner else ""
-        return f"{said}, {hidden}" if hidden else said
+        shown = item.name + visibility.told(visibility.show_alone(owner, item))
+        return describe(shown, solved.report)
 
     return Item(source.name, work, apply, preview)
 
@@ -122,8 +121,8 @@ class SolveOperator(JobOperator):
         return placement.in_place(*destination(settings_of(source), self))
 
 
-def describe(item, report):
-    figures = [item.name]
+def describe(shown, report):
+    figures = [shown]
     if "energy" in report:
         figures.append(translated("energy {value}", value=f"{report['energy']:.4g}"))
     if report.get("handle_error_mean"):

@@ -3,6 +3,7 @@
 
 from ..blender import modifier_stack, property_definitions
 from ..blender.object_references import settings_of
+from ..names import PLAYED_GROUP, WARP_KEY
 from . import inputs
 
 
@@ -33,9 +34,47 @@ def put(source, group):
         cache.vertex_group = group if group in source.vertex_groups else ""
 
 
+def lend(source, item):
+    """Has a carried object heed its own weights of the name of the source's mask, where it has such."""
+    group = group_of(source)
+    if group:
+        put_carried(item, group)
+
+
+def put_carried(item, group):
+    """Gives what carries the motion of a carried object this group, or none; its own choice stays."""
+    if settings_of(item).stiffness.mask:
+        return
+    group = group if has(item, group) else ""
+    if item.type in ("MESH", "CURVES", "POINTCLOUD", "GREASEPENCIL"):
+        put(item, group)
+    for modifier in item.modifiers:
+        if (
+            modifier.type == "NODES"
+            and modifier.node_group is not None
+            and PLAYED_GROUP in modifier.node_group
+        ):
+            inputs.put_attribute(modifier, "Mask", group)
+    keys = item.data.shape_keys if item.type == "LATTICE" else None
+    if keys is not None and WARP_KEY in keys.key_blocks:
+        keys.key_blocks[WARP_KEY].vertex_group = group
+
+
+def has(item, group):
+    """Whether an object has weights of that name: a vertex group, or numbers on the points of hair."""
+    if item.type in ("CURVES", "POINTCLOUD"):
+        attribute = item.data.attributes.get(group)
+        return attribute is not None and (attribute.domain, attribute.data_type) == ("POINT", "FLOAT")
+    return group in item.vertex_groups
+
+
 def chosen(settings):
     """The user has chosen another group."""
-    put(settings.id_data, settings.mask)
+    source = settings.id_data
+    put(source, settings.mask)
+    for entry in settings_of(source).carried:
+        if entry.item is not None and entry.item.library is None:
+            put_carried(entry.item, settings.mask)
 
 
 property_definitions.listeners["mask"] = chosen

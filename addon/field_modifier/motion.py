@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from ..blender import modifier_stack
+from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..names import FIELD_MODIFIER, HELPER_SUFFIX, OFFSETS, TURNS
 from . import armatures, cache_modifier, inputs, masks, node_group
@@ -101,7 +102,7 @@ def take_helper(source, modifier, mesh):
     mesh.materials.clear()
     helper = inputs.get(modifier, "Offsets")
     mesh.name = f"{source.name}{HELPER_SUFFIX}"
-    if helper is None or helper.users > 1 or helper.library is not None:  # a copied object shares it
+    if helper is None or users_of(helper) > 1 or helper.library is not None:  # a copied object shares it
         inputs.put(modifier, "Offsets", bpy.data.objects.new(mesh.name, mesh))
         return
     old, count = helper.data, len(mesh.vertices)
@@ -119,8 +120,13 @@ def forget_helper(modifier):
         discard_helper(helper)
 
 
+def users_of(helper):
+    """How many use it; `users` counts too many of what an input of a modifier names, in Blender 5.2."""
+    return len(bpy.data.user_map(subset=[helper])[helper])
+
+
 def discard_helper(helper):
-    if helper.users == 0 and helper.library is None:
+    if users_of(helper) == 0 and helper.library is None:
         mesh = helper.data
         bpy.data.objects.remove(helper)
         if mesh.users == 0:
@@ -207,5 +213,7 @@ def discard(source):
             discard_helper(helper)
         if group.users == 0:
             bpy.data.node_groups.remove(group)
+    if settings_of(source).under_rig:  # a write counts as a change of the object
+        settings_of(source).under_rig = False
     if source.data.library is None and source.data.users == 1:
         write_to(source.data, Motion(None))

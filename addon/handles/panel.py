@@ -74,7 +74,7 @@ class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
     def fill(self, context, source, settings):
         layout = self.layout
         row = layout.row()
-        row.template_list("ARAPFIELDS_UL_handles", "", settings, "handles", settings, "active_handle", rows=4)
+        row.template_list("ARAPFIELDS_UL_handles", "", settings, "handles", settings, "active_handle", rows=3)
         column = row.column(align=True)
         column.menu("ARAPFIELDS_MT_add_handle", icon="ADD", text="")
         column.operator(Op.REMOVE_HANDLE, icon="REMOVE", text="")

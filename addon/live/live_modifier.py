@@ -8,7 +8,7 @@ from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..deform.solve_job import SolvedMesh
 from ..field_modifier import armatures, cache_modifier, motion
-from ..results import placement
+from ..results import placement, visibility
 from .live_object import LIVE
 
 
@@ -26,6 +26,7 @@ class LiveModifier:
     def bind(self, context, source):
         """Also when the source has changed: what was there before stays to be restored."""
         motion.bind(context, source)
+        visibility.show_alone(source, source, for_now=True)
 
     def require(self, source):
         """UserError where the user has removed or applied it."""
@@ -44,6 +45,7 @@ class LiveModifier:
         """Gives the source the motion that it had before, or none."""
         if source is not None:
             settings_of(source).live_kind = ""
+            visibility.give_back(source)
             if source.mode != "EDIT":
                 motion.restore(source, self.before)
                 if not self.was_silent:
@@ -55,6 +57,7 @@ class LiveModifier:
         """Leaves the motion where it is, or puts it where the user wants the result; returns the object."""
         settings = settings_of(source)
         settings.live_kind = ""
+        visibility.forget(source)
         target, shape = settings.target, self.shown
         if (
             target in ("REPLACE", "KEY")

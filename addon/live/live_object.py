@@ -1,15 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A live shape that is an object of its own: a surface, or the copy that the user wants as the result."""
 
-import contextlib
-import json
-
 import bpy
 
 from ..blender import mesh_arrays
 from ..blender.object_references import ObjectReference, settings_of
 from ..core.errors import UserError
-from ..results import result_objects
+from ..results import result_objects, visibility
 
 LIVE = "LIVE"  # kind of the result that a live source has
 
@@ -20,13 +17,10 @@ class LiveObject:
     in_place = False
 
     def __init__(self, context, source, surface):
-        settings = settings_of(source)
-        if not settings.live_hidden:
-            settings.live_hidden = json.dumps([source.hide_get(), source.hide_render])
         mesh = result_objects.shown_mesh(context, source, len(surface.local))
         active, selected = context.view_layer.objects.active, list(context.selected_objects)
         item = result_objects.show(context, source, LIVE, LIVE, mesh, {"output": LIVE}, select=False)
-        result_objects.hide(source)
+        visibility.show_alone(source, item, for_now=True)
         context.view_layer.objects.active = active
         for other in selected:
             other.select_set(True)
@@ -65,7 +59,7 @@ class LiveObject:
         mesh = item.data
         bpy.data.objects.remove(item)
         item = result_objects.show(context, source, kind, settings_of(source).output, mesh, {"output": LIVE})
-        result_objects.hide(source)
+        visibility.show_alone(source, item)
         return item
 
 
@@ -73,12 +67,7 @@ def forget(source):
     """The source is no longer live: it is seen as before, and lists no live result; returns that, if any."""
     settings = settings_of(source)
     settings.live_kind = ""
-    if settings.live_hidden:
-        seen, rendered = json.loads(settings.live_hidden)
-        source.hide_render = rendered
-        with contextlib.suppress(RuntimeError):  # in a collection that the view layer leaves out
-            source.hide_set(seen)
-        settings.live_hidden = ""
+    visibility.give_back(source)
     item = None
     for index in reversed(range(len(settings.results))):
         if settings.results[index].kind == LIVE:

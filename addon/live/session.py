@@ -18,7 +18,7 @@ from ..core.runtime.coroutines import run_to_completion, step_for
 from ..core.runtime.latest_request_worker import REST, LatestRequestWorker
 from ..field_modifier import motion
 from ..handles import empties
-from ..results import placement
+from ..results import placement, visibility
 from ..stiffness import painted
 from ..stylize import preference
 from ..surface.source_surface import read_surface
@@ -228,6 +228,8 @@ class Session(Edits, Following):
 
     def take_away(self, source):
         """Everything looks as it did before; `source` is None where it is gone."""
+        if self.keeps and source is not None:
+            visibility.forget(source)
         self.display.take_away(source)
         self.carrying.take_away()
 

@@ -20,8 +20,7 @@ from ..core.errors import UserError
 from ..core.runtime import jobs
 from ..field_modifier import motion
 from ..handles import empties, movers
-from ..results import result_objects
-from . import live_object
+from . import leftovers
 from .animated import scene_range
 from .following import scene_frame
 from .session import Changed, Session
@@ -228,8 +227,11 @@ def rendered_matrix(item, bone="", *, depsgraph):
     return empties.matrix_of(item.original.evaluated_get(depsgraph), bone)
 
 
-def recover():
-    """After a load or an undone step: ends what no session or no source knows as live any more."""
+def recover(leave=leftovers.clear):
+    """After a load or an undone step: ends what no session or no source knows as live any more.
+
+    `leave(source)` deals with one that is said to be live, and is not.
+    """
     for uid, session in list(live.items()):
         source = session.source.find()
         if source is None or not settings_of(source).live_kind:
@@ -242,6 +244,5 @@ def recover():
     for source in bpy.data.objects:
         if settings_of(source).live_kind and not is_live(source):
             with contextlib.suppress(UserError, RuntimeError, AttributeError):
-                item = live_object.forget(source)
-                if item is not None:
-                    result_objects.discard(item)
+                leave(source)
+                settings_of(source).live_kind = ""

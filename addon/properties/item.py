@@ -113,6 +113,14 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
         name="Armatures Switched Off",
         description="Armature modifiers that the field replaces, and whether they were on, as JSON",
     )
+    under_rig: bpy.props.BoolProperty(
+        name="Before Armatures",
+        description="Whether the field works on the shape at rest, which armatures pose afterwards",
+    )
+    rest_bones: bpy.props.StringProperty(
+        name="Bones at Rest",
+        description="Where an armature's bones were before they were fitted to a wrapped shape, as JSON",
+    )
     handle_of: bpy.props.PointerProperty(
         type=bpy.types.Object, name="Handle Of", description="The object that this Empty is a handle of"
     )
@@ -134,6 +142,9 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     live_hidden: bpy.props.StringProperty(
         name="Hidden before Live",
         description="Whether the object was hidden in viewport and renders, as JSON",
+    )
+    set_aside: bpy.props.BoolProperty(
+        name="Set Aside", description="Hidden since what was made of it lies in its place"
     )
     fit_key: bpy.props.StringProperty(name="Fit", description="Name of the object's last fit in the cache")
     fit_options: bpy.props.StringProperty(

@@ -2,12 +2,14 @@
 import bpy
 
 from ..blender import mesh_arrays, modifier_stack
+from ..blender.language import translated
 from ..blender.object_references import settings_of, source_of
 from ..blender.source_operator import SourceOperator
 from ..carried import passengers
 from ..core.errors import UserError
 from ..field_modifier import motion
 from ..names import Op
+from ..wrap import rigs
 from . import placement, result_objects
 
 
@@ -57,6 +59,11 @@ class ARAPFIELDS_OT_remove_field(FieldOperator, bpy.types.Operator):
     bl_label = "Remove"
 
     def execute(self, context):
+        try:
+            for rig in rigs.of(source_of(context)):
+                rigs.reset(context, rig)
+        except UserError as error:
+            self.report({"WARNING"}, translated(error))
         motion.remove(source_of(context))
         passengers.give_back_all(source_of(context))
         return {"FINISHED"}

@@ -73,7 +73,6 @@ def new_object(context, source, kind, output, moved, before):
     item = result_objects.show(context, source, kind, output, mesh, moved.report)
     if mesh.shape_keys is not None:
         result_objects.add_warp_key(item, before, moved.vertices)
-    result_objects.hide(source)
     return item
 
 

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Result objects: made once for a source and kind, updated in place by later runs."""
 
-import contextlib
 import json
 
 import bpy
@@ -77,13 +76,6 @@ def show(context, source, kind, output, mesh, report, select=True):
     if select and context.view_layer.objects.active == source:
         select_only(context, item)
     return item
-
-
-def hide(source):
-    """Takes a source out of sight and out of renders, where its result lies in its place."""
-    source.hide_render = True
-    with contextlib.suppress(RuntimeError):  # in a collection that the view layer leaves out
-        source.hide_set(True)
 
 
 CHANNELS = (

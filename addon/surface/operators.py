@@ -16,7 +16,7 @@ from ..names import Op
 from ..properties.item import refine_thin, resolution
 from ..properties.item import surface as surface_choice
 from ..properties.settings import quality
-from ..results import result_objects
+from ..results import result_objects, visibility
 from . import staleness
 from .source_surface import read_surface
 
@@ -86,8 +86,8 @@ class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):
             item = result_objects.show(
                 bpy.context, owner, "EXTRACT", "SURFACE", result_objects.surface_mesh(owner, *mesh), report
             )
-            result_objects.hide(owner)
-            return translated("{name} with {count} triangles", name=item.name, count=f"{len(mesh[1]):,}")
+            said = translated("{name} with {count} triangles", name=item.name, count=f"{len(mesh[1]):,}")
+            return said + visibility.told(visibility.show_alone(owner, item))
 
         return Item(source.name, work, apply)
 

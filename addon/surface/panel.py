@@ -53,7 +53,7 @@ def remarks(source):
     if shown:
         yield translated("Read with its modifiers applied ({count})", count=len(shown))
     if after:
-        yield translated("Read before {names}, which follow it", names=", ".join(after))
+        yield translated("Read before {names}", names=", ".join(after))
     if source.data.shape_keys:
         yield translated("Read with its shape keys as they are set")
 

@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ..blender import mesh_arrays
 from ..blender.object_references import in_scene, settings_of
 from ..core.errors import UserError
 from ..core.geometry.spaces import transform
@@ -40,12 +41,25 @@ def used(source):
     return [e for e in settings_of(source).wrap.landmarks if in_scene(e.rest) and in_scene(e.on_target)]
 
 
-def read(source, space):
-    """[(rest, on_target)] in solve space, (3,) each."""
+def at_rest(context, source):
+    """(n, 3) vertices of the shape that a field works on, in the world."""
+    return transform(matrix_of(source), mesh_arrays.read(context, source, in_place=True).vertices)
+
+
+def read(source, space, seen=None, rest=None):
+    """[(rest, on_target)] in solve space, (3,) each.
+
+    `seen` and `rest`, (n, 3) in the world: the shape that the landmarks were put on, and the one to be
+    wrapped, where a pose lies between. A landmark goes with its nearest vertex.
+    """
     found = []
+    posed = seen is not None and len(seen) == len(rest) and not np.array_equal(seen, rest)
     for entry in used(source):
-        ends = [matrix_of(item)[:3, 3][None] for item in (entry.rest, entry.on_target)]
-        found.append(tuple(transform(space.world_to_solve, end)[0] for end in ends))
+        ends = [matrix_of(item)[:3, 3] for item in (entry.rest, entry.on_target)]
+        if posed:
+            nearest = ((seen - ends[0]) ** 2).sum(axis=1).argmin()
+            ends[0] = ends[0] + rest[nearest] - seen[nearest]
+        found.append(tuple(transform(space.world_to_solve, end[None])[0] for end in ends))
     return found
 
 

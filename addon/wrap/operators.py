@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+from dataclasses import replace
+
 import bpy
 import numpy as np
 
@@ -7,7 +9,7 @@ from ..blender.host import has_window
 from ..blender.language import translated
 from ..blender.object_references import settings_of, source_of
 from ..blender.presets import preset_classes
-from ..blender.property_definitions import annotations, effective_values
+from ..blender.property_definitions import annotations, effective_value, effective_values
 from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError
 from ..core.geometry.spaces import space_of, transform
@@ -19,7 +21,8 @@ from ..live.giving_way import give_way
 from ..names import Op
 from ..properties.item import result_properties
 from ..surface.source_surface import build_options
-from . import landmarks
+from . import landmarks, rigs
+from .properties import fit_rig
 
 onto = bpy.props.StringProperty(
     name="Onto",
@@ -40,6 +43,7 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
     __annotations__ = {
         **annotations(WRAP, options={"SKIP_SAVE"}),
         "onto": onto,
+        "fit_rig": fit_rig(options={"SKIP_SAVE"}),
         **result_properties(),
     }
 
@@ -48,24 +52,57 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
         """As the settings ask; a script may name another target."""
         return super().refuses(source) or (landmarks.refusal(source) if has_window() else None)
 
+    def coroutine(self, context):
+        """Where nothing came of it, the field's modifier stands again where it did."""
+        self.below = []
+        try:
+            return (yield from super().coroutine(context))
+        finally:
+            for below in self.below:
+                below.give_back()
+
     def plan(self, context, source, weights):
-        give_way(context, source, *destination(settings_of(source), self))
+        settings = settings_of(source)
+        give_way(context, source, *destination(settings, self))
         context.view_layer.update()
-        values = effective_values(WRAP, settings_of(source).wrap, self)
+        values = effective_values(WRAP, settings.wrap, self)
         af = native.library()
         options = build_options(af.WrapOptions, values)
         space = space_of(source.matrix_world, source.name)
         other = landmarks.target_of(source, self.onto)
-        pairs = landmarks.read(source, space)
+        fitting = below = None
+        if effective_value("fit_rig", settings.wrap, self) and self.in_place(source) and rigs.of(source):
+            before = landmarks.at_rest(context, source)
+            fitting, below = rigs.Fitting(source, space), rigs.Below(source)
+            self.below.append(below)
+            pairs = landmarks.read(source, space, before, landmarks.at_rest(context, source))
+        else:
+            pairs = landmarks.read(source, space)
         vertices, triangles = read_target(context, other, space)
 
         def solve(tracker, rest, samples, weight):
             task = tracker.start("Wrapping", weight)
             field = af.wrap(samples, af.MeshSdf(vertices, triangles), pairs, options, task=task)
             tracker.warnings += [UserError("note: {text}", text=text) for text in field.report.notes]
+            if fitting is not None:
+                fitting.move(field)
+                tracker.warnings += fitting.warnings
             return field
 
-        return plan_solve_job(context, self, source, "WRAP", values["samples"], values["seed"], solve)
+        item = plan_solve_job(context, self, source, "WRAP", values["samples"], values["seed"], solve)
+        return item if fitting is None else with_bones(item, fitting, below)
+
+
+def with_bones(item, fitting, below):
+    """The same item, which moves the bones as well."""
+
+    def apply(solved):
+        said = item.apply(solved)
+        below.kept = True
+        fitting.put(bpy.context)
+        return said
+
+    return replace(item, apply=apply)
 
 
 def read_target(context, target, space):
@@ -120,8 +157,33 @@ class ARAPFIELDS_OT_remove_landmark(SourceOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
+class ARAPFIELDS_OT_reset_bones(SourceOperator, bpy.types.Operator):
+    """Put the bones at rest back to where they were before they were fitted to the wrapped shape"""
+
+    bl_idname = Op.RESET_BONES
+    bl_label = "Reset Bones"
+    bl_options = {"UNDO"}
+    guide = "wrap"
+
+    @classmethod
+    def refuses(cls, source):
+        if any(settings_of(rig).rest_bones for rig in rigs.of(source)):
+            return None
+        return UserError("no bones were fitted to {name}", name=source.name)
+
+    def execute(self, context):
+        try:
+            for rig in rigs.of(source_of(context)):
+                rigs.reset(context, rig)
+        except UserError as error:
+            self.report({"ERROR"}, translated(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
 CLASSES = [
     ARAPFIELDS_OT_wrap,
+    ARAPFIELDS_OT_reset_bones,
     ARAPFIELDS_OT_add_landmark,
     ARAPFIELDS_OT_remove_landmark,
     *preset_classes("wrap", "Wrap", WRAP),

@@ -11,6 +11,16 @@ def is_target(group, item):
     return item.type == "MESH" and item != group.id_data
 
 
+def fit_rig(**extra):
+    return bpy.props.BoolProperty(
+        name="Fit Armature",
+        description="Wrap the shape at rest and move the bones of its armature along, so that it poses the "
+        "wrapped shape",
+        default=True,
+        **extra,
+    )
+
+
 class ARAPFIELDS_PG_landmark(bpy.types.PropertyGroup):
     rest: bpy.props.PointerProperty(
         type=bpy.types.Object, name="Landmark", description="Empty on the object at rest"
@@ -33,6 +43,7 @@ class ARAPFIELDS_PG_wrap(bpy.types.PropertyGroup):
             name="Landmarks",
             description="Pairs of places that belong together",
         ),
+        "fit_rig": fit_rig(),
         **annotations(WRAP),
     }
 

@@ -10,6 +10,14 @@ from pathlib import Path
 import pybind11
 
 SERVED = [(3, 11), (3, 13), (3, 14)]  # Pythons of the Blenders that the manifest admits
+AS_THE_LIBRARY = [  # of its CMake cache; the last three link for an older glibc (cmake/wheel/old_glibc.py)
+    "CMAKE_CXX_COMPILER",
+    "CMAKE_CXX_COMPILER_LAUNCHER",
+    "CMAKE_MAKE_PROGRAM",
+    "CMAKE_CXX_STANDARD_LIBRARIES",
+    "CMAKE_MODULE_LINKER_FLAGS",
+    "CMAKE_SHARED_LINKER_FLAGS",
+]
 ROOT = Path(__file__).resolve().parents[2]
 SEARCHED = [
     str(ROOT / "build/python-headers/*/usr/include"),  # python_headers.py
@@ -67,11 +75,7 @@ def build_binding(root, build, headers, version, work):
         f"-DEIGEN_INCLUDE_DIR={cached(build, 'EIGEN_INCLUDE_DIR')}",
         f"-DPYBIND11_INCLUDE_DIR={pybind11.get_include()}",
     ]
-    configure += [
-        f"-D{name}={cached(build, name)}"
-        for name in ("CMAKE_CXX_COMPILER", "CMAKE_CXX_COMPILER_LAUNCHER", "CMAKE_MAKE_PROGRAM")
-        if cached(build, name)
-    ]
+    configure += [f"-D{name}={cached(build, name)}" for name in AS_THE_LIBRARY if cached(build, name)]
     for command in (configure, [cmake, "--build", str(folder)]):
         done = subprocess.run(command, capture_output=True, text=True)
         if done.returncode:

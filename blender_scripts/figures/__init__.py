@@ -9,6 +9,7 @@ class Figure(NamedTuple):
     shows: str
     published: bool = False  # needs the published networks or meshes; written outside the repository
     pages: tuple = ()  # of docs, whose scripts it runs
+    window: bool = False  # needs a Blender with a window: see windowed.py
 
 
 WORKFLOWS = tuple(f"workflows/{name}.md" for name in ("pins", "character", "animate", "stylize"))
@@ -25,11 +26,20 @@ FIGURES = [
     Figure("live", "six frames of a handle dragged live"),
     Figure("character", "materials and UVs of a deformed and a stylized mesh"),
     Figure("workflows", "the ends of the workflow pages, by the pages' own scripts", pages=WORKFLOWS),
+    Figure("wrapping", "a rigged template wrapped onto a scan, and posed"),
     Figure("batch", "a folder of meshes in one style"),
+    Figure(
+        "loop_window",
+        "the steps of the pin page in Blender's window, moving",
+        pages=WORKFLOWS[:1],
+        window=True,
+    ),
     Figure("loop_pins", "a creature posed by pins, moving", pages=WORKFLOWS[:1]),
     Figure(
         "loop_character", "a character that waves, eyes, shirt and hair carried, moving", pages=WORKFLOWS[1:2]
     ),
+    Figure("loop_walk", "a walk without and with secondary motion, and moving", pages=("workflows/walk.md",)),
+    Figure("loop_wrap", "a dog that takes the shape of a scan, and moving", pages=("workflows/wrap.md",)),
     Figure("loop_style", "a style's strength from none to all, moving"),
     Figure("published", "the published bunny by three methods", published=True),
     Figure("published_hand", "one finger of the published hand pulled", published=True),

@@ -8,19 +8,6 @@ from mathutils import Matrix
 from .looping import film
 from .workflows import followed, in_examples
 
-PIN, ANCHOR = (0.95, 0.30, 0.02), (0.02, 0.16, 0.75)
-
-
-def marker(empty, anchor):
-    """A ball where a pin is, a cube where an anchor is, before the surface."""
-    if anchor:
-        bpy.ops.mesh.primitive_cube_add(size=0.09)
-    else:
-        bpy.ops.mesh.primitive_uv_sphere_add(radius=0.06)
-    item = bpy.context.object
-    item.data.materials.append(stage.material(empty.name, ANCHOR if anchor else PIN, roughness=0.3))
-    return item
-
 
 def parts(share):
     """Of the way of the head and of the tail: the head goes first."""
@@ -32,7 +19,7 @@ def loop(output):
     handles = list(dinosaur.arapfields.handles)
     ends = [handle.empty.matrix_world.copy() for handle in handles]
     rests = [Matrix([handle.rest[k : k + 4] for k in range(0, 16, 4)]) for handle in handles]
-    markers = [marker(handle.empty, handle.anchor) for handle in handles]
+    markers = [stage.pin((0, 0, 0), handle.anchor) for handle in handles]
     out = stage_side()
 
     def pose(share):

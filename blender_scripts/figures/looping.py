@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Short loops: frames there and back as an animated WebP, and the last frame as a picture of its own."""
+"""Short loops as an animated WebP, there and back or round and round, and a frame as a picture of its own."""
 
 import math
 import tempfile
@@ -26,19 +26,19 @@ def film(output, name, pose, width=440, frames=FRAMES):
             pose((1 - math.cos(math.pi * frame / (frames - 1))) / 2)
             path = snapshot(Path(folder) / f"{frame}.png", width, SAMPLES)
             taken.append(Image.open(path).convert("RGB").copy())
-    return {"frames": frames, "bytes": encode(taken, output / f"{name}.webp")}
-
-
-def encode(taken, path):
-    """There and back, as good as fits in MOST; bytes."""
     order = [*taken, *taken[-2:0:-1]]
-    wait = [MILLISECONDS] * len(order)
-    wait[0] = wait[len(taken) - 1] = REST
+    waits = [MILLISECONDS] * len(order)
+    waits[0] = waits[frames - 1] = REST
+    return {"frames": frames, "bytes": encode(order, waits, output / f"{name}.webp", taken[-1])}
+
+
+def encode(order, waits, path, poster):
+    """The frames, each for so many milliseconds, as good as fits in MOST, and one as a JPEG; bytes."""
     for quality in QUALITY:
         order[0].save(
-            path, save_all=True, append_images=order[1:], duration=wait, loop=0, quality=quality, method=6
+            path, save_all=True, append_images=order[1:], duration=waits, loop=0, quality=quality, method=6
         )
         if path.stat().st_size <= MOST:
             break
-    taken[-1].save(path.with_suffix(".jpg"), quality=86, optimize=True)
+    poster.save(path.with_suffix(".jpg"), quality=86, optimize=True)
     return path.stat().st_size

@@ -11,7 +11,7 @@ void bind_attachment(py::module_& module) {
   py::class_<Attachment>(
       module, "Attachment",
       "Points that go along with a body: clothes, hair, hats, lattices, whatever its motion does not see.\n\n"
-      "Within 0.05 of the body's size they go where a field takes them; beyond 0.09 along with rigid frames\n"
+      "Within 0.03 of the body's size they go where a field takes them; beyond 0.06 along with rigid frames\n"
       "of the surface, f(p) + R(p) (y − p), several of which share a point, so that nothing tears where the\n"
       "nearest place of the surface jumps; between the two with a mixture. What depends on the rest shapes\n"
       "alone is found once: a live session asks for positions() each frame.")

@@ -10,8 +10,8 @@
 namespace arapfields {
 
 /// Points that a field carries along with a body: clothes, hair, hats, whatever its motion does not see.
-/// Near the body, within 0.05 of its size, they go where the field takes them. A field knows less and less of
-/// what is farther away: beyond 0.09 they go along with rigid frames of the surface, the nearest ones most
+/// Near the body, within 0.03 of its size, they go where the field takes them. A field knows less and less of
+/// what is farther away: beyond 0.06 they go along with rigid frames of the surface, the nearest ones most
 /// (f(p) + R(p) (y − p) for places p of the surface, R the rotation closest to the Jacobian), between the two
 /// with a mixture. Several frames share a point, with weights that change smoothly from point to point, so
 /// that nothing tears where its nearest place jumps. All that does not depend on the field is found once.

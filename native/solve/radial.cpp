@@ -17,8 +17,11 @@ namespace {
 
 /// Steps between two looks at the clock.
 constexpr int steps_at_once = 10;
+/// Of the energy, in so many steps: with less than that a deformation has arrived. Thin parts under many held
+/// samples would go on for hundreds of steps, for a ten-thousandth.
+constexpr double least_gain = 1e-3;
 /// From so many centers on, half of them, or so many, make a first result, in so many steps at most.
-constexpr int worth_a_first = 600, most_first = 500, first_steps = 12;
+constexpr int worth_a_first = 600, most_first = 500, first_steps = 20;
 /// What makes the first result of a style.
 constexpr int style_first_centers = 400, style_first_samples = 4000, style_first_steps = 30;
 /// A style that folds between the samples that were looked at goes on so many times, with so many more times
@@ -28,16 +31,19 @@ constexpr double unfolding = 10.0;
 /// Share of the handles' weight with which exact handles still pull at the radial field inside the blend,
 /// which nothing else holds in their boxes.
 constexpr double share_of_exact = 0.01;
-/// Samples a center that carry it, and that the energy sees: more centers than samples can tell apart would
-/// fit them and fold between them.
-constexpr int samples_a_center = 8;
+/// Samples a center that carry it, and that the energy sees where there are as many: more centers than
+/// samples can tell apart would fit them and fold between them.
+constexpr int samples_a_center = 8, seen_a_center = 10;
+/// Samples of a handle that are held: with fewer it is chance how far to its edge they reach, and so how much
+/// room is left for the bend.
+constexpr int held_samples = 1024;
 constexpr Index least_centers = 50;
 
 template <class Options>
 LiveOptions live_options(const Options& options) {
   LiveOptions live;
   live.surface = options.surface;
-  live.handle_samples = options.handles.handle_batch;
+  live.handle_samples = std::max(options.handles.handle_batch, held_samples);
   live.threads = options.machine.threads;
   live.seed = options.training.seed;
   live.tolerance = 3e-5;
@@ -49,22 +55,29 @@ void set_centers(LiveOptions& live, int centers, const SurfaceSamples& samples) 
   const Index carried = std::max(least_centers, samples.size() / samples_a_center);
   live.fine_centers = static_cast<int>(std::min<Index>(centers, carried));
   live.coarse_centers = live.fine_centers / 5;
-  live.samples = std::max(live.samples, samples_a_center * live.fine_centers);
+  live.samples = std::max(live.samples, seen_a_center * live.fine_centers);
 }
 
 /// The result that there is.
 using Shown = std::function<std::shared_ptr<DeformationField>()>;
 
+/// Energies, in the solver's units: what is worse is not shown to whoever watches; and the share of it that
+/// the steps between two looks must gain at least.
+struct Bounds {
+  double worst = std::numeric_limits<double>::infinity();
+  double least_gain = 0.0;
+};
+
 /// Solves until it converges, is out of steps or time, or the observer ends it. The solver's energy is the
-/// loss divided by `rigidity`. What is worse than `worst`, in its units, is not shown to whoever watches.
+/// loss divided by `rigidity`.
 LoopResult run(LiveSolver& live, const TrainingOptions& how, const Progress& progress,
-               const SolveHooks& hooks, double rigidity, const Shown& shown,
-               double worst = std::numeric_limits<double>::infinity()) {
+               const SolveHooks& hooks, double rigidity, const Shown& shown, const Bounds& bounds) {
   const int iterations = how.iterations;
   const Stopwatch watch;
   LoopResult result;
   Iteration told;
   bool ended = false;
+  double before = std::numeric_limits<double>::infinity();
   LiveHooks steps{hooks.energies, 1.0 / rigidity, {}};
   if (hooks.observer)
     steps.observer = [&](const std::vector<LossTerm>& terms) {
@@ -81,15 +94,17 @@ LoopResult run(LiveSolver& live, const TrainingOptions& how, const Progress& pro
     const int at_once = std::min(steps_at_once, iterations - result.iterations);
     const double done = static_cast<double>(result.iterations) / iterations;
     live.solve(at_once, 0.0, progress.part(done, done + static_cast<double>(at_once) / iterations));
-    if (live.report().value <= worst) progress.look([&](PointsIn points) { return shown()->at(points); });
+    const double value = live.report().value;
+    if (value <= bounds.worst) progress.look([&](PointsIn points) { return shown()->at(points); });
     result.iterations += static_cast<int>(live.report().iterations);
-    result.history.emplace_back(result.iterations, live.report().value);
+    result.history.emplace_back(result.iterations, value);
     result.seconds = watch.seconds();
     if (ended) {
       result.stopped_by = StopReason::observer;
       break;
     }
-    if (live.report().iterations < at_once) break;
+    if (live.report().iterations < at_once || before - value < bounds.least_gain * value) break;
+    before = value;
     if (how.time_budget > 0.0 && result.seconds > how.time_budget) {
       result.stopped_by = StopReason::time_budget;
       break;
@@ -138,7 +153,8 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
   LiveSolver solver(samples, handles, fine, progress.part(done, 0.4), shape, blend);
   if (first) solver.adopt(*first);
   const Shown shown = [&] { return around(solver.field()); };
-  LoopResult loop = run(solver, options.training, progress.part(0.4, 0.95), hooks, 1.0, shown);
+  LoopResult loop =
+      run(solver, options.training, progress.part(0.4, 0.95), hooks, 1.0, shown, {.least_gain = least_gain});
   ObjectiveTerms terms;
   terms.stiffness = SurfaceStiffness(shape->thickness, options.surface);
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
@@ -193,7 +209,7 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
   solver.set_style(style, options.strength, options.sharpness, weights, up);
   const Shown shown = [&] { return solver.field(); };
   const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95), hooks, options.rigidity,
-                              shown, quick.report().value);
+                              shown, {.worst = quick.report().value});
   solver.set_hooks({hooks.energies, 1.0 / options.rigidity, {}});
   const bool ended = loop.stopped_by == StopReason::observer || loop.stopped_by == StopReason::time_budget;
   for (int round = 0; round < unfolding_rounds && options.surface.barrier > 0.0 && !ended; ++round) {

@@ -23,7 +23,7 @@ TABLE = options_table.resolved()
 
 # (operation, option, what the table says, what it shall say): one of each type.
 CHANGES = [
-    ("deform", "centers", "default = 1000\nrange = [5, 3000]", "default = 345\nrange = [5, 3000]"),
+    ("deform", "centers", "default = 1500\nrange = [5, 3000]", "default = 345\nrange = [5, 3000]"),
     ("stylize", "bending", "bending = { default = 0.1", "bending = { default = 0.0625"),
     ("fit", "optimizer", 'default = "muon"', 'default = "adam"'),
     ("deform", "exact_handles", 'default = false\nlabel = "Exact', 'default = true\nlabel = "Exact'),

@@ -22,8 +22,9 @@ VERTICES, FRESH, FRESH_SEED = 50_000, 50_000, 99
 FEW = {
     "fine_centers": 500,
     "coarse_centers": 100,
-    "samples": 4000,
-    "handle_samples": af.DeformOptions().handle_batch,
+    "samples": 5000,
+    "handle_samples": 1024,
+    "iterations": 20,
 }
 REFERENCE_SAMPLES = 40_000  # they carry as many centers
 REFERENCE = (  # many centers to convergence; then a network on top

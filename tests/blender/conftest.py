@@ -1,8 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tests that run inside a headless Blender (PyPI's bpy) with its own empty user folder."""
+"""Tests that run inside a headless Blender (PyPI's bpy) with its own empty user folder.
+
+ARAPFIELDS_WORKER   command that runs a Python file in another Blender instead, as `blender --background
+                    --factory-startup --python-use-system-env --python`; it must import arapfields and pytest
+"""
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +15,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+WORKER = shlex.split(os.environ.get("ARAPFIELDS_WORKER", ""))
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
@@ -35,7 +41,7 @@ class Blender:
     def call(self, file, function, arguments):
         if self.process is None or self.process.poll() is not None:
             self.process = subprocess.Popen(
-                [sys.executable, str(HERE / "worker.py")],
+                [*(WORKER or [sys.executable]), str(HERE / "worker.py")],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 text=True,
@@ -44,7 +50,7 @@ class Blender:
         order = {"file": file, "function": function, "arguments": arguments}
         self.process.stdin.write(json.dumps(order) + "\n")
         self.process.stdin.flush()
-        answer = self.process.stdout.readline()
+        answer = next((line for line in self.process.stdout if line.startswith('"')), "")  # after its banner
         if not answer:
             pytest.fail(f"Blender ended with status {self.process.wait()}")
         if json.loads(answer):
@@ -58,7 +64,8 @@ class Blender:
 
 @pytest.fixture(scope="session")
 def blender(tmp_path_factory):
-    pytest.importorskip("bpy", reason="PyPI's bpy is not installed")
+    if not WORKER:
+        pytest.importorskip("bpy", reason="PyPI's bpy is not installed")
     worker = Blender(tmp_path_factory.mktemp("blender"))
     yield worker
     worker.close()

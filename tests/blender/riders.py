@@ -35,7 +35,8 @@ def rider(kind):
         curves.attributes["position"].data.foreach_set("vector", (points - at).astype(np.float32).ravel())
         return link("Hair", curves, at)
     if kind == "GREASEPENCIL":
-        pencil = bpy.data.grease_pencils_v3.new("Ink")
+        pencils = getattr(bpy.data, "grease_pencils_v3", bpy.data.grease_pencils)  # renamed in 5.0
+        pencil = pencils.new("Ink")
         drawing = pencil.layers.new("Lines").frames.new(1).drawing
         drawing.add_strokes([2, 2])
         drawing.attributes["position"].data.foreach_set("vector", (points - at).astype(np.float32).ravel())

@@ -84,6 +84,12 @@ def test_install_use_and_remove(extension, blender, torch):
     assert left_behind(blender) == []
 
 
+@pytest.mark.parametrize("blender", blenders.NAMES, indirect=True)
+def test_carried_objects_of_all_kinds(extension, blender):
+    done = blender.run("installed_carried.py", blender.inside(blender.bring(extension)))
+    assert "CARRIED" in done.stdout and "Traceback" not in done.stdout + done.stderr
+
+
 @pytest.mark.parametrize("blender", blenders.NAMES[-1:], indirect=True)
 def test_batches_in_blender_itself(extension, blender):
     """As a command of the installed extension and as a script, which skips what the command has done."""

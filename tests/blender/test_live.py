@@ -161,8 +161,8 @@ def test_playback_is_followed():
 
 @pytest.mark.parametrize("target", ["MODIFIER", "NEW"])
 @in_blender
-def test_loading_a_file_ends_live_mode_and_cleans_what_was_saved_of_it(target):
-    """The shape on the source stays as it was saved; a live object goes, and the source is seen again."""
+def test_a_file_saved_while_live_shows_the_same_shape_as_a_result(target):
+    """On the source, or on an object of its own; the panel says so, and nothing is live."""
     import tempfile
 
     import bpy
@@ -170,6 +170,7 @@ def test_loading_a_file_ends_live_mode_and_cleans_what_was_saved_of_it(target):
     import scenes
     from test_live import step
 
+    from addon.core.runtime import jobs
     from addon.live import sessions
 
     bar, _, moving = scenes.bar_with_handles()
@@ -177,17 +178,28 @@ def test_loading_a_file_ends_live_mode_and_cleans_what_was_saved_of_it(target):
     bpy.ops.arapfields.live()
     moving.location.z += 0.4
     step()
-    shown = scenes.world_points(bar)
+    shown = scenes.world_points(bpy.data.objects["Bar" if target == "MODIFIER" else "Bar_live"])
+    assert shown[:, 2].max() > 0.4
     path = tempfile.mktemp(suffix=".blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.read_homefile(use_empty=True)
     assert not sessions.live
     bpy.ops.wm.open_mainfile(filepath=path)
-    assert "Bar_live" not in bpy.data.objects
     bar = bpy.data.objects["Bar"]
-    assert not bar.arapfields.live_kind and not bar.arapfields.results
-    assert not bar.hide_get() and not bar.hide_render
-    assert np.array_equal(scenes.world_points(bar), shown)
+    result = bar if target == "MODIFIER" else bpy.data.objects["Bar_deformed"]
+    assert [item for item in bpy.data.objects if item.type == "MESH" and item.visible_get()] == [result]
+    assert not result.hide_render and (result == bar or bar.hide_render)
+    assert np.array_equal(scenes.world_points(result), shown)
+    assert not bar.arapfields.live_kind and "Bar_live" not in bpy.data.objects
+    assert [entry.kind for entry in bar.arapfields.results] == ([] if result == bar else ["DEFORM"])
+    assert jobs.messages() == [
+        ("INFO", "Bar: it was live when the file was saved; its shape is kept as a result")
+    ]
+    scenes.activate(bar)
+    assert bpy.ops.arapfields.deform(**scenes.QUICK) == {"FINISHED"}  # and updates that
+    assert [item for item in bpy.data.objects if item.type == "MESH" and item.visible_get()] == [result]
+    bpy.ops.wm.read_homefile(use_empty=True)
+    assert not jobs.messages()
 
 
 @in_blender

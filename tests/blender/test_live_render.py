@@ -129,7 +129,9 @@ bpy.ops.render.render(write_still=True)
 import os
 os._exit(7)
 """
-        done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+        program = bpy.app.binary_path  # empty where Blender is a module of Python
+        command = [program, "-b", "--factory-startup", "--python-expr"] if program else [sys.executable, "-c"]
+        done = subprocess.run([*command, script], capture_output=True, text=True)
         assert done.returncode == 7, done.stderr
         with_it, without = (picture(folder / f"{name}.png") for name in ("with", "without"))
         assert (with_it[:, :, 3] > 0.5).sum() > 100 and np.array_equal(with_it, without)

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Wrapping an object onto another inside Blender: what moves, what stays, what is refused."""
 
+import types
+
+import pytest
 from inside import in_blender
 
 
@@ -110,3 +113,106 @@ def test_a_rigged_template_goes_onto_a_soup_with_its_uvs_groups_and_keys():
     diagonal = np.linalg.norm(np.ptp(target, axis=0))
     assert np.abs(af.MeshSdf(target, corners)(wrapped)).mean() < 0.02 * diagonal
     assert np.linalg.norm(wrapped - rest, axis=1).min() > 1.0
+
+
+@pytest.mark.slow  # half a minute
+@in_blender
+def test_a_rigged_character_goes_onto_a_scan_with_its_bones():
+    import bpy
+    import character
+    import numpy as np
+    import scenes
+    import wraps
+    from dressing import seen_mesh
+
+    import arapfields as af
+
+    body, rig = wraps.rigged_character()
+    body.arapfields.wrap.onto, shape = wraps.scan_of(wraps.grown_parts())
+    scenes.activate(body)
+    for rest, there in wraps.landmarks_of_people():
+        bpy.ops.arapfields.add_landmark(rest=rest, on_target=there)
+
+    def depths(posed=True):
+        points, _, triangles = seen_mesh(body)
+        return -af.MeshSdf(points, triangles)(wraps.joints(rig, posed))
+
+    within = depths() > 0.005
+    kept = scenes.everything(body), [tuple(p.co) for p in body.data.shape_keys.key_blocks["Belly"].data]
+    assert bpy.ops.arapfields.wrap() == {"FINISHED"}
+    now = scenes.everything(body)
+    assert all(now[name] == value for name, value in kept[0].items())
+    assert [tuple(p.co) for p in body.data.shape_keys.key_blocks["Belly"].data] == kept[1]
+    points = seen_mesh(body)[0]
+    assert np.abs(shape(points)).mean() < 0.003 * np.linalg.norm(np.ptp(points, axis=0))
+    assert [m.type for m in body.modifiers] == ["MIRROR", "NODES", "ARMATURE"]
+    assert (depths()[within] > 0.005).all()
+    character.pose(types.SimpleNamespace(rig=rig))
+    after = seen_mesh(body)[0]
+    raised = (after - points)[points[:, 0] > 0.6]
+    assert raised[:, 2].mean() > 0.3 and np.isfinite(after).all()
+    assert (depths()[within] > 0.005).all()
+
+
+@in_blender
+def test_bones_are_fitted_from_their_own_rest_each_time_and_can_be_reset():
+    import bpy
+    import numpy as np
+    import pytest
+    import scenes
+    from wraps import SMALL, joints, rigged_bar, soup_of
+
+    item, rig = rigged_bar()
+    item.arapfields.wrap.onto = soup_of(item)
+    rest = joints(rig, posed=False)
+    with pytest.raises(RuntimeError, match="no bones were fitted"):
+        bpy.ops.arapfields.reset_bones()
+    rig.pose.bones["Upper"].rotation_mode = "XYZ"
+    rig.pose.bones["Upper"].rotation_euler.x = 0.4
+    rig.hide_set(True)
+    found = []
+    for _ in range(2):
+        assert bpy.ops.arapfields.wrap(**SMALL) == {"FINISHED"}
+        assert [m.type for m in item.modifiers] == ["NODES", "ARMATURE"]
+        assert bpy.context.view_layer.objects.active == item and rig.hide_get() and rig.mode == "OBJECT"
+        found.append(joints(rig, posed=False))
+    assert np.abs(found[1] - found[0]).max() < 1e-5 and np.linalg.norm(found[0] - rest, axis=1).min() > 1.0
+    assert abs(rig.pose.bones["Upper"].rotation_euler.x - 0.4) < 1e-6
+    assert bpy.ops.arapfields.reset_bones() == {"FINISHED"}
+    assert np.abs(joints(rig, posed=False) - rest).max() < 1e-5
+    assert bpy.ops.arapfields.wrap(**SMALL) == {"FINISHED"}
+    assert bpy.ops.arapfields.remove_field() == {"FINISHED"}
+    assert np.abs(joints(rig, posed=False) - rest).max() < 1e-5 and len(item.modifiers) == 1
+    assert bpy.ops.arapfields.wrap(fit_rig=False, **SMALL) == {"FINISHED"}
+    assert [m.type for m in item.modifiers] == ["ARMATURE", "NODES"]
+    assert np.abs(joints(rig, posed=False) - rest).max() < 1e-5
+    scenes.activate(item)
+
+
+@in_blender
+def test_bones_that_cannot_be_fitted_and_wraps_that_fail_leave_the_stack():
+    import bpy
+    import numpy as np
+    import pytest
+    from wraps import SMALL, joints, rigged_bar, soup_of
+
+    from addon.core.runtime import jobs
+
+    item, rig = rigged_bar()
+    item.arapfields.wrap.onto = soup_of(item)
+    rest = joints(rig, posed=False)
+    assert bpy.ops.arapfields.wrap(fit_rig=False, **SMALL) == {"FINISHED"}
+    bpy.ops.arapfields.add_landmark(rest=(0, 0, 0), on_target=(3, 1, 0))
+    entry = item.arapfields.wrap.landmarks[0]
+    entry.on_target.location.z += 50
+    bpy.context.view_layer.update()
+    with pytest.raises(RuntimeError, match=r"landmarks\[0\]"):
+        bpy.ops.arapfields.wrap(**SMALL)
+    assert [m.type for m in item.modifiers] == ["ARMATURE", "NODES"] and not item.arapfields.under_rig
+    assert bpy.ops.arapfields.remove_landmark(index=0) == {"FINISHED"}
+    for home in list(rig.users_collection):
+        home.objects.unlink(rig)
+    jobs.board.messages.clear()
+    assert bpy.ops.arapfields.wrap(**SMALL) == {"FINISHED"}
+    assert any("the bones of Rig stay" in str(text) for text in jobs.messages())
+    assert np.array_equal(joints(rig, posed=False), rest)

@@ -2,8 +2,14 @@
 """Objects to wrap onto each other."""
 
 import bpy
+import character
 import numpy as np
 import scenes
+from character import rig, weigh
+from characters import Capsules
+from dressing import link
+
+import arapfields as af
 
 SMALL = {"centers": 50, "stages": 3, "iterations": 10, "samples": 1500}
 
@@ -58,3 +64,70 @@ def soup_of(item):
     bpy.context.view_layer.update()
     scenes.activate(item)
     return soup
+
+
+def scan_of(parts, noise=0.004, resolution=96, lost=0.03):
+    """Loose, noisy triangles with holes of a body of capsules."""
+    shape = Capsules(parts, af.Frame([0, 0, 1.0], 1.25))
+    vertices, triangles = af.extract_surface(shape, resolution=resolution)[:2]
+    rng = np.random.default_rng(0)
+    corners = vertices[triangles[rng.random(len(triangles)) > lost]]
+    corners = (corners + rng.normal(0, noise / 2, (len(corners), 1, 3))).reshape(-1, 3)
+    mesh = bpy.data.meshes.new("Scan")
+    mesh.from_pydata(corners.tolist(), [], np.arange(len(corners)).reshape(-1, 3).tolist())
+    return link("Scan", mesh), Capsules(parts, shape.frame)
+
+
+def rigged_character():
+    """(body, armature): the character's body, textured, with a shape key."""
+    body, armature = link("Body", character.half_body()), rig(character.BONES)
+    points = np.array([vertex.co for vertex in body.data.vertices])
+    uv = body.data.uv_layers.new(name="UV")
+    corners = np.array([loop.vertex_index for loop in body.data.loops])
+    uv.data.foreach_set("uv", points[corners][:, [0, 2]].astype(np.float32).ravel())
+    weigh(body, character.BONES)
+    body.shape_key_add(name="Basis")
+    belly = body.shape_key_add(name="Belly")
+    for point, place in zip(belly.data, points, strict=True):
+        point.co.y -= 0.1 * np.exp(-20 * ((place - [0, -0.16, 1.0]) ** 2).sum())
+    body.modifiers.new("Mirror", "MIRROR").use_clip = True
+    body.modifiers.new("Armature", "ARMATURE").object = armature
+    scenes.activate(body)
+    return body, armature
+
+
+def grown_parts():
+    """The character's capsules as another person's: longer legs, shorter, hanging arms, a thicker trunk."""
+    parts = [
+        ((0, 0, 1.0), (0, 0, 1.38), 0.21),
+        ((0, 0.02, 1.35), (0, 0, 1.72), 0.075),
+        ((0, -0.02, 1.79), (0, -0.02, 1.89), 0.15),
+    ]
+    for s in (-1, 1):
+        parts += [
+            ((s * 0.13, 0, 1.42), (s * 0.4, 0.02, 1.28), 0.07),
+            ((s * 0.4, 0.02, 1.28), (s * 0.64, -0.1, 1.1), 0.065),
+            ((s * 0.11, 0, 0.95), (s * 0.2, 0.03, 0.1), 0.095),
+        ]
+    return parts
+
+
+ENDS = {  # of the character and of the other person: crown, hands, feet
+    "crown": ((0, 0, 1.84), (0, -0.02, 2.04)),
+    "hand": ((0.835, 0, 1.28), (0.70, -0.14, 1.06)),
+    "foot": ((0.11, 0, 0.02), (0.2, 0.03, 0.005)),
+}
+
+
+def landmarks_of_people():
+    found = [ENDS["crown"]]
+    for rest, there in (ENDS["hand"], ENDS["foot"]):
+        found += [((s * rest[0], *rest[1:]), (s * there[0], *there[1:])) for s in (-1, 1)]
+    return found
+
+
+def joints(armature, posed):
+    """(k, 3) heads and tails of the bones in the world, at rest or as they are posed."""
+    bones = armature.pose.bones
+    ends = [(b.head, b.tail) if posed else (b.bone.head_local, b.bone.tail_local) for b in bones]
+    return np.array([armature.matrix_world @ end for pair in ends for end in pair])

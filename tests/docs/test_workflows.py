@@ -68,6 +68,38 @@ def animate():
     assert np.linalg.norm(now - rest, axis=1).max() > 0.2
 
 
+def walk():
+    """With the feet where they walk, the tail is elsewhere than its handles alone would have it."""
+    import bpy
+
+    scene, dinosaur = bpy.context.scene, bpy.data.objects["Dinosaur"]
+    scene.frame_set(57)
+    rest, swung = seen("Dinosaur")
+    bpy.ops.arapfields.deform()
+    _, stiff = seen("Dinosaur")
+    size, off = np.ptp(rest[:, 2]), np.linalg.norm(swung - stiff, axis=1)
+    tail, feet = rest[:, 1] > 1.2, rest[:, 2] < 0.08 * size
+    assert dinosaur.arapfields.secondary.use
+    assert off[tail].mean() > 0.05 * size and off[feet].mean() < 0.03 * size, (
+        off[tail].mean(),
+        off[feet].mean(),
+    )
+
+
+def wrap():
+    """The dog, moved beside, lies on the scan."""
+    import bpy
+    from mathutils.bvhtree import BVHTree
+
+    (_, dog), (_, scan) = seen("Dog"), seen("Scan")
+    triangles = [tuple(face.vertices) for face in bpy.data.objects["Scan"].data.polygons]
+    tree = BVHTree.FromPolygons(scan.tolist(), triangles)
+    laid = dog + np.array(bpy.data.objects["Dog"].location)  # seen from the scan's own origin
+    off = np.array([tree.find_nearest(point)[3] for point in laid])
+    size = np.linalg.norm(np.ptp(scan, axis=0))
+    assert np.mean(off) < 0.01 * size, np.mean(off) / size
+
+
 def stylize():
     rest, now = seen("Dog")
     assert len(rest) == len(now) and np.linalg.norm(now - rest, axis=1).max() > 0.05
@@ -80,7 +112,7 @@ def python():
     assert raised[:, 2].max() > 1.75
 
 
-CHECKS = {check.__name__: check for check in (pins, character, animate, stylize, python)}
+CHECKS = {check.__name__: check for check in (pins, character, animate, walk, stylize, wrap, python)}
 
 
 @pytest.mark.slow  # the scenes and a bake take some ten seconds each

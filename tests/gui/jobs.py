@@ -61,7 +61,7 @@ def checks(found, folder):
     yield from until_idle(30)
     found["cancel_s"] = round(time.perf_counter() - begin, 4)
     found["exact_after_cancel"] = stage.everything() == before
-    yield 1.0
+    yield 4.0  # sections of the panel slide to where they stay
     stage.picture(folder, "cancelled")
     yield from in_place(found, folder, before)
     yield from escape(found, before)

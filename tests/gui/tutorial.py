@@ -63,7 +63,7 @@ def steps():
     yield from picture("handles", {"source", "handles", "deform"})
     with stage.override():
         bpy.ops.arapfields.deform(output="WARP")
-    yield from picture("deformed", {"source", "deform", "status"})
+    yield from picture("deformed", {"source", "deform"})
     with stage.override():
         scenes.activate(suzanne)
         bpy.ops.arapfields.stylize(style="CUBE")

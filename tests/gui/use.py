@@ -1,23 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is seen is what a click hits: in the viewport, on faces of boxes, in search and status bar."""
+"""Faces of boxes, search and the status bar, as the mouse finds them."""
 
 import bpy
-import numpy as np
 import scenes
 import stage
-from bpy_extras.view3d_utils import location_3d_to_region_2d, region_2d_to_origin_3d
+from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
-PICKS = 10
 CANCEL = (45, 12)  # pixels from the window's lower right corner to the middle of the status bar's button
-BESIDE = 20.0  # pixels from an Empty's line at which a click can only mean what is behind it
-CORNERS = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
-EDGES = [(a, b) for a in range(8) for b in range(a) if bin(a ^ b).count("1") == 1]
 
 
 def checks(found, folder):
-    for target in ("MODIFIER", "NEW"):
-        yield from picks(found, folder, target)
     yield from face(found, folder)
     yield from search(found, folder)
     yield from cancel(found, folder)
@@ -30,86 +23,11 @@ def pixel(point):
     return round(region.x + seen.x), round(window.height - region.y - seen.y)
 
 
-def corners(empty):
-    """(8, 2) pixels of the corners of the Empty's cube, in the order of CORNERS."""
-    return np.array([pixel(empty.matrix_world @ Vector(corner)) for corner in CORNERS], dtype=float)
-
-
-def is_clear(point, empties):
-    """Whether a point of the world is seen well beside every edge of these Empties' cubes."""
-    at = np.array(pixel(point), dtype=float)
-    for empty in empties:
-        ends = corners(empty)
-        for a, b in EDGES:
-            way = ends[b] - ends[a]
-            share = np.clip((at - ends[a]) @ way / max(way @ way, 1.0), 0.0, 1.0)
-            if np.linalg.norm(ends[a] + share * way - at) < BESIDE:
-                return False
-    return True
-
-
-def visible_vertices(item, count, empties):
-    """Vertices of what is shown of an object that nothing hides from the viewer, far from one another."""
-    _, area, region = stage.view()
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    eye = area.spaces.active.region_3d
-    found = []
-    for point in scenes.world_points(item):
-        flat = location_3d_to_region_2d(region, eye, Vector(point))
-        if flat is None or not 90 < flat.x < region.width - 330 or not 60 < flat.y < region.height - 60:
-            continue
-        origin = region_2d_to_origin_3d(region, eye, flat)
-        way = Vector(point) - origin
-        if not is_clear(point, empties):
-            continue
-        hit, where, *_ = bpy.context.scene.ray_cast(depsgraph, origin, way.normalized())
-        if hit and (where - Vector(point)).length < 0.02:
-            found.append(point)
-    return [found[index] for index in np.linspace(0, len(found) - 1, count + 2).astype(int)[1:-1]]
-
-
 def edge_points(empty, count):
     """Points on edges of the Empty's cube."""
     ends = [((-1, -1, -1), (1, -1, -1)), ((-1, -1, 1), (1, -1, 1)), ((-1, -1, -1), (-1, -1, 1))]
     for a, b in ends[:count]:
         yield empty.matrix_world @ (0.7 * Vector(a) + 0.3 * Vector(b))
-
-
-def picks(found, folder, target):
-    """Ten clicks on what is seen: the mesh that was deformed and both handles."""
-    stage.empty_file()
-    with stage.override():
-        bar, fixed, moving = scenes.bar_with_handles()
-        moving.location.z += 0.6
-        bpy.context.view_layer.update()
-        scenes.activate(bar)
-        bpy.ops.arapfields.deform("EXEC_DEFAULT", **scenes.QUICK, target=target)
-        bpy.ops.view3d.view_all()
-    yield 1.0
-    meshes = [o for o in bpy.context.scene.objects if o.type == "MESH" and o.visible_get()]
-    found[f"overlapping_{target}"] = len(meshes) - 1
-    wanted = [(meshes[0], point) for point in visible_vertices(meshes[0], PICKS - 6, (fixed, moving))]
-    wanted += [(empty, point) for empty in (fixed, moving) for point in edge_points(empty, 3)]
-    hits, missed = 0, []
-    for item, point in wanted:
-        with stage.override():
-            for other in bpy.context.selected_objects:
-                other.select_set(False)
-            bpy.context.view_layer.objects.active = None
-        yield 0.3
-        stage.tool("mousemove", *pixel(point), "click", 1)
-        for _ in range(20):  # a busy machine takes its time
-            yield 0.2
-            active = bpy.context.view_layer.objects.active
-            if active is not None:
-                break
-        hits += active == item
-        if active != item:
-            missed.append((item.name, active.name if active else None, pixel(point)))
-    found[f"picks_{target}"] = f"{hits} of {len(wanted)}"
-    found[f"missed_{target}"] = missed
-    stage.picture(folder, f"picks-{target.lower()}")
-    print(found, flush=True)
 
 
 def face(found, folder):

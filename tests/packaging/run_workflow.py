@@ -75,6 +75,16 @@ def plan(step, values):
     return "run", command
 
 
+def interpreter(version, path):
+    """A Python that starts: of `path`, where pyenv's names may lead to none, or pyenv's own."""
+    candidates = [shutil.which(f"python{version}", path=path)]
+    candidates += sorted(Path.home().glob(f".pyenv/versions/{version}.*/bin/python{version}"))
+    for found in filter(None, candidates):
+        if subprocess.run([found, "-c", ""], capture_output=True).returncode == 0:
+            return found
+    raise RuntimeError(f"there is no python{version} here")
+
+
 class Job:
     """One job of one workflow, with one combination of its matrix, in `folder`."""
 
@@ -97,29 +107,23 @@ class Job:
         """The folder of programs of an environment with this Python, as a fresh machine has it."""
         place = self.folder / f"python{version}"
         if not place.exists():
-            outside = {key: value for key, value in os.environ.items() if key != "VIRTUAL_ENV"}
-            found = shutil.which(f"python{version}", path=self.environment["PATH"])
-            version_env = {**outside, "PYENV_VERSION": os.environ.get("PYENV_VERSION", "")}
-            if found is None:
-                raise RuntimeError(f"there is no python{version} here")
-            subprocess.run([found, "-m", "venv", place], check=True, env=version_env, capture_output=True)
+            found = interpreter(version, self.environment["PATH"])
+            subprocess.run([found, "-m", "venv", place], check=True, capture_output=True)
         return place / "bin"
 
     def run(self, step):
         command = CONTAINER_PYTHON.sub(
             lambda found: str(self.python(f"{found[1]}.{found[2]}").parent), filled(step["run"], self.values)
         )
-        named = step.get("shell") == "bash"
-        shell = ["bash", "--noprofile", "--norc", "-eo", "pipefail"] if named else ["bash", "-e"]
-        if self.container and not named:
-            shell = ["sh", "-e"]
+        shell = ["sh", "-e"] if self.container else ["bash", "-e"]
+        if step.get("shell") == "bash":
+            shell = ["bash", "--noprofile", "--norc", "-eo", "pipefail"]
         script = self.files / "step.sh"
         script.write_text(command)
         environment = self.environment | {
             str(key): filled(value, self.values) for key, value in step.get("env", {}).items()
         }
-        command = [*shell, str(script)]
-        process = subprocess.Popen(command, cwd=self.clone, env=environment, start_new_session=True)
+        process = subprocess.Popen([*shell, script], cwd=self.clone, env=environment, start_new_session=True)
         try:
             code = process.wait(self.limit)
         except BaseException:
@@ -127,7 +131,7 @@ class Job:
             process.wait()
             raise
         if code:
-            raise subprocess.CalledProcessError(code, command)
+            raise subprocess.CalledProcessError(code, list(map(str, process.args)))
         self.take_over()
 
     def take_over(self):
@@ -135,9 +139,8 @@ class Job:
         for line in (self.files / "GITHUB_PATH").read_text().split():
             place = CONTAINER_PYTHON.sub(lambda f: str(self.python(f"{f[1]}.{f[2]}").parent), line)
             self.environment["PATH"] = f"{place}{os.pathsep}{self.environment['PATH']}"
-        for line in (self.files / "GITHUB_ENV").read_text().splitlines():
-            name, _, value = line.partition("=")
-            self.environment[name] = value
+        lines = (self.files / "GITHUB_ENV").read_text().splitlines()
+        self.environment |= dict(line.split("=", 1) for line in lines)
         for name in ("GITHUB_PATH", "GITHUB_ENV"):
             (self.files / name).write_text("")
 
@@ -176,10 +179,10 @@ def set_up_python(job, given):
 
 def upload(job, given):
     """Copies what GitHub would keep; nothing to keep is an error where the step says so."""
-    patterns = filled(given["path"], job.values).split()
-    found = [path for pattern in patterns for path in sorted(job.clone.glob(pattern))]
+    patterns = filled(given["path"], job.values)
+    found = [path for pattern in patterns.split() for path in sorted(job.clone.glob(pattern))]
     if not found and given.get("if-no-files-found") == "error":
-        raise RuntimeError(f"there is nothing like {' '.join(patterns)}")
+        raise RuntimeError(f"there is nothing like {patterns}")
     place = job.folder / "artifacts" / filled(given["name"], job.values)
     place.mkdir(parents=True, exist_ok=True)
     for path in found:
@@ -195,9 +198,8 @@ ACTIONS = {
 
 def jobs(path):
     """(name, content, combination) of all jobs of a workflow."""
-    for name, content in yaml.safe_load(path.read_text(encoding="utf-8"))["jobs"].items():
-        for values in combinations(content):
-            yield name, content, values
+    listed = yaml.safe_load(path.read_text(encoding="utf-8"))["jobs"].items()
+    return [(name, content, values) for name, content in listed for values in combinations(content)]
 
 
 def arguments():

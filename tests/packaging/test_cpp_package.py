@@ -12,6 +12,7 @@ import meshes
 import numpy as np
 import pytest
 from cases import turn
+from environments import run
 
 import arapfields as af
 
@@ -23,15 +24,6 @@ LIBRARY = Path(af.__file__).parent / "libarapfields.so"
 CMAKE = shutil.which("cmake", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
 PUBLIC = sorted((NATIVE / "include" / "arapfields").glob("*.h"))
 PRINTED = 1e-5  # coordinates of the example's file have six digits
-LEFT_OUT = ("LD_LIBRARY_PATH", "CMAKE_PREFIX_PATH", "PYTHONPATH")  # nothing is found by chance
-
-
-def run(*command, **keywords):
-    environment = {key: value for key, value in os.environ.items() if key not in LEFT_OUT}
-    command = [str(part) for part in command]
-    done = subprocess.run(command, capture_output=True, text=True, env=environment, **keywords)
-    assert done.returncode == 0, (done.stdout + done.stderr)[-4000:]
-    return done.stdout
 
 
 def cached(name):
@@ -47,11 +39,14 @@ def prefix(tmp_path_factory):
     return folder
 
 
-def build_example(folder, *definitions):
-    """Configures and compiles a copy of the example in `folder`; the program's path."""
+def build_example(folder, *definitions, python=sys.executable):
+    """Configures and compiles a copy of the example in `folder`; the program's path.
+
+    `python` is one whose cmeel-eigen has Eigen.
+    """
     shutil.copytree(EXAMPLE, folder / "source")
     ninja = ["-G", "Ninja", f"-DCMAKE_MAKE_PROGRAM={cached('CMAKE_MAKE_PROGRAM')}"]
-    python = f"-DPython_EXECUTABLE={sys.executable}"  # whose cmeel-eigen has Eigen
+    python = f"-DPython_EXECUTABLE={python}"
     run(CMAKE, "-S", folder / "source", "-B", folder / "build", *ninja, python, *definitions)
     run(CMAKE, "--build", folder / "build")
     return folder / "build" / "bend"
@@ -102,6 +97,16 @@ def test_the_example_gives_what_python_gives(place, prefix, tmp_path):
     else:
         found = f"-Darapfields_DIR={run(sys.executable, '-m', 'arapfields', '--cmake-dir').strip()}"
     check_example(build_example(tmp_path, found), tmp_path)
+
+
+@pytest.mark.slow
+def test_the_example_builds_against_the_wheel_of_a_clean_environment(environment, tmp_path):
+    """The manylinux wheel, with Eigen's headers from PyPI beside it."""
+    run(environment, "-m", "pip", "install", "-q", "--disable-pip-version-check", "cmeel-eigen")
+    place = run(environment, "-m", "arapfields", "--cmake-dir", cwd=tmp_path).strip()
+    assert str(environment.parents[1]) in place
+    program = build_example(tmp_path, f"-Darapfields_DIR={place}", python=environment)
+    check_example(program, tmp_path)
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What pip gets: the wheel and the source distribution in environments that have nothing else of ours."""
 
+import json
 import os
 import re
 import subprocess
@@ -12,11 +13,11 @@ from email.parser import Parser
 from pathlib import Path
 
 import pytest
+from environments import fresh, run
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 OTHER_TORCH = os.environ.get("ARAPFIELDS_OTHER_TORCH", "2.8.0")  # its wheel is large: 0.9 GB
-LEFT_OUT = ("PYTHONPATH", "LD_LIBRARY_PATH", "VIRTUAL_ENV")  # nothing is found by chance
 # What the README's lines take for granted: a mesh, and three boxes.
 GIVEN = """
 import numpy as np
@@ -35,38 +36,6 @@ assert V_deformed.shape == V.shape and np.abs(moved[V[:, 2] < -0.9]).max() < 0.1
 assert np.abs(moved[V[:, 2] > 0.9] - [0.3, 0, 0]).max() < 0.1
 print("bent", af.__version__, af.__file__)
 """
-
-
-def run(*command, code=0, **keywords):
-    environment = {key: value for key, value in os.environ.items() if key not in LEFT_OUT}
-    command = [str(part) for part in command]
-    done = subprocess.run(command, capture_output=True, text=True, env=environment, **keywords)
-    assert done.returncode == code, (done.stdout + done.stderr)[-4000:]
-    return done.stdout + done.stderr
-
-
-@pytest.fixture(scope="module")
-def built(tmp_path_factory):
-    """(wheel, source distribution) as `make wheel` makes them; ARAPFIELDS_DIST names a folder with both."""
-    folder = Path(os.environ.get("ARAPFIELDS_DIST", tmp_path_factory.mktemp("dist")))
-    if not list(folder.glob("*.whl")):
-        run(sys.executable, "-m", "pip", "install", "-q", "-r", ROOT / "cmake" / "wheel" / "requirements.txt")
-        run(sys.executable, ROOT / "cmake" / "wheel" / "build_wheel.py", "--output", folder, cwd=ROOT)
-    (wheel,), (source,) = folder.glob("*cp311*.whl"), folder.glob("*.tar.gz")
-    return wheel, source
-
-
-@pytest.fixture(scope="module")
-def environment(built, tmp_path_factory):
-    """The Python of an environment in which the wheel alone was asked for."""
-    return fresh(tmp_path_factory.mktemp("right"), built[0])
-
-
-def fresh(folder, *wanted):
-    run(sys.executable, "-m", "venv", folder / "venv")
-    python = folder / "venv" / "bin" / "python"
-    run(python, "-m", "pip", "install", "-q", "--disable-pip-version-check", *wanted)
-    return python
 
 
 def five_lines():
@@ -104,7 +73,7 @@ def test_metadata_are_those_of_the_project(built):
 def test_another_torch_gets_its_line(built, tmp_path):
     """Beside a torch that it was not built for, as `pip install --no-deps` or a forced version leave it."""
     python = fresh(tmp_path, "--no-deps", built[0], f"torch=={OTHER_TORCH}", "numpy")
-    said = run(python, "-c", "import arapfields", code=1, cwd=tmp_path)
+    said = run(python, "-c", "import arapfields", code=1, cwd=tmp_path, stderr=subprocess.STDOUT)
     last = said.strip().splitlines()[-1]
     needed = PROJECT["dependencies"][1].partition("==")[2]
     assert last.startswith(
@@ -113,12 +82,35 @@ def test_another_torch_gets_its_line(built, tmp_path):
     assert last.endswith(f"pip install torch=={needed}, or build arapfields anew")
 
 
+def in_source(path):
+    """What the source distribution holds, as paths from its top."""
+    with tarfile.open(path) as archive:
+        return {name.partition("/")[2] for name in archive.getnames()}
+
+
+def known(*folders):
+    """Files that git knows."""
+    done = subprocess.run(["git", "ls-files", *folders], cwd=ROOT, capture_output=True, text=True, check=True)
+    return set(done.stdout.splitlines())
+
+
+@pytest.mark.slow
+def test_the_source_distribution_has_what_builds_and_nothing_else(built):
+    top = {"CHANGELOG.md", "CMakeLists.txt", "LICENSE", "README.md", "pyproject.toml", "PKG-INFO"}
+    cmake = {name for name in known("cmake") if not re.search(r"/wheel/|mingw", name)}
+    assert in_source(built[1]) == top | cmake | known("native")
+
+
 @pytest.mark.slow
 def test_the_source_distribution_builds_by_itself(built, tmp_path):
     """pip fetches compilers' helpers, headers and libtorch from PyPI; a C++ compiler is the system's."""
-    with tarfile.open(built[1]) as archive:
-        names = {name.partition("/")[2] for name in archive.getnames()}
-    assert {"CMakeLists.txt", "LICENSE", "README.md", "native/options/options.toml", "PKG-INFO"} <= names
-    assert not [name for name in names if name.startswith(("addon/", "docs/", "tests/"))]
     python = fresh(tmp_path, built[1])
     run(python, "-c", GIVEN + five_lines() + CHECKED, cwd=tmp_path)
+
+
+def test_warnings_are_errors_for_us_alone():
+    """Compilers that we have not seen may warn of more."""
+    listed = (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
+    assert re.search(r'option\(ARAPFIELDS_WERROR "[^"]*" OFF\)', listed)
+    ours = json.loads((ROOT / "build" / "wheel" / "compile_commands.json").read_text(encoding="utf-8"))
+    assert ours and all(" -Werror " in one["command"] for one in ours)

@@ -92,3 +92,14 @@ def test_every_step_of_ours_is_understood(path):
             kind, what = run_workflow.plan(step, values)
             known = ("its condition", "installs packages", "actions/download-artifact has no substitute")
             assert kind != "left out" or what.startswith(known), (step, what)
+
+
+def test_a_python_that_does_not_start_is_passed_over(tmp_path):
+    """pyenv's names lie in PATH and end with 127 where that version is not chosen."""
+    for folder, text in (("shims", "exit 127"), ("whole", "exit 0")):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "python9.9").write_text(f"#!/bin/sh\n{text}\n")
+        (tmp_path / folder / "python9.9").chmod(0o755)
+    assert run_workflow.interpreter("9.9", str(tmp_path / "whole")).endswith("whole/python9.9")
+    with pytest.raises(RuntimeError, match=r"no python9\.9"):
+        run_workflow.interpreter("9.9", str(tmp_path / "shims"))

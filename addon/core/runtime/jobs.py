@@ -213,5 +213,9 @@ def add_message(level, text):
     board.messages.append((level, text))
 
 
+def forget_messages():
+    board.messages.clear()
+
+
 def messages():
     return list(board.messages)

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What plays a bake of hair, point clouds and Grease Pencil, for which Blender has no cache of its own.
+
+A mesh without faces has the points, in no scene; it plays the frames, by Mesh Cache or by shape keys, and a
+modifier of the object takes each point's position from there. All of it is Blender's own: it plays and
+renders without the extension. An attribute of the points tells their vertex there, counted from 1; points
+that are drawn later have none, and stay.
+"""
+
+import bpy
+
+from ..blender import modifier_stack
+from ..core.errors import UserError
+from ..field_modifier import inputs
+from ..field_modifier.node_group import Graph
+from ..names import CACHE_MODIFIER, PLAYED_GROUP, PLAYED_SUFFIX, ROWS
+from .drawings import layers_of
+
+VERSION = 1
+
+
+def find_or_make():
+    """The node group of the modifier."""
+    for group in bpy.data.node_groups:
+        if group.get(PLAYED_GROUP) == VERSION and group.library is None:
+            return group
+    group = build()
+    group[PLAYED_GROUP] = VERSION
+    return group
+
+
+def build():
+    group = bpy.data.node_groups.new(CACHE_MODIFIER, "GeometryNodeTree")
+    group.is_modifier = True
+    graph = Graph(group)
+    graph.socket("Geometry", "INPUT", "NodeSocketGeometry")
+    for name, text in (("Factor", "How far the points go of the way"), ("Mask", "How far each point goes")):
+        socket = graph.socket(name, "INPUT", "NodeSocketFloat", text)
+        socket.default_value, socket.min_value, socket.max_value, socket.subtype = 1.0, 0.0, 1.0, "FACTOR"
+    graph.socket("Points", "INPUT", "NodeSocketObject", "Mesh that plays the points")
+    graph.socket("Geometry", "OUTPUT", "NodeSocketGeometry")
+
+    given = graph.node("NodeGroupInput").outputs
+    played = graph.node("GeometryNodeObjectInfo", given["Points"]).outputs["Geometry"]
+    row = graph.node("GeometryNodeInputNamedAttribute", ROWS, data_type="INT").outputs[0]
+    known = graph.node("ShaderNodeMath", row, 0.5, operation="GREATER_THAN").outputs[0]
+    vertex = graph.node("ShaderNodeMath", row, 1.0, operation="SUBTRACT").outputs[0]
+    position = graph.node("GeometryNodeInputPosition").outputs[0]
+    there = graph.node("GeometryNodeSampleIndex", data_type="FLOAT_VECTOR", domain="POINT")
+    graph.link(played, there.inputs[0])
+    graph.link(position, there.inputs["Value"])
+    graph.link(vertex, there.inputs["Index"])
+    strength = graph.node("ShaderNodeMath", given["Factor"], given["Mask"], operation="MULTIPLY").outputs[0]
+    way = graph.node("ShaderNodeVectorMath", there.outputs["Value"], position, operation="SUBTRACT").outputs[
+        0
+    ]
+    moved = graph.node("ShaderNodeVectorMath", way, operation="SCALE")
+    graph.link(strength, moved.inputs["Scale"])
+    place = graph.node("GeometryNodeSetPosition")
+    graph.link(given["Geometry"], place.inputs["Geometry"])
+    graph.link(known, place.inputs["Selection"])
+    graph.link(moved.outputs[0], place.inputs["Offset"])
+    graph.node("NodeGroupOutput", place.outputs[0])
+    return group
+
+
+def find(item):
+    """The modifier that plays an object's points, or None."""
+    played = (m for m in item.modifiers if m.type == "NODES" and m.node_group is not None)
+    return next((m for m in played if PLAYED_GROUP in m.node_group), None)
+
+
+def play(item, points, counts):
+    """Has the object play a new mesh of these (n, 3) points, `counts` in each of its drawings; returns that
+    mesh's object, which still rests. A bake before goes."""
+    layers = layers_of(item)
+    if counts != [len(layer["position"].data) for layer in layers]:
+        raise UserError("{name} changed while it was worked on; run again", name=item.name)
+    remove(item)
+    name = f"{item.name}{PLAYED_SUFFIX}"
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(points.tolist(), [], [])
+    first = 1
+    for layer, count in zip(layers, counts, strict=True):
+        rows = layer.get(ROWS) or layer.new(ROWS, "INT", "POINT")
+        rows.data.foreach_set("value", list(range(first, first + count)))
+        first += count
+    field = modifier_stack.find(item)
+    modifier = item.modifiers.new(CACHE_MODIFIER, "NODES")
+    modifier.node_group = find_or_make()
+    inputs.put(modifier, "Points", bpy.data.objects.new(name, mesh))
+    if field is not None:
+        inputs.put_attribute(modifier, "Mask", inputs.get_attribute(field, "Mask"))
+        inputs.put(modifier, "Factor", inputs.get(field, "Factor"))
+    item.modifiers.move(len(item.modifiers) - 1, 0)  # hair grown from these follows
+    set_playing(item, True)
+    return inputs.get(modifier, "Points")
+
+
+def set_playing(item, on):
+    """Shows the bake instead of the field, or the other way round."""
+    for modifier, shown in ((find(item), on), (modifier_stack.find(item), not on)):
+        if modifier is not None:
+            modifier.show_viewport = modifier.show_render = shown
+
+
+def remove(item):
+    """Takes the bake off; the cache's file stays."""
+    modifier = find(item)
+    if modifier is None:
+        return
+    set_playing(item, False)
+    played, group = inputs.get(modifier, "Points"), modifier.node_group
+    item.modifiers.remove(modifier)
+    if played is not None and played.users == 0:
+        discard(played)
+    if group.users == 0:
+        bpy.data.node_groups.remove(group)
+    for layer in layers_of(item):
+        if ROWS in layer:
+            layer.remove(layer[ROWS])
+    item.data.update_tag()
+
+
+def discard(played):
+    """Takes away the mesh that plays, with its keys' animation."""
+    mesh = played.data
+    keys = mesh.shape_keys
+    action = keys.animation_data.action if keys is not None and keys.animation_data else None
+    bpy.data.objects.remove(played)
+    if mesh.users == 0:
+        bpy.data.meshes.remove(mesh)
+    if action is not None and action.users == 0:
+        bpy.data.actions.remove(action)

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Armatures whose bones go along with a wrap: their rest is moved by its field, and can be given back."""
+
+import json
+from contextlib import contextmanager
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from ..blender import modifier_stack
+from ..blender.object_references import ObjectReference, settings_of
+from ..core.errors import UserError
+from ..core.geometry import carrying
+from ..core.geometry.spaces import inverse, transform
+from ..handles.movers import matrix_of
+
+LEAST_BONE = 1e-5  # of the object's size; Blender removes bones without a length
+
+
+def of(source):
+    """The armatures that pose a source, except those that it carries."""
+    carried = [entry.item for entry in settings_of(source).carried]
+    posing = [m.object for m in source.modifiers if modifier_stack.is_posing(source, m) and m.show_viewport]
+    return [rig for rig in dict.fromkeys(posing) if rig not in carried]
+
+
+def refusal(rig):
+    """Why an armature's bones cannot be fitted, as a UserError; None where they can."""
+    if rig.library is not None or rig.data.library is not None or rig.override_library is not None:
+        return UserError("the bones of {rig} stay: it is linked from another file", rig=rig.name)
+    if rig.mode == "EDIT":
+        return UserError("the bones of {rig} stay: it is in Edit Mode", rig=rig.name)
+    if bpy.context.view_layer.objects.get(rig.name) != rig:
+        return UserError("the bones of {rig} stay: it is not in the view layer", rig=rig.name)
+    return None
+
+
+class Fitting:
+    """The bones of a source's armatures, for one wrap. `warnings`: which of them stay, and why."""
+
+    def __init__(self, source, space):
+        self.warnings, self.rigs, self.moved = [], [], []
+        for rig in of(source):
+            reason = refusal(rig)
+            if reason is not None:
+                self.warnings.append(reason)
+            elif rig.data.bones:
+                self.rigs.append((ObjectReference(rig), *resting(rig), space.world_to_solve @ matrix_of(rig)))
+
+    def move(self, field):
+        """Finds where the bones belong, on a worker."""
+        self.moved = []
+        for reference, names, poses, lengths, to_solve in self.rigs:
+            points = carrying.bone_points(poses, lengths)
+            before = transform(to_solve, points)
+            after = field(before)
+            if not np.isfinite(after).all():
+                raise UserError("the result has bones that are not finite; try other settings")
+            found = carrying.bone_poses(to_solve @ poses, before, after)
+            heads, tails = after[0 :: len(carrying.BONE_POINTS)], after[1 :: len(carrying.BONE_POINTS)]
+            back = inverse(to_solve)
+            axes = found[:, :3, 2] @ back[:3, :3].T
+            self.moved.append((reference, names, transform(back, heads), transform(back, tails), axes))
+
+    def put(self, context):
+        """Moves the bones at rest, on the main thread."""
+        for reference, names, heads, tails, axes in self.moved:
+            rig = reference.get()
+            if not settings_of(rig).rest_bones:
+                settings_of(rig).rest_bones = json.dumps(rest_of(rig))
+            write(context, rig, dict(zip(names, zip(heads, tails, axes, strict=True), strict=True)))
+
+
+def rest_of(rig):
+    """{name: [head, tail, z axis]} of the bones at rest, in the armature's coordinates."""
+    return {
+        bone.name: [list(bone.head_local), list(bone.tail_local), list(bone.matrix_local.col[2][:3])]
+        for bone in rig.data.bones
+    }
+
+
+def resting(rig):
+    """(names, (k, 4, 4) poses, (k) lengths) of the bones as they were before any fit."""
+    noted = settings_of(rig).rest_bones
+    ends = rest_of(rig) | (json.loads(noted) if noted else {})
+    names = [bone.name for bone in rig.data.bones]
+    poses, lengths = np.tile(np.eye(4), (len(names), 1, 1)), []
+    for pose, name in zip(poses, names, strict=True):
+        head, tail, z = np.array(ends[name], dtype=np.float64)
+        y = (tail - head) / np.linalg.norm(tail - head)
+        x = np.cross(y, z)
+        x /= np.linalg.norm(x)
+        pose[:3, :3], pose[:3, 3] = np.stack([x, y, np.cross(x, y)], axis=1), head
+        lengths.append(np.linalg.norm(tail - head))
+    return names, poses, lengths
+
+
+def write(context, rig, ends):
+    """Puts bones at rest where {name: (head, tail, z axis)} say; those that are gone are passed over."""
+    least = LEAST_BONE * max(np.ptp([end for head, tail, _ in ends.values() for end in (head, tail)], axis=0))
+    with edit_bones(context, rig) as bones:
+        for name, (head, tail, _) in ends.items():
+            if name in bones and np.linalg.norm(np.subtract(tail, head)) > least:
+                bones[name].head, bones[name].tail = head, tail
+        for name, (_, _, z) in ends.items():
+            if name in bones:
+                bones[name].align_roll(Vector(z))
+
+
+def reset(context, rig):
+    """Gives an armature's bones the rest that they had before they were fitted."""
+    noted = settings_of(rig).rest_bones
+    if not noted:
+        return
+    reason = refusal(rig)
+    if reason is not None:
+        raise reason
+    write(context, rig, json.loads(noted))
+    settings_of(rig).rest_bones = ""
+
+
+class Below:
+    """The field's place before a source's armatures, taken for one wrap and given back where that fails."""
+
+    def __init__(self, source):
+        self.source = ObjectReference(source)
+        self.was, self.index, self.kept = settings_of(source).under_rig, None, False
+        settings_of(source).under_rig = True
+        modifier = modifier_stack.find(source)
+        if modifier is None:
+            return
+        index = source.modifiers.find(modifier.name)
+        posing = (k for k, m in enumerate(source.modifiers) if modifier_stack.is_posing(source, m))
+        first = next(posing, index)
+        if first < index:
+            self.index = index
+            source.modifiers.move(index, first)
+
+    def give_back(self):
+        source = self.source.find()
+        if source is None or self.kept:
+            return
+        settings_of(source).under_rig = self.was
+        modifier = modifier_stack.find(source)
+        if modifier is not None and self.index is not None:
+            source.modifiers.move(source.modifiers.find(modifier.name), self.index)
+
+
+@contextmanager
+def edit_bones(context, rig):
+    """The armature's bones at rest, to be changed; what was active, selected and hidden is so afterwards."""
+    layer = context.view_layer
+    active = layer.objects.active
+    mode = active.mode if active is not None else "OBJECT"
+    seen = rig.hide_viewport, rig.hide_get(), rig.data.use_mirror_x
+    if mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    rig.hide_viewport = False
+    rig.hide_set(False)
+    rig.data.use_mirror_x = False
+    layer.objects.active = rig
+    try:
+        bpy.ops.object.mode_set(mode="EDIT")
+        try:
+            yield rig.data.edit_bones
+        finally:
+            bpy.ops.object.mode_set(mode="OBJECT")
+    finally:
+        rig.data.use_mirror_x = seen[2]
+        rig.hide_set(seen[1])
+        rig.hide_viewport = seen[0]
+        layer.objects.active = active
+        if mode != "OBJECT":
+            bpy.ops.object.mode_set(mode=mode)

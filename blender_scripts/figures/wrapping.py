@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A rigged, coloured child wrapped onto the scan of a grown-up, bones included, and posed by its own rig."""
+
+import json
+
+import bpy
+import child
+import dressing
+import numpy as np
+import stage
+from mathutils import Matrix, Vector
+from shapes import Cone, Ellipsoid, build, mirrored, tube
+
+from .workflows import extension
+
+SPACING = 1.75
+BONE = (0.02, 0.12, 0.55)
+PAIRS = (  # crown, nose, hands, feet: on the child, and on the scan
+    ((0, 0.02, 1.81), (0, 0.01, 2.24)),
+    ((0, -0.335, 1.45), (0, -0.255, 1.99)),
+    *(((s * 0.82, 0, 0.97), (s * 0.82, -0.06, 1.05)) for s in (-1, 1)),
+    *(((s * 0.13, -0.2, 0.04), (s * 0.19, -0.24, 0.04)) for s in (-1, 1)),
+)
+
+
+def grown():
+    """A grown-up of the child's parts: longer legs, a smaller head, arms that hang."""
+    middle = [
+        Ellipsoid((0, 0.01, 2.03), (0.185, 0.215, 0.225)),
+        Ellipsoid((0, -0.22, 1.99), (0.03, 0.045, 0.035), blend=0.03),
+        Cone((0, 0.02, 1.62), (0, 0.02, 1.88), 0.08, 0.08, blend=0.05),
+        *tube([(0, 0, 1.12), (0, 0, 1.3), (0, 0, 1.58)], [0.19, 0.2, 0.17]),
+        *tube([(0, 0, 0.95), (0, 0, 1.05)], [0.2, 0.2], blend=0.06),
+    ]
+    half = [
+        *tube([(0.14, 0.01, 1.57), (0.48, 0, 1.33), (0.72, -0.05, 1.12)], [0.095, 0.075, 0.06], blend=0.07),
+        Ellipsoid((0.78, -0.06, 1.06), (0.065, 0.05, 0.08), blend=0.04),
+        Ellipsoid((0.18, 0.03, 2.02), (0.03, 0.05, 0.06), blend=0.03),
+        *tube([(0.12, 0, 0.9), (0.17, -0.02, 0.5), (0.19, 0.02, 0.14)], [0.135, 0.11, 0.085], blend=0.06),
+        Ellipsoid((0.19, -0.07, 0.065), (0.085, 0.19, 0.065), blend=0.03),
+    ]
+    return build([*middle, *mirrored(half)], 0.05, cells=110)
+
+
+def scan():
+    """Its triangles, loose, noisy, with holes."""
+    shape, rng = grown(), np.random.default_rng(0)
+    kept = shape.triangles[rng.random(len(shape.triangles)) > 0.04]
+    corners = (shape.vertices[kept] + rng.normal(0, 0.002, (len(kept), 1, 3))).reshape(-1, 3)
+    mesh = bpy.data.meshes.new("Scan")
+    mesh.from_pydata(corners.tolist(), [], np.arange(len(corners)).reshape(-1, 3).tolist())
+    mesh.materials.append(stage.material("Scan", stage.CLAY))
+    return dressing.link("Scan", mesh)
+
+
+def bones_of(rig):
+    """[(head, tail)] in the world, as they are posed."""
+    return [(rig.matrix_world @ bone.head, rig.matrix_world @ bone.tail) for bone in rig.pose.bones]
+
+
+def as_seen(name, item, rig, column):
+    """What is shown of a body now, half transparent, and its bones."""
+    seen = item.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh = bpy.data.meshes.new_from_object(seen)
+    paint = stage.vertex_paint(name)
+    paint.node_tree.nodes["Principled BSDF"].inputs["Alpha"].default_value = 0.6
+    mesh.materials.clear()
+    mesh.materials.append(paint)
+    shown = [dressing.link(name, mesh)]
+    for head, tail in bones_of(rig):
+        way = tail - head
+        bpy.ops.mesh.primitive_cone_add(vertices=4, radius1=0.1 * way.length, radius2=0, depth=way.length)
+        bone = bpy.context.object
+        bone.matrix_world = (
+            Matrix.Translation((head + tail) / 2) @ way.to_track_quat("Z", "Y").to_matrix().to_4x4()
+        )
+        bone.data.materials.append(stage.material("Bone", BONE))
+        shown.append(bone)
+    for one in shown:
+        one.matrix_world = Matrix.Translation((column * SPACING, 0, 0)) @ one.matrix_world
+    return shown
+
+
+def pose(rig):
+    for name, axis, angle in (
+        ("Upper Arm.L", (0, -1, 0), 1.5),
+        ("Forearm.L", (0, -1, 0), 0.5),
+        ("Upper Arm.R", (0, 1, 0), -0.3),
+        ("Leg.R", (1, 0, 0), 0.5),
+        ("Neck", (0, 0, 1), 0.5),
+    ):
+        bone = rig.pose.bones[name]
+        head = Matrix.Translation(bone.head)
+        bone.matrix = head @ Matrix.Rotation(angle, 4, Vector(axis)) @ head.inverted() @ bone.matrix
+        bpy.context.view_layer.update()
+
+
+def render(output):
+    extension()
+    stage.clear()
+    body, rig = child.coloured("Body", child.body()), dressing.rig(child.BONES)
+    dressing.weigh(body, child.BONES)
+    body.modifiers.new("Armature", "ARMATURE").object = rig
+    target = scan()
+    body.arapfields.wrap.onto = target
+    bpy.context.view_layer.objects.active = body
+    body.select_set(True)
+    bpy.context.view_layer.update()
+    for rest, there in PAIRS:
+        bpy.ops.arapfields.add_landmark(rest=rest, on_target=there)
+    shown = as_seen("Template", body, rig, 0)
+    bpy.context.view_layer.objects.active = body
+    bpy.ops.arapfields.wrap()
+    report = json.loads(body["arapfields_report"])
+    shown += as_seen("Wrapped", body, rig, 2)
+    pose(rig)
+    shown += as_seen("Posed", body, rig, 3)
+    target.matrix_world = Matrix.Translation((SPACING, 0, 0))
+    for item in (body, rig, *(o for o in bpy.data.objects if o.type == "EMPTY")):
+        item.hide_render = True
+    stage.photograph([*shown, target], output / "wrapping.png", width=1200, elevation=4)
+    return {name: round(100 * report[name], 3) for name in ("to_target_mean", "from_target_mean")}

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A film of a Blender 5.2 that has a window, in a system of its own that is entered by chroot.
+
+ARAPFIELDS_BLENDER52 names its root folder (default /opt/blender52), with Blender, Xvfb, xdotool and
+ImageMagick inside; the native library comes from the extension in dist.
+"""
+
+import io
+import os
+import shutil
+import subprocess
+import zipfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+CHROOT = Path(os.environ.get("ARAPFIELDS_BLENDER52", "/opt/blender52"))
+PROJECT = ("addon", "native/options", "tests/gui")  # what runs in there
+SCRIPTS = [ROOT / "tests/gui" / name for name in ("film.py", "mouse.py", "stage.py")]
+SIZE = (880, 620)  # pixels of the window
+PATIENCE = 900  # seconds, for a busy machine
+SESSION = """
+export LIBGL_ALWAYS_SOFTWARE=1 DISPLAY=:97 HOME={0}/home PYTHONPATH={0}/site PYTHONDONTWRITEBYTECODE=1
+mkdir -p $HOME
+Xvfb $DISPLAY -screen 0 {1}x{2}x24 & screen=$!
+sleep 2
+timeout {3} blender --python-use-system-env --factory-startup --window-geometry 0 0 {1} {2} \
+  --python {0}/project/tests/gui/film.py -- {0}/film {0}/scene.blend
+status=$?
+kill $screen
+exit $status
+"""
+
+
+def extension():
+    """The newest zip for this system; None where there is none."""
+    found = sorted((ROOT / "dist").glob("arapfields-*-linux-x64.zip"), key=lambda path: path.stat().st_mtime)
+    return found[-1] if found else None
+
+
+def missing():
+    """What a film lacks, in one line; None where it can be made."""
+    if os.geteuid() or not (CHROOT / "usr/bin/blender").exists():
+        return f"no Blender with a window in {CHROOT}, or no right to enter it"
+    return None if extension() else "no extension in dist (make extension)"
+
+
+def unpack(target):
+    """The wheels of the extension, as a folder to import from."""
+    with zipfile.ZipFile(extension()) as outer:
+        for name in outer.namelist():
+            if name.endswith(".whl"):
+                zipfile.ZipFile(io.BytesIO(outer.read(name))).extractall(target)
+
+
+def record(scene, folder):
+    """Runs tests/gui/film.py on a .blend; its pictures and film.json come to a folder that is made."""
+    there = CHROOT / "tmp" / f"arapfields-film-{os.getpid()}"
+    shutil.rmtree(there, ignore_errors=True)
+    there.mkdir(parents=True)
+    try:
+        unpack(there / "site")
+        for name in PROJECT:
+            leave = shutil.ignore_patterns("__pycache__")
+            shutil.copytree(ROOT / name, there / "project" / name, ignore=leave)
+        (there / "project/tests/blender").mkdir()
+        shutil.copy(ROOT / "tests/blender/scenes.py", there / "project/tests/blender")
+        shutil.copy(scene, there / "scene.blend")
+        inside = Path("/") / there.relative_to(CHROOT)
+        session = SESSION.format(inside, *SIZE, PATIENCE)
+        made = subprocess.run(["chroot", str(CHROOT), "bash", "-c", session], capture_output=True, text=True)
+        if not (there / "film/film.json").exists():
+            raise RuntimeError(f"no film: {made.stdout[-2000:]}{made.stderr[-2000:]}")
+        shutil.copytree(there / "film", folder)
+    finally:
+        shutil.rmtree(there)

@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Commands and Python environments that find nothing by chance."""
+
+import os
+import subprocess
+import sys
+
+LEFT_OUT = ("CMAKE_PREFIX_PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "VIRTUAL_ENV")
+
+
+def run(*command, code=0, **keywords):
+    """What a command prints; it must end with `code`. stderr=subprocess.STDOUT adds its errors."""
+    environment = {key: value for key, value in os.environ.items() if key not in LEFT_OUT}
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    command = [str(part) for part in command]
+    done = subprocess.run(command, text=True, env=environment, **(pipes | keywords))
+    assert done.returncode == code, (done.stdout + (done.stderr or ""))[-4000:]
+    return done.stdout
+
+
+def fresh(folder, *wanted):
+    """The Python of a new environment below `folder`, in which pip was asked for `wanted`."""
+    run(sys.executable, "-m", "venv", folder / "venv")
+    python = folder / "venv" / "bin" / "python"
+    run(python, "-m", "pip", "install", "-q", "--disable-pip-version-check", *wanted)
+    return python

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The pin page's steps in a window, by mouse, a picture of it after each move: frames of a film.
+
+blender --factory-startup --window-geometry 0 0 880 620 --python tests/gui/film.py -- FOLDER PINS.blend
+Writes FOLDER/NNN.png and film.json: where the cursor was in each, which the pictures do not show, and
+whether its button was down.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+FEET = ((0.33, -0.05, 0.10), (-0.24, -0.10, 0.10))
+DRAGS = (((0.15, -0.80, 1.42), (-22, -58)), ((0.02, 1.30, 0.84), (-24, -104)))  # where, pixels to go
+BACKGROUND = (0.16, 0.17, 0.19)
+STEPS = 9
+
+
+class Film:
+    """Pictures of the window and what is known of each."""
+
+    def __init__(self, folder):
+        self.folder, self.frames = folder, []
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def take(self, spot, pressed=False, hold=1):
+        import stage
+
+        stage.picture(self.folder, f"{len(self.frames):03}")
+        self.frames.append({"cursor": list(spot), "pressed": pressed, "hold": hold})
+
+    def write(self):
+        (self.folder / "film.json").write_text(json.dumps(self.frames))
+
+
+def set_view(item):
+    """The creature alone, from its front and side, no grid; the tool in hand."""
+    import bpy
+    import scenes
+    import stage
+    from mathutils import Euler
+
+    bpy.data.collections["Studio"].hide_viewport = True
+    scenes.activate(item)
+    with stage.override():
+        space = bpy.context.space_data
+        space.show_region_ui, space.show_region_toolbar = False, True
+        space.shading.color_type, space.shading.background_type = "VERTEX", "VIEWPORT"
+        space.shading.background_color = BACKGROUND
+        for name in (
+            "show_floor",
+            "show_axis_x",
+            "show_axis_y",
+            "show_cursor",
+            "show_text",
+            "show_relationship_lines",
+        ):
+            setattr(space.overlay, name, False)
+        space.show_gizmo_navigate = False
+        eye = space.region_3d
+        eye.view_perspective = "PERSP"
+        eye.view_rotation = Euler((1.45, 0, 1.0)).to_quaternion()
+        bpy.ops.view3d.view_selected()
+        eye.view_distance *= 0.80
+        eye.view_location.z += 0.12
+        bpy.ops.arapfields.pin_tool("INVOKE_DEFAULT")
+        bpy.ops.ed.undo_push(message="stage")
+
+
+def glide(film, start, end, steps=3):
+    """The cursor on its way, without its button."""
+    import stage
+
+    for step in range(1, steps + 1):
+        spot = [round(a + step / steps * (b - a)) for a, b in zip(start, end, strict=True)]
+        stage.tool("mousemove", *spot)
+        yield 0.35
+        film.take(spot)
+
+
+def steps(film, path, found):
+    import bpy
+    import mouse
+    import numpy as np
+    import scenes
+    import stage
+
+    bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False)
+    yield 1.0
+    dinosaur = bpy.data.objects["Dinosaur"]
+    set_view(dinosaur)
+    yield 2.0
+    rest, spot = scenes.world_points(dinosaur), (460, 500)
+    stage.tool("mousemove", *spot)
+    yield 0.5
+    film.take(spot, hold=4)
+    for number, where in enumerate(FEET, 1):
+        goal = mouse.pixel(where)
+        yield from glide(film, spot, goal)
+        stage.tool("keydown", "shift")
+        yield 0.2
+        stage.tool("click", 1)
+        yield from mouse.until(lambda count=number: len(dinosaur.arapfields.handles) == count, 8.0)
+        stage.tool("keyup", "shift")
+        yield 0.4
+        film.take(goal, pressed=True, hold=3)
+        spot = goal
+    for where, by in DRAGS:
+        now = scenes.world_points(dinosaur)[np.linalg.norm(rest - where, axis=1).argmin()]
+        goal = mouse.pixel(now)
+        yield from glide(film, spot, goal)
+        stage.tool("mousedown", 1)
+        yield from mouse.until(mouse.is_dragging, 5.0)
+        for step in range(1, STEPS + 1):
+            spot = [round(a + step / STEPS * b) for a, b in zip(goal, by, strict=True)]
+            stage.tool("mousemove", *spot)
+            yield 0.15
+            yield from mouse.until(mouse.is_followed)
+            yield 0.25
+            film.take(spot, pressed=True, hold=3 if step == STEPS else 1)
+        yield from mouse.release()
+        yield 0.3
+    film.take(spot, hold=10)
+    found["pins"] = [[entry.empty.name, entry.anchor] for entry in dinosaur.arapfields.handles]
+    found["moved"] = round(float(np.linalg.norm(scenes.world_points(dinosaur) - rest, axis=1).max()), 3)
+
+
+def main():
+    folder, path = Path(sys.argv[-2]), Path(sys.argv[-1])
+    sys.path[:0] = [str(ROOT), str(ROOT / "tests/blender"), str(ROOT / "tests/gui")]
+    import stage
+
+    film, found = Film(folder), {}
+
+    def ended(error):
+        found.update({"error": error} if error else {"finished": True})
+        (folder / "found.json").write_text(json.dumps(found, indent=1))
+        film.write()
+
+    stage.start(lambda: steps(film, path, found), ended, folder)
+
+
+main()

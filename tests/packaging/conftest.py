@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is uploaded to a package index, and an environment that has it."""
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+from environments import fresh, run
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="session")
+def built(tmp_path_factory):
+    """(wheel, source distribution) as `make wheel` makes them; ARAPFIELDS_DIST names a folder with both."""
+    folder = Path(os.environ.get("ARAPFIELDS_DIST", tmp_path_factory.mktemp("dist")))
+    if not list(folder.glob("*.whl")):
+        run(sys.executable, "-m", "pip", "install", "-q", "-r", ROOT / "cmake" / "wheel" / "requirements.txt")
+        run(sys.executable, ROOT / "cmake" / "wheel" / "build_wheel.py", "--output", folder, cwd=ROOT)
+    (wheel,), (source,) = folder.glob("*cp311*.whl"), folder.glob("*.tar.gz")
+    return wheel.resolve(), source.resolve()
+
+
+@pytest.fixture(scope="session")
+def environment(built, tmp_path_factory):
+    """The Python of an environment in which the wheel alone was asked for."""
+    return fresh(tmp_path_factory.mktemp("right"), built[0])
