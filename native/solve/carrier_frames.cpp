@@ -102,7 +102,7 @@ CarrierFrames::CarrierFrames(PointsIn samples) {
     }
   });
   for (std::size_t level = 0; level < levels.size(); ++level) {
-    areas_[level] = Vector::Zero(std::min(levels[level], places_.rows()));
+    areas_[level] = Vector::Zero(std::min<Index>(levels[level], places_.rows()));
     for (const Index place : nearest[level]) areas_[level][place] += 1.0 / static_cast<double>(n);
   }
 }

@@ -20,7 +20,7 @@ def extension(tmp_path_factory):
     """The zip: the one named by ARAPFIELDS_EXTENSION, or built here for the Pythons at hand."""
     given = os.environ.get("ARAPFIELDS_EXTENSION")
     if given:
-        return Path(given)
+        return Path(given).resolve()
     import arapfields
 
     build = Path(arapfields.__file__).parents[2]
