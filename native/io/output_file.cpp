@@ -101,7 +101,9 @@ void OutputFile::open_folder(const fs::path& target) {
   std::error_code none;
   const fs::file_status there = fs::status(target, none);
   const bool exists = fs::exists(there);
-  if (name.empty() || name == "." || name == ".." || fs::is_directory(there)) throw FileError(path_, EISDIR);
+  const auto& text = name.native();  // "", "." and ".." are folders
+  const bool dots = text.size() <= 2 && text.find_first_not_of(fs::path::value_type('.')) == text.npos;
+  if (dots || fs::is_directory(there)) throw FileError(path_, EISDIR);
   require(!exists || fs::is_regular_file(there), path_, "is not a regular file",
           "pipes, devices and sockets cannot be written to");
   if (exists && !system_file::may_write(target)) throw FileError(path_, errno);

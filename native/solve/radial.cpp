@@ -37,6 +37,8 @@ constexpr int samples_a_center = 8, seen_a_center = 10;
 /// Samples of a handle that are held: with fewer it is chance how far to its edge they reach, and so how much
 /// room is left for the bend.
 constexpr int held_samples = 1024;
+/// So many more centers for exact handles, whose margins are narrow.
+constexpr double more_for_exact = 4.0 / 3.0;
 constexpr Index least_centers = 50;
 
 template <class Options>
@@ -130,7 +132,8 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
   const ThreadScope threads(options.machine.threads);
   LiveOptions fine = live_options(options);
   fine.symmetry = options.symmetry;
-  set_centers(fine, options.centers, samples);
+  set_centers(fine, exact != nullptr ? static_cast<int>(more_for_exact * options.centers) : options.centers,
+              samples);
   fine.handle_weight = options.handles.handle_weight * (exact != nullptr ? share_of_exact : 1.0);
   const auto blend = exact != nullptr ? exact->blend : nullptr;
   const auto around = [&](std::shared_ptr<DeformationField> field) {
