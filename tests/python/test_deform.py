@@ -82,7 +82,7 @@ def test_exact_handles_that_overlap_are_named(samples):
         )
     together = cases.shift([0, 0, 0.1])
     field = af.deform(
-        samples, [cases.moved(a, together), cases.moved(b, together)], quick(exact_handles=True)
+        samples, [cases.moved(a, together), cases.moved(b, together)], quick(exact_handles=True, margin=0.1)
     )
     assert field.report.handle_error_max < tolerances.EXACT_HANDLE
 
@@ -91,7 +91,7 @@ def test_exact_handles_that_nearly_overlap_stay_exact_and_are_named(samples):
     a = cases.box([-0.9, -0.3, -0.3], [-0.03, 0.3, 0.3])
     b = cases.box([0.03, -0.3, -0.3], [0.9, 0.3, 0.3])
     handles = [cases.moved(a), cases.moved(b, cases.turn([0, 1, 0], 20))]
-    field = af.deform(samples, handles, quick(exact_handles=True))
+    field = af.deform(samples, handles, quick(exact_handles=True, margin=0.1))
     assert field.report.handle_error_max < tolerances.EXACT_HANDLE
     assert "handles[0] and handles[1]" in field.report.notes[0]
 
