@@ -27,7 +27,7 @@ constexpr int style_first_centers = 400, style_first_samples = 4000, style_first
 /// A style that folds between the samples that were looked at goes on so many times, with so many more times
 /// the barrier's weight, in so many steps at most.
 constexpr int unfolding_rounds = 5, unfolding_steps = 15;
-constexpr double unfolding = 10.0;
+constexpr double unfolding = 3.0;
 /// Share of the handles' weight with which exact handles still pull at the radial field inside the blend,
 /// which nothing else holds in their boxes.
 constexpr double share_of_exact = 0.01;
@@ -37,8 +37,9 @@ constexpr int samples_a_center = 8, seen_a_center = 10;
 /// Samples of a handle that are held: with fewer it is chance how far to its edge they reach, and so how much
 /// room is left for the bend.
 constexpr int held_samples = 1024;
-/// So many more centers for exact handles, whose margins are narrow.
+/// So many more centers for exact handles, whose margins are narrow, up to so many.
 constexpr double more_for_exact = 4.0 / 3.0;
+constexpr int most_for_exact = 2500;
 constexpr Index least_centers = 50;
 
 template <class Options>
@@ -132,8 +133,8 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
   const ThreadScope threads(options.machine.threads);
   LiveOptions fine = live_options(options);
   fine.symmetry = options.symmetry;
-  set_centers(fine, exact != nullptr ? static_cast<int>(more_for_exact * options.centers) : options.centers,
-              samples);
+  const int more = std::min(most_for_exact, static_cast<int>(more_for_exact * options.centers));
+  set_centers(fine, exact != nullptr ? std::max(options.centers, more) : options.centers, samples);
   fine.handle_weight = options.handles.handle_weight * (exact != nullptr ? share_of_exact : 1.0);
   const auto blend = exact != nullptr ? exact->blend : nullptr;
   const auto around = [&](std::shared_ptr<DeformationField> field) {
