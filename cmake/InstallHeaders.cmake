@@ -2,6 +2,7 @@
 # Installs the public headers, include/arapfields/*.h, and those of the library's own that they include, from the
 # folders ROOTS into TARGET. In the tree these are included as "folder/name.h"; in the installed copies as
 # "arapfields/folder/name.h".
+cmake_minimum_required(VERSION 3.25)
 list(GET ROOTS 0 first)
 file(GLOB pending RELATIVE "${first}" "${first}/include/arapfields/*.h")
 set(seen ${pending})

@@ -10,6 +10,7 @@ that are drawn later have none, and stay.
 import bpy
 
 from ..blender import modifier_stack
+from ..blender.removal import remove_mesh_object, remove_node_modifier
 from ..core.errors import UserError
 from ..field_modifier import inputs
 from ..field_modifier.node_group import Graph
@@ -110,25 +111,11 @@ def remove(item):
     if modifier is None:
         return
     set_playing(item, False)
-    played, group = inputs.get(modifier, "Points"), modifier.node_group
-    item.modifiers.remove(modifier)
+    played = inputs.get(modifier, "Points")
+    remove_node_modifier(modifier)
     if played is not None and played.users == 0:
-        discard(played)
-    if group.users == 0:
-        bpy.data.node_groups.remove(group)
+        remove_mesh_object(played)
     for layer in layers_of(item):
         if ROWS in layer:
             layer.remove(layer[ROWS])
     item.data.update_tag()
-
-
-def discard(played):
-    """Takes away the mesh that plays, with its keys' animation."""
-    mesh = played.data
-    keys = mesh.shape_keys
-    action = keys.animation_data.action if keys is not None and keys.animation_data else None
-    bpy.data.objects.remove(played)
-    if mesh.users == 0:
-        bpy.data.meshes.remove(mesh)
-    if action is not None and action.users == 0:
-        bpy.data.actions.remove(action)

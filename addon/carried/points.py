@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Objects that are carried point by point and are no meshes: by the field's modifier, or by a shape key."""
 
-import bpy
 import numpy as np
 
 from ..blender import modifier_stack
+from ..blender.removal import remove_node_modifier
 from ..core.errors import UserError
 from ..field_modifier import motion, node_group
 from ..names import FIELD_MODIFIER, OFFSETS, WARP_KEY
@@ -69,10 +69,7 @@ class AttributeCarrier(Carrier):
         played_points.remove(item)
         modifier = modifier_stack.find(item)
         if modifier is not None:
-            group = modifier.node_group
-            item.modifiers.remove(modifier)
-            if group.users == 0:
-                bpy.data.node_groups.remove(group)
+            remove_node_modifier(modifier)
         for layer in layers_of(item):
             if OFFSETS in layer:
                 layer.remove(layer[OFFSETS])

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..blender import modifier_stack
 from ..blender.object_references import settings_of
+from ..blender.removal import remove_mesh_object, remove_node_modifier
 from ..core.errors import UserError
 from ..names import FIELD_MODIFIER, HELPER_SUFFIX, OFFSETS, TURNS
 from . import armatures, cache_modifier, inputs, masks, node_group
@@ -127,10 +128,7 @@ def users_of(helper):
 
 def discard_helper(helper):
     if users_of(helper) == 0 and helper.library is None:
-        mesh = helper.data
-        bpy.data.objects.remove(helper)
-        if mesh.users == 0:
-            bpy.data.meshes.remove(mesh)
+        remove_mesh_object(helper)
 
 
 def carrier(source, modifier):
@@ -207,12 +205,10 @@ def discard(source):
     """Takes the object's modifier away where what it moved is part of the mesh now."""
     modifier = modifier_stack.find(source)
     if modifier is not None:
-        helper, group = inputs.get(modifier, "Offsets"), modifier.node_group
-        source.modifiers.remove(modifier)
+        helper = inputs.get(modifier, "Offsets")
+        remove_node_modifier(modifier)
         if helper is not None:
             discard_helper(helper)
-        if group.users == 0:
-            bpy.data.node_groups.remove(group)
     if settings_of(source).under_rig:  # a write counts as a change of the object
         settings_of(source).under_rig = False
     if source.data.library is None and source.data.users == 1:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack
 from ..blender.object_references import settings_of
+from ..blender.removal import remove_mesh_object
 from ..core.errors import UserError
 from ..field_modifier import motion
 from ..names import REPORT, RESULT_SUFFIX, RESULTS, WARP_KEY
@@ -25,14 +26,8 @@ def collection(context):
 
 def discard(item):
     """Takes a result away with all that was made for it: mesh, keys' animation, an empty collection."""
-    mesh, homes = item.data, list(item.users_collection)
-    keys = mesh.shape_keys
-    action = keys.animation_data.action if keys is not None and keys.animation_data else None
-    bpy.data.objects.remove(item)
-    if mesh.users == 0:
-        bpy.data.meshes.remove(mesh)
-        if action is not None and action.users == 0:
-            bpy.data.actions.remove(action)
+    homes = list(item.users_collection)
+    remove_mesh_object(item)
     for home in homes:
         if home.name.split(".")[0] == RESULTS and not home.all_objects and not home.children:
             bpy.data.collections.remove(home)

@@ -8,6 +8,7 @@
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "fields/radial_evaluator.h"
+#include "solve/live_setup.h"
 #include "solve/notes.h"
 #include "solve/setup.h"
 #include "solve/wrap_alignment.h"
@@ -37,13 +38,6 @@ WrapStage stage_at(double t, const WrapOptions& options) {
   return stage;
 }
 
-double quantile(Vector values, double share) {
-  const Index last = values.size() - 1;
-  const Index k = std::min(last, static_cast<Index>(share * static_cast<double>(values.size())));
-  std::nth_element(values.data(), values.data() + k, values.data() + values.size());
-  return values[k];
-}
-
 /// A field of the aligned cube as one of the samples' own, which takes them onto the target.
 std::shared_ptr<RadialField> placed(const RadialBasis& basis, const RowMatrix<double>& coefficients,
                                     const Similarity& placement, const SurfaceSamples& samples) {
@@ -57,17 +51,15 @@ std::shared_ptr<RadialField> placed(const RadialBasis& basis, const RowMatrix<do
 }
 
 void measure_distances(const WrapPlaces& end, const WrapTarget& target, WrapReport& report) {
-  const Vector to = surface_distances(target.tree, target.points, target.normals, target.spacing, end.places,
-                                      end.normals, target.whole) /
-                    target.diagonal;
+  const SurfaceDistances to = surface_distances(target.tree, target.points, target.normals, target.spacing,
+                                                end.places, end.normals, end.growth, target.whole);
   const OrientedPoints tree(end.places, end.normals);
-  const Vector from = surface_distances(tree, end.places, end.normals, mean_spacing(end.places),
-                                        target.points, target.normals, {}) /
-                      target.diagonal;
-  report.to_target_mean = to.size() > 0 ? to.mean() : 0.0;
-  report.to_target_95 = to.size() > 0 ? quantile(to, 0.95) : 0.0;
-  report.from_target_mean = from.mean();
-  report.from_target_95 = quantile(from, 0.95);
+  const SurfaceDistances from = surface_distances(tree, end.places, end.normals, mean_spacing(end.places),
+                                                  target.points, target.normals, {}, {});
+  report.to_target_mean = to.mean / target.diagonal;
+  report.to_target_95 = to.most_95 / target.diagonal;
+  report.from_target_mean = from.mean / target.diagonal;
+  report.from_target_95 = from.most_95 / target.diagonal;
 }
 
 /// Beside the scale of the alignment.
@@ -131,9 +123,13 @@ WrapSolution wrap(const SurfaceSamples& samples, const ImplicitFunction& functio
   }
   progress.report(0.95, "measuring the result");
   solution.field = placed(level.basis(), coefficients, placement, samples);
-  const WrapPlaces end(level.basis(), coefficients, samples.points, samples.normals);
+  // Neighbours beside each other: blocks of points then see few centers.
+  const std::vector<Index> order(shape.order.begin(), shape.order.end());
+  const Points points = rows_of(samples.points, order);
+  const RadialEvaluator<double> everywhere(level.basis(), points, JetOrder::first);
+  const WrapPlaces end(everywhere, coefficients, rows_of(samples.normals, order));
   report.distortion = end.distortion;
-  report.arap = measure_energy(level.basis(), coefficients, samples.points);
+  report.arap = measure_energy(level.basis(), coefficients, points);
   report.diagonal = there.diagonal;
   report.scale = placement.scale / samples.frame.scale;
   report.matched_share = level.matched_share();

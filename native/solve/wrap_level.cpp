@@ -25,8 +25,9 @@ constexpr Index pulled_samples = 2000;
 constexpr Index steps_at_once = 6;
 constexpr double tolerance = 1e-4, floor = 1e-12;
 
-Points deformed_normals(JetView<const double> jets, PointsIn normals) {
+Points deformed_normals(JetView<const double> jets, PointsIn normals, Vector& growth) {
   Points result(jets.count, 3);
+  growth.resize(jets.count);
   for (Index i = 0; i < jets.count; ++i) {
     Mat3 jacobian, cofactors;
     for (int k = 0; k < 3; ++k) jacobian.col(k) = Eigen::Map<const Vec3>(jets.at(first_column(k), i));
@@ -34,6 +35,7 @@ Points deformed_normals(JetView<const double> jets, PointsIn normals) {
     const Vec3 normal = cofactors * normals.row(i).transpose();
     const double length = normal.norm();
     result.row(i) = normals.row(i);
+    growth[i] = length;
     if (length > 0.0) result.row(i) = normal.transpose() / length;
   }
   return result;
@@ -41,12 +43,12 @@ Points deformed_normals(JetView<const double> jets, PointsIn normals) {
 
 }  // namespace
 
-WrapPlaces::WrapPlaces(const RadialBasis& basis, const RowMatrix<double>& coefficients, PointsIn points,
+WrapPlaces::WrapPlaces(const RadialEvaluator<double>& field, const RowMatrix<double>& coefficients,
                        PointsIn rest_normals) {
-  JetBlock<double> jets(points.rows(), JetOrder::first);
-  RadialEvaluator<double>(basis, points, JetOrder::first).evaluate(coefficients, jets.view());
-  places = Eigen::Map<const Points>(jets.view().data, points.rows(), 3);
-  normals = deformed_normals(jets.view(), rest_normals);
+  JetBlock<double> jets(field.size(), JetOrder::first);
+  field.evaluate(coefficients, jets.view());
+  places = Eigen::Map<const Points>(jets.view().data, field.size(), 3);
+  normals = deformed_normals(jets.view(), rest_normals, growth);
   distortion = arapfields::distortion<double>(jets.view());
 }
 
@@ -63,6 +65,7 @@ WrapLevel::WrapLevel(const SurfaceSamples& samples, const RestShape& shape, cons
       {{std::max<Index>(1, centers / fine_a_coarse), coarse_radius}, {centers, fine_radius, true}},
       shape.layout);
   basis_.set_embedding(shape.embedding);
+  field_ = std::make_unique<RadialEvaluator<double>>(basis_, points_, JetOrder::first);
   bending_ = SurfaceStiffness(shape.thickness, options.surface).bending(points_);
   weights_.resize(samples.weights.size() > 0 ? points_.rows() : 0);
   for (std::size_t i = 0; i < chosen.size(); ++i) {
@@ -88,10 +91,20 @@ Vector WrapLevel::bending(const WrapStage& stage) const {
   return bending_.array() * factor;
 }
 
+/// By samples' bending; on a closed target that is a factor times the same at every stage.
+RowMatrix<double> WrapLevel::stiffness(double factor, const Vector& bending, const Progress& progress) {
+  if (!target_.closed) return stiffness_matrix(basis_, points_, bending, weights_, progress);
+  if (stretching_.size() == 0) {
+    const Vector none = Vector::Zero(points_.rows());
+    stretching_ = stiffness_matrix(basis_, points_, none, weights_, progress.part(0.0, 0.5));
+    bent_ = stiffness_matrix(basis_, points_, bending_, weights_, progress.part(0.5, 1.0)) - stretching_;
+  }
+  return stretching_ + factor * bent_;
+}
+
 void WrapLevel::factorise(const WrapStage& stage, const Progress& progress) {
   const Index marks = landmarks_.rows(), places = place_values_.rows();
   const Vector lambda = bending(stage);
-  const RowMatrix<double> stiffness = stiffness_matrix(basis_, points_, lambda, weights_, progress);
   RowMatrix<double> values(marks + places, basis_.size());
   values << landmark_values_, place_values_;
   Vector shares(marks + places);
@@ -100,12 +113,12 @@ void WrapLevel::factorise(const WrapStage& stage, const Progress& progress) {
       Vector::Constant(places, pull / static_cast<double>(places));
   objective_->set_stiffness(lambda, weights_);
   objective_->set_handles({landmarks_, ends_, shares.head(marks)}, landmark_values_,
-                          inverse_factor(stiffness, values, shares));
+                          inverse_factor(stiffness(stage.bending, lambda, progress), values, shares));
 }
 
 Index WrapLevel::descend(const WrapStage& stage, RowMatrix<double>& coefficients, const Progress& progress) {
   const auto match = [&] {
-    const WrapPlaces now(basis_, coefficients, points_, normals_);
+    const WrapPlaces now(*field_, coefficients, normals_);
     terms_->match(now.places, now.normals, stage.pull);
   };
   match();

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "energies/distortion.h"
+#include "fields/radial_evaluator.h"
 #include "options/wrap.h"
 #include "solve/live_objective.h"
 #include "solve/rest_shape.h"
@@ -15,9 +16,11 @@ namespace arapfields {
 /// Where points and their unit normals come to by a field, and how far it is from a fold there.
 struct WrapPlaces {
   Points places, normals;
+  Vector growth;  ///< of areas there, against those at rest
   Distortion distortion;
-  WrapPlaces(const RadialBasis& basis, const RowMatrix<double>& coefficients, PointsIn points,
-             PointsIn normals);
+  /// `field` evaluates at points with these normals at rest, at first order or more.
+  WrapPlaces(const RadialEvaluator<double>& field, const RowMatrix<double>& coefficients,
+             PointsIn rest_normals);
 };
 
 /// One stage: what draws and what resists.
@@ -43,6 +46,7 @@ class WrapLevel {
 
  private:
   Vector bending(const WrapStage& stage) const;
+  RowMatrix<double> stiffness(double factor, const Vector& bending, const Progress& progress);
   void factorise(const WrapStage& stage, const Progress& progress);
 
   const WrapOptions& options_;
@@ -50,6 +54,8 @@ class WrapLevel {
   RadialBasis basis_;
   Points points_, normals_, landmarks_, ends_;
   Vector bending_, weights_;
+  std::unique_ptr<RadialEvaluator<double>> field_;  // at the samples
+  RowMatrix<double> stretching_, bent_;             // of a closed target: stiffness without and by bending
   std::unique_ptr<LiveObjective<float>> objective_;
   std::shared_ptr<WrapTerms> terms_;
   RowMatrix<double> landmark_values_, place_values_;

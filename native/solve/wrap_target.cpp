@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "core/errors.h"
 #include "core/parallel.h"
@@ -122,19 +123,32 @@ WrapTarget wrap_target(const ImplicitFunction& function, Index count, std::uint6
   return target;
 }
 
-Vector surface_distances(const OrientedPoints& tree, PointsIn points, PointsIn normals, double spacing,
-                         PointsIn others, PointsIn other_normals, const Vector& whole) {
+SurfaceDistances surface_distances(const OrientedPoints& tree, PointsIn points, PointsIn normals,
+                                   double spacing, PointsIn others, PointsIn other_normals,
+                                   const Vector& areas, const Vector& whole) {
   const std::vector<Index> nearest = tree.nearest(others, other_normals, 0.0);
-  std::vector<double> told;
+  std::vector<std::pair<double, double>> told;  // distances with areas
+  double area = 0.0, sum = 0.0;
   for (Index i = 0; i < others.rows(); ++i) {
     const Index k = nearest[static_cast<std::size_t>(i)];
     if (whole.size() > 0 && whole[k] == 0.0) continue;
     const Vec3 way = others.row(i) - points.row(k), normal = normals.row(k);
     const double across = way.dot(normal);
     const double along = std::max(0.0, (way - across * normal).norm() - spacing);
-    told.push_back(std::hypot(across, along));
+    told.emplace_back(std::hypot(across, along), areas.size() > 0 ? areas[i] : 1.0);
+    area += told.back().second;
+    sum += told.back().first * told.back().second;
   }
-  return Eigen::Map<const Vector>(told.data(), static_cast<Index>(told.size()));
+  SurfaceDistances result;
+  if (!(area > 0.0)) return result;
+  result.mean = sum / area;
+  std::sort(told.begin(), told.end());
+  double covered = 0.0;
+  for (const auto& [distance, share] : told) {
+    result.most_95 = distance;
+    if ((covered += share) >= 0.95 * area) break;
+  }
+  return result;
 }
 
 }  // namespace arapfields

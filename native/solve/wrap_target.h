@@ -41,10 +41,17 @@ WrapTarget wrap_target(const ImplicitFunction& function, Index count, std::uint6
 /// About the distance of neighbours among points that are spread evenly over a surface.
 double mean_spacing(PointsIn points);
 
+/// Distances between surfaces: the mean, and what 95 % of an area keep; 0 where none was told.
+struct SurfaceDistances {
+  double mean = 0.0, most_95 = 0.0;
+};
+
 /// How far others (n,3) are from a surface of which there are points and normals: the way across it, and the
-/// way along it beyond the spacing of its points. Where `whole` (a number a point, or empty) is 0 nothing is
-/// told: what would be compared with a border has no counterpart.
-Vector surface_distances(const OrientedPoints& tree, PointsIn points, PointsIn normals, double spacing,
-                         PointsIn others, PointsIn other_normals, const Vector& whole);
+/// way along it beyond the spacing of its points. Each other stands for its area (a number each, or empty:
+/// all for the same). Where `whole` (a number a point, or empty) is 0 nothing is told: what would be compared
+/// with a border has no counterpart.
+SurfaceDistances surface_distances(const OrientedPoints& tree, PointsIn points, PointsIn normals,
+                                   double spacing, PointsIn others, PointsIn other_normals,
+                                   const Vector& areas, const Vector& whole);
 
 }  // namespace arapfields

@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -115,6 +116,18 @@ def test_the_tables_of_the_peers_are_those_measured():
     text, kept = render.PEERS.read_text(), json.loads(render.PEERS.with_suffix(".json").read_text())
     assert text == render.peers_page(text, kept), "run python -m tests.benchmarks.render"
     assert {"implicit-arap", "gaussStylization"} == {row["code"] for row in kept["rows"] if "code" in row}
+
+
+def test_the_option_and_the_pages_agree_that_cuda_was_not_run():
+    """Who runs it changes all of these: the option's words, its default, README, and the pages' figures."""
+    options = tomllib.loads((pages.ROOT / "native/options/options.toml").read_text())
+    device = options["machine"]["options"]["device"]
+    assert "has not been run" in device["choices"]["cuda"][1] and device["default"] == "auto"
+    assert device["choices"]["auto"][1].startswith("The processor")
+    said = {"README.md": "never run on a device", "docs/install.md": "not run for want of a device"}
+    said["docs/performance.md"] = "No machine with a CUDA device was at hand, so there is no figure"
+    missing = [page for page, words in said.items() if words not in (pages.ROOT / page).read_text()]
+    assert not missing
 
 
 @pytest.mark.slow

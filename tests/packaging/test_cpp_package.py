@@ -90,6 +90,18 @@ def check_example(program, tmp_path):
     assert refused.returncode == 2 and "arguments" in refused.stderr  # what the library throws is caught
 
 
+def test_one_version_of_cmake_is_asked_for():
+    """By every file that asks for one: ours, the examples', pip's and the page.
+
+    The script that installs headers is run by itself, with the policies of CMake 2.4 unless it says so.
+    """
+    pattern = r'(?:cmake_minimum_required\(VERSION |\bcmake(?:\.version = ")?>=|CMake \()([\d.]+)'
+    places = ["CMakeLists.txt", "pyproject.toml", "requirements.txt", "cmake/wheel/requirements.txt"]
+    places += ["docs/cpp.md", "cmake/InstallHeaders.cmake", *EXAMPLE.parent.glob("cpp*/CMakeLists.txt")]
+    asked = {str(path): re.search(pattern, (ROOT / path).read_text())[1] for path in places}
+    assert len(asked) == 8 and len(set(asked.values())) == 1, asked
+
+
 @pytest.mark.parametrize("place", ["prefix", "wheel"])
 def test_the_example_gives_what_python_gives(place, prefix, tmp_path):
     if place == "prefix":
