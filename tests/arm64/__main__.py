@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Builds the library for 64-bit ARM with Debian's cross compiler and runs its tests there, under qemu.
 
-python -m tests.arm64 [--all] [--jobs N] [--only reference native python]
+python -m tests.arm64 [--all] [--jobs N] [--only reference native python] [--tests FILE ...]
 
 Everything lies in build/arm64: a Debian with Python (root), torch's wheel and others for that processor
 (site), and the build. Needs root, for debootstrap and chroot, and Debian packages, named where they lack.
@@ -23,6 +23,7 @@ WORK = ROOT / "build/arm64"
 SYSTEM, SITE, BUILD = WORK / "root", WORK / "site", WORK / "build"
 TORCH = SITE / "torch"
 HEADERS = SYSTEM / "usr/include/python3.11"
+SUZANNE = WORK / "suzanne.npz"  # Blender's monkey, made here: there is no bpy for that processor
 PROGRAMS = {
     "debootstrap": "debootstrap",
     "aarch64-linux-gnu-g++": "g++-aarch64-linux-gnu",
@@ -139,6 +140,7 @@ def inside(command, data):
         "PYTHONPATH": f"{BUILD / 'python'}:{SITE}",
         "PYTHONDONTWRITEBYTECODE": "1",
         "ARAPFIELDS_DATA": str(data or "/nowhere"),
+        "ARAPFIELDS_SUZANNE": str(SUZANNE),
     }
     settings = " ".join(f"{name}={q(value)}" for name, value in environment.items())
     run = f"cd {q(ROOT)} && {command}"
@@ -165,11 +167,19 @@ def reference(data):
     return all(difference <= allowed for _, difference, allowed in rows)
 
 
+def write_suzanne():
+    code = "import sys, numpy, meshes; v, f = meshes.suzanne(); numpy.savez(sys.argv[1], v=v, f=f)"
+    subprocess.run([sys.executable, "-c", code, str(SUZANNE)], cwd=ROOT / "tests", check=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--all", action="store_true", help="the whole of tests/python and tests/addon_core")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="compilers at a time")
     parser.add_argument("--only", nargs="+", choices=["reference", "native", "python"])
+    parser.add_argument(
+        "--tests", nargs="+", default=[], help="files of Python tests to run instead of those chosen"
+    )
     given = parser.parse_args()
     check_programs()
     WORK.mkdir(parents=True, exist_ok=True)
@@ -181,7 +191,8 @@ def main():
     data = data.resolve() if data.is_dir() else None
     if data is None:
         print("without the published networks: the bunny's figures and the tests that need them are left out")
-    files = ["tests/python", "tests/addon_core"] if given.all else []
+    write_suzanne()
+    files = given.tests or (["tests/python", "tests/addon_core"] if given.all else [])
     files = files or [f"tests/python/{name}.py" for name in PYTHON_TESTS]
     pytest = shlex.join(["python3", "-m", "pytest", "-q", "-p", "no:cacheprovider", "-m", "not slow", *files])
     steps = {
