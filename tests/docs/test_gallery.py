@@ -3,6 +3,8 @@
 
 import json
 import sys
+import threading
+from pathlib import Path
 
 import pages
 import pytest
@@ -77,3 +79,32 @@ def test_what_is_not_up_to_date_is_rendered(tmp_path, rendered, change):
     (tmp_path / "manifest.json").write_text(json.dumps(manifest))
     assert not gallery.bring_up_to_date(figure, tmp_path, force=False)  # what it tried was refused
     assert rendered == [figure.name]
+
+
+def test_figures_drawn_at_a_time_keep_their_own_pictures(tmp_path, monkeypatch, capsys):
+    """Two at a time, one of which fails after it has drawn: it keeps the picture that it had."""
+    good, bad = COMMITTED[:2]
+    both = threading.Barrier(2, timeout=30)
+
+    def drawn(command, **_):
+        name, folder = command[command.index("--draw") + 1], Path(command[command.index("--output") + 1])
+        (folder / f"{name}.png").write_bytes(b"new")
+        (folder / gallery.DRAWN).write_text(json.dumps({"files": [f"{name}.png"], "measured": {"a": 1}}))
+        both.wait()
+        return type("Result", (), {"returncode": int(name == bad.name), "stdout": "", "stderr": "why"})()
+
+    monkeypatch.setattr(gallery.subprocess, "run", drawn)
+    (tmp_path / f"{bad.name}.png").write_bytes(b"old")
+    arguments = ["--output", str(tmp_path), "--only", good.name, bad.name, "--jobs", "2"]
+    monkeypatch.setattr(sys, "argv", ["gallery", "--", *arguments])
+    assert gallery.main() == 1
+    assert (tmp_path / f"{good.name}.png").read_bytes() == b"new"
+    assert (tmp_path / f"{bad.name}.png").read_bytes() == b"old"
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    assert set(manifest) == {good.name} and manifest[good.name]["files"] == [f"{good.name}.png"]
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "manifest.json",
+        f"{good.name}.png",
+        f"{bad.name}.png",
+    }
+    assert "failed\nwhy" in capsys.readouterr().out
