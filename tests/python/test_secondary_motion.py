@@ -27,10 +27,10 @@ def samples():
     return bar_samples(3000)
 
 
-def released(samples, angle=35.0, further=(), **options):
+def released(surface, angle=35.0, further=(), **options):
     """A bar that was bent by so many degrees, and of which one end is let go."""
     live = af.LiveDeformer(
-        samples, [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)], af.LiveOptions(**(QUICK | options))
+        surface, [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)], af.LiveOptions(**(QUICK | options))
     )
     live.solve([LEFT, turned(angle) @ RIGHT], iterations=300, tolerance=1e-6)
     live.set_handles([af.Cuboid(LEFT, LEFT)])
@@ -106,7 +106,8 @@ def test_periods_hold_from_360_to_1500_centers_and_from_24_to_240_frames_a_secon
         found.append((period_of(times, heights), decay_of(times, energies)))
     for period, decay in found[1:]:
         assert period == pytest.approx(found[0][0], rel=ALIKE)
-        assert decay == pytest.approx(found[0][1], rel=ALIKE, abs=ALIKE)
+        # Without damping there is no decay to be changed by a share: what a period may lose, or seem to.
+        assert decay == pytest.approx(found[0][1], rel=ALIKE, abs=0.0 if damping else ALIKE / period)
 
 
 @pytest.mark.slow
