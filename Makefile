@@ -181,8 +181,7 @@ build/blenders/5.2/.ready:
 
 gallery: build $(VENV)/.tools  ## the documentation's pictures, rendered by the code
 	$(PIP) -q -r docs/requirements.txt
-	$(PY) blender_scripts/gallery.py --output docs/gallery
-	$(PY) docs/hooks/measured.py
+	$(PY) blender_scripts/gallery.py --output docs/gallery; status=$$?; $(PY) docs/hooks/measured.py && exit $$status
 
 docs: build  ## the documentation site in site/
 	$(PIP) -q -r docs/requirements.txt

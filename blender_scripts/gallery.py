@@ -28,6 +28,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 sys.path[:0] = [str(HERE)]
 
+import at_hand  # noqa: E402
 import windowed  # noqa: E402
 from figures import FIGURES  # noqa: E402
 
@@ -164,8 +165,8 @@ def main():
         if figure.published and not data_folder().is_dir():
             print(f"{figure.name:16} skipped: no published shapes at {data_folder()}", flush=True)
             continue
-        if figure.window and windowed.missing():
-            print(f"{figure.name:16} skipped: {windowed.missing()}", flush=True)
+        if figure.window and (lacking := at_hand.lacking()):
+            print(f"{figure.name:16} skipped: {lacking}", flush=True)
             continue
         folder = ROOT / "out" / "gallery" if figure.published else options.output
         folder.mkdir(parents=True, exist_ok=True)
