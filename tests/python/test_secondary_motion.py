@@ -20,6 +20,7 @@ TIP = np.array([[2.0, 0.0, 0.0]])
 ENERGY_RISE, ALIKE = 0.01, 0.05
 # Of a rate of decay against what was asked for: energy falls in turns, as it is kinetic or not.
 DECAY = 0.15
+OWN_DECAY = 0.06  # 1/s, what the scheme itself takes from undamped swings at 24 frames a second
 
 
 @pytest.fixture(scope="module")
@@ -106,8 +107,7 @@ def test_periods_hold_from_360_to_1500_centers_and_from_24_to_240_frames_a_secon
         found.append((period_of(times, heights), decay_of(times, energies)))
     for period, decay in found[1:]:
         assert period == pytest.approx(found[0][0], rel=ALIKE)
-        # Without damping there is no decay to be changed by a share: what a period may lose, or seem to.
-        assert decay == pytest.approx(found[0][1], rel=ALIKE, abs=0.0 if damping else ALIKE / period)
+        assert decay == pytest.approx(found[0][1], rel=ALIKE, abs=0.0 if damping else OWN_DECAY)
 
 
 @pytest.mark.slow
