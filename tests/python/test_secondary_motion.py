@@ -96,13 +96,8 @@ def test_frame_rates_change_neither_period_nor_decay(samples):
 def test_periods_hold_from_360_to_1500_centers_and_from_24_to_240_frames_a_second(damping):
     found = []
     for fine, coarse, rate in ((300, 60, 24), (300, 60, 240), (1250, 250, 60)):
-        live = released(
-            bar_samples(12000),
-            further={"damping": damping},
-            samples=6000,
-            fine_centers=fine,
-            coarse_centers=coarse,
-        )
+        size = {"samples": 6000, "fine_centers": fine, "coarse_centers": coarse}
+        live = released(bar_samples(12000), further={"damping": damping}, **size)
         times, heights, energies = swung(live, 3.0, rate)
         found.append((period_of(times, heights), decay_of(times, energies)))
     for period, decay in found[1:]:
