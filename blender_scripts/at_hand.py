@@ -1,15 +1,33 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a figure of Blender's window lacks here, before it is tried: windowed.py says what it is made with."""
+"""What a figure lacks here, before it is tried."""
 
 import io
+import os
 import re
 import zipfile
+from pathlib import Path
 
 import windowed
 
+ROOT = Path(__file__).resolve().parents[1]
+PEERS = ROOT / "build" / "bench" / "peers"  # what make bench PEERS=path keeps of its results
 
-def lacking():
-    """One line; None where the film can be made."""
+
+def data_folder():
+    return Path(os.environ.get("ARAPFIELDS_DATA", ROOT.parent / "shared" / "data"))
+
+
+def lacking(figure):
+    """One line; None where the figure can be made."""
+    if figure.published and not data_folder().is_dir():
+        return f"no published shapes at {data_folder()}"
+    if figure.peers and not any(PEERS.glob("moved-*.npz")):
+        return "no results of others' code (make bench PEERS=path)"
+    return lacking_of_window() if figure.window else None
+
+
+def lacking_of_window():
+    """windowed.py says what a film is made with."""
     missing, python = windowed.missing(), pythons_version()
     if missing or not python or has_native_module(windowed.extension(), python):
         return missing

@@ -74,10 +74,6 @@ def content_hash(figure):
     return digest.hexdigest()[:16]
 
 
-def data_folder():
-    return Path(os.environ.get("ARAPFIELDS_DATA", ROOT.parent / "shared" / "data"))
-
-
 def pictures(folder):
     """Those of a figure: sheets, and loops with the frame that stands for each."""
     return [path for path in folder.iterdir() if path.suffix in (".png", ".webp", ".jpg")]
@@ -162,10 +158,7 @@ def main():
     for figure in FIGURES:
         if options.only and figure.name not in options.only:
             continue
-        if figure.published and not data_folder().is_dir():
-            print(f"{figure.name:16} skipped: no published shapes at {data_folder()}", flush=True)
-            continue
-        if figure.window and (lacking := at_hand.lacking()):
+        if lacking := at_hand.lacking(figure):
             print(f"{figure.name:16} skipped: {lacking}", flush=True)
             continue
         folder = ROOT / "out" / "gallery" if figure.published else options.output

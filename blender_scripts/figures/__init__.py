@@ -8,6 +8,7 @@ class Figure(NamedTuple):
     name: str  # module of this package
     shows: str
     published: bool = False  # needs the published networks or meshes; written outside the repository
+    peers: bool = False  # shows results of others' code
     pages: tuple = ()  # of docs, whose scripts it runs
     window: bool = False  # needs a Blender with a window: see windowed.py
     timed: bool = False  # tells how long something took: nothing else is rendered meanwhile
@@ -46,6 +47,9 @@ FIGURES = [
     Figure("published", "the published bunny by three methods", published=True, timed=True),
     Figure("published_hand", "one finger of the published hand pulled", published=True),
     Figure(
-        "published_peers", "the paper's comparisons, figures 6 and 7, with its competitor", published=True
+        "published_peers",
+        "the paper's comparisons, figures 6 and 7, with its competitor",
+        published=True,
+        peers=True,
     ),
 ]

@@ -58,8 +58,20 @@ def test_an_extension_for_another_python_than_that_blenders_is_named(built, tmp_
     monkeypatch.setattr(windowed, "CHROOT", tmp_path)
     monkeypatch.setattr(windowed, "missing", lambda: None)
     monkeypatch.setattr(windowed, "extension", lambda: outer)
-    lacking = at_hand.lacking()
+    lacking = at_hand.lacking_of_window()
     assert lacking is None if built == "cpython-314" else "make extension PYTHONS=3.14" in lacking
+
+
+def test_what_is_not_at_hand_is_named(tmp_path, monkeypatch):
+    (peers,) = [figure for figure in FIGURES if figure.peers]
+    monkeypatch.setattr(at_hand, "PEERS", tmp_path)
+    monkeypatch.setenv("ARAPFIELDS_DATA", str(tmp_path / "nowhere"))
+    assert "nowhere" in at_hand.lacking(peers)
+    monkeypatch.setenv("ARAPFIELDS_DATA", str(tmp_path))
+    assert "make bench PEERS=path" in at_hand.lacking(peers)
+    (tmp_path / "moved-hand-ours.npz").touch()
+    assert at_hand.lacking(peers) is None
+    assert at_hand.lacking(COMMITTED[0]) is None
 
 
 @pytest.fixture
