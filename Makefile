@@ -15,7 +15,7 @@ PYTEST := $(PY) -m pytest
 ALL_TESTS := $(PYTEST) -n logical --maxprocesses 4 --dist loadfile
 NATIVE_TESTS := build/wheel/tests/native_tests
 
-.PHONY: help setup build examples demo test test-slow test-windows fuzz bench sanitize format lint wheel workflows extension repository blenders gallery docs clean
+.PHONY: help setup build examples demo test test-slow test-windows test-arm64 fuzz bench sanitize format lint wheel workflows extension repository blenders gallery docs clean
 
 help:  ## this list
 	@grep -E '^[a-z0-9-]+:.*##' Makefile | sed -E 's/:.*##/ -/'
@@ -100,6 +100,11 @@ test-windows: windows-tools setup  ## all but the torch sources, compiled for Wi
 	$(VENV)/bin/cmake --build build/windows
 	WINEPREFIX=$(abspath build/wine) WINEDEBUG=-all timeout 900 $(WINE) $(WINDOWS_TESTS) --color_output=no --report_level=short
 
+# Debian: debootstrap, g++-aarch64-linux-gnu and qemu-user-static; and root, for debootstrap and chroot. ARM64 takes
+# arguments: ARM64="--only reference", "--all", "--jobs 1".
+test-arm64: build $(VENV)/.tools  ## slow: the library and its tests on 64-bit ARM, compiled here and run under qemu
+	$(PY) -m tests.arm64 $(ARM64)
+
 fuzz: build $(VENV)/.tools  ## the nets, long: 20,000 odd calls and 20,000 damaged files of every kind
 	$(PY) -m tests.fuzz
 
@@ -176,8 +181,7 @@ build/blenders/5.2/.ready:
 
 gallery: build $(VENV)/.tools  ## the documentation's pictures, rendered by the code
 	$(PIP) -q -r docs/requirements.txt
-	$(PY) blender_scripts/gallery.py --output docs/gallery
-	$(PY) docs/hooks/measured.py
+	$(PY) blender_scripts/gallery.py --output docs/gallery; status=$$?; $(PY) docs/hooks/measured.py && exit $$status
 
 docs: build  ## the documentation site in site/
 	$(PIP) -q -r docs/requirements.txt

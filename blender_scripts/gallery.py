@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Renders the documentation's pictures that are out of date, headless, each in a process of its own.
 
-    python blender_scripts/gallery.py [--output docs/gallery] [--only NAME ...] [--all] [--list]
+    python blender_scripts/gallery.py [--output docs/gallery] [--only NAME ...] [--all] [--jobs N] [--list]
 
 A picture is up to date when its modules, those that all share and the library's sources are what it was made
 with (manifest.json in the output folder, which also holds the figures measured on the way). Figures of
@@ -18,13 +18,17 @@ import re
 import resource
 import subprocess
 import sys
+import tempfile
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 sys.path[:0] = [str(HERE)]
 
+import at_hand  # noqa: E402
 import windowed  # noqa: E402
 from figures import FIGURES  # noqa: E402
 
@@ -41,6 +45,10 @@ LIBRARY = [
     for path in sorted((ROOT / "native").rglob("*"))
     if path.suffix in (".cpp", ".h") and path.parent.name != "bindings"
 ]
+
+
+DRAWN = "drawn.json"  # which pictures a figure's process has made, and what it measured
+ONE_AT_A_TIME = threading.Lock()
 
 
 def with_imports(name, found=()):
@@ -66,46 +74,55 @@ def content_hash(figure):
     return digest.hexdigest()[:16]
 
 
-def data_folder():
-    return Path(os.environ.get("ARAPFIELDS_DATA", ROOT.parent / "shared" / "data"))
-
-
 def pictures(folder):
     """Those of a figure: sheets, and loops with the frame that stands for each."""
     return [path for path in folder.iterdir() if path.suffix in (".png", ".webp", ".jpg")]
 
 
 def draw(name, folder):
-    """In the figure's own process: renders, and leaves the measured figures beside the pictures."""
-    folder.mkdir(parents=True, exist_ok=True)
-    before = {path: path.stat().st_mtime_ns for path in pictures(folder)}
-    figures = importlib.import_module(f"figures.{name}").render(folder)
-    files = sorted(p.name for p in pictures(folder) if before.get(p) != p.stat().st_mtime_ns)
-    (folder / f".{name}.json").write_text(json.dumps({"files": files, "measured": figures}))
+    """In the figure's own process: renders into an empty folder, and leaves what was measured there."""
+    measured = importlib.import_module(f"figures.{name}").render(folder)
+    files = sorted(path.name for path in pictures(folder))
+    (folder / DRAWN).write_text(json.dumps({"files": files, "measured": measured}))
+
+
+def is_up_to_date(figure, folder):
+    known = read_manifest(folder).get(figure.name, {})
+    there = known.get("files") and all((folder / file).exists() for file in known["files"])
+    return bool(there) and known.get("hash") == content_hash(figure)
+
+
+def read_manifest(folder):
+    path = folder / "manifest.json"
+    return json.loads(path.read_text()) if path.exists() else {}
+
+
+def take(figure, drawn, folder):
+    """Puts what was drawn in its place, and into the manifest."""
+    entry = json.loads((drawn / DRAWN).read_text())
+    for file in entry["files"]:
+        os.replace(drawn / file, folder / file)
+    manifest = read_manifest(folder)
+    manifest[figure.name] = {"shows": figure.shows, "hash": content_hash(figure), **entry}
+    (folder / "manifest.json").write_text(json.dumps(dict(sorted(manifest.items())), indent=1) + "\n")
 
 
 def bring_up_to_date(figure, folder, force):
-    """One line on the screen; False where rendering failed."""
-    manifest_path = folder / "manifest.json"
-    manifest = json.loads(manifest_path.read_text()) if manifest_path.exists() else {}
-    known, wanted = manifest.get(figure.name, {}), content_hash(figure)
-    there = known.get("files") and all((folder / file).exists() for file in known["files"])
-    if there and known.get("hash") == wanted and not force:
+    """One line on the screen; False where rendering failed, which leaves the pictures as they were."""
+    title = f"{figure.name:16} {figure.shows} ..."
+    if is_up_to_date(figure, folder) and not force:
         print(f"{figure.name:16} up to date", flush=True)
         return True
-    print(f"{figure.name:16} {figure.shows} ...", end=" ", flush=True)
-    begin, begin_work = time.perf_counter(), work_of_children()
-    command = [sys.executable, str(HERE / "gallery.py"), "--draw", figure.name, "--output", str(folder)]
-    made = subprocess.run(command, capture_output=True, text=True)
-    if made.returncode:
-        print(f"failed\n{made.stdout[-2000:]}{made.stderr[-2000:]}", flush=True)
-        return False
-    result = folder / f".{figure.name}.json"
-    manifest[figure.name] = {"shows": figure.shows, "hash": wanted, **json.loads(result.read_text())}
-    result.unlink()
-    manifest_path.write_text(json.dumps(dict(sorted(manifest.items())), indent=1) + "\n")
-    seconds, work = time.perf_counter() - begin, work_of_children() - begin_work
-    print(f"{seconds:.0f} s, {work:.0f} s of processor time", flush=True)
+    begin = time.perf_counter()
+    with tempfile.TemporaryDirectory(dir=folder, prefix=".") as drawn:
+        command = [sys.executable, str(HERE / "gallery.py"), "--draw", figure.name, "--output", drawn]
+        made = subprocess.run(command, capture_output=True, text=True)
+        if made.returncode:
+            print(f"{title} failed\n{made.stdout[-2000:]}{made.stderr[-2000:]}", flush=True)
+            return False
+        with ONE_AT_A_TIME:
+            take(figure, Path(drawn), folder)
+    print(f"{title} {time.perf_counter() - begin:.0f} s", flush=True)
     return True
 
 
@@ -120,11 +137,15 @@ def main():
     parser.add_argument("--output", type=Path, default=ROOT / "docs" / "gallery")
     parser.add_argument("--only", nargs="+", default=[], metavar="NAME")
     parser.add_argument("--all", action="store_true", help="render what is up to date as well")
+    jobs = min(4, os.cpu_count() or 1)
+    parser.add_argument(
+        "--jobs", type=int, default=jobs, help="figures at a time, but for those that are timed"
+    )
     parser.add_argument("--list", action="store_true", help="name the figures and stop")
     parser.add_argument("--draw", help=argparse.SUPPRESS)
     options = parser.parse_args(sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else None)
     if options.draw:
-        draw(options.draw, options.output)
+        draw(options.draw, options.output.resolve())
         sys.stdout.flush()
         os._exit(0)  # bpy 4.5 may wait forever for a thread of its own while the process ends
     if options.list:
@@ -133,21 +154,26 @@ def main():
     unknown = set(options.only) - {figure.name for figure in FIGURES}
     if unknown:
         parser.error(f"no figure {', '.join(sorted(unknown))}; --list names them")
-    done = []
+    begin, wanted = time.perf_counter(), []
     for figure in FIGURES:
         if options.only and figure.name not in options.only:
             continue
-        if figure.published and not data_folder().is_dir():
-            print(f"{figure.name:16} skipped: no published shapes at {data_folder()}", flush=True)
-            continue
-        if figure.window and windowed.missing():
-            print(f"{figure.name:16} skipped: {windowed.missing()}", flush=True)
+        if lacking := at_hand.lacking(figure):
+            print(f"{figure.name:16} skipped: {lacking}", flush=True)
             continue
         folder = ROOT / "out" / "gallery" if figure.published else options.output
         folder.mkdir(parents=True, exist_ok=True)
-        done.append(bring_up_to_date(figure, folder.resolve(), options.all))
+        wanted.append((figure, folder.resolve()))
+    done = []
+    for timed, jobs in ((True, 1), (False, max(1, options.jobs))):
+        with ThreadPoolExecutor(jobs) as pool:
+            asked = [
+                pool.submit(bring_up_to_date, *one, options.all) for one in wanted if one[0].timed == timed
+            ]
+            done += [one.result() for one in asked]
     if work_of_children() > 1:
-        print(f"{'all':16} {work_of_children():.0f} s of processor time")
+        seconds = time.perf_counter() - begin
+        print(f"{'all':16} {seconds:.0f} s, {work_of_children():.0f} s of processor time")
     return 0 if all(done) else 1
 
 

@@ -1,15 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The paper's figures 6 and 7 with its competitor, from what make bench PEERS=path left in build/bench."""
 
-from pathlib import Path
-
 import numpy as np
 import stage
+from at_hand import PEERS
 from shapes import Shape
 
 from .common import add, stack, turned
 
-KEPT = Path(__file__).resolve().parents[2] / "build" / "bench" / "peers"
 METHODS = {
     "ours,-default": "ours",
     "implicit-arap": "implicit-arap",
@@ -27,7 +25,7 @@ def row(shape):
     """(caption, vertices, triangles) at rest and by each method that has a result."""
     found = []
     for name, caption in METHODS.items():
-        path = KEPT / f"moved-{shape}-{name}.npz"
+        path = PEERS / f"moved-{shape}-{name}.npz"
         if path.exists():
             kept = np.load(path)
             found = found or [("at rest", kept["vertices"], kept["triangles"])]
@@ -40,7 +38,7 @@ def render(output):
     for shape, (degrees, spacing, size) in ROWS.items():
         columns = row(shape)
         if not columns:
-            raise FileNotFoundError(f"no results of the {shape} in {KEPT}: make bench PEERS=path")
+            raise FileNotFoundError(f"no results of the {shape} in {PEERS}: make bench PEERS=path")
         stage.clear()
         shown, rest = [], columns[0][1]
         for column, (text, moved, triangles) in enumerate(columns):

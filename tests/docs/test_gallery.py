@@ -3,13 +3,18 @@
 
 import json
 import sys
+import threading
+import zipfile
+from pathlib import Path
 
 import pages
 import pytest
 
 sys.path.insert(0, str(pages.ROOT / "blender_scripts"))
 
+import at_hand
 import gallery
+import windowed
 from figures import FIGURES
 
 COMMITTED = [figure for figure in FIGURES if not figure.published]
@@ -39,6 +44,34 @@ def test_what_a_solve_did_not_measure_is_left_out():
     report = {"energy": 0.1234567, "handle_error_mean": 0.0, "preference": None}
     field = type("Field", (), {"report": report})()
     assert measured(field) == {"energy": 0.12346, "handle_error_mean": 0.0}
+
+
+@pytest.mark.parametrize("built", ["cpython-314", "cpython-311"])
+def test_an_extension_for_another_python_than_that_blenders_is_named(built, tmp_path, monkeypatch):
+    inner, outer = tmp_path / "a.whl", tmp_path / "arapfields-1-linux-x64.zip"
+    with zipfile.ZipFile(inner, "w") as wheel:
+        wheel.writestr(f"arapfields/_native.{built}-x86_64-linux-gnu.so", "")
+    with zipfile.ZipFile(outer, "w") as extension:
+        extension.write(inner, "wheels/a.whl")
+    for name in ("python3", "python3.9", "python3.14"):
+        (tmp_path / "usr/lib" / name).mkdir(parents=True)
+    monkeypatch.setattr(windowed, "CHROOT", tmp_path)
+    monkeypatch.setattr(windowed, "missing", lambda: None)
+    monkeypatch.setattr(windowed, "extension", lambda: outer)
+    lacking = at_hand.lacking_of_window()
+    assert lacking is None if built == "cpython-314" else "make extension PYTHONS=3.14" in lacking
+
+
+def test_what_is_not_at_hand_is_named(tmp_path, monkeypatch):
+    (peers,) = [figure for figure in FIGURES if figure.peers]
+    monkeypatch.setattr(at_hand, "PEERS", tmp_path)
+    monkeypatch.setenv("ARAPFIELDS_DATA", str(tmp_path / "nowhere"))
+    assert "nowhere" in at_hand.lacking(peers)
+    monkeypatch.setenv("ARAPFIELDS_DATA", str(tmp_path))
+    assert "make bench PEERS=path" in at_hand.lacking(peers)
+    (tmp_path / "moved-hand-ours.npz").touch()
+    assert at_hand.lacking(peers) is None
+    assert at_hand.lacking(COMMITTED[0]) is None
 
 
 @pytest.fixture
@@ -77,3 +110,32 @@ def test_what_is_not_up_to_date_is_rendered(tmp_path, rendered, change):
     (tmp_path / "manifest.json").write_text(json.dumps(manifest))
     assert not gallery.bring_up_to_date(figure, tmp_path, force=False)  # what it tried was refused
     assert rendered == [figure.name]
+
+
+def test_figures_drawn_at_a_time_keep_their_own_pictures(tmp_path, monkeypatch, capsys):
+    """Two at a time, one of which fails after it has drawn: it keeps the picture that it had."""
+    good, bad = COMMITTED[:2]
+    both = threading.Barrier(2, timeout=30)
+
+    def drawn(command, **_):
+        name, folder = command[command.index("--draw") + 1], Path(command[command.index("--output") + 1])
+        (folder / f"{name}.png").write_bytes(b"new")
+        (folder / gallery.DRAWN).write_text(json.dumps({"files": [f"{name}.png"], "measured": {"a": 1}}))
+        both.wait()
+        return type("Result", (), {"returncode": int(name == bad.name), "stdout": "", "stderr": "why"})()
+
+    monkeypatch.setattr(gallery.subprocess, "run", drawn)
+    (tmp_path / f"{bad.name}.png").write_bytes(b"old")
+    arguments = ["--output", str(tmp_path), "--only", good.name, bad.name, "--jobs", "2"]
+    monkeypatch.setattr(sys, "argv", ["gallery", "--", *arguments])
+    assert gallery.main() == 1
+    assert (tmp_path / f"{good.name}.png").read_bytes() == b"new"
+    assert (tmp_path / f"{bad.name}.png").read_bytes() == b"old"
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    assert set(manifest) == {good.name} and manifest[good.name]["files"] == [f"{good.name}.png"]
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "manifest.json",
+        f"{good.name}.png",
+        f"{bad.name}.png",
+    }
+    assert "failed\nwhy" in capsys.readouterr().out

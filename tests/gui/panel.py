@@ -16,7 +16,7 @@ def checks(found, folder):
     bar.modifiers.new("Subdivision", "SUBSURF")
     moving.location.z, moving.rotation_euler.y = 0.45, -0.5
     bar.arapfields.surface = "FIT"  # which has more to show
-    yield 1.0
+    yield 4.0  # sections slide to where they stay
     stage.picture(folder, "handles")
     yield from sections(folder, "panel")
     found["languages"] = len(bpy.app.translations.locales)

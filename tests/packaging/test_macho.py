@@ -144,7 +144,9 @@ def test_pyconfig_answers_what_the_headers_ask_and_nothing_else(tmp_path):
 def test_sizes_of_matrices_are_compared_as_one_type():
     """Eigen's sizes are long, ours int64_t: on a Mac two types, which std::min and std::max do not take."""
     compared = re.compile(r"std::(?:min|max)\((?=[^;]*?\.(?:rows|cols)\(\))([^;{]*)")
-    for path in sorted((ROOT / "native").rglob("*.[ch]*")):
+    sources = [path for path in (ROOT / "native").rglob("*.*") if path.suffix in (".cpp", ".h")]
+    assert sources
+    for path in sorted(sources):
         for match in compared.finditer(path.read_text(encoding="utf-8")):
             depths = list(accumulate((c == "(") - (c == ")") for c in match[1]))
             given = match[1][: depths.index(-1)] if -1 in depths else match[1]

@@ -20,6 +20,7 @@ TIP = np.array([[2.0, 0.0, 0.0]])
 ENERGY_RISE, ALIKE = 0.01, 0.05
 # Of a rate of decay against what was asked for: energy falls in turns, as it is kinetic or not.
 DECAY = 0.15
+OWN_DECAY = 0.06  # 1/s, what the scheme itself takes from undamped swings at 24 frames a second
 
 
 @pytest.fixture(scope="module")
@@ -27,10 +28,10 @@ def samples():
     return bar_samples(3000)
 
 
-def released(samples, angle=35.0, further=(), **options):
+def released(surface, angle=35.0, further=(), **options):
     """A bar that was bent by so many degrees, and of which one end is let go."""
     live = af.LiveDeformer(
-        samples, [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)], af.LiveOptions(**(QUICK | options))
+        surface, [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)], af.LiveOptions(**(QUICK | options))
     )
     live.solve([LEFT, turned(angle) @ RIGHT], iterations=300, tolerance=1e-6)
     live.set_handles([af.Cuboid(LEFT, LEFT)])
@@ -95,18 +96,13 @@ def test_frame_rates_change_neither_period_nor_decay(samples):
 def test_periods_hold_from_360_to_1500_centers_and_from_24_to_240_frames_a_second(damping):
     found = []
     for fine, coarse, rate in ((300, 60, 24), (300, 60, 240), (1250, 250, 60)):
-        live = released(
-            bar_samples(12000),
-            further={"damping": damping},
-            samples=6000,
-            fine_centers=fine,
-            coarse_centers=coarse,
-        )
+        size = {"samples": 6000, "fine_centers": fine, "coarse_centers": coarse}
+        live = released(bar_samples(12000), further={"damping": damping}, **size)
         times, heights, energies = swung(live, 3.0, rate)
         found.append((period_of(times, heights), decay_of(times, energies)))
     for period, decay in found[1:]:
         assert period == pytest.approx(found[0][0], rel=ALIKE)
-        assert decay == pytest.approx(found[0][1], rel=ALIKE, abs=ALIKE)
+        assert decay == pytest.approx(found[0][1], rel=ALIKE, abs=0.0 if damping else OWN_DECAY)
 
 
 @pytest.mark.slow

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The guide's pictures of Blender's window, cut from what tests/gui/window.py saw.
+
+    python blender_scripts/window_pictures.py OUTPUT_OF_PANEL [OUTPUT_OF_JOBS_AND_LIVE] [--to docs/images]
+
+The folders are those of `window.py -- FOLDER panel` and `window.py -- FOLDER jobs live`, in a window of
+1600 × 1000. A section's picture ends where, compared with the closed panel, the next section's header lies.
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+ROOT = Path(__file__).resolve().parents[1]
+# Of the sidebar's pictures, in pixels: tests/gui/panel.py presses the same rows.
+STEP, INNER = 28.4, 26.0  # from one closed section to the next, and within Advanced
+LEFT, WORDS = slice(0, 258), slice(8, 120)  # a section, and where its header has words
+HEADER = 22  # height of what is compared
+STATUS = 72  # height of the section of one line above Advanced
+SIDEBAR = (1028, 84, 1286, 904)
+SHOWN = (1280, 800)
+TOP = ("source", "handles", "deform", "stylize")
+WITHIN = ("surface", "result")
+WINDOW = ("handles", "running", "cancelled", "live")  # blender-NAME.png
+MENU = (940, 167, 1284, 411)  # the menu of styles and the header of its section
+
+
+def pixels(path):
+    return np.asarray(Image.open(path).convert("RGB"), dtype=np.int16)
+
+
+def found(strip, picture):
+    """The row of a picture where a strip lies, by its words."""
+    rows = range(picture.shape[0] - len(strip))
+    off = [np.abs(picture[row : row + len(strip), WORDS] - strip[:, WORDS]).mean() for row in rows]
+    row = int(np.argmin(off))
+    if off[row] > 6:
+        raise ValueError(f"no such header: the nearest is off by {off[row]:.1f} of 255")
+    return row
+
+
+def next_header(closed, row, step, beginning):
+    """The strip of the header below a row of the closed panel."""
+    top = round(beginning + step * (row + 1)) + 2
+    return closed[top : top + HEADER]
+
+
+def section(folder, name, row, closed, step, beginning):
+    """The picture of one section, from its header to the next one's."""
+    whole = pixels(folder / f"panel-{name}.png")
+    end = found(next_header(closed, row, step, beginning), whole) - 2
+    return whole[round(beginning + step * row) : end, LEFT]
+
+
+def save(array, path):
+    Image.fromarray(array.astype(np.uint8)).save(path, optimize=True)
+    print(path)
+
+
+def of_panel(folder, target):
+    closed, advanced = pixels(folder / "panel-closed.png"), pixels(folder / "panel-advanced.png")
+    for row, name in enumerate(TOP):
+        save(section(folder, name, row, closed, STEP, 0), target / f"panel-{name}.png")
+    first = found(next_header(closed, 5, STEP, 0), advanced) - 2 + STEP  # within Advanced
+    for name, row in zip(WITHIN, (0, 6), strict=True):
+        save(section(folder, name, row, advanced, INNER, first), target / f"panel-{name}.png")
+    Image.open(folder / "panel-styles.png").convert("RGB").crop(MENU).save(
+        target / "style-menu.png", optimize=True
+    )
+    return closed
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("panel", type=Path, help="the folder of window.py's part `panel`")
+    parser.add_argument("jobs", type=Path, nargs="?", help="that of its parts `jobs` and `live`")
+    parser.add_argument("--to", type=Path, default=ROOT / "docs/images")
+    options = parser.parse_args()
+    closed = of_panel(options.panel, options.to)
+    for name in WINDOW:
+        folder = options.panel if name == "handles" else options.jobs
+        if folder is None:
+            continue
+        shown = Image.open(folder / f"{name}.png").convert("RGB")
+        shown.resize(SHOWN, Image.Resampling.LANCZOS).save(options.to / f"blender-{name}.png", optimize=True)
+        if name == "cancelled":
+            sidebar = np.asarray(shown.crop(SIDEBAR), dtype=np.int16)
+            end = found(next_header(closed, 5, STEP, 0), sidebar) - 2
+            save(sidebar[end - STATUS : end, LEFT], options.to / "panel-status.png")
+
+
+if __name__ == "__main__":
+    main()
