@@ -127,12 +127,17 @@ sanitize: setup  ## the native tests under the address and undefined-behaviour s
 	$(VENV)/bin/cmake --build build/sanitize-thread --target native_tests
 	build/sanitize-thread/tests/native_tests --run_test=threads,live_threads --run_test='!@fork'
 
-format: setup  ## clang-format and ruff over our files
+# What these words read from git; an unpacked archive has none.
+.PHONY: git-clone
+git-clone:
+	@test . -ef "$$(git rev-parse --show-toplevel 2> /dev/null)" || { echo "A git clone is needed: this reads from git which files are ours"; exit 1; }
+
+format: git-clone setup  ## clang-format and ruff over our files
 	$(GIT)
 	git ls-files '*.h' '*.cpp' | xargs $(VENV)/bin/clang-format -i
 	$(VENV)/bin/ruff format -q . && $(VENV)/bin/ruff check -q --fix .
 
-lint: setup  ## the same, checking alone
+lint: git-clone setup  ## the same, checking alone
 	$(GIT)
 	git ls-files '*.h' '*.cpp' | xargs $(VENV)/bin/clang-format --dry-run --Werror
 	$(VENV)/bin/ruff format --check -q . && $(VENV)/bin/ruff check .
@@ -146,7 +151,7 @@ wheel: $(VENV)/.ready  ## for pip: a manylinux wheel for .venv's Python and the 
 	$(PY) cmake/wheel/build_wheel.py --output dist $(if $(GLIBC),--glibc $(GLIBC))
 
 # KEEP="NAME …" hands variables of this shell on to the steps, such as a compiler's cache.
-workflows: setup  ## the continuous integration's steps for Linux, run here one by one in fresh clones: build/workflows
+workflows: git-clone setup  ## the continuous integration's steps for Linux, run here one by one in fresh clones: build/workflows
 	$(GIT)
 	$(PY) tests/packaging/run_workflow.py .github/workflows/*.yml $(if $(KEEP),--keep $(KEEP))
 
