@@ -158,12 +158,13 @@ def main():
     for figure in FIGURES:
         if options.only and figure.name not in options.only:
             continue
-        if lacking := at_hand.lacking(figure):
+        folder = (ROOT / "out" / "gallery" if figure.published else options.output).resolve()
+        lacking = at_hand.lacking(figure)
+        if lacking and (options.all or not is_up_to_date(figure, folder)):
             print(f"{figure.name:16} skipped: {lacking}", flush=True)
             continue
-        folder = ROOT / "out" / "gallery" if figure.published else options.output
         folder.mkdir(parents=True, exist_ok=True)
-        wanted.append((figure, folder.resolve()))
+        wanted.append((figure, folder))
     done = []
     for timed, jobs in ((True, 1), (False, max(1, options.jobs))):
         with ThreadPoolExecutor(jobs) as pool:
