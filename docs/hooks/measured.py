@@ -145,7 +145,7 @@ def beside(start, further=""):
         told.append(
             f"{by}{spent}: energy of the mesh {row['mesh_energy']:.3f}, handles off by "
             f"{row['handle_error_percent']:.2g} % of the size{others}, volume {row['volume_ratio']:.2f}, "
-            f"{row['folded_percent']:.2g} % folded, {row['cpu_s']:.2g} processor seconds"
+            f"{row['folded_percent']:.2g} % folded, {row['cpu_s']:.3g} processor seconds"
         )
     return "; ".join(told)
 
