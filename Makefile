@@ -23,7 +23,6 @@ help:  ## this list
 # What is not at hand is said in one line, before anything is fetched.
 lacks = { echo "$(1)"; exit 1; }
 BASE = $(or $(wildcard $(PY)),$(PYTHON))
-GIT = @git rev-parse --git-dir > /dev/null 2>&1 || $(call lacks,A clone made by git is needed: this word asks git for its files)
 define COMPILER
 	@command -v c++ > /dev/null || $(call lacks,A C++20 compiler is needed (Debian: g++))
 	@test -e "$$($(BASE) -c 'import sysconfig; print(sysconfig.get_path("include"))')/Python.h" || \
@@ -130,29 +129,25 @@ sanitize: setup  ## the native tests under the address and undefined-behaviour s
 # What these words read from git; an unpacked archive has none.
 .PHONY: git-clone
 git-clone:
-	@test . -ef "$$(git rev-parse --show-toplevel 2> /dev/null)" || { echo "A git clone is needed: this reads from git which files are ours"; exit 1; }
+	@test . -ef "$$(git rev-parse --show-toplevel 2> /dev/null)" || $(call lacks,A clone made by git is needed: this word asks git for its files)
 
 format: git-clone setup  ## clang-format and ruff over our files
-	$(GIT)
 	git ls-files '*.h' '*.cpp' | xargs $(VENV)/bin/clang-format -i
 	$(VENV)/bin/ruff format -q . && $(VENV)/bin/ruff check -q --fix .
 
 lint: git-clone setup  ## the same, checking alone
-	$(GIT)
 	git ls-files '*.h' '*.cpp' | xargs $(VENV)/bin/clang-format --dry-run --Werror
 	$(VENV)/bin/ruff format --check -q . && $(VENV)/bin/ruff check .
 
 # GLIBC=2.28, as if nothing is said: the oldest C library to run with.
 GLIBC :=
-wheel: $(VENV)/.ready  ## for pip: a manylinux wheel for .venv's Python and the source distribution, in dist
+wheel: git-clone $(VENV)/.ready  ## for pip: a manylinux wheel for .venv's Python and the source distribution, in dist
 	$(COMPILER)
-	$(GIT)
 	$(PIP) -q -r cmake/wheel/requirements.txt
 	$(PY) cmake/wheel/build_wheel.py --output dist $(if $(GLIBC),--glibc $(GLIBC))
 
 # KEEP="NAME …" hands variables of this shell on to the steps, such as a compiler's cache.
 workflows: git-clone setup  ## the continuous integration's steps for Linux, run here one by one in fresh clones: build/workflows
-	$(GIT)
 	$(PY) tests/packaging/run_workflow.py .github/workflows/*.yml $(if $(KEEP),--keep $(KEEP))
 
 # PYTHONS="3.11 3.13" makes those a must; else 3.11 and whatever headers are at hand or to be had. GLIBC=2.28 takes

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The published bunny under the same boxes by three methods: neural, radial, and libigl's mesh ARAP."""
 
-import os
 import time
-from pathlib import Path
 
 import numpy as np
 import stage
+from at_hand import data_folder
 from shapes import Shape
 
 import arapfields as af
@@ -25,8 +24,7 @@ def published(name):
     """A network of the authors, from ../shared/data or ARAPFIELDS_DATA."""
     import torch
 
-    root = Path(os.environ.get("ARAPFIELDS_DATA", Path(__file__).resolve().parents[3] / "shared" / "data"))
-    state = torch.load(root / "neural_sdf" / f"{name}.pt", map_location="cpu", weights_only=True)
+    state = torch.load(data_folder() / "neural_sdf" / f"{name}.pt", map_location="cpu", weights_only=True)
     layers = sorted({int(key.split(".")[2]) for key in state})
     weights = [state[f"net.net.{i}.weight"].double().numpy() for i in layers]
     biases = [state[f"net.net.{i}.bias"].double().numpy() for i in layers]
