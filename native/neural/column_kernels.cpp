@@ -22,18 +22,14 @@ void forward(const ColumnBlock<Scalar>& b) {
       h[w] = value * scale;
       if constexpr (keep) slope[w] = s;
       if constexpr (columns > 1) {
-        const Scalar z1 = z[w + plane], z2 = z[w + 2 * plane], z3 = z[w + 3 * plane];
+        const Scalar z1 = z[w + plane], z2 = z[w + 2 * plane];
         h[w + plane] = s * z1;
         h[w + 2 * plane] = s * z2;
-        h[w + 3 * plane] = s * z3;
-        if constexpr (columns > 4) {
+        if constexpr (columns > 3) {
           const Scalar c = b.sharpness * s * (1 - s);
-          h[w + 4 * plane] = s * z[w + 4 * plane] + c * z1 * z1;
-          h[w + 5 * plane] = s * z[w + 5 * plane] + c * z2 * z2;
-          h[w + 6 * plane] = s * z[w + 6 * plane] + c * z3 * z3;
-          h[w + 7 * plane] = s * z[w + 7 * plane] + c * z1 * z2;
-          h[w + 8 * plane] = s * z[w + 8 * plane] + c * z1 * z3;
-          h[w + 9 * plane] = s * z[w + 9 * plane] + c * z2 * z3;
+          h[w + 3 * plane] = s * z[w + 3 * plane] + c * z1 * z1;
+          h[w + 4 * plane] = s * z[w + 4 * plane] + c * z2 * z2;
+          h[w + 5 * plane] = s * z[w + 5 * plane] + c * z1 * z2;
         }
       }
     }
@@ -53,33 +49,24 @@ void back(const ColumnBlock<Scalar>& b, Scalar* cotangents, Scalar* bias_gradien
       Scalar g0 = s * g[w];
       if constexpr (columns > 1) {
         const Scalar c = b.sharpness * s * (1 - s);
-        const Scalar z1 = z[w + plane], z2 = z[w + 2 * plane], z3 = z[w + 3 * plane];
-        const Scalar g1 = g[w + plane], g2 = g[w + 2 * plane], g3 = g[w + 3 * plane];
-        Scalar d1 = s * g1, d2 = s * g2, d3 = s * g3;
-        Scalar by_curve = z1 * g1 + z2 * g2 + z3 * g3;
-        if constexpr (columns > 4) {
-          const Scalar g11 = g[w + 4 * plane], g22 = g[w + 5 * plane], g33 = g[w + 6 * plane];
-          const Scalar g12 = g[w + 7 * plane], g13 = g[w + 8 * plane], g23 = g[w + 9 * plane];
-          const Scalar a1 = g11 * z1, a2 = g22 * z2, a3 = g33 * z3;
-          const Scalar m1 = g12 * z2 + g13 * z3, m2 = g12 * z1 + g23 * z3, m3 = g13 * z1 + g23 * z2;
-          d1 += c * (2 * a1 + m1);
-          d2 += c * (2 * a2 + m2);
-          d3 += c * (2 * a3 + m3);
-          by_curve += g11 * z[w + 4 * plane] + g22 * z[w + 5 * plane] + g33 * z[w + 6 * plane] +
-                      g12 * z[w + 7 * plane] + g13 * z[w + 8 * plane] + g23 * z[w + 9 * plane];
-          const Scalar squares = a1 * z1 + a2 * z2 + a3 * z3 + g12 * z1 * z2 + g13 * z1 * z3 + g23 * z2 * z3;
-          g0 += b.sharpness * c * (1 - 2 * s) * squares;
-          g[w + 4 * plane] = s * g11;
-          g[w + 5 * plane] = s * g22;
-          g[w + 6 * plane] = s * g33;
-          g[w + 7 * plane] = s * g12;
-          g[w + 8 * plane] = s * g13;
-          g[w + 9 * plane] = s * g23;
+        const Scalar z1 = z[w + plane], z2 = z[w + 2 * plane];
+        const Scalar g1 = g[w + plane], g2 = g[w + 2 * plane];
+        Scalar d1 = s * g1, d2 = s * g2;
+        Scalar by_curve = z1 * g1 + z2 * g2;
+        if constexpr (columns > 3) {
+          const Scalar g11 = g[w + 3 * plane], g22 = g[w + 4 * plane], g12 = g[w + 5 * plane];
+          const Scalar a1 = g11 * z1, a2 = g22 * z2;
+          d1 += c * (2 * a1 + g12 * z2);
+          d2 += c * (2 * a2 + g12 * z1);
+          by_curve += g11 * z[w + 3 * plane] + g22 * z[w + 4 * plane] + g12 * z[w + 5 * plane];
+          g0 += b.sharpness * c * (1 - 2 * s) * (a1 * z1 + a2 * z2 + g12 * z1 * z2);
+          g[w + 3 * plane] = s * g11;
+          g[w + 4 * plane] = s * g22;
+          g[w + 5 * plane] = s * g12;
         }
         g0 += c * by_curve;
         g[w + plane] = d1;
         g[w + 2 * plane] = d2;
-        g[w + 3 * plane] = d3;
       }
       g[w] = g0;
       bias_gradient[w] += g0;
@@ -90,15 +77,15 @@ void back(const ColumnBlock<Scalar>& b, Scalar* cotangents, Scalar* bias_gradien
 template <class Scalar, bool keep>
 void forward_any(const ColumnBlock<Scalar>& b) {
   if (b.columns == 1) return forward<Scalar, 1, keep>(b);
-  if (b.columns == 4) return forward<Scalar, 4, keep>(b);
-  forward<Scalar, 10, keep>(b);
+  if (b.columns == 3) return forward<Scalar, 3, keep>(b);
+  forward<Scalar, 6, keep>(b);
 }
 
 template <class Scalar>
 void back_any(const ColumnBlock<Scalar>& b, Scalar* cotangents, Scalar* bias_gradient) {
   if (b.columns == 1) return back<Scalar, 1>(b, cotangents, bias_gradient);
-  if (b.columns == 4) return back<Scalar, 4>(b, cotangents, bias_gradient);
-  back<Scalar, 10>(b, cotangents, bias_gradient);
+  if (b.columns == 3) return back<Scalar, 3>(b, cotangents, bias_gradient);
+  back<Scalar, 6>(b, cotangents, bias_gradient);
 }
 
 }  // namespace

@@ -7,9 +7,9 @@
 
 namespace arapfields {
 
-/// One layer's softplus on jets all of whose columns travel through the layers: planes (points, width), one a
-/// column (core/jets.h). `z` holds the pre-activations, its plane 0 without the bias; `h` receives the jets
-/// of φ, and `slope` (points, width; null: not kept) φ'.
+/// One layer's softplus on jets of the plane all of whose columns travel through the layers: planes
+/// (points, width), one a column (core/jets2d.h). `z` holds the pre-activations, its plane 0 without the
+/// bias; `h` receives the jets of φ, and `slope` (points, width; null: not kept) φ'.
 template <class Scalar>
 struct ColumnBlock {
   const Scalar* z = nullptr;
@@ -19,7 +19,7 @@ struct ColumnBlock {
   Scalar sharpness = 1;
   std::int64_t points = 0;
   std::int64_t width = 0;
-  int columns = 1;  ///< 1, 4 or 10
+  int columns = 1;  ///< 1, 3 or 6
 };
 
 #define ARAPFIELDS_COLUMN_KERNELS(Scalar)                                                             \

@@ -3,27 +3,32 @@
 
 #include <ATen/ATen.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "neural/column_kernels.h"
-#include "neural/jet_algebra.h"
+#include "neural/plane_algebra.h"
 
 namespace arapfields {
 namespace {
 
 std::size_t at_(int i) { return static_cast<std::size_t>(i); }
 
+/// Columns of a plane jet that carry a jet of `columns` columns.
+int plane_columns(int columns) { return columns == 10 ? columns2 : columns == 4 ? 3 : 1; }
+/// Rows of an encoding that are not zero: each entry knows one coordinate, so no mixed derivatives.
+Index encoded_rows(int plane, Index count) { return std::min(plane, columns2 - 1) * count; }
+
 /// Columns of a plane-by-plane block as jets of single numbers: entry i of row p, of `stride` entries a row.
-template <class Scalar>
-NumberJet<Scalar> gather(const Scalar* data, Index count, Index stride, Index p, Index i, int columns) {
-  NumberJet<Scalar> jet;
+template <class Jet, class Scalar>
+Jet gather(const Scalar* data, Index count, Index stride, Index p, Index i, int columns) {
+  Jet jet;
   for (int c = 0; c < columns; ++c) jet[c] = data[(c * count + p) * stride + i];
   return jet;
 }
 
-template <class Scalar>
-void scatter(const NumberJet<Scalar>& jet, Scalar* data, Index count, Index stride, Index p, Index i,
-             int columns) {
+template <class Jet, class Scalar>
+void scatter(const Jet& jet, Scalar* data, Index count, Index stride, Index p, Index i, int columns) {
   for (int c = 0; c < columns; ++c) data[(c * count + p) * stride + i] = jet[c];
 }
 
@@ -68,29 +73,49 @@ ColumnBlock<Scalar> block_of(const CouplingShape& shape, const CouplingMemory& m
   return block;
 }
 
-/// (s, t) of coupling layer i, from memory.jets.
+/// The plane jets of (s, t) of coupling layer i, by the two coordinates that memory.jets has for it.
 template <class Scalar>
 void condition(const CouplingShape& shape, const CouplingViews& views, int i, CouplingMemory& memory) {
   const CouplingViews::Network& network = views.networks[at_(i)];
   const Index count = memory.jets.size(1), entries = shape.fan_in(0);
-  const int columns = static_cast<int>(memory.jets.size(0));
-  const auto* jets = memory.jets.const_data_ptr<Scalar>();
+  const int plane = plane_columns(static_cast<int>(memory.jets.size(0)));
+  const auto* points = memory.jets.const_data_ptr<Scalar>();
   auto* encoding = memory.encoding.data_ptr<Scalar>();
   for (Index p = 0; p < count; ++p)
-    for (int which = 0; which < 2; ++which) {
-      const NumberJet<Scalar> u = gather(jets, count, 3, p, (i + 1 + which) % 3, columns);
-      each_entry(shape, u[0], which, [&](Index entry, const Derivatives<Scalar>& phi) {
-        scatter(chain(phi, u, columns), encoding, count, entries, p, entry, columns);
-      });
-    }
+    for (int which = 0; which < 2; ++which)
+      each_entry(shape, points[3 * p + (i + 1 + which) % 3], which,
+                 [&](Index entry, const Derivatives<Scalar>& phi) {
+                   const auto at = [&](int c) -> Scalar& {
+                     return encoding[(c * count + p) * entries + entry];
+                   };
+                   at(0) = phi.value;
+                   if (plane > 1) at(1 + which) = phi.first;
+                   if (plane > 3) at(3 + which) = phi.second;
+                 });
   for (int l = 0; l < shape.layers; ++l) {
-    at::mm_out(memory.pre[at_(l)], l == 0 ? memory.encoding : memory.activations[at_(l - 1)],
-               network.weights[at_(l)].t());
+    const at::Tensor& below = l == 0 ? memory.encoding : memory.activations[at_(l - 1)];
+    const Index rows = l == 0 ? encoded_rows(plane, count) : below.size(0);
+    at::Tensor pre = memory.pre[at_(l)].narrow(0, 0, rows);
+    at::mm_out(pre, below.narrow(0, 0, rows), network.weights[at_(l)].t());
     ARAPFIELDS_DISPATCH(activate_columns(block_of<Scalar>(shape, memory, l, network.biases[at_(l)])));
   }
   at::mm_out(memory.output, memory.activations.back(), network.weights.back().t());
   memory.output.narrow(0, 0, count).add_(network.biases.back());
 }
+
+/// What coupling layer i meets at point p: the coordinate x that it moves, the other two, and the plane jets
+/// of (s, t) by these.
+template <class Scalar>
+struct Place {
+  Place(const Scalar* jets, const Scalar* output, Index count, Index p, int i, int columns)
+      : x(gather<NumberJet<Scalar>>(jets, count, 3, p, i % 3, columns)),
+        u(gather<NumberJet<Scalar>>(jets, count, 3, p, (i + 1) % 3, columns)),
+        v(gather<NumberJet<Scalar>>(jets, count, 3, p, (i + 2) % 3, columns)),
+        s(gather<PlaneJet<Scalar>>(output, count, 2, p, 0, plane_columns(columns))),
+        t(gather<PlaneJet<Scalar>>(output, count, 2, p, 1, plane_columns(columns))) {}
+  NumberJet<Scalar> x, u, v;
+  PlaneJet<Scalar> s, t;
+};
 
 template <class Scalar>
 at::Tensor couple_as(const CouplingShape& shape, const CouplingViews& views, const at::Tensor& points,
@@ -109,13 +134,13 @@ at::Tensor couple_as(const CouplingShape& shape, const CouplingViews& views, con
     if (!next.is_same(here.jets)) next.copy_(here.jets);
     auto* moved = next.data_ptr<Scalar>();
     const auto* output = here.output.const_data_ptr<Scalar>();
-    const int axis = i % 3;
     for (Index p = 0; p < count; ++p) {
-      const NumberJet<Scalar> s = gather(output, count, 2, p, 0, columns_here);
-      NumberJet<Scalar> y = product(chain(bounded_exp(s[0]), s, columns_here),
-                                    gather(moved, count, 3, p, axis, columns_here), columns_here);
-      for (int c = 0; c < columns_here; ++c) y[c] += output[(c * count + p) * 2 + 1];
-      scatter(y, moved, count, 3, p, axis, columns_here);
+      const Place<Scalar> here_at(moved, output, count, p, i, columns_here);
+      const NumberJet<Scalar> s = chain(here_at.s, here_at.u, here_at.v, columns_here);
+      NumberJet<Scalar> y = product(chain(bounded_exp(s[0]), s, columns_here), here_at.x, columns_here);
+      const NumberJet<Scalar> t = chain(here_at.t, here_at.u, here_at.v, columns_here);
+      for (int c = 0; c < columns_here; ++c) y[c] += t[c];
+      scatter(y, moved, count, 3, p, i % 3, columns_here);
     }
     jets = next;
   }
@@ -132,10 +157,11 @@ void couple_back_as(const CouplingShape& shape, const CouplingViews& views, cons
   const int columns_here = static_cast<int>(given.size(0));
   gradient.offset.add_(given[0].sum(0));
   auto* pull = given.data_ptr<Scalar>();
-  const at::Tensor upper = at::empty({columns_here * count, 2}, given.options());
-  at::Tensor wide = at::empty({columns_here * count, shape.width}, given.options());
+  const int plane = plane_columns(columns_here);
+  const at::Tensor upper = at::empty({plane * count, 2}, given.options());
+  at::Tensor wide = at::empty({plane * count, shape.width}, given.options());
   at::Tensor spare = at::empty_like(wide);
-  const at::Tensor encoded = at::empty({columns_here * count, entries}, given.options());
+  at::Tensor encoded = at::empty({encoded_rows(plane, count), entries}, given.options());
   for (int i = shape.couplings - 1; i >= 0; --i) {
     CouplingMemory& here = memory[at_(i)];
     const CouplingViews::Network& network = views.networks[at_(i)];
@@ -143,18 +169,22 @@ void couple_back_as(const CouplingShape& shape, const CouplingViews& views, cons
     const auto* jets = here.jets.const_data_ptr<Scalar>();
     const auto* output = here.output.const_data_ptr<Scalar>();
     auto* of_output = upper.data_ptr<Scalar>();
-    const int axis = i % 3;
     for (Index p = 0; p < count; ++p) {
-      const NumberJet<Scalar> g = gather<Scalar>(pull, count, 3, p, axis, columns_here);
-      const NumberJet<Scalar> s = gather(output, count, 2, p, 0, columns_here);
+      const Place<Scalar> at(jets, output, count, p, i, columns_here);
+      const auto given_to = [&](int axis) {
+        return gather<NumberJet<Scalar>>(pull, count, 3, p, axis % 3, columns_here);
+      };
+      const NumberJet<Scalar> g = given_to(i), s = chain(at.s, at.u, at.v, columns_here);
       const Derivatives<Scalar> phi = bounded_exp(s[0]);
-      NumberJet<Scalar> of_x, of_e, of_s;
+      NumberJet<Scalar> of_x, of_e, of_s, of_u = given_to(i + 1), of_v = given_to(i + 2);
       product_back(chain(phi, s, columns_here), g, of_x, columns_here);
-      product_back(gather(jets, count, 3, p, axis, columns_here), g, of_e, columns_here);
+      product_back(at.x, g, of_e, columns_here);
       chain_back(phi, s, of_e, of_s, columns_here);
-      scatter(of_x, pull, count, 3, p, axis, columns_here);
-      scatter(of_s, of_output, count, 2, p, 0, columns_here);
-      scatter(g, of_output, count, 2, p, 1, columns_here);
+      scatter(chain_back(at.s, at.u, at.v, of_s, of_u, of_v, columns_here), of_output, count, 2, p, 0, plane);
+      scatter(chain_back(at.t, at.u, at.v, g, of_u, of_v, columns_here), of_output, count, 2, p, 1, plane);
+      scatter(of_x, pull, count, 3, p, i % 3, columns_here);
+      scatter(of_u, pull, count, 3, p, (i + 1) % 3, columns_here);
+      scatter(of_v, pull, count, 3, p, (i + 2) % 3, columns_here);
     }
     into.biases.back().add_(upper.narrow(0, 0, count).sum(0));
     into.weights.back().addmm_(upper.t(), here.activations.back());
@@ -163,21 +193,25 @@ void couple_back_as(const CouplingShape& shape, const CouplingViews& views, cons
       ARAPFIELDS_DISPATCH(activate_columns_back(block_of<Scalar>(shape, here, l, network.biases[at_(l)]),
                                                 wide.data_ptr<Scalar>(),
                                                 into.biases[at_(l)].data_ptr<Scalar>()));
-      into.weights[at_(l)].addmm_(wide.t(), l == 0 ? here.encoding : here.activations[at_(l - 1)]);
-      at::Tensor below = l == 0 ? encoded : spare;
-      at::mm_out(below, wide, network.weights[at_(l)]);
+      const at::Tensor& below = l == 0 ? here.encoding : here.activations[at_(l - 1)];
+      const Index rows = l == 0 ? encoded.size(0) : below.size(0);
+      const at::Tensor used = wide.narrow(0, 0, rows);
+      into.weights[at_(l)].addmm_(used.t(), below.narrow(0, 0, rows));
+      at::mm_out(l == 0 ? encoded : spare, used, network.weights[at_(l)]);
       if (l > 0) std::swap(wide, spare);
     }
     const auto* of_entries = encoded.const_data_ptr<Scalar>();
     for (Index p = 0; p < count; ++p)
       for (int which = 0; which < 2; ++which) {
-        const Index coordinate = (i + 1 + which) % 3;
-        const NumberJet<Scalar> u = gather(jets, count, 3, p, coordinate, columns_here);
-        NumberJet<Scalar> back = gather<Scalar>(pull, count, 3, p, coordinate, columns_here);
-        each_entry(shape, u[0], which, [&](Index entry, const Derivatives<Scalar>& phi) {
-          chain_back(phi, u, gather(of_entries, count, entries, p, entry, columns_here), back, columns_here);
+        const Index coordinate = 3 * p + (i + 1 + which) % 3;
+        Scalar back = 0;
+        each_entry(shape, jets[coordinate], which, [&](Index entry, const Derivatives<Scalar>& phi) {
+          const auto of = [&](int c) { return of_entries[(c * count + p) * entries + entry]; };
+          back += phi.first * of(0);
+          if (plane > 1) back += phi.second * of(1 + which);
+          if (plane > 3) back += phi.third * of(3 + which);
         });
-        scatter(back, pull, count, 3, p, coordinate, columns_here);
+        pull[coordinate] += back;
       }
   }
 }
@@ -223,14 +257,15 @@ CouplingViews::CouplingViews(const CouplingShape& shape, const at::Tensor& flat)
 std::vector<CouplingMemory> coupling_memory(const CouplingShape& shape, const at::Tensor& like, Index count,
                                             int columns, bool keep) {
   std::vector<CouplingMemory> memory(keep ? static_cast<std::size_t>(shape.couplings) : 1);
-  const auto make = [&](Index rows, Index width) { return at::empty({rows, width}, like.options()); };
+  const Index rows = plane_columns(columns) * count;
+  const auto make = [&](Index height, Index width) { return at::zeros({height, width}, like.options()); };
   for (CouplingMemory& layer : memory) {
     layer.jets = at::empty({columns, count, 3}, like.options());
-    layer.encoding = make(columns * count, shape.fan_in(0));
-    layer.output = make(columns * count, 2);
+    layer.encoding = make(rows, shape.fan_in(0));
+    layer.output = make(rows, 2);
     for (int l = 0; l < shape.layers; ++l) {
-      layer.pre.push_back(make(columns * count, shape.width));
-      layer.activations.push_back(make(columns * count, shape.width));
+      layer.pre.push_back(make(rows, shape.width));
+      layer.activations.push_back(make(rows, shape.width));
       layer.slope.push_back(make(count, shape.width));
     }
   }

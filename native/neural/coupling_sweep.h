@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The two sweeps through coupling layers, and the way back to where points came from, for one block of
-// points; for libtorch sources alone. All ten columns of second-order jets travel through the layers: each
-// layer bends what the one before it made, so that sums over the layers alone (mlp.h) would not do.
+// points; for libtorch sources alone. A layer's network is a function of the plane: its jets by the two
+// coordinates that it sees, six columns at most, travel through it, and the chain rule lifts what comes out,
+// two numbers a point, to all ten columns by the coordinates at rest.
 #pragma once
 
 #include <ATen/core/Tensor.h>
@@ -25,9 +26,10 @@ struct CouplingViews {
   at::Tensor offset;
 };
 
-/// What one coupling layer computes for a block: the jets (columns, count, 3) that come in, its encoding
-/// (columns·count, 4·octaves), the hidden layers' pre-activations and activations (columns·count, width),
-/// their slopes (count, width), and the output (columns·count, 2).
+/// What one coupling layer computes for a block: the jets (columns, count, 3) that come in, and as plane jets
+/// (core/jets2d.h) of 1, 3 or 6 columns its encoding (plane·count, 4·octaves), the hidden layers'
+/// pre-activations and activations (plane·count, width), their slopes (count, width), and the output
+/// (plane·count, 2). What no mixed derivative of the encoding reaches stays zero.
 struct CouplingMemory {
   at::Tensor jets, encoding, output;
   std::vector<at::Tensor> pre, activations, slope;
