@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <functional>
 #include <stdexcept>
 
 #include "core/errors.h"
+#include "core/jets2d.h"
 #include "core/memory.h"
 #include "core/parallel.h"
 #include "core/random.h"
@@ -20,7 +22,7 @@ namespace {
 
 /// Points a block holds, and groups of blocks at most, each with a gradient of its own: both fixed, so that
 /// results do not depend on the number of threads.
-constexpr Index block_points = 32, value_block_points = 256, most_groups = 8;
+constexpr Index block_points = 48, value_block_points = 256, most_groups = 8;
 
 struct Range {
   Index begin, count;
@@ -57,30 +59,37 @@ void for_each_range(const std::vector<Range>& ranges, const std::function<void(c
 }  // namespace
 
 struct InvertibleField::State {
+  /// What a forward call keeps for the pull-back.
+  struct Pass {
+    Index count;
+    JetOrder order;
+    std::vector<Range> ranges;
+    std::vector<std::vector<CouplingMemory>> kept;
+  };
   CouplingShape shape;
   at::Tensor parameters, gradient;
   CouplingViews views;
-  // Of the last forward call:
-  std::vector<Range> ranges;
-  std::vector<std::vector<CouplingMemory>> kept;
-  Index count = -1;
-  JetOrder order = JetOrder::value;
+  std::deque<Pass> passes;  // the last one first; a step of a solve has two kinds of them
   bool fresh = false;
   // Gradients of the groups but the first.
   std::vector<at::Tensor> parts;
   std::vector<CouplingViews> part_views;
 
-  void prepare(Index n, JetOrder wanted) {
-    if (n == count && wanted == order) return;
-    const double numbers = static_cast<double>(n) * columns(wanted) * shape.couplings *
+  Pass& prepare(Index count, JetOrder order) {
+    constexpr std::size_t most_passes = 2;
+    for (std::size_t i = 0; i < passes.size(); ++i)
+      if (passes[i].count == count && passes[i].order == order) {
+        std::swap(passes[i], passes.front());
+        return passes.front();
+      }
+    const double numbers = static_cast<double>(count) * std::min(columns(order), columns2) * shape.couplings *
                            (2.0 * shape.layers * shape.width + shape.fan_in(0));
-    kept.clear();
+    if (passes.size() == most_passes) passes.pop_back();
     require_memory("batch", numbers * static_cast<double>(parameters.element_size()));
-    ranges = ranges_of(n, wanted);
-    for (const Range& range : ranges)
-      kept.push_back(coupling_memory(shape, parameters, range.count, columns(wanted), true));
-    count = n;
-    order = wanted;
+    Pass& pass = passes.emplace_front(Pass{count, order, ranges_of(count, order), {}});
+    for (const Range& range : pass.ranges)
+      pass.kept.push_back(coupling_memory(shape, parameters, range.count, columns(order), true));
+    return pass;
   }
 };
 
@@ -162,13 +171,13 @@ at::Tensor InvertibleField::forward(const at::Tensor& points, JetOrder order) {
   require(points.dim() == 2 && points.size(1) == 3 && points.is_cpu() &&
               points.scalar_type() == s.parameters.scalar_type(),
           "points", "another shape, dtype or device", "expected an (n,3) tensor like the parameters");
-  s.prepare(points.size(0), order);
+  State::Pass& pass = s.prepare(points.size(0), order);
   at::Tensor result = at::empty({columns(order), points.size(0), 3}, s.parameters.options());
-  for_groups(static_cast<Index>(s.ranges.size()), [&](Index r, Index) {
-    const Range& range = s.ranges[static_cast<std::size_t>(r)];
+  for_groups(static_cast<Index>(pass.ranges.size()), [&](Index r, Index) {
+    const Range& range = pass.ranges[static_cast<std::size_t>(r)];
     result.narrow(1, range.begin, range.count)
         .copy_(couple(s.shape, s.views, points.narrow(0, range.begin, range.count), order,
-                      s.kept[static_cast<std::size_t>(r)]));
+                      pass.kept[static_cast<std::size_t>(r)]));
   });
   s.fresh = true;
   return result;
@@ -183,11 +192,12 @@ void InvertibleField::pull_back(const at::Tensor& cotangents) {
   const ThreadScope scope;
   State& s = *state_;
   if (!s.fresh) throw std::logic_error("InvertibleField::pull_back needs a forward call of its own");
-  require(cotangents.dim() == 3 && cotangents.size(0) == columns(s.order) && cotangents.size(1) == s.count &&
-              cotangents.scalar_type() == s.parameters.scalar_type(),
+  State::Pass& pass = s.passes.front();
+  require(cotangents.dim() == 3 && cotangents.size(0) == columns(pass.order) &&
+              cotangents.size(1) == pass.count && cotangents.scalar_type() == s.parameters.scalar_type(),
           "cotangents", "another shape or dtype than the jets", "they must match");
   s.fresh = false;
-  const auto ranges = static_cast<Index>(s.ranges.size());
+  const auto ranges = static_cast<Index>(pass.ranges.size());
   const Index groups = std::min(ranges, most_groups);
   while (static_cast<Index>(s.parts.size()) < groups) {
     s.parts.push_back(s.parts.empty() ? s.gradient : at::empty_like(s.gradient));
@@ -195,9 +205,9 @@ void InvertibleField::pull_back(const at::Tensor& cotangents) {
   }
   for (Index g = 1; g < groups; ++g) s.parts[static_cast<std::size_t>(g)].zero_();
   for_groups(ranges, [&](Index r, Index g) {
-    const Range& range = s.ranges[static_cast<std::size_t>(r)];
+    const Range& range = pass.ranges[static_cast<std::size_t>(r)];
     couple_back(s.shape, s.views, cotangents.narrow(1, range.begin, range.count),
-                s.kept[static_cast<std::size_t>(r)], s.part_views[static_cast<std::size_t>(g)]);
+                pass.kept[static_cast<std::size_t>(r)], s.part_views[static_cast<std::size_t>(g)]);
   });
   for (Index g = 1; g < groups; ++g) s.gradient.add_(s.parts[static_cast<std::size_t>(g)]);
 }

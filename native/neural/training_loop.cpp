@@ -59,13 +59,20 @@ class Run {
         result_.stopped_by = StopReason::time_budget;
         break;
       }
+      const double share = options_.schedule.share(iteration, done);
+      for (int step = 1; step < options_.steps; ++step) {
+        trained_.gradient.zero_();
+        body_.accumulate(iteration);
+        optimizer_.step(share);
+        progress_.check();
+      }
       trained_.gradient.zero_();
       losses_.keep(iteration, body_.accumulate(iteration));
       if (losses_.due(iteration) && look() && body_.is_good_enough()) {
         result_.stopped_by = StopReason::target;
         break;
       }
-      optimizer_.step(options_.schedule.share(iteration, done));
+      optimizer_.step(share);
       report(elapsed, done);
       body_.iterated(iteration + 1);
       if (options_.observer && !observed(iteration)) {

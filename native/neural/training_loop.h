@@ -29,6 +29,7 @@ struct LoopOptions {
   TrainingOptions training;  ///< the schedule follows the clock where a time budget is ahead
   OptimizerOptions optimizer;
   Schedule schedule;
+  int steps = 1;               ///< of the optimizer that an iteration takes, at one rate
   IterationObserver observer;  ///< none: nothing is read for it
 };
 
@@ -37,7 +38,7 @@ class LoopBody {
  public:
   virtual ~LoopBody() = default;
   /// Adds the gradient of the estimate to the gradient, which is zero before; returns the estimate, one
-  /// number wherever it was computed.
+  /// number wherever it was computed. Asked once a step of the iteration.
   virtual at::Tensor accumulate(int iteration) = 0;
   /// Asked every ten iterations or so: whether the parameters as they are suffice.
   virtual bool is_good_enough() { return false; }

@@ -23,7 +23,7 @@ bool names_a_network(const Options& given) {
 
 /// Each coupling layer's network is narrower and shallower than the one of a neural field.
 CouplingShape coupling_shape(NetworkOptions network, int couplings) {
-  network.width = std::max(1, network.width / 2);
+  network.width = std::max(1, network.width / 4);
   network.layers = std::max(1, network.layers / 2);
   CouplingShape shape{network};
   shape.couplings = couplings;
@@ -47,13 +47,17 @@ std::shared_ptr<TrainableField> made_field(const Options& options) {
   return field;
 }
 
-/// What one layer changes, all that follow carry on: steps of coupling layers have to be smaller.
+/// What one layer changes, all that follow carry on: steps of coupling layers have to be smaller, and more,
+/// which their narrow networks make up for.
 template <class Options>
 LoopOptions made_training(const Options& options) {
   LoopOptions loop;
   loop.training = options.training;
-  if (chosen_field(options) == FieldKind::invertible && loop.training.learning_rate == 0.0)
-    loop.training.learning_rate = TrainingOptions::automatic_learning_rate(options.training.optimizer) / 3.0;
+  if (chosen_field(options) != FieldKind::invertible) return loop;
+  if (loop.training.learning_rate == 0.0)
+    loop.training.learning_rate = TrainingOptions::automatic_learning_rate(options.training.optimizer) / 5.0;
+  loop.optimizer.momentum = 0.9;
+  loop.steps = 9;
   return loop;
 }
 

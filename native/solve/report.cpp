@@ -110,6 +110,11 @@ Solution solve_field(std::shared_ptr<TrainableField> field, const SurfaceSamples
                      const WrapObjective& wrap) {
   field->set_frame(samples.frame);
   field->set_rest_points(samples.points.topRows(std::min(samples.size(), kept_rest_points)));
+  if (options.steps > 1) {  // many steps of half the batches come further than half as many of whole ones
+    terms.batch = (terms.batch + 1) / 2;
+    terms.fresh = (terms.fresh + 1) / 2;
+    terms.pull.handle_batch = (terms.pull.handle_batch + 1) / 2;
+  }
   FieldObjective objective(samples, std::move(terms));
   const std::unique_ptr<Objective> wrapped = wrap ? wrap(objective) : nullptr;
   try {
