@@ -57,7 +57,7 @@ LoopOptions made_training(const Options& options) {
   if (loop.training.learning_rate == 0.0)
     loop.training.learning_rate = TrainingOptions::automatic_learning_rate(options.training.optimizer) / 5.0;
   loop.optimizer.momentum = 0.9;
-  loop.steps = 9;
+  loop.steps = 8;
   return loop;
 }
 

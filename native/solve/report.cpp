@@ -110,10 +110,10 @@ Solution solve_field(std::shared_ptr<TrainableField> field, const SurfaceSamples
                      const WrapObjective& wrap) {
   field->set_frame(samples.frame);
   field->set_rest_points(samples.points.topRows(std::min(samples.size(), kept_rest_points)));
-  if (options.steps > 1) {  // many steps of half the batches come further than half as many of whole ones
-    terms.batch = (terms.batch + 1) / 2;
-    terms.fresh = (terms.fresh + 1) / 2;
-    terms.pull.handle_batch = (terms.pull.handle_batch + 1) / 2;
+  if (options.steps > 1) {  // many steps of smaller batches come further than fewer of whole ones
+    terms.batch = (2 * terms.batch + 2) / 3;
+    terms.fresh = (2 * terms.fresh + 2) / 3;
+    terms.pull.handle_batch = (terms.pull.handle_batch + 3) / 4;
   }
   FieldObjective objective(samples, std::move(terms));
   const std::unique_ptr<Objective> wrapped = wrap ? wrap(objective) : nullptr;
