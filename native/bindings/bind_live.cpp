@@ -112,7 +112,9 @@ void bind_live(py::module_& module) {
                           "All that the next step of a LiveDeformer depends on beside its targets. It fits a "
                           "solver of the\nsame samples, options and number of handles.")
       .def_readonly("coefficients", &MotionState::coefficients, "(n, 3), of the centers and an affine map.")
-      .def_readonly("velocities", &MotionState::velocities, "(n, 3), a second.");
+      .def_readonly("velocities", &MotionState::velocities, "(n, 3), a second.")
+      .def_readonly("accelerations", &MotionState::accelerations,
+                    "(n, 3), a second squared; (0, 3) at rest.");
   py::class_<LiveSolver>(
       module, "LiveDeformer",
       "Deforms a surface at interactive rates: handles move, solve() follows from the last shape.\n\n"

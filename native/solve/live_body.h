@@ -14,6 +14,9 @@ struct LiveBody {
   std::optional<SecondaryMotion> asked;  // `up` of length 1
   Vector masses;                         // of the samples that the energy sees
   RowMatrix<double> velocities;          // of the coefficients; empty: at rest
+  RowMatrix<double> accelerations;       // of the coefficients, by the last step's forces; empty: not known
+  RowMatrix<double> gram, smoothing;     // what smooth() takes for steps of the length `smoothed`
+  double smoothed = 0.0;
   std::vector<Mat4> motions;      // of the handles where the last step or solve ended; empty: not known
   double factored_inertia = 0.0;  // in the preconditioner
 

@@ -160,6 +160,7 @@ void LiveSolver::State::stiffen(const Progress& progress) {
   stiffness_ =
       stiffness_matrix(basis_, rows_of(surface_, chosen_), bending_, weights_, progress, blend_.get());
   if (mirror_) mirror_->symmetrise_matrix(stiffness_);
+  body_.smoothing.resize(0, 0);
   for_each_precision([&](auto& precision) { precision.objective->set_stiffness(bending_, weights_); });
 }
 

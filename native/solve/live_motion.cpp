@@ -2,32 +2,41 @@
 // How a live solver's surface moves as a body: steps in time.
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <string>
 #include <utility>
 
+#include "core/dense.h"
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
+#include "fields/radial_basis.h"
 #include "solve/live_setup.h"
 #include "solve/live_state.h"
+#include "solve/live_stiffness.h"
 
 namespace arapfields {
 namespace {
 
 /// Stiffness of the ground against the energy of the surface.
 constexpr double ground_stiffness = 1000.0;
-/// Both stages of a step are implicit Euler steps of this share of it: the two-stage singly diagonally
-/// implicit Runge-Kutta method of second order, which is L-stable (Alexander, SIAM J. Numer. Anal. 14, 1977).
-/// It needs no force but those at its own stages, and all that one step leaves to the next is a place and a
-/// velocity.
-constexpr double stage_share = 1.0 - 0.5 * std::numbers::sqrt2;
-/// A stage ends where its next step is expected to gain less than this share of the kinetic energy, or this.
-constexpr double motion_tolerance = 1e-4, motion_floor = 1e-10;
+/// What swings too fast to be shown keeps so much a step: a jump of the handles soon stops ringing, and
+/// slower swings lose nothing of note.
+constexpr double kept_of_fast = 0.7;
+constexpr TimeScheme usual = TimeScheme::generalised_alpha(kept_of_fast);
 
-/// Share of a way that a stage's start keeps: what no sample sees of a velocity, which nothing else slows,
-/// dies away.
-constexpr double unseen_decay = 0.998;
+/// Seconds of a step for which the next three hold.
+constexpr double usual_step = 1.0 / 96.0;
+/// A step ends where its next one is expected to gain less than this share of the kinetic energy, as the
+/// square of its length, at most the second; or this share of all, or this, which is what single precision
+/// can tell.
+constexpr double motion_share = 3e-4, largest_share = 1e-2, motion_tolerance = 3e-5, motion_floor = 1e-10;
+/// Velocities and accelerations half of which a step takes, as the root of its length, by their mean
+/// ‖J‖² + λ‖D‖² against their mean square: waves shorter than a part is thick, which solves see last.
+constexpr double smoothed = 3e3;
+/// The first step from rest may take so many times longer: its acceleration is not known.
+constexpr Index first_iterations = 4;
+/// What a solve may leave of a step's way, as a share.
+constexpr double most_left = 0.1;
 
 /// Seconds of a frame, at least and at most.
 constexpr double shortest_frame = 1e-5, longest_frame = 10.0;
@@ -91,24 +100,51 @@ void LiveSolver::State::precondition(double inertia) {
   factorise();
 }
 
+/// What smooth() needs after steps of length h.
+void LiveSolver::State::choose_smoothing(double h) {
+  if (body_.smoothing.size() > 0 && body_.smoothed == h) return;
+  const RowMatrix<double> rows = radial_rows(basis_, rows_of(surface_, chosen_), JetOrder::value);
+  const Vector share = Vector::Constant(rows.rows(), 1.0 / static_cast<double>(rows.rows()));
+  const RowMatrix<double> weighted = share.cwiseSqrt().asDiagonal() * rows;
+  body_.gram.resize(rows.cols(), rows.cols());
+  lower_gram<double>(Transpose::yes, weighted, 0.0, body_.gram);
+  body_.smoothing = inverse_factor(std::sqrt(h / usual_step) / smoothed * stiffness_, rows, share);
+  body_.smoothed = h;
+}
+
+/// Velocities and accelerations without their short waves, and without what no sample sees of them:
+/// 1 − (1 − S)² of S = (G + τK)⁻¹ G, for the mean squares of the values at the samples and of the
+/// derivatives.
+RowMatrix<double> LiveSolver::State::smooth(const RowMatrix<double>& velocities) const {
+  const auto once = [&](const RowMatrix<double>& x) -> RowMatrix<double> {
+    const RowMatrix<double> y = body_.gram.selfadjointView<Eigen::Lower>() * x;
+    const RowMatrix<double> z = body_.smoothing.triangularView<Eigen::Lower>() * y;
+    return body_.smoothing.transpose().triangularView<Eigen::Upper>() * z;
+  };
+  const RowMatrix<double> first = once(velocities);
+  return 2.0 * first - once(first);
+}
+
 MotionState LiveSolver::State::motion_state() const {
   RowMatrix<double> velocities = body_.velocities;
   if (velocities.size() == 0) velocities.setZero(basis_.size(), 3);
-  return {coefficients_, velocities, body_.motions};
+  return {coefficients_, velocities, body_.accelerations, body_.motions};
 }
 
 void LiveSolver::State::set_motion_state(const MotionState& state) {
   const auto fits = [&](const RowMatrix<double>& c) {
     return c.rows() == basis_.size() && c.cols() == 3 && c.allFinite();
   };
-  require(fits(state.coefficients) && fits(state.velocities), "state",
-          "of another solver, or with NaN or infinity",
+  require(fits(state.coefficients) && fits(state.velocities) &&
+              (state.accelerations.size() == 0 || fits(state.accelerations)),
+          "state", "of another solver, or with NaN or infinity",
           "one that this solver, or one with the same samples and options, gave is needed");
   require(state.motions.empty() || std::ssize(state.motions) == bound_.count(), "state",
           "of " + std::to_string(state.motions.size()) + " handles",
           "the solver has " + std::to_string(bound_.count()));
   coefficients_ = state.coefficients;
   body_.velocities = state.velocities;
+  body_.accelerations = state.accelerations;
   body_.motions = state.motions;
   forget_past();
 }
@@ -123,6 +159,7 @@ void LiveSolver::State::forget_past() {
 /// The body has come to rest where it is.
 void LiveSolver::State::rest() {
   body_.velocities.resize(0, 3);
+  body_.accelerations.resize(0, 3);
   body_.motions = motions_of(bound_);
 }
 
@@ -137,23 +174,60 @@ Points LiveSolver::State::pair_targets_between(const std::vector<Mat4>& before, 
   return both;
 }
 
-/// One implicit stage of length `a` from `from` with `velocity`: where it ends.
-RowMatrix<double> LiveSolver::State::stage(const RowMatrix<double>& from, const RowMatrix<double>& velocity,
-                                           double a, const Twist& carried, const Progress& progress) {
-  const double drag = 2.0 * body_.asked->options.damping * a;
-  RowMatrix<double> goal = from + a * velocity;
-  if (drag > 0.0) goal = (goal + drag * (from + a * carried.of(from, basis_.center_count()))) / (1.0 + drag);
-  if (mirror_) mirror_->symmetrise(goal);
-  VectorF reached;
-  fast_.objective->measure(goal, reached);
-  weigh<float>(fast_, body_.mass() * (1.0 + drag) / (a * a), fast_.objective->sample_values(reached));
+/// One step of a scheme from the place, velocity and acceleration at hand. Whether it could be solved; a step
+/// of backward Euler always moves, others only then.
+bool LiveSolver::State::swing(const TimeScheme& scheme, double h, const Twist& carried,
+                              const Progress& progress) {
+  const auto [alpha, w, gamma, beta] = scheme;
   if (fast_.u.size() == 0) fast_.objective->measure(coefficients_, fast_.u);
-  if (fast_.objective->value(reached, nullptr) < fast_.objective->value(fast_.u, nullptr)) {
-    coefficients_ = goal;
-    fast_.u = std::move(reached);
+  const RowMatrix<double> q = coefficients_, v = body_.velocities;
+  RowMatrix<double> a = RowMatrix<double>::Zero(q.rows(), 3);
+  if (scheme == usual) a = body_.accelerations;
+  const VectorF u = fast_.u;
+  const double drag = 2.0 * body_.asked->options.damping, unit = scheme.reach() * h * h;
+  const double inert = scheme.inert(drag * h), inertia = body_.mass() * inert / unit;
+  const RowMatrix<double> ahead = q + w * h * (v + (0.5 - beta) * h * a);  // where a' = 0 would lead
+  RowMatrix<double> known = alpha * a;
+  if (drag > 0.0)
+    known += drag * (v + w * h * (1.0 - gamma) * a - carried.of(q + w * h * v, basis_.center_count()));
+  weigh<float>(fast_, inertia, fast_.objective->sample_values_of(ahead - unit / inert * known));
+  coefficients_ = ahead + unit * a;
+  fast_.objective->measure(coefficients_, fast_.u);
+  const double share = std::min(largest_share, motion_share * std::pow(h / usual_step, 2.0));
+  descend(fast_,
+          {(scheme == TimeScheme::midpoint() ? first_iterations : 1) * options_.iterations, motion_tolerance,
+           share * report_.kinetic + motion_floor},
+          progress);
+  if (!report_.converged && scheme != TimeScheme::backward_euler()) {
+    coefficients_ = q;
+    fast_.u = u;
+    return false;
   }
-  descend(fast_, {options_.iterations, 0.0, motion_tolerance * report_.kinetic + motion_floor}, progress);
-  return coefficients_;
+  if (fast_.u.size() == 0) fast_.objective->measure(coefficients_, fast_.u);
+  const VectorF du = fast_.u - u;
+  const double further = 1.0 + left_along(du, inertia);
+  const RowMatrix<double> way = further * (coefficients_ - q), next = (q + way - ahead) / unit;
+  coefficients_ = q + way / w;
+  fast_.u = u + static_cast<float>(further / w) * du;
+  RowMatrix<double> both(q.rows(), 6);
+  both << v + h * ((1.0 - gamma) * a + gamma * next), next;
+  both = smooth(both);
+  body_.velocities = both.leftCols(3);
+  body_.accelerations = both.rightCols(3);
+  if (mirror_) mirror_->symmetrise(body_.velocities), mirror_->symmetrise(body_.accelerations);
+  return true;
+}
+
+/// How much further a step should go along its way `du`, as a share of it, so that what the solve left of the
+/// gradient does no work on it: that it ends early then neither feeds nor slows the motion.
+double LiveSolver::State::left_along(const VectorF& du, double inertia) {
+  VectorF cotangents;
+  fast_.objective->value(fast_.u, &cotangents);
+  const Points way = fast_.objective->sample_values(du).cast<double>();
+  const double curvature =
+      inertia * body_.masses.dot(way.rowwise().squaredNorm()) / static_cast<double>(way.rows());
+  const double share = -cotangents.cast<double>().dot(du.cast<double>()) / curvature;
+  return std::abs(share) < most_left ? share : 0.0;  // else it is no small correction
 }
 
 std::shared_ptr<RadialField> LiveSolver::State::step(const std::vector<Handle>& moved, double seconds,
@@ -197,6 +271,7 @@ void LiveSolver::State::change_coordinates(const Mat4& motion) {
   coefficients_ *= m.topLeftCorner<3, 3>().transpose();
   coefficients_.row(basis_.center_count()) += m.topRightCorner<3, 1>().transpose();
   if (body_.velocities.size() > 0) body_.velocities *= m.topLeftCorner<3, 3>().transpose();
+  if (body_.accelerations.size() > 0) body_.accelerations *= m.topLeftCorner<3, 3>().transpose();
   for (Mat4& handle : body_.motions) handle = m * handle;
 }
 
@@ -207,40 +282,24 @@ void LiveSolver::State::advance(double seconds, const Progress& progress) {
                                       pairs_.weights, seconds);
   const auto count = static_cast<Index>(std::ceil(seconds / body_.asked->options.longest_step - 1e-9));
   const Index steps = std::max<Index>(1, count);
-  const double h = seconds / static_cast<double>(steps), a = stage_share * h;
-  precondition(rounded(body_.mass() * (1.0 / a + 2.0 * body_.asked->options.damping) / a));
+  const double h = seconds / static_cast<double>(steps);
+  precondition(
+      rounded(body_.mass() * usual.inert(2.0 * body_.asked->options.damping * h) / (usual.reach() * h * h)));
+  choose_smoothing(h);
   forget_past();
   if (body_.velocities.size() == 0) body_.velocities.setZero(basis_.size(), 3);
   report_.iterations = report_.evaluations = 0;
   report_.kinetic = kinetic_energy();
-  RowMatrix<double> acceleration;  // of the last stage
-  const auto guess = [&](const RowMatrix<double>& from, const RowMatrix<double>& velocity) {
-    if (acceleration.size() == 0) return;
-    coefficients_ = from + unseen_decay * a * (velocity + a * acceleration);
-    fast_.u.resize(0);
-  };
   for (Index k = 0; k < steps; ++k) {
-    const auto aim = [&](double share) {
-      const Points targets =
-          pair_targets_between(before, (static_cast<double>(k) + share) / static_cast<double>(steps));
-      fast_.objective->set_targets(targets);
+    const auto share = [&](double within) {
+      return (static_cast<double>(k) + within) / static_cast<double>(steps);
     };
-    const auto part = [&](Index stage) {
-      const auto at = [&](Index s) {
-        return static_cast<double>(2 * k + s) / static_cast<double>(2 * steps);
-      };
-      return progress.part(at(stage), at(stage + 1));
+    const auto swings = [&](const TimeScheme& scheme) {
+      fast_.objective->set_targets(pair_targets_between(before, share(scheme.w)));
+      return swing(scheme, h, carried, progress.part(share(0.0), share(1.0)));
     };
-    const RowMatrix<double> q = coefficients_, v = body_.velocities;
-    guess(q, v);
-    aim(stage_share);
-    const RowMatrix<double> first = (stage(q, v, a, carried, part(0)) - q) / a;
-    acceleration = (first - v) / a;
-    const RowMatrix<double> from = q + (h - a) * first, velocity = v + (h - a) * acceleration;
-    guess(from, velocity);
-    aim(1.0);
-    body_.velocities = (stage(from, velocity, a, carried, part(1)) - from) / a;
-    acceleration = (body_.velocities - velocity) / a;
+    if (!swings(body_.accelerations.size() > 0 ? usual : TimeScheme::midpoint()))
+      swings(TimeScheme::backward_euler());
   }
   report_.kinetic = kinetic_energy();
   for_each_precision([&](auto& precision) { precision.objective->set_targets(pairs_.targets); });

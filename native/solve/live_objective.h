@@ -61,6 +61,12 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
       return PointsOf<Scalar>(Eigen::Map<const PointsOf<Scalar>>(jets.data, jets.count, 3));
     });
   }
+  /// Where the field with these coefficients takes them; without a blend.
+  PointsOf<Scalar> sample_values_of(const RowMatrix<double>& c) const {
+    PointsOf<Scalar> values(samples_.size(), 3);
+    samples_.evaluate(c, {values.data(), samples_.size(), JetOrder::value});
+    return values;
+  }
   /// Where the pairs' sources are.
   Eigen::Map<const PointsOf<Scalar>> handle_values(const Measurements& u) const {
     return {u.data() + handle_offset(), pairs_.sources.rows(), 3};

@@ -10,6 +10,7 @@
 #include "solve/live_objective.h"
 #include "solve/live_solver.h"
 #include "solve/surface_stiffness.h"
+#include "solve/time_scheme.h"
 
 namespace arapfields {
 
@@ -60,7 +61,7 @@ class LiveSolver::State {
   }
   std::pair<Vector, Vector> resistance() const;
   LiveStyle style_at_samples(const StyleAsked& asked) const;
-  void stiffen(const Progress& progress);
+  void stiffen(const Progress& progress), choose_smoothing(double h);
   bool choose_influence();
   std::shared_ptr<const Influence> reaches_of_handles() const;
   Points pair_targets() const;
@@ -71,10 +72,10 @@ class LiveSolver::State {
   void choose_pairs(), reflect_pairs(), choose_stance(), stand_otherwise(), factorise();
   void follow_rigidly(), extrapolate(), hold_lowest(), forget_past(), rest();
   Points pair_targets_between(const std::vector<Mat4>& before, double share) const;
-  RowMatrix<double> stage(const RowMatrix<double>& from, const RowMatrix<double>& velocity, double a,
-                          const Twist&, const Progress&);
-  void change_coordinates(const Mat4& motion);
-  void advance(double seconds, const Progress& progress);
+  bool swing(const TimeScheme& scheme, double h, const Twist& carried, const Progress& progress);
+  double left_along(const VectorF& du, double inertia);
+  RowMatrix<double> smooth(const RowMatrix<double>& velocities) const;
+  void change_coordinates(const Mat4& motion), advance(double seconds, const Progress& progress);
   double kinetic_energy();
 
   LiveOptions options_;

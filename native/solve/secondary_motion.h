@@ -20,6 +20,7 @@ struct SecondaryMotion {
 /// Where a body is and how it moves: all that the next step depends on beside its handles' targets.
 struct MotionState {
   RowMatrix<double> coefficients, velocities;  ///< (size,3) of the radial basis, and a second
+  RowMatrix<double> accelerations;             ///< (size,3), a second²; empty: not known
   std::vector<Mat4> motions;                   ///< of the handles, in cube coordinates; empty: not known
 };
 

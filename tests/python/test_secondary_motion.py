@@ -16,11 +16,9 @@ from arapfields._native import testing
 
 QUICK = {"samples": 600, "coarse_centers": 20, "fine_centers": 80}
 TIP = np.array([[2.0, 0.0, 0.0]])
-# The agreed limits: of the total energy's rise, and of changes of period and decay.
-ENERGY_RISE, ALIKE = 0.01, 0.05
-# Of a rate of decay against what was asked for: energy falls in turns, as it is kinetic or not.
-DECAY = 0.15
-OWN_DECAY = 0.06  # 1/s, what the scheme itself takes from undamped swings at 24 frames a second
+ENERGY_RISE, ALIKE = 0.01, 0.05  # agreed: of the total energy's rise, and of changes of period and decay
+DECAY = 0.15  # of a rate against what was asked for: energy falls in turns, as it is kinetic or not
+LEFT_OF_3 = 2.4  # s; after these a damping of 3 leaves less than solves in single precision can tell
 
 
 @pytest.fixture(scope="module")
@@ -75,10 +73,13 @@ def test_without_strength_steps_are_solves_bit_for_bit(samples):
     assert plain.report.value == stepped.report.value and stepped.report.kinetic == 0.0
 
 
-def test_the_total_energy_does_not_rise(samples):
-    _, _, energies = swung(released(samples), 3.0, 24)
-    assert energies.max() <= (1 + ENERGY_RISE) * energies[0]
-    assert energies[-1] > 0.5 * energies[0]  # nor does the scheme eat it
+@pytest.mark.parametrize(("rate", "seconds"), [(24, 3.0), (240, 1.0)])
+def test_the_total_energy_does_not_rise(samples, rate, seconds):
+    live = released(samples)
+    start = live.report.value
+    _, _, energies = swung(live, seconds, rate)
+    assert energies.max() <= (1 + ENERGY_RISE) * start
+    assert energies[-1] > 0.75 * start  # nor does the scheme eat it
 
 
 def test_frame_rates_change_neither_period_nor_decay(samples):
@@ -92,17 +93,20 @@ def test_frame_rates_change_neither_period_nor_decay(samples):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("damping", [0.0, 2.0])
-def test_periods_hold_from_360_to_1500_centers_and_from_24_to_240_frames_a_second(damping):
+@pytest.mark.parametrize(("damping", "seconds"), [(0.0, 3.0), (2.0, 3.0), (3.0, LEFT_OF_3)])
+def test_periods_hold_from_360_to_1500_centers_and_from_24_to_240_frames_a_second(damping, seconds):
     found = []
     for fine, coarse, rate in ((300, 60, 24), (300, 60, 240), (1250, 250, 60)):
         size = {"samples": 6000, "fine_centers": fine, "coarse_centers": coarse}
         live = released(bar_samples(12000), further={"damping": damping}, **size)
-        times, heights, energies = swung(live, 3.0, rate)
+        times, heights, energies = swung(live, seconds, rate)
         found.append((period_of(times, heights), decay_of(times, energies)))
     for period, decay in found[1:]:
         assert period == pytest.approx(found[0][0], rel=ALIKE)
-        assert decay == pytest.approx(found[0][1], rel=ALIKE, abs=0.0 if damping else OWN_DECAY)
+        if damping:
+            assert decay == pytest.approx(found[0][1], rel=ALIKE)
+        else:  # of the amplitude as much is left
+            assert np.exp(-seconds * decay) == pytest.approx(np.exp(-seconds * found[0][1]), rel=ALIKE)
 
 
 @pytest.mark.slow
