@@ -32,8 +32,7 @@ void compose_at(const JetView<const double>& outer, const JetView<double>& inner
           for (int m = 0; m < 3; ++m)
             sum += before(l, j) * before(m, k) * Eigen::Map<const Vec3>(outer.at(second_column(l, m), i));
       }
-    for (int c = 4; c < 10; ++c)
-      Eigen::Map<Vec3>(inner.at(c, i)) = second[static_cast<std::size_t>(c - 4)];
+    for (int c = 4; c < 10; ++c) Eigen::Map<Vec3>(inner.at(c, i)) = second[static_cast<std::size_t>(c - 4)];
   }
   for (int k = 0; k < 3; ++k) Eigen::Map<Vec3>(inner.at(first_column(k), i)) = after * before.col(k);
 }
@@ -62,8 +61,7 @@ void compose(JetView<const double> outer, JetView<double> inner) {
 ComposedField::ComposedField(std::vector<FieldStep> steps) : steps_(std::move(steps)) {
   for (const FieldStep& step : steps_) {
     require(step.map != nullptr, "steps", "one without a map", "each needs one");
-    require(step.repeats >= 1, "steps", std::to_string(step.repeats) + " repeats",
-            "at least one is needed");
+    require(step.repeats >= 1, "steps", std::to_string(step.repeats) + " repeats", "at least one is needed");
   }
 }
 

@@ -17,19 +17,21 @@
 namespace arapfields {
 namespace {
 
-constexpr Index target_points = 12000, drawing_points = 6000, kept_rest_points = 4000, measured_points = 20000, energy_points = 4000;
+constexpr Index target_points = 12000, drawing_points = 6000, kept_rest_points = 4000,
+                measured_points = 20000, energy_points = 4000;
 /// From the first stage to the last: weights of the pull, of what resists and of distances whatever the
 /// normals, share of ways along the target, and the radius and number of centers.
-constexpr double first_pull = 10.0, last_pull = 2000.0, first_rigid = 1.0, last_rigid = 0.05, last_nearest = 1.0,
-                 first_slack = 0.3, last_slack = 0.05, first_reach = 0.5, last_reach = 0.067;
-constexpr double first_centers = 60.0, landmark_pull = 30.0, viscosity = 0.1;
+constexpr double first_pull = 10.0, last_pull = 2000.0, first_rigid = 1.0, last_rigid = 0.1,
+                 last_nearest = 1.0, first_slack = 0.3, last_slack = 0.1, first_reach = 0.5,
+                 last_reach = 0.067;
+constexpr double first_centers = 60.0, landmark_pull = 30.0, viscosity = 1.5, coverage = 5.0;
 
 double between(double first, double last, double t) { return first * std::pow(last / first, t); }
 
 WrapStage stage_at(double t, const WrapOptions& options) {
   WrapStage stage;
-  stage.pull = {between(first_pull, last_pull * options.closeness, t), options.coverage, options.normal_weight,
-                between(first_slack, last_slack, t), last_nearest * t * t};
+  stage.pull = {between(first_pull, last_pull * options.closeness, t), coverage * options.coverage,
+                options.normal_weight, between(first_slack, last_slack, t), last_nearest * t * t};
   stage.landmarks = landmark_pull * options.landmark_weight;
   stage.rigid = between(first_rigid, last_rigid, t);
   stage.viscous = viscosity * options.bending;
@@ -73,8 +75,8 @@ void measure(const ComposedField& field, const SurfaceSamples& samples, const Wr
   const SurfaceDistances to = surface_distances(target.tree, target.points, target.normals, target.spacing,
                                                 places, normals, growth, target.whole);
   const OrientedPoints tree(places, normals);
-  const SurfaceDistances from = surface_distances(tree, places, normals, mean_spacing(places), target.points,
-                                                  target.normals, {}, {});
+  const SurfaceDistances from =
+      surface_distances(tree, places, normals, mean_spacing(places), target.points, target.normals, {}, {});
   report.to_target_mean = to.mean / target.diagonal;
   report.to_target_95 = to.most_95 / target.diagonal;
   report.from_target_mean = from.mean / target.diagonal;
@@ -128,12 +130,10 @@ WrapSolution wrap(const SurfaceSamples& samples, const ImplicitFunction& functio
   for (int stage = 0; stage < options.stages; ++stage) {
     const double t = options.stages > 1 ? static_cast<double>(stage) / (options.stages - 1) : 1.0;
     for (int k = 0; k < options.iterations; ++k) {
-      flow.step(stage_at(t, options),
-                flowing.part(static_cast<double>(report.iterations) / all,
-                             static_cast<double>(report.iterations + 1) / all));
+      flow.step(stage_at(t, options), flowing.part(static_cast<double>(report.iterations) / all,
+                                                   static_cast<double>(report.iterations + 1) / all));
       ++report.iterations;
-      progress.look(
-          [&](PointsIn points) { return placed(flow.steps(), placement, samples)->at(points); });
+      progress.look([&](PointsIn points) { return placed(flow.steps(), placement, samples)->at(points); });
     }
   }
   progress.report(0.95, "measuring the result");

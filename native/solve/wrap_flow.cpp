@@ -34,8 +34,7 @@ double unevenness(const RadialBasis& basis, const RowMatrix<double>& velocity, P
   double most = 0.0;
   for (Index i = 0; i < places.rows(); ++i) {
     Mat3 gradient;
-    for (int k = 0; k < 3; ++k)
-      gradient.col(k) = Eigen::Map<const Vec3>(jets.view().at(first_column(k), i));
+    for (int k = 0; k < 3; ++k) gradient.col(k) = Eigen::Map<const Vec3>(jets.view().at(first_column(k), i));
     Eigen::SelfAdjointEigenSolver<Mat3> solver;
     solver.computeDirect(gradient.transpose() * gradient, Eigen::EigenvaluesOnly);
     most = std::max(most, solver.eigenvalues()[2]);
@@ -51,8 +50,7 @@ Points moved_normals(const RowMatrix<double>& jacobians, PointsIn normals, Vecto
   for (Index i = 0; i < normals.rows(); ++i) {
     const Mat3 jacobian = Eigen::Map<const RowMat3>(&jacobians(i, 0));
     Mat3 cofactors;
-    for (int k = 0; k < 3; ++k)
-      cofactors.col(k) = jacobian.col((k + 1) % 3).cross(jacobian.col((k + 2) % 3));
+    for (int k = 0; k < 3; ++k) cofactors.col(k) = jacobian.col((k + 1) % 3).cross(jacobian.col((k + 2) % 3));
     const Vec3 normal = cofactors * normals.row(i).transpose();
     growth[i] = normal.norm();
     if (growth[i] > 0.0) result.row(i) = normal.transpose() / growth[i];
@@ -130,8 +128,7 @@ void WrapFlow::follow(const RadialBasis& basis, RowMatrix<double> velocity, Poin
   const Index n = places_.rows(), marks = landmarks_.rows();
   JetBlock<double> jets(n, JetOrder::first);
   for (int repeat = 0; repeat < repeats; ++repeat) {
-    RadialEvaluator<double>(basis, places_, JetOrder::first)
-        .evaluate(step.map->coefficients(), jets.view());
+    RadialEvaluator<double>(basis, places_, JetOrder::first).evaluate(step.map->coefficients(), jets.view());
     for (Index i = 0; i < n; ++i) {
       places_.row(i) = Eigen::Map<const Vec3>(jets.view().at(0, i));
       RowMat3 gradient;
@@ -160,8 +157,8 @@ void WrapFlow::step(const WrapStage& stage, const Progress& progress) {
   WrapMotion motion{chosen.surface.places, chosen.jacobians, stage.rigid * chosen.rest_shares,
                     stage.viscous * chosen.grown_shares, ridge * unit};
   if (!target_.closed)  // what has no counterpart stays as stiff as at first
-    motion.rigid = chosen.rest_shares.array() *
-                   (stage.rigid + (1.0 - stage.rigid) * (1.0 - forces.agreements.array()));
+    motion.rigid =
+        chosen.rest_shares.array() * (stage.rigid + (1.0 - stage.rigid) * (1.0 - forces.agreements.array()));
   if (chosen.weights.size() > 0) motion.rigid = motion.rigid.cwiseProduct(chosen.weights);
   const WrapMarks marks{landmarks_, ends_ - landmarks_, stage.landmarks * unit};
   const RadialBasis centers = basis(stage, chosen.surface.places);

@@ -121,8 +121,7 @@ void Assembly::add(Index b, Sums& sums) const {
   Block wide(all, 6 * block_size), asked = of[0] * pulls;
   for (int k = 0; k < 3; ++k) {
     const Block& along = of[static_cast<std::size_t>(4 + k)];
-    wide.middleCols(k * block_size, block_size) =
-        along.array().rowwise() * rigid.sqrt().transpose();
+    wide.middleCols(k * block_size, block_size) = along.array().rowwise() * rigid.sqrt().transpose();
     wide.middleCols((3 + k) * block_size, block_size) =
         of[static_cast<std::size_t>(1 + k)].array().rowwise() * viscous.sqrt().transpose();
     asked.noalias() += along * left.middleCols<3>(3 * k);
