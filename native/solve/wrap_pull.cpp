@@ -37,7 +37,7 @@ WrapForces::WrapForces(const WrapTarget& target, const WrapPlaces& surface, cons
   const OrientedPoints tree(places, normals);
   const std::vector<Index> there = target.tree.nearest(places, normals, pull.turn);
   const std::vector<Index> back = tree.nearest(target.points, target.normals, pull.turn);
-  matched_share = 0.0;
+  double unmatched = 0.0;
   for (Index i = 0; i < n; ++i) {
     const Index k = there[static_cast<std::size_t>(i)];
     const Vec3 way = (target.points.row(k) - places.row(i)).transpose(), normal = target.normals.row(k);
@@ -47,11 +47,14 @@ WrapForces::WrapForces(const WrapTarget& target, const WrapPlaces& surface, cons
       const double missed = (places.row(start) - places.row(i)).norm();
       if (missed > way_back * target.spacing + way_back_share * way.norm()) weight = 0.0;
     }
-    if (!(weight > 0.0)) continue;
-    matched_share += surface.shares[i];
+    if (!(weight > 0.0)) {
+      unmatched += surface.shares[i];
+      continue;
+    }
     agreements[i] = weight;
     add(i, way, normal, pull.slack, pull.weight * weight * surface.shares[i]);
   }
+  matched_share = 1.0 - unmatched;
   for (Index k = 0; k < m && pull.coverage > 0.0; ++k) {
     const Index i = back[static_cast<std::size_t>(k)];
     const Vec3 normal = target.normals.row(k);

@@ -15,14 +15,10 @@ namespace arapfields {
 namespace {
 
 constexpr Index block_size = 16;
-/// Parts that are summed on their own: the result does not depend on the number of threads.
-constexpr Index parts = 4;
 /// Of the trace's mean, added to the diagonal, and how often it is raised where rounding has its way.
 constexpr double rounding = 1e-9, rounding_growth = 100.0;
 constexpr int rounding_tries = 4;
-/// Numbers of a block's functions: values, derivatives, derivatives along the columns of J.
-constexpr int kinds = 7;
-using Block = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using Block = RowMatrix<float>;
 
 Mat3 closest_rotation(const Mat3& matrix) {
   const Eigen::JacobiSVD<Mat3> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
@@ -31,115 +27,121 @@ Mat3 closest_rotation(const Mat3& matrix) {
   return u * svd.matrixV().transpose();
 }
 
-/// Sums over some of the points: what the coordinates share, what couples them, and what is asked for.
-struct Sums {
-  RowMatrix<double> shared;                  // (size, size), lower triangle
-  std::array<RowMatrix<double>, 6> coupled;  // the same for xx, yy, zz, xy, xz, yz
-  RowMatrix<double> asked;                   // (size, 3)
-
-  explicit Sums(Index size) : shared(RowMatrix<double>::Zero(size, size)) {
-    coupled.fill(shared);
-    asked.setZero(size, 3);
-  }
+/// What a block of neighbouring places adds to the sums, by the functions that they feel.
+struct Piece {
+  std::vector<Index> functions;  // ascending
+  Block values;                  // (functions, places)
+  Block slopes;  // (functions, 6 places): weighted derivatives along columns of J, and along axes
+  Block asked;   // (functions, 3)
+  Eigen::Matrix<float, block_size, 6> forms;
 };
 
 class Assembly {
  public:
-  Assembly(const RadialBasis& basis, const WrapMotion& motion, const WrapForces& forces)
-      : basis_(basis), motion_(motion), forces_(forces), field_(basis, motion.places, JetOrder::first) {}
+  Assembly(const RadialBasis& basis, const WrapMotion& motion, const WrapForces& forces);
 
-  std::vector<Sums> sums(const Progress& progress) const {
-    std::vector<Sums> result(parts, Sums(basis_.size()));
-    parallel_for(0, parts, 1, [&](Index first, Index last) {
-      for (Index part = first; part < last; ++part)
-        for (Index b = part; b < field_.blocks() && !progress.cancelled(); b += parts)
-          add(b, result[static_cast<std::size_t>(part)]);
-    });
-    progress.check();
-    return result;
-  }
+  /// (size, size) what all coordinates share (−1) or what couples them (0 to 5: xx, yy, zz, xy, xz, yz); the
+  /// lower triangle.
+  RowMatrix<double> products(int which, const Progress& progress) const;
+  RowMatrix<double> asked() const;
 
  private:
-  /// (functions, points) of one kind after the other; the four affine functions come last.
-  std::array<Block, kinds> functions(Index b, const RadialBlock<double>& block) const;
-  void add(Index b, Sums& sums) const;
+  Piece piece(Index b, const RadialEvaluator<double>& field, const WrapMotion& motion,
+              const WrapForces& forces) const;
+  void add_slopes(Index p, const Mat3& jacobian, float rigid, float viscous, const Block& slopes,
+                  Piece& piece) const;
 
-  const RadialBasis& basis_;
-  const WrapMotion& motion_;
-  const WrapForces& forces_;
-  RadialEvaluator<double> field_;
+  Index centers_;
+  std::vector<Piece> pieces_;
 };
 
-std::array<Block, kinds> Assembly::functions(Index b, const RadialBlock<double>& block) const {
-  const Index count = block.active_count, all = count + 4,
-              valid = std::min(block_size, motion_.places.rows() - b * block_size);
-  std::vector<double> rows(static_cast<std::size_t>(count * 4 * block_size));
-  ARAPFIELDS_DISPATCH(radial_rows(block, 4, rows.data()));
-  std::array<Block, kinds> result;
-  result.fill(Block::Zero(all, block_size));
-  for (Index a = 0; a < count; ++a)
-    for (int c = 0; c < 4; ++c)
-      for (Index p = 0; p < valid; ++p)
-        result[static_cast<std::size_t>(c)](a, p) =
-            static_cast<float>(rows[static_cast<std::size_t>((a * 4 + c) * block_size + p)]);
-  for (Index p = 0; p < valid; ++p) {
-    result[0](count, p) = 1.0F;
-    for (int k = 0; k < 3; ++k) {
-      result[0](count + 1 + k, p) = static_cast<float>(motion_.places(b * block_size + p, k));
-      result[static_cast<std::size_t>(1 + k)](count + 1 + k, p) = 1.0F;
-    }
-    const auto* jacobian = &motion_.jacobians(b * block_size + p, 0);
-    for (int k = 0; k < 3; ++k)
-      for (int l = 0; l < 3; ++l)
-        result[static_cast<std::size_t>(4 + k)].col(p) +=
-            static_cast<float>(jacobian[3 * l + k]) * result[static_cast<std::size_t>(1 + l)].col(p);
-  }
-  return result;
+Assembly::Assembly(const RadialBasis& basis, const WrapMotion& motion, const WrapForces& forces)
+    : centers_(basis.center_count()) {
+  const RadialEvaluator<double> field(basis, motion.places, JetOrder::first);
+  pieces_.resize(static_cast<std::size_t>(field.blocks()));
+  parallel_for(0, field.blocks(), 4, [&](Index first, Index last) {
+    for (Index b = first; b < last; ++b)
+      pieces_[static_cast<std::size_t>(b)] = piece(b, field, motion, forces);
+  });
 }
 
-void Assembly::add(Index b, Sums& sums) const {
-  const RadialBlock<double> block = field_.block(b);
-  const Index count = block.active_count, all = count + 4, centers = basis_.center_count(),
-              first = b * block_size, valid = std::min(block_size, motion_.places.rows() - first);
-  const std::array<Block, kinds> of = functions(b, block);
-  const auto index = [&](Index a) { return a < count ? Index{block.active[a]} : centers + a - count; };
-  Eigen::Matrix<float, block_size, 7> factors = Eigen::Matrix<float, block_size, 7>::Zero();
-  Eigen::Matrix<float, block_size, 9> left = Eigen::Matrix<float, block_size, 9>::Zero();
-  Eigen::Matrix<float, block_size, 3> pulls = Eigen::Matrix<float, block_size, 3>::Zero();
-  Eigen::Array<float, block_size, 1> rigid = rigid.Zero(), viscous = viscous.Zero();
-  for (Index p = 0; p < valid; ++p) {
-    factors.row(p).head<6>() = forces_.forms.row(first + p).cast<float>();
-    pulls.row(p) = forces_.pulls.row(first + p).cast<float>();
-    rigid[p] = static_cast<float>(motion_.rigid[first + p]);
-    viscous[p] = static_cast<float>(motion_.viscous[first + p]);
-    const Mat3 jacobian =
-        Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(&motion_.jacobians(first + p, 0));
-    const Mat3 missing = closest_rotation(jacobian) - jacobian;
-    for (int k = 0; k < 3; ++k)
-      left.row(p).segment<3>(3 * k) = rigid[p] * missing.col(k).transpose().cast<float>();
-  }
-  Block wide(all, 6 * block_size), asked = of[0] * pulls;
+/// `slopes` (functions, 3) of one place.
+void Assembly::add_slopes(Index p, const Mat3& jacobian, float rigid, float viscous, const Block& slopes,
+                          Piece& piece) const {
+  const Eigen::Matrix3f missing = (closest_rotation(jacobian) - jacobian).cast<float>();
+  const Block along = slopes * jacobian.cast<float>();
+  piece.asked.noalias() += rigid * along * missing.transpose();
   for (int k = 0; k < 3; ++k) {
-    const Block& along = of[static_cast<std::size_t>(4 + k)];
-    wide.middleCols(k * block_size, block_size) = along.array().rowwise() * rigid.sqrt().transpose();
-    wide.middleCols((3 + k) * block_size, block_size) =
-        of[static_cast<std::size_t>(1 + k)].array().rowwise() * viscous.sqrt().transpose();
-    asked.noalias() += along * left.middleCols<3>(3 * k);
+    piece.slopes.col(k * block_size + p) = std::sqrt(rigid) * along.col(k);
+    piece.slopes.col((3 + k) * block_size + p) = std::sqrt(viscous) * slopes.col(k);
   }
-  const auto scatter = [&](const Block& products, RowMatrix<double>& to) {
-    for (Index i = 0; i < all; ++i) {
-      double* row = &to(index(i), 0);
-      for (Index j = 0; j <= i; ++j) row[index(j)] += static_cast<double>(products(i, j));
-    }
+}
+
+Piece Assembly::piece(Index b, const RadialEvaluator<double>& field, const WrapMotion& motion,
+                      const WrapForces& forces) const {
+  const RadialBlock<double> block = field.block(b);
+  const Index count = block.active_count, all = count + 4, first = b * block_size,
+              valid = std::min(block_size, motion.places.rows() - first);
+  Piece piece;
+  piece.functions.assign(block.active, block.active + count);
+  for (Index k = 0; k < 4; ++k) piece.functions.push_back(centers_ + k);
+  std::vector<double> rows(static_cast<std::size_t>(count * 4 * block_size));
+  ARAPFIELDS_DISPATCH(radial_rows(block, 4, rows.data()));
+  const auto row = [&](Index a, int c, Index p) {
+    return static_cast<float>(rows[static_cast<std::size_t>((a * 4 + c) * block_size + p)]);
   };
-  Block products = wide * wide.transpose();
-  scatter(products, sums.shared);
-  for (int c = 0; c < 6; ++c) {
-    products.noalias() =
-        (of[0].array().rowwise() * factors.col(c).array().transpose()).matrix() * of[0].transpose();
-    scatter(products, sums.coupled[static_cast<std::size_t>(c)]);
+  piece.values.setZero(all, block_size);
+  piece.slopes.setZero(all, 6 * block_size);
+  piece.asked.setZero(all, 3);
+  piece.forms.setZero();
+  Block slopes = Block::Zero(all, 3);
+  slopes.bottomRows(3).setIdentity();
+  for (Index p = 0; p < valid; ++p) {
+    const Index i = first + p;
+    for (Index a = 0; a < count; ++a) {
+      piece.values(a, p) = row(a, 0, p);
+      for (int k = 0; k < 3; ++k) slopes(a, k) = row(a, 1 + k, p);
+    }
+    piece.values(count, p) = 1.0F;
+    piece.values.col(p).tail<3>() = motion.places.row(i).transpose().cast<float>();
+    piece.forms.row(p) = forces.forms.row(i).cast<float>();
+    piece.asked.noalias() += piece.values.col(p) * forces.pulls.row(i).cast<float>();
+    const Mat3 jacobian =
+        Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(&motion.jacobians(i, 0));
+    add_slopes(p, jacobian, static_cast<float>(motion.rigid[i]), static_cast<float>(motion.viscous[i]),
+               slopes, piece);
   }
-  for (Index i = 0; i < all; ++i) sums.asked.row(index(i)) += asked.row(i).cast<double>();
+  return piece;
+}
+
+RowMatrix<double> Assembly::products(int which, const Progress& progress) const {
+  RowMatrix<double> sum = RowMatrix<double>::Zero(centers_ + 4, centers_ + 4);
+  Block product, scaled;
+  for (const Piece& piece : pieces_) {
+    if (progress.cancelled()) break;
+    const auto size = static_cast<Index>(piece.functions.size());
+    product.resize(size, size);
+    if (which < 0) {
+      lower_gram<float>(Transpose::no, piece.slopes, 0.0F, product);
+    } else {
+      scaled = piece.values * piece.forms.col(which).asDiagonal();
+      gemm<float>(Transpose::no, Transpose::yes, 1.0F, scaled, piece.values, 0.0F, product);
+    }
+    for (Index i = 0; i < size; ++i) {
+      double* row = &sum(piece.functions[static_cast<std::size_t>(i)], 0);
+      for (Index j = 0; j <= i; ++j)
+        row[piece.functions[static_cast<std::size_t>(j)]] += static_cast<double>(product(i, j));
+    }
+  }
+  return sum;
+}
+
+RowMatrix<double> Assembly::asked() const {
+  RowMatrix<double> sum = RowMatrix<double>::Zero(centers_ + 4, 3);
+  for (const Piece& piece : pieces_)
+    for (std::size_t i = 0; i < piece.functions.size(); ++i)
+      sum.row(piece.functions[i]) += piece.asked.row(static_cast<Index>(i)).cast<double>();
+  return sum;
 }
 
 /// Adds a symmetric matrix, of which the lower triangle is known, to a block of the whole.
@@ -171,26 +173,28 @@ RowMatrix<double> solve_velocity(const RadialBasis& basis, const WrapMotion& mot
                                  const WrapMarks& marks, const Progress& progress) {
   constexpr int coupled_of[3][3] = {{0, 3, 4}, {3, 1, 5}, {4, 5, 2}};
   const Index size = basis.size();
-  std::vector<Sums> sums = Assembly(basis, motion, forces).sums(progress);
-  Sums& sum = sums.front();
-  for (std::size_t part = 1; part < sums.size(); ++part) {
-    sum.shared += sums[part].shared;
-    for (std::size_t c = 0; c < 6; ++c) sum.coupled[c] += sums[part].coupled[c];
-    sum.asked += sums[part].asked;
-  }
-  sum.shared.diagonal().head(basis.center_count()).array() += motion.ridge;
+  const Assembly assembly(basis, motion, forces);
+  progress.check();
+  std::array<RowMatrix<double>, 7> products;  // the first is what the coordinates share
+  parallel_jobs(7, [&](Index job) {
+    products[static_cast<std::size_t>(job)] = assembly.products(static_cast<int>(job) - 1, progress);
+  });
+  progress.check();
+  RowMatrix<double>& shared = products[0];
+  RowMatrix<double> asked_of = assembly.asked();
+  shared.diagonal().head(basis.center_count()).array() += motion.ridge;
   if (marks.places.rows() > 0) {
     const RowMatrix<double> rows = radial_rows(basis, marks.places, JetOrder::value);
     const double weight = marks.weight / static_cast<double>(rows.rows());
-    sum.shared += weight * rows.transpose() * rows;
-    sum.asked += weight * rows.transpose() * marks.ways;
+    shared += weight * rows.transpose() * rows;
+    asked_of += weight * rows.transpose() * marks.ways;
   }
   RowMatrix<double> matrix = RowMatrix<double>::Zero(3 * size, 3 * size), asked(3 * size, 1);
   for (int q = 0; q < 3; ++q) {
-    add_block(sum.shared, q, q, matrix);
+    add_block(shared, q, q, matrix);
     for (int r = 0; r <= q; ++r)
-      add_block(sum.coupled[static_cast<std::size_t>(coupled_of[q][r])], q, r, matrix);
-    asked.middleRows(q * size, size) = sum.asked.col(q);
+      add_block(products[static_cast<std::size_t>(1 + coupled_of[q][r])], q, r, matrix);
+    asked.middleRows(q * size, size) = asked_of.col(q);
   }
   progress.check();
   const RowMatrix<double> found = cholesky_solve<double>(factor_of(matrix), asked);
