@@ -2,6 +2,7 @@
 #include <deque>
 
 #include "core/errors.h"
+#include "fields/composed_field.h"
 #include "fields/invertible_field.h"
 #include "fields/neural_field.h"
 #include "fields/radial_field.h"
@@ -14,8 +15,14 @@ namespace {
 
 constexpr const char* field_kind = "field";
 constexpr Index most_couplings = 256;
-constexpr const char* field_types = "'neural', 'radial' or 'invertible' is needed";
+constexpr int most_repeats = 256;
+constexpr std::size_t most_steps = 100000;
+constexpr const char* field_types = "'neural', 'radial', 'invertible' or 'composed' is needed";
 constexpr Index most_rows = Index{1} << 40;  ///< declared; what there is of them is the file's size
+
+std::string step_prefix(const std::string& prefix, std::size_t step) {
+  return prefix + "steps[" + std::to_string(step) + "].";
+}
 
 /// Adds a field's arrays to a file and keeps those that have to be made for it.
 class FieldArrays {
@@ -27,6 +34,8 @@ class FieldArrays {
       add_radial(*radial, prefix);
     else if (const auto* invertible = dynamic_cast<const InvertibleField*>(&field))
       add_invertible(*invertible, prefix);
+    else if (const auto* composed = dynamic_cast<const ComposedField*>(&field))
+      add_composed(*composed, prefix);
     add_rows(prefix + "rest_points", field.rest_points());
   }
   ArchiveWriter file;
@@ -74,9 +83,21 @@ class FieldArrays {
     add_rows(prefix + "embedding.slopes", basis.embedding->slopes);
   }
 
+  void add_composed(const ComposedField& field, const std::string& prefix) {
+    for (std::size_t i = 0; i < field.steps().size(); ++i)
+      add_radial(*field.steps()[i].map, step_prefix(prefix, i));
+  }
+
   std::deque<VectorF> kept_;  // whose elements stay where they are
   std::deque<Vector> doubles_;
 };
+
+void add_radial_structure(const RadialField& field, Json& structure) {
+  structure["centers"] = field.basis().center_count();
+  if (field.influence()) structure["influence"] = field.influence()->places().rows();
+  if (const InteriorEmbedding* embedding = field.basis().embedding.get())
+    structure["embedding"] = {{"nodes", embedding->nodes.rows()}, {"width", embedding->width}};
+}
 
 Json structure_of(const DeformationField& field) {
   Json structure{{"frame", frame_structure(field.frame())}, {"rest_points", field.rest_points().rows()}};
@@ -87,17 +108,21 @@ Json structure_of(const DeformationField& field) {
     if (neural->base()) structure["base"] = structure_of(*neural->base());
   } else if (const auto* radial = dynamic_cast<const RadialField*>(&field)) {
     structure["type"] = "radial";
-    structure["centers"] = radial->basis().center_count();
-    if (radial->influence()) structure["influence"] = radial->influence()->places().rows();
-    if (const InteriorEmbedding* embedding = radial->basis().embedding.get())
-      structure["embedding"] = {{"nodes", embedding->nodes.rows()}, {"width", embedding->width}};
+    add_radial_structure(*radial, structure);
+  } else if (const auto* composed = dynamic_cast<const ComposedField*>(&field)) {
+    structure["type"] = "composed";
+    structure["steps"] = Json::array();
+    for (const FieldStep& step : composed->steps()) {
+      Json& one = structure["steps"].emplace_back(Json{{"repeats", step.repeats}});
+      add_radial_structure(*step.map, one);
+    }
   } else if (const auto* invertible = dynamic_cast<const InvertibleField*>(&field)) {
     structure["type"] = "invertible";
     structure["network"] = network_structure(MlpShape{invertible->shape(), 2});
     structure["couplings"] = invertible->shape().couplings;
   } else {
     throw InvalidInput("field", "a kind without a file format",
-                       "neural, invertible and radial fields can be saved");
+                       "neural, invertible, radial and composed fields can be saved");
   }
   return structure;
 }
@@ -145,10 +170,8 @@ std::shared_ptr<DeformationField> read_invertible(ArchiveReader& file, const Jso
   return field;
 }
 
-std::shared_ptr<DeformationField> read_radial(ArchiveReader& file, const Json& structure,
-                                              const std::string& name, const std::string& prefix) {
-  const JsonObject object(structure, name,
-                          {"type", "frame", "rest_points", "centers", "embedding", "influence"});
+std::shared_ptr<RadialField> read_radial(ArchiveReader& file, const JsonObject& object,
+                                         const std::string& prefix) {
   const Index count = object.integer("centers", 0, most_rows);
   RadialBasis basis;
   basis.centers = file.points(prefix + "centers", count);
@@ -175,19 +198,43 @@ std::shared_ptr<DeformationField> read_radial(ArchiveReader& file, const Json& s
                                        std::move(influence));
 }
 
+std::shared_ptr<DeformationField> read_composed(ArchiveReader& file, const Json& structure,
+                                                const std::string& name, const std::string& prefix) {
+  const Json& given = JsonObject(structure, name, {"type", "frame", "rest_points", "steps"}).at("steps");
+  require(given.is_array() && given.size() <= most_steps, name + ".steps", "no list, or too long a one",
+          "at most " + std::to_string(most_steps) + " steps are needed");
+  std::vector<FieldStep> steps;
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    const JsonObject step(given[i], step_prefix(name + ".", i) + "map",
+                          {"repeats", "centers", "embedding", "influence"});
+    const auto repeats = static_cast<int>(step.integer("repeats", 1, most_repeats));
+    steps.push_back({read_radial(file, step, step_prefix(prefix, i)), repeats});
+  }
+  return std::make_shared<ComposedField>(std::move(steps));
+}
+
 std::shared_ptr<DeformationField> read_field(ArchiveReader& file, const Json& structure,
                                              const std::string& name, const std::string& prefix) {
   require(structure.is_object() && structure.contains("type") && structure["type"].is_string(), name,
           "'type' is missing", field_types);
   const std::string type = structure["type"].get<std::string>();
-  require(type == "neural" || type == "radial" || type == "invertible", name + ".type", "'" + type + "'",
-          field_types);
-  const auto field = type == "neural"   ? read_neural(file, structure, name, prefix)
-                     : type == "radial" ? read_radial(file, structure, name, prefix)
-                                        : read_invertible(file, structure, name, prefix);
   const JsonObject object(structure, name,
                           {"type", "frame", "rest_points", "network", "handles", "base", "centers",
-                           "embedding", "influence", "couplings"});
+                           "embedding", "influence", "couplings", "steps"});
+  std::shared_ptr<DeformationField> field;
+  if (type == "neural")
+    field = read_neural(file, structure, name, prefix);
+  else if (type == "invertible")
+    field = read_invertible(file, structure, name, prefix);
+  else if (type == "composed")
+    field = read_composed(file, structure, name, prefix);
+  else if (type == "radial")
+    field = read_radial(
+        file,
+        JsonObject(structure, name, {"type", "frame", "rest_points", "centers", "embedding", "influence"}),
+        prefix);
+  else
+    throw InvalidInput(name + ".type", "'" + type + "'", field_types);
   field->set_frame(read_frame(object.at("frame"), object.name("frame")));
   field->set_rest_points(file.points(prefix + "rest_points", object.integer("rest_points", 0, most_rows)));
   return field;

@@ -7,68 +7,84 @@
 
 #include "core/parallel.h"
 #include "core/stopwatch.h"
-#include "fields/radial_evaluator.h"
+#include "distance/morton.h"
 #include "solve/live_setup.h"
 #include "solve/notes.h"
 #include "solve/setup.h"
 #include "solve/wrap_alignment.h"
-#include "solve/wrap_level.h"
+#include "solve/wrap_flow.h"
 
 namespace arapfields {
 namespace {
 
-/// Samples a center, at least, and the fewest centers.
-constexpr Index samples_a_center = 8, least_centers = 50;
-constexpr Index target_points = 12000, kept_rest_points = 4000;
-/// From the first stage to the last: weights of the pull and of the landmarks, factor of the bending, and
-/// share of ways along the target.
-constexpr double first_pull = 5.0, last_pull = 5000.0, first_landmarks = 20.0, last_landmarks = 200.0,
-                 first_bending = 1.0, last_bending = 0.02, first_slack = 0.5, last_slack = 0.05;
+constexpr Index target_points = 12000, drawing_points = 6000, kept_rest_points = 4000,
+                measured_points = 20000, energy_points = 4000;
+/// From the first stage to the last: weights of the pull, of what resists and of distances whatever the
+/// normals, share of ways along the target, and the radius and number of centers.
+constexpr double first_pull = 10.0, last_pull = 2000.0, first_rigid = 1.0, last_rigid = 0.1,
+                 last_nearest = 1.0, first_slack = 0.3, last_slack = 0.1, first_reach = 0.5,
+                 last_reach = 0.067;
+constexpr double first_centers = 60.0, landmark_pull = 30.0, viscosity = 1.5, coverage = 5.0;
 
 double between(double first, double last, double t) { return first * std::pow(last / first, t); }
 
 WrapStage stage_at(double t, const WrapOptions& options) {
   WrapStage stage;
-  stage.pull.weight = between(first_pull, last_pull * options.closeness, t);
-  stage.pull.slack = between(first_slack, last_slack, t);
-  stage.pull.coverage = options.coverage;
-  stage.pull.turn = options.normal_weight;
-  stage.landmarks = options.landmark_weight * between(first_landmarks, last_landmarks, t);
-  stage.bending = between(first_bending, last_bending, t);
+  stage.pull = {between(first_pull, last_pull * options.closeness, t), coverage * options.coverage,
+                options.normal_weight, between(first_slack, last_slack, t), last_nearest * t * t};
+  stage.landmarks = landmark_pull * options.landmark_weight;
+  stage.rigid = between(first_rigid, last_rigid, t);
+  stage.viscous = viscosity * options.bending;
+  stage.reach = between(first_reach, last_reach, t);
+  const auto most = static_cast<double>(options.centers);
+  stage.centers = static_cast<Index>(std::round(between(std::min(first_centers, most), most, t)));
   return stage;
 }
 
-/// A field of the aligned cube as one of the samples' own, which takes them onto the target.
-std::shared_ptr<RadialField> placed(const RadialBasis& basis, const RowMatrix<double>& coefficients,
-                                    const Similarity& placement, const SurfaceSamples& samples) {
+/// The steps in the aligned cube as a field of the samples' own, which takes them onto the target.
+std::shared_ptr<ComposedField> placed(std::vector<FieldStep> steps, const Similarity& placement,
+                                      const SurfaceSamples& samples) {
   const Frame& frame = samples.frame;
-  RowMatrix<double> there = coefficients * (placement.scale / frame.scale * placement.rotation.transpose());
-  there.row(basis.center_count()) += (placement.translation - frame.center).transpose() / frame.scale;
-  auto field = std::make_shared<RadialField>(basis, std::move(there));
+  const RadialBasis none{Points(0, 3), Vector(0)};
+  RowMatrix<double> there =
+      none.identity() * (placement.scale / frame.scale * placement.rotation.transpose());
+  there.row(0) += (placement.translation - frame.center).transpose() / frame.scale;
+  steps.push_back({std::make_shared<RadialField>(none, std::move(there)), 1});
+  auto field = std::make_shared<ComposedField>(std::move(steps));
   field->set_frame(frame);
   field->set_rest_points(samples.points.topRows(std::min(samples.size(), kept_rest_points)));
   return field;
 }
 
-void measure_distances(const WrapPlaces& end, const WrapTarget& target, WrapReport& report) {
+/// Beside the scale of the alignment: `field` is of the aligned cube.
+void measure(const ComposedField& field, const SurfaceSamples& samples, const WrapTarget& target,
+             WrapReport& report) {
+  Random random(0);
+  const std::vector<Index> rows = stratified(morton_order(samples.points), measured_points, random);
+  const Points points = rows_of(samples.points, rows);
+  JetBlock<double> jets(points.rows(), JetOrder::first);
+  field.evaluate(points, jets.view());
+  report.distortion = distortion<double>(std::as_const(jets).view());
+  const Points places = Eigen::Map<const Points>(jets.view().data, points.rows(), 3);
+  RowMatrix<double> jacobians(points.rows(), 9);
+  for (Index i = 0; i < points.rows(); ++i)
+    for (int k = 0; k < 3; ++k)
+      for (int l = 0; l < 3; ++l) jacobians(i, 3 * l + k) = jets.view().at(first_column(k), i)[l];
+  Vector growth;
+  const Points normals = moved_normals(jacobians, rows_of(samples.normals, rows), growth);
   const SurfaceDistances to = surface_distances(target.tree, target.points, target.normals, target.spacing,
-                                                end.places, end.normals, end.growth, target.whole);
-  const OrientedPoints tree(end.places, end.normals);
-  const SurfaceDistances from = surface_distances(tree, end.places, end.normals, mean_spacing(end.places),
-                                                  target.points, target.normals, {}, {});
+                                                places, normals, growth, target.whole);
+  const OrientedPoints tree(places, normals);
+  const SurfaceDistances from =
+      surface_distances(tree, places, normals, mean_spacing(places), target.points, target.normals, {}, {});
   report.to_target_mean = to.mean / target.diagonal;
   report.to_target_95 = to.most_95 / target.diagonal;
   report.from_target_mean = from.mean / target.diagonal;
   report.from_target_95 = from.most_95 / target.diagonal;
-}
-
-/// Beside the scale of the alignment.
-ArapValue measure_energy(const RadialBasis& basis, const RowMatrix<double>& coefficients, PointsIn samples) {
-  Points some(std::min<Index>(samples.rows(), kept_rest_points), 3);
-  for (Index i = 0; i < some.rows(); ++i) some.row(i) = samples.row(i * samples.rows() / some.rows());
-  JetBlock<double> jets(some.rows(), JetOrder::second);
-  RadialEvaluator<double>(basis, some).evaluate(coefficients, jets.view());
-  return arap_energy<double>(std::as_const(jets).view(), 1.0, 0.0, {});
+  const Points some = rows_of(points, random_subset(points.rows(), energy_points, random));
+  JetBlock<double> second(some.rows(), JetOrder::second);
+  field.evaluate(some, second.view());
+  report.arap = arap_energy<double>(std::as_const(second).view(), 1.0, 0.0, {});
 }
 
 WrapSource source_of(const SurfaceSamples& samples, const std::vector<Landmark>& landmarks) {
@@ -105,42 +121,29 @@ WrapSolution wrap(const SurfaceSamples& samples, const ImplicitFunction& functio
                                               report.notes, progress.part(0.1, 0.15));
   const WrapTarget target = there.seen_from(placement);
   const Points ends = placement.inverse_of(source.ends);
-  const RestShape shape(samples, true, seed);
-  progress.report(0.2, "surface measured");
+  progress.report(0.2, "aligned");
 
-  const Index centers =
-      std::min<Index>(options.centers, std::max(least_centers, samples.size() / samples_a_center));
-  WrapLevel level(samples, shape, target, source.landmarks, ends, options, centers);
-  RowMatrix<double> coefficients = level.basis().identity();
-  double done = 0.2;
+  const WrapTarget drawing = target.thinned(drawing_points);
+  WrapFlow flow(samples, drawing, source.landmarks, ends, seed);
+  const Progress flowing = progress.part(0.2, 0.95);
+  const double all = options.stages * options.iterations;
   for (int stage = 0; stage < options.stages; ++stage) {
     const double t = options.stages > 1 ? static_cast<double>(stage) / (options.stages - 1) : 1.0;
-    const double next = done + (0.95 - done) / (options.stages - stage);
-    report.iterations += level.descend(stage_at(t, options), coefficients, progress.part(done, next));
-    done = next;
-    progress.look(
-        [&](PointsIn points) { return placed(level.basis(), coefficients, placement, samples)->at(points); });
+    for (int k = 0; k < options.iterations; ++k) {
+      flow.step(stage_at(t, options), flowing.part(static_cast<double>(report.iterations) / all,
+                                                   static_cast<double>(report.iterations + 1) / all));
+      ++report.iterations;
+      progress.look([&](PointsIn points) { return placed(flow.steps(), placement, samples)->at(points); });
+    }
   }
   progress.report(0.95, "measuring the result");
-  solution.field = placed(level.basis(), coefficients, placement, samples);
-  // Neighbours beside each other: blocks of points then see few centers.
-  const std::vector<Index> order(shape.order.begin(), shape.order.end());
-  const Points points = rows_of(samples.points, order);
-  const RadialEvaluator<double> everywhere(level.basis(), points, JetOrder::first);
-  const WrapPlaces end(everywhere, coefficients, rows_of(samples.normals, order));
-  report.distortion = end.distortion;
-  report.arap = measure_energy(level.basis(), coefficients, points);
+  solution.field = placed(flow.steps(), placement, samples);
+  measure(ComposedField(flow.steps()), samples, target, report);
   report.diagonal = there.diagonal;
   report.scale = placement.scale / samples.frame.scale;
-  report.matched_share = level.matched_share();
-  measure_distances(end, target, report);
-  if (!landmarks.empty()) {
-    Points reached(ends.rows(), 3);
-    RadialEvaluator<double>(level.basis(), source.landmarks, JetOrder::value)
-        .evaluate(coefficients, {reached.data(), ends.rows(), JetOrder::value});
-    const Vector left = placement.scale * (reached - ends).rowwise().norm();
-    report.landmarks.assign(left.data(), left.data() + left.size());
-  }
+  report.matched_share = flow.matched_share();
+  const Vector left = placement.scale * (flow.landmarks() - ends).rowwise().norm();
+  report.landmarks.assign(left.data(), left.data() + left.size());
   for (std::string& note : notes_on(report.distortion, std::nullopt)) report.notes.push_back(std::move(note));
   report.seconds = watch.seconds();
   progress.report(1.0, "done");

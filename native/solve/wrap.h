@@ -10,7 +10,7 @@
 #include "core/task.h"
 #include "energies/arap.h"
 #include "energies/distortion.h"
-#include "fields/radial_field.h"
+#include "fields/field.h"
 #include "mesh/surface_samples.h"
 #include "options/wrap.h"
 
@@ -37,15 +37,16 @@ struct WrapReport {
 };
 
 struct WrapSolution {
-  std::shared_ptr<RadialField> field;
+  std::shared_ptr<DeformationField> field;
   WrapReport report;
 };
 
 /// Deforms a surface onto the zero set of a function, as rigidly as possible: moves, turns and scales it as a
-/// whole, then bends it in stages of decreasing rigidity, drawn by the nearest places with like normals on
-/// both sides and by landmarks. What has no counterpart on an open target is only carried along. The samples
-/// need normals; their weights say what resists more. Throws InvalidInput that names bad options, samples,
-/// landmarks far off their surfaces or contradicting each other, and a target without a surface; Cancelled.
+/// whole, then lets it flow there in stages of decreasing rigidity, drawn by the nearest places with like
+/// normals on both sides and by landmarks. It does not pass through itself: each step can be undone. What has
+/// no counterpart on an open target is only carried along. The samples need normals; their weights say what
+/// resists more. Throws InvalidInput that names bad options, samples, landmarks far off their surfaces or
+/// contradicting each other, and a target without a surface; Cancelled.
 ARAPFIELDS_EXPORT WrapSolution wrap(const SurfaceSamples& samples, const ImplicitFunction& target,
                                     const std::vector<Landmark>& landmarks, const WrapOptions& options,
                                     const Progress& progress = {});
