@@ -74,6 +74,9 @@ def make_examples(folder):
     target[0, 3] = 0.5
     handles = [af.Cuboid(rest, rest), af.Cuboid(above, target)]
     small = {"iterations": 3, "batch": 20, "width": 8, "layers": 1, "octaves": 2, "threads": 1}
+    ends = both * [1.2, 1.0, 1.1]
+    onto = af.MeshSdf(ends, np.arange(len(ends) - 3)[:, None] + [0, 1, 2])
+    flow = af.WrapOptions(centers=20, stages=2, iterations=1, alignment="rigid", threads=1)
     live = {"samples": 200, "coarse_centers": 8, "fine_centers": 20, "iterations": 3, "threads": 1}
     made = {
         "sdf": sdf,
@@ -82,6 +85,7 @@ def make_examples(folder):
         "refined": af.deform(samples, handles, af.DeformOptions(start="radial", centers=20, **small)),
         "invertible": af.deform(samples, handles, af.DeformOptions(field="invertible", couplings=3, **small)),
         "radial": af.LiveDeformer(samples, handles, af.LiveOptions(interior=False, **live)).solve(),
+        "composed": af.wrap(samples, onto, options=flow),
         "embedded": af.LiveDeformer(samples, handles, af.LiveOptions(interior=True, **live)).solve(),
     }
     for name, thing in made.items():

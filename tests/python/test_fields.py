@@ -34,6 +34,15 @@ def refined(samples):
     return af.deform(samples, cases.bar_handles(), options)
 
 
+@pytest.fixture(scope="module")
+def wrapped(samples):
+    """A flow: maps one after the other."""
+    onto = af.MeshSdf(
+        samples.points * [1.2, 1.1, 0.9], np.arange(len(samples.points) - 2)[:, None] + [0, 1, 2]
+    )
+    return af.wrap(samples, onto, options=af.WrapOptions(centers=40, stages=3, iterations=2))
+
+
 def differences(function, points, step=2e-3):
     """Central differences of fourth order, the new axis last."""
     columns = []
@@ -45,7 +54,7 @@ def differences(function, points, step=2e-3):
     return np.stack(columns, -1)
 
 
-@pytest.mark.parametrize("kind", ["bent", "exact", "refined"])
+@pytest.mark.parametrize("kind", ["bent", "exact", "refined", "wrapped"])
 def test_derivatives_against_differences(kind, samples, request):
     field = request.getfixturevalue(kind)
     points = samples.points[:40] * 0.97

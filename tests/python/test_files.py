@@ -29,7 +29,10 @@ def refusal(path, content=None):
     return str(error.value)
 
 
-@pytest.mark.parametrize("name", ["sdf", "neural", "exact", "refined", "invertible", "radial", "embedded"])
+NAMES = ["sdf", "neural", "exact", "refined", "invertible", "composed", "radial", "embedded"]
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_any_reader_of_safetensors_opens_them(name, examples):
     texts, arrays = archives.read(examples[name])
     found = safetensors.numpy.load_file(examples[name])
@@ -40,7 +43,7 @@ def test_any_reader_of_safetensors_opens_them(name, examples):
     assert texts["kind"] == ("sdf" if name == "sdf" else "field")
 
 
-@pytest.mark.parametrize("name", ["sdf", "neural", "exact", "refined", "invertible", "radial", "embedded"])
+@pytest.mark.parametrize("name", NAMES)
 def test_what_is_read_is_written_again(name, examples, tmp_path):
     archives.load(examples[name]).save(tmp_path / "again")
     assert (tmp_path / "again").read_bytes() == examples[name].read_bytes()
@@ -174,10 +177,19 @@ def test_what_a_file_says_of_itself(change, word, examples, tmp_path):
         (["base"], {}),
         (["base", "frame"], 7),
         (["colour"], 1),
+        (["steps"], {}),
+        (["steps"], 3),
+        (["steps"], [3]),
+        (["steps", 0], {}),
+        (["steps", 0, "repeats"], 0),
+        (["steps", 0, "repeats"], 10**9),
+        (["steps", 0, "centers"], 10**11),
+        (["steps", 0, "centers"], 1),
+        (["steps", 0, "steps"], []),
     ],
 )
 def test_structures_that_do_not_fit(where, value, examples, tmp_path):
-    name = "exact" if where[0] == "handles" else "refined"
+    name = {"handles": "exact", "steps": "composed"}.get(where[0], "refined")
     texts, arrays = archives.read(examples[name])
     part = texts["structure"]
     for key in where[:-1]:

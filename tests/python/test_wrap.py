@@ -49,6 +49,18 @@ def test_any_implicit_function_is_a_target(samples):
     assert any("not alike" in note for note in field.report.notes)
 
 
+def test_what_the_target_lacks_is_drawn_in_without_passing_through_itself(figure, samples):
+    """The nose and the hump of the shape have no counterpart on a ball."""
+    ball = af.MeshSdf(*cases.sphere(0.8, 3))
+    field = af.wrap(samples, ball, [], af.WrapOptions(alignment="none", centers=200))
+    v, f = cases.figure(5)
+    assert cases.crossing_share(field(v), f) == 0
+    assert field.report.flipped_share == 0 and field.report.min_determinant > 0
+    (mean, _), (back, _) = cases.distances(field(v), f, *cases.sphere(0.8, 4), 2000)
+    assert max(mean, back) < FOUND_AGAIN
+    assert np.abs(field.inverse(field(v[:500])) - v[:500]).max() < 1e-6
+
+
 def test_what_an_open_target_lacks_keeps_its_shape(figure, samples):
     v, f = figure
     half = f[(v[f].mean(1)[:, 0] < 0.2)]

@@ -8,18 +8,13 @@ from network_oracle import Network
 
 import arapfields as af
 
-# By pair, in % of the target's diagonal: largest mean distance either way, and what 95 % keep. The aim is
-# 0.3 and 1.5; limbs that have to grow out of a trunk stay beyond. Then the share of crossing triangles:
-# parts that the target lacks are laid onto it.
-REACHED = {
-    "shiba spot": (0.3, 1.5, 0.05),
-    "spot shiba": (0.3, 1.5, 0.015),
-    "bunny frog": (1.0, 4.5, 0.16),
-    "whale spot": (0.7, 3.5, 0.09),
-}
+PAIRS = ("shiba spot", "spot shiba", "bunny frog", "whale spot")
+# Of the exact distances either way, in % of the target's diagonal: the mean, and what 95 % keep.
+NEAR, NEARLY_ALL = 0.3, 1.5
+CROSSING = 0.001  # of the triangles: the flow folds nothing, but triangles have edges as long as they have
 # What the report tells, from the samples, of the mean distances between the surfaces themselves.
 TOLD = 0.06
-UPRIGHT = 0.99  # share of samples with det J > 0
+UPRIGHT = 0.999  # share of samples with det J > 0
 
 FACING = {"shiba": (1, 0, 0), "spot": (0, 1, 0), "bunny": (-1, 0, 0), "frog": (1, 0, 0), "whale": (0, -1, 0)}
 
@@ -69,22 +64,22 @@ def landmarks(name, v):
     return whale_clicks(v) if name == "whale" else clicks(v, FACING[name])
 
 
-@pytest.mark.parametrize("pair", REACHED)
-def test_published_shapes_onto_each_other(data_dir, pair):
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("pair", PAIRS)
+def test_published_shapes_onto_each_other(data_dir, pair, seed):
     name, onto = pair.split()
     _, v, f = surface(data_dir, name)
     target, onto_v, onto_f = surface(data_dir, onto)
     here, there = landmarks(name, v), landmarks(onto, onto_v)
     pairs = [(here[place], there[place]) for place in here if place in there]
-    field = af.wrap(af.sample_mesh(v, f), target, pairs)
+    field = af.wrap(af.sample_mesh(v, f), target, pairs, af.WrapOptions(seed=seed))
     wrapped = field(v)
-    largest, farthest, crossing = REACHED[pair]
     exact = cases.distances(wrapped, f, onto_v, onto_f, 20000)
     told = field.report.to_target_mean, field.report.from_target_mean
     for (mean, most), reported in zip(exact, told, strict=True):
-        assert mean <= largest and most <= farthest
+        assert mean <= NEAR and most <= NEARLY_ALL
         assert abs(100 * reported - mean) <= TOLD
-    assert cases.crossing_share(wrapped, f) <= crossing
+    assert cases.crossing_share(wrapped, f) <= CROSSING
     assert 1 - field.report.flipped_share >= UPRIGHT
 
 
