@@ -24,7 +24,7 @@ constexpr Index target_points = 12000, drawing_points = 6000, kept_rest_points =
 constexpr double first_pull = 10.0, last_pull = 2000.0, first_rigid = 1.0, last_rigid = 0.1,
                  last_nearest = 1.0, first_slack = 0.3, last_slack = 0.1, first_reach = 0.5,
                  last_reach = 0.067;
-constexpr double first_centers = 60.0, landmark_pull = 30.0, viscosity = 1.5, coverage = 5.0;
+constexpr double first_centers = 60.0, landmark_pull = 30.0, viscosity = 1.5, coverage = 5.75;
 
 double between(double first, double last, double t) { return first * std::pow(last / first, t); }
 
