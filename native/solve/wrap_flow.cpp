@@ -62,7 +62,7 @@ Points moved_normals(const RowMatrix<double>& jacobians, PointsIn normals, Vecto
 struct WrapFlow::Chosen {
   WrapPlaces surface;  // shares of the surface by its area then and at rest, half and half
   RowMatrix<double> jacobians;
-  Vector rest_shares, grown_shares, weights;
+  Vector rest_shares, grown_shares, weights, bend_weights;
 };
 
 WrapFlow::WrapFlow(const SurfaceSamples& samples, const WrapTarget& target, PointsIn landmarks, PointsIn ends,
@@ -72,6 +72,7 @@ WrapFlow::WrapFlow(const SurfaceSamples& samples, const WrapTarget& target, Poin
   places_ = rows_of(samples.points, taken);
   rest_normals_ = rows_of(samples.normals, taken);
   if (samples.weights.size() > 0) weights_ = entries_of(samples.weights, taken);
+  if (samples.bend_weights.size() > 0) bend_weights_ = entries_of(samples.bend_weights, taken);
   jacobians_.setZero(places_.rows(), 9);
   for (int k = 0; k < 3; ++k) jacobians_.col(4 * k).setOnes();
 }
@@ -102,6 +103,7 @@ WrapFlow::Chosen WrapFlow::choose(Index count) {
   chosen.grown_shares /= chosen.grown_shares.sum();
   chosen.surface.shares = 0.5 * (chosen.rest_shares + chosen.grown_shares);
   if (weights_.size() > 0) chosen.weights = entries_of(weights_, rows);
+  if (bend_weights_.size() > 0) chosen.bend_weights = entries_of(bend_weights_, rows);
   return chosen;
 }
 
@@ -160,6 +162,7 @@ void WrapFlow::step(const WrapStage& stage, const Progress& progress) {
     motion.rigid =
         chosen.rest_shares.array() * (stage.rigid + (1.0 - stage.rigid) * (1.0 - forces.agreements.array()));
   if (chosen.weights.size() > 0) motion.rigid = motion.rigid.cwiseProduct(chosen.weights);
+  if (chosen.bend_weights.size() > 0) motion.viscous = motion.viscous.cwiseProduct(chosen.bend_weights);
   const WrapMarks marks{landmarks_, ends_ - landmarks_, stage.landmarks * unit};
   const RadialBasis centers = basis(stage, chosen.surface.places);
   follow(centers, solve_velocity(centers, motion, forces, marks, progress.part(0.2, 0.8)),

@@ -48,7 +48,7 @@ class WrapFlow {
   Random random_;
   Points rest_normals_, places_;  // of samples, neighbours at rest beside each other
   RowMatrix<double> jacobians_;   // (n,9), row-major
-  Vector weights_;
+  Vector weights_, bend_weights_;
   Points landmarks_, ends_;
   std::vector<FieldStep> steps_;
   double matched_share_ = 1.0;

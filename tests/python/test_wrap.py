@@ -38,6 +38,20 @@ def test_a_moved_scaled_and_bent_shape_is_found_again(figure, samples, landmarks
     assert away < 0.08  # its points too, nearly: nothing but rigidity keeps them from sliding along it
 
 
+@pytest.mark.parametrize("name", ["weights", "bend_weights"])
+def test_what_weighs_more_resists_more(figure, samples, name):
+    """The nose beside the rest of a shape that is to become a ball."""
+    v, f = figure
+    nose = v[:, 0] > 1.0
+    heavy = np.where(samples.points[:, 0] > 0.9, 300.0, 1.0)
+    lengths = [
+        np.ptp(af.wrap(each, af.MeshSdf(*cases.sphere(0.8, 3)), [], options)(v)[nose][:, 0])
+        for options in [af.WrapOptions(alignment="none", **cases.SMALL)]
+        for each in (samples, samples.with_weights(**{name: heavy}))
+    ]
+    assert lengths[1] > 1.1 * lengths[0]
+
+
 def test_any_implicit_function_is_a_target(samples):
     class Ball(af.ImplicitFunction):
         def __call__(self, points):
