@@ -12,6 +12,26 @@ from ..core.errors import UserError
 from ..names import Op
 from . import landmarks
 
+AROUND = np.arange(0, 2 * np.pi, np.pi / 4)
+# Pixels about a click in which a surface is found: scans have holes, and ends of limbs are thin.
+OFFSETS = [np.zeros(2), *(r * np.array([np.cos(a), np.sin(a)]) for r in (3, 6, 9, 12) for a in AROUND)]
+NAVIGATION = (110, 320)  # pixels that Blender's gizmos of navigation take in the view's upper right corner
+
+
+def covers(region, spot):
+    """Whether a region has that pixel of the window."""
+    return 0 <= spot[0] - region.x < region.width and 0 <= spot[1] - region.y < region.height
+
+
+def is_navigation(context, region, spot):
+    """Whether a pixel of the window is among the view's gizmos of navigation."""
+    space, scale = context.area.spaces.active, context.preferences.system.ui_scale
+    if not (space.show_gizmo and space.show_gizmo_navigate):
+        return False
+    aside = [r.x for r in context.area.regions if r.type == "UI" and r.width > 1 and r.x > region.x]
+    right, top = min([region.x + region.width, *aside]), region.y + region.height
+    return spot[0] > right - scale * NAVIGATION[0] and spot[1] > top - scale * NAVIGATION[1]
+
 
 class ARAPFIELDS_OT_click_landmarks(SourceOperator, bpy.types.Operator):
     """Click a place on the object, then where it belongs on the target, again and again"""
@@ -54,25 +74,33 @@ class ARAPFIELDS_OT_click_landmarks(SourceOperator, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def click(self, context, event):
-        """Takes a click on one of the two objects; whether it was one."""
-        region = next((r for r in context.area.regions if r.type == "WINDOW"), None)
-        pixel = event.mouse_x - region.x, event.mouse_y - region.y
-        if not (0 <= pixel[0] < region.width and 0 <= pixel[1] < region.height):
+        """Takes a click, also one on neither object; False where it belongs to what lies over the view."""
+        spot = event.mouse_x, event.mouse_y
+        whole = next(r for r in context.area.regions if r.type == "WINDOW")
+        if not covers(whole, spot) or any(covers(r, spot) for r in context.area.regions if r != whole):
             return False
-        view = context.area.spaces.active.region_3d
-        origin = view3d_utils.region_2d_to_origin_3d(region, view, pixel)
-        direction = view3d_utils.region_2d_to_vector_3d(region, view, pixel)
-        hit, place, _, _, item, _ = context.scene.ray_cast(
-            context.evaluated_depsgraph_get(), origin, direction
-        )
-        which = next((k for k, end in enumerate(self.ends) if hit and end.find() == item.original), None)
+        which, place = self.struck(context, whole, np.subtract(spot, (whole.x, whole.y)))
         if which is None:
-            return False
+            return not is_navigation(context, whole, spot)
         self.clicked[which] = np.array(place)
         if len(self.clicked) == 2:
             landmarks.place(context, *(end.get() for end in self.ends), self.clicked[0], self.clicked[1])
             self.clicked = {}
         return True
+
+    def struck(self, context, region, pixel):
+        """(which, place) of the surface at a pixel, else of the nearest about it; (None, None) for none."""
+        view, graph = context.area.spaces.active.region_3d, context.evaluated_depsgraph_get()
+        scale = context.preferences.system.ui_scale
+        for offset in OFFSETS:
+            at = pixel + scale * offset
+            origin = view3d_utils.region_2d_to_origin_3d(region, view, at)
+            direction = view3d_utils.region_2d_to_vector_3d(region, view, at)
+            hit, place, _, _, item, _ = context.scene.ray_cast(graph, origin, direction)
+            for which, end in enumerate(self.ends):
+                if hit and end.find() == item.original:
+                    return which, place
+        return None, None
 
     def take_back(self):
         """The half of a pair that was clicked, else the last pair."""

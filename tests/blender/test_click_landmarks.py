@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Landmarks by click, driven by stand-ins for a 3D view and its mouse: a pixel is a hundredth of a unit."""
+
+from types import SimpleNamespace
+
+from inside import in_blender
+
+
+def clicker():
+    """(item, click) of a bar and a target 3 units to its right, seen from the front.
+
+    `click(x, z)`, in units, gives what the modal operator answers and the halves of a pair that it has.
+    """
+    import bpy
+    import scenes
+    from mathutils import Matrix
+
+    from addon.blender.object_references import ObjectReference
+    from addon.wrap.clicking import ARAPFIELDS_OT_click_landmarks as Operator
+
+    target = scenes.bar("Scan")
+    target.location.x = 3
+    item = scenes.bar()
+    item.arapfields.wrap.onto = target
+    bpy.context.view_layer.update()
+    names = ("modal", "click", "struck", "take_back", "tell", "end")
+    made = type("Clicker", (), {name: vars(Operator)[name] for name in names})()
+    made.ends, made.clicked, made.report = [ObjectReference(item), ObjectReference(target)], {}, print
+    turn = Matrix(((1, 0, 0, 0), (0, 0, 1, 0), (0, -1, 0, -10), (0, 0, 0, 1)))
+    flat = Matrix.Diagonal((0.2, 0.2, -0.01, 1)) @ turn
+    view = SimpleNamespace(
+        view_matrix=turn, perspective_matrix=flat, is_perspective=False, view_perspective="ORTHO"
+    )
+    whole = SimpleNamespace(type="WINDOW", x=0, y=0, width=1000, height=1000)
+    sidebar = SimpleNamespace(type="UI", x=850, y=0, width=150, height=1000)
+    space = SimpleNamespace(region_3d=view, show_gizmo=True, show_gizmo_navigate=True)
+    area = SimpleNamespace(
+        regions=[whole, sidebar],
+        spaces=SimpleNamespace(active=space),
+        header_text_set=print,
+        tag_redraw=print,
+    )
+    context = SimpleNamespace(
+        area=area,
+        scene=bpy.context.scene,
+        evaluated_depsgraph_get=bpy.context.evaluated_depsgraph_get,
+        collection=bpy.context.collection,
+        view_layer=bpy.context.view_layer,
+        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
+    )
+
+    def click(x, z):
+        event = SimpleNamespace(type="LEFTMOUSE", value="PRESS", mouse_x=500 + 100 * x, mouse_y=500 + 100 * z)
+        return made.modal(context, event), sorted(made.clicked)
+
+    return item, click
+
+
+@in_blender
+def test_a_click_just_beside_the_surface_takes_its_edge():
+    import numpy as np
+    from test_click_landmarks import clicker
+
+    item, click = clicker()
+    assert click(-1.08, 0.0) == ({"RUNNING_MODAL"}, [0])
+    assert click(3.0, 0.33) == ({"RUNNING_MODAL"}, [])
+    (pair,) = item.arapfields.wrap.landmarks
+    ends = [end.matrix_world.translation for end in (pair.rest, pair.on_target)]
+    assert np.abs(ends[0].x + 1) < 0.05 and np.abs(ends[1].z - 0.25) < 0.05
+
+
+@in_blender
+def test_a_click_on_neither_selects_nothing_and_the_sidebar_has_its_own():
+    from test_click_landmarks import clicker
+
+    _, click = clicker()
+    assert click(1.5, 0.0) == ({"RUNNING_MODAL"}, [])  # between the two
+    assert click(3.8, 0.0) == ({"PASS_THROUGH"}, [])  # the sidebar lies over the target
+    assert click(3.0, 4.0) == ({"PASS_THROUGH"}, [])  # the gizmos of navigation
