@@ -11,6 +11,7 @@ import hashlib
 import bpy
 
 from ..blender import timers
+from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..field_modifier import motion
 
@@ -81,7 +82,10 @@ def put_back(reference, before):
         if source is not None and source.mode == "EDIT":
             return WAIT
         if source is not None:
+            under_rig = settings_of(source).under_rig
             motion.restore(source, before)
+            if settings_of(source).under_rig != under_rig:  # the result is still to come to that place
+                settings_of(source).under_rig = under_rig
         return None
 
     if attempt() is not None:

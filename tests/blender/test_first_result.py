@@ -30,6 +30,24 @@ def test_what_is_shown_is_put_back_bit_for_bit():
 
 
 @in_blender
+def test_the_field_keeps_the_place_below_the_armature_that_a_wrap_took_for_it():
+    from test_first_result import first_result
+    from wraps import rigged_bar
+
+    from addon.blender import modifier_stack
+
+    item, _ = rigged_bar()
+    item.arapfields.under_rig = True
+    place = modifier_stack.place(item)
+    first, moved = first_result(item)
+    first.show(moved.astype("f4"))
+    assert [m.type for m in item.modifiers] == ["NODES", "ARMATURE"]
+    first.clear()
+    assert [m.type for m in item.modifiers] == ["ARMATURE"]
+    assert modifier_stack.place(item) == place == 0
+
+
+@in_blender
 def test_steps_that_were_pushed_meanwhile_hold_nothing_of_it():
     import bpy
     import scenes
