@@ -41,7 +41,7 @@ def test_a_moved_scaled_and_bent_shape_is_found_again(figure, samples, landmarks
 @pytest.mark.parametrize("name", ["weights", "bend_weights"])
 def test_what_weighs_more_resists_more(figure, samples, name):
     """The nose beside the rest of a shape that is to become a ball."""
-    v, f = figure
+    v, _ = figure
     nose = v[:, 0] > 1.0
     heavy = np.where(samples.points[:, 0] > 0.9, 300.0, 1.0)
     lengths = [
