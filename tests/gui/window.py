@@ -2,8 +2,8 @@
 """Run by a real Blender with a window: jobs, live mode, the panel. docs/development.md says how.
 
 blender --factory-startup --python tests/gui/window.py -- OUTPUT_FOLDER [PART ...]
-Parts are panel, use, picks, jobs, stalls, live, press, pins, undo, render, table and endings; all where none
-is named. Of some there are shorter ones: picks-in-place, pins-rate, undo-within and undo-escaped. Writes
+Parts are panel, use, picks, jobs, stalls, live, press, pins, undo, render, table, wrap and endings; all where
+none is named. Of some there are shorter ones: picks-in-place, pins-rate, undo-within and undo-escaped. Writes
 checks.json, and pictures where ImageMagick's `import` is at hand; xdotool moves the mouse.
 Ends with a job running, which must not hold it.
 """
@@ -17,7 +17,7 @@ import bpy
 ROOT = Path(__file__).resolve().parents[2]
 OUTPUT, *PARTS = sys.argv[sys.argv.index("--") + 1 :]
 OUTPUT = Path(OUTPUT)
-sys.path[:0] = [str(ROOT), str(ROOT / "tests/blender"), str(ROOT / "tests/gui")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests/blender"), str(ROOT / "tests/gui")]
 
 import jobs  # noqa: E402
 import live  # noqa: E402
@@ -32,6 +32,7 @@ import stalls  # noqa: E402
 import table  # noqa: E402
 import undo  # noqa: E402
 import use  # noqa: E402
+import wrapping  # noqa: E402
 
 import addon  # noqa: E402
 
@@ -57,6 +58,7 @@ def steps():
         "undo-escaped": lambda: undo.checks(FOUND, OUTPUT, ("escaped",)),
         "render": lambda: render.checks(FOUND, OUTPUT),
         "table": lambda: table.checks(FOUND, OUTPUT),
+        "wrap": lambda: wrapping.checks(FOUND, OUTPUT),
         "endings": lambda: jobs.endings(FOUND),
     }
     stage.empty_file()

@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Wrap by mouse: the target chosen, landmarks clicked, the press, Esc, Factor, undo, a file opened again."""
+
+import time
+import types
+
+import bpy
+import character
+import numpy as np
+import panel
+import scenes
+import stage
+import wraps
+from mathutils import Vector
+from mouse import pixel, until
+
+SCAN_AT = Vector((2.0, 0, 0))
+# In the sidebar, of a window of 1600 × 1000, with Wrap alone open.
+EYEDROPPER, BUTTON, WRAP = (1263, 240), (1155, 265), (1155, 494)
+SETTLED = 1.5  # seconds in which the sidebar's sections slide to where they stay
+
+
+def checks(found, folder):
+    yield from set_stage()
+    yield from choose_target(found, folder)
+    yield from click_landmarks(found, folder)
+    yield from press(found, folder)
+
+
+def set_stage():
+    """The rigged, textured body and beside it the scan, from the front, with Wrap alone open."""
+    stage.empty_file()
+    with stage.override():
+        body, rig = wraps.rigged_character()
+        scan, _ = wraps.scan_of(wraps.grown_parts())
+        scan.location = SCAN_AT
+        body.data.materials.append(chequered())
+        rig.show_in_front = True
+        scenes.activate(body)
+        bpy.ops.view3d.view_all()
+        bpy.ops.view3d.view_axis(type="FRONT")
+        bpy.context.space_data.shading.color_type = "TEXTURE"
+        bpy.ops.ed.undo_push(message="stage")
+    yield 2.0
+    yield from panel.open_alone({"wrap"})
+    yield SETTLED
+
+
+def chequered():
+    picture = bpy.data.images.new("Chequers", 512, 512)
+    picture.generated_type = "COLOR_GRID"
+    material = bpy.data.materials.new("Chequered")
+    material.use_nodes = True
+    node = material.node_tree.nodes.new("ShaderNodeTexImage")
+    node.image = picture
+    shader = material.node_tree.nodes["Principled BSDF"]
+    material.node_tree.links.new(node.outputs[0], shader.inputs[0])
+    material.node_tree.nodes.active = node
+    return material
+
+
+def choose_target(found, folder):
+    """With the eyedropper beside Onto, on the scan."""
+    body, scan = bpy.data.objects["Body"], bpy.data.objects["Scan"]
+    yield from click(EYEDROPPER)
+    yield from click(pixel(SCAN_AT + Vector((0, -0.2, 1.2))))
+    found["wrap_target_by_eyedropper"] = body.arapfields.wrap.onto == scan
+
+
+def click(spot, button=1, pause=0.6):
+    stage.tool("mousemove", spot[0] - 3, spot[1])
+    yield 0.3
+    stage.tool("mousemove", *spot)
+    yield 0.3
+    stage.tool("click", button)
+    yield pause
+
+
+def key(name, pause=0.6):
+    stage.tool("key", name)
+    yield pause
+
+
+def click_landmarks(found, folder):
+    """Five pairs; the first half and the first pair are taken back by Backspace and clicked again."""
+    entries = bpy.data.objects["Body"].arapfields.wrap.landmarks
+    pairs = [(Vector(rest), SCAN_AT + Vector(there)) for rest, there in wraps.landmarks_of_people()]
+    middle = [Vector((0, 0, 1.0)), SCAN_AT + Vector((0, 0, 1.2))]
+    yield from click(BUTTON)
+    yield from click(inward(pairs[0][0], middle[0]))
+    stage.picture(folder, "wrap-half-a-pair")
+    yield from key("BackSpace")
+    for number, pair in enumerate((pairs[0], *pairs)):
+        for end, inner in zip(pair, middle, strict=True):
+            yield from click(inward(end, inner))
+        if number == 0:
+            found["wrap_first_pair"] = len(entries)
+            yield from key("BackSpace")
+            found["wrap_taken_back"] = len(entries)
+    stage.picture(folder, "wrap-clicked")
+    yield from key("Return")
+    away = [
+        round(float((Vector(end.matrix_world.translation) - where).length), 3)
+        for entry, pair in zip(entries, pairs, strict=True)
+        for end, where in zip((entry.rest, entry.on_target), pair, strict=True)
+    ]
+    found["wrap_landmarks_off_by"] = away
+    stage.tool("mousemove", 500, 850)
+    yield 0.6
+    stage.picture(folder, "wrap-landmarks")
+
+
+def inward(end, middle, by=0.03):
+    """The pixel of a place just within the outline."""
+    return pixel(end + by * (middle - end).normalized())
+
+
+def shape():
+    return scenes.world_points(bpy.data.objects["Body"])
+
+
+def press(found, folder):
+    """Esc during the first wrap, then one to its end: undone, redone, posed, with its target gone."""
+    body, rig = bpy.data.objects["Body"], bpy.data.objects["Rig"]
+    rest, bones = shape(), wraps.joints(rig, posed=False)
+    yield from click(WRAP, pause=1.0)
+    was_running = running()
+    stage.tool("mousemove", 600, 500)
+    yield from key("Escape", pause=0.1)
+    yield from until(lambda: not running(), 20.0)
+    yield 0.5
+    found["wrap_escape"] = was_running and np.array_equal(shape(), rest) and not fielded(body)
+    begin = time.perf_counter()
+    yield from click(WRAP, pause=1.0)
+    stage.picture(folder, "wrap-running")
+    yield from until(lambda: not running(), 120.0)
+    found["wrap_press_s"] = round(time.perf_counter() - begin, 1)
+    yield 1.0
+    stage.tool("mousemove", 500, 850)
+    yield 0.6
+    stage.picture(folder, "wrap-wrapped")
+    wrapped, moved = shape(), wraps.joints(rig, posed=False)
+    found["wrap_moves"] = [round(float(np.abs(a - b).max()), 3) for a, b in ((wrapped, rest), (moved, bones))]
+    yield from key("ctrl+z", pause=1.5)
+    body, rig = bpy.data.objects["Body"], bpy.data.objects["Rig"]
+    found["wrap_undone"] = np.array_equal(shape(), rest) and not fielded(body)
+    found["wrap_undone_bones"] = np.allclose(wraps.joints(rig, posed=False), bones, atol=1e-6)
+    yield from key("ctrl+shift+z", pause=1.5)
+    body, rig = bpy.data.objects["Body"], bpy.data.objects["Rig"]
+    found["wrap_redone"] = np.array_equal(shape(), wrapped)
+    found["wrap_redone_bones"] = np.allclose(wraps.joints(rig, posed=False), moved, atol=1e-6)
+    found["wrap_stack"] = [m.type for m in body.modifiers]
+    with stage.override():
+        character.pose(types.SimpleNamespace(rig=rig))
+    yield 1.0
+    stage.picture(folder, "wrap-posed")
+    yield from target_gone(found, folder)
+
+
+def target_gone(found, folder):
+    """The target is deleted while the object is wrapped onto it again; then the file is opened again."""
+    yield from click(WRAP, pause=1.0)
+    was_running = running()
+    bpy.data.objects.remove(bpy.data.objects["Scan"])
+    yield from until(lambda: not running(), 120.0)
+    yield 1.0
+    stage.picture(folder, "wrap-target-gone")
+    found["wrap_outlives_its_target"] = was_running and fielded(bpy.data.objects["Body"])
+    before, path = shape(), str(folder / "wrapped.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    yield 2.0
+    found["wrap_opened_again"] = np.array_equal(shape(), before)
+
+
+def running():
+    from addon.core.runtime import jobs
+
+    return jobs.running() is not None
+
+
+def fielded(item):
+    from addon.blender import modifier_stack
+
+    return modifier_stack.find(item) is not None
