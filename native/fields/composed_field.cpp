@@ -67,8 +67,9 @@ ComposedField::ComposedField(std::vector<FieldStep> steps) : steps_(std::move(st
 
 void ComposedField::evaluate(PointsIn points, JetView<double> out) const {
   const std::vector<std::uint32_t> order = morton_order(points);
-  for (Index first = 0; first < points.rows(); first += points_at_once) {
-    const Index count = std::min(points_at_once, points.rows() - first);
+  const Index all = points.rows();
+  for (Index first = 0; first < all; first += points_at_once) {
+    const Index count = std::min(points_at_once, all - first);
     Points here(count, 3);
     for (Index i = 0; i < count; ++i) here.row(i) = points.row(order[static_cast<std::size_t>(first + i)]);
     JetBlock<double> jets = identity_jets(here, out.order);

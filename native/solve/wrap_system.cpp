@@ -81,7 +81,7 @@ Piece Assembly::piece(Index b, const RadialEvaluator<double>& field, const WrapM
                       const WrapForces& forces) const {
   const RadialBlock<double> block = field.block(b);
   const Index count = block.active_count, all = count + 4, first = b * block_size,
-              valid = std::min(block_size, motion.places.rows() - first);
+              left = motion.places.rows() - first, valid = std::min<Index>(block_size, left);
   Piece piece;
   piece.functions.assign(block.active, block.active + count);
   for (Index k = 0; k < 4; ++k) piece.functions.push_back(centers_ + k);

@@ -6,8 +6,8 @@ import pytest
 from .run import refusals, run_target, unreached
 
 COUNTS = {
-    "fields": 1200,
-    "sdfs": 400,
+    "fields": 1400,
+    "sdfs": 500,
     "meshes": 300,
     "handles": 400,
     "normals": 300,
@@ -30,7 +30,7 @@ def findings():
 
 @pytest.mark.parametrize("target", COUNTS)
 def test_nothing_but_documented_errors(target, findings):
-    found = findings[target] = run_target(target, seed=1, count=COUNTS[target])
+    found = findings[target] = run_target(target, seed=3, count=COUNTS[target])
     assert sum(found.outcomes.values()) == COUNTS[target]
     assert not found.failures, found.failures[:3]
     if target != "records":  # which count as damaged instead
