@@ -81,10 +81,7 @@ class BakeOperator(JobOperator):
 
 
 def effective_kind(source, operator=None):
-    group = settings_of(source).bake
-    return object_bake.kind_of(
-        source, group.kind if operator is None else effective_value("kind", group, operator)
-    )
+    return object_bake.kind_of(source, effective_value("kind", settings_of(source).bake, operator))
 
 
 def refusal_of(source, kind):

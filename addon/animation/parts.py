@@ -23,7 +23,7 @@ class SharedFrames:
             session.kind,
             session.output,
             surface.exact,
-            surface.fit_options,
+            surface.fit.options,
             session.cells,
         ]
         content = repr(common).encode() + surface.vertices.tobytes() + surface.triangles.tobytes()

@@ -31,7 +31,7 @@ def definition(parameter, **extra):
     return bpy.props.FloatProperty(default=p.default, precision=precision, **limits, **common)
 
 
-def effective_values(parameters, group, operator):
+def effective_values(parameters, group, operator=None):
     """Values by name: the operator's arguments where given, else the object's settings."""
     return {p.name: from_single_precision(effective_value(p.name, group, operator)) for p in parameters}
 
@@ -43,4 +43,5 @@ def from_single_precision(value):
 
 def effective_value(name, group, operator):
     """One setting: the operator's argument where given, else the object's."""
-    return getattr(operator if operator.properties.is_property_set(name) else group, name)
+    given = operator is not None and operator.properties.is_property_set(name)
+    return getattr(operator if given else group, name)

@@ -17,8 +17,6 @@ from .runtime import native
 
 KEPT = 4000  # samples at most that tell where the surface is
 VERSION = 1
-OUTSIDE = 0.15  # of the shape's size: farther from it the field means nothing to another mesh
-FEW = 0.05  # share of the other mesh that may be farther
 
 
 @dataclass(frozen=True)
@@ -34,19 +32,6 @@ class Pose:
 
     def to_local(self, points):
         return transform(inverse(self.local_to_solve), points)
-
-    def refusal(self, distances, name):
-        """Why a mesh with these (n,) distances of its points from the samples is none for the field, as a
-        UserError; None where it is one."""
-        size = float(np.linalg.norm(np.ptp(self.samples.points, axis=0)))
-        share = float((distances > OUTSIDE * size).mean())
-        if share <= FEW:
-            return None
-        return UserError(
-            "{share} of {name} lie outside of the pose's field; it was saved on another shape, or elsewhere",
-            share=f"{share:.0%}",
-            name=name,
-        )
 
 
 def to_bytes(pose):

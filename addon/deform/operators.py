@@ -2,6 +2,7 @@
 import bpy
 
 from ..blender.language import translated
+from ..blender.native_options import options_of
 from ..blender.object_references import settings_of
 from ..blender.presets import preset_classes
 from ..blender.property_definitions import annotations, effective_values
@@ -14,7 +15,6 @@ from ..handles.native_handles import native_handles
 from ..live.giving_way import give_way
 from ..names import Op
 from ..properties.item import result_properties
-from ..surface.source_surface import build_options
 from .solve_job import SolveOperator, destination, plan_solve_job
 
 
@@ -44,7 +44,7 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
         context.view_layer.update()
         values = effective_values(DEFORM, settings_of(source).deform, self)
         af = native.library()
-        options = build_options(af.DeformOptions, values)
+        options = options_of("deform", values)
         handles = empties.solve_handles(source, space_of(source.matrix_world, source.name), weights)
 
         require_reach_heeded(handles, values)

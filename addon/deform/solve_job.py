@@ -19,7 +19,6 @@ from ..core.runtime.jobs import Item
 from ..jobs.job_operator import JobOperator
 from ..poses import applying
 from ..results import placement, visibility
-from ..stiffness import painted
 from ..surface.source_surface import read_surface
 from ..viewport.previews import Preview
 from .first_result import FirstResult
@@ -40,16 +39,13 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
     """The job's item. `solve(tracker, surface, samples, weight)` returns the field, on the worker."""
     settings = settings_of(source)
     output, target = destination(settings, operator)
-    cells = effective_value("resolution", settings, operator)
     reason = placement.refusal(source, output, target)
     if reason is not None:
         raise reason
-    surface = read_surface(context, source, in_place=placement.in_place(output, target))
-    surface.exact = effective_value("surface", settings, operator) == "EXACT"
-    surface.refine_thin = effective_value("refine_thin", settings, operator)
-    carrying = Carrying(context, source)
-    surface.painted = painted.read(context, source, surface.in_place)
-    surface.together = carrying.solids(context, surface.space)
+    exact = effective_value("surface", settings, operator) == "EXACT"
+    extraction = {name: effective_value(name, settings, operator) for name in ("resolution", "refine_thin")}
+    carrying, in_place = Carrying(context, source), placement.in_place(output, target)
+    surface = read_surface(context, source, in_place, exact=exact, carrying=carrying)
     frames = carrying.frames(surface.space, depsgraph_of(context))
 
     found = []  # the field and its samples
@@ -65,12 +61,12 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
         field = solve(tracker, surface, points, weight)
         topology, report = None, {"output": output, **field.report.to_dict()}
         if output == "REMESH":
-            after, topology, figures = surface.extract_moved(tracker, field, cells)
+            after, topology, figures = surface.extract_moved(tracker, field, **extraction)
             report |= figures
         else:
             before = surface.vertices
             if output == "SURFACE":
-                before, topology = surface.extract(tracker, cells, 0.1)
+                before, topology = surface.extract(tracker, 0.1, **extraction)
             after = field(before)
         if not np.isfinite(after).all():
             raise UserError("the result has vertices that are not finite; try other settings")

@@ -46,7 +46,7 @@ class Edits:
                 return False
             self.may_be_edited = False
             return not painted.same(
-                painted.read(bpy.context, source, self.surface.in_place), self.surface.painted
+                painted.read(bpy.context, source, self.surface.in_place), self.surface.stiffness
             )
         self.may_be_edited = False
         return mesh_arrays.fingerprint(source.data) != self.fingerprint

@@ -19,7 +19,6 @@ from ..core.runtime.latest_request_worker import REST, LatestRequestWorker
 from ..field_modifier import motion
 from ..handles import empties
 from ..results import placement, visibility
-from ..stiffness import painted
 from ..stylize import preference
 from ..surface.source_surface import read_surface
 from . import body
@@ -62,8 +61,9 @@ class Session(Edits, Following):
         self.output = settings.output
         if in_place is None:
             in_place = shown and placement.in_place(self.output, settings.target)
-        self.surface = read_surface(context, source, in_place=in_place)
-        self.surface.exact = settings.surface == "EXACT"
+        context.view_layer.update()
+        self.carrying, self.riding = Carrying(context, source), []
+        self.surface = read_surface(context, source, in_place, carrying=self.carrying)
         self.moves_by_itself = in_place and has_motion_before(source)
         self.fingerprint = mesh_arrays.fingerprint(source.data)
         self.may_be_edited = self.may_have_moved = False
@@ -79,9 +79,6 @@ class Session(Edits, Following):
             None  # (n, 3) those that the solver moves, in local coordinates and solve space
         )
         self.worker, self.display = None, earlier.display if shown and earlier else None
-        self.carrying, self.riding = Carrying(context, source), []
-        self.surface.painted = painted.read(context, source, in_place)
-        self.surface.together = self.carrying.solids(context, self.surface.space)
         if keeps or frame_range(source, kind) is None:
             self.frame = scene_frame(context.scene)
         if shown:
@@ -91,7 +88,7 @@ class Session(Edits, Following):
         self.reading = self.read(context, follow)
 
     def ready_solver(self):
-        extras = self.surface.together or any(part is not None for part in self.surface.painted)
+        extras = self.surface.solids or any(part is not None for part in self.surface.stiffness)
         if self.kind != "DEFORM" or not self.surface.in_place or extras:
             return None
         return warm.take(self.surface, self.energy)

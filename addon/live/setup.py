@@ -5,21 +5,22 @@ import bpy
 
 from ..blender import modifier_stack
 from ..blender.object_references import settings_of
-from ..blender.property_definitions import from_single_precision
+from ..blender.property_definitions import effective_values, from_single_precision
+from ..core.settings.parameters import DEFORM
+from ..core.settings.styles import STYLIZE
 from ..handles import empties, movers
 from . import body
+
+# Options of the panels that weigh the terms of the live energy.
+ENERGY = {"bending", "bending_unit", "barrier", "handle_weight", "symmetry", "rigidity", "keep_stance"}
 
 
 def energy_weights(settings, kind):
     """The weights of the energy's terms by name, as the section that is live has them."""
+    shown = DEFORM if kind == "DEFORM" else STYLIZE
     group = settings.deform if kind == "DEFORM" else settings.stylize
-    weights = {"bending": group.bending, "barrier": group.barrier}
-    weights["handle_weight"] = settings.deform.handle_weight
-    if kind == "STYLIZE":
-        weights["rigidity"], weights["keep_stance"] = group.rigidity, group.keep_stance
-    weights = {name: from_single_precision(value) for name, value in weights.items()}
-    weights |= {"bending_unit": group.bending_unit.lower()}
-    return weights | ({"symmetry": group.symmetry.lower()} if kind == "DEFORM" else {})
+    weights = effective_values([option for option in shown if option.name in ENERGY], group)
+    return weights | {"handle_weight": from_single_precision(settings.deform.handle_weight)}
 
 
 def differ_in_handles(a, b):

@@ -7,14 +7,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..blender import vertex_groups
-from ..blender.user_preferences import machine_options
+from ..blender.native_options import options_of
 from ..core.errors import UserError
 from ..core.geometry.edges import Topology
 from ..core.runtime import native
 from ..core.runtime.progress import ProgressTracker
 from ..core.settings.parameters import presets
 from ..handles.native_handles import native_handles
-from ..surface.source_surface import supported_options
 from .swinging import Swinging
 
 SAMPLES = 6000
@@ -61,7 +60,7 @@ class Solving(Swinging):
             self.weights = vertex_groups.at_points(surface.vertices, self.weights, self.samples.points)
         self.make_solver(self.handles, self.energy)
         if self.output != "WARP":
-            self.rest, self.topology = surface.extract(ProgressTracker(af.Task), self.cells, 0.1)
+            self.rest, self.topology = surface.extract(ProgressTracker(af.Task), 0.1, resolution=self.cells)
             self.solver.track(self.rest)
         else:
             self.follow_points(surface.local)
@@ -79,8 +78,7 @@ class Solving(Swinging):
         self.bound, self.energy, self.style_set, self.body = handles, energy, None, None
         held = self.native_handles(handles)
         options["interior"] = bool(held)  # a style alone acts everywhere alike
-        options |= supported_options(af.LiveOptions, machine_options())
-        self.solver = af.LiveDeformer(self.samples, held, af.LiveOptions(**options))
+        self.solver = af.LiveDeformer(self.samples, held, options_of("live", options))
         if self.rest is not None:
             self.solver.track(self.rest)
 

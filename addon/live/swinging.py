@@ -6,7 +6,7 @@ import time
 import numpy as np
 
 from ..blender import vertex_groups
-from ..core.runtime import native
+from ..blender.native_options import options_of
 
 PACE = 1 / 60  # seconds from one shape to the next while it swings
 MOST_PACES = 3  # that a step in real time stands for; fewer lengths of steps, fewer preconditioners
@@ -31,7 +31,7 @@ class Swinging:
         if body is None:
             self.solver.set_secondary_motion(None)
             return
-        options = native.library().SecondaryMotionOptions(**dict(body.options))
+        options = options_of("secondary", dict(body.options))
         further = {"masses": self.masses, "up": body.up, "ground": body.ground}
         self.solver.set_secondary_motion(options, **further)
 

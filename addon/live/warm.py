@@ -4,14 +4,14 @@
 import numpy as np
 
 from ..blender.host import has_window
+from ..blender.native_options import options_of
 from ..blender.object_references import settings_of
-from ..blender.user_preferences import machine_options
 from ..core.errors import UserError
 from ..core.runtime import native
 from ..core.runtime.progress import ProgressTracker
 from ..core.runtime.threads import start_thread
 from ..results import placement
-from ..surface.source_surface import read_surface, supported_options
+from ..surface.source_surface import read_surface
 from .setup import energy_weights
 from .solving import SAMPLES
 
@@ -37,7 +37,6 @@ class Warm:
             surface = read_surface(context, source, in_place=True)
         except UserError:
             return
-        surface.exact = settings.surface == "EXACT"
         energy = energy_weights(settings, "DEFORM")
         if surface.exact:  # a fit may take minutes
             self._thread = start_thread("warming", lambda: self._make(surface, energy), has_window())
@@ -46,8 +45,7 @@ class Warm:
         try:
             af = native.library()
             samples = surface.samples(ProgressTracker(af.Task), SAMPLES, 0, own_triangles=True)
-            options = {**energy, **supported_options(af.LiveOptions, machine_options())}
-            solver = af.LiveDeformer(samples, (), af.LiveOptions(**options))
+            solver = af.LiveDeformer(samples, (), options_of("live", energy))
             solver.track(surface.vertices)
             self._made = surface, energy, samples, solver
         except (ValueError, UserError):  # the session that asks for it will tell

@@ -2,7 +2,6 @@
 """A pose puts another mesh, and what that carries, where its field takes them."""
 
 import numpy as np
-from mathutils.kdtree import KDTree
 
 from ..blender import modifier_stack
 from ..blender.mesh_arrays import positions
@@ -16,7 +15,6 @@ from ..core.poses import Pose
 from ..core.runtime import native
 from ..field_modifier import motion
 
-LOOKED_AT = 4000  # points of the mesh that are compared with the shape of the pose
 solved = {}  # session_uid of a source → the Pose of its last solve, for it to be saved
 
 
@@ -37,10 +35,15 @@ def apply(context, source, pose, strength):
     if not len(points) or not np.isfinite(points).all():
         raise UserError("{name} has no points, or some that are not finite", name=source.name)
     rest = pose.to_solve(points)
-    reason = pose.refusal(distances(pose.samples.points, rest), source.name)
-    if reason is not None:
-        raise reason
-    offsets, turns = strength * (pose.to_local(pose.field(rest)) - points), None
+    try:
+        posed = pose.field.apply(rest)
+    except native.library().InvalidInput as error:
+        raise UserError(
+            "{name} lies outside of the pose's field; it was saved on another shape, or elsewhere ({error})",
+            name=source.name,
+            error=error,
+        ) from error
+    offsets, turns = strength * (pose.to_local(posed) - points), None
     if has_free_normals:
         turns = strength * rotations.turns(pose.field.jacobian(rest), pose.local_to_solve)
     carrying = Carrying(context, source)
@@ -51,12 +54,3 @@ def apply(context, source, pose, strength):
     motion.write(source, motion.Motion(offsets, turns))
     carrying.put(context, shapes)
     return carrying.take_warnings()
-
-
-def distances(samples, points):
-    """(k,) from some of the points to the nearest sample."""
-    tree = KDTree(len(samples))
-    for index, sample in enumerate(samples):
-        tree.insert(sample, index)
-    tree.balance()
-    return np.array([tree.find(point)[2] for point in points[:: max(1, len(points) // LOOKED_AT)]])

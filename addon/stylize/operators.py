@@ -3,6 +3,7 @@ import bpy
 
 from ..blender import vertex_groups
 from ..blender.host import has_window
+from ..blender.native_options import options_of
 from ..blender.object_references import settings_of, source_of
 from ..blender.presets import preset_classes
 from ..blender.property_definitions import annotations, effective_values
@@ -17,7 +18,6 @@ from ..live.giving_way import give_way
 from ..names import Op
 from ..properties.item import result_properties
 from ..properties.settings import frame, style
-from ..surface.source_surface import build_options
 from . import preference
 
 
@@ -51,7 +51,7 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
         settings = settings_of(source).stylize
         values = effective_values(STYLIZE, settings, self)
         af = native.library()
-        options = build_options(af.StylizeOptions, values)
+        options = options_of("stylize", values)
         space = space_of(source.matrix_world, source.name)
         style = preference.requested_style(settings, space, self)
         handles = empties.solve_handles(source, space, of_groups) if settings.use_handles else []

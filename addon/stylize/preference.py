@@ -61,7 +61,7 @@ def requested_style(settings, space, operator=None, where=matrix_of):
     """The style of an object's settings (and the operator's arguments, where given)."""
 
     def setting(name):
-        return effective_value(name, settings, operator) if operator is not None else getattr(settings, name)
+        return effective_value(name, settings, operator)
 
     which = setting("style")
     reason = missing_object(which, setting("frame"), settings)

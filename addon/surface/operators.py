@@ -39,18 +39,18 @@ class ARAPFIELDS_OT_fit(JobOperator, bpy.types.Operator):
     }
 
     def plan(self, context, source, _):
-        surface = read_surface(context, source, self, settings_of(source).in_place)
+        surface = read_surface(context, source, settings_of(source).in_place, fit_operator=self)
         again = self.again
 
         def work(tracker):
-            return surface.fit(tracker, 1.0, again)
+            return surface.fit.surface(tracker, 1.0, again)
 
         def apply(sdf):
             source = surface.reference.get()
-            if surface.is_cached:
+            if surface.fit.is_cached:
                 staleness.mark_fitted(source, surface)
                 settings = settings_of(source)
-                settings.fit_key = surface.key
+                settings.fit_key = surface.fit.key
                 settings.fit_report = json.dumps(sdf.report.to_dict())
             return translated("surface fitted")
 
@@ -71,13 +71,13 @@ class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):
     surface: surface_choice(options={"SKIP_SAVE"})
 
     def plan(self, context, source, _):
-        surface = read_surface(context, source)
-        surface.exact = effective_value("surface", settings_of(source), self) == "EXACT"
+        exact = effective_value("surface", settings_of(source), self) == "EXACT"
+        surface = read_surface(context, source, exact=exact)
         cells = effective_value("resolution", settings_of(source), self)
-        surface.refine_thin = effective_value("refine_thin", settings_of(source), self)
+        refine_thin = effective_value("refine_thin", settings_of(source), self)
 
         def work(tracker):
-            vertices, topology = surface.extract(tracker, cells, 0.8)
+            vertices, topology = surface.extract(tracker, 0.8, resolution=cells, refine_thin=refine_thin)
             return surface.space.to_local(vertices), topology
 
         def apply(mesh):

@@ -8,20 +8,20 @@ import bpy
 from ..blender.object_references import settings_of
 from ..core.settings.parameters import native_options
 from ..field_modifier import motion
-from .source_surface import fit_values
+from .surface_fit import fit_values
 
 changed = set()  # session_uid of objects whose geometry was updated since their fit
 
 
 def options_text(settings):
     """The fit's settings of an object, comparable."""
-    return json.dumps(sorted(native_options(fit_values(settings.fit, None)).items()))
+    return json.dumps(sorted(native_options("fit", fit_values(settings.fit, None)).items()))
 
 
 def mark_fitted(source, surface):
     """Notes that this source has just been fitted."""
     changed.discard(source.session_uid)
-    settings_of(source).fit_options = json.dumps(sorted(surface.fit_options.items()))
+    settings_of(source).fit_options = json.dumps(sorted(surface.fit.options.items()))
 
 
 def reason(source):

@@ -7,6 +7,7 @@ import numpy as np
 from ..blender import mesh_arrays
 from ..blender.host import has_window
 from ..blender.language import translated
+from ..blender.native_options import options_of
 from ..blender.object_references import settings_of, source_of
 from ..blender.presets import preset_classes
 from ..blender.property_definitions import annotations, effective_value, effective_values
@@ -20,7 +21,6 @@ from ..handles.empties import matrix_of
 from ..live.giving_way import give_way
 from ..names import Op
 from ..properties.item import result_properties
-from ..surface.source_surface import build_options
 from . import landmarks, rigs
 from .properties import fit_rig
 
@@ -67,7 +67,7 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
         context.view_layer.update()
         values = effective_values(WRAP, settings.wrap, self)
         af = native.library()
-        options = build_options(af.WrapOptions, values)
+        options = options_of("wrap", values)
         space = space_of(source.matrix_world, source.name)
         other = landmarks.target_of(source, self.onto)
         fitting = below = None

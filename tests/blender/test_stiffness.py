@@ -144,7 +144,7 @@ def test_what_goes_together_resists_and_is_held():
         scenes.activate(rod, bar)
         bpy.ops.arapfields.live()
         session = sessions.live[bar.session_uid]
-        assert bool(session.surface.together) == (way == "TOGETHER") and not session.carrying.warnings
+        assert bool(session.surface.solids) == (way == "TOGETHER") and not session.carrying.warnings
         moving.location.z, moving.rotation_euler.y = 0.5, -0.6
         step(refined=True)
         found.append(scenes.world_points(rod))

@@ -27,19 +27,19 @@ def test_a_fit_is_cached_and_goes_stale_with_the_mesh():
     ours = bar.arapfields
     assert fit_cache().path(ours.fit_key).exists() and fit_cache().size() > 0
     assert json.loads(ours.fit_report)["near_mean"] < 0.05
-    assert read_surface(bpy.context, bar).is_cached and staleness.reason(bar) == ""
+    assert read_surface(bpy.context, bar).fit.is_cached and staleness.reason(bar) == ""
     bar.arapfields.fit.iterations += 1
     assert staleness.reason(bar) == "The settings changed since the fit"
     bar.arapfields.fit.iterations -= 1
     bar.location.x += 3  # where it is does not matter
-    assert read_surface(bpy.context, bar).key == ours.fit_key
+    assert read_surface(bpy.context, bar).fit.key == ours.fit_key
     bpy.context.view_layer.update()
     assert staleness.reason(bar) == ""
     bar.data.vertices[0].co.x += 0.1
     bar.data.update()
     bpy.context.view_layer.update()
     assert staleness.reason(bar) == "The mesh changed since the fit"
-    assert not read_surface(bpy.context, bar).is_cached
+    assert not read_surface(bpy.context, bar).fit.is_cached
     bpy.ops.arapfields.clear_cache()
     assert fit_cache().size() == 0
 

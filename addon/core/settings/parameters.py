@@ -86,9 +86,8 @@ DEFORM = parameters("deform")
 MACHINE = parameters("machine")
 EXTRACTION = parameters("extraction")
 
-OURS = {option["name"] for block in TABLE.values() for option in block["further"]}  # no native options
 
-
-def native_options(values):
-    """The settings that the native options know, as keyword arguments."""
-    return {name: value for name, value in values.items() if name not in OURS}
+def native_options(operation, values):
+    """The settings that the operation's native options know, as keyword arguments."""
+    known = {option["name"] for option in TABLE.get(operation, {"options": ()})["options"]}
+    return {name: value for name, value in values.items() if name in known}
