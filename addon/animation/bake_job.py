@@ -27,7 +27,7 @@ class BakePass:
         starts = [bake.session.start for bake in bakes if bake.simulation is not None]
         # With secondary motion, also the frames that lead to those that are baked.
         self.played = played(frames, min(starts)) if starts else list(frames)
-        moving = any(bake.session.moves_by_itself or bake.session.carrying.passengers for bake in bakes)
+        moving = any(bake.session.moves_by_itself or bake.session.carrying.objects for bake in bakes)
         self.feed = FrameFeed(AHEAD if moving else len(self.played))
 
     def item(self, context, job, failures):

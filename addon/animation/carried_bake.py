@@ -11,8 +11,8 @@ import contextlib
 from ..blender import modifier_stack
 from ..blender.language import translated
 from ..carried import played_points
+from ..carried.carried_objects import KINDS, find
 from ..carried.carriers import MeshCarrier
-from ..carried.passengers import KINDS, find
 from ..carried.points import AttributeCarrier, KeyCarrier, drop_key, key_points, own_key, put_key
 from ..carried.transforms import BonesCarrier
 from ..core.errors import UserError
@@ -34,29 +34,29 @@ class CarriedBake:
     def __init__(self, carrying, frames, cache_of, fps, is_shared):
         self.carrying, self.frames, self.fps, self.warnings = carrying, frames, fps, []
         self.shapes, self.writers, self.places = {}, {}, {}
-        for passenger in list(carrying.passengers):
-            name = passenger.reference.name
+        for carried in list(carrying.objects):
+            name = carried.reference.name
             if is_shared:
-                carrying.leave(passenger, UserError("{name} is not baked in parts; bake it whole", name=name))
-            elif cache_of is not None and isinstance(passenger.carrier, (MeshCarrier, AttributeCarrier)):
-                self.places[passenger] = cache_of(name)
+                carrying.leave(carried, UserError("{name} is not baked in parts; bake it whole", name=name))
+            elif cache_of is not None and isinstance(carried.carrier, (MeshCarrier, AttributeCarrier)):
+                self.places[carried] = cache_of(name)
 
     def prepare(self):
         """Opens the caches; on the worker."""
         from arapfields.point_cache import PointCacheWriter
 
         frames = {"start": self.frames.start, "step": self.frames.step, "fps": self.fps}
-        for passenger, (path, _) in self.places.items():
-            points = len(passenger.carrier.points)
-            self.writers[passenger] = PointCacheWriter(path, points, self.frames.count, **frames)
+        for carried, (path, _) in self.places.items():
+            points = len(carried.carrier.points)
+            self.writers[carried] = PointCacheWriter(path, points, self.frames.count, **frames)
 
     def add(self, shapes):
         """Takes what one frame's shape carries; on the worker."""
-        for passenger, shape in shapes:
-            if passenger in self.writers:
-                self.writers[passenger].write(shape)
+        for carried, shape in shapes:
+            if carried in self.writers:
+                self.writers[carried].write(shape)
             else:
-                self.shapes.setdefault(passenger, []).append(shape)
+                self.shapes.setdefault(carried, []).append(shape)
 
     def finish(self):
         for writer in self.writers.values():
@@ -70,23 +70,23 @@ class CarriedBake:
     def place(self, context, source, job):
         """Coroutine: puts all in their places; one that cannot take its motion is named."""
         moved = []
-        for passenger in self.carrying.passengers:
+        for carried in self.carrying.objects:
             try:
-                item, entry = passenger.reference.get(), find(source, passenger.reference.get())
+                item, entry = carried.reference.get(), find(source, carried.reference.get())
                 if entry is None:
                     raise UserError("{name} is no longer carried", name=item.name)
-                if passenger in self.writers:
-                    self.play(passenger, item)
-                elif len(self.shapes.get(passenger, ())) != self.frames.count:
+                if carried in self.writers:
+                    self.play(carried, item)
+                elif len(self.shapes.get(carried, ())) != self.frames.count:
                     raise UserError("{name} was not there at every frame", name=item.name)
-                elif isinstance(passenger.carrier, AttributeCarrier):
-                    yield from self.add_points(passenger, item)
-                elif isinstance(passenger.carrier, MeshCarrier):
-                    yield from self.add_object(context, passenger, item)
-                elif isinstance(passenger.carrier, KeyCarrier):
-                    self.add_keys(passenger, item)
+                elif isinstance(carried.carrier, AttributeCarrier):
+                    yield from self.add_points(carried, item)
+                elif isinstance(carried.carrier, MeshCarrier):
+                    yield from self.add_object(context, carried, item)
+                elif isinstance(carried.carrier, KeyCarrier):
+                    self.add_keys(carried, item)
                 else:
-                    moved.append(passenger)
+                    moved.append(carried)
             except (UserError, OSError, RuntimeError) as error:
                 self.warnings.append(
                     error if isinstance(error, UserError) else UserError("{error}", error=error)
@@ -95,14 +95,14 @@ class CarriedBake:
             yield from self.add_keyframes(context, source, moved, job)
         self.warnings += self.carrying.take_warnings()
 
-    def play(self, passenger, item):
-        self.writers[passenger].commit()
-        if isinstance(passenger.carrier, AttributeCarrier):
-            item = played_points.play(item, passenger.carrier.points, passenger.carrier.counts)
-        cache_modifier.play(item, self.places[passenger][1], self.frames.start, self.frames.step)
+    def play(self, carried, item):
+        self.writers[carried].commit()
+        if isinstance(carried.carrier, AttributeCarrier):
+            item = played_points.play(item, carried.carrier.points, carried.carrier.counts)
+        cache_modifier.play(item, self.places[carried][1], self.frames.start, self.frames.step)
 
-    def add_object(self, context, passenger, item):
-        shapes, frames = self.shapes[passenger], [plain(frame) for frame in self.frames]
+    def add_object(self, context, carried, item):
+        shapes, frames = self.shapes[carried], [plain(frame) for frame in self.frames]
         mesh = result_objects.shown_mesh(context, item, len(shapes[0]))
         report = {"frames": len(frames)}
         baked = result_objects.show(context, item, "BAKE", "BAKE", mesh, report, select=False)
@@ -111,14 +111,14 @@ class CarriedBake:
             yield Pause.REDRAW
         visibility.show_alone(item, baked)
 
-    def add_points(self, passenger, item):
-        played = played_points.play(item, passenger.carrier.points, passenger.carrier.counts)
+    def add_points(self, carried, item):
+        played = played_points.play(item, carried.carrier.points, carried.carrier.counts)
         frames = [plain(frame) for frame in self.frames]
-        for number, shape in enumerate(self.shapes[passenger]):
+        for number, shape in enumerate(self.shapes[carried]):
             result_objects.add_frame(played, frames, number, shape)
             yield Pause.REDRAW
 
-    def add_keys(self, passenger, item):
+    def add_keys(self, carried, item):
         """A shape key a frame, in place of those of an earlier bake."""
         mask = own_key(item).vertex_group if own_key(item) is not None else ""
         drop_key(item, also_basis=False)
@@ -128,10 +128,10 @@ class CarriedBake:
         for key in [key for key in keys.key_blocks if key.name.startswith(BAKED_KEY)]:
             item.shape_key_remove(key)
         basis, frames = key_points(keys.reference_key), [plain(frame) for frame in self.frames]
-        for number, shape in enumerate(self.shapes[passenger]):
+        for number, shape in enumerate(self.shapes[carried]):
             key = item.shape_key_add(name=f"{BAKED_KEY}{frames[number]}", from_mix=False)
             key.vertex_group = mask
-            put_key(key, basis + (shape - passenger.carrier.points))
+            put_key(key, basis + (shape - carried.carrier.points))
             for frame in frames[max(0, number - 1) : number + 2]:
                 key.value = float(frame == frames[number])
                 key.keyframe_insert("value", frame=frame)
@@ -146,11 +146,11 @@ class CarriedBake:
                     number / self.frames.count, translated("Storing frame {frame}", frame=plain(frame))
                 )
                 scene.frame_set(int(frame // 1), subframe=frame - frame // 1)
-                for passenger in moved:
-                    item, entry = passenger.reference.get(), find(source, passenger.reference.get())
-                    passenger.carrier.bind(context, item, entry)
-                    passenger.carrier.write(item, entry, self.shapes[passenger][number])
-                    insert(item, passenger.carrier, frame)
+                for carried in moved:
+                    item, entry = carried.reference.get(), find(source, carried.reference.get())
+                    carried.carrier.bind(context, item, entry)
+                    carried.carrier.write(item, entry, self.shapes[carried][number])
+                    insert(item, carried.carrier, frame)
                 yield Pause.REDRAW
         finally:
             with contextlib.suppress(ReferenceError):

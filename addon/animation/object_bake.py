@@ -160,7 +160,7 @@ class ObjectBake:
         """Coroutine: the caches in their places and what plays them; returns the line to report."""
         source = self.unchanged_source()
         told = yield from self.place_own(context, source, job)
-        if self.carried.carrying.passengers:
+        if self.carried.carrying.objects:
             sessions.end(context, source)
             yield from self.carried.place(context, source, job)
         return told

@@ -8,7 +8,7 @@ rest, now and parent are (4, 4) matrices to solve space, `after` the points ther
 
 import numpy as np
 
-from ..blender import modifier_stack
+from ..blender import mesh_arrays, modifier_stack
 from ..core.errors import UserError
 from ..core.geometry.spaces import inverse, transform
 from ..field_modifier import motion
@@ -17,7 +17,7 @@ from ..field_modifier import motion
 class Carrier:
     """What all kinds share. `before` is what the object had when it was bound, to be restored."""
 
-    is_transform = False
+    base_kind = "NONE"  # of the entry's `base` while the field moves the object this way
 
     def __init__(self, context, item):
         self.points = self.read(context, item)
@@ -25,6 +25,11 @@ class Carrier:
             raise UserError("{name} is empty; it is not carried", name=item.name)
         if not np.isfinite(self.points).all():
             raise UserError("{name} has points that are not finite; it is not carried", name=item.name)
+
+    @staticmethod
+    def is_on(item):
+        """Whether the field has put something on the object itself."""
+        return False
 
     def basis(self, item, entry, depsgraph):
         """The object's own motion without the field's, where the field moves it as a whole; else None."""
@@ -42,7 +47,7 @@ class MeshCarrier(Carrier):
         if reason is not None:
             raise reason
         with modifier_stack.evaluated_mesh(context, item, in_place=True) as mesh:
-            return mesh_positions(mesh)
+            return mesh_arrays.positions(mesh)
 
     def bind(self, context, item, entry):
         motion.bind(context, item)
@@ -63,9 +68,3 @@ class MeshCarrier(Carrier):
     @staticmethod
     def release(item, entry):
         motion.remove(item)
-
-
-def mesh_positions(mesh):
-    flat = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-    mesh.vertices.foreach_get("co", flat)
-    return flat.reshape(-1, 3).astype(np.float64)

@@ -9,10 +9,10 @@ from ..core.errors import UserError
 from ..core.geometry.spaces import transform
 from ..field_modifier import masks, motion
 from . import refusals
+from .carried_objects import CarriedObject, CarriedPose, find, give_back, is_carried_otherwise
 from .carriers import MeshCarrier
-from .passengers import Frame, Passenger, find, give_back, is_carried_otherwise
-from .places import depsgraph_of, place_of
 from .transforms import BonesCarrier
+from .world_matrices import depsgraph_of, world_matrices
 
 SAME_PLACE = 1e-6  # of an object's size: matrices in single precision
 
@@ -21,138 +21,136 @@ class Carrying:
     """What a source carries. `warnings`: what is left out and why, each told once."""
 
     def __init__(self, context, source):
-        self.source, self.warnings, self.passengers, self.before = ObjectReference(source), [], [], {}
+        self.source, self.warnings, self.objects, self.before = ObjectReference(source), [], [], {}
         self.rigs = modifier_stack.handle_rigs(source)
         for entry in settings_of(source).carried:
             try:
                 reason = refusals.of_entry(source, entry)
                 if reason is not None:
                     raise reason
-                self.passengers.append(Passenger(context, entry))
+                self.objects.append(CarriedObject(context, entry))
             except (UserError, ValueError) as error:
                 self.warnings.append(error)
 
     def solids(self, context, space):
         """[(vertices, triangles)] in solve space of what is sampled together with the body."""
-        found, depsgraph = [], depsgraph_of(context)
-        for passenger in self.passengers:
-            if passenger.way != "TOGETHER" or not isinstance(passenger.carrier, MeshCarrier):
+        meshes, depsgraph = [], depsgraph_of(context)
+        for carried in self.objects:
+            if carried.way != "TOGETHER" or not isinstance(carried.carrier, MeshCarrier):
                 continue
-            item = passenger.reference.get()
+            item = carried.reference.get()
             try:
                 mesh = mesh_arrays.read(context, item, in_place=True)
             except UserError as error:
                 self.warnings.append(error)
                 continue
-            rest = space.world_to_solve @ place_of(item, self.rigs, depsgraph).rest
-            found.append((transform(rest, mesh.vertices), mesh.triangles))
-        return found
+            rest = space.world_to_solve @ world_matrices(item, self.rigs, depsgraph).rest
+            meshes.append((transform(rest, mesh.vertices), mesh.triangles))
+        return meshes
 
     # Main thread, each time something may have moved.
 
-    def frames(self, space, depsgraph):
-        """Where all passengers are; those that are gone are left out, and named."""
-        source, found = self.source.get(), []
-        for passenger in list(self.passengers):
+    def poses(self, space, depsgraph):
+        """[CarriedPose] of all objects; those that are gone are left out, and named."""
+        source, poses = self.source.get(), []
+        for carried in list(self.objects):
             try:
-                item, entry = passenger.reference.get(), self.entry_of(source, passenger)
-                basis = passenger.carrier.basis(item, entry, depsgraph)
-                place = place_of(item, self.rigs, depsgraph, basis)
+                item, entry = carried.item_and_entry(source)
+                basis = carried.carrier.basis(item, entry, depsgraph)
+                world = world_matrices(item, self.rigs, depsgraph, basis)
             except UserError as error:
-                self.leave(passenger, error)
+                self.leave(carried, error)
                 continue
-            matrices = (space.world_to_solve @ matrix for matrix in (place.rest, place.now, place.parent))
-            found.append(Frame(passenger, passenger.carrier.points, *matrices))
-        return found
+            matrices = (space.world_to_solve @ matrix for matrix in (world.rest, world.now, world.parent))
+            poses.append(CarriedPose(carried, carried.carrier.points, *matrices))
+        return poses
 
     def watch(self, objects, data):
         """Notes whose points may be others: `objects` and `data` are session_uids that Blender updated."""
-        for passenger in self.passengers:
-            item = passenger.reference.find()
+        for carried in self.objects:
+            item = carried.reference.find()
             if item is None or item.session_uid in motion.written:
                 continue
             edited = item.data is not None and item.data.session_uid in data
-            moved = item.session_uid in objects and passenger.moves_by_itself(item)
-            passenger.may_be_edited |= edited or moved
+            moved = item.session_uid in objects and carried.moves_by_itself(item)
+            carried.may_be_edited |= edited or moved
 
     def expect_motion(self):
         """Another frame: what moves by itself may have other points."""
-        for passenger in self.passengers:
-            item = passenger.reference.find()
-            passenger.may_be_edited |= item is not None and passenger.moves_by_itself(item)
+        for carried in self.objects:
+            item = carried.reference.find()
+            carried.may_be_edited |= item is not None and carried.moves_by_itself(item)
 
     def refresh(self, context):
         """Reads again what may have been edited; whether any has other points."""
         changed = False
-        for passenger in list(self.passengers):
-            if not passenger.may_be_edited or isinstance(passenger.carrier, BonesCarrier):
+        for carried in list(self.objects):
+            if not carried.may_be_edited or isinstance(carried.carrier, BonesCarrier):
                 continue
             try:
-                item = passenger.reference.get()
+                item = carried.reference.get()
                 if item.mode == "EDIT":
                     continue
-                passenger.may_be_edited, points = False, passenger.carrier.read(context, item)
+                carried.may_be_edited, points = False, carried.carrier.read(context, item)
             except UserError as error:
-                self.leave(passenger, error)
+                self.leave(carried, error)
                 continue
-            if len(points) != len(passenger.carrier.points):
+            if len(points) != len(carried.carrier.points):
                 raise Reshaped
-            if not np.array_equal(points, passenger.carrier.points):
-                passenger.carrier.points, changed = points, True
+            if not np.array_equal(points, carried.carrier.points):
+                carried.carrier.points, changed = points, True
         return changed
 
     # On a worker.
 
-    def moved(self, af, samples, field, frames, strength=1.0):
-        """[(passenger, what its carrier writes)] of all where the field takes them, so much of the way."""
-        return [(frame.passenger, self.moved_one(af, samples, field, frame, strength)) for frame in frames]
+    def moved(self, af, samples, field, poses, strength=1.0):
+        """[(carried object, what its carrier writes)] where the field takes them, so much of the way."""
+        return [(pose.carried, self.moved_one(af, samples, field, pose, strength)) for pose in poses]
 
-    def moved_one(self, af, samples, field, frame, strength=1.0):
-        passenger = frame.passenger
-        attached = passenger.attached
-        if attached is None or attached[0] is not frame.points or not near(attached[1], frame.rest):
-            attachment = af.Attachment(samples, transform(frame.rest, frame.points))
-            attached = passenger.attached = frame.points, frame.rest, attachment
+    def moved_one(self, af, samples, field, pose, strength=1.0):
+        carried = pose.carried
+        attached = carried.attached
+        if attached is None or attached[0] is not pose.points or not near(attached[1], pose.rest):
+            attachment = af.Attachment(samples, transform(pose.rest, pose.points))
+            attached = carried.attached = pose.points, pose.rest, attachment
         after = np.asarray(attached[2].positions(field))
         if not np.isfinite(after).all():
             raise UserError("the shape has vertices that are NaN or infinite; move the handles less far")
         if strength != 1.0:
-            rest = transform(frame.rest, frame.points)
+            rest = transform(pose.rest, pose.points)
             after = rest + strength * (after - rest)
-        return passenger.carrier.moved(frame.rest, frame.now, frame.parent, after)
+        return carried.carrier.moved(pose.rest, pose.now, pose.parent, after)
 
     # Main thread: showing and taking back.
 
     def bind(self, context, before=None):
         """Makes all ready to be moved; `before` is what they had before a run that goes on with this one."""
-        source = self.source.get()
-        for passenger in list(self.passengers):
+        source, before = self.source.get(), dict(before or {})
+        for carried in list(self.objects):
             try:
-                item, entry = passenger.reference.get(), self.entry_of(source, passenger)
-                uid = passenger.reference.uid
-                if is_carried_otherwise(item, entry, passenger.carrier):
+                item, entry = carried.item_and_entry(source)
+                uid = carried.reference.uid
+                if is_carried_otherwise(item, entry, carried.carrier):
                     give_back(item, entry)
-                    before = None
-                self.before[uid] = (before or {}).get(
-                    uid, (passenger, passenger.carrier.snapshot(item, entry))
-                )
-                passenger.carrier.bind(context, item, entry)
+                    before.pop(uid, None)
+                self.before[uid] = before.get(uid) or (carried, carried.carrier.snapshot(item, entry))
+                carried.carrier.bind(context, item, entry)
                 masks.lend(source, item)
             except (UserError, RuntimeError) as error:
-                self.leave(passenger, error)
+                self.leave(carried, error)
 
     def show(self, shapes):
         """Puts what `moved` made onto the objects; one that cannot take it is named and left out."""
         source = self.source.get()
-        for passenger, shape in shapes:
-            if passenger not in self.passengers:
+        for carried, shape in shapes:
+            if carried not in self.objects:
                 continue
             try:
-                item = passenger.reference.get()
+                item, entry = carried.item_and_entry(source)
                 if item.mode not in PAUSING:
-                    passenger.carrier.write(item, self.entry_of(source, passenger), shape)
+                    carried.carrier.write(item, entry, shape)
             except (UserError, RuntimeError) as error:
-                self.leave(passenger, error)
+                self.leave(carried, error)
 
     def put(self, context, shapes):
         """Leaves the objects where a field takes them."""
@@ -162,40 +160,33 @@ class Carrying:
     def renew(self):
         """What they have now is what they had before: an undone step put it there."""
         source = self.source.get()
-        for passenger in self.passengers:
-            item = passenger.reference.find()
-            if item is not None and passenger.reference.uid in self.before:
-                shape = passenger.carrier.snapshot(item, self.entry_of(source, passenger))
-                self.before[passenger.reference.uid] = passenger, shape
+        for carried in self.objects:
+            if carried.reference.find() is not None and carried.reference.uid in self.before:
+                shape = carried.carrier.snapshot(*carried.item_and_entry(source))
+                self.before[carried.reference.uid] = carried, shape
 
     def take_away(self):
         """Gives all what they had before."""
         source = self.source.find()
-        for passenger, before in self.before.values():
-            item = passenger.reference.find()
+        for carried, before in self.before.values():
+            item = carried.reference.find()
             entry = None if source is None else find(source, item)
             if item is not None and entry is not None and item.mode != "EDIT":
-                passenger.carrier.restore(item, entry, before)
+                carried.carrier.restore(item, entry, before)
         self.before.clear()
 
     def forget(self, settings):
         """Those that a list no longer has were given back already."""
-        kept = {entry.item.session_uid for entry in settings.carried if entry.item is not None}
-        self.before = {uid: kept_one for uid, kept_one in self.before.items() if uid in kept}
+        listed = {entry.item.session_uid for entry in settings.carried if entry.item is not None}
+        self.before = {uid: before for uid, before in self.before.items() if uid in listed}
 
-    def entry_of(self, source, passenger):
-        entry = find(source, passenger.reference.get())
-        if entry is None:
-            raise UserError("{name} is no longer carried", name=passenger.reference.name)
-        return entry
-
-    def leave(self, passenger, error):
-        self.passengers.remove(passenger)
+    def leave(self, carried, error):
+        self.objects.remove(carried)
         self.warnings.append(error)
 
     def take_warnings(self):
-        found, self.warnings = self.warnings, []
-        return found
+        warnings, self.warnings = self.warnings, []
+        return warnings
 
 
 class Reshaped(Exception):

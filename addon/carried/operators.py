@@ -8,7 +8,7 @@ from ..core.errors import UserError
 from ..core.settings.choices import CARRYING
 from ..live import sessions
 from ..names import Op
-from . import passengers, refusals
+from . import carried_objects, refusals
 
 
 class CarriedOperator(SourceOperator):
@@ -67,9 +67,9 @@ def carry(source, item, way):
     if reason is not None:
         raise reason
     other = settings_of(item).carried_by
-    if other is not None and other != source and passengers.find(other, item) is not None:
+    if other is not None and other != source and carried_objects.find(other, item) is not None:
         raise UserError("{name} is carried by {other} already", name=item.name, other=other.name)
-    entry = passengers.find(source, item)
+    entry = carried_objects.find(source, item)
     if entry is None:
         entry = settings_of(source).carried.add()
         settings_of(source).active_carried = len(settings_of(source).carried) - 1
@@ -91,7 +91,7 @@ class ARAPFIELDS_OT_release(CarriedOperator, bpy.types.Operator):
         count = len(settings.carried)
         rows = range(count) if self.all else [min(max(settings.active_carried, 0), count - 1)]
         for row in reversed(rows):
-            passengers.release(source, row)
+            carried_objects.release(source, row)
         settings.active_carried = max(0, min(settings.active_carried, len(settings.carried) - 1))
         if sessions.is_live(source):
             sessions.live[source.session_uid].carrying.forget(settings)

@@ -4,7 +4,7 @@
 from ..blender.modifier_stack import handle_rigs
 from ..blender.object_references import in_scene, settings_of
 from ..core.errors import UserError
-from .places import constrained_to
+from .world_matrices import constrained_to
 
 BINDING = {"LATTICE": "object", "CURVE": "object", "HOOK": "object"}  # modifiers that follow another object
 BINDING |= {"MESH_DEFORM": "object", "SURFACE_DEFORM": "target"}

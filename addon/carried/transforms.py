@@ -7,43 +7,74 @@ import numpy as np
 from mathutils import Euler, Matrix, Quaternion, Vector
 
 from ..core.errors import UserError
-from ..core.geometry import carrying
+from ..core.geometry import posing
 from ..core.geometry.spaces import inverse, transform
 from ..field_modifier import motion
 from .carriers import Carrier
-from .places import array
+from .world_matrices import array
 
 
-class TransformCarrier(Carrier):
+class PoseCarrier(Carrier):
+    """What takes the motion in channels of the object; the user's own values are the entry's `base`, as JSON.
+
+    `state(item)` is {name: numbers} of these channels, `put_state` writes them.
+    """
+
+    def bind(self, context, item, entry):
+        if not entry.base:
+            entry.base, entry.base_kind = json.dumps(self.state(item)), self.base_kind
+
+    def snapshot(self, item, entry):
+        return self.state(item), entry.base, base_kind_of(entry)
+
+    def restore(self, item, entry, before):
+        state, entry.base, entry.base_kind = before
+        self.put_state(item, state)
+
+    @classmethod
+    def own_state(cls, item, entry):
+        """The state that is the user's own."""
+        return cls.state(item) | (json.loads(entry.base) if base_kind_of(entry) == cls.base_kind else {})
+
+    @classmethod
+    def release(cls, item, entry):
+        if base_kind_of(entry) == cls.base_kind:
+            cls.put_state(item, json.loads(entry.base))
+            entry.base, entry.base_kind = "", "NONE"
+
+
+def base_kind_of(entry):
+    """What the entry's `base` holds; files of versions that had no such field tell it by the base's names."""
+    if not entry.base or entry.base_kind != "NONE":
+        return entry.base_kind
+    return "TRANSFORM" if set(DELTAS) == set(json.loads(entry.base)) else "BONES"
+
+
+class TransformCarrier(PoseCarrier):
     """Any object as a whole, by its delta transforms: its own channels, keys and constraints stay."""
 
-    is_transform = True
+    base_kind = "TRANSFORM"
 
     def read(self, context, item):
         if item.rotation_mode == "AXIS_ANGLE":
             raise UserError("{name} turns by Axis Angle; choose another rotation mode", name=item.name)
         corners = array([tuple(corner) for corner in item.bound_box])
         if item.type == "EMPTY" or not np.ptp(corners, axis=0).any():
-            return carrying.frame_points(item.empty_display_size if item.type == "EMPTY" else 0.05)
+            return posing.frame_points(item.empty_display_size if item.type == "EMPTY" else 0.05)
         return corners
 
     def basis(self, item, entry, depsgraph):
-        location, rotation, scale = own_channels(item.evaluated_get(depsgraph), base_of(item, entry))
-        return array(Matrix.LocRotScale(location, rotation, scale))
+        return own_basis(item.evaluated_get(depsgraph), self.own_state(item, entry))
 
     def moved(self, rest, now, parent, after):
         """The (4, 4) own motion that takes the object, as a whole, to where its points go."""
-        whole = carrying.rigid_motion_of(transform(rest, self.points), after)
+        whole = posing.rigid_motion_of(transform(rest, self.points), after)
         return inverse(parent) @ whole @ rest
 
-    def bind(self, context, item, entry):
-        if not entry.base:
-            entry.base = json.dumps(deltas(item))
-
     def write(self, item, entry, basis):
-        base = base_of(item, entry)
-        before = array(Matrix.LocRotScale(*own_channels(item, base)))
-        turn = Matrix(carrying.turn_between(before, basis).tolist()) @ base_turn(item, base).to_matrix()
+        base = self.own_state(item, entry)
+        turn = posing.turn_between(own_basis(item, base), basis)
+        turn = Matrix(turn.tolist()) @ base_turn(item, base).to_matrix()
         motion.written.add(item.session_uid)
         item.delta_location = (basis[:3, 3] - array(item.location)).tolist()
         if item.rotation_mode == "QUATERNION":
@@ -51,49 +82,26 @@ class TransformCarrier(Carrier):
         else:
             item.delta_rotation_euler = turn.to_euler(item.rotation_mode)
 
-    def snapshot(self, item, entry):
-        return deltas(item), entry.base
-
-    def restore(self, item, entry, before):
-        put_deltas(item, before[0])
-        entry.base = before[1]
+    @staticmethod
+    def state(item):
+        return {name: list(getattr(item, name)) for name in DELTAS}
 
     @staticmethod
-    def release(item, entry):
-        if entry.base:
-            put_deltas(item, json.loads(entry.base))
-            entry.base = ""
+    def put_state(item, state):
+        for name, value in state.items():
+            setattr(item, name, value)
 
 
 DELTAS = ("delta_location", "delta_rotation_euler", "delta_rotation_quaternion")
 
 
-def deltas(item):
-    return {name: list(getattr(item, name)) for name in DELTAS}
-
-
-def put_deltas(item, values):
-    for name, value in values.items():
-        setattr(item, name, value)
-
-
-def base_of(item, entry):
-    """The deltas that are the user's own."""
-    return json.loads(entry.base) if entry.base else deltas(item)
-
-
-def own_rotation(item):
-    """The rotation channel as a quaternion."""
-    if item.rotation_mode == "QUATERNION":
-        return item.rotation_quaternion.copy()
-    return item.rotation_euler.to_quaternion()
-
-
-def own_channels(item, base):
-    """(location, rotation, scale) of an object's channels with these deltas."""
+def own_basis(item, base):
+    """(4, 4) the motion of an object's channels with these deltas."""
+    quaternion = item.rotation_mode == "QUATERNION"
+    rotation = item.rotation_quaternion if quaternion else item.rotation_euler.to_quaternion()
     location = item.location + Vector(base["delta_location"])
     scale = Vector([a * b for a, b in zip(item.scale, item.delta_scale, strict=True)])
-    return location, base_turn(item, base) @ own_rotation(item), scale
+    return array(Matrix.LocRotScale(location, base_turn(item, base) @ rotation, scale))
 
 
 def base_turn(item, base):
@@ -102,8 +110,10 @@ def base_turn(item, base):
     return Euler(base["delta_rotation_euler"], item.rotation_mode).to_quaternion()
 
 
-class BonesCarrier(Carrier):
+class BonesCarrier(PoseCarrier):
     """An armature: each bone's pose follows, heads where they go, bones towards their moved tails."""
+
+    base_kind = "BONES"
 
     def read(self, context, item):
         if item.pose is None or not len(item.pose.bones):
@@ -115,50 +125,31 @@ class BonesCarrier(Carrier):
         self.connected = [bone.bone.use_connect for bone in bones]
         self.lengths = [bone.bone.length for bone in bones]
         self.poses = None
-        return carrying.bone_points(self.rest, self.lengths)
+        return posing.bone_points(self.rest, self.lengths)
 
     def take_base(self, item, entry):
         """The points are those of the pose that is the user's own."""
-        bases = base_poses(item, entry)
-        self.poses = carrying.posed(self.rest, self.parents, np.stack([bases[name] for name in self.names]))
-        self.points = carrying.bone_points(self.poses, self.lengths)
+        bases = self.own_state(item, entry)
+        bases = np.array([bases[name] for name in self.names], dtype=np.float64)
+        self.poses = posing.posed(self.rest, self.parents, bases)
+        self.points = posing.bone_points(self.poses, self.lengths)
 
     def moved(self, rest, now, parent, after):
         before = transform(rest, self.points)
         in_solve = rest @ self.poses
-        return inverse(now) @ carrying.bone_poses(in_solve, before, after)
-
-    def bind(self, context, item, entry):
-        if not entry.base:
-            bases = {bone.name: array(bone.matrix_basis).tolist() for bone in item.pose.bones}
-            entry.base = json.dumps(bases)
+        return inverse(now) @ posing.bone_poses(in_solve, before, after)
 
     def write(self, item, entry, targets):
         motion.written.add(item.session_uid)
-        bases = carrying.chained(self.rest, self.parents, targets, self.connected)
-        for name, basis in zip(self.names, bases, strict=True):
-            item.pose.bones[name].matrix_basis = Matrix(basis.tolist())
-
-    def snapshot(self, item, entry):
-        return {bone.name: bone.matrix_basis.copy() for bone in item.pose.bones}, entry.base
-
-    def restore(self, item, entry, before):
-        put_poses(item, before[0])
-        entry.base = before[1]
+        bases = posing.chained(self.rest, self.parents, targets, self.connected)
+        self.put_state(item, dict(zip(self.names, bases.tolist(), strict=True)))
 
     @staticmethod
-    def release(item, entry):
-        put_poses(item, {name: Matrix(basis.tolist()) for name, basis in base_poses(item, entry).items()})
-        entry.base = ""
+    def state(item):
+        return {bone.name: [list(row) for row in bone.matrix_basis] for bone in item.pose.bones}
 
-
-def put_poses(item, bases):
-    for name, basis in bases.items():
-        if name in item.pose.bones:
-            item.pose.bones[name].matrix_basis = basis
-
-
-def base_poses(item, entry):
-    """{bone: (4, 4) own motion} that is the user's own."""
-    noted = json.loads(entry.base) if entry.base else {}
-    return {b.name: np.array(noted.get(b.name, b.matrix_basis), dtype=np.float64) for b in item.pose.bones}
+    @staticmethod
+    def put_state(item, state):
+        for name, basis in state.items():
+            if name in item.pose.bones:
+                item.pose.bones[name].matrix_basis = Matrix(basis)

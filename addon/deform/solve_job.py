@@ -11,7 +11,7 @@ from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..blender.property_definitions import effective_value
 from ..carried.carrying import Carrying
-from ..carried.places import depsgraph_of
+from ..carried.world_matrices import depsgraph_of
 from ..core.errors import UserError
 from ..core.geometry.edges import Topology
 from ..core.runtime import native
@@ -46,7 +46,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
     extraction = {name: effective_value(name, settings, operator) for name in ("resolution", "refine_thin")}
     carrying, in_place = Carrying(context, source), placement.in_place(output, target)
     surface = read_surface(context, source, in_place, exact=exact, carrying=carrying)
-    frames = carrying.frames(surface.space, depsgraph_of(context))
+    frames = carrying.poses(surface.space, depsgraph_of(context))
 
     found = []  # the field and its samples
     shown = FirstResult if placement.keeps_mesh(output, target) else Preview

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..carried.passengers import Frame
+from ..carried.carried_objects import CarriedPose
 from .body import Body
 
 
@@ -17,7 +17,7 @@ class Request(NamedTuple):
     points: np.ndarray  # (n, 3) the source's own, in local coordinates, where the field is evaluated
     handles: list  # at rest
     energy: dict  # weights of the energy's terms, by name
-    carried: list  # carried.passengers.Frame of what goes along
+    carried: list  # carried.carried_objects.CarriedPose of what goes along
     body: Body | None = None  # what has secondary motion
 
 
@@ -27,7 +27,7 @@ def alike(a, b):
         return False
     if a.body != b.body or a.handles is not b.handles or not same_points(a.points, b.points):
         return False
-    if len(a.carried) != len(b.carried) or not all(map(Frame.same, a.carried, b.carried)):
+    if len(a.carried) != len(b.carried) or not all(map(CarriedPose.same, a.carried, b.carried)):
         return False
     return len(a.targets) == len(b.targets) and all(map(np.array_equal, a.targets, b.targets))
 

@@ -10,7 +10,7 @@ from ..blender.host import has_window
 from ..blender.object_references import ObjectReference, settings_of
 from ..blender.property_definitions import from_single_precision
 from ..carried.carrying import Carrying
-from ..carried.places import depsgraph_of
+from ..carried.world_matrices import depsgraph_of
 from ..core.errors import UserError
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
@@ -197,7 +197,7 @@ class Session(Edits, Following):
         if self.handles:
             current = empties.solve_handles(source, space, where=where)
             targets = [h.target[:3, 3] if h.kind == "POINT" else h.target for h in current]
-        frames = self.carrying.frames(space, depsgraph or depsgraph_of(context))
+        frames = self.carrying.poses(space, depsgraph or depsgraph_of(context))
         if self.kind != "STYLIZE":
             return Request(targets, None, self.placed, self.handles, energy, frames, swings)
         style = preference.requested_style(settings, space, where=where)

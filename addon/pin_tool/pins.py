@@ -7,7 +7,7 @@ from mathutils import Matrix
 
 from ..blender import object_references
 from ..blender.object_references import owner_of, settings_of
-from ..carried import passengers
+from ..carried import carried_objects
 from ..core.errors import UserError
 from ..core.geometry.handles import box_matrix
 from ..core.geometry.spaces import inverse
@@ -143,6 +143,6 @@ def remove(context, source, empty):
     settings_of(source).hold_far = False
     sessions.end(context, source)
     motion.remove(source)
-    passengers.give_back_all(source)
+    carried_objects.give_back_all(source)
     source.select_set(True)
     context.view_layer.objects.active = source

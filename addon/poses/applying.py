@@ -7,7 +7,7 @@ from ..blender import modifier_stack
 from ..blender.mesh_arrays import positions
 from ..blender.object_references import settings_of
 from ..carried.carrying import Carrying
-from ..carried.places import array, depsgraph_of
+from ..carried.world_matrices import array, depsgraph_of
 from ..core.errors import UserError
 from ..core.geometry import rotations
 from ..core.geometry.spaces import Space
@@ -48,7 +48,7 @@ def apply(context, source, pose, strength):
         turns = strength * rotations.turns(pose.field.jacobian(rest), pose.local_to_solve)
     carrying = Carrying(context, source)
     space = Space(pose.local_to_solve, array(source.matrix_world) @ np.linalg.inv(pose.local_to_solve))
-    frames = carrying.frames(space, depsgraph_of(context))
+    frames = carrying.poses(space, depsgraph_of(context))
     shapes = carrying.moved(native.library(), pose.samples, pose.field, frames, strength)
     motion.bind(context, source)
     motion.write(source, motion.Motion(offsets, turns))

@@ -5,7 +5,7 @@ from ..blender import mesh_arrays, modifier_stack
 from ..blender.language import translated
 from ..blender.object_references import settings_of, source_of
 from ..blender.source_operator import SourceOperator
-from ..carried import passengers
+from ..carried import carried_objects
 from ..core.errors import UserError
 from ..field_modifier import motion
 from ..names import Op
@@ -65,7 +65,7 @@ class ARAPFIELDS_OT_remove_field(FieldOperator, bpy.types.Operator):
         except UserError as error:
             self.report({"WARNING"}, translated(error))
         motion.remove(source_of(context))
-        passengers.give_back_all(source_of(context))
+        carried_objects.give_back_all(source_of(context))
         return {"FINISHED"}
 
 

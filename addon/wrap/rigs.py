@@ -11,7 +11,7 @@ from mathutils import Vector
 from ..blender import modifier_stack
 from ..blender.object_references import ObjectReference, settings_of
 from ..core.errors import UserError
-from ..core.geometry import carrying
+from ..core.geometry import posing
 from ..core.geometry.spaces import inverse, transform
 from ..handles.movers import matrix_of
 
@@ -52,13 +52,13 @@ class Fitting:
         """Finds where the bones belong, on a worker."""
         self.moved = []
         for reference, names, poses, lengths, to_solve in self.rigs:
-            points = carrying.bone_points(poses, lengths)
+            points = posing.bone_points(poses, lengths)
             before = transform(to_solve, points)
             after = field(before)
             if not np.isfinite(after).all():
                 raise UserError("the result has bones that are not finite; try other settings")
-            found = carrying.bone_poses(to_solve @ poses, before, after)
-            heads, tails = after[0 :: len(carrying.BONE_POINTS)], after[1 :: len(carrying.BONE_POINTS)]
+            found = posing.bone_poses(to_solve @ poses, before, after)
+            heads, tails = after[0 :: len(posing.BONE_POINTS)], after[1 :: len(posing.BONE_POINTS)]
             back = inverse(to_solve)
             axes = found[:, :3, 2] @ back[:3, :3].T
             self.moved.append((reference, names, transform(back, heads), transform(back, tails), axes))

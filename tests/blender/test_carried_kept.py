@@ -124,3 +124,74 @@ def test_renders_show_all_at_the_frame_that_is_rendered():
     bpy.ops.render.render(animation=True)
     for item, before in zip(items, rest, strict=True):
         assert np.abs(shown(item) - before - [0, 0, 0.4]).max() < 0.1, item.name
+
+
+@pytest.mark.parametrize("kind", ["EMPTY", "ARMATURE"])
+@in_blender
+def test_files_of_versions_without_a_kind_of_base_come_back(kind):
+    import tempfile
+
+    import bpy
+    import numpy as np
+    import scenes
+    from riders import body, rider, shown
+    from test_carried_kept import CLOSE
+
+    bar, moving = body()
+    item = rider(kind)
+    rest = shown(item)
+    scenes.activate(item, bar)
+    bpy.ops.arapfields.carry()
+    moving.location.z += 0.4
+    assert bpy.ops.arapfields.deform() == {"FINISHED"}
+    assert np.abs(shown(item) - rest).max() > 0.2
+    entry = bar.arapfields.carried[0]
+    assert entry.base and entry.base_kind == {"EMPTY": "TRANSFORM", "ARMATURE": "BONES"}[kind]
+    entry.property_unset("base_kind")
+    path = f"{tempfile.mkdtemp()}/earlier.blend"
+    names = bar.name, item.name
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    bar, item = (bpy.data.objects[name] for name in names)
+    scenes.activate(bar)
+    assert bpy.ops.arapfields.live() == {"FINISHED"}  # goes on from the object's own pose
+    bpy.ops.arapfields.live()
+    assert bpy.ops.arapfields.release(all=True) == {"FINISHED"}
+    assert np.abs(shown(item) - rest).max() < CLOSE
+
+
+@in_blender
+def test_another_way_to_be_carried_spoils_nothing_of_the_others():
+    """An armature that follows, then moves as a whole; an Empty and a patch come after it in the list."""
+    import bpy
+    import numpy as np
+    import scenes
+    from riders import body, rider, shown
+    from test_carried_kept import CLOSE
+    from test_live import step
+
+    from addon.live import sessions
+
+    bar, moving = body()
+    items = [rider(kind) for kind in ("ARMATURE", "EMPTY", "MESH")]
+    rest = [shown(item) for item in items]
+    for item in items:
+        scenes.activate(item, bar)
+        bpy.ops.arapfields.carry()
+    scenes.activate(bar)
+    moving.location.z += 0.4
+    solves = {"deform": bpy.ops.arapfields.deform, "live": lambda: sessions.begin(bpy.context, bar)}
+    for name, solve in solves.items():
+        for way in ("FOLLOW", "RIGID"):
+            bar.arapfields.carried[0].way = way
+            solve()
+            step(refined=True)
+            pose = np.array(items[0].pose.bones[0].matrix_basis)
+            assert (np.abs(pose - np.eye(4)).max() < CLOSE) == (way == "RIGID"), (name, way)
+            for item, before in zip(items, rest, strict=True):
+                assert np.abs(shown(item) - before).max() > 0.2, (name, way, item.name)
+        if name == "deform":
+            assert bpy.ops.arapfields.remove_field() == {"FINISHED"}
+    sessions.end(bpy.context, bar)
+    for item, before in zip(items, rest, strict=True):
+        assert np.abs(shown(item) - before).max() < CLOSE, item.name

@@ -1,24 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One carried object for one run, and what takes the field off it again."""
 
-import json
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..blender import modifier_stack
 from ..blender.object_references import ObjectReference, settings_of
+from ..core.errors import UserError
 from .carriers import MeshCarrier
 from .points import AttributeCarrier, KeyCarrier
-from .transforms import BonesCarrier, TransformCarrier
+from .transforms import BonesCarrier, TransformCarrier, base_kind_of
 
 KINDS = {"MESH": MeshCarrier, "ARMATURE": BonesCarrier}
 KINDS |= dict.fromkeys(("CURVES", "POINTCLOUD", "GREASEPENCIL"), AttributeCarrier)
 KINDS |= dict.fromkeys(("CURVE", "SURFACE", "LATTICE"), KeyCarrier)
 
 
-class Passenger:
-    """One carried object that the field moves."""
+class CarriedObject:
+    """One object that the field moves as well."""
 
     def __init__(self, context, entry):
         item, self.way = entry.item, entry.way
@@ -35,12 +35,20 @@ class Passenger:
             return bool(modifier_stack.shown_before(item, in_place=True)) or item.data.shape_keys is not None
         return isinstance(self.carrier, KeyCarrier) and item.data.shape_keys is not None
 
+    def item_and_entry(self, source):
+        """The object and its entry in the source's list; UserError where either is gone."""
+        item = self.reference.get()
+        entry = find(source, item)
+        if entry is None:
+            raise UserError("{name} is no longer carried", name=self.reference.name)
+        return item, entry
+
 
 @dataclass(frozen=True)
-class Frame:
-    """A passenger's points, and (4, 4) matrices to solve space: of it at rest and now, and of its parent."""
+class CarriedPose:
+    """A carried object's points, and (4, 4) matrices to solve space: at rest, now, and of its parent now."""
 
-    passenger: Passenger
+    carried: CarriedObject
     points: np.ndarray
     rest: np.ndarray
     now: np.ndarray
@@ -73,19 +81,15 @@ def release(source, index):
 
 def give_back(item, entry):
     """Takes off an object whatever the field put there, in any of the ways to carry it."""
-    kind = KINDS.get(item.type)
-    if kind is not None and kind is not BonesCarrier:
-        kind.release(item, entry)
-    if entry.base:
-        is_pose = item.type == "ARMATURE" and "delta_location" not in json.loads(entry.base)
-        (BonesCarrier if is_pose else TransformCarrier).release(item, entry)
+    for carrier in dict.fromkeys((KINDS.get(item.type, TransformCarrier), TransformCarrier)):
+        carrier.release(item, entry)
 
 
 def is_carried_otherwise(item, entry, carrier):
     """Whether the field still moves an object in another way than this carrier's."""
-    if isinstance(carrier, TransformCarrier):
-        return item.type != "ARMATURE" and item.type in KINDS and KINDS[item.type].is_on(item)
-    return bool(entry.base) and (not isinstance(carrier, BonesCarrier) or "delta_location" in entry.base)
+    if base_kind_of(entry) not in ("NONE", carrier.base_kind):
+        return True
+    return isinstance(carrier, TransformCarrier) and KINDS.get(item.type, TransformCarrier).is_on(item)
 
 
 def give_back_all(source):

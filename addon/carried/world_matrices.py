@@ -16,7 +16,7 @@ FOLLOWING = {"CHILD_OF", "COPY_LOCATION", "COPY_TRANSFORMS", "ARMATURE"}  # cons
 
 
 @dataclass(frozen=True)
-class Place:
+class WorldMatrices:
     """(4, 4) matrices to the world: of the object at rest and now, and of its parent now."""
 
     rest: np.ndarray
@@ -33,15 +33,15 @@ def depsgraph_of(context):
     return context.view_layer.depsgraph or context.evaluated_depsgraph_get()
 
 
-def place_of(item, rigs, depsgraph, basis=None):
-    """The object's Place; `basis` is its own motion where it is another than the object's present one."""
+def world_matrices(item, rigs, depsgraph, basis=None):
+    """The object's matrices; `basis` is its own motion where that is not the object's present one."""
     seen = item.evaluated_get(depsgraph)
     now, own = array(seen.matrix_world), array(seen.matrix_basis)
     parent = parent_now(item, depsgraph, now, own)
     if basis is None and not hangs_on(item, rigs):
-        return Place(now, now, parent)
+        return WorldMatrices(now, now, parent)
     at_rest = parent_at_rest(item, rigs, depsgraph) if hangs_on(item, rigs) else parent
-    return Place(at_rest @ (own if basis is None else basis), now, parent)
+    return WorldMatrices(at_rest @ (own if basis is None else basis), now, parent)
 
 
 def parent_now(item, depsgraph, now, own):
@@ -54,7 +54,7 @@ def parent_now(item, depsgraph, now, own):
 
 
 def parent_at_rest(item, rigs, depsgraph):
-    rest = place_of(item.parent, rigs, depsgraph).rest
+    rest = world_matrices(item.parent, rigs, depsgraph).rest
     return parent_of(item, depsgraph, rest, posed=item.parent not in rigs)
 
 
@@ -90,6 +90,5 @@ def constrained_to(item, rigs):
 
 
 def targets(constraint):
-    entries = getattr(constraint, "targets", None)  # of an Armature constraint
-    found = [entry.target for entry in entries] if entries is not None else [constraint.target]
-    return {item for item in found if item is not None}
+    entries = getattr(constraint, "targets", [constraint])  # several, of an Armature constraint
+    return {entry.target for entry in entries} - {None}
