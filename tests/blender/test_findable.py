@@ -3,7 +3,7 @@
 
 from inside import in_blender
 
-OURS = (
+OPERATORS = (
     "PIN_TOOL",
     "PIN_ADD",
     "ADD_HANDLE",
@@ -21,7 +21,7 @@ OURS = (
 @in_blender
 def test_the_object_menu_has_all_that_the_panel_does():
     import bpy
-    from test_findable import OURS
+    from test_findable import OPERATORS
     from test_panels import Layout
 
     from addon import menus
@@ -36,7 +36,7 @@ def test_the_object_menu_has_all_that_the_panel_does():
 
     stand_in = type("Menu", (), {"layout": Noting([])})()
     menus.ARAPFIELDS_MT_object.draw(stand_in, bpy.context)
-    assert {getattr(Op, name) for name in OURS} <= {*asked}
+    assert {getattr(Op, name) for name in OPERATORS} <= {*asked}
     for name, draw in menus.PLACES.items():
         assert getattr(bpy.types, name).draw._draw_funcs.count(draw) == 1
         draw(stand_in, bpy.context)

@@ -8,14 +8,15 @@ from inside import in_blender
 def test_names_and_defaults_are_the_librarys():
     import arapfields as af
     from addon.core.settings.fitting import FIT
-    from addon.core.settings.parameters import DEFORM, OURS
+    from addon.core.settings.parameters import DEFORM, TABLE
     from addon.core.settings.styles import STYLIZE
 
+    addons_own = {option["name"] for block in TABLE.values() for option in block["further"]}
     tables = {"DeformOptions": DEFORM, "StylizeOptions": STYLIZE, "FitOptions": FIT}
     for name, table in tables.items():
         options = getattr(af, name)()
         for parameter in table:
-            if parameter.name in OURS:
+            if parameter.name in addons_own:
                 continue
             assert parameter.name in type(options).fields, (name, parameter.name)
             assert getattr(options, parameter.name) == parameter.default, (name, parameter.name)
