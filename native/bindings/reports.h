@@ -3,8 +3,8 @@
 #pragma once
 
 #include "bindings/bind.h"
-#include "neural/iteration.h"
-#include "neural/loop_result.h"
+#include "optimize/iteration.h"
+#include "optimize/loop_result.h"
 
 namespace arapfields::python {
 

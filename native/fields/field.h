@@ -6,7 +6,7 @@
 #include "core/frame.h"
 #include "core/jets.h"
 #include "core/types.h"
-#include "neural/matrix_place.h"
+#include "optimize/matrix_place.h"
 
 namespace at {
 class Tensor;

@@ -14,7 +14,7 @@
 #include "mesh/sample_mesh.h"
 #include "neural/mlp.h"
 #include "neural/parameters.h"
-#include "neural/training_loop.h"
+#include "optimize/training_loop.h"
 
 namespace arapfields {
 namespace {

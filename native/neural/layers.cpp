@@ -5,8 +5,8 @@
 #include "core/parallel.h"
 #include "core/random.h"
 #include "core/tensors.h"
-#include "neural/muon.h"
 #include "neural/parameters.h"
+#include "optimize/muon.h"
 
 namespace arapfields {
 namespace {

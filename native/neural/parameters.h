@@ -3,8 +3,8 @@
 #pragma once
 
 #include "core/types.h"
-#include "neural/matrix_place.h"
 #include "neural/mlp.h"
+#include "optimize/matrix_place.h"
 
 namespace arapfields {
 

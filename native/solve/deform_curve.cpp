@@ -10,7 +10,7 @@
 #include "core/memory.h"
 #include "core/parallel.h"
 #include "energies/arap2d.h"
-#include "solve/quasi_newton.h"
+#include "optimize/quasi_newton.h"
 
 namespace arapfields {
 namespace {

@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "fields/field.h"
-#include "neural/training_loop.h"
+#include "optimize/training_loop.h"
 #include "options/deform.h"
 #include "options/stylize.h"
 

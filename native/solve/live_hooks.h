@@ -2,7 +2,7 @@
 #pragma once
 
 #include "energies/external_energy.h"
-#include "neural/iteration.h"
+#include "optimize/iteration.h"
 
 namespace arapfields {
 

@@ -8,10 +8,10 @@
 #include "energies/handles.h"
 #include "fields/mirror.h"
 #include "fields/radial_evaluator.h"
+#include "optimize/quasi_newton.h"
 #include "solve/live_blend.h"
 #include "solve/live_hooks.h"
 #include "solve/live_terms.h"
-#include "solve/quasi_newton.h"
 
 namespace arapfields {
 

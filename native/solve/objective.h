@@ -5,7 +5,7 @@
 
 #include "core/random.h"
 #include "fields/field.h"
-#include "neural/training_loop.h"
+#include "optimize/training_loop.h"
 
 namespace arapfields {
 

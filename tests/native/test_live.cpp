@@ -7,7 +7,7 @@
 #include "core/random.h"
 #include "core/tall_product.h"
 #include "fields/radial_evaluator.h"
-#include "solve/quasi_newton.h"
+#include "optimize/quasi_newton.h"
 
 using namespace arapfields;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "neural/adam_kernel.h"
+#include "optimize/adam_kernel.h"
 
 #include <cmath>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/quasi_newton.h"
+#include "optimize/quasi_newton.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "neural/training_loop.h"
+#include "optimize/training_loop.h"
 
 #include <ATen/ATen.h>
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "neural/optimizer.h"
+#include "optimize/optimizer.h"
 
 #include <optional>
 
-#include "neural/muon.h"
+#include "optimize/muon.h"
 
 namespace arapfields {
 

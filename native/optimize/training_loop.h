@@ -6,9 +6,9 @@
 
 #include "core/errors.h"
 #include "core/task.h"
-#include "neural/iteration.h"
-#include "neural/loop_result.h"
-#include "neural/optimizer.h"
+#include "optimize/iteration.h"
+#include "optimize/loop_result.h"
+#include "optimize/optimizer.h"
 
 namespace arapfields {
 

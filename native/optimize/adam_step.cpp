@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "neural/adam_step.h"
+#include "optimize/adam_step.h"
 
 #include <ATen/ATen.h>
 
@@ -7,7 +7,7 @@
 
 #include "core/aten_path.h"
 #include "core/parallel.h"
-#include "neural/adam_kernel.h"
+#include "optimize/adam_kernel.h"
 
 namespace arapfields {
 namespace {

@@ -4,8 +4,8 @@
 #include <memory>
 #include <vector>
 
-#include "neural/adam_step.h"
-#include "neural/matrix_place.h"
+#include "optimize/adam_step.h"
+#include "optimize/matrix_place.h"
 
 namespace arapfields {
 

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "neural/matrix_place.h"
+#include "optimize/matrix_place.h"
 #include "options/training.h"
 
 namespace at {
@@ -28,7 +28,7 @@ struct Trainable {
   std::vector<MatrixPlace> matrices = {};
 };
 
-/// Steps along the gradient: neural/muon.h for the matrices, or neural/adam_step.h. Parameters
+/// Steps along the gradient: optimize/muon.h for the matrices, or optimize/adam_step.h. Parameters
 /// without matrices are moved by Adam, whatever the options say; a learning rate of 0 is the kind's own.
 class Optimizer {
  public:
