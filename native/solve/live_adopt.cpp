@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // How a live solver takes another field's shape.
 #include "core/parallel.h"
-#include "solve/live_setup.h"
+#include "sampling/sample_choice.h"
 #include "solve/live_state.h"
 
 namespace arapfields {

@@ -5,7 +5,7 @@
 
 #include "core/parallel.h"
 #include "fields/radial_evaluator.h"
-#include "solve/live_setup.h"
+#include "sampling/sample_choice.h"
 #include "solve/live_state.h"
 
 namespace arapfields {

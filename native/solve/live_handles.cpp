@@ -4,8 +4,8 @@
 
 #include "core/parallel.h"
 #include "core/random.h"
+#include "sampling/sample_choice.h"
 #include "sampling/sample_weights.h"
-#include "solve/live_setup.h"
 #include "solve/live_state.h"
 #include "solve/live_stiffness.h"
 #include "solve/setup.h"

@@ -10,7 +10,7 @@
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "fields/radial_basis.h"
-#include "solve/live_setup.h"
+#include "sampling/sample_choice.h"
 #include "solve/live_state.h"
 #include "solve/live_stiffness.h"
 

@@ -8,7 +8,7 @@
 #include "core/parallel.h"
 #include "core/random.h"
 #include "energies/alignment.h"
-#include "solve/live_setup.h"
+#include "sampling/sample_choice.h"
 #include "solve/live_stiffness.h"
 #include "solve/notes.h"
 #include "solve/rest_shape.h"

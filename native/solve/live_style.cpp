@@ -3,7 +3,7 @@
 #include <string>
 
 #include "core/errors.h"
-#include "solve/live_setup.h"
+#include "sampling/sample_choice.h"
 #include "solve/live_state.h"
 #include "solve/setup.h"
 

@@ -4,7 +4,7 @@
 #include "core/random.h"
 #include "fields/mirror.h"
 #include "sampling/canonical_order.h"
-#include "solve/live_setup.h"
+#include "sampling/sample_choice.h"
 #include "solve/setup.h"
 
 namespace arapfields {

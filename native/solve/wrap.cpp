@@ -8,7 +8,7 @@
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "distance/morton.h"
-#include "solve/live_setup.h"
+#include "sampling/sample_choice.h"
 #include "solve/notes.h"
 #include "solve/setup.h"
 #include "solve/wrap_alignment.h"

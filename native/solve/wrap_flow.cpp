@@ -9,7 +9,7 @@
 #include "core/parallel.h"
 #include "distance/morton.h"
 #include "fields/radial_evaluator.h"
-#include "solve/live_setup.h"
+#include "sampling/sample_choice.h"
 
 namespace arapfields {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/live_setup.h"
+#include "sampling/sample_choice.h"
 
 #include <algorithm>
 
