@@ -4,9 +4,9 @@
 #include "bindings/bind.h"
 #include "bindings/files.h"
 #include "bindings/reports.h"
+#include "fields/apply_field.h"
 #include "fields/inverse.h"
 #include "io/files.h"
-#include "solve/apply_field.h"
 
 namespace arapfields::python {
 namespace {

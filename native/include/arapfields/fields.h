@@ -4,8 +4,8 @@
 #pragma once
 
 #include "core/jets.h"
+#include "fields/apply_field.h"
 #include "fields/composed_field.h"
 #include "fields/field.h"
 #include "fields/inverse.h"
 #include "fields/radial_field.h"
-#include "solve/apply_field.h"

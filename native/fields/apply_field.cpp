@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/apply_field.h"
+#include "fields/apply_field.h"
 
 #include <cmath>
 #include <string>
