@@ -4,7 +4,7 @@
 #include "bindings/bind.h"
 #include "bindings/python_function.h"
 #include "bindings/reports.h"
-#include "solve/wrap.h"
+#include "wrap/wrap.h"
 
 namespace arapfields::python {
 namespace {

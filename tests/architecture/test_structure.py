@@ -21,6 +21,7 @@ FOLDERS = [
     "fields",
     "energies",
     "solve",
+    "wrap",
     "extraction",
     "io",
 ]

@@ -2,4 +2,4 @@
 // One surface onto another: wrap.
 #pragma once
 
-#include "solve/wrap.h"
+#include "wrap/wrap.h"

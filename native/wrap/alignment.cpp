@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/wrap_alignment.h"
+#include "wrap/alignment.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/wrap.h"
+#include "wrap/wrap.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,8 +11,8 @@
 #include "sampling/sample_choice.h"
 #include "solve/notes.h"
 #include "solve/setup.h"
-#include "solve/wrap_alignment.h"
-#include "solve/wrap_flow.h"
+#include "wrap/alignment.h"
+#include "wrap/flow.h"
 
 namespace arapfields {
 namespace {

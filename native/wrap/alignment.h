@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "solve/wrap.h"
-#include "solve/wrap_target.h"
+#include "wrap/target.h"
+#include "wrap/wrap.h"
 
 namespace arapfields {
 

@@ -3,7 +3,7 @@
 
 #include "core/task.h"
 #include "fields/radial_basis.h"
-#include "solve/wrap_pull.h"
+#include "wrap/pull.h"
 
 namespace arapfields {
 

@@ -8,7 +8,7 @@
 #include "fields/composed_field.h"
 #include "mesh/surface_samples.h"
 #include "options/wrap.h"
-#include "solve/wrap_system.h"
+#include "wrap/system.h"
 
 namespace arapfields {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/wrap_target.h"
+#include "wrap/target.h"
 
 #include <algorithm>
 #include <cmath>

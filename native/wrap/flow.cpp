@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/wrap_flow.h"
+#include "wrap/flow.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>

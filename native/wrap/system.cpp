@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/wrap_system.h"
+#include "wrap/system.h"
 
 #include <Eigen/SVD>
 #include <array>
