@@ -22,7 +22,7 @@ PYBIND11_MODULE(_native, module) {
   bind_extraction(module);
   bind_live(module);
   bind_wrap(module);
-  bind_attachment(module);
+  bind_attach(module);
   bind_curves(module);
   bind_io(module);
   bind_solve_testing(module);

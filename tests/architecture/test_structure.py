@@ -22,6 +22,7 @@ FOLDERS = [
     "energies",
     "solve",
     "wrap",
+    "attach",
     "extraction",
     "io",
 ]

@@ -2,5 +2,5 @@
 // What goes along with a deformed body: Attachment, rigid_motion.
 #pragma once
 
+#include "attach/attachment.h"
 #include "energies/alignment.h"
-#include "solve/attachment.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/attachment.h"
+#include "attach/attachment.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,6 +7,7 @@
 #include <typeinfo>
 #include <vector>
 
+#include "attach/carrier_frames.h"
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "distance/morton.h"
@@ -14,7 +15,6 @@
 #include "fields/radial_evaluator.h"
 #include "fields/radial_field.h"
 #include "sampling/nearest_sample.h"
-#include "solve/carrier_frames.h"
 #include "solve/setup.h"
 
 namespace arapfields {

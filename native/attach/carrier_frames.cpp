@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/carrier_frames.h"
+#include "attach/carrier_frames.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "attach/carrier_kernel.h"
 #include "core/memory.h"
 #include "core/parallel.h"
 #include "energies/rotation.h"
 #include "fields/radial_basis.h"
-#include "solve/carrier_kernel.h"
 
 namespace arapfields {
 namespace {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "attach/attachment.h"
 #include "bindings/arguments.h"
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
 #include "energies/alignment.h"
-#include "solve/attachment.h"
 
 namespace arapfields::python {
 
-void bind_attachment(py::module_& module) {
+void bind_attach(py::module_& module) {
   py::class_<Attachment>(
       module, "Attachment",
       "Points that go along with a body: clothes, hair, hats, lattices, whatever its motion does not see.\n\n"

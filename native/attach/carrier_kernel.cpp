@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/carrier_kernel.h"
+#include "attach/carrier_kernel.h"
 
 #include "core/pack.h"
 
