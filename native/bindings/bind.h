@@ -37,7 +37,7 @@ void bind_wrap(py::module_& module);
 void bind_extraction(py::module_& module);
 void bind_live(py::module_& module);
 void bind_attach(py::module_& module);
-void bind_curves(py::module_& module);
+void bind_curve(py::module_& module);
 void bind_solve_testing(py::module_& module);
 void bind_invertible_testing(py::module_& module);
 

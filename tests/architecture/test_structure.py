@@ -23,6 +23,7 @@ FOLDERS = [
     "solve",
     "wrap",
     "attach",
+    "curve",
     "extraction",
     "io",
 ]

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/deform_curve.h"
+#include "curve/deform_curve.h"
 
 #include <Eigen/LU>
 #include <algorithm>

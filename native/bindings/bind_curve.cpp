@@ -3,9 +3,9 @@
 #include "bindings/arguments.h"
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
+#include "curve/deform_curve.h"
 #include "energies/arap2d.h"
 #include "sampling/curve_samples.h"
-#include "solve/deform_curve.h"
 
 namespace arapfields::python {
 namespace {
@@ -50,7 +50,7 @@ void bind_testing(py::module_& testing) {
 
 }  // namespace
 
-void bind_curves(py::module_& module) {
+void bind_curve(py::module_& module) {
   py::class_<CurveSamples>(module, "CurveSamples", "Samples of a plane curve, in order along it.")
       .def_readonly("points", &CurveSamples::points, "(n, 2)")
       .def_readonly("normals", &CurveSamples::normals,
