@@ -19,7 +19,7 @@ while(pending)
   endif()
   # The text as it is, but its includes: a list would lose semicolons, so it is never made one.
   file(READ "${path}" text)
-  string(REGEX MATCHALL "#include \"[a-z_0-9]+/[a-z_0-9]+\\.h\"" lines "${text}")
+  string(REGEX MATCHALL "#include \"[a-z_0-9/]+\\.h\"" lines "${text}")
   foreach(line IN LISTS lines)
     string(REGEX REPLACE "#include \"(.*)\"" "\\1" name "${line}")
     if(name MATCHES "^arapfields/")

@@ -9,8 +9,8 @@
 #include "core/device.h"
 #include "solve/deform.h"
 #include "solve/field_measures.h"
-#include "solve/inverse_training.h"
 #include "solve/stylize.h"
+#include "solve/trained/inverse_training.h"
 
 namespace arapfields::python {
 namespace {

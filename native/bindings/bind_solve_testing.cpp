@@ -4,7 +4,7 @@
 #include "bindings/python_function.h"
 #include "core/aten_path.h"
 #include "options/deform.h"
-#include "solve/loss_probe.h"
+#include "solve/trained/loss_probe.h"
 
 namespace arapfields::python {
 void bind_solve_testing(py::module_& module) {

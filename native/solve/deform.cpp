@@ -7,10 +7,10 @@
 #include "core/parallel.h"
 #include "fields/neural_field.h"
 #include "solve/field_choice.h"
-#include "solve/invertible_objective.h"
 #include "solve/radial.h"
 #include "solve/report.h"
 #include "solve/setup.h"
+#include "solve/trained/invertible_objective.h"
 
 namespace arapfields {
 namespace {

@@ -4,8 +4,8 @@
 #include <functional>
 #include <memory>
 
-#include "solve/field_objective.h"
 #include "solve/solution.h"
+#include "solve/trained/field_objective.h"
 
 namespace arapfields {
 

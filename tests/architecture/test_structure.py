@@ -21,6 +21,7 @@ FOLDERS = [
     "fields",
     "energies",
     "solve",
+    "solve/trained",
     "wrap",
     "attach",
     "curve",

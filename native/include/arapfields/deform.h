@@ -5,4 +5,4 @@
 #include "energies/handles.h"
 #include "solve/deform.h"
 #include "solve/hooks.h"
-#include "solve/inverse_training.h"
+#include "solve/trained/inverse_training.h"

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/inverse_training.h"
+#include "solve/trained/inverse_training.h"
 
 #include "core/device.h"
 #include "core/parallel.h"
 #include "fields/neural_field.h"
-#include "solve/cycle.h"
-#include "solve/objective.h"
 #include "solve/setup.h"
+#include "solve/trained/cycle.h"
+#include "solve/trained/objective.h"
 
 namespace arapfields {
 namespace {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/loss_probe.h"
+#include "solve/trained/loss_probe.h"
 
 #include "core/parallel.h"
 #include "core/tensors.h"
 #include "fields/neural_field.h"
 #include "fields/radial_evaluator.h"
 #include "sampling/canonical_order.h"
-#include "solve/field_objective.h"
+#include "solve/trained/field_objective.h"
 
 namespace arapfields {
 namespace {

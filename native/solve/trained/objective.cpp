@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/objective.h"
+#include "solve/trained/objective.h"
 
 #include <ATen/ATen.h>
 

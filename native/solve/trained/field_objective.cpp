@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/field_objective.h"
+#include "solve/trained/field_objective.h"
 
 #include <algorithm>
 

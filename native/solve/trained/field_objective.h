@@ -10,8 +10,8 @@
 #include "energies/style.h"
 #include "mesh/surface_samples.h"
 #include "options/handles.h"
-#include "solve/objective.h"
 #include "solve/surface_stiffness.h"
+#include "solve/trained/objective.h"
 
 namespace arapfields {
 

@@ -6,7 +6,7 @@
 
 #include "fields/neural_field.h"
 #include "mesh/surface_samples.h"
-#include "solve/objective.h"
+#include "solve/trained/objective.h"
 
 namespace arapfields {
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/invertible_objective.h"
+#include "solve/trained/invertible_objective.h"
 
 #include <algorithm>
 
-#include "solve/cycle.h"
+#include "solve/trained/cycle.h"
 
 namespace arapfields {
 
