@@ -35,7 +35,7 @@ void bind_object_style(py::module_& module);
 void bind_solve(py::module_& module);
 void bind_wrap(py::module_& module);
 void bind_extraction(py::module_& module);
-void bind_live(py::module_& module);
+void bind_radial(py::module_& module);
 void bind_attach(py::module_& module);
 void bind_curve(py::module_& module);
 void bind_solve_testing(py::module_& module);

@@ -20,7 +20,7 @@ PYBIND11_MODULE(_native, module) {
   bind_object_style(module);
   bind_solve(module);
   bind_extraction(module);
-  bind_live(module);
+  bind_radial(module);
   bind_wrap(module);
   bind_attach(module);
   bind_curve(module);

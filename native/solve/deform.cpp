@@ -7,7 +7,7 @@
 #include "core/parallel.h"
 #include "fields/neural_field.h"
 #include "solve/field_choice.h"
-#include "solve/radial.h"
+#include "solve/radial/full_solve.h"
 #include "solve/report.h"
 #include "solve/setup.h"
 #include "solve/trained/invertible_objective.h"

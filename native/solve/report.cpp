@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "solve/field_measures.h"
-#include "solve/notes.h"
 #include "solve/setup.h"
+#include "solve/warnings.h"
 
 namespace arapfields {
 namespace {

@@ -3,7 +3,7 @@
 
 #include "core/parallel.h"
 #include "solve/field_choice.h"
-#include "solve/radial.h"
+#include "solve/radial/full_solve.h"
 #include "solve/report.h"
 #include "solve/setup.h"
 

@@ -9,8 +9,8 @@
 #include "core/stopwatch.h"
 #include "distance/morton.h"
 #include "sampling/sample_choice.h"
-#include "solve/notes.h"
 #include "solve/setup.h"
+#include "solve/warnings.h"
 #include "wrap/alignment.h"
 #include "wrap/flow.h"
 

@@ -21,6 +21,7 @@ FOLDERS = [
     "fields",
     "energies",
     "solve",
+    "solve/radial",
     "solve/trained",
     "wrap",
     "attach",

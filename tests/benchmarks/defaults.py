@@ -18,7 +18,7 @@ from . import shapes
 from .shapes import cases
 
 VERTICES, FRESH, FRESH_SEED = 50_000, 50_000, 99
-# What the first result is made of, as native/solve/radial.cpp has it.
+# What the first result is made of, as native/solve/radial/full_solve.cpp has it.
 FEW = {
     "fine_centers": 500,
     "coarse_centers": 100,

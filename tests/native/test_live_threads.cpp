@@ -7,7 +7,7 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "solve/live_solver.h"
+#include "solve/radial/radial_solver.h"
 
 using namespace arapfields;
 
@@ -49,7 +49,7 @@ LiveOptions small_options(int threads) {
 
 /// Where a drag over some frames takes the points.
 PointsF dragged(const SurfaceSamples& samples, int threads) {
-  LiveSolver live(samples, pose(0.0), small_options(threads));
+  RadialSolver live(samples, pose(0.0), small_options(threads));
   live.track(samples.points);
   for (int frame = 1; frame <= frames; ++frame) {
     live.set_targets(pose(0.1 * frame));
@@ -76,7 +76,7 @@ BOOST_AUTO_TEST_CASE(solvers_at_once_do_not_know_of_each_other) {
 
 BOOST_AUTO_TEST_CASE(a_solve_is_watched_and_cancelled_from_another_thread) {
   const SurfaceSamples samples = ball(600);
-  LiveSolver live(samples, pose(0.0), small_options(2));
+  RadialSolver live(samples, pose(0.0), small_options(2));
   live.set_targets(pose(0.8));
   Task task;
   std::atomic<bool> ended{false}, monotone{true};

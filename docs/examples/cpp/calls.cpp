@@ -70,7 +70,7 @@ int main(int argc, char** argv) {
   Handle end;
   end.kind = Handle::Kind::point;
   end.rest_point = end.target_point = mesh.vertices.row(0);
-  LiveSolver live(samples, {end}, LiveOptions());
+  RadialSolver live(samples, {end}, LiveOptions());
   end.target_point.z() += 0.1;
   live.set_targets({end});
   const Points moved = live.solve()->at(mesh.vertices);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Deformation at interactive rates: LiveSolver.
+// Deformation at interactive rates: RadialSolver.
 #pragma once
 
-#include "solve/live_solver.h"
+#include "solve/radial/radial_solver.h"

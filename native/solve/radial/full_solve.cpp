@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/radial.h"
+#include "solve/radial/full_solve.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,10 +7,10 @@
 #include <limits>
 
 #include "core/parallel.h"
-#include "solve/live_solver.h"
-#include "solve/rest_shape.h"
+#include "solve/radial/radial_solver.h"
+#include "solve/radial/rest_shape.h"
+#include "solve/radial/symmetry.h"
 #include "solve/setup.h"
-#include "solve/symmetry.h"
 
 namespace arapfields {
 namespace {
@@ -73,7 +73,7 @@ struct Bounds {
 
 /// Solves until it converges, is out of steps or time, or the observer ends it. The solver's energy is the
 /// loss divided by `rigidity`.
-LoopResult run(LiveSolver& live, const TrainingOptions& how, const Progress& progress,
+LoopResult run(RadialSolver& live, const TrainingOptions& how, const Progress& progress,
                const SolveHooks& hooks, double rigidity, const Shown& shown, const Bounds& bounds) {
   const int iterations = how.iterations;
   const Stopwatch watch;
@@ -81,7 +81,7 @@ LoopResult run(LiveSolver& live, const TrainingOptions& how, const Progress& pro
   Iteration told;
   bool ended = false;
   double before = std::numeric_limits<double>::infinity();
-  LiveHooks steps{hooks.energies, 1.0 / rigidity, {}};
+  RadialHooks steps{hooks.energies, 1.0 / rigidity, {}};
   if (hooks.observer)
     steps.observer = [&](const std::vector<LossTerm>& terms) {
       ++told.number;
@@ -149,12 +149,12 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
     set_centers(few, std::min(most_first, fine.fine_centers / 2), samples);
     few.handle_weight = (exact != nullptr ? followed_closely(options) : options).handles.handle_weight;
     few.tolerance = LiveOptions().tolerance;
-    LiveSolver solver(samples, handles, few, progress.part(0.0, 0.1), shape);
+    RadialSolver solver(samples, handles, few, progress.part(0.0, 0.1), shape);
     first = solver.solve(std::min(first_steps, options.training.iterations), 0.0, progress.part(0.1, 0.15));
     progress.look([&](PointsIn points) { return around(first)->at(points); });
   }
   const double done = first ? 0.15 : 0.0;
-  LiveSolver solver(samples, handles, fine, progress.part(done, 0.4), shape, blend);
+  RadialSolver solver(samples, handles, fine, progress.part(done, 0.4), shape, blend);
   if (first) solver.adopt(*first);
   const Shown shown = [&] { return around(solver.field()); };
   LoopResult loop =
@@ -204,12 +204,12 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
   few.samples = style_first_samples;
   few.fine_centers = style_first_centers;
   few.coarse_centers = few.fine_centers / 5;
-  LiveSolver quick(samples, handles, few, progress.part(0.0, 0.1), shape);
+  RadialSolver quick(samples, handles, few, progress.part(0.0, 0.1), shape);
   quick.set_style(style, options.strength, options.sharpness, weights, up);
   const std::shared_ptr<const RadialField> first =
       quick.solve(std::min(style_first_steps, options.training.iterations), 0.0, progress.part(0.1, 0.15));
   progress.look([&](PointsIn points) { return first->at(points); });
-  LiveSolver solver(samples, handles, live, progress.part(0.15, 0.3), shape);
+  RadialSolver solver(samples, handles, live, progress.part(0.15, 0.3), shape);
   solver.set_style(style, options.strength, options.sharpness, weights, up);
   const Shown shown = [&] { return solver.field(); };
   const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95), hooks, options.rigidity,

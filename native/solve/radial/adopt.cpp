@@ -2,18 +2,18 @@
 // How a live solver takes another field's shape.
 #include "core/parallel.h"
 #include "sampling/sample_choice.h"
-#include "solve/live_state.h"
+#include "solve/radial/state.h"
 
 namespace arapfields {
 
 /// The projection in the surrogate's norm, by conjugate gradients, since the preconditioner knows a part of
 /// the samples. What single precision leaves of far coefficients grows with each round: the round of least
 /// energy is the start.
-void LiveSolver::State::adopt(const DeformationField& field) {
+void RadialSolver::State::adopt(const DeformationField& field) {
   constexpr int rounds = 8;
   const ThreadScope threads(options_.threads);
   precondition(0.0);
-  const LiveObjective<float>& objective = *fast_.objective;
+  const RadialObjective<float>& objective = *fast_.objective;
   const Points places = rows_of(surface_, chosen_);
   // Fields of another frame: the reflections' plane may have moved it.
   const Frame& from = field.frame();
@@ -32,7 +32,7 @@ void LiveSolver::State::adopt(const DeformationField& field) {
   field.evaluate(there(pairs_.sources), {ends.data(), ends.rows(), JetOrder::value});
   ends = here(ends);
   VectorF wanted = VectorF::Zero(30 * places.rows() + 3 * ends.rows() + 3 * basis_.center_count());
-  if (blend_) LiveBlend<double>(*blend_, places).multiply(jets.view());
+  if (blend_) RadialBlend<double>(*blend_, places).multiply(jets.view());
   wanted.head(30 * places.rows()) =
       Eigen::Map<const Vector>(jets.view().data, 30 * places.rows()).cast<float>();
   wanted.segment(30 * places.rows(), 3 * ends.rows()) =

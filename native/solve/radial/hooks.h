@@ -8,7 +8,7 @@ namespace arapfields {
 
 /// What joins a live solve: energies at its samples, and who is told of the weighted terms after each step
 /// and ends the solve by false.
-struct LiveHooks {
+struct RadialHooks {
   ExternalEnergies energies;
   double weight = 1.0;  ///< of the energies
   std::function<bool(const std::vector<LossTerm>&)> observer;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/notes.h"
+#include "solve/warnings.h"
 
 #include <cmath>
 #include <cstdio>

@@ -4,13 +4,13 @@
 
 #include "core/errors.h"
 #include "sampling/sample_choice.h"
-#include "solve/live_state.h"
+#include "solve/radial/state.h"
 #include "solve/setup.h"
 
 namespace arapfields {
 
-void LiveSolver::State::set_style(const Style& style, double strength, double sharpness,
-                                  const Vector& weights, const Vec3& up) {
+void RadialSolver::State::set_style(const Style& style, double strength, double sharpness,
+                                    const Vector& weights, const Vec3& up) {
   require_range("strength", strength, 0, 1e6);
   require(
       weights.size() == 0 ||
@@ -22,7 +22,7 @@ void LiveSolver::State::set_style(const Style& style, double strength, double sh
           "a style needs samples with normals");
   require_no_reach(handles_);
   StyleAsked asked{style, strength, sharpness, weights, up};
-  LiveStyle here = style_at_samples(asked);
+  RadialStyle here = style_at_samples(asked);
   if (here.style.idle(here.normals)) return clear_style();
   require(up.allFinite() && up.norm() > 0.0, "up", "zero, NaN or infinite", "a finite direction is needed");
   const bool other_way_up = up != up_, first = !style_;
@@ -35,8 +35,8 @@ void LiveSolver::State::set_style(const Style& style, double strength, double sh
 }
 
 /// The style at the samples that the energy sees.
-LiveStyle LiveSolver::State::style_at_samples(const StyleAsked& asked) const {
-  LiveStyle here;
+RadialStyle RadialSolver::State::style_at_samples(const StyleAsked& asked) const {
+  RadialStyle here;
   here.normals = rows_of(surface_normals_, chosen_);
   here.style = StyleAtSamples::of(asked.style, here.normals, asked.sharpness);
   if (asked.weights.size() > 0)
@@ -46,7 +46,7 @@ LiveStyle LiveSolver::State::style_at_samples(const StyleAsked& asked) const {
   return here;
 }
 
-void LiveSolver::State::clear_style() {
+void RadialSolver::State::clear_style() {
   const bool stood = stance_.has_value();
   style_.reset();
   style_asked_.reset();
@@ -56,18 +56,18 @@ void LiveSolver::State::clear_style() {
 }
 
 /// What is held of a figure without handles has changed; the next solve makes up for it.
-void LiveSolver::State::stand_otherwise() {
+void RadialSolver::State::stand_otherwise() {
   choose_pairs();
   choose_stance();
   inverse_factor_.resize(0, 0);
 }
 
 /// Without handles, a style's figure keeps its stance.
-void LiveSolver::State::choose_stance() {
+void RadialSolver::State::choose_stance() {
   stance_.reset();
   if (style_ && handles_.empty() && options_.keep_stance > 0.0)
     stance_ =
-        LiveStance{Stance::of(surface_, up_).at(chosen_), rows_of(surface_, chosen_), options_.keep_stance};
+        RadialStance{Stance::of(surface_, up_).at(chosen_), rows_of(surface_, chosen_), options_.keep_stance};
 }
 
 }  // namespace arapfields

@@ -13,7 +13,7 @@ namespace arapfields {
 
 /// What a solve reached, measured at its own samples. The stretch and the energy are pure numbers, the bend
 /// is in 1/cube units², lengths are in mesh units.
-struct LiveReport {
+struct RadialReport {
   ArapValue arap;      ///< arap.energy with the samples' own stiffness
   double value = 0.0;  ///< all that is minimised
   double handle_mean = 0.0, handle_max = 0.0;

@@ -9,9 +9,9 @@
 #include "fields/mirror.h"
 #include "fields/radial_evaluator.h"
 #include "optimize/quasi_newton.h"
-#include "solve/live_blend.h"
-#include "solve/live_hooks.h"
-#include "solve/live_terms.h"
+#include "solve/radial/blend.h"
+#include "solve/radial/hooks.h"
+#include "solve/radial/terms.h"
 
 namespace arapfields {
 
@@ -20,11 +20,11 @@ namespace arapfields {
 /// samples, values at the handles' sources, centers. In single precision a step costs half, and the value is
 /// good to some 1e-6 of itself.
 template <class Scalar>
-class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
+class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
  public:
   using Measurements = Eigen::VectorX<Scalar>;
 
-  LiveObjective(const RadialBasis& basis, PointsIn samples, double handle_weight);
+  RadialObjective(const RadialBasis& basis, PointsIn samples, double handle_weight);
   /// λ of each sample (n), and its factor on its energy (n; empty: all 1).
   void set_stiffness(const Vector& bending, const Vector& weights);
   /// A barrier against folds with this weight and threshold; 0: none.
@@ -34,18 +34,18 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
                    const RowMatrix<double>& inverse_factor);
   /// New targets for the pairs in place.
   void set_targets(PointsIn targets);
-  void set_style(const std::optional<LiveStyle>& style);
+  void set_style(const std::optional<RadialStyle>& style);
   /// Exact handles: f is no longer the radial field itself, whose values handles still pull at.
-  void set_blend(LiveBlend<Scalar> blend) { blend_ = std::move(blend); }
+  void set_blend(RadialBlend<Scalar> blend) { blend_ = std::move(blend); }
   /// `rest` (n,3): the samples.
-  void set_hooks(const LiveHooks& hooks, PointsIn rest);
-  void set_stance(const std::optional<LiveStance>& stance);
+  void set_hooks(const RadialHooks& hooks, PointsIn rest);
+  void set_stance(const std::optional<RadialStance>& stance);
   /// What a body with mass feels; none: the solve is one of shapes alone.
   void set_body(std::optional<Body<Scalar>> body) { body_ = std::move(body); }
   /// Gradients and steps are those of symmetric fields alone.
   void set_mirror(const std::optional<Mirror>& mirror) { mirror_ = mirror; }
 
-  LiveTerms terms(const Measurements& u) const { return evaluate(u, nullptr); }
+  RadialTerms terms(const Measurements& u) const { return evaluate(u, nullptr); }
   /// What `call` makes of the jets of f at the samples.
   template <class Call>
   auto with_jets(const Measurements& u, Call&& call) const {
@@ -83,8 +83,8 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
   bool accepted(const Measurements& u) const override;
 
  private:
-  LiveTerms evaluate(const Measurements& u, Measurements* cotangents) const;
-  LiveTerms evaluate(JetView<const Scalar> jets, const Measurements& u, Scalar* cotangents) const;
+  RadialTerms evaluate(const Measurements& u, Measurements* cotangents) const;
+  RadialTerms evaluate(JetView<const Scalar> jets, const Measurements& u, Scalar* cotangents) const;
   Index handle_offset() const { return 30 * samples_.size(); }
   Index center_offset() const { return handle_offset() + 3 * pairs_.sources.rows(); }
 
@@ -95,21 +95,21 @@ class LiveObjective final : public MeasuredObjectiveOf<Scalar> {
   HandleBatch<Scalar> pairs_;
   TallMatrix<Scalar> handle_basis_;   // (pairs, size)
   TallMatrix<float> inverse_factor_;  // L⁻¹ of the preconditioner's matrix L Lᵀ
-  LiveBlend<Scalar> blend_;
-  std::optional<LiveStyle> style_;
-  std::optional<LiveStance> stance_;
+  RadialBlend<Scalar> blend_;
+  std::optional<RadialStyle> style_;
+  std::optional<RadialStance> stance_;
   std::optional<Body<Scalar>> body_;
   PointsOf<Scalar> stance_rest_, style_normals_, style_targets_;
   Eigen::VectorX<Scalar> style_weights_;
   std::optional<Mirror> mirror_;
-  LiveHooks hooks_;
+  RadialHooks hooks_;
   Points rest_;  // for external energies
 };
 
 /// The objective in one precision, and what it measured last.
 template <class Scalar>
-struct LivePrecision {
-  std::unique_ptr<LiveObjective<Scalar>> objective;
+struct RadialPrecision {
+  std::unique_ptr<RadialObjective<Scalar>> objective;
   Eigen::VectorX<Scalar> u;  // measurements of the coefficients at hand; empty: not known
   int uses = 0;              // solves since u was measured afresh
 };

@@ -5,12 +5,12 @@
 #include <optional>
 #include <vector>
 
-#include "solve/handle_motion.h"
-#include "solve/secondary_motion.h"
+#include "solve/radial/handle_motion.h"
+#include "solve/radial/secondary_motion.h"
 
 namespace arapfields {
 
-struct LiveBody {
+struct RadialBody {
   std::optional<SecondaryMotion> asked;  // `up` of length 1
   Vector masses;                         // of the samples that the energy sees
   RowMatrix<double> velocities;          // of the coefficients; empty: at rest

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/live_blend.h"
+#include "solve/radial/blend.h"
 
 namespace arapfields {
 namespace {
@@ -11,7 +11,7 @@ std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 }  // namespace
 
 template <class Scalar>
-LiveBlend<Scalar>::LiveBlend(const HandleBlend& blend, PointsIn samples) {
+RadialBlend<Scalar>::RadialBlend(const HandleBlend& blend, PointsIn samples) {
   const Index n = samples.rows();
   Vector free(all * n);
   blend.free_weight(samples, JetOrder::second, free.data());
@@ -33,7 +33,7 @@ LiveBlend<Scalar>::LiveBlend(const HandleBlend& blend, PointsIn samples) {
 }
 
 template <class Scalar>
-void LiveBlend<Scalar>::multiply(JetView<Scalar> jets) const {
+void RadialBlend<Scalar>::multiply(JetView<Scalar> jets) const {
   for (std::size_t r = 0; r < rows_.size(); ++r) {
     const Scalar* a = &free_[all * r];
     for (int i = 0; i < 3; ++i) {
@@ -50,7 +50,7 @@ void LiveBlend<Scalar>::multiply(JetView<Scalar> jets) const {
 }
 
 template <class Scalar>
-void LiveBlend<Scalar>::multiply_transposed(JetView<Scalar> cotangents) const {
+void RadialBlend<Scalar>::multiply_transposed(JetView<Scalar> cotangents) const {
   for (std::size_t r = 0; r < rows_.size(); ++r) {
     const Scalar* a = &free_[all * r];
     for (int i = 0; i < 3; ++i) {
@@ -70,14 +70,14 @@ void LiveBlend<Scalar>::multiply_transposed(JetView<Scalar> cotangents) const {
 }
 
 template <class Scalar>
-void LiveBlend<Scalar>::add_fixed(JetView<Scalar> jets) const {
+void RadialBlend<Scalar>::add_fixed(JetView<Scalar> jets) const {
   for (std::size_t r = 0; r < rows_.size(); ++r)
     for (int c = 0; c < all; ++c)
       for (int i = 0; i < 3; ++i)
         jets.at(c, rows_[r])[i] += fixed_[at(3 * (all * static_cast<Index>(r) + c) + i)];
 }
 
-template class LiveBlend<float>;
-template class LiveBlend<double>;
+template class RadialBlend<float>;
+template class RadialBlend<double>;
 
 }  // namespace arapfields

@@ -9,9 +9,9 @@
 #include "fields/radial_field.h"
 #include "mesh/surface_samples.h"
 #include "options/live.h"
-#include "solve/live_hooks.h"
-#include "solve/live_report.h"
-#include "solve/secondary_motion.h"
+#include "solve/radial/hooks.h"
+#include "solve/radial/report.h"
+#include "solve/radial/secondary_motion.h"
 
 namespace arapfields {
 
@@ -20,17 +20,17 @@ struct RestShape;
 
 /// Deforms a surface at interactive rates: the energy of deform (and stylize) over a radial field, solved
 /// from where the last solve ended. Serves one caller at a time.
-class ARAPFIELDS_EXPORT LiveSolver {
+class ARAPFIELDS_EXPORT RadialSolver {
  public:
-  /// Handles in mesh coordinates; none are needed where a style follows. `shape` (solve/rest_shape.h) is that
-  /// of the samples where several solvers share it. With a blend (solve/live_blend.h), what is solved for is
-  /// the radial field inside it. Throws InvalidInput as deform does.
-  LiveSolver(const SurfaceSamples& samples, const std::vector<Handle>& handles, const LiveOptions& options,
-             const Progress& progress = {}, std::shared_ptr<const RestShape> shape = nullptr,
-             std::shared_ptr<const HandleBlend> blend = nullptr);
-  ~LiveSolver();
-  LiveSolver(LiveSolver&&) noexcept;
-  LiveSolver& operator=(LiveSolver&&) noexcept;
+  /// Handles in mesh coordinates; none are needed where a style follows. `shape` (solve/radial/rest_shape.h)
+  /// is that of the samples where several solvers share it. With a blend (solve/radial/blend.h), what is
+  /// solved for is the radial field inside it. Throws InvalidInput as deform does.
+  RadialSolver(const SurfaceSamples& samples, const std::vector<Handle>& handles, const LiveOptions& options,
+               const Progress& progress = {}, std::shared_ptr<const RestShape> shape = nullptr,
+               std::shared_ptr<const HandleBlend> blend = nullptr);
+  ~RadialSolver();
+  RadialSolver(RadialSolver&&) noexcept;
+  RadialSolver& operator=(RadialSolver&&) noexcept;
 
   /// Other handles for the same surface; the shape at hand stays the start of the next solve.
   void set_handles(const std::vector<Handle>& handles);
@@ -47,7 +47,7 @@ class ARAPFIELDS_EXPORT LiveSolver {
   /// from the next solve on; the shape at hand is the start, as nearly as it can be.
   void set_symmetry(SymmetryPlane symmetry, const Progress& progress = {});
   /// Energies that join the solver's own, and an observer of its steps.
-  void set_hooks(const LiveHooks& hooks);
+  void set_hooks(const RadialHooks& hooks);
   /// Moves the handles' targets.
   void set_targets(const std::vector<Handle>& moved);
   /// Improves the field for the targets and the style at hand; 0 iterations or tolerance: the options'.
@@ -87,12 +87,15 @@ class ARAPFIELDS_EXPORT LiveSolver {
   std::shared_ptr<RadialField> field() const;
   /// What the last solve reached; after follow() it is measured at the first call, against the targets at
   /// hand.
-  const LiveReport& report() const;
+  const RadialReport& report() const;
   const std::vector<Handle>& handles() const;
 
  private:
   class State;
   std::unique_ptr<State> state_;
 };
+
+/// Its first name, for one release more.
+using LiveSolver = RadialSolver;
 
 }  // namespace arapfields

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/live_state.h"
+#include "solve/radial/state.h"
 
 #include <cmath>
 #include <string>
@@ -9,12 +9,12 @@
 #include "core/random.h"
 #include "energies/alignment.h"
 #include "sampling/sample_choice.h"
-#include "solve/live_stiffness.h"
-#include "solve/notes.h"
-#include "solve/rest_shape.h"
+#include "solve/radial/rest_shape.h"
+#include "solve/radial/stiffness.h"
+#include "solve/radial/symmetry.h"
 #include "solve/setup.h"
 #include "solve/surface_stiffness.h"
-#include "solve/symmetry.h"
+#include "solve/warnings.h"
 
 namespace arapfields {
 namespace {
@@ -34,9 +34,9 @@ constexpr double worthwhile_gain = 0.1;
 
 }  // namespace
 
-LiveSolver::State::State(const SurfaceSamples& samples, const std::vector<Handle>& handles,
-                         const LiveOptions& options, const Progress& progress,
-                         std::shared_ptr<const RestShape> shape, std::shared_ptr<const HandleBlend> blend)
+RadialSolver::State::State(const SurfaceSamples& samples, const std::vector<Handle>& handles,
+                           const LiveOptions& options, const Progress& progress,
+                           std::shared_ptr<const RestShape> shape, std::shared_ptr<const HandleBlend> blend)
     : options_(options),
       samples_(options.symmetry == SymmetryPlane::none ? samples
                                                        : across(samples, axis_of(options.symmetry))),
@@ -77,12 +77,12 @@ LiveSolver::State::State(const SurfaceSamples& samples, const std::vector<Handle
 }
 
 template <class Scalar>
-void LiveSolver::State::prepare(Precision<Scalar>& precision) {
+void RadialSolver::State::prepare(Precision<Scalar>& precision) {
   precision.objective =
-      std::make_unique<LiveObjective<Scalar>>(basis_, rows_of(surface_, chosen_), options_.handle_weight);
+      std::make_unique<RadialObjective<Scalar>>(basis_, rows_of(surface_, chosen_), options_.handle_weight);
   precision.objective->set_stiffness(bending_, weights_);
   precision.objective->set_mirror(mirror_);
-  if (blend_) precision.objective->set_blend(LiveBlend<Scalar>(*blend_, rows_of(surface_, chosen_)));
+  if (blend_) precision.objective->set_blend(RadialBlend<Scalar>(*blend_, rows_of(surface_, chosen_)));
   precision.objective->set_barrier(options_.surface.barrier, options_.surface.barrier_threshold);
   if (inverse_factor_.size() > 0) precision.objective->set_handles(pairs_, pair_values_, inverse_factor_);
   precision.objective->set_style(style_);
@@ -91,21 +91,21 @@ void LiveSolver::State::prepare(Precision<Scalar>& precision) {
   weigh(precision);
 }
 
-void LiveSolver::State::set_hooks(const LiveHooks& hooks) {
+void RadialSolver::State::set_hooks(const RadialHooks& hooks) {
   hooks_ = hooks;
   for_each_precision(
       [&](auto& precision) { precision.objective->set_hooks(hooks_, rows_of(surface_, chosen_)); });
   optimizer_.forget();
 }
 
-int LiveSolver::State::solve_threads() const {
+int RadialSolver::State::solve_threads() const {
   const Index work = static_cast<Index>(chosen_.size()) * basis_.center_count();
   return options_.threads == 0 && work < worth_threads ? 1 : options_.threads;
 }
 
 template <class Scalar>
-QuasiNewtonReport LiveSolver::State::descend(Precision<Scalar>& precision, const QuasiNewtonOptions& options,
-                                             const Progress& progress) {
+QuasiNewtonReport RadialSolver::State::descend(Precision<Scalar>& precision,
+                                               const QuasiNewtonOptions& options, const Progress& progress) {
   QuasiNewtonReport found;
   try {
     found = optimizer_.minimise(*precision.objective, options, coefficients_, precision.u, progress);
@@ -122,10 +122,10 @@ QuasiNewtonReport LiveSolver::State::descend(Precision<Scalar>& precision, const
   return found;
 }
 
-template QuasiNewtonReport LiveSolver::State::descend<float>(Precision<float>&, const QuasiNewtonOptions&,
-                                                             const Progress&);
+template QuasiNewtonReport RadialSolver::State::descend<float>(Precision<float>&, const QuasiNewtonOptions&,
+                                                               const Progress&);
 
-Index LiveSolver::State::follow(Index iterations, double tolerance, const Progress& progress) {
+Index RadialSolver::State::follow(Index iterations, double tolerance, const Progress& progress) {
   const ThreadScope threads(solve_threads());
   const Stopwatch watch;
   if (iterations <= 0) iterations = options_.iterations;
@@ -153,8 +153,8 @@ Index LiveSolver::State::follow(Index iterations, double tolerance, const Progre
   return report_.iterations;
 }
 
-std::shared_ptr<RadialField> LiveSolver::State::solve(Index iterations, double tolerance,
-                                                      const Progress& progress) {
+std::shared_ptr<RadialField> RadialSolver::State::solve(Index iterations, double tolerance,
+                                                        const Progress& progress) {
   const Stopwatch watch;
   follow(iterations, tolerance, progress);
   report();
@@ -162,7 +162,7 @@ std::shared_ptr<RadialField> LiveSolver::State::solve(Index iterations, double t
   return field();
 }
 
-const LiveReport& LiveSolver::State::report() {
+const RadialReport& RadialSolver::State::report() {
   if (is_measured_) return report_;
   const ThreadScope threads(solve_threads());
   if (is_exact_)
@@ -174,7 +174,7 @@ const LiveReport& LiveSolver::State::report() {
 }
 
 /// Where handles moved together, the whole shape moves along first: no energy but theirs feels it.
-void LiveSolver::State::follow_rigidly() {
+void RadialSolver::State::follow_rigidly() {
   if (fast_.u.size() == 0) fast_.objective->measure(coefficients_, fast_.u);
   const Points values = fast_.objective->handle_values(fast_.u).cast<double>();
   const Alignment alignment = best_alignment(values, pairs_.targets, pairs_.weights);
@@ -188,7 +188,7 @@ void LiveSolver::State::follow_rigidly() {
 }
 
 /// A drag goes on as it went: starts one step further along the last change where that is better.
-void LiveSolver::State::extrapolate() {
+void RadialSolver::State::extrapolate() {
   if (fast_.u.size() == 0) fast_.objective->measure(coefficients_, fast_.u);
   const VectorF start = fast_.u;
   const RowMatrix<double> from = coefficients_;
@@ -206,7 +206,7 @@ void LiveSolver::State::extrapolate() {
 }
 
 /// No energy of ours feels a translation: what is left of one is taken out exactly.
-void LiveSolver::State::hold_lowest() {
+void RadialSolver::State::hold_lowest() {
   Points value(1, 3);
   RadialEvaluator<double>(basis_, pairs_.sources.topRows(1))
       .evaluate(coefficients_, {value.data(), 1, JetOrder::value});
@@ -217,11 +217,11 @@ void LiveSolver::State::hold_lowest() {
 }
 
 template <class Scalar>
-void LiveSolver::State::measure(Precision<Scalar>& precision) {
+void RadialSolver::State::measure(Precision<Scalar>& precision) {
   if (!precision.objective) prepare(precision);
-  const LiveObjective<Scalar>& objective = *precision.objective;
+  const RadialObjective<Scalar>& objective = *precision.objective;
   if (precision.u.size() == 0) objective.measure(coefficients_, precision.u);
-  const LiveTerms terms = objective.terms(precision.u);
+  const RadialTerms terms = objective.terms(precision.u);
   report_.arap = terms.arap;
   report_.preference.reset();
   if (style_) report_.preference = preference_of(style_->style.preference, terms.gauss);
@@ -237,9 +237,9 @@ void LiveSolver::State::measure(Precision<Scalar>& precision) {
   report_.handle_max = frame_.scale * distance.maxCoeff();
 }
 
-template void LiveSolver::State::measure<float>(Precision<float>&);
+template void RadialSolver::State::measure<float>(Precision<float>&);
 
-void LiveSolver::State::reset() {
+void RadialSolver::State::reset() {
   coefficients_ = basis_.identity();
   u_before_.resize(0);
   fast_.u.resize(0);
@@ -258,14 +258,14 @@ void LiveSolver::State::reset() {
   is_measured_ = true;
 }
 
-void LiveSolver::State::track(PointsIn points) {
+void RadialSolver::State::track(PointsIn points) {
   tracked_ = TrackedPoints(basis_, frame_, points);
   tracked_.set_influence(influence_.get());
   tracked_rest_ = points;
 }
 
-std::unique_ptr<LiveSolver::State> LiveSolver::State::with_symmetry(SymmetryPlane symmetry,
-                                                                    const Progress& progress) const {
+std::unique_ptr<RadialSolver::State> RadialSolver::State::with_symmetry(SymmetryPlane symmetry,
+                                                                        const Progress& progress) const {
   LiveOptions options = options_;
   options.symmetry = symmetry;
   auto next = std::make_unique<State>(samples_, handles_, options, progress, nullptr, nullptr);
@@ -281,7 +281,7 @@ std::unique_ptr<LiveSolver::State> LiveSolver::State::with_symmetry(SymmetryPlan
   return next;
 }
 
-std::shared_ptr<RadialField> LiveSolver::State::field() const {
+std::shared_ptr<RadialField> RadialSolver::State::field() const {
   auto result = std::make_shared<RadialField>(basis_, coefficients_, influence_);
   result->set_frame(frame_);
   result->set_rest_points(rows_of(surface_, chosen_));

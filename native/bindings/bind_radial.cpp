@@ -7,13 +7,13 @@
 #include "bindings/reports.h"
 #include "bindings/styles.h"
 #include "options/stylize.h"
-#include "solve/live_solver.h"
+#include "solve/radial/radial_solver.h"
 
 namespace arapfields::python {
 namespace {
 
 /// The solver's handles with new targets: one 4×4 matrix, or three numbers for a point, a handle.
-std::vector<Handle> moved_handles(const LiveSolver& live, const py::object& targets) {
+std::vector<Handle> moved_handles(const RadialSolver& live, const py::object& targets) {
   std::vector<Handle> moved = live.handles();
   const std::string allowed = "one for each of the " + std::to_string(moved.size()) +
                               " handles is needed: (4, 4), or (3,) for a point";
@@ -30,8 +30,8 @@ std::vector<Handle> moved_handles(const LiveSolver& live, const py::object& targ
   return moved;
 }
 
-LiveReportResult report(const LiveSolver& live) {
-  const LiveReport& r = live.report();
+LiveReportResult report(const RadialSolver& live) {
+  const RadialReport& r = live.report();
   return make_report(
       "LiveReport",
       py::dict("stretch"_a = r.arap.stretch, "bend"_a = r.arap.bend, "energy"_a = r.arap.energy,
@@ -44,13 +44,13 @@ LiveReportResult report(const LiveSolver& live) {
                "preference"_a = r.preference, "kinetic"_a = r.kinetic, "speed"_a = r.speed));
 }
 
-RadialFieldResult with_report(const LiveSolver& live) {
+RadialFieldResult with_report(const RadialSolver& live) {
   py::object field = py::cast(live.field());
   attach_report(field, report(live));
   return field;
 }
 
-void set_out(LiveSolver& live, const std::optional<ArraysArgument>& targets, Index iterations,
+void set_out(RadialSolver& live, const std::optional<ArraysArgument>& targets, Index iterations,
              double tolerance) {
   require(iterations >= 0, "iterations", std::to_string(iterations), "0 (the options') or more is allowed");
   require(tolerance >= 0.0 && tolerance < 1.0, "tolerance", std::to_string(tolerance),
@@ -58,21 +58,21 @@ void set_out(LiveSolver& live, const std::optional<ArraysArgument>& targets, Ind
   if (targets) live.set_targets(moved_handles(live, *targets));
 }
 
-RadialFieldResult solve(LiveSolver& live, const std::optional<ArraysArgument>& targets, Index iterations,
+RadialFieldResult solve(RadialSolver& live, const std::optional<ArraysArgument>& targets, Index iterations,
                         double tolerance, Task* task) {
   set_out(live, targets, iterations, tolerance);
   run_long(task, [&](const Progress& progress) { return live.solve(iterations, tolerance, progress); });
   return with_report(live);
 }
 
-Index follow(LiveSolver& live, const std::optional<ArraysArgument>& targets, Index iterations,
+Index follow(RadialSolver& live, const std::optional<ArraysArgument>& targets, Index iterations,
              double tolerance, Task* task) {
   set_out(live, targets, iterations, tolerance);
   return run_long(task,
                   [&](const Progress& progress) { return live.follow(iterations, tolerance, progress); });
 }
 
-RadialFieldResult step(LiveSolver& live, const std::optional<ArraysArgument>& targets, double seconds,
+RadialFieldResult step(RadialSolver& live, const std::optional<ArraysArgument>& targets, double seconds,
                        const std::optional<ArrayArgument>& coordinates, Task* task) {
   const Mat4 motion = coordinates ? as_matrix4(*coordinates, "coordinates") : Mat4(Mat4::Identity());
   const std::vector<Handle> moved = targets ? moved_handles(live, *targets) : live.handles();
@@ -80,7 +80,7 @@ RadialFieldResult step(LiveSolver& live, const std::optional<ArraysArgument>& ta
   return with_report(live);
 }
 
-void set_secondary_motion(LiveSolver& live, const std::optional<SecondaryMotionOptions>& options,
+void set_secondary_motion(RadialSolver& live, const std::optional<SecondaryMotionOptions>& options,
                           const std::optional<ArrayArgument>& masses, const std::optional<ArrayArgument>& up,
                           const std::optional<double>& ground) {
   if (!options) return live.set_secondary_motion(std::nullopt);
@@ -91,7 +91,7 @@ void set_secondary_motion(LiveSolver& live, const std::optional<SecondaryMotionO
   live.set_secondary_motion(motion);
 }
 
-void set_style(LiveSolver& live, const std::optional<NormalsArgument>& normals, double strength,
+void set_style(RadialSolver& live, const std::optional<NormalsArgument>& normals, double strength,
                double sharpness, const std::optional<ArrayArgument>& weights,
                const std::optional<ArrayArgument>& up) {
   if (!normals) return live.clear_style();
@@ -103,7 +103,7 @@ void set_style(LiveSolver& live, const std::optional<NormalsArgument>& normals, 
 
 }  // namespace
 
-void bind_live(py::module_& module) {
+void bind_radial(py::module_& module) {
   py::class_<RadialField, DeformationField, std::shared_ptr<RadialField>>(
       module, "RadialField", "A deformation as a sum of compact centers and an affine map.")
       .def_property_readonly(
@@ -115,7 +115,7 @@ void bind_live(py::module_& module) {
       .def_readonly("velocities", &MotionState::velocities, "(n, 3), a second.")
       .def_readonly("accelerations", &MotionState::accelerations,
                     "(n, 3), a second squared; (0, 3) at rest.");
-  py::class_<LiveSolver>(
+  py::class_<RadialSolver>(
       module, "LiveDeformer",
       "Deforms a surface at interactive rates: handles move, solve() follows from the last shape.\n\n"
       "The energy is that of deform (METHOD: stretch, true bend, handles), of a style as in stylize, over a\n"
@@ -125,7 +125,7 @@ void bind_live(py::module_& module) {
                        const LiveOptions& options, Task* task) {
              const auto held = as_handles(handles);
              return run_long(task, [&](const Progress& progress) {
-               return std::make_unique<LiveSolver>(samples, held, options, progress);
+               return std::make_unique<RadialSolver>(samples, held, options, progress);
              });
            }),
            "samples"_a, "handles"_a = py::tuple(), py::arg_v("options", LiveOptions(), "LiveOptions()"),
@@ -146,26 +146,26 @@ void bind_live(py::module_& module) {
            "asked for. Returns the steps taken; fewer than `iterations` where no more are needed.")
       .def(
           "track",
-          [](LiveSolver& live, const ArrayArgument& points) {
+          [](RadialSolver& live, const ArrayArgument& points) {
             const Points mesh = as_points(points, "points");
             run_long(nullptr, [&](const Progress&) { live.track(mesh); });
           },
           "points"_a, "Prepares points (n, 3), a mesh's vertices for instance, for tracked().")
       .def(
           "tracked",
-          [](const LiveSolver& live) {
+          [](const RadialSolver& live) {
             return run_long(nullptr, [&](const Progress&) { return live.tracked(); });
           },
           "Where the deformation at hand takes the points given to track: (n, 3), single precision. Several\n"
           "times faster than the field itself.")
       .def(
           "set_handles",
-          [](LiveSolver& live, const HandlesArgument& handles) { live.set_handles(as_handles(handles)); },
+          [](RadialSolver& live, const HandlesArgument& handles) { live.set_handles(as_handles(handles)); },
           "handles"_a,
           "Other handles for the same surface; the shape at hand is kept as the start of the next solve.")
       .def(
           "set_weights",
-          [](LiveSolver& live, const std::optional<ArrayArgument>& weights,
+          [](RadialSolver& live, const std::optional<ArrayArgument>& weights,
              const std::optional<ArrayArgument>& bend_weights) {
             const Vector w = weights ? as_vector(*weights, "weights") : Vector();
             const Vector b = bend_weights ? as_vector(*bend_weights, "bend_weights") : Vector();
@@ -176,7 +176,7 @@ void bind_live(py::module_& module) {
           "SurfaceSamples.with_weights; None: 1 everywhere.")
       .def(
           "set_symmetry",
-          [](LiveSolver& live, const std::string& symmetry, Task* task) {
+          [](RadialSolver& live, const std::string& symmetry, Task* task) {
             SymmetryPlane plane{};
             choose(symmetry, "symmetry", plane);
             run_long(task, [&](const Progress& progress) { live.set_symmetry(plane, progress); });
@@ -214,9 +214,9 @@ void bind_live(py::module_& module) {
            "the surface feels it. Without set_secondary_motion, "
            "solve(targets).\n"
            "The same steps from the same start give the same bits. Where it raises, nothing has moved.")
-      .def_property("motion_state", &LiveSolver::motion_state, &LiveSolver::set_motion_state,
+      .def_property("motion_state", &RadialSolver::motion_state, &RadialSolver::set_motion_state,
                     "Where the surface is and how it moves, as a MotionState; set it to go on from there.")
-      .def("reset", &LiveSolver::reset, "Back to the identity and to handles at rest.")
+      .def("reset", &RadialSolver::reset, "Back to the identity and to handles at rest.")
       .def_property_readonly("field", &with_report, "The deformation at hand, as a DeformationField.")
       .def_property_readonly(
           "report", &report,

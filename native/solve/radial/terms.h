@@ -12,13 +12,13 @@
 namespace arapfields {
 
 /// A style's preference at the samples of a live solve.
-struct LiveStyle {
+struct RadialStyle {
   StyleAtSamples style;
   Points normals;       ///< (n,3) rest normals of the samples
   double weight = 1.0;  ///< λ_Gauss
 };
 
-/// What LiveSolver::set_style was called with.
+/// What RadialSolver::set_style was called with.
 struct StyleAsked {
   Style style;
   double strength, sharpness;
@@ -27,14 +27,14 @@ struct StyleAsked {
 };
 
 /// What keeps a figure's stance at the samples of a live solve.
-struct LiveStance {
+struct RadialStance {
   Stance stance;
   Points rest;  ///< (n,3) samples
   double weight = 0.0;
 };
 
 /// What the terms of the energy come to.
-struct LiveTerms {
+struct RadialTerms {
   ArapValue arap;
   double handles = 0.0;          ///< mean squared distance to the targets
   double gauss = 0.0;            ///< style_energy(), where there is a style

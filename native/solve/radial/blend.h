@@ -11,10 +11,10 @@ namespace arapfields {
 /// its free weight a (fields/handle_blend.h). Linear in r but for a part that the targets decide. Only
 /// samples in boxes and margins are touched; empty: f = r.
 template <class Scalar>
-class LiveBlend {
+class RadialBlend {
  public:
-  LiveBlend() = default;
-  LiveBlend(const HandleBlend& blend, PointsIn samples);
+  RadialBlend() = default;
+  RadialBlend(const HandleBlend& blend, PointsIn samples);
   bool empty() const { return rows_.empty(); }
   /// Jets of a r from those of r.
   void multiply(JetView<Scalar> jets) const;

@@ -6,15 +6,15 @@
 
 #include "fields/mirror.h"
 #include "fields/tracked_points.h"
-#include "solve/live_body.h"
-#include "solve/live_objective.h"
-#include "solve/live_solver.h"
+#include "solve/radial/body.h"
+#include "solve/radial/objective.h"
+#include "solve/radial/radial_solver.h"
+#include "solve/radial/time_scheme.h"
 #include "solve/surface_stiffness.h"
-#include "solve/time_scheme.h"
 
 namespace arapfields {
 
-class LiveSolver::State {
+class RadialSolver::State {
  public:
   State(const SurfaceSamples& samples, const std::vector<Handle>& handles, const LiveOptions& options,
         const Progress& progress, std::shared_ptr<const RestShape> shape,
@@ -23,7 +23,7 @@ class LiveSolver::State {
   void set_style(const Style& style, double strength, double sharpness, const Vector& weights,
                  const Vec3& up);
   void clear_style();
-  void set_hooks(const LiveHooks& hooks);
+  void set_hooks(const RadialHooks& hooks);
   void set_weights(const Vector& weights, const Vector& bend_weights);
   void set_targets(const std::vector<Handle>& moved);
   Index follow(Index iterations, double tolerance, const Progress& progress);
@@ -41,13 +41,13 @@ class LiveSolver::State {
   std::unique_ptr<State> with_symmetry(SymmetryPlane symmetry, const Progress& progress) const;
   PointsF tracked() const { return tracked_.moved(coefficients_); }
   std::shared_ptr<RadialField> field() const;
-  const LiveReport& report();
+  const RadialReport& report();
   const std::vector<Handle>& handles() const { return handles_; }
   const LiveOptions& options() const { return options_; }
 
  private:
   template <class Scalar>
-  using Precision = LivePrecision<Scalar>;
+  using Precision = RadialPrecision<Scalar>;
   template <class Scalar>
   void prepare(Precision<Scalar>& precision);
   template <class Scalar>
@@ -60,7 +60,7 @@ class LiveSolver::State {
     if (exact_.objective) call(exact_);
   }
   std::pair<Vector, Vector> resistance() const;
-  LiveStyle style_at_samples(const StyleAsked& asked) const;
+  RadialStyle style_at_samples(const StyleAsked& asked) const;
   void stiffen(const Progress& progress), choose_smoothing(double h);
   bool choose_influence();
   std::shared_ptr<const Influence> reaches_of_handles() const;
@@ -98,21 +98,21 @@ class LiveSolver::State {
   Points held_;                                 // samples beyond it, which are held in place
   HandleBatch<double> pairs_;                   // of handles, of what is held, and reflections of both
   RowMatrix<double> stiffness_, pair_values_, inverse_factor_;
-  std::optional<LiveStyle> style_;
+  std::optional<RadialStyle> style_;
   std::optional<StyleAsked> style_asked_;
-  LiveHooks hooks_;
+  RadialHooks hooks_;
   Vec3 up_ = Vec3::UnitZ();
-  std::optional<LiveStance> stance_;
+  std::optional<RadialStance> stance_;
   Precision<float> fast_;    // what a drag needs
   Precision<double> exact_;  // what follows where more is asked for; made when it first is
   QuasiNewton optimizer_;
   RowMatrix<double> coefficients_;
   RowMatrix<double> coefficients_before_;  // where the solve before the last one ended; empty: not known
   VectorF u_before_;
-  LiveBody body_;
+  RadialBody body_;
   TrackedPoints tracked_;
   Points tracked_rest_;
-  LiveReport report_;
+  RadialReport report_;
   bool is_measured_ = true;  // whether the report is of the shape at hand
   bool is_exact_ = false;    // whether that came of double precision
 };

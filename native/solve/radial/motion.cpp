@@ -11,8 +11,8 @@
 #include "core/stopwatch.h"
 #include "fields/radial_basis.h"
 #include "sampling/sample_choice.h"
-#include "solve/live_state.h"
-#include "solve/live_stiffness.h"
+#include "solve/radial/state.h"
+#include "solve/radial/stiffness.h"
 
 namespace arapfields {
 namespace {
@@ -49,7 +49,7 @@ double rounded(double inertia) { return std::exp2(std::round(std::log2(inertia))
 
 }  // namespace
 
-void LiveSolver::State::set_secondary_motion(const std::optional<SecondaryMotion>& motion) {
+void RadialSolver::State::set_secondary_motion(const std::optional<SecondaryMotion>& motion) {
   if (motion) {
     motion->options.validate();
     require(!blend_, "secondary motion", "with exact handles", "it needs handles that pull");
@@ -77,7 +77,7 @@ void LiveSolver::State::set_secondary_motion(const std::optional<SecondaryMotion
 
 /// The body that the objective feels, of which no inertia is asked.
 template <class Scalar>
-void LiveSolver::State::weigh(Precision<Scalar>& precision, double inertia, PointsOf<Scalar> goal) {
+void RadialSolver::State::weigh(Precision<Scalar>& precision, double inertia, PointsOf<Scalar> goal) {
   if (!body_.has_mass()) return precision.objective->set_body(std::nullopt);
   Body<Scalar> body{body_.masses.cast<Scalar>(), rows_of(surface_, chosen_).cast<Scalar>(), std::move(goal),
                     inertia};
@@ -90,18 +90,18 @@ void LiveSolver::State::weigh(Precision<Scalar>& precision, double inertia, Poin
   }
   precision.objective->set_body(std::move(body));
 }
-template void LiveSolver::State::weigh<float>(Precision<float>&, double, PointsF);
-template void LiveSolver::State::weigh<double>(Precision<double>&, double, Points);
+template void RadialSolver::State::weigh<float>(Precision<float>&, double, PointsF);
+template void RadialSolver::State::weigh<double>(Precision<double>&, double, Points);
 
 /// Factors the preconditioner for this inertia, where it is not already.
-void LiveSolver::State::precondition(double inertia) {
+void RadialSolver::State::precondition(double inertia) {
   if (inverse_factor_.size() > 0 && body_.factored_inertia == inertia) return;
   body_.factored_inertia = inertia;
   factorise();
 }
 
 /// What smooth() needs after steps of length h.
-void LiveSolver::State::choose_smoothing(double h) {
+void RadialSolver::State::choose_smoothing(double h) {
   if (body_.smoothing.size() > 0 && body_.smoothed == h) return;
   const RowMatrix<double> rows = radial_rows(basis_, rows_of(surface_, chosen_), JetOrder::value);
   const Vector share = Vector::Constant(rows.rows(), 1.0 / static_cast<double>(rows.rows()));
@@ -115,7 +115,7 @@ void LiveSolver::State::choose_smoothing(double h) {
 /// Velocities and accelerations without their short waves, and without what no sample sees of them:
 /// 1 − (1 − S)² of S = (G + τK)⁻¹ G, for the mean squares of the values at the samples and of the
 /// derivatives.
-RowMatrix<double> LiveSolver::State::smooth(const RowMatrix<double>& velocities) const {
+RowMatrix<double> RadialSolver::State::smooth(const RowMatrix<double>& velocities) const {
   const auto once = [&](const RowMatrix<double>& x) -> RowMatrix<double> {
     const RowMatrix<double> y = body_.gram.selfadjointView<Eigen::Lower>() * x;
     const RowMatrix<double> z = body_.smoothing.triangularView<Eigen::Lower>() * y;
@@ -125,13 +125,13 @@ RowMatrix<double> LiveSolver::State::smooth(const RowMatrix<double>& velocities)
   return 2.0 * first - once(first);
 }
 
-MotionState LiveSolver::State::motion_state() const {
+MotionState RadialSolver::State::motion_state() const {
   RowMatrix<double> velocities = body_.velocities;
   if (velocities.size() == 0) velocities.setZero(basis_.size(), 3);
   return {coefficients_, velocities, body_.accelerations, body_.motions};
 }
 
-void LiveSolver::State::set_motion_state(const MotionState& state) {
+void RadialSolver::State::set_motion_state(const MotionState& state) {
   const auto fits = [&](const RowMatrix<double>& c) {
     return c.rows() == basis_.size() && c.cols() == 3 && c.allFinite();
   };
@@ -150,21 +150,21 @@ void LiveSolver::State::set_motion_state(const MotionState& state) {
 }
 
 /// What follows depends on the coefficients alone.
-void LiveSolver::State::forget_past() {
+void RadialSolver::State::forget_past() {
   for_each_precision([](auto& precision) { precision.u.resize(0), precision.uses = 0; });
   u_before_.resize(0);
   optimizer_.forget();
 }
 
 /// The body has come to rest where it is.
-void LiveSolver::State::rest() {
+void RadialSolver::State::rest() {
   body_.velocities.resize(0, 3);
   body_.accelerations.resize(0, 3);
   body_.motions = motions_of(bound_);
 }
 
 /// Where the pairs pull at a share of the way from earlier motions of the handles to those at hand.
-Points LiveSolver::State::pair_targets_between(const std::vector<Mat4>& before, double share) const {
+Points RadialSolver::State::pair_targets_between(const std::vector<Mat4>& before, double share) const {
   if (handles_.empty()) return pairs_.targets;
   Points own(static_cast<Index>(pair_rows_.size()) + held_.rows(), 3);
   own << targets_between(bound_, before, share, pair_rows_), held_;
@@ -176,8 +176,8 @@ Points LiveSolver::State::pair_targets_between(const std::vector<Mat4>& before, 
 
 /// One step of a scheme from the place, velocity and acceleration at hand. Whether it could be solved; a step
 /// of backward Euler always moves, others only then.
-bool LiveSolver::State::swing(const TimeScheme& scheme, double h, const Twist& carried,
-                              const Progress& progress) {
+bool RadialSolver::State::swing(const TimeScheme& scheme, double h, const Twist& carried,
+                                const Progress& progress) {
   const auto [alpha, w, gamma, beta] = scheme;
   if (fast_.u.size() == 0) fast_.objective->measure(coefficients_, fast_.u);
   const RowMatrix<double> q = coefficients_, v = body_.velocities;
@@ -220,7 +220,7 @@ bool LiveSolver::State::swing(const TimeScheme& scheme, double h, const Twist& c
 
 /// How much further a step should go along its way `du`, as a share of it, so that what the solve left of the
 /// gradient does no work on it: that it ends early then neither feeds nor slows the motion.
-double LiveSolver::State::left_along(const VectorF& du, double inertia) {
+double RadialSolver::State::left_along(const VectorF& du, double inertia) {
   VectorF cotangents;
   fast_.objective->value(fast_.u, &cotangents);
   const Points way = fast_.objective->sample_values(du).cast<double>();
@@ -230,8 +230,8 @@ double LiveSolver::State::left_along(const VectorF& du, double inertia) {
   return std::abs(share) < most_left ? share : 0.0;  // else it is no small correction
 }
 
-std::shared_ptr<RadialField> LiveSolver::State::step(const std::vector<Handle>& moved, double seconds,
-                                                     const Mat4& coordinates, const Progress& progress) {
+std::shared_ptr<RadialField> RadialSolver::State::step(const std::vector<Handle>& moved, double seconds,
+                                                       const Mat4& coordinates, const Progress& progress) {
   require(std::isfinite(seconds) && seconds >= shortest_frame && seconds <= longest_frame, "seconds",
           number_text(seconds),
           number_text(shortest_frame) + " to " + number_text(longest_frame) + " is allowed");
@@ -261,7 +261,7 @@ std::shared_ptr<RadialField> LiveSolver::State::step(const std::vector<Handle>& 
 }
 
 /// The same body, and the same handles of the last step, in coordinates that have moved.
-void LiveSolver::State::change_coordinates(const Mat4& motion) {
+void RadialSolver::State::change_coordinates(const Mat4& motion) {
   const Mat3 turn = motion.topLeftCorner<3, 3>();
   require(motion.allFinite() && motion.row(3) == Eigen::RowVector4d(0, 0, 0, 1) && turn.determinant() > 0.0 &&
               (turn.transpose() * turn - Mat3::Identity()).norm() < rigid_error,
@@ -275,7 +275,7 @@ void LiveSolver::State::change_coordinates(const Mat4& motion) {
   for (Mat4& handle : body_.motions) handle = m * handle;
 }
 
-void LiveSolver::State::advance(double seconds, const Progress& progress) {
+void RadialSolver::State::advance(double seconds, const Progress& progress) {
   const std::vector<Mat4> now = motions_of(bound_);
   const std::vector<Mat4> before = body_.motions.size() == now.size() ? body_.motions : now;
   const Twist carried = twist_between(pair_targets_between(before, 0.0), pair_targets_between(before, 1.0),
@@ -307,7 +307,7 @@ void LiveSolver::State::advance(double seconds, const Progress& progress) {
 }
 
 /// ½ mass · mean m ‖v‖² of the samples' velocities v; their root mean square becomes the report's speed.
-double LiveSolver::State::kinetic_energy() {
+double RadialSolver::State::kinetic_energy() {
   VectorF u;
   fast_.objective->measure(body_.velocities, u);
   const Points v = fast_.objective->sample_values(u).cast<double>();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/handle_motion.h"
+#include "solve/radial/handle_motion.h"
 
 #include <Eigen/Geometry>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/live_stiffness.h"
+#include "solve/radial/stiffness.h"
 
 #include <algorithm>
 #include <array>

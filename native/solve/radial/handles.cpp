@@ -6,8 +6,8 @@
 #include "core/random.h"
 #include "sampling/sample_choice.h"
 #include "sampling/sample_weights.h"
-#include "solve/live_state.h"
-#include "solve/live_stiffness.h"
+#include "solve/radial/state.h"
+#include "solve/radial/stiffness.h"
 #include "solve/setup.h"
 #include "solve/surface_stiffness.h"
 
@@ -25,7 +25,7 @@ constexpr Index most_places = 256;
 
 }  // namespace
 
-void LiveSolver::State::choose_pairs() {
+void RadialSolver::State::choose_pairs() {
   pair_rows_.clear();
   held_.resize(0, 3);
   if (handles_.empty()) {
@@ -67,7 +67,7 @@ void LiveSolver::State::choose_pairs() {
 }
 
 /// Where all handles that move have a reach, what is beyond all of these is held. Whether that has changed.
-bool LiveSolver::State::choose_influence() {
+bool RadialSolver::State::choose_influence() {
   std::shared_ptr<const Influence> next = reaches_;
   for (Index i = 0; i < bound_.count() && next; ++i) {
     const Index begin = bound_.begin(i), rows = bound_.begin(i + 1) - begin;
@@ -80,7 +80,7 @@ bool LiveSolver::State::choose_influence() {
   return changed;
 }
 
-std::shared_ptr<const Influence> LiveSolver::State::reaches_of_handles() const {
+std::shared_ptr<const Influence> RadialSolver::State::reaches_of_handles() const {
   std::vector<Vec3> places;
   std::vector<double> reaches;
   for (Index i = 0; i < bound_.count(); ++i) {
@@ -109,7 +109,7 @@ std::shared_ptr<const Influence> LiveSolver::State::reaches_of_handles() const {
                                            basis_.embedding);
 }
 
-Points LiveSolver::State::pair_targets() const {
+Points RadialSolver::State::pair_targets() const {
   Points result(static_cast<Index>(pair_rows_.size()) + held_.rows(), 3);
   result << rows_of(bound_.targets(), pair_rows_), held_;
   return result;
@@ -117,7 +117,7 @@ Points LiveSolver::State::pair_targets() const {
 
 /// What pulls at a point pulls at its reflection as well: a symmetric field feels no difference, and the
 /// preconditioner becomes symmetric.
-void LiveSolver::State::reflect_pairs() {
+void RadialSolver::State::reflect_pairs() {
   if (!mirror_) return;
   const Index n = pairs_.weights.size();
   const HandleBatch<double> own = pairs_;
@@ -129,7 +129,7 @@ void LiveSolver::State::reflect_pairs() {
   pairs_.weights << 0.5 * own.weights, 0.5 * own.weights;
 }
 
-void LiveSolver::State::set_weights(const Vector& weights, const Vector& bend_weights) {
+void RadialSolver::State::set_weights(const Vector& weights, const Vector& bend_weights) {
   const ThreadScope threads(options_.threads);
   samples_ = with_weights(samples_, weights, bend_weights);
   stiffen({});
@@ -138,7 +138,7 @@ void LiveSolver::State::set_weights(const Vector& weights, const Vector& bend_we
 }
 
 /// w of each sample that the energy sees (empty: all 1), and λ.
-std::pair<Vector, Vector> LiveSolver::State::resistance() const {
+std::pair<Vector, Vector> RadialSolver::State::resistance() const {
   const Vector all = energy_weights(samples_, bound_);
   Vector weights(all.size() > 0 ? static_cast<Index>(chosen_.size()) : 0), bending = own_bending_;
   for (std::size_t i = 0; i < chosen_.size(); ++i) {
@@ -150,7 +150,7 @@ std::pair<Vector, Vector> LiveSolver::State::resistance() const {
 }
 
 /// The samples' resistance, where their weights or handles that scale have changed it.
-void LiveSolver::State::stiffen(const Progress& progress) {
+void RadialSolver::State::stiffen(const Progress& progress) {
   const auto [weights, bending] = resistance();
   if (stiffness_.size() > 0 && weights.size() == weights_.size() && weights == weights_ &&
       bending == bending_)
@@ -164,7 +164,7 @@ void LiveSolver::State::stiffen(const Progress& progress) {
   for_each_precision([&](auto& precision) { precision.objective->set_stiffness(bending_, weights_); });
 }
 
-void LiveSolver::State::set_handles(const std::vector<Handle>& handles) {
+void RadialSolver::State::set_handles(const std::vector<Handle>& handles) {
   const ThreadScope threads(options_.threads);
   if (style_) require_no_reach(handles);
   bound_ = BoundHandles(in_cube(handles, frame_), surface_);
@@ -180,7 +180,7 @@ void LiveSolver::State::set_handles(const std::vector<Handle>& handles) {
 }
 
 /// The preconditioner of the handles and the stance at hand.
-void LiveSolver::State::factorise() {
+void RadialSolver::State::factorise() {
   pair_values_ = radial_rows(basis_, pairs_.sources, JetOrder::value);
   RowMatrix<double> values = pair_values_;
   Vector weights = options_.handle_weight * pairs_.weights;
@@ -213,7 +213,7 @@ void LiveSolver::State::factorise() {
   optimizer_.forget();
 }
 
-void LiveSolver::State::set_targets(const std::vector<Handle>& moved) {
+void RadialSolver::State::set_targets(const std::vector<Handle>& moved) {
   bound_.retarget(in_cube(moved, frame_));
   for (std::size_t i = 0; i < handles_.size(); ++i) {
     handles_[i].target = moved[i].target;

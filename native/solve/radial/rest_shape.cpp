@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/rest_shape.h"
+#include "solve/radial/rest_shape.h"
 
 #include "core/random.h"
 #include "fields/mirror.h"

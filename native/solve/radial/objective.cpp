@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/live_objective.h"
+#include "solve/radial/objective.h"
 
 #include <numeric>
 
@@ -15,39 +15,39 @@ constexpr double coefficient_weight = 1e-10;
 }  // namespace
 
 template <class Scalar>
-LiveObjective<Scalar>::LiveObjective(const RadialBasis& basis, PointsIn samples, double handle_weight)
+RadialObjective<Scalar>::RadialObjective(const RadialBasis& basis, PointsIn samples, double handle_weight)
     : center_count_(basis.center_count()), handle_weight_(handle_weight), samples_(basis, samples) {}
 
 template <class Scalar>
-void LiveObjective<Scalar>::set_stiffness(const Vector& bending, const Vector& weights) {
+void RadialObjective<Scalar>::set_stiffness(const Vector& bending, const Vector& weights) {
   bending_ = bending.cast<Scalar>();
   weights_ = weights.cast<Scalar>();
 }
 
 template <class Scalar>
-void LiveObjective<Scalar>::set_barrier(double weight, double threshold) {
+void RadialObjective<Scalar>::set_barrier(double weight, double threshold) {
   barrier_ = weight;
   barrier_threshold_ = threshold;
 }
 
 template <class Scalar>
-void LiveObjective<Scalar>::set_handles(const HandleBatch<double>& pairs,
-                                        const RowMatrix<double>& values_of_basis,
-                                        const RowMatrix<double>& inverse_factor) {
+void RadialObjective<Scalar>::set_handles(const HandleBatch<double>& pairs,
+                                          const RowMatrix<double>& values_of_basis,
+                                          const RowMatrix<double>& inverse_factor) {
   pairs_ = {pairs.sources.cast<Scalar>(), pairs.targets.cast<Scalar>(), pairs.weights.cast<Scalar>()};
   handle_basis_ = TallMatrix<Scalar>(values_of_basis);
   inverse_factor_ = TallMatrix<float>(inverse_factor, true);
 }
 
 template <class Scalar>
-void LiveObjective<Scalar>::set_targets(PointsIn targets) {
+void RadialObjective<Scalar>::set_targets(PointsIn targets) {
   require(targets.rows() == pairs_.sources.rows(), "targets", std::to_string(targets.rows()) + " rows",
           std::to_string(pairs_.sources.rows()) + " are needed");
   pairs_.targets = targets.cast<Scalar>();
 }
 
 template <class Scalar>
-void LiveObjective<Scalar>::set_style(const std::optional<LiveStyle>& style) {
+void RadialObjective<Scalar>::set_style(const std::optional<RadialStyle>& style) {
   style_ = style;
   if (!style) return;
   style_normals_ = style->normals.template cast<Scalar>();
@@ -56,15 +56,15 @@ void LiveObjective<Scalar>::set_style(const std::optional<LiveStyle>& style) {
 }
 
 template <class Scalar>
-void LiveObjective<Scalar>::set_hooks(const LiveHooks& hooks, PointsIn rest) {
+void RadialObjective<Scalar>::set_hooks(const RadialHooks& hooks, PointsIn rest) {
   hooks_ = hooks;
   rest_ = rest;
 }
 
 template <class Scalar>
-bool LiveObjective<Scalar>::accepted(const Measurements& u) const {
+bool RadialObjective<Scalar>::accepted(const Measurements& u) const {
   if (!hooks_.observer) return true;
-  const LiveTerms terms = evaluate(u, nullptr);
+  const RadialTerms terms = evaluate(u, nullptr);
   std::vector<LossTerm> told{{"stretch", terms.arap.stretch_energy}};
   if ((bending_.array() > 0).any()) told.push_back({"bend", terms.arap.energy - terms.arap.stretch_energy});
   if (style_) told.push_back({"style", style_->weight * terms.gauss});
@@ -78,13 +78,13 @@ bool LiveObjective<Scalar>::accepted(const Measurements& u) const {
 }
 
 template <class Scalar>
-void LiveObjective<Scalar>::set_stance(const std::optional<LiveStance>& stance) {
+void RadialObjective<Scalar>::set_stance(const std::optional<RadialStance>& stance) {
   stance_ = stance;
   if (stance) stance_rest_ = stance->rest.template cast<Scalar>();
 }
 
 template <class Scalar>
-void LiveObjective<Scalar>::measure(const RowMatrix<double>& c, Measurements& u) const {
+void RadialObjective<Scalar>::measure(const RowMatrix<double>& c, Measurements& u) const {
   u.resize(center_offset() + 3 * center_count_);
   samples_.evaluate(c, {u.data(), samples_.size(), JetOrder::second});
   blend_.multiply({u.data(), samples_.size(), JetOrder::second});
@@ -95,7 +95,7 @@ void LiveObjective<Scalar>::measure(const RowMatrix<double>& c, Measurements& u)
 }
 
 template <class Scalar>
-LiveTerms LiveObjective<Scalar>::evaluate(const Measurements& u, Measurements* cotangents) const {
+RadialTerms RadialObjective<Scalar>::evaluate(const Measurements& u, Measurements* cotangents) const {
   if (cotangents != nullptr) cotangents->setZero(u.size());
   return with_jets(u, [&](JetView<const Scalar> jets) {
     return evaluate(jets, u, cotangents != nullptr ? cotangents->data() : nullptr);
@@ -103,10 +103,10 @@ LiveTerms LiveObjective<Scalar>::evaluate(const Measurements& u, Measurements* c
 }
 
 template <class Scalar>
-LiveTerms LiveObjective<Scalar>::evaluate(JetView<const Scalar> jets, const Measurements& u,
-                                          Scalar* out) const {
+RadialTerms RadialObjective<Scalar>::evaluate(JetView<const Scalar> jets, const Measurements& u,
+                                              Scalar* out) const {
   const JetView<Scalar> jet_cotangents{out, samples_.size(), JetOrder::second};
-  LiveTerms terms;
+  RadialTerms terms;
   terms.arap = arap_energy<Scalar>(jets, 1.0, 1.0, jet_cotangents,
                                    {weights_.size() > 0 ? weights_.data() : nullptr, bending_.data()});
   const Index pairs = pairs_.sources.rows();
@@ -127,7 +127,7 @@ LiveTerms LiveObjective<Scalar>::evaluate(JetView<const Scalar> jets, const Meas
 }
 
 template <class Scalar>
-Eigen::VectorX<Scalar> LiveObjective<Scalar>::weighted(const Measurements& u) const {
+Eigen::VectorX<Scalar> RadialObjective<Scalar>::weighted(const Measurements& u) const {
   Measurements result = Measurements::Zero(u.size());
   const Index n = samples_.size(), pairs = pairs_.sources.rows();
   for (int c = 1; c < 10; ++c) {
@@ -146,8 +146,8 @@ Eigen::VectorX<Scalar> LiveObjective<Scalar>::weighted(const Measurements& u) co
 }
 
 template <class Scalar>
-double LiveObjective<Scalar>::value(const Measurements& u, Measurements* cotangents) const {
-  const LiveTerms terms = evaluate(u, cotangents);
+double RadialObjective<Scalar>::value(const Measurements& u, Measurements* cotangents) const {
+  const RadialTerms terms = evaluate(u, cotangents);
   const auto centers = u.tail(3 * center_count_);
   if (cotangents != nullptr) cotangents->tail(3 * center_count_) = Scalar(2.0 * coefficient_weight) * centers;
   return terms.arap.energy + handle_weight_ * terms.handles + (style_ ? style_->weight * terms.gauss : 0.0) +
@@ -158,7 +158,7 @@ double LiveObjective<Scalar>::value(const Measurements& u, Measurements* cotange
 }
 
 template <class Scalar>
-RowMatrix<double> LiveObjective<Scalar>::pull_back(const Measurements& cotangents) const {
+RowMatrix<double> RadialObjective<Scalar>::pull_back(const Measurements& cotangents) const {
   RowMatrix<double> gradient = RowMatrix<double>::Zero(center_count_ + 4, 3);
   if (blend_.empty()) {
     samples_.pull_back({cotangents.data(), samples_.size(), JetOrder::second}, gradient);
@@ -175,7 +175,7 @@ RowMatrix<double> LiveObjective<Scalar>::pull_back(const Measurements& cotangent
 }
 
 template <class Scalar>
-RowMatrix<double> LiveObjective<Scalar>::precondition(const RowMatrix<double>& gradient) const {
+RowMatrix<double> RadialObjective<Scalar>::precondition(const RowMatrix<double>& gradient) const {
   const double size = gradient.norm();
   if (!(size > 0.0)) return gradient;
   const PointsF scaled = (gradient / size).cast<float>();
@@ -185,7 +185,7 @@ RowMatrix<double> LiveObjective<Scalar>::precondition(const RowMatrix<double>& g
   return step;
 }
 
-template class LiveObjective<float>;
-template class LiveObjective<double>;
+template class RadialObjective<float>;
+template class RadialObjective<double>;
 
 }  // namespace arapfields

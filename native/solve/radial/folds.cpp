@@ -6,12 +6,12 @@
 #include "core/parallel.h"
 #include "fields/radial_evaluator.h"
 #include "sampling/sample_choice.h"
-#include "solve/live_state.h"
+#include "solve/radial/state.h"
 
 namespace arapfields {
 
 /// As little as these samples add to the rest surface's stiffness, the preconditioner stays.
-Index LiveSolver::State::watch_folds(double barrier) {
+Index RadialSolver::State::watch_folds(double barrier) {
   const ThreadScope threads(options_.threads);
   const std::size_t before = chosen_.size();
   std::vector<bool> seen(static_cast<std::size_t>(surface_.rows()), false);
