@@ -17,12 +17,16 @@ HOLDS = {
     "sampling": "points by random lines",
     "fields": "f, J, D and pull-back",
     "energies": "value and cotangents",
-    "solve": "Adam, live solver",
+    "optimize": "L-BFGS, Muon, Adam",
+    "solve": "deform, stylize, RadialSolver",
+    "wrap": "one surface onto another",
+    "attach": "what a body carries",
+    "curve": "curves of the plane",
     "extraction": "marching cubes",
     "io": "files, whole or not",
 }
 UNDER_ALL = ("core", "options")
-WIDTH, STEP, BOX, TOP = 1110, 121, 104, 250
+WIDTH, STEP, BOX, TOP = 1484, 112, 100, 310
 INK, LINE = "#1f2937", "#94a3b8"
 
 
@@ -30,14 +34,14 @@ def pipeline():
     """The native folders but those under all, in the order in which CMake lists them."""
     text = (ROOT / "native" / "CMakeLists.txt").read_text()
     listed = re.search(r"foreach\(folder ([^)]*)\)", text)[1].split()
-    return [folder for folder in listed if folder not in UNDER_ALL]
+    return [folder for folder in listed if folder not in UNDER_ALL and "/" not in folder]
 
 
 def includes():
     """The pairs (from, to) of folders one of whose files includes a header of the other."""
     found = set()
     for folder in [*pipeline(), *UNDER_ALL]:
-        for path in sorted((ROOT / "native" / folder).glob("*.*")):
+        for path in sorted((ROOT / "native" / folder).rglob("*.*")):
             targets = re.findall(r'^\s*#include\s+"(\w+)/', path.read_text(), re.M)
             found |= {(folder, target) for target in targets if target != folder}
     return found
@@ -80,11 +84,11 @@ def svg():
     folders, found = pipeline(), includes()
     left = {name: 20 + STEP * i for i, name in enumerate(folders)}
     parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} 425" font-family="sans-serif" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {TOP + 175}" font-family="sans-serif" '
         f'font-size="13" fill="{INK}">',
         '<defs><marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="7" markerHeight="7" '
         'markerUnits="userSpaceOnUse" orient="auto"><path d="M0 0L8 4L0 8z" fill="#64748b"/></marker></defs>',
-        f'<rect width="{WIDTH}" height="425" fill="#ffffff"/>',
+        f'<rect width="{WIDTH}" height="{TOP + 175}" fill="#ffffff"/>',
     ]
     full = WIDTH - 40
     parts += box(20, 14, 300, 52, "addon", "Blender: core (no bpy), a folder a feature", "#fff7ed")

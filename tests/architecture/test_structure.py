@@ -77,11 +77,25 @@ def test_includes_follow_the_data_flow():
     for position, folder in enumerate(FOLDERS):
         # Energies and fields know only jets; neither knows the other.
         allowed = {*FOLDERS[: position + 1]} - ({"fields"} if folder == "energies" else set())
+        parts = {other for other in FOLDERS if other.startswith(folder.split("/")[0] + "/")}
+        # A folder uses its parts, which do not use each other.
+        allowed = (allowed - parts) | {folder} if "/" in folder else allowed | parts
         for path in (ROOT / "native" / folder).glob("*.*"):
             for include in includes(path):
-                top = include.split("/")[0]
-                if "/" in include and top in {*FOLDERS, "bindings"} and top not in allowed:
+                place = include.rpartition("/")[0]
+                if place in {*FOLDERS, "bindings"} and place not in allowed:
                     wrong.append(f"{name(path)} includes {include}")
+    assert not wrong, wrong
+
+
+def test_no_headers_include_each_other():
+    headers = [p for p in sources(".h") if name(p).startswith("native/")]
+    wrong = [
+        name(path)
+        for path in headers
+        for include in includes(path)
+        if (ROOT / "native" / include).is_file() and path in reached(ROOT / "native" / include)
+    ]
     assert not wrong, wrong
 
 
