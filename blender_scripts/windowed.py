@@ -62,8 +62,8 @@ def record(scene, folder):
         for name in PROJECT:
             leave = shutil.ignore_patterns("__pycache__")
             shutil.copytree(ROOT / name, there / "project" / name, ignore=leave)
-        (there / "project/tests/blender").mkdir()
-        shutil.copy(ROOT / "tests/blender/scenes.py", there / "project/tests/blender")
+        (there / "project/tests/support/blender").mkdir(parents=True)
+        shutil.copy(ROOT / "tests/support/blender/scenes.py", there / "project/tests/support/blender")
         shutil.copy(scene, there / "scene.blend")
         inside = Path("/") / there.relative_to(CHROOT)
         session = SESSION.format(inside, *SIZE, PATIENCE)

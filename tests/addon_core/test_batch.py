@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from batches import FakeLaunch, batch, make_folders, statuses
+from support.programs.batches import FakeLaunch, batch, make_folders, statuses
 
 from addon.commands.batch import flags, plan, run_batch
 from addon.commands.children import Children, understand

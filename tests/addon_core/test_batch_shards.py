@@ -10,7 +10,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from batches import FakeLaunch, batch, starts, statuses
+from support.programs.batches import FakeLaunch, batch, starts, statuses
 
 from addon.commands.batch import run_batch
 from addon.commands.record import Record
@@ -30,7 +30,7 @@ def many(tmp_path):
 
 def start(folder, *flags):
     where = ["--style", "cube", "-i", str(folder / "in"), "-o", str(folder / "out")]
-    command = [sys.executable, str(ROOT / "tests" / "batches.py"), *where, *flags]
+    command = [sys.executable, str(ROOT / "tests/support/programs/batches.py"), *where, *flags]
     return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
 
 

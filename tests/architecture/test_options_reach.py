@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from support.blender.inside import require_bpy
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "native" / "options"
@@ -98,7 +99,7 @@ print("DEFAULTS", settings.stylize.bending, settings.deform.exact_handles, setti
 
 
 def test_a_changed_default_reaches_blenders_properties(changed, tmp_path):
-    pytest.importorskip("bpy", reason="PyPI's bpy is not installed")
+    require_bpy()
     (tmp_path / "native" / "options").mkdir(parents=True)
     (tmp_path / "native" / "options" / "options.toml").write_text((changed / "options.toml").read_text())
     (tmp_path / "native" / "options" / "table.py").write_text((FOLDER / "table.py").read_text())

@@ -168,7 +168,8 @@ def reference(data):
 
 
 def write_suzanne():
-    code = "import sys, numpy, meshes; v, f = meshes.suzanne(); numpy.savez(sys.argv[1], v=v, f=f)"
+    code = "import sys, numpy; from support.geometry import meshes; v, f = meshes.suzanne()"
+    code += "; numpy.savez(sys.argv[1], v=v, f=f)"
     subprocess.run([sys.executable, "-c", code, str(SUZANNE)], cwd=ROOT / "tests", check=True)
 
 

@@ -76,9 +76,8 @@ def main():
     parser.add_argument("--data", type=Path, help="published networks; without them the bunny is left out")
     parser.add_argument("--level", help="instruction set that the kernels must have been chosen for")
     given = parser.parse_args()
-    import cases
-    import meshes
-    from network_oracle import Network
+    from support.geometry import cases, meshes
+    from support.oracles.network import Network
 
     import arapfields as af
     from arapfields._native import testing

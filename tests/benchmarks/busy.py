@@ -18,7 +18,7 @@ busy.measure(*sys.argv[1:])
 
 def work(name):
     """The call that is timed: 60 iterations of a deformation, or fifteen live solves."""
-    from cases import bar_handles, bar_samples
+    from support.geometry.cases import bar_handles, bar_samples
 
     import arapfields as af
 

@@ -10,8 +10,8 @@ SHAPES, OBJECTS, POINTS = 60, 6, 100_000
 
 
 def run():
-    from cases import box, moved, shift
-    from characters import HIP, trousers
+    from support.geometry.cases import box, moved, shift
+    from support.geometry.characters import HIP, trousers
 
     import arapfields as af
 

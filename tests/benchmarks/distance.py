@@ -16,7 +16,7 @@ import arapfields as af
 from . import timing
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-import meshes
+from support.geometry import meshes
 
 POINTS = 300_000
 THREADS = 2

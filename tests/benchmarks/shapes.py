@@ -15,9 +15,8 @@ import arapfields as af
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "blender_scripts")]
-import cases  # noqa: E402
-import meshes  # noqa: E402
-from network_oracle import Network  # noqa: E402
+from support.geometry import cases, meshes  # noqa: E402
+from support.oracles.network import Network  # noqa: E402
 
 OURS = {"bunny": "dinosaur", "spot": "dog", "hand": "hand", "whale": "lizard", "cube": "mug"}
 CREATURES = ("dinosaur", "lizard", "octopus")

@@ -19,7 +19,7 @@ import numpy as np
 import arapfields as af
 sys.path[:0] = [{root!r}]
 from tests.benchmarks import shapes
-import meshes
+from support.geometry import meshes
 def peak(): return int(Path('/proc/self/status').read_text().split('VmHWM:')[1].split()[0]) / 1024
 def torus(count):
     n = int(np.sqrt(count / 2))

@@ -13,16 +13,16 @@ import sys
 from pathlib import Path
 
 import pytest
+from support.blender.inside import require_bpy
 
 ROOT = Path(__file__).resolve().parents[2]
 WORKER = shlex.split(os.environ.get("ARAPFIELDS_WORKER", ""))
-HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE))
+PROGRAM = ROOT / "tests/support/blender/worker.py"
 
 
 def isolated(folder):
     """Environment of a Blender that knows nothing of the user's own."""
-    paths = [str(ROOT), str(ROOT / "tests"), str(HERE), os.environ.get("PYTHONPATH", "")]
+    paths = [str(ROOT), str(ROOT / "tests"), os.environ.get("PYTHONPATH", "")]
     return {
         **os.environ,
         "PYTHONPATH": os.pathsep.join(filter(None, paths)),
@@ -41,14 +41,14 @@ class Blender:
     def call(self, file, function, arguments):
         if self.process is None or self.process.poll() is not None:
             self.process = subprocess.Popen(
-                [*(WORKER or [sys.executable]), str(HERE / "worker.py")],
+                [*(WORKER or [sys.executable]), str(PROGRAM)],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 text=True,
                 env=isolated(self.folder),
             )
         order = {"file": file, "function": function, "arguments": arguments}
-        self.process.stdin.write(json.dumps(order) + "\n")
+        self.process.stdin.write(json.dumps(order, default=str) + "\n")
         self.process.stdin.flush()
         answer = next((line for line in self.process.stdout if line.startswith('"')), "")  # after its banner
         if not answer:
@@ -65,7 +65,7 @@ class Blender:
 @pytest.fixture(scope="session")
 def blender(tmp_path_factory):
     if not WORKER:
-        pytest.importorskip("bpy", reason="PyPI's bpy is not installed")
+        require_bpy()
     worker = Blender(tmp_path_factory.mktemp("blender"))
     yield worker
     worker.close()

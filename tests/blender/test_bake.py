@@ -1,27 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Baking animated handles into shape keys, and leaving it half done."""
 
-from inside import in_blender
+import numpy as np
+from support.blender.inside import IN_BLENDER, in_blender
 
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.baking import animated, cancelled_at, stepped
 
-def animated():
-    import scenes
-
-    bar, _, moving = scenes.bar_with_handles()
-    for frame, height in ((1, 0.0), (5, 0.4)):
-        moving.location.z = height
-        moving.keyframe_insert("location", frame=frame)
-    scenes.activate(bar)
-    return bar
+    from addon.animation import caches
+    from addon.core.runtime import jobs
 
 
 @in_blender
 def test_animated_handles_are_baked_into_keys():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_bake import animated
-
     bar = animated()
     bpy.context.scene.frame_set(3)
     assert bpy.ops.arapfields.bake(format="KEYS", start=1, end=5, step=2) == {"FINISHED"}
@@ -37,53 +30,9 @@ def test_animated_handles_are_baked_into_keys():
     assert np.all(np.diff(heights) > 0.1)
 
 
-def stepped(**given):
-    """The bake operator as a window runs it, to be stepped by hand; a plain object has its arguments."""
-    import types
-
-    import addon.animation.operators as bake
-    from addon.animation.bake_operator import BakeOperator
-
-    class Operator(BakeOperator):
-        title, in_window, scope, filepath = "Bake", False, "ACTIVE", given.pop("filepath", "")
-        prepare, warn_of_weight = bake.ARAPFIELDS_OT_bake.prepare, bake.ARAPFIELDS_OT_bake.warn_of_weight
-        part = (0, 0)
-        properties = types.SimpleNamespace(is_property_set=lambda name: name in given)
-
-        def add_message(self, level, text):
-            self.said = text
-
-    for name, value in given.items():
-        setattr(Operator, name, value)
-    return Operator()
-
-
-def cancelled_at(operator, stage):
-    """Steps it, cancels it when it says this, and returns what the operator does."""
-    import bpy
-
-    from addon.core.runtime import jobs
-    from addon.core.runtime.coroutines import Pause
-
-    coroutine = operator.coroutine(bpy.context)
-    try:
-        while True:
-            if next(coroutine) is Pause.WORKER:
-                jobs.running().join(0.001)
-            if stage in jobs.running().message:
-                jobs.running().cancel()
-    except StopIteration as ended:
-        return ended.value
-    finally:
-        jobs.stop()
-
-
 @in_blender
 def test_a_cancelled_bake_leaves_nothing():
     """Stepped as a window would: cancelled while solving and while storing."""
-    import bpy
-    from test_bake import animated, cancelled_at, stepped
-
     bar = animated()
 
     def names():
@@ -101,12 +50,6 @@ def test_a_cancelled_bake_leaves_nothing():
 
 @in_blender
 def test_many_keys_say_what_they_weigh():
-    import bpy
-    from test_bake import animated
-
-    from addon.animation import caches
-    from addon.core.runtime import jobs
-
     animated()
     caches.HEAVY = 1e3
     try:

@@ -1,64 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bakes as point caches: what plays them, where they lie, and what is left when something goes wrong."""
 
-from inside import in_blender
+import numpy as np
+from support.blender.inside import IN_BLENDER, in_blender
 
-EXACT = 1e-6  # single precision of positions of size one
-
-
-def animated(name="Bar", folder=None):
-    """A bar whose right end rises from frame 1 to frame 5, in a saved file; (bar, its folder)."""
-    import tempfile
-    from pathlib import Path
-
+if IN_BLENDER:
     import bpy
-    import scenes
+    from support.blender import scenes
+    from support.blender.baking import EXACT, at, saved_animation, solved
+    from support.blender.live import step
+    from support.blender.panels import drawn
+    from support.blender.stacks import add_modifier
 
-    bar, _, moving = scenes.bar_with_handles(name)
-    for frame, height in ((1, 0.0), (5, 0.4)):
-        moving.location.z = height
-        moving.keyframe_insert("location", frame=frame)
-    scenes.activate(bar)
-    folder = folder or Path(tempfile.mkdtemp())
-    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "scene.blend"))
-    return bpy.data.objects[name], folder
-
-
-def at(item, frame):
-    """(n, 3) local points of an object as shown at a frame."""
-    import bpy
-    from stacks import local_points
-
-    whole = int(frame // 1)
-    bpy.context.scene.frame_set(whole, subframe=frame - whole)
-    return local_points(item)
-
-
-def solved(source, frame, kind="DEFORM"):
-    """(n, 3) the solver's own answer at a frame, in local coordinates."""
-    import bpy
-
-    from addon.core.runtime.coroutines import run_to_completion
-    from addon.live.session import Session
-
-    session = Session(bpy.context, source, kind, shown=False, follow=False, in_place=True)
-    run_to_completion(session.reading)
-    whole = int(frame // 1)
-    bpy.context.scene.frame_set(whole, subframe=frame - whole)
-    if session.moves_by_itself:
-        session.read_points(bpy.context, source)
-    session.prepare()
-    return session.solve_from_rest(session.current_request(bpy.context, source)).points
+    import addon.animation.bake_job as bake_job
+    from addon.core.runtime import jobs
+    from addon.field_modifier import cache_modifier
+    from addon.live import sessions
 
 
 @in_blender
 def test_a_cache_plays_what_the_solver_says_at_every_frame():
-    import bpy
-    import numpy as np
-    from test_bake_cache import EXACT, animated, at, solved
-    from test_panels import drawn
-
-    bar, folder = animated()
+    bar, folder = saved_animation()
     bpy.context.scene.frame_set(3)
     assert bpy.ops.arapfields.bake(start=1, end=5, subframes=2) == {"FINISHED"}
     assert bpy.context.scene.frame_current == 3
@@ -75,12 +37,7 @@ def test_a_cache_plays_what_the_solver_says_at_every_frame():
 
 @in_blender
 def test_the_cache_stands_where_the_field_does_and_a_second_bake_keeps_its_modifier():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_bake_cache import EXACT, animated, at, solved
-
-    bar, folder = animated()
+    bar, folder = saved_animation()
     bar.modifiers.new("Subdivision", "SUBSURF").levels = 1
     bpy.ops.arapfields.deform(**scenes.QUICK)
     assert [m.type for m in bar.modifiers] == ["NODES", "SUBSURF"]
@@ -102,19 +59,12 @@ def test_the_cache_stands_where_the_field_does_and_a_second_bake_keeps_its_modif
 
 @in_blender
 def test_several_objects_are_baked_in_one_pass_and_one_that_fails_stops_no_other():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_bake_cache import EXACT, animated, at, solved
-
-    first, folder = animated("One")
-    second, _ = animated("Two", folder)
+    first, folder = saved_animation("One")
+    second, _ = saved_animation("Two", folder)
     plain = scenes.bar("Plain")
     plain.location.y = 3
     scenes.activate(plain, second, first)
     assert bpy.ops.arapfields.bake(start=1, end=3, scope="SELECTED") == {"FINISHED"}
-    from addon.core.runtime import jobs
-
     assert sorted(path.name for path in (folder / "cache").iterdir()) == ["One.pc2", "Two.pc2"]
     assert ("WARNING", "Plain: Add a handle first") in jobs.messages(), jobs.messages()
     for bar in (first, second):
@@ -123,14 +73,7 @@ def test_several_objects_are_baked_in_one_pass_and_one_that_fails_stops_no_other
 
 @in_blender
 def test_what_moves_before_the_field_is_read_at_every_frame():
-    import bpy
-    import numpy as np
-    from stacks import add_modifier
-    from test_bake_cache import EXACT, animated, at, solved
-
-    import addon.animation.bake_job as bake_job
-
-    bar, _ = animated()
+    bar, _ = saved_animation()
     add_modifier(bar, "ARMATURE")
     bone = bar.modifiers[0].object.pose.bones["Second"]
     for frame, turn in ((1, 0.0), (5, 0.5)):
@@ -151,11 +94,7 @@ def test_what_moves_before_the_field_is_read_at_every_frame():
 
 @in_blender
 def test_outputs_that_are_no_modifier_play_on_an_object_of_their_own():
-    import bpy
-    import numpy as np
-    from test_bake_cache import animated, at
-
-    bar, folder = animated()
+    bar, folder = saved_animation()
     bar.arapfields.output, bar.arapfields.resolution = "SURFACE", 24
     for _ in range(2):
         assert bpy.ops.arapfields.bake(start=1, end=5, step=4) == {"FINISHED"}
@@ -170,16 +109,7 @@ def test_outputs_that_are_no_modifier_play_on_an_object_of_their_own():
 
 @in_blender
 def test_live_and_deform_put_the_field_back_and_a_bake_ends_live():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_bake_cache import animated, at
-    from test_live import step
-
-    from addon.field_modifier import cache_modifier
-    from addon.live import sessions
-
-    bar, _ = animated()
+    bar, _ = saved_animation()
     bpy.ops.arapfields.bake(start=1, end=5)
     baked = at(bar, 4)
     bpy.ops.arapfields.live()

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.blender.inside import require_bpy
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -14,15 +15,15 @@ ROOT = Path(__file__).resolve().parents[2]
 @pytest.fixture
 def scene(tmp_path, user_folder):
     """(folder with scene.blend: a bar that bends from frame 1 to 5, run(*arguments))."""
-    pytest.importorskip("bpy", reason="PyPI's bpy is not installed")
+    require_bpy()
     folder = tmp_path / "scene"
     folder.mkdir()
     make = f"""
-import sys; sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / "tests/blender")!r}]
+import sys; sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / "tests")!r}]
 import addon, bpy; bpy.ops.wm.read_homefile(use_empty=True); addon.register()
 from pathlib import Path
-import test_bake_cache
-test_bake_cache.animated("Bar", Path({str(folder)!r}))
+from support.blender import baking
+baking.saved_animation("Bar", Path({str(folder)!r}))
 bpy.context.scene.frame_end = 5
 bpy.ops.wm.save_mainfile()
 """

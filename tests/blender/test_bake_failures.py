@@ -1,20 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bakes that cannot be: each is named, and the last good cache stays."""
 
-from inside import in_blender
+import os
+import resource
+import tempfile
+
+import pytest
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender.baking import animated, cancelled_at, saved_animation, stepped
+
+    from addon.animation import played
 
 
 @in_blender
 def test_whatever_goes_wrong_is_named_and_the_last_good_cache_stays():
-    import os
-    import resource
-
-    import bpy
-    import pytest
-    from test_bake import cancelled_at, stepped
-    from test_bake_cache import animated
-
-    _, folder = animated()
+    _, folder = saved_animation()
     bpy.ops.arapfields.bake(start=1, end=3)
     path = folder / "cache/Bar.pc2"
     good = path.read_bytes()
@@ -43,12 +46,7 @@ def test_whatever_goes_wrong_is_named_and_the_last_good_cache_stays():
 
 @in_blender
 def test_a_bake_that_no_longer_fits_is_named():
-    import bpy
-    from test_bake_cache import animated
-
-    from addon.animation import played
-
-    bar, folder = animated()
+    bar, folder = saved_animation()
     assert bpy.ops.arapfields.bake(range="HANDLES") == {"FINISHED"}
     assert played.record_of(bar)["frames"] == 5 and played.problem(bar, look_closely=True) is None
     bar.data.vertices[0].co.x += 0.1
@@ -64,12 +62,6 @@ def test_a_bake_that_no_longer_fits_is_named():
 
 @in_blender
 def test_an_unsaved_file_asks_for_a_place():
-    import tempfile
-
-    import bpy
-    import pytest
-    from test_bake import animated
-
     animated()
     with pytest.raises(RuntimeError, match=r"save the \.blend first"):
         bpy.ops.arapfields.bake(start=1, end=2)

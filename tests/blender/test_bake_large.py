@@ -1,8 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A bake of a large mesh: what memory it takes, and whether a Blender without the extension plays it."""
 
+import subprocess
+import sys
+import tempfile
+import threading
+from pathlib import Path
+
+import numpy as np
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.baking import EXACT, solved
+
+    from addon.core.runtime import jobs
 
 SIDE, FRAMES = 500, 40  # 250,000 vertices; 120 MB of frames
 MOST = 1e9  # bytes over idle that a bake may take
@@ -11,11 +25,6 @@ NOISE = 60e6  # bytes that the memory of a process comes and goes by: half of wh
 
 def torus():
     """A closed surface of SIDE² vertices, held at one side, whose other side turns and rises."""
-    import bpy
-    import numpy as np
-    import scenes
-    from test_bake_large import FRAMES, SIDE
-
     angle = np.arange(SIDE) * 2 * np.pi / SIDE
     around, across = np.meshgrid(angle, angle, indexing="ij")
     reach = 1.4 + 0.5 * np.cos(across)
@@ -48,19 +57,6 @@ def memory():
 @pytest.mark.slow
 @in_blender
 def test_a_long_bake_of_a_large_mesh_takes_little_memory_and_plays_anywhere():
-    import subprocess
-    import sys
-    import tempfile
-    import threading
-    from pathlib import Path
-
-    import bpy
-    import numpy as np
-    from test_bake_cache import EXACT, solved
-    from test_bake_large import FRAMES, MOST, NOISE, SIDE, memory, torus
-
-    from addon.core.runtime import jobs
-
     item, folder = torus(), Path(tempfile.mkdtemp())
     bpy.context.scene.frame_set(1)
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "large.blend"))

@@ -1,39 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bones of armatures as handles."""
 
-from inside import in_blender
+import numpy as np
+import pytest
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.bones import handles_of, rigged_bar
+    from support.blender.live import step
+
+    from addon.live import sessions
 
 QUICK = {"field": "radial", "samples": 2000}
 STOPPED = 5e-4  # how far apart solves end whose targets differ by rounding alone
 SAME = 1e-6  # of the size: single precision of matrices and positions
 
 
-def rigged_bar(with_groups=True):
-    """(bar, rig): a bar whose two bones bend it in the middle, by its armature modifier."""
-    import scenes
-    from stacks import add_modifier, armature
-
-    bar = scenes.bar()
-    if with_groups:
-        add_modifier(bar, "ARMATURE")
-        rig = bar.modifiers["Armature"].object
-    else:
-        rig = armature()
-    rig.pose.bones["Second"].rotation_euler.z = 0.0
-    scenes.activate(rig, bar)
-    return bar, rig
-
-
 @in_blender
 def test_posed_bones_drive_the_field_live_and_the_armature_is_not_doubled():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_bones import rigged_bar
-    from test_live import step
-
-    from addon.live import sessions
-
     bar, rig = rigged_bar()
     rest = scenes.world_points(bar)
     assert bpy.ops.arapfields.add_bones() == {"FINISHED"}
@@ -63,12 +49,6 @@ def test_posed_bones_drive_the_field_live_and_the_armature_is_not_doubled():
 
 @in_blender
 def test_a_bone_equals_a_constrained_empty_with_the_same_region():
-    import bpy
-    import numpy as np
-    import scenes
-    from bones import handles_of
-    from test_bones import QUICK, SAME, STOPPED, rigged_bar
-
     bar, rig = rigged_bar()
     rest = scenes.world_points(bar)
     bar.scale, rig.location = (1.2, 1.2, 1.2), (0.1, 0.2, -0.1)
@@ -114,12 +94,6 @@ def test_a_bone_equals_a_constrained_empty_with_the_same_region():
 
 @in_blender
 def test_frames_in_any_order_give_the_same_poses():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_bones import rigged_bar
-    from test_live import step
-
     bar, rig = rigged_bar()
     bone = rig.pose.bones["Second"]
     for frame, angle in ((1, 0.0), (5, 0.6), (9, -0.6)):
@@ -141,12 +115,6 @@ def test_frames_in_any_order_give_the_same_poses():
 
 @in_blender
 def test_bones_without_groups_hold_what_lies_about_them():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_bones import rigged_bar
-    from test_live import step
-
     bar, rig = rigged_bar(with_groups=False)
     assert bpy.ops.arapfields.add_bones(bones="DEFORMING") == {"FINISHED"}
     assert [entry.group for entry in bar.arapfields.handles] == ["", ""]
@@ -164,11 +132,6 @@ def test_bones_without_groups_hold_what_lies_about_them():
 
 @in_blender
 def test_what_is_wrong_with_bones_is_named():
-    import bpy
-    import pytest
-    import scenes
-    from test_bones import rigged_bar
-
     bar = scenes.bar()
     with pytest.raises(RuntimeError, match="Bar follows no armature"):
         bpy.ops.arapfields.add_bones()
@@ -198,11 +161,6 @@ def test_what_is_wrong_with_bones_is_named():
 
 @in_blender
 def test_handle_operators_work_on_bones():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_bones import SAME, rigged_bar
-
     bar, rig = rigged_bar()
     bpy.ops.arapfields.add_bones()
     rig.pose.bones["Second"].rotation_euler.z = 0.5
@@ -224,11 +182,6 @@ def test_handle_operators_work_on_bones():
 
 @in_blender
 def test_a_replaced_mesh_is_not_posed_again():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_bones import QUICK, rigged_bar
-
     bar, rig = rigged_bar()
     bpy.ops.arapfields.add_bones()
     rig.pose.bones["Second"].rotation_euler.z = 0.5

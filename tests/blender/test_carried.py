@@ -1,8 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Objects that a source's field moves as well."""
 
+import numpy as np
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.bones import rigged_bar
+    from support.blender.live import step
+    from support.blender.riders import body, rider, shown, taken
+
+    from addon.live import sessions
 
 CLOSE = 1e-5  # single precision of positions of size one
 
@@ -13,15 +23,6 @@ KINDS = ["MESH", "CURVES", "GREASEPENCIL", "CURVE", "LATTICE", "EMPTY", "ARMATUR
 @pytest.mark.parametrize("kind", KINDS)
 @in_blender
 def test_each_kind_follows_live_and_comes_back(kind):
-    import bpy
-    import numpy as np
-    import scenes
-    from riders import body, rider, shown, taken
-    from test_carried import CLOSE
-    from test_live import step
-
-    from addon.live import sessions
-
     bar, moving = body()
     item = rider(kind)
     bpy.context.view_layer.update()
@@ -50,12 +51,6 @@ def test_each_kind_follows_live_and_comes_back(kind):
 @pytest.mark.parametrize("kind", KINDS)
 @in_blender
 def test_each_kind_goes_with_a_solve_and_is_released(kind):
-    import bpy
-    import numpy as np
-    import scenes
-    from riders import body, rider, shown
-    from test_carried import CLOSE
-
     bar, moving = body()
     item = rider(kind)
     bpy.context.view_layer.update()
@@ -74,13 +69,6 @@ def test_each_kind_goes_with_a_solve_and_is_released(kind):
 
 @in_blender
 def test_what_is_rigid_stays_so():
-    import bpy
-    import numpy as np
-    import scenes
-    from riders import body
-    from test_carried import CLOSE
-    from test_live import step
-
     bar, moving = body()
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, location=(0.7, 0, 0.2), segments=12, ring_count=8)
     eye = bpy.context.object
@@ -108,16 +96,6 @@ def test_what_is_rigid_stays_so():
 @in_blender
 def test_an_eye_on_a_bone_does_not_move_twice():
     """A child of a bone that is a handle: it is where the field has it, not the bone's motion on top."""
-    import bpy
-    import numpy as np
-    import scenes
-    from riders import taken
-    from test_bones import rigged_bar
-    from test_carried import CLOSE
-    from test_live import step
-
-    from addon.live import sessions
-
     bar, rig = rigged_bar()
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, location=(0.8, 0, 0.2), segments=12, ring_count=8)
     eye = bpy.context.object

@@ -1,8 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Carried objects in bakes, renders, and through undo."""
 
+import tempfile
+
+import numpy as np
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.live import step
+    from support.blender.riders import body, rider, shown
+    from support.blender.scenes import camera
+
+    from addon.live import sessions
 
 CLOSE = 1e-5  # single precision of positions of size one
 
@@ -10,15 +22,6 @@ CLOSE = 1e-5  # single precision of positions of size one
 @pytest.mark.parametrize("format", ["PC2", "KEYS"])
 @in_blender
 def test_all_are_baked_at_once(format):
-    import tempfile
-
-    import bpy
-    import numpy as np
-    import scenes
-    from riders import body, rider, shown
-    from test_carried_kept import CLOSE
-    from test_live import step
-
     bar, moving = body()
     items = [rider(kind) for kind in ("MESH", "CURVE", "EMPTY", "ARMATURE", "CURVES", "GREASEPENCIL")]
     bpy.context.view_layer.update()
@@ -61,12 +64,6 @@ def test_all_are_baked_at_once(format):
 
 @in_blender
 def test_undo_and_redo_take_all_along():
-    import bpy
-    import numpy as np
-    import scenes
-    from riders import body, rider, shown
-    from test_carried_kept import CLOSE
-
     bpy.context.preferences.edit.use_global_undo = True
     bar, moving = body()
     names = [rider(kind).name for kind in ("MESH", "CURVES", "CURVE", "EMPTY", "ARMATURE")]
@@ -99,14 +96,6 @@ def test_undo_and_redo_take_all_along():
 
 @in_blender
 def test_renders_show_all_at_the_frame_that_is_rendered():
-    import tempfile
-
-    import bpy
-    import numpy as np
-    import scenes
-    from riders import body, rider, shown
-    from test_live_render import camera
-
     scene = camera(16)
     bar, moving = body()
     items = [rider(kind) for kind in ("MESH", "EMPTY", "CURVES")]
@@ -129,14 +118,6 @@ def test_renders_show_all_at_the_frame_that_is_rendered():
 @pytest.mark.parametrize("kind", ["EMPTY", "ARMATURE"])
 @in_blender
 def test_files_of_versions_without_a_kind_of_base_come_back(kind):
-    import tempfile
-
-    import bpy
-    import numpy as np
-    import scenes
-    from riders import body, rider, shown
-    from test_carried_kept import CLOSE
-
     bar, moving = body()
     item = rider(kind)
     rest = shown(item)
@@ -163,15 +144,6 @@ def test_files_of_versions_without_a_kind_of_base_come_back(kind):
 @in_blender
 def test_another_way_to_be_carried_spoils_nothing_of_the_others():
     """An armature that follows, then moves as a whole; an Empty and a patch come after it in the list."""
-    import bpy
-    import numpy as np
-    import scenes
-    from riders import body, rider, shown
-    from test_carried_kept import CLOSE
-    from test_live import step
-
-    from addon.live import sessions
-
     bar, moving = body()
     items = [rider(kind) for kind in ("ARMATURE", "EMPTY", "MESH")]
     rest = [shown(item) for item in items]

@@ -1,19 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Carried objects of other files, overridden, hidden or lost while live, and what a mask says of them."""
 
+import tempfile
+
+import numpy as np
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.live import step
+    from support.blender.riders import body, rider, shown
+    from support.blender.scenes import delete
+
+    from addon.core.runtime import jobs
+    from addon.live import sessions
 
 CLOSE = 1e-5  # single precision of positions of size one
 
 
 def from_another_file(*kinds):
     """The objects of these kinds, linked from a file of their own, in the scene."""
-    import tempfile
-
-    import bpy
-    from riders import rider
-
     made = [rider(kind) for kind in kinds]
     names = [item.name for item in made]
     path = f"{tempfile.mkdtemp()}/other.blend"
@@ -30,16 +38,6 @@ def from_another_file(*kinds):
 
 @in_blender
 def test_what_is_linked_is_named_and_the_rest_goes_on():
-    import bpy
-    import numpy as np
-    import pytest
-    import scenes
-    from riders import body, rider, shown
-    from test_carried_lost import from_another_file
-    from test_live import step
-
-    from addon.core.runtime import jobs
-
     bar, moving = body()
     linked = from_another_file("MESH")[0]
     scenes.activate(linked, bar)
@@ -68,16 +66,6 @@ def test_what_is_linked_is_named_and_the_rest_goes_on():
 @in_blender
 def test_library_overrides_are_carried_or_named(kind):
     """What moves as a whole, a mesh and bones need none of the linked data; other points lie there."""
-    import bpy
-    import numpy as np
-    import scenes
-    from riders import body, shown
-    from test_carried_lost import CLOSE, from_another_file
-    from test_live import step
-
-    from addon.core.runtime import jobs
-    from addon.live import sessions
-
     bar, moving = body()
     linked = from_another_file(kind)[0]
     item = linked.override_create(remap_local_usages=True)
@@ -105,17 +93,6 @@ def test_library_overrides_are_carried_or_named(kind):
 
 @in_blender
 def test_one_that_is_hidden_or_deleted_while_live_is_named_and_nothing_of_the_rest_is_lost():
-    import bpy
-    import numpy as np
-    import scenes
-    from riders import body, rider, shown
-    from test_carried_lost import CLOSE
-    from test_live import step
-    from test_lost_objects import delete
-
-    from addon.core.runtime import jobs
-    from addon.live import sessions
-
     bar, moving = body()
     items = [rider(kind) for kind in ("MESH", "CURVES", "EMPTY", "LATTICE")]
     bpy.context.view_layer.update()
@@ -152,13 +129,6 @@ def test_one_that_is_hidden_or_deleted_while_live_is_named_and_nothing_of_the_re
 
 @in_blender
 def test_the_influence_mask_counts_where_a_carried_object_has_weights_of_that_name():
-    import bpy
-    import numpy as np
-    import scenes
-    from riders import body, rider, shown
-    from test_carried_lost import CLOSE
-    from test_live import step
-
     bar, moving = body()
     bar.vertex_groups.new(name="Face").add(list(range(len(bar.data.vertices))), 1.0, "REPLACE")
     items = [rider(kind) for kind in ("MESH", "CURVES", "LATTICE", "CURVE", "EMPTY")]

@@ -1,18 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Carried objects that are edited, lost or refused, that share an armature, and bakes."""
 
+import numpy as np
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.bones import rigged_bar
+    from support.blender.live import step
+    from support.blender.riders import body, link, rider, shown, taken
+
+    from addon.core.runtime import jobs
+    from addon.live import sessions
 
 CLOSE = 1e-5  # single precision of positions of size one
 
 
 @in_blender
 def test_what_moves_anyway_is_named_and_left():
-    import bpy
-    import scenes
-    from riders import body, rider
-
     bar, _ = body()
     patch, spot, cage = rider("MESH"), rider("EMPTY"), rider("LATTICE")
     for item in (spot, cage):
@@ -31,15 +38,6 @@ def test_what_moves_anyway_is_named_and_left():
 
 @in_blender
 def test_bad_ones_are_named_and_the_rest_goes_on():
-    import bpy
-    import numpy as np
-    import scenes
-    from riders import body, link, rider, shown
-    from test_live import step
-
-    from addon.core.runtime import jobs
-    from addon.live import sessions
-
     bar, moving = body()
     good = rider("MESH")
     bad = [link(name, bpy.data.meshes.new(name)) for name in ("Hollow", "Gone", "Dark", "Torn", "Lone")]
@@ -83,15 +81,6 @@ def test_bad_ones_are_named_and_the_rest_goes_on():
 
 @in_blender
 def test_a_moved_or_edited_one_follows_from_where_it_is():
-    import bpy
-    import numpy as np
-    import scenes
-    from riders import body, rider, shown, taken
-    from test_carried_uses import CLOSE
-    from test_live import step
-
-    from addon.live import sessions
-
     bar, moving = body()
     patch, spot = rider("MESH"), rider("EMPTY")
     scenes.activate(patch, spot, bar)
@@ -118,16 +107,6 @@ def test_a_moved_or_edited_one_follows_from_where_it_is():
 
 @in_blender
 def test_a_shirt_of_the_same_armature_is_not_posed_twice():
-    import bpy
-    import numpy as np
-    import scenes
-    from riders import taken
-    from test_bones import rigged_bar
-    from test_carried_uses import CLOSE
-    from test_live import step
-
-    from addon.live import sessions
-
     bar, rig = rigged_bar()
     shirt = bar.copy()
     shirt.data, shirt.name = bar.data.copy(), "Shirt"
@@ -152,11 +131,6 @@ def test_a_shirt_of_the_same_armature_is_not_posed_twice():
 
 @in_blender
 def test_a_group_of_a_bone_that_is_missing_is_named():
-    import bpy
-    import pytest
-    import scenes
-    from test_bones import rigged_bar
-
     bar, _ = rigged_bar()
     bpy.ops.arapfields.add_bones()
     bar.vertex_groups.remove(bar.vertex_groups["Second"])

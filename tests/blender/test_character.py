@@ -1,8 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A whole character moves by its bones: eyes stay in their sockets, hair on the head."""
 
+import numpy as np
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+import arapfields as af
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import character
+    from support.blender.live import step
+
+    from addon.core.runtime import jobs
+    from addon.live import sessions
 
 STEPS = 4  # of live mode, in which its solver comes to rest
 
@@ -10,15 +21,6 @@ STEPS = 4  # of live mode, in which its solver comes to rest
 @pytest.mark.slow  # about ten seconds
 @in_blender
 def test_a_character_moves_whole():
-    import bpy
-    import character
-    import numpy as np
-    from test_character import STEPS, distances, hair_points, rigid
-    from test_live import step
-
-    from addon.core.runtime import jobs
-    from addon.live import sessions
-
     made = character.build()
     rest = {item.name: character.seen_mesh(item)[0] for item in (made.body, made.shirt, made.hat, *made.eyes)}
     skin = rest["Body"], character.seen_mesh(made.body)[2]
@@ -85,16 +87,11 @@ def test_a_character_moves_whole():
 
 def distances(vertices, triangles, points):
     """(p,) signed distances of points from a surface, negative inside."""
-    import arapfields as af
-
     return af.signed_distance(vertices, triangles, points)
 
 
 def hair_points(hair):
     """(strands, points of each, 3) as they are shown."""
-    import bpy
-    import numpy as np
-
     data = hair.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     flat = np.empty(3 * len(data.points), np.float32)
     data.attributes["position"].data.foreach_get("vector", flat)
@@ -102,6 +99,4 @@ def hair_points(hair):
 
 
 def rigid(before, after):
-    import arapfields as af
-
     return af.rigid_motion(before, after)

@@ -3,7 +3,16 @@
 
 from types import SimpleNamespace
 
-from inside import in_blender
+import numpy as np
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from mathutils import Matrix
+    from support.blender import scenes
+
+    from addon.blender.object_references import ObjectReference
+    from addon.wrap.clicking import ARAPFIELDS_OT_click_landmarks as Operator
 
 
 def clicker():
@@ -11,13 +20,6 @@ def clicker():
 
     `click(x, z)`, in units, gives what the modal operator answers and the halves of a pair that it has.
     """
-    import bpy
-    import scenes
-    from mathutils import Matrix
-
-    from addon.blender.object_references import ObjectReference
-    from addon.wrap.clicking import ARAPFIELDS_OT_click_landmarks as Operator
-
     target = scenes.bar("Scan")
     target.location.x = 3
     item = scenes.bar()
@@ -58,9 +60,6 @@ def clicker():
 
 @in_blender
 def test_a_click_just_beside_the_surface_takes_its_edge():
-    import numpy as np
-    from test_click_landmarks import clicker
-
     item, click = clicker()
     assert click(-1.08, 0.0) == ({"RUNNING_MODAL"}, [0])
     assert click(3.0, 0.33) == ({"RUNNING_MODAL"}, [])
@@ -71,8 +70,6 @@ def test_a_click_just_beside_the_surface_takes_its_edge():
 
 @in_blender
 def test_a_click_on_neither_selects_nothing_and_the_sidebar_has_its_own():
-    from test_click_landmarks import clicker
-
     _, click = clicker()
     assert click(1.5, 0.0) == ({"RUNNING_MODAL"}, [])  # between the two
     assert click(3.8, 0.0) == ({"PASS_THROUGH"}, [])  # the sidebar lies over the target

@@ -9,9 +9,10 @@ import sys
 import time
 from pathlib import Path
 
-import meshes
 import numpy as np
 import pytest
+from support.blender.inside import require_bpy
+from support.geometry import meshes
 
 ROOT = Path(__file__).resolve().parents[2]
 QUICK = ["--iterations", "20", "--samples", "1000", "--batch", "100", "--width", "16", "--layers", "1"]
@@ -29,7 +30,7 @@ HOLD_AND_LIFT = {
 
 @pytest.fixture(autouse=True)
 def needs_bpy():
-    pytest.importorskip("bpy", reason="PyPI's bpy is not installed")
+    require_bpy()
 
 
 @pytest.fixture
@@ -138,9 +139,9 @@ def test_deform_a_file_under_handles(script, tmp_path):
 
 def test_a_blend_keeps_its_handles_and_gets_the_results(script, tmp_path):
     make = f"""
-import sys; sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / "tests/blender")!r}]
+import sys; sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / "tests")!r}]
 import addon, bpy; bpy.ops.wm.read_homefile(use_empty=True); addon.register()
-import scenes; bar, _, moving = scenes.bar_with_handles(); moving.location.z += 0.3
+from support.blender import scenes; bar, _, moving = scenes.bar_with_handles(); moving.location.z += 0.3
 scenes.bar("Other").location.y = 5
 bpy.ops.wm.save_as_mainfile(filepath={str(tmp_path / "bar.blend")!r})
 """

@@ -3,18 +3,22 @@
 
 import math
 
+import numpy as np
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from mathutils import Matrix
+    from support.blender import scenes
+
+    from addon.core.runtime import jobs
 
 ON_SOURCE = 2e-6  # single precision of positions of size one
 
 
 @in_blender
 def test_the_moved_end_follows_and_the_held_end_stays():
-    import bpy
-    import numpy as np
-    import scenes
-
     bar, _, moving = scenes.bar_with_handles()
     before = scenes.world_points(bar)
     moving.location.z += 0.4
@@ -28,10 +32,6 @@ def test_the_moved_end_follows_and_the_held_end_stays():
 
 @in_blender
 def test_unmoved_handles_give_the_shape_itself():
-    import bpy
-    import numpy as np
-    import scenes
-
     bar, *_ = scenes.bar_with_handles()
     before = scenes.world_points(bar)
     bpy.ops.arapfields.deform(output="WARP", **scenes.NEW)
@@ -40,9 +40,6 @@ def test_unmoved_handles_give_the_shape_itself():
 
 @in_blender
 def test_everything_but_positions_is_byte_equal():
-    import bpy
-    import scenes
-
     bar, _, moving = scenes.bar_with_handles()
     scenes.decorate(bar)
     before = scenes.everything(bar)
@@ -55,10 +52,6 @@ def test_everything_but_positions_is_byte_equal():
 
 @in_blender
 def test_shape_keys_stay_and_the_motion_is_one_more():
-    import bpy
-    import numpy as np
-    import scenes
-
     bar, _, moving = scenes.bar_with_handles()
     bar.shape_key_add(name="Basis")
     key = bar.shape_key_add(name="Fat")
@@ -86,10 +79,6 @@ def test_shape_keys_stay_and_the_motion_is_one_more():
 
 @in_blender
 def test_modifiers_are_read_and_the_result_is_what_was_shown():
-    import bpy
-    import numpy as np
-    import scenes
-
     bar, _, moving = scenes.bar_with_handles()
     bar.modifiers.new("Subdivision", "SUBSURF").levels = 1
     before = scenes.world_points(bar)
@@ -115,11 +104,6 @@ PLACES = {
 @in_blender
 def test_a_result_lands_on_its_source_wherever_that_is(place):
     """One handle moves as a screw of the whole bar: the result is the rigidly moved bar."""
-    import bpy
-    import numpy as np
-    import scenes
-    from mathutils import Matrix
-
     bar = scenes.bar()
     for name, value in PLACES[place].items():
         if name == "parent":
@@ -147,9 +131,6 @@ def test_a_result_lands_on_its_source_wherever_that_is(place):
 
 @in_blender
 def test_a_second_run_updates_the_same_object():
-    import bpy
-    import scenes
-
     scenes.bar_with_handles()
     for _ in range(2):
         scenes.activate(bpy.data.objects["Bar"])
@@ -160,10 +141,6 @@ def test_a_second_run_updates_the_same_object():
 
 @in_blender
 def test_same_seed_same_result():
-    import bpy
-    import numpy as np
-    import scenes
-
     bar, _, moving = scenes.bar_with_handles()
     moving.location.z += 0.4
     found = []
@@ -176,16 +153,11 @@ def test_same_seed_same_result():
 
 @in_blender
 def test_several_objects_in_one_call_and_one_that_fails():
-    import bpy
-    import scenes
-
     bars = [scenes.bar_with_handles(name)[0] for name in ("One", "Two")]
     bare = scenes.bar("Bare")
     scenes.activate(bare, *bars)
     assert bpy.ops.arapfields.deform(scope="SELECTED", **scenes.NEW) == {"FINISHED"}
     assert {"One_deformed", "Two_deformed"} <= set(bpy.data.objects.keys())
     assert "Bare_deformed" not in bpy.data.objects
-    from addon.core.runtime import jobs
-
     assert [level for level, _ in jobs.messages()] == ["INFO", "INFO", "WARNING"]
     assert "Bare has no handle" in jobs.messages()[-1][1]

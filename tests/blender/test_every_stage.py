@@ -6,7 +6,15 @@ same object (or what is left) can be worked on again.
 """
 
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes, stages
+    from support.blender.stages import again, source, stray
+
+    from addon.core.runtime import jobs
+    from addon.live import sessions
 
 STAGES = ["idle", "job", "live", "bake"]
 ACTIONS = [
@@ -28,10 +36,6 @@ ACTIONS = [
 @pytest.mark.parametrize("action", ACTIONS)
 @in_blender
 def test_nothing_breaks(action, stage, which):
-    import stages
-
-    from addon.core.runtime import jobs
-
     jobs.board.messages.clear()
     with stages.watched() as errors:
         present = stages.Stage(stage)
@@ -47,13 +51,6 @@ def test_nothing_breaks(action, stage, which):
 @pytest.mark.parametrize("target", ["MODIFIER", "NEW"])
 @in_blender
 def test_undone_past_live_and_back_leaves_nothing_astray(target):
-    import bpy
-    import scenes
-    import stages
-    from stages import again, source, stray
-
-    from addon.live import sessions
-
     bar, _, moving = scenes.bar_with_handles()
     bar.arapfields.target = target
     moving.location.z += stages.LIFT

@@ -1,8 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Alembic, USD and glTF with what the object does, read back by another Blender, by usd-core and by hand."""
 
+import json
+import resource
+import shutil
+import struct
+import subprocess
+import sys
+import types
+
+import numpy as np
 import pytest
-from inside import in_blender
+from pxr import UsdGeom
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.baking import saved_animation
 
 EXACT = 1e-6  # of the object's size: single precision
 READER = """
@@ -39,11 +54,7 @@ os._exit(7)
 
 def scene_to_export():
     """A bar that moves and bends from frame 3 to 7, at 25 frames a second, in a saved file; (bar, folder)."""
-    import bpy
-    import numpy as np
-    from test_bake_cache import animated
-
-    bar, folder = animated()
+    bar, folder = saved_animation()
     bar.location, bar.rotation_euler.z, bar.scale.y = (0.3, 0.2, 0.1), 0.4, 1.2
     index = bar.data.attributes.new("_ORIGINAL_INDEX", "FLOAT", "POINT")
     index.data.foreach_set("value", np.arange(len(bar.data.vertices), dtype=np.float32))
@@ -56,9 +67,6 @@ def scene_to_export():
 
 def shown(item, frames):
     """{frame: (n, 3) world points}."""
-    import bpy
-    import scenes
-
     found = {}
     for frame in frames:
         bpy.context.scene.frame_set(frame)
@@ -67,8 +75,6 @@ def shown(item, frames):
 
 
 def state(item):
-    import bpy
-
     flags = [(m.name, m.type, m.show_viewport, m.show_render) for m in item.modifiers]
     kinds = bpy.data.objects, bpy.data.meshes, bpy.data.actions, bpy.data.shape_keys, bpy.data.scenes
     scene = bpy.context.scene
@@ -84,13 +90,6 @@ def state(item):
 @in_blender
 def test_what_is_exported_is_read_back(kind):
     """By Blender itself, in a process that never heard of the extension."""
-    import subprocess
-    import sys
-
-    import bpy
-    import numpy as np
-    from test_export_animation import EXACT, READER, scene_to_export, shown, state
-
     bar, folder = scene_to_export()
     path = folder / f"Bar{dict(ABC='.abc', USD='.usdc', GLTF='.glb')[kind]}"
     bpy.context.scene.frame_set(4)
@@ -119,13 +118,6 @@ def test_what_is_exported_is_read_back(kind):
 
 @in_blender
 def test_the_times_of_a_gltf_are_the_frames_seconds():
-    import json
-    import struct
-
-    import bpy
-    import numpy as np
-    from test_export_animation import scene_to_export
-
     _, folder = scene_to_export()
     bpy.ops.arapfields.export_animation(format="GLTF", filepath=str(folder / "a.glb"))
     content = (folder / "a.glb").read_bytes()
@@ -140,13 +132,6 @@ def test_the_times_of_a_gltf_are_the_frames_seconds():
 @in_blender
 def test_the_times_of_an_alembic_are_seconds():
     """A scene of twice the rate finds each frame at twice its number."""
-    import subprocess
-    import sys
-
-    import bpy
-    import numpy as np
-    from test_export_animation import EXACT, READER, scene_to_export, shown
-
     bar, folder = scene_to_export()
     bpy.ops.arapfields.bake()
     expected = shown(bar, range(2, 6))
@@ -163,14 +148,7 @@ def test_the_times_of_an_alembic_are_seconds():
 
 @in_blender
 def test_usd_is_what_its_own_library_reads():
-    import bpy
-    import numpy as np
-    import pytest
-    from test_export_animation import EXACT, scene_to_export, shown
-
     usd = pytest.importorskip("pxr.Usd", reason="usd-core is not installed")
-    from pxr import UsdGeom
-
     bar, folder = scene_to_export()
     bpy.ops.arapfields.bake(subframes=2)
     path = folder / "Bar.usdc"
@@ -189,14 +167,6 @@ def test_usd_is_what_its_own_library_reads():
 @pytest.mark.parametrize("kind", ["ABC", "USD", "GLTF"])
 @in_blender
 def test_an_export_that_fails_is_named_and_changes_nothing(kind):
-    import resource
-    import shutil
-    import types
-
-    import bpy
-    import pytest
-    from test_export_animation import scene_to_export, state
-
     bar, folder = scene_to_export()
     bpy.ops.arapfields.bake()
     path = folder / f"Bar{dict(ABC='.abc', USD='.usdc', GLTF='.glb')[kind]}"

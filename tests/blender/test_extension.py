@@ -8,8 +8,8 @@ import sys
 import zipfile
 from pathlib import Path
 
-import blenders
 import pytest
+from support.blender import blenders
 
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.slow

@@ -1,7 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where users look for things: Blender's menus, tooltips, manual pages, a word at the first start."""
 
-from inside import in_blender
+import fnmatch
+from pathlib import Path
+from urllib.parse import urlparse
+
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.panels import Layout
+
+    import addon.registration as registration
+    from addon import first_run, menus
+    from addon.blender import guide
+    from addon.names import Op
 
 OPERATORS = (
     "PIN_TOOL",
@@ -20,13 +34,6 @@ OPERATORS = (
 
 @in_blender
 def test_the_object_menu_has_all_that_the_panel_does():
-    import bpy
-    from test_findable import OPERATORS
-    from test_panels import Layout
-
-    from addon import menus
-    from addon.names import Op
-
     asked = []
 
     class Noting(Layout):
@@ -44,11 +51,6 @@ def test_the_object_menu_has_all_that_the_panel_does():
 
 @in_blender
 def test_an_empty_added_as_a_handle_is_one():
-    import bpy
-    import scenes
-
-    from addon import menus
-
     bar = scenes.bar()
     asked = {}
 
@@ -69,15 +71,6 @@ def test_an_empty_added_as_a_handle_is_one():
 
 @in_blender
 def test_every_operator_names_its_page_and_every_page_exists():
-    import fnmatch
-    from pathlib import Path
-    from urllib.parse import urlparse
-
-    import bpy
-
-    import addon.registration as registration
-    from addon.blender import guide
-
     address, patterns = guide.manual_map()
     folder = Path(urlparse(address).path)
     assert all((folder / page).is_file() for _, page in patterns)
@@ -103,10 +96,6 @@ def test_every_operator_names_its_page_and_every_page_exists():
 
 @in_blender
 def test_the_first_start_says_where_the_extension_is_and_only_the_first():
-    import bpy
-
-    from addon import first_run
-
     class Manager:
         shown = 0
 

@@ -1,16 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a running solve shows on the source itself: nothing of it stays, in no step of undo either."""
 
-from inside import in_blender
+import numpy as np
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.wraps import rigged_bar
+
+    from addon import lifecycle
+    from addon.blender import modifier_stack, timers
+    from addon.core.runtime import threads
+    from addon.deform.first_result import FirstResult
+    from addon.live import sessions
+    from addon.names import OFFSETS
+    from addon.surface.source_surface import read_surface
 
 
 @in_blender
 def test_what_is_shown_is_put_back_bit_for_bit():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_first_result import first_result, state
-
     bar, *_ = scenes.bar_with_handles()
     for earlier in (False, True):
         if earlier:
@@ -31,11 +40,6 @@ def test_what_is_shown_is_put_back_bit_for_bit():
 
 @in_blender
 def test_the_field_keeps_the_place_below_the_armature_that_a_wrap_took_for_it():
-    from test_first_result import first_result
-    from wraps import rigged_bar
-
-    from addon.blender import modifier_stack
-
     item, _ = rigged_bar()
     item.arapfields.under_rig = True
     place = modifier_stack.place(item)
@@ -49,10 +53,6 @@ def test_the_field_keeps_the_place_below_the_armature_that_a_wrap_took_for_it():
 
 @in_blender
 def test_steps_that_were_pushed_meanwhile_hold_nothing_of_it():
-    import bpy
-    import scenes
-    from test_first_result import first_result, state
-
     bpy.context.preferences.edit.use_global_undo = True
     for earlier in (False, True):
         bar, *_ = scenes.bar_with_handles(f"Bar {earlier}")
@@ -75,12 +75,6 @@ def test_steps_that_were_pushed_meanwhile_hold_nothing_of_it():
 
 @in_blender
 def test_a_first_result_waits_for_the_end_of_edit_mode():
-    import bpy
-    import scenes
-    from test_first_result import first_result, state
-
-    from addon.blender import timers
-
     bar, *_ = scenes.bar_with_handles()
     before = state(bar)
     first, moved = first_result(bar)
@@ -98,12 +92,6 @@ def test_a_first_result_waits_for_the_end_of_edit_mode():
 
 @in_blender
 def test_a_mesh_that_changed_is_left_alone():
-    import bpy
-    import scenes
-    from test_first_result import first_result
-
-    from addon.names import OFFSETS
-
     bar, *_ = scenes.bar_with_handles()
     first, moved = first_result(bar)
     bar.data = bar.data.copy()
@@ -117,15 +105,7 @@ def test_a_mesh_that_changed_is_left_alone():
 
 @in_blender
 def test_no_thread_works_on_when_the_process_ends():
-    import scenes
-
-    from addon import lifecycle
-    from addon.core.runtime import threads
-    from addon.live import sessions
-
     bar, *_ = scenes.bar_with_handles()
-    import bpy
-
     sessions.begin(bpy.context, bar)
     assert threads.own_threads()
     lifecycle.end_threads()
@@ -135,11 +115,6 @@ def test_no_thread_works_on_when_the_process_ends():
 
 def first_result(bar):
     """What shows a solve of this object, and (n, 3) moved points in solve space."""
-    import bpy
-
-    from addon.deform.first_result import FirstResult
-    from addon.surface.source_surface import read_surface
-
     first = FirstResult(read_surface(bpy.context, bar, in_place=True))
     moved = first.points.copy()
     moved[:, 2] += 0.2 * moved[:, 0] ** 2
@@ -148,9 +123,6 @@ def first_result(bar):
 
 def state(bar):
     """All that a first result touches, comparable bit for bit."""
-    import bpy
-    import scenes
-
     bpy.context.view_layer.update()
     names = [sorted(getattr(bpy.data, kind).keys()) for kind in ("objects", "meshes", "node_groups")]
     attributes = [(a.name, a.domain, a.data_type) for a in bar.data.attributes]

@@ -1,19 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """With symmetry, handles and pins have ghosts on the other side."""
 
-from inside import in_blender
+import numpy as np
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.live import step
+    from support.blender.pins import pin
+
+    from addon.live import sessions
+    from addon.pin_tool import drawing
+    from addon.viewport.handle_boxes import CIRCLE_ENDS, box_lines, ghosts, segments
 
 
 @in_blender
 def test_ghosts_are_where_the_other_side_is_held_and_goes():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_live import step
-
-    from addon.live import sessions
-    from addon.viewport.handle_boxes import box_lines, ghosts, segments
-
     bar, fixed, moving = scenes.bar_with_handles()
     fixed.location, fixed.scale = (0, 0, 0), (0.1, 0.5, 0.5)
     bpy.context.view_layer.update()
@@ -42,14 +45,6 @@ def test_ghosts_are_where_the_other_side_is_held_and_goes():
 
 @in_blender
 def test_pins_have_theirs_on_turned_and_scaled_objects_too():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_pins import pin
-
-    from addon.pin_tool import drawing
-    from addon.viewport.handle_boxes import CIRCLE_ENDS, ghosts
-
     bar = scenes.bar()
     bar.location, bar.rotation_euler.z, bar.scale = (1, 2, 3), 0.7, (2, 2, 2)
     bpy.context.view_layer.update()

@@ -1,19 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Vertex groups of large meshes: read in slices, counted aside."""
 
-from inside import in_blender
+import time
 
+import numpy as np
+from support.blender.inside import IN_BLENDER, in_blender
 
-@in_blender
-def test_weights_of_groups_are_read_in_slices():
+if IN_BLENDER:
     import bpy
-    import numpy as np
-    import scenes
+    from support.blender import scenes
 
     from addon.blender import vertex_groups
     from addon.core.errors import UserError
     from addon.core.runtime.coroutines import run_to_completion
+    from addon.handles import counts
 
+
+@in_blender
+def test_weights_of_groups_are_read_in_slices():
     bar = scenes.decorate(scenes.bar())
     other = bar.vertex_groups.new(name="Other")
     other.add([1, 5], 0.25, "REPLACE")
@@ -47,13 +51,6 @@ def test_weights_of_groups_are_read_in_slices():
 
 @in_blender
 def test_a_window_counts_large_meshes_aside():
-    import time
-
-    import bpy
-    import scenes
-
-    from addon.handles import counts
-
     bar, fixed, _ = scenes.bar_with_handles()
     scenes.decorate(bar)
     entries = bar.arapfields.handles

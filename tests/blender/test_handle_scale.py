@@ -1,15 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Handles that scale what they hold, where that is asked for."""
 
+import numpy as np
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.baking import RUN, cache_file
+    from support.blender.live import step
+    from support.blender.panels import drawn
+    from support.blender.stacks import local_points
+
+    from addon.core.runtime import jobs
 
 
 def enlarged(allow):
     """(bar, moving): the bar's end is half as large again, by its handle; held at the other."""
-    import bpy
-    import scenes
-
     bar, _, moving = scenes.bar_with_handles()
     bar.arapfields.handles[1].allow_scale = allow
     moving.scale = [1.5 * s for s in moving.scale]
@@ -21,25 +29,19 @@ def enlarged(allow):
 @pytest.mark.parametrize("allow", [False, True])
 @in_blender
 def test_what_a_handle_holds_is_scaled_where_asked(allow):
-    import bpy
-    import numpy as np
-    from test_handle_reach import RUN, cache_file, shown
-    from test_handle_scale import enlarged
-    from test_live import step
-
     bar, moving = enlarged(allow)
     rest = np.array([v.co for v in bar.data.vertices])
     held = rest[:, 0] > 0.8
     expected = rest[held] + ([0.5, 0.5, 0.5] * (rest[held] - [1, 0, 0]) if allow else 0.0)
     bpy.ops.arapfields.deform(**RUN)
-    found = [shown(bar)]
+    found = [local_points(bar)]
     bpy.ops.arapfields.live()
     step(refined=True)
-    found.append(shown(bar))
+    found.append(local_points(bar))
     bpy.ops.arapfields.live()
     moving.keyframe_insert("scale", frame=1)
     bpy.ops.arapfields.bake(start=1, end=1, filepath=cache_file())
-    found.append(shown(bar))
+    found.append(local_points(bar))
     for after in found:
         error = np.abs(after[held] - expected).max()
         print(allow, error)
@@ -49,13 +51,6 @@ def test_what_a_handle_holds_is_scaled_where_asked(allow):
 
 @in_blender
 def test_a_flat_or_mirrored_scale_is_refused_by_name_and_by_axis_it_may_differ():
-    import bpy
-    import numpy as np
-    import pytest
-    import scenes
-    from test_handle_reach import RUN, shown
-    from test_handle_scale import enlarged
-
     bar, moving = enlarged(True)
     kept = moving.scale[2]
     for bad in (0.0, -kept):
@@ -68,7 +63,7 @@ def test_a_flat_or_mirrored_scale_is_refused_by_name_and_by_axis_it_may_differ()
     scenes.activate(bar)
     bpy.ops.arapfields.deform(**RUN)
     tip = np.array([v.co.x for v in bar.data.vertices]) > 0.9
-    after = shown(bar)[tip]
+    after = local_points(bar)[tip]
     assert abs(np.ptp(after[:, 2]) - 1.0) < 0.1 and abs(np.ptp(after[:, 1]) - 0.5) < 0.1
     bpy.ops.arapfields.mirror_handle(axis="X")
     assert all(entry.allow_scale for entry in bar.arapfields.handles[1:])
@@ -76,13 +71,6 @@ def test_a_flat_or_mirrored_scale_is_refused_by_name_and_by_axis_it_may_differ()
 
 @in_blender
 def test_a_scale_that_counts_for_nothing_is_said():
-    import bpy
-    from test_handle_reach import RUN
-    from test_handle_scale import enlarged
-    from test_panels import drawn
-
-    from addon.core.runtime import jobs
-
     said = "Moving is scaled, which counts only with Allow Scale"
 
     def told():

@@ -1,17 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Handles: Empties of every kind, their rest poses, and who owns them."""
 
-from inside import in_blender
+import numpy as np
+import pytest
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+
+    from addon.blender.object_references import source_of
+    from addon.core.geometry.spaces import space_of
+    from addon.handles import empties
 
 
 @in_blender
 def test_selected_empties_become_handles_and_anchors_at_first():
-    import bpy
-    import scenes
-
-    from addon.core.geometry.spaces import space_of
-    from addon.handles import empties
-
     bar, fixed, moving = scenes.bar_with_handles()
     found = empties.solve_handles(bar, space_of(bar.matrix_world))
     assert [h.name for h in found] == ["Fixed", "Moving"] and all(h.is_anchor for h in found)
@@ -25,9 +29,6 @@ def test_selected_empties_become_handles_and_anchors_at_first():
 
 @in_blender
 def test_without_empties_one_is_made_at_the_cursor():
-    import bpy
-    import scenes
-
     bar = scenes.bar()
     bpy.context.scene.cursor.location = (0.5, 0, 0)
     bpy.ops.arapfields.add_handle()
@@ -38,10 +39,6 @@ def test_without_empties_one_is_made_at_the_cursor():
 
 @in_blender
 def test_rest_follows_the_source_and_reset_returns_to_it():
-    import bpy
-    import numpy as np
-    import scenes
-
     bar, _, moving = scenes.bar_with_handles()
     before = np.array(moving.matrix_world)
     bar.location.x += 5
@@ -55,12 +52,6 @@ def test_rest_follows_the_source_and_reset_returns_to_it():
 
 @in_blender
 def test_set_rest_makes_the_present_pose_the_rest():
-    import bpy
-    import scenes
-
-    from addon.core.geometry.spaces import space_of
-    from addon.handles import empties
-
     bar, _, moving = scenes.bar_with_handles()
     moving.location.y += 0.1
     bpy.ops.arapfields.set_rest(all=True)
@@ -70,9 +61,6 @@ def test_set_rest_makes_the_present_pose_the_rest():
 
 @in_blender
 def test_remove_takes_the_selected_and_may_delete_them():
-    import bpy
-    import scenes
-
     bar, fixed, _ = scenes.bar_with_handles()
     scenes.activate(fixed, bar)
     bpy.ops.arapfields.remove_handle()
@@ -85,11 +73,6 @@ def test_remove_takes_the_selected_and_may_delete_them():
 
 @in_blender
 def test_a_deleted_empty_is_no_handle_any_more():
-    import bpy
-    import scenes
-
-    from addon.handles import empties
-
     bar, _, moving = scenes.bar_with_handles()
     bpy.data.objects.remove(moving)
     assert [e.empty.name for e in empties.used(bar)] == ["Fixed"]
@@ -97,11 +80,6 @@ def test_a_deleted_empty_is_no_handle_any_more():
 
 @in_blender
 def test_with_a_handle_or_a_result_active_the_source_is_still_found():
-    import bpy
-    import scenes
-
-    from addon.blender.object_references import source_of
-
     bar, fixed, _ = scenes.bar_with_handles()
     scenes.activate(fixed)
     assert source_of(bpy.context) == bar
@@ -113,10 +91,6 @@ def test_with_a_handle_or_a_result_active_the_source_is_still_found():
 
 @in_blender
 def test_a_vertex_group_is_a_handle():
-    import bpy
-    import numpy as np
-    import scenes
-
     bar = scenes.bar()
     before = scenes.world_points(bar)
     for name, chosen in (("left", before[:, 0] < -0.8), ("right", before[:, 0] > 0.8)):
@@ -134,13 +108,6 @@ def test_a_vertex_group_is_a_handle():
 
 @in_blender
 def test_a_box_around_the_selected_vertices():
-    import bpy
-    import numpy as np
-    import pytest
-    import scenes
-
-    from addon.handles import empties
-
     bar = scenes.bar()
     bar.rotation_euler.z, bar.scale = 0.5, (1, 2, 1)
     bpy.context.view_layer.update()
@@ -163,12 +130,6 @@ def test_a_box_around_the_selected_vertices():
 
 @in_blender
 def test_a_mirrored_handle_moves_as_the_mirror_image():
-    import bpy
-    import numpy as np
-    import scenes
-
-    from addon.handles import empties
-
     bar = scenes.bar()
     bar.location, bar.rotation_euler.z = (1, 2, 3), 0.7
     bpy.context.view_layer.update()
@@ -194,10 +155,6 @@ def test_a_mirrored_handle_moves_as_the_mirror_image():
 
 @in_blender
 def test_a_mirrored_group_takes_the_other_sides_group():
-    import bpy
-    import pytest
-    import scenes
-
     bar = scenes.bar()
     for name, chosen in (("arm.L", [0, 1, 2]), ("arm.R", [5, 6, 7])):
         bar.vertex_groups.new(name=name).add(chosen, 1.0, "REPLACE")

@@ -1,14 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Handles as users see and hit them: rows and Empties together, names, colours, sizes of boxes."""
 
-from inside import in_blender
+import numpy as np
+import pytest
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+
+    from addon.blender.object_references import source_of
+    from addon.core.geometry.spaces import rigid_motion
+    from addon.handles import empties
+    from addon.handles.naming import name_for
 
 
 @in_blender
 def test_a_row_and_its_empty_are_chosen_together():
-    import bpy
-    import scenes
-
     bar, fixed, moving = scenes.bar_with_handles()
     bar.arapfields.active_handle = 0
     assert bpy.context.selected_objects == [fixed] and bpy.context.object == fixed
@@ -24,9 +32,6 @@ def test_a_row_and_its_empty_are_chosen_together():
 
 @in_blender
 def test_a_row_whose_empty_cannot_be_selected_selects_nothing():
-    import bpy
-    import scenes
-
     bar, fixed, moving = scenes.bar_with_handles()
     moving.hide_set(True)
     scenes.activate(bar)
@@ -44,12 +49,6 @@ def test_a_row_whose_empty_cannot_be_selected_selects_nothing():
 
 @in_blender
 def test_handles_are_named_by_what_they_hold():
-    import bpy
-    import numpy as np
-    import scenes
-
-    from addon.handles.naming import name_for
-
     bar = scenes.bar()
     bar.location, bar.rotation_euler.z = (1, 2, 3), 0.4
     bpy.context.view_layer.update()
@@ -67,11 +66,6 @@ def test_handles_are_named_by_what_they_hold():
 
 @in_blender
 def test_handles_without_a_group_are_numbered_and_names_of_the_users_stay():
-    import bpy
-    import scenes
-
-    from addon.handles.naming import name_for
-
     bar = scenes.bar()
     for name in ("Empty", "Jaw", "Empty.001"):
         empty = scenes.cube_empty((0.5, 0, 0), (0.2, 0.2, 0.2), name)
@@ -88,11 +82,6 @@ def test_handles_without_a_group_are_numbered_and_names_of_the_users_stay():
 
 @in_blender
 def test_a_new_handle_is_selected_to_be_moved_at_once():
-    import bpy
-    import scenes
-
-    from addon.blender.object_references import source_of
-
     bar = scenes.bar()
     bpy.ops.arapfields.add_handle(place="CURSOR")
     empty = bar.arapfields.handles[0].empty
@@ -111,8 +100,6 @@ GREYS = [(0.24, 0.24, 0.24), (0.6, 0.6, 0.6)]  # Blender's viewport and a solid 
 
 def oklab(colour):
     """Lightness and two hues of an sRGB colour, in which distances are what is seen (B. Ottosson, 2020)."""
-    import numpy as np
-
     c = np.asarray(colour, dtype=float)
     linear = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
     cones = np.array(
@@ -134,11 +121,6 @@ def oklab(colour):
 
 @in_blender
 def test_sixteen_handles_have_sixteen_distinct_colours():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_handles_seen import GREYS, LEAST_DIFFERENCE, oklab
-
     bar = scenes.bar()
     for _ in range(16):
         scenes.activate(bar)
@@ -159,14 +141,6 @@ def test_sixteen_handles_have_sixteen_distinct_colours():
 
 @in_blender
 def test_a_box_is_resized_by_a_face_and_keeps_its_motion():
-    import bpy
-    import numpy as np
-    import pytest
-    import scenes
-
-    from addon.core.geometry.spaces import rigid_motion
-    from addon.handles import empties
-
     bar, _, moving = scenes.bar_with_handles()
     bar.rotation_euler.x, bar.location.y = 0.3, 1.0
     moving.location.z, moving.rotation_euler.y = 0.4, 0.5

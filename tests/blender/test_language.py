@@ -1,17 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every text that a user may read is in the translations, and templates keep their fields."""
 
-from inside import in_blender
+import string
+import tempfile
+from pathlib import Path
+
+import pytest
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    from support.blender import strings
+
+    from addon.blender.language import translated
+    from addon.blender.translations import read_po, translations
+    from addon.core.errors import UserError
 
 
 @in_blender
 def test_every_text_is_translated():
-    import string
-
-    import strings
-
-    from addon.blender.translations import translations
-
     texts = strings.every()
     assert len(texts) > 250
 
@@ -31,9 +37,6 @@ def test_every_text_is_translated():
 
 @in_blender
 def test_messages_are_filled_in_after_translation():
-    from addon.blender.language import translated
-    from addon.core.errors import UserError
-
     assert translated("{count} frames baked", count=3) == "3 frames baked"
     assert translated(UserError("{name} is not a mesh object", name="{x}")) == "{x} is not a mesh object"
     assert translated(ValueError("as it is")) == "as it is"
@@ -41,13 +44,6 @@ def test_messages_are_filled_in_after_translation():
 
 @in_blender
 def test_wrapped_lines_and_every_form_of_a_po_file_are_read():
-    import tempfile
-    from pathlib import Path
-
-    import pytest
-
-    from addon.blender.translations import read_po
-
     path = Path(tempfile.mkdtemp()) / "de_DE.po"
     path.write_text(
         'msgid ""\nmsgstr "Content-Type: text/plain; charset=UTF-8\\n"\n\n'

@@ -1,8 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Enabled and disabled again and again, in whatever state: nothing of the extension is left in Blender."""
 
+import inspect
+import re
+import time
+
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from bl_ui.space_toolsystem_toolbar import VIEW3D_PT_tools_active as toolbar
+    from support.blender import scenes
+
+    import addon
+    from addon import lifecycle
+    from addon.blender import host, icons, library_loading, timers
+    from addon.core.runtime import jobs, native, threads
+    from addon.handles import counts
+    from addon.jobs.display import display
+    from addon.live.warm import warm
+    from addon.pin_tool import drag, hover, tool
+    from addon.viewport import previews
 
 ROUNDS = 20
 STATES = ["idle", "live", "job", "counting", "drag", "warm"]
@@ -10,14 +29,6 @@ STATES = ["idle", "live", "job", "counting", "drag", "warm"]
 
 def remains():
     """All that the extension has in this Blender: {kind: names}."""
-    import inspect
-    import re
-
-    import bpy
-
-    from addon import lifecycle
-    from addon.blender import icons, timers
-    from addon.core.runtime import threads
 
     def of_addon(function):
         return (getattr(function, "__module__", "") or "").startswith("addon")
@@ -64,23 +75,15 @@ def remains():
 
 def pin_tools():
     """The extension's tools in Object Mode's toolbar."""
-    from bl_ui.space_toolsystem_toolbar import VIEW3D_PT_tools_active as toolbar
-
     flat = toolbar._tools_flatten(toolbar._tools["OBJECT"])
     return [tool.idname for tool in flat if tool and tool.idname.startswith("arapfields")]
 
 
 def is_busy(state):
     """Whether one of lifecycle.STATE holds anything."""
-    from addon.core.runtime import jobs
-    from addon.jobs.display import display
-    from addon.live.warm import warm
-    from addon.pin_tool.hover import hover
-    from addon.viewport import previews
-
     if state is warm:
         return state._thread is not None
-    if state is hover:
+    if state is hover.hover:
         return state.target is not None or state.drag is not None
     if state is jobs.board:
         return state.job is not None
@@ -93,24 +96,12 @@ def is_busy(state):
 
 def enter(state):
     """Puts the scene into a state in which there is something to end."""
-    import time
-
-    import bpy
-    import scenes
-
-    from addon.core.runtime import jobs, native, threads
-    from addon.handles import counts
-
     bar, *_ = scenes.bar_with_handles()
     if state == "live":
         assert bpy.ops.arapfields.live() == {"FINISHED"}
     elif state == "warm":
-        from addon.live.warm import warm
-
         warm.prepare(bpy.context, bar)
     elif state == "drag":
-        from addon.pin_tool import drag, hover
-
         before = drag.Before(bpy.context, bar)
         hover.hover.drag = drag.Drag(bpy.context, before, bpy.data.objects["Moving"])
         hover.hover.drag.move(bpy.context, (1.0, 0.0, 0.3))
@@ -132,12 +123,6 @@ def enter(state):
 @pytest.mark.parametrize("state", STATES)
 @in_blender
 def test_nothing_is_left_when_the_extension_is_disabled(state):
-    import bpy
-    from test_lifecycle import ROUNDS, enter, remains
-
-    import addon
-    from addon.handles import counts
-
     enabled, points_inside = None, counts.points_inside
     for _ in range(ROUNDS):
         there = {kind: len(names) for kind, names in remains().items()}
@@ -156,14 +141,6 @@ def test_nothing_is_left_when_the_extension_is_disabled(state):
 @in_blender
 def test_in_a_window_drawing_and_timers_end_too():
     """Blender's own calls are noted, as a Blender without a window draws nothing."""
-    import bpy
-    from test_lifecycle import ROUNDS, remains
-
-    import addon
-    from addon import lifecycle
-    from addon.blender import host, library_loading
-    from addon.pin_tool import tool
-
     addon.unregister()
     there, kept = [], (lifecycle.has_window, library_loading.has_window, bpy.types.SpaceView3D)
 
@@ -203,13 +180,6 @@ def test_in_a_window_drawing_and_timers_end_too():
 
 @in_blender
 def test_what_failed_half_way_is_undone():
-    import bpy
-    import pytest
-    from test_lifecycle import remains
-
-    import addon
-    from addon import lifecycle
-
     addon.unregister()
     parts, lifecycle.PARTS = lifecycle.PARTS, (*lifecycle.PARTS, (lambda: 1 / 0, None))
     try:

@@ -1,31 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Live mode, stepped by hand: without a window Blender runs no timers."""
 
+import tempfile
+
+import numpy as np
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
 
-WAIT = 30  # seconds for a shape to follow
-
-
-def step(refined=False):
+if IN_BLENDER:
     import bpy
-    from test_live import WAIT
+    from support.blender import scenes
+    from support.blender.live import step
 
+    from addon.core.runtime import jobs
     from addon.live import sessions
-
-    bpy.context.view_layer.update()
-    sessions.update(bpy.context, wait=WAIT, refined=refined)
 
 
 @in_blender
 def test_the_result_follows_moves_and_returns():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_live import step
-
-    from addon.live import sessions
-
     bar, _, moving = scenes.bar_with_handles()
     before = scenes.world_points(bar)
     assert bpy.ops.arapfields.live() == {"FINISHED"} and sessions.is_live(bar)
@@ -46,10 +38,6 @@ def test_the_result_follows_moves_and_returns():
 
 @in_blender
 def test_off_restores_what_was_there():
-    import bpy
-    import scenes
-    from test_live import step
-
     bar, _, moving = scenes.bar_with_handles()
 
     def names():
@@ -71,11 +59,6 @@ def test_off_restores_what_was_there():
 @pytest.mark.parametrize("target", ["MODIFIER", "REPLACE", "KEY", "NEW"])
 @in_blender
 def test_a_live_shape_can_be_kept(target):
-    import bpy
-    import numpy as np
-    import scenes
-    from test_live import step
-
     bar, _, moving = scenes.bar_with_handles()
     bar.arapfields.target = target
     scenes.decorate(bar)
@@ -99,11 +82,6 @@ def test_a_live_shape_can_be_kept(target):
 
 @in_blender
 def test_several_objects_are_live_at_once():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_live import step
-
     pairs = [scenes.bar_with_handles(name) for name in ("One", "Two")]
     for bar, _, _ in pairs:
         scenes.activate(bar)
@@ -119,12 +97,6 @@ def test_several_objects_are_live_at_once():
 
 @in_blender
 def test_a_new_handle_sets_the_solver_up_again():
-    import bpy
-    import scenes
-    from test_live import step
-
-    from addon.live import sessions
-
     bar, _, _ = scenes.bar_with_handles()
     bpy.ops.arapfields.live()
     scenes.activate(bar)
@@ -140,11 +112,6 @@ def test_a_new_handle_sets_the_solver_up_again():
 
 @in_blender
 def test_playback_is_followed():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_live import step
-
     bar, _, moving = scenes.bar_with_handles()
     for frame, height in ((1, 0.0), (9, 0.4)):
         moving.location.z = height
@@ -163,16 +130,6 @@ def test_playback_is_followed():
 @in_blender
 def test_a_file_saved_while_live_shows_the_same_shape_as_a_result(target):
     """On the source, or on an object of its own; the panel says so, and nothing is live."""
-    import tempfile
-
-    import bpy
-    import numpy as np
-    import scenes
-    from test_live import step
-
-    from addon.core.runtime import jobs
-    from addon.live import sessions
-
     bar, _, moving = scenes.bar_with_handles()
     bar.arapfields.target = target
     bpy.ops.arapfields.live()
@@ -204,10 +161,6 @@ def test_a_file_saved_while_live_shows_the_same_shape_as_a_result(target):
 
 @in_blender
 def test_what_cannot_be_live_is_named():
-    import bpy
-    import pytest
-    import scenes
-
     scenes.bar()
     with pytest.raises(RuntimeError, match="Bar has no handle"):
         bpy.ops.arapfields.live()

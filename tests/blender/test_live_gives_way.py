@@ -1,18 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Deform and Stylize pressed while an object is live: they take the pose, live mode ends by itself."""
 
+import numpy as np
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes, stages
+    from support.blender.live import step
+
+    from addon.core.runtime import jobs
+    from addon.deform.solve_job import placement_refusal
+    from addon.live import sessions
+    from addon.pin_tool import drag
 
 FINE = 0.03  # of the bar, by which a live shape and the solve of its pose may differ
 
 
 def lifted(target="MODIFIER"):
     """(bar, its points at rest): live, its end lifted and the shape there."""
-    import bpy
-    import scenes
-    from test_live import step
-
     bar, _, moving = scenes.bar_with_handles()
     bar.arapfields.target = target
     rest = scenes.world_points(bar)
@@ -26,14 +33,6 @@ def lifted(target="MODIFIER"):
 @pytest.mark.parametrize("target", ["MODIFIER", "NEW", "REPLACE", "KEY"])
 @in_blender
 def test_deform_takes_the_live_pose(target):
-    import bpy
-    import numpy as np
-    import scenes
-    from test_live_gives_way import FINE, lifted
-
-    from addon.deform.solve_job import placement_refusal
-    from addon.live import sessions
-
     bar, rest = lifted(target)
     assert placement_refusal(bar) is None
     live = scenes.world_points(bar if target != "NEW" else bpy.data.objects["Bar_live"])
@@ -49,12 +48,6 @@ def test_deform_takes_the_live_pose(target):
 
 @in_blender
 def test_stylize_works_on_the_rest_shape_of_what_is_live():
-    import bpy
-    import scenes
-    from test_live_gives_way import lifted
-
-    from addon.live import sessions
-
     bar, rest = lifted()
     bpy.ops.arapfields.stylize(style="CUBE", **scenes.QUICK)
     bpy.context.view_layer.update()
@@ -65,15 +58,6 @@ def test_stylize_works_on_the_rest_shape_of_what_is_live():
 
 @in_blender
 def test_a_job_that_is_cancelled_leaves_the_live_shape():
-    import bpy
-    import numpy as np
-    import scenes
-    import stages
-    from test_live_gives_way import lifted
-
-    from addon.core.runtime import jobs
-    from addon.live import sessions
-
     bar, _ = lifted()
     live = scenes.world_points(bar)
     present = stages.Stage("job")
@@ -89,14 +73,6 @@ def test_a_job_that_is_cancelled_leaves_the_live_shape():
 
 @in_blender
 def test_pins_are_dragged_again_after_deform():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_live import step
-
-    from addon.live import sessions
-    from addon.pin_tool import drag
-
     bar = scenes.bar()
     bpy.ops.ed.undo_push(message="bar")
     dragged = drag.of_new_pin(bpy.context, bar, np.array([0.9, -0.25, 0.0]), 0.1)

@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Live sources that users delete, edit or undo at the wrong moment."""
 
+import numpy as np
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.live import step
+    from support.blender.scenes import delete
+
+    from addon.live import sessions
 
 
 @pytest.mark.parametrize("which", ["source", "live object", "modifier"])
 @in_blender
 def test_live_ends_when_its_source_or_its_object_is_deleted(which):
-    import bpy
-    import scenes
-    from test_live import step
-    from test_lost_objects import delete
-
-    from addon.live import sessions
-
     bar, _, moving = scenes.bar_with_handles()
     bar.arapfields.target = "NEW" if which == "live object" else "MODIFIER"
     bpy.ops.arapfields.live()
@@ -31,13 +33,6 @@ def test_live_ends_when_its_source_or_its_object_is_deleted(which):
 
 @in_blender
 def test_edits_of_a_live_source_are_followed():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_live import step
-
-    from addon.live import sessions
-
     bar, *_ = scenes.bar_with_handles()
     bpy.ops.arapfields.live()
     session = sessions.live[bar.session_uid]
@@ -55,13 +50,6 @@ def test_edits_of_a_live_source_are_followed():
 
 @in_blender
 def test_live_waits_while_its_source_is_in_edit_mode():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_live import step
-
-    from addon.live import sessions
-
     bar, _, moving = scenes.bar_with_handles()
     bpy.ops.arapfields.live()
     scenes.activate(bar)
@@ -84,13 +72,6 @@ def test_live_waits_while_its_source_is_in_edit_mode():
 
 @in_blender
 def test_a_live_object_that_undo_left_in_no_scene_goes_too():
-    import bpy
-    import scenes
-    from test_live import step
-    from test_lost_objects import delete
-
-    from addon.live import sessions
-
     bar, *_ = scenes.bar_with_handles()
     bar.arapfields.target = "NEW"
     bpy.ops.arapfields.live()

@@ -1,21 +1,29 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What renders show of a source that is live, and of a file that is opened without the extension."""
 
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
 
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.baking import animated
+    from support.blender.live import step
+    from support.blender.scenes import camera
+    from support.blender.stacks import build, local_points
 
-def camera(size=48):
-    import scenes
-
-    return scenes.camera(size)
+    from addon.core.runtime import jobs
+    from addon.live import sessions
 
 
 def picture(path):
     """(height, width, 4) pixels of a file."""
-    import bpy
-    import numpy as np
-
     image = bpy.data.images.load(str(path))
     pixels = np.empty(len(image.pixels), np.float32)
     image.pixels.foreach_get(pixels)
@@ -26,8 +34,6 @@ def picture(path):
 
 def counted(item):
     """How many visible meshes of the evaluated scene are this source's or its results'."""
-    import bpy
-
     depsgraph = bpy.context.evaluated_depsgraph_get()
     shown = [i.object.original for i in depsgraph.object_instances if i.object.type == "MESH"]
     return sum(one.name.startswith(item.name) and not one.hide_render for one in shown)
@@ -36,18 +42,6 @@ def counted(item):
 @pytest.mark.parametrize("target", ["MODIFIER", "NEW"])
 @in_blender
 def test_a_render_of_an_animation_follows_the_handles_while_live(target):
-    import tempfile
-    from pathlib import Path
-
-    import bpy
-    import numpy as np
-    import scenes
-    from test_bake import animated
-    from test_live import step
-    from test_live_render import camera, counted, picture
-
-    from addon.live import sessions
-
     bar = animated()
     bar.arapfields.target = target
     scene, folder = camera(), Path(tempfile.mkdtemp())
@@ -74,14 +68,6 @@ def test_a_render_of_an_animation_follows_the_handles_while_live(target):
 
 @in_blender
 def test_a_handle_hidden_in_renders_is_said():
-    import tempfile
-
-    import bpy
-    from test_bake import animated
-    from test_live_render import camera
-
-    from addon.core.runtime import jobs
-
     jobs.board.messages.clear()
     animated()
     scene = camera(16)
@@ -96,16 +82,6 @@ def test_a_handle_hidden_in_renders_is_said():
 @in_blender
 def test_a_file_looks_the_same_without_the_extension():
     """Opened by a Blender that never heard of it: the same points bit for bit, the same picture."""
-    import subprocess
-    import sys
-    import tempfile
-    from pathlib import Path
-
-    import bpy
-    import numpy as np
-    from stacks import build, local_points
-    from test_live_render import camera, picture
-
     for stack in (["FIELD", "SUBSURF"], ["MIRROR", "FIELD"]):
         bpy.ops.wm.read_factory_settings(use_empty=True)
         build(stack)

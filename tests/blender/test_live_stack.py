@@ -1,8 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Live mode among other modifiers: what moves before the field, and modes in which it pauses."""
 
+import numpy as np
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.live import step
+    from support.blender.stacks import add_modifier, local_points
+
+    from addon.blender import mesh_arrays, modifier_stack
+    from addon.field_modifier import inputs, motion
+    from addon.live import sessions
 
 BY_HAND = 1e-5  # single precision of positions of size one
 
@@ -10,16 +21,6 @@ BY_HAND = 1e-5  # single precision of positions of size one
 @in_blender
 def test_the_field_is_evaluated_where_the_modifiers_before_have_the_points():
     """The armature before it moves while live: the field stays, and moves the points where they are now."""
-    import bpy
-    import numpy as np
-    import scenes
-    from stacks import add_modifier, local_points
-    from test_live import step
-    from test_live_stack import BY_HAND
-
-    from addon.blender import mesh_arrays, modifier_stack
-    from addon.live import sessions
-
     bar, _, moving = scenes.bar_with_handles()
     add_modifier(bar, "ARMATURE")
     assert bpy.ops.arapfields.live() == {"FINISHED"}
@@ -47,14 +48,6 @@ def test_the_field_is_evaluated_where_the_modifiers_before_have_the_points():
 @pytest.mark.parametrize("mode", ["EDIT", "SCULPT"])
 @in_blender
 def test_live_pauses_in_modes_that_change_the_mesh(mode):
-    import bpy
-    import numpy as np
-    import scenes
-    from test_live import step
-
-    from addon.field_modifier import motion
-    from addon.live import sessions
-
     bar, _, moving = scenes.bar_with_handles()
     bpy.ops.arapfields.live()
     moving.location.z += 0.2
@@ -80,14 +73,6 @@ def test_live_pauses_in_modes_that_change_the_mesh(mode):
 
 @in_blender
 def test_a_modifier_added_before_binds_the_handles_anew():
-    import bpy
-    import numpy as np
-    import scenes
-    from stacks import add_modifier, local_points
-    from test_live import step
-
-    from addon.live import sessions
-
     bar, _, moving = scenes.bar_with_handles()
     bpy.ops.arapfields.live()
     moving.location.z += 0.3
@@ -109,13 +94,6 @@ def test_a_modifier_added_before_binds_the_handles_anew():
 
 @in_blender
 def test_what_was_there_before_live_mode_comes_back_bit_for_bit():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_live import step
-
-    from addon.field_modifier import inputs
-
     bar, _, moving = scenes.bar_with_handles()
     moving.location.z += 0.3
     bpy.ops.arapfields.deform(**scenes.QUICK)
@@ -134,14 +112,6 @@ def test_what_was_there_before_live_mode_comes_back_bit_for_bit():
 @in_blender
 def test_undone_steps_end_or_refresh_live_mode():
     """As after an undone step: a source that is not live in it, and one whose offsets are older."""
-    import bpy
-    import numpy as np
-    import scenes
-    from test_live import step
-
-    from addon.field_modifier import motion
-    from addon.live import sessions
-
     bar, _, moving = scenes.bar_with_handles()
     bpy.ops.arapfields.live()
     moving.location.z += 0.3

@@ -1,16 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Live styles, and the implicit surface that follows its handles."""
 
-from inside import in_blender
+import numpy as np
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.live import step
+    from support.blender.scenes import FIT
+
+    from addon.live import sessions
 
 
 @in_blender
 def test_a_style_follows_its_sliders_without_handles():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_live import step
-
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
     ball = bpy.context.object
     assert bpy.ops.arapfields.live(kind="STYLIZE") == {"FINISHED"}
@@ -33,11 +37,6 @@ def test_a_style_follows_its_sliders_without_handles():
 
 @in_blender
 def test_handles_and_a_style_together():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_live import step
-
     bar, _, moving = scenes.bar_with_handles()
     before = scenes.world_points(bar)
     bar.arapfields.stylize.style, bar.arapfields.stylize.use_handles = "CYLINDER", True
@@ -50,11 +49,6 @@ def test_handles_and_a_style_together():
 
 @in_blender
 def test_the_implicit_surface_follows_too():
-    import bpy
-    import scenes
-    from test_live import step
-    from test_surface import FIT
-
     bar, _, moving = scenes.bar_with_handles()
     for name, value in FIT.items():
         setattr(bar.arapfields.fit, name, value)
@@ -71,11 +65,6 @@ def test_the_implicit_surface_follows_too():
 
 @in_blender
 def test_a_live_style_follows_stiffness_rigidity_and_the_fold_barrier():
-    import bpy
-    from test_live import step
-
-    from addon.live import sessions
-
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
     ball = bpy.context.object
     style = ball.arapfields.stylize

@@ -1,28 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Objects that users delete, duplicate, override or edit at the wrong moment."""
 
-from inside import in_blender
+import tempfile
 
+import numpy as np
+import pytest
+from support.blender.inside import IN_BLENDER, in_blender
 
-def delete(item):
-    """As the user does: unlinked from the scene, while pointers keep the data alive."""
+if IN_BLENDER:
     import bpy
+    from support.blender import scenes
+    from support.blender.baking import animated
+    from support.blender.scenes import delete
 
-    for home in item.users_collection:
-        home.objects.unlink(item)
-    bpy.context.view_layer.update()
-    assert item.name in bpy.data.objects
+    from addon.blender.object_references import source_of
+    from addon.handles import empties, operators
 
 
 @in_blender
 def test_a_deleted_empty_is_no_handle_though_a_pointer_keeps_it():
-    import bpy
-    import pytest
-    import scenes
-    from test_lost_objects import delete
-
-    from addon.handles import empties
-
     bar, fixed, moving = scenes.bar_with_handles()
     delete(moving)
     assert [entry.empty for entry in empties.used(bar)] == [fixed]
@@ -33,12 +29,6 @@ def test_a_deleted_empty_is_no_handle_though_a_pointer_keeps_it():
 
 @in_blender
 def test_a_deleted_source_is_worked_on_no_more():
-    import bpy
-    import scenes
-    from test_lost_objects import delete
-
-    from addon.blender.object_references import source_of
-
     bar, fixed, _ = scenes.bar_with_handles()
     bpy.ops.arapfields.deform(**scenes.NEW)
     result = bpy.data.objects["Bar_deformed"]
@@ -52,10 +42,6 @@ def test_a_deleted_source_is_worked_on_no_more():
 
 @in_blender
 def test_a_copy_of_a_handle_takes_no_other_handle_away():
-    import bpy
-    import pytest
-    import scenes
-
     bar, fixed, moving = scenes.bar_with_handles()
     copied = moving.copy()
     bpy.context.collection.objects.link(copied)
@@ -73,10 +59,6 @@ def test_a_copy_of_a_handle_takes_no_other_handle_away():
 
 @in_blender
 def test_taking_a_handle_from_another_mesh_is_said():
-    import scenes
-
-    from addon.handles import operators
-
     bar, _, moving = scenes.bar_with_handles()
     other = scenes.bar("Other")
     scenes.activate(moving, other)
@@ -87,10 +69,6 @@ def test_taking_a_handle_from_another_mesh_is_said():
 
 @in_blender
 def test_a_handle_that_holds_nothing_is_said():
-    import scenes
-
-    from addon.handles import operators
-
     bar = scenes.bar()
     far = scenes.cube_empty((30, 0, 0), (1, 1, 1), "Far")
     scenes.activate(far, bar)
@@ -100,8 +78,6 @@ def test_a_handle_that_holds_nothing_is_said():
 
 def reports(operator, **properties):
     """{level: texts} that an operator reports when it is executed with these properties."""
-    import bpy
-
     said = {"INFO": [], "WARNING": [], "ERROR": []}
     stand_in = type("Operator", (), {**vars(operator), **properties})
     for base in reversed(operator.__mro__[1:2]):
@@ -115,12 +91,6 @@ def reports(operator, **properties):
 
 @in_blender
 def test_a_library_override_is_refused_before_pressing():
-    import tempfile
-
-    import bpy
-    import pytest
-    import scenes
-
     scenes.bar_with_handles("Linked")
     path = tempfile.mktemp(suffix=".blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
@@ -147,11 +117,6 @@ def test_a_library_override_is_refused_before_pressing():
 
 @in_blender
 def test_after_a_bake_the_present_frame_is_shown():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_bake import animated
-
     bar = animated()
     bpy.context.scene.frame_set(1)
     bpy.ops.arapfields.bake(format="KEYS", start=1, end=5, step=2)

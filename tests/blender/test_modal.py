@@ -2,8 +2,18 @@
 """The modal operator and what it shows, driven by stand-ins for a window's events, timer and status bar."""
 
 import contextlib
+import time
 
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import addon
+    from addon.blender import timers
+    from addon.core.runtime import jobs, native
+    from addon.core.runtime.coroutines import Pause
+    from addon.core.runtime.progress import JobCancelled
+    from addon.jobs import display, modal
+    from addon.jobs.modal import ModalRun
 
 
 class Window:
@@ -33,9 +43,6 @@ class Window:
 @contextlib.contextmanager
 def window():
     """A Window that the add-on takes for Blender's own."""
-    from addon.blender import timers
-    from addon.jobs import display, modal
-
     stand_in, kept = Window(timers.bpy.app), (display.bpy, timers.bpy, modal.has_window)
     display.bpy, timers.bpy, modal.has_window = stand_in, stand_in, lambda: True
     try:
@@ -46,9 +53,6 @@ def window():
 
 def operator(work):
     """A modal operator whose one job is `work(tracker)`."""
-    from addon.core.runtime import jobs, native
-    from addon.core.runtime.coroutines import Pause
-    from addon.jobs.modal import ModalRun
 
     class Operator(ModalRun):
         def coroutine(self, context):
@@ -67,8 +71,6 @@ def event(kind, value="NOTHING"):
 
 
 def until_ended(running, context):
-    import time
-
     end = time.monotonic() + 60
     while time.monotonic() < end:
         time.sleep(0.005)
@@ -82,15 +84,11 @@ def wait_for_cancel(tracker):
     task = tracker.start("Waiting", 1.0)
     while not task.cancelled:
         pass
-    from addon.core.runtime.progress import JobCancelled
-
     raise JobCancelled
 
 
 @in_blender
 def test_a_job_runs_beside_events_and_leaves_nothing_in_the_window():
-    import time
-
     with window() as context:
         running = operator(lambda tracker: (tracker.start("Working", 1.0), time.sleep(0.5)))
         assert running.invoke(context, None) == {"RUNNING_MODAL"}
@@ -113,9 +111,6 @@ def test_escape_cancels():
 
 @in_blender
 def test_the_status_bar_is_cleared_when_the_extension_is_disabled():
-    import addon
-    from addon.core.runtime import jobs
-
     with window() as context:
         running = operator(wait_for_cancel)
         running.invoke(context, None)

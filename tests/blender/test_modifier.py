@@ -1,34 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The result as a modifier: compared with the field applied by hand, wherever it is in the stack."""
 
+import numpy as np
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.stack_list import STACKS
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.stacks import build, by_hand, local_points
+
+    from addon.blender import modifier_stack
+    from addon.field_modifier import inputs
 
 BY_HAND = 1e-5  # single precision of positions of size one, through Blender's modifiers
-STACKS = {  # modifiers, with FIELD where the field's own is; "keys": shape keys
-    "alone": ["FIELD"],
-    "subdivision after": ["FIELD", "SUBSURF"],
-    "subdivision before": ["SUBSURF", "FIELD"],
-    "mirror before": ["MIRROR", "FIELD"],
-    "mirror after": ["FIELD", "MIRROR"],
-    "armature before": ["ARMATURE", "FIELD"],
-    "armature after": ["FIELD", "ARMATURE"],
-    "shape keys": ["keys", "FIELD"],
-    "all": ["keys", "MIRROR", "ARMATURE", "FIELD", "SUBSURF"],
-}
 
 
 @pytest.mark.parametrize("case", STACKS)
 @in_blender
 def test_the_modifier_does_what_the_field_does_by_hand(case):
-    import bpy
-    import numpy as np
-    from stacks import build, by_hand, local_points
-    from test_modifier import BY_HAND, STACKS
-
-    from addon.blender import modifier_stack
-    from addon.field_modifier import inputs
-
     bar, _, field = build(STACKS[case])
     own = [kind for kind in STACKS[case] if kind != "keys"]
     assert [modifier_stack.is_field(m) for m in bar.modifiers] == [kind == "FIELD" for kind in own]
@@ -62,9 +53,6 @@ def test_the_modifier_does_what_the_field_does_by_hand(case):
 
 @in_blender
 def test_nothing_but_a_modifier_an_attribute_and_a_group_is_added():
-    import bpy
-    import scenes
-
     bar, _, moving = scenes.bar_with_handles()
     scenes.decorate(bar)
     before = scenes.everything(bar)
@@ -84,10 +72,6 @@ def test_nothing_but_a_modifier_an_attribute_and_a_group_is_added():
 @in_blender
 def test_where_there_are_more_vertices_than_offsets_they_come_from_the_nearest_place():
     """As in a render at a higher level of subdivision than the viewport's."""
-    import bpy
-    import numpy as np
-    from stacks import build, local_points
-
     bar, _, field = build(["SUBSURF", "FIELD"])
     bar.modifiers["Subsurf"].levels = 2
     modifier = bar.modifiers["ARAP Fields"]

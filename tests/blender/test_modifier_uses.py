@@ -1,17 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The result as a modifier: shared meshes, applying, free normals, files."""
 
+import math
+import tempfile
+
+import numpy as np
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.stack_list import STACKS
+
+if IN_BLENDER:
+    import bpy
+    from mathutils import Matrix
+    from support.blender import scenes
+    from support.blender.scenes import FIT
+    from support.blender.stacks import build, local_points
+
+    from addon.blender import modifier_stack
+    from addon.blender.object_references import source_of
+    from addon.surface import staleness
 
 
 @in_blender
 def test_objects_that_share_a_mesh_move_alone():
-    import bpy
-    import numpy as np
-    import scenes
-    from stacks import local_points
-
     bar, _, moving = scenes.bar_with_handles()
     other = bpy.data.objects.new("Other", bar.data)
     bpy.context.collection.objects.link(other)
@@ -37,13 +48,6 @@ def test_objects_that_share_a_mesh_move_alone():
 @pytest.mark.parametrize("case", ["alone", "mirror before", "shape keys"])
 @in_blender
 def test_the_modifier_can_be_applied(case):
-    import bpy
-    import numpy as np
-    import pytest
-    import scenes
-    from stacks import build, local_points
-    from test_modifier import STACKS
-
     bar, *_ = build(STACKS[case])
     moved = local_points(bar)
     scenes.activate(bar)
@@ -66,11 +70,6 @@ def test_the_modifier_can_be_applied(case):
 
 @in_blender
 def test_replacing_or_keying_supersedes_the_modifier():
-    import bpy
-    import numpy as np
-    import scenes
-    from stacks import local_points
-
     for target in ("REPLACE", "KEY"):
         bar, _, moving = scenes.bar_with_handles(f"Bar{target}")
         bar.modifiers.new("Subdivision", "SUBSURF")
@@ -85,15 +84,6 @@ def test_replacing_or_keying_supersedes_the_modifier():
 
 @in_blender
 def test_free_normals_turn_with_the_field():
-    import math
-
-    import bpy
-    import numpy as np
-    import pytest
-    import scenes
-    from mathutils import Matrix
-    from stacks import local_points
-
     if bpy.app.version < (4, 5, 0):
         pytest.skip("this Blender has no free normals")
     for domain in ("POINT", "CORNER", "FACE"):
@@ -121,18 +111,12 @@ def test_free_normals_turn_with_the_field():
 
 @in_blender
 def test_reading_the_shape_leaves_unkeyed_poses_alone():
-    import bpy
-    from stacks import build
-    from test_modifier import STACKS
-
     bar, *_ = build(STACKS["armature before"])
     bone = bar.modifiers["Armature"].object.pose.bones["Second"]
     bone.keyframe_insert("rotation_euler", frame=1)
     bpy.context.scene.frame_set(7)
     bone.rotation_euler.z = 1.1
     bpy.context.view_layer.update()
-    from addon.blender import modifier_stack
-
     with modifier_stack.evaluated_mesh(bpy.context, bar, in_place=True) as mesh:
         seen = max(vertex.co.y for vertex in mesh.vertices)
     assert abs(bone.rotation_euler.z - 1.1) < 1e-6 and seen > 0.6
@@ -140,13 +124,6 @@ def test_reading_the_shape_leaves_unkeyed_poses_alone():
 
 @in_blender
 def test_a_result_brings_no_source_along_when_it_is_appended():
-    import tempfile
-
-    import bpy
-    import scenes
-
-    from addon.blender.object_references import source_of
-
     bar, *_ = scenes.bar_with_handles()
     bpy.ops.arapfields.deform(**scenes.NEW)
     result = bpy.data.objects["Bar_deformed"]
@@ -167,12 +144,6 @@ def test_a_result_brings_no_source_along_when_it_is_appended():
 
 @in_blender
 def test_moving_the_modifier_does_not_age_the_fit():
-    import bpy
-    import scenes
-    from test_surface import FIT
-
-    from addon.surface import staleness
-
     bar, _, moving = scenes.bar_with_handles()
     for name, value in FIT.items():
         setattr(bar.arapfields.fit, name, value)

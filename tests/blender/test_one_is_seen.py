@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Of a source, its live shape and its results, one is seen in one place, and the one that it seems to be."""
 
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.live import step
+
+    from addon.core.runtime import jobs
 
 
 def seen():
     """Names of the meshes in the viewport, which are those in renders."""
-    import bpy
-
     meshes = [item for item in bpy.context.scene.objects if item.type == "MESH"]
     shown = [item.name for item in meshes if item.visible_get()]
     assert shown == [item.name for item in meshes if not item.hide_render]
@@ -16,12 +21,6 @@ def seen():
 
 @in_blender
 def test_each_result_takes_the_place_of_the_one_before():
-    import bpy
-    import scenes
-    from test_one_is_seen import seen
-
-    from addon.core.runtime import jobs
-
     bar, _, moving = scenes.bar_with_handles()
     moving.location.z += 0.4
     bpy.context.view_layer.update()
@@ -39,10 +38,6 @@ def test_each_result_takes_the_place_of_the_one_before():
 
 @in_blender
 def test_what_the_user_has_moved_aside_or_hidden_stays_so():
-    import bpy
-    import scenes
-    from test_one_is_seen import seen
-
     bar, *_ = scenes.bar_with_handles()
     bpy.ops.arapfields.deform(**scenes.NEW)
     bpy.data.objects["Bar_deformed"].location.y = 2.0
@@ -60,11 +55,6 @@ def test_what_the_user_has_moved_aside_or_hidden_stays_so():
 
 @in_blender
 def test_live_mode_shows_its_shape_alone_and_gives_back_what_was_seen():
-    import bpy
-    import scenes
-    from test_live import step
-    from test_one_is_seen import seen
-
     bar, _, moving = scenes.bar_with_handles()
     moving.location.z += 0.4
     bpy.context.view_layer.update()
@@ -86,10 +76,6 @@ def test_live_mode_shows_its_shape_alone_and_gives_back_what_was_seen():
 @in_blender
 def test_a_render_sees_the_source_again_when_it_takes_the_result_itself():
     """A deleted result leaves its source hidden in renders, which Alt H does not undo."""
-    import bpy
-    import scenes
-    from test_one_is_seen import seen
-
     bar, *_ = scenes.bar_with_handles()
     bpy.ops.arapfields.deform(**scenes.NEW)
     bpy.data.objects.remove(bpy.data.objects["Bar_deformed"])

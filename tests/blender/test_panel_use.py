@@ -4,16 +4,20 @@
 import json
 
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.panels import Layout, drawn, prepared
+
+    from addon.core.runtime import jobs
+    from addon.handles import empties
+    from addon.jobs import status_bar
 
 
 @in_blender
 def test_everyday_sections_come_first_and_numbers_are_under_advanced():
-    import bpy
-    from test_panels import drawn, prepared
-
-    from addon.core.runtime import jobs
-
     prepared("handles")
     jobs.add_message("INFO", "Bar: done")
     found = drawn()
@@ -49,11 +53,6 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 @in_blender
 def test_what_a_button_would_refuse_is_said_before(case):
-    import bpy
-    import scenes
-    from test_panel_use import REFUSED
-    from test_panels import drawn
-
     bar = scenes.bar()
     ours = bar.arapfields
     if case == "no group":
@@ -84,10 +83,6 @@ def test_what_a_button_would_refuse_is_said_before(case):
 
 @in_blender
 def test_what_the_panel_refuses_the_operators_refuse_too():
-    import bpy
-    import pytest
-    import scenes
-
     bar = scenes.bar()
     points = [vertex.co for vertex in bar.data.vertices]
     bar.data.clear_geometry()
@@ -100,11 +95,6 @@ def test_what_the_panel_refuses_the_operators_refuse_too():
 
 @in_blender
 def test_a_menu_offers_what_the_mesh_has():
-    import bpy
-    import scenes
-
-    from addon.handles import empties
-
     bar = scenes.bar()
     assert not empties.can_place(None, "CUBE", "CURSOR")
     assert empties.can_place(bar, "CUBE", "CURSOR") and not empties.can_place(bar, "GROUP", "AUTO")
@@ -119,9 +109,6 @@ def test_a_menu_offers_what_the_mesh_has():
 
 @in_blender
 def test_a_fit_tells_its_errors():
-    import bpy
-    from test_panels import drawn, prepared
-
     prepared("fitted")
     texts = drawn()["ARAPFIELDS_PT_surface"]
     told = [text for text in texts if "error at the surface" in text]
@@ -135,11 +122,6 @@ def test_a_fit_tells_its_errors():
 
 @in_blender
 def test_the_status_bar_shows_the_job_and_its_cancel():
-    import bpy
-    from test_panels import Layout, prepared
-
-    from addon.jobs import status_bar
-
     def texts():
         found = []
         status_bar.draw(type("Header", (), {"layout": Layout(found)})(), bpy.context)
@@ -158,9 +140,6 @@ def test_the_status_bar_shows_the_job_and_its_cancel():
 @pytest.mark.parametrize("field", ["auto", "radial", "neural"])
 @in_blender
 def test_the_fold_barrier_acts_on_every_field(field):
-    import bpy
-    import scenes
-
     _, _, moving = scenes.bar_with_handles()
     moving.location.x -= 1.2  # the bar is pressed together
     bpy.context.view_layer.update()

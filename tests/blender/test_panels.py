@@ -2,7 +2,14 @@
 """Every section and menu draws in every state, naming only properties, operators and menus that exist."""
 
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender.panels import drawn, prepared
+
+    import addon.registration as registration
+    from addon.core.runtime import jobs
 
 STATES = [
     "nothing",
@@ -22,147 +29,6 @@ STATES = [
     "a failure",
     "library missing",
 ]
-
-
-class Layout:
-    """Stands for Blender's: checks what it is asked to show, and notes the texts."""
-
-    def __init__(self, texts):
-        self.__dict__["texts"] = texts
-
-    def __setattr__(self, name, value):
-        assert name in (
-            *("use_property_split", "use_property_decorate", "ui_units_x", "alignment", "emboss", "enabled"),
-            *("active", "alert", "scale_y"),
-        ), name
-
-    def prop(self, data, name, **options):
-        own = name.startswith('["') and data.get(name[2:-2]) is not None  # an input of a node group
-        assert own or name in data.bl_rna.properties, (data, name)
-        self.texts.append(options["text"] if own else options.get("text", data.bl_rna.properties[name].name))
-
-    def prop_search(self, data, name, source, collection, **options):
-        self.prop(data, name)
-        assert collection in source.bl_rna.properties
-
-    def operator(self, name, **options):
-        import bpy
-
-        group, operator = name.split(".")
-        rna = getattr(getattr(bpy.ops, group), operator).get_rna_type()
-        self.texts.append(options.get("text", rna.name))
-        return type("Arguments", (), dict.fromkeys(rna.properties.keys()))()
-
-    def operator_menu_enum(self, name, prop, **options):
-        assert prop in self.operator(name).__class__.__dict__
-
-    def menu(self, name, **options):
-        import bpy
-
-        assert hasattr(bpy.types, name), name
-
-    def template_list(self, kind, _, data, name, active_data, active, **options):
-        import bpy
-
-        for row, item in enumerate(getattr(data, name)):
-            getattr(bpy.types, kind).draw_item(None, bpy.context, self, data, item, 0, data, active, row)
-
-    def label(self, text="", **options):
-        self.texts.append(text)
-
-    def progress(self, factor, text):
-        assert 0 <= factor <= 1
-        self.texts.append(text)
-
-    def template_icon(self, icon_value, scale):
-        assert icon_value > 0
-
-    def separator(self):
-        pass
-
-    def panel(self, name, default_closed):
-        return self, self
-
-    def row(self, **options):
-        return self
-
-    column = box = grid_flow = row
-
-
-def drawn():
-    """The texts of all sections that show, by section; menus are drawn as well."""
-    import bpy
-    from test_panels import Layout
-
-    import addon.registration as registration
-
-    found = {}
-    for module in registration.MODULES:
-        for cls in getattr(module, "CLASSES", []):
-            if not issubclass(cls, (bpy.types.Panel, bpy.types.Menu)) or "preset" in cls.__name__:
-                continue
-            if issubclass(cls, bpy.types.Panel) and not cls.poll(bpy.context):
-                continue
-            texts = found[cls.__name__] = []
-            stand_in = type("Section", (), {"layout": Layout(texts), "fill": getattr(cls, "fill", None)})()
-            if hasattr(cls, "draw_header_preset"):
-                cls.draw_header_preset(stand_in, bpy.context)
-            cls.draw(stand_in, bpy.context)
-    return found
-
-
-def prepared(state):
-    """Puts Blender into that state; returns what puts it back."""
-    import bpy
-    import scenes
-
-    from addon.core.errors import UserError
-    from addon.core.runtime import jobs, native
-
-    if state == "a camera":
-        bpy.ops.object.camera_add()
-    if state in ("nothing", "a camera"):
-        return lambda: None
-    bar, fixed, _ = scenes.bar_with_handles() if state != "a mesh" else (scenes.bar(), None, None)
-    ours, undo = bar.arapfields, lambda: None
-    if state == "modifiers and keys":
-        bar.modifiers.new("S", "SUBSURF")
-        bar.shape_key_add(name="Basis")
-    elif state == "edit mode":
-        bpy.ops.object.mode_set(mode="EDIT")
-        return lambda: bpy.ops.object.mode_set(mode="OBJECT")
-    elif state == "a handle active":
-        scenes.activate(fixed)
-    elif state == "a deleted handle":
-        bpy.data.objects.remove(fixed)
-    elif state == "a group's handle":
-        bar.vertex_groups.new(name="G").add([0, 1, 2], 1.0, "REPLACE")
-        bpy.ops.arapfields.add_handle(kind="GROUP", place="CURSOR")
-    elif state == "a mesh":
-        ours.surface = "FIT"
-    elif state in ("fitted", "fit cleared"):
-        ours.surface = "FIT"
-        for name, value in {"iterations": 5, "width": 16, "layers": 2, "near_points": 2000}.items():
-            setattr(ours.fit, name, value)
-        bpy.ops.arapfields.fit()
-        if state == "fit cleared":
-            bpy.ops.arapfields.clear_cache()
-    elif state == "custom style":
-        ours.stylize.style = "OBJECT"
-    elif state == "live":
-        bpy.ops.arapfields.live()
-    elif state == "running":
-        gate = __import__("threading").Event()
-        jobs.begin(
-            jobs.Job("Deform", [jobs.Item("Bar", lambda tracker: gate.wait(60))], native.library().Task)
-        )
-        return lambda: (gate.set(), jobs.stop())
-    elif state == "a failure":
-        jobs.add_message("ERROR", "Bar: the mesh has no faces")
-    elif state == "library missing":
-        native._state.problem = UserError("The native library is not part of this installation.")
-        return native.forget
-    return undo
 
 
 EXPECTED = {
@@ -186,10 +52,6 @@ EXPECTED = {
 @pytest.mark.parametrize("state", STATES)
 @in_blender
 def test_the_panel_draws(state):
-    from test_panels import EXPECTED, drawn, prepared
-
-    from addon.core.runtime import jobs
-
     jobs.board.messages.clear()
     undo = prepared(state)
     try:
@@ -212,11 +74,6 @@ def test_the_panel_draws(state):
 @in_blender
 def test_every_grey_button_says_why():
     """Each operator's poll either holds or gives a reason, in states where it does not hold."""
-    import bpy
-    from test_panels import prepared
-
-    import addon.registration as registration
-
     polled = [
         cls
         for module in registration.MODULES

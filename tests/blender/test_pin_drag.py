@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is seen of a drag with the pin tool while it goes on."""
 
-from inside import in_blender
+import numpy as np
+from support.blender.inside import IN_BLENDER, in_blender
 
-
-@in_blender
-def test_the_shape_moves_with_the_pin_in_the_same_picture():
+if IN_BLENDER:
     import bpy
-    import numpy as np
-    import scenes
+    from support.blender import scenes
 
     from addon.live import sessions
     from addon.pin_tool import drag
 
+
+@in_blender
+def test_the_shape_moves_with_the_pin_in_the_same_picture():
     bar = scenes.bar()
     dragged = drag.of_new_pin(bpy.context, bar, np.array([0.9, -0.25, 0.0]), 0.1)
     sessions.update(bpy.context, wait=30)

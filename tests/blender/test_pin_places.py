@@ -1,24 +1,29 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where a pin's place is at rest, on the screen, and what it is called."""
 
+import itertools
+
+import numpy as np
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from mathutils import Matrix
+    from support.blender import scenes
+    from support.blender.pins import pin
+
+    from addon.core.geometry.spaces import transform
+    from addon.field_modifier import motion
+    from addon.handles import empties
+    from addon.handles.palette import PALETTE, free_colour
+    from addon.pin_tool import pins, places, screen
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.7])
 @in_blender
 def test_a_pin_on_a_deformed_mesh_is_at_rest_where_its_place_was(turn):
     """For a mesh that has moved rigidly the place, the turn and the motion of the pin are known."""
-    import bpy
-    import numpy as np
-    import scenes
-    from mathutils import Matrix
-
-    from addon.core.geometry.spaces import transform
-    from addon.field_modifier import motion
-    from addon.handles import empties
-    from addon.pin_tool import pins
-
     bar = scenes.bar()
     bar.matrix_world = Matrix.Translation((1, 2, 3)) @ Matrix.Rotation(0.4, 4, "X") @ Matrix.Scale(2.0, 4)
     bpy.context.view_layer.update()
@@ -43,13 +48,6 @@ def test_a_pin_on_a_deformed_mesh_is_at_rest_where_its_place_was(turn):
 @in_blender
 def test_a_known_face_decides_where_surfaces_touch():
     """Two sheets at rest apart lie on one another: the face tells which of them was hit."""
-    import bpy
-    import numpy as np
-    import scenes
-
-    from addon.field_modifier import motion
-    from addon.pin_tool import places
-
     points = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
     mesh = bpy.data.meshes.new("Sheets")
     mesh.from_pydata(points, [], [(0, 1, 2, 3), (4, 5, 6, 7)])
@@ -66,11 +64,6 @@ def test_a_known_face_decides_where_surfaces_touch():
 
 @in_blender
 def test_under_a_subdivision_the_place_is_found_by_nearness():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_pins import pin
-
     bar = scenes.bar()
     bar.modifiers.new("Subdivision", "SUBSURF").levels = 1
     bpy.context.view_layer.update()
@@ -85,14 +78,6 @@ def test_under_a_subdivision_the_place_is_found_by_nearness():
 
 @in_blender
 def test_names_by_what_is_held_and_colours_apart():
-    import itertools
-
-    import numpy as np
-    import scenes
-    from test_pins import pin
-
-    from addon.handles.palette import PALETTE, free_colour
-
     assert len(set(PALETTE)) >= 16
     apart = [np.linalg.norm(np.subtract(a, b)) for a, b in itertools.combinations(PALETTE, 2)]
     assert min(apart) > 0.2
@@ -110,10 +95,6 @@ def test_names_by_what_is_held_and_colours_apart():
 
 @in_blender
 def test_screen_places():
-    import numpy as np
-
-    from addon.pin_tool import screen
-
     wide = np.array([[0.5, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
     spots = screen.project(wide, (200, 100), [(0, 0, 0), (2, 0, 0), (0, -1, 0)])
     assert np.allclose(spots, [(100, 50), (200, 50), (100, 0)])

@@ -1,20 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Undo and redo of pins: what a step holds comes back bit for bit, and no solver answers to it."""
 
-from inside import in_blender
+import numpy as np
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.live import WAIT, step
+    from support.blender.pins import pin, state
+
+    from addon.live import sessions
+    from addon.pin_tool import drag
 
 ROUNDS = 20
 
 
 @in_blender
 def test_rounds_of_undo_and_redo_are_exact():
-    import bpy
-    import scenes
-    from test_pins import WAIT, pin, state
-    from test_pins_undo import ROUNDS
-
-    from addon.live import sessions
-
     scenes.bar()
     bpy.context.preferences.edit.use_global_undo = True
     states = []
@@ -49,14 +52,6 @@ def test_rounds_of_undo_and_redo_are_exact():
 
 @in_blender
 def test_a_drag_after_an_undone_one_starts_from_what_is_shown():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_pins import WAIT, follow, pin
-
-    from addon.live import sessions
-    from addon.pin_tool import drag
-
     scenes.bar()
     bpy.context.preferences.edit.use_global_undo = True
     pin(bpy.data.objects["Bar"], (1.0, 0.0, 0.25), target=(1.0, 0.0, 0.5))
@@ -65,7 +60,7 @@ def test_a_drag_after_an_undone_one_starts_from_what_is_shown():
     shown = scenes.world_points(bar)
     dragged = drag.of_entry(bpy.context, bar, bar.arapfields.handles[0])
     dragged.move(bpy.context, (1.0, 0.4, 0.9))
-    follow()
+    step()
     dragged.end(bpy.context)
     bpy.ops.ed.undo_push(message="second")
     bpy.ops.ed.undo()
@@ -74,5 +69,5 @@ def test_a_drag_after_an_undone_one_starts_from_what_is_shown():
     assert np.array_equal(scenes.world_points(bar), shown)
     dragged = drag.of_entry(bpy.context, bar, bar.arapfields.handles[0])
     dragged.move(bpy.context, (1.0, 0.0, 0.5 + 1e-3))
-    follow()
+    step()
     assert 0 < np.abs(scenes.world_points(bar) - shown).max() < 0.02

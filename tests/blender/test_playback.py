@@ -1,8 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A frame's shape is the frame's alone, played, jumped to, baked or rendered; styles that are animated."""
 
+import tempfile
+
+import numpy as np
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.live import step
+    from support.blender.scenes import camera
+    from support.blender.stacks import local_points
+
+    from addon.live import sessions
 
 PATIENCE = 600  # seconds for a frame, on however busy a machine
 SAME = 1e-4  # of the object's size: the agreed limit; two solves of one request agree in every bit
@@ -10,9 +22,6 @@ SAME = 1e-4  # of the object's size: the agreed limit; two solves of one request
 
 def turning(frames=40):
     """A bar whose right end turns by 150° and rises from frame 1 to the last."""
-    import bpy
-    import scenes
-
     bar, _, moving = scenes.bar_with_handles()
     for frame, turn, height in ((1, 0.0, 0.0), (frames, 2.6, 0.3)):
         moving.rotation_euler.x, moving.location.z = turn, height
@@ -25,8 +34,6 @@ def turning(frames=40):
 
 def styled():
     """A ball that becomes a cube from frame 1 to 40, and everything else of the style changes with it."""
-    import bpy
-
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
     ball = bpy.context.object
     axes = bpy.data.objects.new("Axes", None)
@@ -49,12 +56,6 @@ def styled():
 
 def live_at(item, kind, frames):
     """(n, 3) what live mode shows when it has come by these frames, stepped as a window would."""
-    import bpy
-    from stacks import local_points
-    from test_playback import PATIENCE
-
-    from addon.live import sessions
-
     bpy.context.scene.frame_set(1)
     bpy.context.view_layer.objects.active = item
     bpy.ops.arapfields.live(kind=kind)
@@ -67,13 +68,6 @@ def live_at(item, kind, frames):
 
 def every_way(item, kind):
     """{way: (n, 3) points of frame 37}."""
-    import tempfile
-
-    import bpy
-    from stacks import local_points
-    from test_live_render import camera
-    from test_playback import live_at
-
     scene, found = camera(8), {}
     for name, frames in (("played", range(34, 38)), ("back", [38, 37]), ("jumped", [37])):
         found[name] = live_at(item, kind, frames)
@@ -95,9 +89,6 @@ def every_way(item, kind):
 
 @in_blender
 def test_a_frame_is_the_same_played_jumped_to_baked_and_rendered():
-    import numpy as np
-    from test_playback import SAME, every_way, turning
-
     bar = turning()
     found = every_way(bar, "DEFORM")
     size = np.ptp(found["jumped"], axis=0).max()
@@ -109,9 +100,6 @@ def test_a_frame_is_the_same_played_jumped_to_baked_and_rendered():
 @pytest.mark.slow
 @in_blender
 def test_a_frame_of_an_animated_style_is_the_same_in_every_way():
-    import numpy as np
-    from test_playback import SAME, every_way, styled
-
     ball = styled()
     found = every_way(ball, "STYLIZE")
     for way, points in found.items():
@@ -123,12 +111,6 @@ def test_a_frame_of_an_animated_style_is_the_same_in_every_way():
 @in_blender
 def test_every_animated_setting_of_a_style_changes_what_is_solved():
     """strength, sharpness, stiffness and orientation, each alone between two frames."""
-    import tempfile
-
-    import bpy
-    import numpy as np
-    from stacks import local_points
-
     for name, values in (("strength", (0.2, 1.0)), ("sharpness", (1.0, 9.0)), ("bending", (0.001, 5.0))):
         bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
         ball = bpy.context.object
@@ -147,14 +129,6 @@ def test_every_animated_setting_of_a_style_changes_what_is_solved():
 
 @in_blender
 def test_live_playback_keeps_solved_frames_and_tells_how_many():
-    import bpy
-    import numpy as np
-    from stacks import local_points
-    from test_live import step
-    from test_playback import live_at, turning
-
-    from addon.live import sessions
-
     bar = turning()
     first = live_at(bar, "DEFORM", [10])
     frames = sessions.live[bar.session_uid].frames
@@ -176,14 +150,6 @@ def test_live_playback_keeps_solved_frames_and_tells_how_many():
 
 @in_blender
 def test_a_drag_at_a_frame_goes_on_from_the_shape_at_hand():
-    import bpy
-    import numpy as np
-    from stacks import local_points
-    from test_live import step
-    from test_playback import live_at, turning
-
-    from addon.live import sessions
-
     bar = turning()
     before = live_at(bar, "DEFORM", [20])
     session = sessions.live[bar.session_uid]

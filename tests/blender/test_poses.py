@@ -1,15 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Poses: a field that was solved on one mesh moves others of the same shape."""
 
-from inside import in_blender
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.blender.inside import IN_BLENDER, in_blender
+
+import arapfields as af
+
+if IN_BLENDER:
+    import bpy
+    from mathutils import Matrix
+    from support.blender import scenes
+    from support.blender.live import step
+    from support.blender.riders import link, rider, shown
 
 
 def creature(name, cuts):
     """A wavy body of revolution along x, as finely divided as `cuts` says."""
-    import bpy
-    import numpy as np
-    from riders import link
-
     across, around = 4 * cuts, 2 * cuts
     x, a = np.meshgrid(
         np.linspace(-1, 1, across), np.linspace(0, 2 * np.pi, around, endpoint=False), indexing="ij"
@@ -29,10 +39,6 @@ def creature(name, cuts):
 
 def saved(source):
     """Deforms a creature and saves the pose "Bent"; returns how far its points moved."""
-    import bpy
-    import numpy as np
-    import scenes
-
     rest = scenes.world_points(source)
     fixed = scenes.cube_empty((-1.0, 0, 0), (0.3, 0.5, 0.5), "Fixed")
     moving = scenes.cube_empty((1.0, 0, 0), (0.3, 0.5, 0.5), "Moving")
@@ -48,13 +54,6 @@ def saved(source):
 
 @in_blender
 def test_a_pose_fits_other_resolutions():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_poses import creature, saved
-
-    import arapfields as af
-
     source = creature("Body", 50)
     assert len(source.data.vertices) == 20_000
     others = [creature("Coarse", 16), creature("Fine", 158)]
@@ -82,17 +81,6 @@ def test_a_pose_fits_other_resolutions():
 
 @in_blender
 def test_strength_files_and_refusals():
-    import tempfile
-    from pathlib import Path
-
-    import bpy
-    import numpy as np
-    import pytest
-    import scenes
-    from mathutils import Matrix
-    from riders import rider, shown
-    from test_poses import creature, saved
-
     source, other = creature("Body", 16), creature("Other", 20)
     patch = rider("MESH")
     scenes.activate(patch, other)
@@ -138,11 +126,6 @@ def test_strength_files_and_refusals():
 
 @in_blender
 def test_a_live_shape_is_saved():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_live import step
-
     bar, _, moving = scenes.bar_with_handles()
     rest = scenes.world_points(bar)
     bpy.ops.arapfields.live()

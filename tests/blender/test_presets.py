@@ -1,8 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Settings that users store under names, by Blender's own preset system."""
 
+from pathlib import Path
+
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+import arapfields as af
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+
+    import addon
+    from addon.core.settings.styles import STYLES
 
 CASES = {"fit": ("iterations", 777), "deform": ("bending", 0.25), "stylize": ("sharpness", 9.0)}
 
@@ -10,12 +21,6 @@ CASES = {"fit": ("iterations", 777), "deform": ("bending", 0.25), "stylize": ("s
 @pytest.mark.parametrize("section", CASES)
 @in_blender
 def test_presets_are_stored_applied_and_removed(section):
-    from pathlib import Path
-
-    import bpy
-    import scenes
-    from test_presets import CASES
-
     bar, fixed, _ = scenes.bar_with_handles()
     settings, (name, value) = getattr(bar.arapfields, section), CASES[section]
     plain = getattr(settings, name)
@@ -40,11 +45,6 @@ def test_presets_are_stored_applied_and_removed(section):
 
 @in_blender
 def test_each_style_has_its_picture():
-    from pathlib import Path
-
-    import addon
-    from addon.core.settings.styles import STYLES
-
     folder = Path(addon.__file__).parent / "icons"
     assert {path.stem for path in folder.glob("*.png")} == {name.replace(" ", "_") for name, _ in STYLES}
     assert all(
@@ -55,11 +55,6 @@ def test_each_style_has_its_picture():
 @pytest.mark.parametrize("section", ["deform", "stylize"])
 @in_blender
 def test_the_papers_own_settings_are_a_preset_and_the_defaults_come_back(section):
-    import bpy
-    import scenes
-
-    import arapfields as af
-
     bar = scenes.bar()
     group = getattr(bar.arapfields, section)
     options = {"deform": af.DeformOptions, "stylize": af.StylizeOptions}[section]
@@ -80,9 +75,6 @@ def test_the_papers_own_settings_are_a_preset_and_the_defaults_come_back(section
 
 @in_blender
 def test_a_result_as_in_the_paper():
-    import bpy
-    import scenes
-
     bar, _, moving = scenes.bar_with_handles()
     moving.location.z += 0.3
     bpy.ops.arapfields.deform_given_preset(preset="PAPER")

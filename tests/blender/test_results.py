@@ -1,16 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where results go: a new object, the source itself, a shape key of it; and what refuses them."""
 
+import re
+import tempfile
+
+import numpy as np
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.scenes import FIT
+
+    import addon.deform.operators as deform
+    from addon.core.runtime import jobs
+    from addon.deform.solve_job import placement_refusal
 
 
 @in_blender
 def test_replacing_moves_the_source_and_keeps_all_else():
-    import bpy
-    import numpy as np
-    import scenes
-
     bar, _, moving = scenes.bar_with_handles()
     scenes.decorate(bar)
     before, points = scenes.everything(bar), scenes.world_points(bar)
@@ -31,10 +40,6 @@ def test_replacing_moves_the_source_and_keeps_all_else():
 
 @in_blender
 def test_a_shape_key_of_the_source_carries_the_motion():
-    import bpy
-    import numpy as np
-    import scenes
-
     bar, _, moving = scenes.bar_with_handles()
     before = scenes.world_points(bar)
     moving.location.z += 0.4
@@ -52,10 +57,6 @@ def test_a_shape_key_of_the_source_carries_the_motion():
 
 @in_blender
 def test_the_surface_can_take_the_sources_place():
-    import bpy
-    import scenes
-    from test_surface import FIT
-
     bar, _, moving = scenes.bar_with_handles()
     for name, value in FIT.items():
         setattr(bar.arapfields.fit, name, value)
@@ -75,14 +76,6 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 @in_blender
 def test_what_the_source_cannot_take_is_refused_before_the_work(case):
-    import re
-
-    import bpy
-    import scenes
-    from test_results import REFUSED
-
-    from addon.deform.solve_job import placement_refusal
-
     bar, *_ = scenes.bar_with_handles()
     arguments = {"target": "KEY"}
     if case == "a key on a surface":
@@ -99,12 +92,6 @@ def test_what_the_source_cannot_take_is_refused_before_the_work(case):
 @in_blender
 def test_linked_objects_give_results_but_are_never_written():
     """From another file: deforming makes a local result; writing into the linked mesh is refused."""
-    import tempfile
-
-    import bpy
-    import numpy as np
-    import scenes
-
     scenes.bar("Linked")
     path = tempfile.mktemp(suffix=".blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
@@ -129,13 +116,6 @@ def test_linked_objects_give_results_but_are_never_written():
 @in_blender
 def test_without_a_window_the_course_gives_what_blocking_gives():
     """Stepped as the window steps it, with a watched preview: the same bits as in one go."""
-    import bpy
-    import numpy as np
-    import scenes
-
-    import addon.deform.operators as deform
-    from addon.core.runtime import jobs
-
     bar, _, moving = scenes.bar_with_handles()
     moving.location.z += 0.4
     bpy.ops.arapfields.deform(**scenes.NEW)

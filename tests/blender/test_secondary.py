@@ -1,14 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Secondary motion: playback and bakes make the same bits, drags settle, jumps begin at rest."""
 
-from inside import in_blender
+import tempfile
+import time
+
+import numpy as np
+import pytest
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.stacks import local_points
+
+    from addon.live import sessions
 
 
 def nodding(frames=6):
     """A bar of which one end is held and moves up, and then holds still; the other swings."""
-    import bpy
-    import scenes
-
     bar, held, moving = scenes.bar_with_handles()
     bpy.data.objects.remove(moving)
     for frame, height in ((1, 0.0), (frames // 2, 0.5)):
@@ -22,11 +31,6 @@ def nodding(frames=6):
 
 def live_shapes(bar, frames):
     """{frame: (n, 3)} of what live mode shows as the scene comes by these frames."""
-    import bpy
-    from stacks import local_points
-
-    from addon.live import sessions
-
     found = {}
     for frame in frames:
         bpy.context.scene.frame_set(frame)
@@ -37,13 +41,6 @@ def live_shapes(bar, frames):
 
 @in_blender
 def test_playback_and_bakes_are_the_same_bits():
-    import tempfile
-
-    import bpy
-    import numpy as np
-    from stacks import local_points
-    from test_secondary import live_shapes, nodding
-
     bar = nodding()
     rest = local_points(bar)
     assert bpy.ops.arapfields.live(kind="DEFORM") == {"FINISHED"}
@@ -71,10 +68,6 @@ def test_playback_and_bakes_are_the_same_bits():
 
 @in_blender
 def test_a_jump_begins_at_rest_and_is_made_again_from_the_start():
-    import bpy
-    import numpy as np
-    from test_secondary import live_shapes, nodding
-
     bar = nodding()
     bpy.ops.arapfields.live(kind="DEFORM")
     jumped = live_shapes(bar, (40,))[40]
@@ -89,15 +82,6 @@ def test_a_jump_begins_at_rest_and_is_made_again_from_the_start():
 
 @in_blender
 def test_a_dragged_handle_lets_it_swing_and_settle():
-    import time
-
-    import bpy
-    import numpy as np
-    import scenes
-    from stacks import local_points
-
-    from addon.live import sessions
-
     bar, held, moving = scenes.bar_with_handles()
     bpy.data.objects.remove(moving)
     bar.arapfields.secondary.use, bar.arapfields.secondary.damping = True, 6.0
@@ -127,12 +111,6 @@ def test_a_dragged_handle_lets_it_swing_and_settle():
 
 @in_blender
 def test_soft_parts_grounds_and_refusals():
-    import tempfile
-
-    import bpy
-    import pytest
-    from test_secondary import live_shapes, nodding
-
     bar = nodding()
     ours = bar.arapfields.secondary
     ours.group = "Nowhere"

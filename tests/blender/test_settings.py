@@ -1,16 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panel's settings are the native library's options: same names, same defaults."""
 
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
 
+import arapfields as af
 
-@in_blender
-def test_names_and_defaults_are_the_librarys():
-    import arapfields as af
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+
+    import addon.registration as registration
+    from addon.blender.property_definitions import effective_values
     from addon.core.settings.fitting import FIT
     from addon.core.settings.parameters import DEFORM, TABLE
     from addon.core.settings.styles import STYLIZE
 
+
+@in_blender
+def test_names_and_defaults_are_the_librarys():
     addons_own = {option["name"] for block in TABLE.values() for option in block["further"]}
     tables = {"DeformOptions": DEFORM, "StylizeOptions": STYLIZE, "FitOptions": FIT}
     for name, table in tables.items():
@@ -24,12 +31,6 @@ def test_names_and_defaults_are_the_librarys():
 
 @in_blender
 def test_values_survive_single_precision():
-    import bpy
-    import scenes
-
-    from addon.blender.property_definitions import effective_values
-    from addon.core.settings.parameters import DEFORM
-
     item = scenes.bar()
 
     class Operator:
@@ -42,10 +43,6 @@ def test_values_survive_single_precision():
 
 @in_blender
 def test_every_property_and_operator_is_described():
-    import bpy
-
-    import addon.registration as registration
-
     bare = []
     for module in registration.MODULES:
         for cls in getattr(module, "CLASSES", []):

@@ -1,15 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Painted stiffness, symmetry, and objects that resist together with the body."""
 
-from inside import in_blender
+import numpy as np
+import pytest
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.live import step
+
+    from addon.live import sessions
 
 
 def painted_bar(times=1.0):
     """(bar, moving): the bar's right half is so many times as stiff; its end is pulled and turned."""
-    import bpy
-    import numpy as np
-    import scenes
-
     bar, _, moving = scenes.bar_with_handles()
     group = bar.vertex_groups.new(name="Bone")
     x = np.array([vertex.co.x for vertex in bar.data.vertices])
@@ -24,9 +29,6 @@ def painted_bar(times=1.0):
 
 def stretch(bar, before, low, high):
     """Largest change of an edge's length, of its own, among those with low < x < high at rest."""
-    import numpy as np
-    import scenes
-
     edges = np.array([edge.vertices for edge in bar.data.edges])
     x = before[edges][..., 0]
     kept = edges[(x > low).all(axis=1) & (x < high).all(axis=1)]
@@ -37,11 +39,6 @@ def stretch(bar, before, low, high):
 
 @in_blender
 def test_a_stiff_part_does_not_stretch_and_ones_change_nothing():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_stiffness import painted_bar, stretch
-
     bar, _ = painted_bar()
     before = scenes.world_points(bar) * 0 + np.array([vertex.co for vertex in bar.data.vertices])
     run = {"field": "radial", "samples": 4000}
@@ -59,12 +56,6 @@ def test_a_stiff_part_does_not_stretch_and_ones_change_nothing():
 
 @in_blender
 def test_live_follows_the_brush_and_presets():
-    import bpy
-    import numpy as np
-    import pytest
-    from test_live import step
-    from test_stiffness import painted_bar, stretch
-
     bar, _ = painted_bar()
     before = np.array([vertex.co for vertex in bar.data.vertices])
     bpy.ops.arapfields.live()
@@ -93,13 +84,6 @@ def test_live_follows_the_brush_and_presets():
 
 @in_blender
 def test_symmetry_moves_both_sides_alike_also_live():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_live import step
-
-    from addon.live import sessions
-
     bar, fixed, moving = scenes.bar_with_handles()
     scenes.activate(fixed, bar)
     bpy.ops.arapfields.remove_handle()
@@ -126,13 +110,6 @@ def test_symmetry_moves_both_sides_alike_also_live():
 @in_blender
 def test_what_goes_together_resists_and_is_held():
     """A rod on the bar is bent less than one that follows: it is sampled too."""
-    import bpy
-    import numpy as np
-    import scenes
-    from test_live import step
-
-    from addon.live import sessions
-
     bar, _, moving = scenes.bar_with_handles()
     rod = scenes.bar("Rod", length=0.5)
     rod.location.z, rod.scale = 0.4, (1.0, 0.4, 0.4)

@@ -1,16 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Any mesh object as a style."""
 
-from inside import in_blender
+import numpy as np
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.styles import SETTINGS, ball
+
+    from addon.stylize import ball as picture
+    from addon.stylize import style_object
 
 
 @in_blender
 def test_a_ball_as_a_style_changes_nothing_and_an_open_box_is_closed():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_stylize import SETTINGS, ball
-
     item = ball()
     before = scenes.world_points(item)
     bpy.ops.mesh.primitive_uv_sphere_add(location=(5, 0, 0), radius=0.3)
@@ -37,9 +41,6 @@ def test_a_ball_as_a_style_changes_nothing_and_an_open_box_is_closed():
 @in_blender
 def test_faces_of_a_mesh_opens_as_object():
     """Files hold a style's number; that of the style which this one took in was the last."""
-    import bpy
-    from test_stylize import ball
-
     style = ball().arapfields.stylize
     items = style.bl_rna.properties["style"].enum_items
     assert items["OBJECT"].value == 15 and len(items) == 16
@@ -50,12 +51,6 @@ def test_faces_of_a_mesh_opens_as_object():
 
 @in_blender
 def test_the_picture_of_a_style_object_is_a_ball():
-    import bpy
-    import numpy as np
-
-    from addon.stylize import ball as picture
-    from addon.stylize import style_object
-
     bpy.ops.mesh.primitive_uv_sphere_add(segments=16, ring_count=8)
     of_ball = picture.picture(style_object.style_of(bpy.context.object)[0])
     bpy.ops.mesh.primitive_cube_add()

@@ -1,27 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Stylizing inside Blender."""
 
+import json
+import math
+
+import numpy as np
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
 
+import arapfields
 
-def ball(name="Ball"):
+if IN_BLENDER:
     import bpy
+    from support.blender import scenes
+    from support.blender.styles import SETTINGS, ball
 
-    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
-    bpy.context.object.name = name
-    return bpy.context.object
-
-
-SETTINGS = {"target": "NEW", "iterations": 60, "samples": 2000, "batch": 200, "width": 32, "layers": 2}
+    from addon.core.settings.styles import STYLES, style_identifier, style_name
 
 
 @in_blender
 def test_a_ball_turns_towards_a_cube_and_keeps_its_mesh():
-    import json
-
-    import bpy
-
     item = ball()
     bpy.ops.arapfields.stylize(style="CUBE", **SETTINGS)
     result = bpy.data.objects["Ball_stylized"]
@@ -33,12 +31,6 @@ def test_a_ball_turns_towards_a_cube_and_keeps_its_mesh():
 @in_blender
 def test_the_style_stands_along_the_chosen_axes(frame):
     """A ball, turned: the cube's axes are those along which its result is most flat."""
-    import math
-
-    import bpy
-    import numpy as np
-    import scenes
-
     item = ball()
     item.rotation_euler.z = math.radians(20)
     empty = scenes.cube_empty((0, 0, 0), (1, 1, 1), "Axes")
@@ -62,13 +54,6 @@ def test_the_style_stands_along_the_chosen_axes(frame):
 @in_blender
 def test_imported_objects_are_styled_upright():
     """A ball, turned as an import turns objects: the flat side of a cone lies below, and there it stands."""
-    import math
-
-    import bpy
-    import numpy as np
-    import scenes
-    from test_stylize import SETTINGS, ball
-
     item = ball()
     item.rotation_euler.x = math.radians(90)
     bpy.context.view_layer.update()
@@ -95,10 +80,6 @@ def test_imported_objects_are_styled_upright():
 
 @in_blender
 def test_a_vertex_group_bounds_the_region():
-    import bpy
-    import numpy as np
-    import scenes
-
     item = ball()
     before = scenes.world_points(item)
     top = item.vertex_groups.new(name="top")
@@ -114,9 +95,6 @@ def test_a_vertex_group_bounds_the_region():
 
 @in_blender
 def test_the_menu_lists_the_librarys_styles():
-    import arapfields
-    from addon.core.settings.styles import STYLES, style_identifier, style_name
-
     assert [name for name, _ in STYLES] == list(arapfields.style_names())
     assert all(style_name(style_identifier(name)) == name for name, _ in STYLES)
 
@@ -124,13 +102,6 @@ def test_the_menu_lists_the_librarys_styles():
 @in_blender
 def test_an_objects_axes_and_its_shape_are_styles():
     """A box turned by 30°: both kinds flatten the ball along the box's axes."""
-    import math
-
-    import bpy
-    import numpy as np
-    import scenes
-    from test_stylize import SETTINGS, ball
-
     item = ball()
     bpy.ops.mesh.primitive_cube_add(location=(5, 0, 0), rotation=(0, 0, math.radians(30)))
     box = bpy.context.object
@@ -146,12 +117,6 @@ def test_an_objects_axes_and_its_shape_are_styles():
 
 @in_blender
 def test_custom_styles_that_give_no_normals_are_named():
-    import bpy
-    import numpy as np
-    import pytest
-    import scenes
-    from test_stylize import SETTINGS, ball
-
     item = ball()
     cloud = bpy.data.meshes.new("Cloud")
     rng = np.random.default_rng(0)
@@ -172,11 +137,6 @@ def test_custom_styles_that_give_no_normals_are_named():
 
 @in_blender
 def test_a_material_bounds_the_region():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_stylize import SETTINGS, ball
-
     item = ball()
     for name in ("bottom", "top"):
         item.data.materials.append(bpy.data.materials.new(name))
@@ -189,7 +149,5 @@ def test_a_material_bounds_the_region():
     assert agreement[heights > 0.5].mean() > agreement[heights < -0.5].mean() + 0.03
     scenes.activate(item)
     item.arapfields.stylize.region_material = bpy.data.materials.new("unused")
-    import pytest
-
     with pytest.raises(RuntimeError, match="does not use the material unused"):
         bpy.ops.arapfields.stylize(style="CUBE", **SETTINGS)

@@ -1,24 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The fitted surface inside Blender: fit, cache, extraction, and deforming the surface itself."""
 
-from inside import in_blender
+import json
 
-FIT = {"iterations": 150, "width": 48, "layers": 2, "near_points": 20000}
+import numpy as np
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bpy
+    from mathutils.bvhtree import BVHTree
+    from support.blender import scenes
+    from support.blender.scenes import FIT
+
+    from addon.blender import user_preferences
+    from addon.blender.user_preferences import fit_cache
+    from addon.core.runtime import jobs
+    from addon.surface import staleness
+    from addon.surface.source_surface import read_surface
+
 NEAR = 0.06  # of the bar's size: what so short a fit reaches
 
 
 @in_blender
 def test_a_fit_is_cached_and_goes_stale_with_the_mesh():
-    import json
-
-    import bpy
-    import scenes
-    from test_surface import FIT
-
-    from addon.blender.user_preferences import fit_cache
-    from addon.surface import staleness
-    from addon.surface.source_surface import read_surface
-
     fit_cache().clear()
     bar = scenes.bar()
     for name, value in FIT.items():
@@ -46,13 +50,6 @@ def test_a_fit_is_cached_and_goes_stale_with_the_mesh():
 
 @in_blender
 def test_a_fit_that_cannot_be_kept_is_used_and_said():
-    import bpy
-    import scenes
-    from test_surface import FIT
-
-    from addon.blender import user_preferences
-    from addon.core.runtime import jobs
-
     bar = scenes.bar()
     before = user_preferences.cache_folder
     user_preferences.cache_folder = lambda: __file__  # a file, where no folder can be made
@@ -70,11 +67,6 @@ def test_a_fit_that_cannot_be_kept_is_used_and_said():
 
 @in_blender
 def test_extraction_lies_on_the_source_in_world_space():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_surface import FIT, NEAR
-
     bar = scenes.bar()
     bar.scale, bar.location, bar.rotation_euler = (1, -1, 1), (4, 5, 6), (0.3, 0.4, 0.5)
     bar.data.materials.append(bpy.data.materials.new("skin"))
@@ -99,11 +91,6 @@ def test_extraction_lies_on_the_source_in_world_space():
 
 @in_blender
 def test_the_surface_is_deformed_like_the_mesh():
-    import bpy
-    import numpy as np
-    import scenes
-    from test_surface import FIT, NEAR
-
     bar, _, moving = scenes.bar_with_handles()
     for name, value in FIT.items():
         setattr(bar.arapfields.fit, name, value)
@@ -115,8 +102,6 @@ def test_the_surface_is_deformed_like_the_mesh():
     bpy.ops.arapfields.deform(output="WARP", surface="FIT", **settings)
     warped = bpy.context.view_layer.objects.active
     assert surface != warped
-    from mathutils.bvhtree import BVHTree
-
     tree = BVHTree.FromObject(surface, bpy.context.evaluated_depsgraph_get())
     off = [tree.find_nearest(v.co)[3] for v in warped.data.vertices]
     assert np.mean(off) < NEAR
@@ -124,18 +109,10 @@ def test_the_surface_is_deformed_like_the_mesh():
 
 @in_blender
 def test_exact_surfaces_need_no_fit():
-    import bpy
-    import numpy as np
-    import scenes
-
-    from addon.blender.user_preferences import fit_cache
-
     fit_cache().clear()
     bar, _, moving = scenes.bar_with_handles()
     assert bar.arapfields.surface == "EXACT"
     assert bpy.ops.arapfields.extract(resolution=48, refine_thin=True) == {"FINISHED"}
-    from mathutils.bvhtree import BVHTree
-
     graph = bpy.context.evaluated_depsgraph_get()
     tree, surface = BVHTree.FromObject(bar, graph), bpy.data.objects["Bar_implicit"]
     cell = 2 * max(bar.dimensions) / 1.5 / 47
@@ -155,14 +132,6 @@ def test_exact_surfaces_need_no_fit():
 
 @in_blender
 def test_a_remeshed_surface_is_even_where_the_shape_is_stretched():
-    import json
-
-    import bpy
-    import numpy as np
-    import scenes
-    from mathutils.bvhtree import BVHTree
-    from test_surface import FIT, NEAR
-
     def lengths(item):
         mesh = item.data
         assert not mesh.validate()

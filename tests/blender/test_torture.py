@@ -1,8 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Meshes that artists really have: each ends in a result or in an error that names what is wrong."""
 
+import numpy as np
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+if IN_BLENDER:
+    import bmesh
+    import bpy
+    from support.blender import scenes
+
+    from addon.live import sessions
 
 BROKEN = {  # name → what the message says
     "empty": "Mesh: the mesh is empty",
@@ -20,11 +28,6 @@ BROKEN = {  # name → what the message says
 @pytest.mark.parametrize("case", BROKEN)
 @in_blender
 def test_what_cannot_be_deformed_is_named(case):
-    import bpy
-    import numpy as np
-    import scenes
-    from test_torture import BROKEN
-
     item, _, moving = scenes.bar_with_handles("Mesh")
     mesh = item.data
     if case in ("empty", "one vertex", "loose edges"):
@@ -60,8 +63,6 @@ def test_what_cannot_be_deformed_is_named(case):
 
 @in_blender
 def test_without_a_mesh_the_operators_say_so():
-    import bpy
-
     for name in ("fit", "deform", "stylize", "extract", "add_handle"):
         with pytest.raises(RuntimeError, match="Select a mesh object"):
             getattr(bpy.ops.arapfields, name)()
@@ -85,11 +86,6 @@ ODD = [
 @pytest.mark.parametrize("case", ODD)
 @in_blender
 def test_odd_meshes_deform(case):
-    import bmesh
-    import bpy
-    import numpy as np
-    import scenes
-
     item, _, moving = scenes.bar_with_handles("Mesh")
     made = bmesh.new()
     made.from_mesh(item.data)
@@ -145,10 +141,6 @@ def test_odd_meshes_deform(case):
 @in_blender
 def test_tiny_and_huge_units(scale):
     """Geometry itself of that size, and the scene's unit scale: results are the plain ones, scaled."""
-    import bpy
-    import numpy as np
-    import scenes
-
     found = {}
     for size in (1.0, scale):
         item, fixed, moving = scenes.bar_with_handles("Mesh")
@@ -170,12 +162,6 @@ def test_tiny_and_huge_units(scale):
 @in_blender
 def test_half_a_million_triangles():
     """Deformed, styled and live, within the memory and patience of a test."""
-    import bpy
-    import numpy as np
-    import scenes
-
-    from addon.live import sessions
-
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=500, y_subdivisions=500, size=2)
     item = bpy.context.object
     points = scenes.world_points(item)

@@ -3,20 +3,27 @@
 
 import types
 
+import numpy as np
 import pytest
-from inside import in_blender
+from support.blender.inside import IN_BLENDER, in_blender
+
+import arapfields as af
+
+if IN_BLENDER:
+    import bpy
+    from dressing import seen_mesh
+    from support.blender import character, scenes, wraps
+    from support.blender.wraps import SMALL, bar_and_target, joints, rigged_bar, soup_of
+
+    from addon.blender import modifier_stack
+    from addon.core.geometry.spaces import space_of
+    from addon.core.runtime import jobs
+    from addon.field_modifier import inputs
+    from addon.wrap import landmarks
 
 
 @in_blender
 def test_the_object_comes_to_lie_on_the_target_and_the_factor_goes_back():
-    import bpy
-    import numpy as np
-    import scenes
-    from wraps import SMALL, bar_and_target
-
-    from addon.blender import modifier_stack
-    from addon.field_modifier import inputs
-
     item, target = bar_and_target()
     rest, there = scenes.world_points(item), scenes.world_points(target)
     for index in (0, len(rest) // 2, len(rest) - 1):
@@ -35,14 +42,6 @@ def test_the_object_comes_to_lie_on_the_target_and_the_factor_goes_back():
 
 @in_blender
 def test_landmarks_are_pairs_of_empties_that_move_with_both():
-    import bpy
-    import numpy as np
-    import scenes
-    from wraps import bar_and_target
-
-    from addon.core.geometry.spaces import space_of
-    from addon.wrap import landmarks
-
     item, target = bar_and_target()
     rest, there = scenes.world_points(item), scenes.world_points(target)
     bpy.ops.arapfields.add_landmark(rest=rest[0] + 0.01, on_target=there[0] - 0.01)
@@ -59,11 +58,6 @@ def test_landmarks_are_pairs_of_empties_that_move_with_both():
 
 @in_blender
 def test_what_cannot_be_wrapped_onto_is_named_and_nothing_is_lost():
-    import bpy
-    import pytest
-    import scenes
-    from wraps import SMALL, bar_and_target
-
     item, target = bar_and_target()
     kept = scenes.everything(item)
     empty = bpy.data.objects.new("Nothing", bpy.data.meshes.new("Nothing"))
@@ -90,13 +84,6 @@ def test_what_cannot_be_wrapped_onto_is_named_and_nothing_is_lost():
 
 @in_blender
 def test_a_rigged_template_goes_onto_a_soup_with_its_uvs_groups_and_keys():
-    import bpy
-    import numpy as np
-    import scenes
-    from wraps import SMALL, rigged_bar, soup_of
-
-    import arapfields as af
-
     item, _ = rigged_bar()
     soup = soup_of(item)
     item.arapfields.wrap.onto = soup
@@ -118,15 +105,6 @@ def test_a_rigged_template_goes_onto_a_soup_with_its_uvs_groups_and_keys():
 @pytest.mark.slow  # half a minute
 @in_blender
 def test_a_rigged_character_goes_onto_a_scan_with_its_bones():
-    import bpy
-    import character
-    import numpy as np
-    import scenes
-    import wraps
-    from dressing import seen_mesh
-
-    import arapfields as af
-
     body, rig = wraps.rigged_character()
     body.arapfields.wrap.onto, shape = wraps.scan_of(wraps.grown_parts())
     scenes.activate(body)
@@ -156,12 +134,6 @@ def test_a_rigged_character_goes_onto_a_scan_with_its_bones():
 
 @in_blender
 def test_bones_are_fitted_from_their_own_rest_each_time_and_can_be_reset():
-    import bpy
-    import numpy as np
-    import pytest
-    import scenes
-    from wraps import SMALL, joints, rigged_bar, soup_of
-
     item, rig = rigged_bar()
     item.arapfields.wrap.onto = soup_of(item)
     rest = joints(rig, posed=False)
@@ -191,13 +163,6 @@ def test_bones_are_fitted_from_their_own_rest_each_time_and_can_be_reset():
 
 @in_blender
 def test_bones_that_cannot_be_fitted_and_wraps_that_fail_leave_the_stack():
-    import bpy
-    import numpy as np
-    import pytest
-    from wraps import SMALL, joints, rigged_bar, soup_of
-
-    from addon.core.runtime import jobs
-
     item, rig = rigged_bar()
     item.arapfields.wrap.onto = soup_of(item)
     rest = joints(rig, posed=False)

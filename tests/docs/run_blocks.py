@@ -66,7 +66,7 @@ def shorten_library():
 
 def readme_names():
     """What the README's reader has: a mesh, a box around each end, and where the second is to go."""
-    from meshes import sphere
+    from support.geometry.meshes import sphere
 
     V, F = sphere(1.0, 3)
     box_a, box_b = np.diag([1.1, 1.1, 0.2, 1.0]), np.diag([1.1, 1.1, 0.2, 1.0])

@@ -79,7 +79,7 @@ def test_commands_of_blender_are_understood():
 
 def test_commands_of_the_package_run(tmp_path):
     import trimesh
-    from meshes import sphere
+    from support.geometry.meshes import sphere
 
     page = pages.ROOT / "docs" / "command-line.md"
     (pose,) = blocks(page, "json")

@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 import pages
 import pytest
-from batches import starts, statuses
+from support.programs.batches import starts, statuses
 
 import arapfields as af
 from arapfields.cli.tracks import read_tracks
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "docs" / "examples" / "farm"
-PROGRAM = f"{sys.executable} {ROOT / 'tests' / 'batches.py'}"
+PROGRAM = f"{sys.executable} {ROOT / 'tests/support/programs/batches.py'}"
 COUNT = 12
 
 
@@ -58,7 +58,9 @@ os.execv(sys.executable, [sys.executable, *sys.argv[2:]])
 
 def test_the_array_script_does_a_part_and_begins_again_what_was_killed(place):
     (place / "dies.py").write_text(DIES_ONCE)
-    program = f"{sys.executable} {place / 'dies.py'} {place / 'mark'} {ROOT / 'tests' / 'batches.py'}"
+    program = (
+        f"{sys.executable} {place / 'dies.py'} {place / 'mark'} {ROOT / 'tests/support/programs/batches.py'}"
+    )
     first = part(place, 1, program)
     assert first.returncode == 0 and "part 1 ended with 137, attempt 1" in first.stderr, first
     assert len(statuses(place / "out")) == COUNT // 2
@@ -100,7 +102,7 @@ def test_openjd_runs_the_template(place):
 def test_the_dask_example_runs(tmp_path):
     pytest.importorskip("distributed", reason="Dask is not installed")
     trimesh = pytest.importorskip("trimesh")
-    from meshes import sphere
+    from support.geometry.meshes import sphere
 
     (tmp_path / "in").mkdir()
     for i in range(3):

@@ -4,9 +4,9 @@
 import json
 from pathlib import Path
 
-import archives
 import numpy as np
 import trimesh
+from support.files import archives
 
 import arapfields as af
 from addon.commands.children import read_objects

@@ -6,8 +6,8 @@ Changes of structure keep lengths and offsets right, so that they get past the f
 
 import json
 
-import archives
 import numpy as np
+from support.files import archives
 
 NUMBERS = [0, 1, -1, 2, 7, 64, 255, 65536, 2**31 - 1, 2**31, 2**32, 2**53, 2**63, 2**64, 10**30, -(2**31)]
 FLOATS = [0.5, -0.0, 1e-320, 1e-160, 1e160, 1.7e308, float("nan"), float("inf"), -float("inf")]

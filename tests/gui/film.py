@@ -37,9 +37,9 @@ class Film:
 def set_view(item):
     """The creature alone, from its front and side, no grid; the tool in hand."""
     import bpy
-    import scenes
     import stage
     from mathutils import Euler
+    from support.blender import scenes
 
     bpy.data.collections["Studio"].hide_viewport = True
     scenes.activate(item)
@@ -83,8 +83,8 @@ def steps(film, path, found):
     import bpy
     import mouse
     import numpy as np
-    import scenes
     import stage
+    from support.blender import scenes
 
     bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False)
     yield 1.0
@@ -128,7 +128,7 @@ def steps(film, path, found):
 
 def main():
     folder, path = Path(sys.argv[-2]), Path(sys.argv[-1])
-    sys.path[:0] = [str(ROOT), str(ROOT / "tests/blender"), str(ROOT / "tests/gui")]
+    sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests/gui")]
     import stage
 
     film, found = Film(folder), {}

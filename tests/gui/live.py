@@ -5,8 +5,8 @@ import time
 
 import bpy
 import numpy as np
-import scenes
 import stage
+from support.blender import scenes
 
 SECONDS = 5.0
 

@@ -7,11 +7,11 @@ handles, and two where it was at rest and no longer is, which choose nothing.
 
 import bpy
 import numpy as np
-import scenes
 import stage
 from bpy_extras.view3d_utils import location_3d_to_region_2d, region_2d_to_origin_3d, region_2d_to_vector_3d
 from mathutils import Vector
 from mouse import until
+from support.blender import scenes
 from use import edge_points, pixel
 
 ON_MESH, ON_HANDLE, ON_NOTHING = 4, 2, 2  # clicks; on each of the two handles

@@ -6,9 +6,9 @@ import time
 
 import bpy
 import numpy as np
-import scenes
 import stage
 from mouse import drag, hover, is_followed, pixel, release, until
+from support.blender import scenes
 
 SECONDS = 5.0
 END = (0.9, -0.25, 0.0)  # on the bar's front

@@ -56,8 +56,8 @@ def steps(folder, path, found):
     import bpy
     import mouse
     import numpy as np
-    import scenes
     import stage
+    from support.blender import scenes
 
     stage.empty_file()
     with stage.override():
@@ -104,7 +104,7 @@ def main():
     import json
 
     folder, path = Path(sys.argv[-2]), sys.argv[-1]
-    sys.path[:0] = [str(ROOT), str(ROOT / "tests/blender"), str(ROOT / "tests/gui")]
+    sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests/gui")]
     import stage
 
     found = {}

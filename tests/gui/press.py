@@ -5,8 +5,8 @@ import time
 
 import bpy
 import numpy as np
-import scenes
 import stage
+from support.blender import scenes
 
 LIMIT = 60.0  # seconds until a result is given up
 ROUNDS = 2

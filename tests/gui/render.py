@@ -4,9 +4,9 @@ the dependency graph of the render holds the source once."""
 
 import bpy
 import numpy as np
-import scenes
 import stage
 from mouse import until
+from support.blender import scenes
 
 FIRST, LAST = 1, 5
 SIZE, WIDTH = 240, 3.2  # of a picture in pixels, and of what it shows

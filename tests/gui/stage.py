@@ -9,7 +9,7 @@ import traceback
 
 import bpy
 import numpy as np
-import scenes
+from support.blender import scenes
 
 PATIENCE = float(os.environ.get("ARAPFIELDS_PATIENCE", "1"))  # times the pauses, for a busy machine
 TAB = (1299, 340)  # where the sidebar's last tab lies in a window of 1600 × 1000

@@ -10,8 +10,8 @@ import time
 
 import bpy
 import numpy as np
-import scenes
 import stage
+from support.blender import scenes
 
 LONG = {**scenes.NEW, "field": "neural", "iterations": 100000, "width": 256, "layers": 4, "batch": 300}
 SECONDS = 4.0

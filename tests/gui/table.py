@@ -9,10 +9,9 @@ follows the cell that it belongs to. A small window will do.
 import subprocess
 
 import bpy
-import scenes
 import stage
-import stages
 from mouse import until
+from support.blender import scenes, stages
 
 WHICH = ("source", "handle", "result")
 STAGES = ("idle", "job", "live", "bake")

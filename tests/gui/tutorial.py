@@ -14,11 +14,11 @@ from mathutils import Euler, Matrix, Vector
 
 ROOT = Path(__file__).resolve().parents[2]
 OUTPUT = Path(sys.argv[sys.argv.index("--") + 1])
-sys.path[:0] = [str(ROOT), str(ROOT / "tests/blender"), str(ROOT / "tests/gui")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests/gui")]
 
 import panel  # noqa: E402
-import scenes  # noqa: E402
 import stage  # noqa: E402
+from support.blender import scenes  # noqa: E402
 
 JAW = ((0.0, -0.35, -0.52), (0.50, 0.62, 0.46))
 EAR = ((1.12, 0.32, 0.17), (0.30, 0.36, 0.40))

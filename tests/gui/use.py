@@ -2,10 +2,10 @@
 """Faces of boxes, search and the status bar, as the mouse finds them."""
 
 import bpy
-import scenes
 import stage
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
+from support.blender import scenes
 
 CANCEL = (45, 12)  # pixels from the window's lower right corner to the middle of the status bar's button
 

@@ -15,13 +15,13 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
 OUTPUT = Path(sys.argv[sys.argv.index("--") + 1])
-sys.path[:0] = [str(ROOT), str(ROOT / "tests/blender"), str(ROOT / "tests/gui")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests/gui")]
 
 import panel  # noqa: E402
-import scenes  # noqa: E402
 import stage  # noqa: E402
 import use  # noqa: E402
 from mouse import until  # noqa: E402
+from support.blender import scenes  # noqa: E402
 
 FOUND = {}
 F3, MINUS = "69", "20"  # their codes: by their names the X server may press Alt too

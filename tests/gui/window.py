@@ -17,7 +17,7 @@ import bpy
 ROOT = Path(__file__).resolve().parents[2]
 OUTPUT, *PARTS = sys.argv[sys.argv.index("--") + 1 :]
 OUTPUT = Path(OUTPUT)
-sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests/blender"), str(ROOT / "tests/gui")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests/gui")]
 
 import jobs  # noqa: E402
 import live  # noqa: E402
@@ -26,13 +26,13 @@ import picks  # noqa: E402
 import pins  # noqa: E402
 import press  # noqa: E402
 import render  # noqa: E402
-import scenes  # noqa: E402
 import stage  # noqa: E402
 import stalls  # noqa: E402
 import table  # noqa: E402
 import undo  # noqa: E402
 import use  # noqa: E402
 import wrapping  # noqa: E402
+from support.blender import scenes  # noqa: E402
 
 import addon  # noqa: E402
 

@@ -5,14 +5,12 @@ import time
 import types
 
 import bpy
-import character
 import numpy as np
 import panel
-import scenes
 import stage
-import wraps
 from mathutils import Vector
 from mouse import pixel, until
+from support.blender import character, scenes, wraps
 
 SCAN_AT = Vector((2.0, 0, 0))
 # In the sidebar, of a window of 1600 × 1000, with Wrap alone open.

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from environments import fresh, run
+from support.programs.environments import fresh, run
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -8,11 +8,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-import meshes
 import numpy as np
 import pytest
-from cases import turn
-from environments import run
+from support.geometry import meshes
+from support.geometry.cases import turn
+from support.programs.environments import run
 
 import arapfields as af
 

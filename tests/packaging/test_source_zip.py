@@ -7,7 +7,7 @@ import sys
 import zipfile
 from pathlib import Path
 
-import pytest
+from support.blender.inside import require_bpy
 
 ROOT = Path(__file__).resolve().parents[2]
 WITHOUT_LIBRARY = """
@@ -38,7 +38,7 @@ print("COMMAND", run(["stylize", "--style", "cube", "-i", "a.ply", "-o", "b.ply"
 
 
 def test_it_is_enabled_and_says_so(tmp_path):
-    pytest.importorskip("bpy", reason="PyPI's bpy is not installed")
+    require_bpy()
     path = tmp_path / "arapfields-main.zip"
     with zipfile.ZipFile(path, "w") as archive:
         for file in (ROOT / "addon").rglob("*"):

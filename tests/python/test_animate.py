@@ -12,10 +12,10 @@ import time
 import numpy as np
 import pytest
 import trimesh
-from bar import LEFT, RIGHT, turned
-from caches import names
-from cli_cases import process, run
-from meshes import sphere
+from support.files.caches import names
+from support.geometry.bar import LEFT, RIGHT, turned
+from support.geometry.meshes import sphere
+from support.programs.cli import process, run
 
 import arapfields as af
 from arapfields.cli.animate import STEPS, TOLERANCE

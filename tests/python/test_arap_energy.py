@@ -4,8 +4,15 @@
 import numpy as np
 import pytest
 import torch
-from energy_oracles import arap_terms, gradient_of, jacobians_of, jets_with_jacobians, polar, random_rotations
-from tolerances import FLOAT32_ENERGY, FLOAT64_GRADIENT, FLOAT64_ROTATION
+from support.oracles.energies import (
+    arap_terms,
+    gradient_of,
+    jacobians_of,
+    jets_with_jacobians,
+    polar,
+    random_rotations,
+)
+from support.tolerances import FLOAT32_ENERGY, FLOAT64_GRADIENT, FLOAT64_ROTATION
 
 from arapfields._native import InvalidInput, testing
 

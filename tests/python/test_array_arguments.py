@@ -5,9 +5,9 @@ import array
 import subprocess
 import sys
 
-import cases
 import numpy as np
 import pytest
+from support.geometry import cases
 
 import arapfields as af
 
@@ -97,7 +97,7 @@ def test_tensors_serve_every_kind_of_argument():
 
 
 def cases_mesh():
-    from meshes import sphere
+    from support.geometry.meshes import sphere
 
     return sphere(1.0, 2)
 

@@ -3,13 +3,12 @@
 
 import contextlib
 
-import cases
-import meshes
 import numpy as np
 import pytest
-import tolerances
 import torch
-from energy_oracles import jets_with_jacobians, random_rotations
+from support import tolerances
+from support.geometry import cases, meshes
+from support.oracles.energies import jets_with_jacobians, random_rotations
 
 import arapfields as af
 from arapfields._native import testing

@@ -6,9 +6,9 @@ import time
 
 import numpy as np
 import pytest
-from cases import box, moved, shift, turn
-from characters import FOOT, HIP, LEG, ring, trousers
-from energy_oracles import random_rotations
+from support.geometry.cases import box, moved, shift, turn
+from support.geometry.characters import FOOT, HIP, LEG, ring, trousers
+from support.oracles.energies import random_rotations
 
 import arapfields as af
 

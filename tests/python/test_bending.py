@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The bending weight trades bend for stretch, monotonically."""
 
-import cases
 import numpy as np
 import pytest
+from support.geometry import cases
 
 import arapfields as af
 

@@ -5,7 +5,7 @@ import importlib.util
 from pathlib import Path
 
 import pytest
-from tolerances import BUSY_SLOWDOWN
+from support.tolerances import BUSY_SLOWDOWN
 
 BENCHMARK = Path(__file__).parents[1] / "benchmarks" / "busy.py"
 

@@ -3,11 +3,11 @@
 
 import dataclasses
 
-import cases
 import numpy as np
 import pytest
-from meshes import sphere
-from tolerances import TERMS_OF_LOSS
+from support.geometry import cases
+from support.geometry.meshes import sphere
+from support.tolerances import TERMS_OF_LOSS
 
 import arapfields as af
 

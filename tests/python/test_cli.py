@@ -10,7 +10,7 @@ import termios
 import numpy as np
 import pytest
 import trimesh
-from cli_cases import HELD_AND_SHIFTED, SMALL_FIT, SMALL_SOLVE, process, run, write_octahedron
+from support.programs.cli import HELD_AND_SHIFTED, SMALL_FIT, SMALL_SOLVE, process, run, write_octahedron
 
 import arapfields as af
 from arapfields.cli import files

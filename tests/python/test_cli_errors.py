@@ -7,7 +7,7 @@ import subprocess
 import time
 
 import pytest
-from cli_cases import HELD_AND_SHIFTED, SMALL_SOLVE, bad_meshes, process, run, write_octahedron
+from support.programs.cli import HELD_AND_SHIFTED, SMALL_SOLVE, bad_meshes, process, run, write_octahedron
 
 VERBS = {
     "fit": ["--output", "out.safetensors"],

@@ -6,8 +6,8 @@ import json
 import numpy as np
 import pytest
 import trimesh
-import wrap_cases as cases
-from cli_cases import run
+from support.geometry import wrap_cases as cases
+from support.programs.cli import run
 
 import arapfields as af
 

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from tolerances import DIFFERENCES, FLOAT32_ENERGY, FLOAT64_GRADIENT
+from support.tolerances import DIFFERENCES, FLOAT32_ENERGY, FLOAT64_GRADIENT
 
 import arapfields as af
 from arapfields._native import testing

@@ -3,10 +3,10 @@
 
 import threading
 
-import cases
 import numpy as np
 import pytest
-import tolerances
+from support import tolerances
+from support.geometry import cases
 
 import arapfields as af
 

@@ -2,10 +2,10 @@
 """Signed distances and winding numbers against libigl, and what they must not depend on."""
 
 import igl
-import meshes
 import numpy as np
 import pytest
-import tolerances
+from support import tolerances
+from support.geometry import meshes
 
 import arapfields as af
 

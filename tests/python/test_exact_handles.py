@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Exact handles of a radial field: interpolated, at little more energy than soft ones."""
 
-import cases
-import tolerances
+from support import tolerances
+from support.geometry import cases
 
 import arapfields as af
 

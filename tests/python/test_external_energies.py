@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Energies written in Python: that they join the loss with their derivatives, in the mesh's coordinates."""
 
-import cases
 import numpy as np
 import pytest
-from meshes import sphere
-from tolerances import ENERGY_IN_PYTHON
+from support.geometry import cases
+from support.geometry.meshes import sphere
+from support.tolerances import ENERGY_IN_PYTHON
 
 import arapfields as af
 

@@ -3,9 +3,9 @@
 
 import numpy as np
 import pytest
-from meshes import check_closed
-from network_oracle import Network
-from tolerances import SAME_VERTICES
+from support.geometry.meshes import check_closed
+from support.oracles.network import Network
+from support.tolerances import SAME_VERTICES
 
 import arapfields as af
 

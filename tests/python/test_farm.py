@@ -6,7 +6,7 @@ import signal
 
 import numpy as np
 import pytest
-from meshes import sphere
+from support.geometry.meshes import sphere
 
 import arapfields as af
 from arapfields import farm

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fields as Python sees them: derivatives against differences, exact handles, inverse, files."""
 
-import cases
 import numpy as np
 import pytest
-import tolerances
+from support import tolerances
+from support.geometry import cases
 
 import arapfields as af
 

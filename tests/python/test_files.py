@@ -6,10 +6,10 @@ import json
 import os
 import struct
 
-import archives
 import numpy as np
 import pytest
 import safetensors.numpy
+from support.files import archives
 
 import arapfields as af
 

@@ -6,8 +6,8 @@ import time
 
 import numpy as np
 import pytest
-from meshes import sphere
-from tolerances import FIT_REPORT
+from support.geometry.meshes import sphere
+from support.tolerances import FIT_REPORT
 
 import arapfields as af
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Samples newly drawn from the surface at each step of a solve."""
 
-import meshes
 import numpy as np
 import pytest
+from support.geometry import meshes
 
 import arapfields as af
 

@@ -4,8 +4,8 @@
 import numpy as np
 import pytest
 import torch
-from energy_oracles import gauss_loss, gradient_of, jets_with_jacobians
-from tolerances import FLOAT64_GRADIENT, GAUSS_WEIGHTS
+from support.oracles.energies import gauss_loss, gradient_of, jets_with_jacobians
+from support.tolerances import FLOAT64_GRADIENT, GAUSS_WEIGHTS
 
 import arapfields as af
 from arapfields._native import testing

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from meshes import sphere
+from support.geometry.meshes import sphere
 
 import arapfields as af
 from arapfields import grids

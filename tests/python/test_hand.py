@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The published hand, whose fingers are close in space and far along the surface."""
 
-import cases
 import numpy as np
 import pytest
+from support.geometry import cases
 
 import arapfields as af
 

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from energy_oracles import random_rotations
+from support.oracles.energies import random_rotations
 
 import arapfields as af
 from arapfields._native import testing

@@ -5,11 +5,11 @@ import gc
 import threading
 import weakref
 
-import cases
 import numpy as np
 import pytest
-from meshes import sphere
-from tolerances import FUNCTION_DIFFERENCES, SPHERE_EXTRACTION
+from support.geometry import cases
+from support.geometry.meshes import sphere
+from support.tolerances import FUNCTION_DIFFERENCES, SPHERE_EXTRACTION
 
 import arapfields as af
 

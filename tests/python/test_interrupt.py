@@ -6,17 +6,20 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
-import cases
 import pytest
+from support.geometry import cases
 
 import arapfields as af
 
+TESTS = str(Path(__file__).parents[1])
 SCRIPT = """
 import signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.path.insert(0, sys.argv[1])
-import cases, arapfields as af
+import arapfields as af
+from support.geometry import cases
 samples, handles = cases.bar_samples(), cases.bar_handles()
 options = dict(width=32, layers=3, batch=100)
 print("ready", flush=True)
@@ -29,9 +32,7 @@ print(af.deform(samples, handles, af.DeformOptions(iterations=3, **options)).rep
 
 
 def test_ctrl_c_in_a_script():
-    running = subprocess.Popen(
-        [sys.executable, "-c", SCRIPT, cases.__file__.rsplit("/", 1)[0]], stdout=subprocess.PIPE, text=True
-    )
+    running = subprocess.Popen([sys.executable, "-c", SCRIPT, TESTS], stdout=subprocess.PIPE, text=True)
     try:
         assert running.stdout.readline() == "ready\n"
         time.sleep(0.5)

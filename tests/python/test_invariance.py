@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A radial result turns, scales and mirrors with its mesh, and does not see what is small and far away."""
 
-import cases
-import meshes
 import numpy as np
 import pytest
+from support.geometry import cases, meshes
 
 import arapfields as af
 

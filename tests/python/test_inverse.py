@@ -4,11 +4,11 @@
 import threading
 import time
 
-import cases
 import numpy as np
 import pytest
-import tolerances
-from network_oracle import Network
+from support import tolerances
+from support.geometry import cases
+from support.oracles.network import Network
 
 import arapfields as af
 

@@ -3,12 +3,11 @@
 
 import time
 
-import cases
-import meshes
 import numpy as np
 import pytest
 import torch
-from tolerances import AUTOGRAD, FLOAT_FIELD_DIFFERENCES
+from support.geometry import cases, meshes
+from support.tolerances import AUTOGRAD, FLOAT_FIELD_DIFFERENCES
 
 import arapfields as af
 from arapfields._native import testing

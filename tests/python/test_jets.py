@@ -5,8 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from network_oracle import Network
-from tolerances import AUTOGRAD, DIFFERENCES, FLOAT_JETS
+from support.oracles.network import Network
+from support.tolerances import AUTOGRAD, DIFFERENCES, FLOAT_JETS
 
 from arapfields._native import testing
 

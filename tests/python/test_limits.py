@@ -7,9 +7,9 @@ import subprocess
 import sys
 import threading
 
-import archives
 import numpy as np
 import pytest
+from support.files import archives
 
 import arapfields as af
 

@@ -3,9 +3,9 @@
 
 import numpy as np
 import pytest
-from bar import LEFT, RIGHT, bar_samples, box, turned
-from energy_oracles import random_rotations
-from tolerances import LIVE_DRIFT, LIVE_IDENTITY, LIVE_ROUNDING, TRACKED
+from support.geometry.bar import LEFT, RIGHT, bar_samples, box, turned
+from support.oracles.energies import random_rotations
+from support.tolerances import LIVE_DRIFT, LIVE_IDENTITY, LIVE_ROUNDING, TRACKED
 
 import arapfields as af
 

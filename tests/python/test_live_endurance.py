@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bar import LEFT, RIGHT, bar_samples, turned
-from cases import box, moved, published_samples, turn
-from tolerances import LIVE_DRIFT
+from support.geometry.bar import LEFT, RIGHT, bar_samples, turned
+from support.geometry.cases import box, moved, published_samples, turn
+from support.tolerances import LIVE_DRIFT
 
 import arapfields as af
 

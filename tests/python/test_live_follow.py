@@ -5,8 +5,8 @@ import threading
 
 import numpy as np
 import pytest
-from bar import LEFT, RIGHT, bar_samples, turned
-from tolerances import LIVE_KEEPS_UP
+from support.geometry.bar import LEFT, RIGHT, bar_samples, turned
+from support.tolerances import LIVE_KEEPS_UP
 
 import arapfields as af
 

@@ -4,9 +4,9 @@
 import numpy as np
 import pytest
 import safetensors
-from bar import bar_samples
-from cases import shift
-from fork import BOTTOM, LEGS, TIP, fork_samples
+from support.geometry.bar import bar_samples
+from support.geometry.cases import shift
+from support.geometry.fork import BOTTOM, LEGS, TIP, fork_samples
 
 import arapfields as af
 

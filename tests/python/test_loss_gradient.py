@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Parameter gradients of whole losses, in float64, against differences along random directions."""
 
-import cases
 import numpy as np
 import pytest
-import tolerances
+from support import tolerances
+from support.geometry import cases
 
 import arapfields as af
 from arapfields._native import testing

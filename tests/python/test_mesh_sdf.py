@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """MeshSdf, the exact signed distance as an implicit function: extracted, sampled, deformed without a fit."""
 
-import cases
-import meshes
 import numpy as np
 import pytest
-import tolerances
-from meshes import check_closed
+from support import tolerances
+from support.geometry import cases, meshes
+from support.geometry.meshes import check_closed
 
 import arapfields as af
 

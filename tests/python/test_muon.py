@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from tolerances import EVENED, SAME_VECTORS
+from support.tolerances import EVENED, SAME_VECTORS
 
 from arapfields._native import testing
 

@@ -4,23 +4,15 @@
 import os
 import subprocess
 import sys
-from itertools import pairwise
 
 import numpy as np
 import pytest
-from network_oracle import Network
-from tolerances import PUBLISHED_GRADIENT, PUBLISHED_VALUE
+from support.oracles.network import Network, small_layers
+from support.tolerances import PUBLISHED_GRADIENT, PUBLISHED_VALUE
 
 import arapfields as af
 
 torch = pytest.importorskip("torch")
-
-
-def small_layers(seed=0, width=8, layers=2, octaves=4):
-    rng = np.random.default_rng(seed)
-    sizes = [6 * octaves, *[width] * layers, 1]
-    weights = [rng.normal(size=(b, a)) / a**0.5 for a, b in pairwise(sizes)]
-    return weights, [rng.normal(size=b) * 0.1 for b in sizes[1:]]
 
 
 @pytest.fixture
@@ -67,7 +59,7 @@ def test_saved_and_loaded_is_the_same_bit_for_bit(sdf, tmp_path):
 def test_kernels_for_every_instruction_set_agree(level):
     code = (
         "import numpy as np, sys; sys.path.insert(0, 'tests')\n"
-        "from arapfields import _native; from python.test_neural_sdf import small_layers\n"
+        "from arapfields import _native; from support.oracles.network import small_layers\n"
         "from arapfields._native import testing\n"
         "w, b = small_layers(width=37)\n"
         "x = np.random.default_rng(0).uniform(-1, 1, (100, 3)); c = np.cos(np.arange(1000))\n"

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a report notes on a result that should not be used unseen, and where the notes are shown."""
 
-import cases
 import pytest
-from cli_cases import HELD_AND_SHIFTED, SMALL_SOLVE, run, write_octahedron
+from support.geometry import cases
+from support.programs.cli import HELD_AND_SHIFTED, SMALL_SOLVE, run, write_octahedron
 
 import arapfields as af
 

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Styles read off an object: the map of directions, its energy, and what it makes of shapes."""
 
-import meshes
 import numpy as np
 import pytest
 import torch
-from cli_cases import run
-from energy_oracles import gradient_of, jacobians_of, jets_with_jacobians
-from tolerances import COMPOSED, FLOAT64_GRADIENT
+from support.geometry import meshes
+from support.oracles.energies import gradient_of, jacobians_of, jets_with_jacobians
+from support.programs.cli import run
+from support.tolerances import COMPOSED, FLOAT64_GRADIENT
 
 import arapfields as af
 from arapfields._native import testing

@@ -4,7 +4,7 @@
 import json
 
 import pytest
-from cli_cases import HELD_AND_SHIFTED, SMALL_SOLVE, run, write_octahedron
+from support.programs.cli import HELD_AND_SHIFTED, SMALL_SOLVE, run, write_octahedron
 
 import arapfields as af
 

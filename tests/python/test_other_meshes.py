@@ -3,9 +3,9 @@
 
 import numpy as np
 import pytest
-from cases import box, moved, turn
-from characters import HIP, LEG, trousers
-from cli_cases import run
+from support.geometry.cases import box, moved, turn
+from support.geometry.characters import HIP, LEG, trousers
+from support.programs.cli import run
 
 import arapfields as af
 

@@ -8,10 +8,10 @@ import subprocess
 import sys
 import time
 
-import archives
 import numpy as np
 import pytest
-from cli_cases import HELD_AND_SHIFTED, SMALL_FIT, SMALL_SOLVE, process, run, write_octahedron
+from support.files import archives
+from support.programs.cli import HELD_AND_SHIFTED, SMALL_FIT, SMALL_SOLVE, process, run, write_octahedron
 
 import arapfields as af
 from arapfields._files import whole_file, write_text
@@ -151,8 +151,9 @@ def test_a_full_disk_is_named_and_changes_nothing(kind, examples, tmp_path):
         pytest.importorskip("bpy", reason="PyPI's bpy brings openvdb")
     suffix = {"npz": ".npz", "vdb": ".vdb"}.get(kind, ".x")
     code = f"""
-import sys; sys.path.insert(0, {str(archives.Path(archives.__file__).parent)!r})
-import archives, numpy as np, arapfields as af
+import sys; sys.path.insert(0, {str(archives.Path(archives.__file__).parents[2])!r})
+import numpy as np, arapfields as af
+from support.files import archives
 from arapfields import _files, grids
 kind, example, places = sys.argv[1], sys.argv[2], sys.argv[3:]
 grid = np.random.default_rng(0).normal(size=(20, 20, 20)).astype(np.float32), np.zeros(3), 0.1

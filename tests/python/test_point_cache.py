@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 import pytest
-from caches import FRAMES, POINTS, names, random_motion, write
+from support.files.caches import FRAMES, POINTS, names, random_motion, write
 
 import arapfields as af
 from arapfields.point_cache import PointCacheReader, PointCacheWriter

@@ -11,7 +11,7 @@ from collections import namedtuple
 
 import numpy as np
 import pytest
-from caches import FRAMES, POINTS, names, random_motion, write
+from support.files.caches import FRAMES, POINTS, names, random_motion, write
 
 import arapfields as af
 from arapfields import point_cache

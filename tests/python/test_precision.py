@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rounded matrix products: a solve that uses them ends where one in single precision does."""
 
-import cases
 import numpy as np
 import pytest
-import tolerances
+from support import tolerances
+from support.geometry import cases
 
 import arapfields as af
 

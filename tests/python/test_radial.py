@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """deform and stylize over a radial field, and networks that start from one."""
 
-import cases
-import meshes
 import numpy as np
 import pytest
-from bar import LEFT, RIGHT, bar_samples, turned
+from support.geometry import cases, meshes
+from support.geometry.bar import LEFT, RIGHT, bar_samples, turned
 
 import arapfields as af
 

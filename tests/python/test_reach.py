@@ -3,10 +3,10 @@
 
 import numpy as np
 import pytest
-from bar import LEFT, RIGHT
-from cases import box, moved, shift
-from characters import FOOT, HIP, LEG, trousers
-from tolerances import TRACKED
+from support.geometry.bar import LEFT, RIGHT
+from support.geometry.cases import box, moved, shift
+from support.geometry.characters import FOOT, HIP, LEG, trousers
+from support.tolerances import TRACKED
 
 import arapfields as af
 
@@ -65,7 +65,7 @@ def test_an_anchor_holds_and_a_handle_without_reach_frees_all(body):
 
 
 def test_boxes_and_regions_reach_from_what_they_hold():
-    from bar import bar_samples
+    from support.geometry.bar import bar_samples
 
     samples = bar_samples()
     target = shift([0, 0, 0.3]) @ RIGHT

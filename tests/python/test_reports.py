@@ -5,10 +5,10 @@ import dataclasses
 import json
 import pickle
 
-import cases
 import numpy as np
 import pytest
-from meshes import sphere
+from support.geometry import cases
+from support.geometry.meshes import sphere
 
 import arapfields as af
 from arapfields import _report_files

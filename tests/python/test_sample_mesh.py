@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Samples straight from triangles, and samples that a caller brings."""
 
-import cases
-import meshes
 import numpy as np
 import pytest
+from support.geometry import cases, meshes
 
 import arapfields as af
 

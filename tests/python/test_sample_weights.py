@@ -3,10 +3,10 @@
 
 import numpy as np
 import pytest
-from bar import LEFT, RIGHT, turned
-from cases import box, moved, turn
-from meshes import box as box_mesh
-from meshes import sphere, subdivide
+from support.geometry.bar import LEFT, RIGHT, turned
+from support.geometry.cases import box, moved, turn
+from support.geometry.meshes import box as box_mesh
+from support.geometry.meshes import sphere, subdivide
 
 import arapfields as af
 

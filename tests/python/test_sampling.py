@@ -3,8 +3,8 @@
 
 import numpy as np
 import pytest
-from network_oracle import Network
-from tolerances import ON_SURFACE
+from support.oracles.network import Network
+from support.tolerances import ON_SURFACE
 
 import arapfields as af
 

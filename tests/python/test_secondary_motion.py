@@ -7,9 +7,9 @@ import time
 import numpy as np
 import pytest
 import torch
-from bar import LEFT, RIGHT, bar_samples, box, turned
-from energy_oracles import gradient_of
-from tolerances import FLOAT32_ENERGY, FLOAT64_GRADIENT
+from support.geometry.bar import LEFT, RIGHT, bar_samples, box, turned
+from support.oracles.energies import gradient_of
+from support.tolerances import FLOAT32_ENERGY, FLOAT64_GRADIENT
 
 import arapfields as af
 from arapfields._native import testing

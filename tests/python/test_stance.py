@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What keeps a figure's stance: value and cotangents, what it is blind to, and what it does to a style."""
 
-import cases
 import numpy as np
 import pytest
-import tolerances
 import torch
-from energy_oracles import gradient_of
+from support import tolerances
+from support.geometry import cases
+from support.oracles.energies import gradient_of
 
 import arapfields as af
 from arapfields._native import testing

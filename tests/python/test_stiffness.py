@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Stiffness in the shape's own measure: the local thickness, and λ that follows it."""
 
-import cases
-import meshes
 import numpy as np
 import pytest
+from support.geometry import cases, meshes
 
 import arapfields as af
 from arapfields._native import testing

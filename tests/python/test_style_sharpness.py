@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Sharpness, weight and reach that follow from a style's normals."""
 
-import cases
-import meshes
 import numpy as np
 import pytest
-from tolerances import GAUSS_WEIGHTS
+from support.geometry import cases, meshes
+from support.tolerances import GAUSS_WEIGHTS
 
 import arapfields as af
 from arapfields.cli.handles import turn_upright

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """stylize: the preference rises, strength 0 is the identity, weights and orientation act, errors name."""
 
-import cases
-import meshes
 import numpy as np
 import pytest
+from support.geometry import cases, meshes
 
 import arapfields as af
 

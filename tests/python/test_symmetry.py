@@ -3,8 +3,8 @@
 
 import numpy as np
 import pytest
-from cases import box, moved, turn
-from characters import HIP, LEG, trousers
+from support.geometry.cases import box, moved, turn
+from support.geometry.characters import HIP, LEG, trousers
 
 import arapfields as af
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cases import bar_handles, bar_samples
-from meshes import torus
+from support.geometry.cases import bar_handles, bar_samples
+from support.geometry.meshes import torus
 
 import arapfields as af
 

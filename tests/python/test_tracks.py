@@ -8,7 +8,7 @@ import zipfile
 
 import numpy as np
 import pytest
-from bar import LEFT, RIGHT, turned
+from support.geometry.bar import LEFT, RIGHT, turned
 
 import arapfields as af
 from arapfields.cli.tracks import read_tracks

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from bar import LEFT, RIGHT, bar_samples, turned
+from support.geometry.bar import LEFT, RIGHT, bar_samples, turned
 
 import arapfields as af
 

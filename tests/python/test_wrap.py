@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-import wrap_cases as cases
+from support.geometry import wrap_cases as cases
 
 import arapfields as af
 

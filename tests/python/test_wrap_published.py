@@ -3,8 +3,8 @@
 
 import numpy as np
 import pytest
-import wrap_cases as cases
-from network_oracle import Network
+from support.geometry import wrap_cases as cases
+from support.oracles.network import Network
 
 import arapfields as af
 

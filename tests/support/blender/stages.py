@@ -5,11 +5,13 @@ import contextlib
 import tempfile
 
 import bpy
-import scenes
+from support.blender import scenes
 
 from addon import lifecycle
+from addon.animation.operators import ARAPFIELDS_OT_bake
 from addon.core.runtime import jobs
 from addon.core.runtime.coroutines import Pause
+from addon.deform.operators import ARAPFIELDS_OT_deform
 from addon.live import sessions
 
 LIFT = 0.4  # of the moving handle, in the height of the world
@@ -85,9 +87,6 @@ class Stage:
         return bpy.data.objects["Bar"], bpy.data.objects["Moving"]
 
     def operator(self):
-        from addon.animation.operators import ARAPFIELDS_OT_bake
-        from addon.deform.operators import ARAPFIELDS_OT_deform
-
         if self.name == "bake":
             given = {"format": "KEYS", "filepath": "", "part": (0, 0)}
             return Operator(ARAPFIELDS_OT_bake, start=1, end=3, step=1, **given)

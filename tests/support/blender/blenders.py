@@ -14,9 +14,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+from support.blender.inside import require_bpy
 
-ROOT = Path(__file__).resolve().parents[2]
-HERE = Path(__file__).resolve().parent
+ROOT = Path(__file__).resolve().parents[3]
+SUPPORT = ROOT / "tests/support"
 FOLDER = Path(os.environ.get("ARAPFIELDS_BLENDERS", ROOT / "build/blenders"))
 CHROOT = Path(os.environ.get("ARAPFIELDS_BLENDER52", "/opt/blender52"))
 NAMES = ["4.5", "4.2", "4.2 with NumPy 2", "5.2", "5.2 in its window's build"]
@@ -46,7 +47,7 @@ class Blender:
 
     def run(self, script, *arguments, check=True):
         """Runs a script of this folder."""
-        command = [*self.command, self.inside(self.bring(HERE) / script)]
+        command = [*self.command, self.inside(self.bring(SUPPORT) / "blender" / script)]
         command += ["--"] if "--python" in self.command else []
         return self.call([*command, *arguments], check)
 
@@ -77,7 +78,7 @@ def python_of(name):
 def find(name, folder):
     """The Blender of that name; skips the test where it is not at hand."""
     if name == "4.5":
-        pytest.importorskip("bpy", reason="PyPI's bpy is not installed")
+        require_bpy()
         return Blender([sys.executable], folder)
     if name == "4.2 with NumPy 2":
         numpy = FOLDER / "numpy2"

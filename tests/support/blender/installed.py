@@ -12,7 +12,7 @@ import sys
 from importlib.machinery import PathFinder
 from pathlib import Path
 
-HERE = Path(__file__).resolve().parent
+TESTS = Path(__file__).resolve().parents[2]
 FOLDER = Path(os.environ["BLENDER_USER_RESOURCES"])
 MODULE = "bl_ext.user_default.arapfields"
 
@@ -69,8 +69,8 @@ def install(path):
 
 def use():
     import bpy
-    import scenes
     from bl_ext.user_default.arapfields.core.runtime import native
+    from support.blender import scenes
 
     assert not native.problem(), native.problem()
     import arapfields
@@ -94,7 +94,7 @@ def use():
 
 def extract(item, resolution):
     import bpy
-    import scenes
+    from support.blender import scenes
 
     scenes.activate(item)
     bpy.ops.arapfields.extract(resolution=resolution)
@@ -119,7 +119,7 @@ def main():
     sys.meta_path.insert(0, FromTheExtension)
     if wanted.torch == "before":
         other_torch(wanted.library)
-    sys.path.insert(0, str(HERE))
+    sys.path.insert(0, str(TESTS))
     import bpy
     import numpy
 

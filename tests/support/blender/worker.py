@@ -29,7 +29,10 @@ def run(order):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     addon.register()
     try:
-        getattr(load(order["file"]), order["function"]).inside(**order["arguments"])
+        arguments = order["arguments"]
+        if "tmp_path" in arguments:
+            arguments["tmp_path"] = Path(arguments["tmp_path"])
+        getattr(load(order["file"]), order["function"]).inside(**arguments)
         return ""
     except BaseException:
         return traceback.format_exc()

@@ -8,13 +8,13 @@ from types import SimpleNamespace
 import bmesh
 import bpy
 import numpy as np
-import scenes
-from characters import Capsules
 from mathutils import Matrix, Vector
+from support.blender import scenes
+from support.geometry.characters import Capsules
 
 import arapfields as af
 
-sys.path.append(str(Path(__file__).resolve().parents[2] / "blender_scripts"))
+sys.path.append(str(Path(__file__).resolve().parents[3] / "blender_scripts"))
 from dressing import link, rig, seen_mesh, strands, weigh
 
 HEIGHT = 1.8

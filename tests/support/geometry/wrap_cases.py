@@ -2,7 +2,7 @@
 """Shapes that are wrapped onto each other, and how far the results are from their targets."""
 
 import numpy as np
-from meshes import sphere
+from support.geometry.meshes import sphere
 
 import arapfields as af
 

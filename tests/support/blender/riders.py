@@ -3,7 +3,7 @@
 
 import bpy
 import numpy as np
-import scenes
+from support.blender import scenes
 
 import arapfields
 

@@ -2,12 +2,10 @@
 """Objects to wrap onto each other."""
 
 import bpy
-import character
 import numpy as np
-import scenes
-from character import rig, weigh
-from characters import Capsules
-from dressing import link
+from support.blender import character, scenes
+from support.blender.character import link, rig, weigh
+from support.geometry.characters import Capsules
 
 import arapfields as af
 

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the tests of batches share: folders of inputs, and a stand-in for Blender.
 
-python tests/batches.py FLAGS is a batch of that stand-in.
+python tests/support/programs/batches.py FLAGS is a batch of that stand-in.
 """
 
 import os
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from addon.commands.batch import run_batch
 from addon.commands.main import interruptible

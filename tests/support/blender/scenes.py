@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Scenes for tests inside Blender: small, textured, with everything on the mesh that must survive."""
 
+import bmesh
 import bpy
 import numpy as np
 
@@ -20,8 +21,6 @@ def activate(*items):
 
 def bar(name="Bar", length=1.0):
     """A bar along x from -length to length, 0.5 wide, of 8 × 4 × 4 quads a side."""
-    import bmesh
-
     mesh = bpy.data.meshes.new(name)
     made = bmesh.new()
     bmesh.ops.create_cube(made, size=1.0)
@@ -154,3 +153,14 @@ def everything(item):
 def set_positions(mesh, points):
     mesh.vertices.foreach_set("co", np.asarray(points, np.float32).ravel())
     mesh.update()
+
+
+def delete(item):
+    """As the user does: unlinked from the scene, while pointers keep the data alive."""
+    for home in item.users_collection:
+        home.objects.unlink(item)
+    bpy.context.view_layer.update()
+    assert item.name in bpy.data.objects
+
+
+FIT = {"iterations": 150, "width": 48, "layers": 2, "near_points": 20000}

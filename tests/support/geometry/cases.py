@@ -4,7 +4,7 @@
 import functools
 
 import numpy as np
-from network_oracle import Network
+from support.oracles.network import Network
 
 import arapfields as af
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run in any Blender, without the native library: the modifier with offsets of our own, and its inputs.
 
-blender -b --factory-startup --python tests/blender/modifier_alone.py     or with PyPI's bpy: python ...
+blender -b --factory-startup --python tests/support/blender/modifier_alone.py
+or with PyPI's bpy: python tests/support/blender/modifier_alone.py
 """
 
 import sys
@@ -11,10 +12,10 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests/blender")]
+ROOT = Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-import scenes  # noqa: E402
+from support.blender import scenes  # noqa: E402
 
 from addon.blender import modifier_stack  # noqa: E402
 from addon.field_modifier import inputs, motion  # noqa: E402

@@ -7,7 +7,11 @@ from pathlib import Path
 
 import bpy
 
-ADDON = Path(__file__).resolve().parents[2] / "addon"
+import addon.registration as registration
+from addon.core.runtime.native import ADVICE
+from addon.pin_tool.tool import ARAPFIELDS_TOOL_pin as tool
+
+ADDON = Path(__file__).resolve().parents[3] / "addon"
 UNTRANSLATED = {"", "X", "Y", "Z", "ARAP Fields", "{error}", "CUDA", "JSON", "Seed"}
 SAYS = {"translated", "UserError", "wrapped"}  # calls whose first argument is read by users
 MENU_ROWS = 2  # place of the text in the rows that menus are made of
@@ -78,16 +82,11 @@ def literal(node):
         for value in node.values:
             yield from literal(value)
     elif isinstance(node, ast.JoinedStr):  # only texts that the module completes with its own constants
-        from addon.core.runtime.native import ADVICE
-
         parts = [v.value if isinstance(v, ast.Constant) else "\0" for v in node.values]
         if "\0" in parts and ADVICE and "ADVICE" in ast.unparse(node):
             yield "".join(part.replace("\0", ADVICE) for part in parts)
 
 
 def every():
-    import addon.registration as registration
-    from addon.pin_tool.tool import ARAPFIELDS_TOOL_pin as tool
-
     found = {*of_classes(registration.MODULES), *of_source(), tool.bl_label, tool.bl_description}
     return sorted(found - UNTRANSLATED)

@@ -12,15 +12,15 @@ import sys
 import tempfile
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-import installed
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+from support.blender import installed
 
 NEAR = 0.12  # to the handle's own motion, of a bar of length 2: the field is no rigid motion
 
 
 def check(items, rest, shift, what):
     import numpy as np
-    from riders import shown
+    from support.blender.riders import shown
 
     for name, before in zip(items, rest, strict=True):
         off = np.abs(shown(bpy.data.objects[name]) - before - [0, 0, shift]).max()
@@ -28,8 +28,8 @@ def check(items, rest, shift, what):
 
 
 def use():
-    import scenes
-    from riders import body, rider, shown
+    from support.blender import scenes
+    from support.blender.riders import body, rider, shown
 
     sessions = importlib.import_module(f"{installed.MODULE}.live.sessions")
     bpy.ops.wm.read_homefile(use_empty=True)

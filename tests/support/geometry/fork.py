@@ -2,7 +2,7 @@
 """A fork: a tube along a U, whose legs are near in space but apart along the shape."""
 
 import numpy as np
-from bar import box
+from support.geometry.bar import box
 
 import arapfields as af
 

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Animated bars, and bakes that are stepped by hand."""
+
+import tempfile
+import types
+from pathlib import Path
+
+import bpy
+from support.blender import scenes
+from support.blender.stacks import local_points
+
+import addon.animation.operators as bake
+from addon.animation.bake_operator import BakeOperator
+from addon.core.runtime import jobs
+from addon.core.runtime.coroutines import Pause, run_to_completion
+from addon.live.session import Session
+
+EXACT = 1e-6  # single precision of positions of size one
+RUN = {"field": "radial", "samples": 1500, "iterations": 15}
+
+
+def animated(name="Bar"):
+    """A bar whose right end rises from frame 1 to frame 5."""
+    bar, _, moving = scenes.bar_with_handles(name)
+    for frame, height in ((1, 0.0), (5, 0.4)):
+        moving.location.z = height
+        moving.keyframe_insert("location", frame=frame)
+    scenes.activate(bar)
+    return bar
+
+
+def stepped(**given):
+    """The bake operator as a window runs it, to be stepped by hand; a plain object has its arguments."""
+
+    class Operator(BakeOperator):
+        title, in_window, scope, filepath = "Bake", False, "ACTIVE", given.pop("filepath", "")
+        prepare, warn_of_weight = bake.ARAPFIELDS_OT_bake.prepare, bake.ARAPFIELDS_OT_bake.warn_of_weight
+        part = (0, 0)
+        properties = types.SimpleNamespace(is_property_set=lambda name: name in given)
+
+        def add_message(self, level, text):
+            self.said = text
+
+    for name, value in given.items():
+        setattr(Operator, name, value)
+    return Operator()
+
+
+def cancelled_at(operator, stage):
+    """Steps it, cancels it when it says this, and returns what the operator does."""
+    coroutine = operator.coroutine(bpy.context)
+    try:
+        while True:
+            if next(coroutine) is Pause.WORKER:
+                jobs.running().join(0.001)
+            if stage in jobs.running().message:
+                jobs.running().cancel()
+    except StopIteration as ended:
+        return ended.value
+    finally:
+        jobs.stop()
+
+
+def saved_animation(name="Bar", folder=None):
+    """A bar whose right end rises from frame 1 to frame 5, in a saved file; (bar, its folder)."""
+    animated(name)
+    folder = folder or Path(tempfile.mkdtemp())
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "scene.blend"))
+    return bpy.data.objects[name], folder
+
+
+def at(item, frame):
+    """(n, 3) local points of an object as shown at a frame."""
+    whole = int(frame // 1)
+    bpy.context.scene.frame_set(whole, subframe=frame - whole)
+    return local_points(item)
+
+
+def solved(source, frame, kind="DEFORM"):
+    """(n, 3) the solver's own answer at a frame, in local coordinates."""
+    session = Session(bpy.context, source, kind, shown=False, follow=False, in_place=True)
+    run_to_completion(session.reading)
+    whole = int(frame // 1)
+    bpy.context.scene.frame_set(whole, subframe=frame - whole)
+    if session.moves_by_itself:
+        session.read_points(bpy.context, source)
+    session.prepare()
+    return session.solve_from_rest(session.current_request(bpy.context, source)).points
+
+
+def cache_file():
+    return str(Path(tempfile.mkdtemp()) / "bar.pc2")

@@ -1,0 +1,13 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Stepping live sources, as their timer does."""
+
+import bpy
+
+from addon.live import sessions
+
+WAIT = 30  # seconds for a shape to follow
+
+
+def step(refined=False):
+    bpy.context.view_layer.update()
+    sessions.update(bpy.context, wait=WAIT, refined=refined)

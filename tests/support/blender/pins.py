@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pins placed and dragged as the pin tool does."""
+
+import bpy
+import numpy as np
+from support.blender import scenes
+from support.blender.live import step
+
+from addon.pin_tool import drag
+
+
+def pin(source, location, radius=0.15, target=None, **further):
+    """Places a pin at a location as shown, and drags it to a target; its Empty."""
+    dragged = drag.of_new_pin(bpy.context, source, np.array(location, float), radius, **further)
+    if target is not None:
+        dragged.move(bpy.context, target)
+        step()
+    dragged.end(bpy.context)
+    bpy.context.view_layer.update()
+    return dragged.empty.get()
+
+
+def state(source):
+    """All that a cancelled drag must leave as it was."""
+    settings, layer = source.arapfields, bpy.context.view_layer
+    handles = [(e.empty.name, e.kind, e.anchor, tuple(e.rest), tuple(e.colour)) for e in settings.handles]
+    empties = [
+        (o.name, o.location[:], o.rotation_euler[:], o.rotation_quaternion[:], o.scale[:])
+        for o in bpy.data.objects
+    ]
+    flags = settings.hold_far, settings.active_handle, settings.live_kind, layer.objects.active.name
+    chosen = sorted(o.name for o in bpy.context.selected_objects)
+    shape = scenes.world_points(source).tobytes()
+    kinds = bpy.data.objects, bpy.data.meshes, bpy.data.node_groups, bpy.data.scenes, source.modifiers
+    return handles, empties, flags, chosen, shape, [sorted(kind.keys()) for kind in kinds]

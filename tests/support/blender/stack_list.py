@@ -1,0 +1,14 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Stacks of modifiers with the field's own among them."""
+
+STACKS = {  # modifiers, with FIELD where the field's own is; "keys": shape keys
+    "alone": ["FIELD"],
+    "subdivision after": ["FIELD", "SUBSURF"],
+    "subdivision before": ["SUBSURF", "FIELD"],
+    "mirror before": ["MIRROR", "FIELD"],
+    "mirror after": ["FIELD", "MIRROR"],
+    "armature before": ["ARMATURE", "FIELD"],
+    "armature after": ["FIELD", "ARMATURE"],
+    "shape keys": ["keys", "FIELD"],
+    "all": ["keys", "MIRROR", "ARMATURE", "FIELD", "SUBSURF"],
+}

@@ -1,0 +1,13 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A ball to be stylized, and settings for quick styles."""
+
+import bpy
+
+
+def ball(name="Ball"):
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
+    bpy.context.object.name = name
+    return bpy.context.object
+
+
+SETTINGS = {"target": "NEW", "iterations": 60, "samples": 2000, "batch": 200, "width": 32, "layers": 2}
