@@ -3,9 +3,11 @@
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
 #include "bindings/files.h"
+#include "bindings/jet_arrays.h"
 #include "bindings/reports.h"
 #include "fields/apply_field.h"
 #include "fields/inverse.h"
+#include "fields/invertible_probe.h"
 #include "io/files.h"
 
 namespace arapfields::python {
@@ -126,6 +128,21 @@ void bind_fields(py::module_& module) {
           "load", &load, "path"_a,
           "What save() wrote. OSError for a file that cannot be read, InvalidInput naming the file for\n"
           "one that is damaged, foreign, of another kind or version, or holds unusable numbers.");
+}
+
+void bind_invertible_testing(py::module_& module) {
+  testing_module(module).def(
+      "invertible_field",
+      [](int width, int layers, int octaves, int couplings, const Vector& parameters, const Points& points,
+         int columns, const Vector& cotangents) {
+        CouplingShape shape;
+        shape.width = width, shape.layers = layers, shape.octaves = octaves, shape.couplings = couplings;
+        const InvertibleProbe probe =
+            probe_invertible(shape, parameters, points, static_cast<JetOrder>(columns), cotangents);
+        return py::make_tuple(probe.jets, probe.gradient, probe.preimages);
+      },
+      "width"_a, "layers"_a, "octaves"_a, "couplings"_a, "parameters"_a, "points"_a, "columns"_a,
+      "cotangents"_a);
 }
 
 }  // namespace arapfields::python

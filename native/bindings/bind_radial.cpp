@@ -58,8 +58,8 @@ void set_out(RadialSolver& live, const std::optional<ArraysArgument>& targets, I
   if (targets) live.set_targets(moved_handles(live, *targets));
 }
 
-RadialFieldResult solve(RadialSolver& live, const std::optional<ArraysArgument>& targets, Index iterations,
-                        double tolerance, Task* task) {
+RadialFieldResult solved_field(RadialSolver& live, const std::optional<ArraysArgument>& targets,
+                               Index iterations, double tolerance, Task* task) {
   set_out(live, targets, iterations, tolerance);
   run_long(task, [&](const Progress& progress) { return live.solve(iterations, tolerance, progress); });
   return with_report(live);
@@ -134,8 +134,8 @@ void bind_radial(py::module_& module) {
            "(none: for a style\n"
            "alone; the lowest sample is then held). InvalidInput names the handle or option that does not "
            "fit.")
-      .def("solve", &solve, "targets"_a = py::none(), py::kw_only(), "iterations"_a = 0, "tolerance"_a = 0.0,
-           "task"_a = py::none(),
+      .def("solve", &solved_field, "targets"_a = py::none(), py::kw_only(), "iterations"_a = 0,
+           "tolerance"_a = 0.0, "task"_a = py::none(),
            "Follows the handles to `targets` (a 4×4 matrix a handle, three numbers for a point; None: where\n"
            "they are) and returns a DeformationField of its own. `iterations` and `tolerance` replace the "
            "options' for\n"
