@@ -144,7 +144,7 @@ def can_place(source, kind, place):
 
 
 def new_empty(context, source, kind, group, place):
-    """A new Empty: about the selected vertices, amid the vertex group, or at the 3D cursor."""
+    """A new Empty: about the selected vertices, in the middle of the vertex group, or at the 3D cursor."""
     corners = transform(matrix_of(source), np.array(source.bound_box))
     size = float(np.ptp(corners, axis=0).max()) / 6 or 1.0
     if place == "SELECTION":

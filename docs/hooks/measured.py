@@ -86,10 +86,9 @@ def sheet(m):
     grown = min(row["share"] / row["share_rest"] for row in fine)
     worst = max(row["flipped_share"] for row in m.values())
     return (
-        f"none leans by more than {lean:.1f}°, no two feet come apart by more than {100 * apart:.1f} % of "
-        "the height; with twelve and twenty faces the share of the area along the style grows to "
-        f"{grown:.1f} times what it is at rest, or more; at most "
-        f"{100 * worst:.2f} % of the samples folded"
+        f"no figure leans by more than {lean:.1f}°, and no two feet come apart by more than "
+        f"{100 * apart:.1f} % of the height. With twelve and twenty faces the area along the style grows "
+        f"to {grown:.1f} times its share at rest, or more. At most {100 * worst:.2f} % of the samples folded"
     )
 
 
@@ -132,22 +131,21 @@ def fingers():
 
 
 def beside(start, further=""):
-    """Ours and implicit-arap's in the rows of docs/peers.json whose problem begins so."""
+    """A sentence for ours and one for implicit-arap: the rows of docs/peers.json whose problem begins so."""
     rows = json.loads((DOCS / "peers.json").read_text())["rows"]
-    told = []
-    for by in ("ours, default", "implicit-arap"):
+    sentences = []
+    for by, shown in (("ours, default", "Ours"), ("implicit-arap", "implicit-arap")):
         (row,) = [row for row in rows if row.get("by") == by and row["what"].startswith(start)]
         if "mesh_energy" not in row:
-            told.append(f"{by}: {row['said']}")
+            sentences.append(f"{shown}: {row['said']}")
             continue
         others = f", other fingertips {row['others_percent']:.1f} % of the length" if further else ""
-        spent = f" ({row['said']})" if row["said"] else ""
-        told.append(
-            f"{by}{spent}: energy of the mesh {row['mesh_energy']:.3f}, handles off by "
-            f"{row['handle_error_percent']:.2g} % of the size{others}, volume {row['volume_ratio']:.2f}, "
-            f"{row['folded_percent']:.2g} % folded, {row['cpu_s']:.3g} processor seconds"
+        sentences.append(
+            f"{shown}: energy {row['mesh_energy']:.3f}, handle error {row['handle_error_percent']:.2g} % of "
+            f"the size{others}, volume {row['volume_ratio']:.2f}, {row['folded_percent']:.2g} % folded, "
+            f"{row['cpu_s']:.3g} processor seconds"
         )
-    return "; ".join(told)
+    return ". ".join(sentences)
 
 
 def figure6():

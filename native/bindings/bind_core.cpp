@@ -70,7 +70,7 @@ void bind_core(py::module_& module) {
             self.watch(as_points(points, "points"), seconds);
           },
           "points"_a, "seconds"_a = 0.4,
-          "Before a call of deform or stylize: it shall say where its field takes these points (n, 3), at "
+          "Before a call of deform or stylize: it then says where its field takes these points (n, 3), at "
           "once\n"
           "when there is a first result and then about every `seconds`, given a third of its time at most. "
           "The\n"

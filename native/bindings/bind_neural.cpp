@@ -218,7 +218,7 @@ void bind_fit(py::module_& module) {
       "Exact distances near the surface and in the cube are regressed with the mean absolute error; the "
       "hidden\n"
       "layers learn by orthogonalised momentum (Muon; Jordan et al. 2024), the rest by Adam, at a rate that\n"
-      "falls linearly to zero. `callback` is told of each Iteration, whose one term is error, and ends the "
+      "falls linearly to zero. `callback` gets each Iteration, whose one term is error, and ends the "
       "fit\n"
       "by raising StopIteration. report: a FitReport.\n"
       "InvalidInput for a broken mesh or option; Cancelled; Diverged, whose last_good is the state before.");

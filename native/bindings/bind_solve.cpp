@@ -129,7 +129,7 @@ void bind_solve(py::module_& module) {
       "bend + handle_weight · mean squared handle distance (section 4 of As-Rigid-As-Possible "
       "Regularization\n"
       "for Implicit Surfaces, with the stretch as printed there; the authors' package divides it by 3), and\n"
-      "each of `energies`, functions of Jets that return an EnergyValue. `callback` is told of each "
+      "each of `energies`, functions of Jets that return an EnergyValue. `callback` gets each "
       "Iteration\n"
       "(terms: stretch, bend, barrier, handles, invertibility, energies[i], those that there are); raising\n"
       "StopIteration in it ends the solve with what was reached, anything else comes through.\n"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The picture of docs/live.md: python -m tests.benchmarks.live_picture (libigl, matplotlib, the data)."""
+"""A picture of docs/performance.md: python -m tests.benchmarks.live_picture (libigl, matplotlib, data)."""
 
 from pathlib import Path
 

@@ -21,7 +21,6 @@ SECTIONS = {  # titles; a module's first sentence stands below
     "defaults": "From the press to the result",
     "exact": "Exact handles",
     "deform": "Deformation",
-    "jets": "The network's sweeps",
     "stylize": "Stylization",
     "live": "Live",
     "live_compare": "Live: against ARAP of a mesh, by size, and fingers",
@@ -42,7 +41,6 @@ HEADINGS = {
     "handle_error_percent": "handle error, % of the size",
     "ours": "ours, thousand points a second",
     "competitor": "libigl, thousand points a second",
-    "same_side": "share with the same sign",
     "ours_s": "ours, s",
     "theirs_s": "theirs, s",
     "of_products": "time over the bare products'",
@@ -78,7 +76,8 @@ HEADINGS |= {
     "within_10_percent": "area within 10°, %",
     "others_percent": "other fingertips, % of the length",
 }
-HIDDEN = {"ratio", "unit"}  # said by another column
+HIDDEN = {"ratio", "unit", "same_side"}  # said by another column, or a check of the run
+PLOTTED = {"jets"}  # whose rows are bars of the plot alone
 
 
 def groups(rows):
@@ -94,6 +93,8 @@ def groups(rows):
 
 def shown(name, columns):
     """Whether a column is drawn: processor seconds are not beside the same figure by the clock."""
+    if name in ("ours_s", "theirs_s") and "competitor" in columns:
+        return False  # the same as points a second
     twin = {"per_cpu_s": "solves_per_s"}.get(name, name.replace("_per_cpu_s", "").replace("_cpu", ""))
     return name not in HIDDEN and (twin == name or twin not in columns)
 
@@ -186,6 +187,8 @@ def page(results, machine):
             "",
         ]
     for module, rows in results.items():
+        if module in PLOTTED:
+            continue
         blocks += [f"## {SECTIONS.get(module, module)}", "", f"{title(module)}.", ""]
         for alike in groups(rows):
             blocks += [table(alike), ""]

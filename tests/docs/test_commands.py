@@ -105,7 +105,6 @@ EXAMPLE = pages.ROOT / "docs" / "examples" / "cpp"
 COMPILED = {  # pages, and the sources that their blocks are parts of, which tests compile and run
     "development.md": [pages.ROOT / "tests" / "native" / "test_foreign_field.cpp"],
     "cpp.md": sorted(EXAMPLE.glob("*.cpp")),
-    "README.md": [EXAMPLE / "bend.cpp"],
 }
 
 

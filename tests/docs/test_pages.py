@@ -58,7 +58,7 @@ def test_messages_of_the_troubleshooting_page_are_in_the_code():
     code = re.sub(r'"\s*\n\s*"', "", "\n".join(path.read_text() for path in sources))
     missing = []
     for message in re.findall(
-        r"^\| `([^`]+)`", (pages.ROOT / "docs" / "troubleshooting.md").read_text(), re.M
+        r"^[|-] `([^`]+)`", (pages.ROOT / "docs" / "troubleshooting.md").read_text(), re.M
     ):
         missing += [
             part for part in re.split(r"…| i | j ", message) if part.strip() and part.strip() not in code
@@ -124,7 +124,7 @@ def test_the_option_and_the_pages_agree_that_cuda_was_not_run():
     device = options["machine"]["options"]["device"]
     assert "has not been run" in device["choices"]["cuda"][1] and device["default"] == "auto"
     assert device["choices"]["auto"][1].startswith("The processor")
-    said = {"README.md": "never run on a device", "docs/install.md": "not run for want of a device"}
+    said = {"README.md": "never run on a device", "docs/install.md": "has not been run on a device"}
     said["docs/performance.md"] = "No machine with a CUDA device was at hand, so there is no figure"
     missing = [page for page, words in said.items() if words not in (pages.ROOT / page).read_text()]
     assert not missing

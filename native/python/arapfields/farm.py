@@ -5,7 +5,7 @@
     outcomes = farm.map(stylized, sorted(Path("meshes").glob("*.ply")), Client("tcp://head:8786"))
 
 Where tasks run, and again after a worker's end, is Dask's affair. What is added: one mesh that fails stops no
-other, and what became of each is told in order.
+other, and the outcomes are in order.
 """
 
 import asyncio
@@ -48,7 +48,7 @@ def map(
     The function and the items travel to the workers: meshes had better be names of files that all can read,
     and the function one that writes its file whole. Items at work on a worker that dies, and values that die
     with it, are done by another, up to the scheduler's `allowed-failures` (3) deaths. What raises is tried
-    `retries` times again; what is wrong with a mesh is wrong each time, hence 0. `on_done` is told of each
+    `retries` times again; what is wrong with a mesh is wrong each time, hence 0. `on_done` gets each
     outcome as it arrives. An interruption cancels what has not begun. InvalidInput where `client` is no
     Client of `distributed`, ImportError where that is missing.
     """

@@ -231,7 +231,7 @@ class Extraction(_Mesh, Generic[ExtractionReportT]):
 
 @dataclass(frozen=True, kw_only=True)
 class Iteration:
-    """What a callback is told after each iteration."""
+    """What a callback gets after each iteration."""
 
     iteration: int
     """Iterations done, from 1."""

@@ -168,7 +168,7 @@ def read_normals(path):
 
 
 def read_style_object(path):
-    """The ObjectStyle of a mesh file; what the mesh lacks is told of the file."""
+    """The ObjectStyle of a mesh file; errors name the file."""
     vertices, triangles = read_mesh(existing_file(path, MESH_SUFFIXES))
     try:
         return ObjectStyle(vertices, triangles)

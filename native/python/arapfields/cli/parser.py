@@ -240,7 +240,7 @@ def _animate(added):
     parser.add_argument(
         "--shard", type=shard, metavar="I/N", help="solve the part I of N; the last part writes the output"
     )
-    parser.add_argument("--up-axis", choices=usd.AXES, default="z", help="what USD is told is up [z]")
+    parser.add_argument("--up-axis", choices=usd.AXES, default="z", help="upward axis of the USD file [z]")
     parser.add_argument("--secondary", action="store_true", help="lag behind the handles, and settle")
     add_option_flags(parser, "secondary", "secondary motion (--secondary)")
     add_option_flags(
