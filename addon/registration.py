@@ -6,15 +6,14 @@ import importlib
 
 import bpy
 
-from . import lifecycle
+from . import lifecycle, object_properties
 from .blender import guide, host
-from .properties import item
 
 CONTENTS = [  # modules with CLASSES
     # what is stored in the .blend: object.arapfields
     *("handles.properties", "carried.properties", "poses.properties", "pin_tool.properties"),
     *("stiffness.properties", "live.properties", "animation.properties", "wrap.properties"),
-    *("properties.settings", "properties.item"),
+    *("properties.solve_settings", "object_properties"),
     # features
     *("surface.operators", "surface.panel"),
     *("handles.operators", "handles.resizing", "handles.panel"),
@@ -36,7 +35,7 @@ def register():
     try:
         for cls in CLASSES:
             bpy.utils.register_class(cls)
-        item.attach()
+        object_properties.attach()
         guide.begin(CLASSES)
         lifecycle.register()
     except Exception:
@@ -55,7 +54,7 @@ def unregister():
     atexit.unregister(lifecycle.end_threads)
     lifecycle.unregister()
     guide.end()
-    item.detach()
+    object_properties.detach()
     for cls in reversed(CLASSES):
         if "bl_rna" in vars(cls):  # is registered; gizmo groups have no other way to tell
             bpy.utils.unregister_class(cls)

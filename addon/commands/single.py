@@ -107,9 +107,9 @@ def solve(source, options):
     given |= {name: given[name].upper() for name in UPPER if name in given}
     if "style" in given:
         given["style"] = style_identifier(given["style"])
-    if "result" in given:
-        given["output"] = given.pop("result")
-    given["target"] = "NEW"
+    if "result" in given:  # the flag says what is made
+        given["output"] = given["result"]
+    given["result"] = "NEW"
     if "quality" in given:
         settings_of(source).fit.quality = given.pop("quality")
     begin = time.perf_counter()

@@ -14,8 +14,9 @@ from ..handles import empties, scaling
 from ..handles.native_handles import native_handles
 from ..live.giving_way import give_way
 from ..names import Op
-from ..properties.item import result_properties
-from .solve_job import SolveOperator, destination, plan_solve_job
+from ..properties.choices import result_properties
+from ..results.placement import destination
+from .solve_job import SolveOperator, plan_solve_job
 
 
 class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):

@@ -7,7 +7,7 @@ from ..core.settings.parameters import DEFORM
 from ..handles import empties
 from ..live.panel import live_buttons
 from ..names import Op
-from .solve_job import placement_refusal
+from ..results.placement import placement_refusal
 
 
 class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):

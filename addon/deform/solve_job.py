@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What deforming and stylizing share: a field is solved on the worker, then moves a mesh."""
 
-from dataclasses import dataclass, field
-
 import bpy
 import numpy as np
 
@@ -13,43 +11,32 @@ from ..blender.property_definitions import effective_value
 from ..carried.carrying import Carrying
 from ..carried.world_matrices import depsgraph_of
 from ..core.errors import UserError
-from ..core.geometry.edges import Topology
 from ..core.runtime import native
 from ..core.runtime.jobs import Item
 from ..jobs.job_operator import JobOperator
 from ..poses import applying
 from ..results import placement, visibility
+from ..results.placement import SolvedMesh, destination, placement_refusal
 from ..surface.source_surface import read_surface
 from ..viewport.previews import Preview
 from .first_result import FirstResult
 
 
-@dataclass
-class SolvedMesh:
-    """What the worker hands back, in local coordinates."""
-
-    vertices: np.ndarray
-    topology: Topology | None  # of the implicit surface; None for the source's own mesh
-    report: dict
-    turns: np.ndarray | None = None  # (n, 3) axis · angle, for free custom normals
-    carried: list = field(default_factory=list)  # what Carrying.moved made
-
-
 def plan_solve_job(context, operator, source, kind, samples, seed, solve):
     """The job's item. `solve(tracker, surface, samples, weight)` returns the field, on the worker."""
     settings = settings_of(source)
-    output, target = destination(settings, operator)
-    reason = placement.refusal(source, output, target)
+    output, result = destination(settings, operator)
+    reason = placement.refusal(source, output, result)
     if reason is not None:
         raise reason
     exact = effective_value("surface", settings, operator) == "EXACT"
     extraction = {name: effective_value(name, settings, operator) for name in ("resolution", "refine_thin")}
-    carrying, in_place = Carrying(context, source), placement.in_place(output, target)
+    carrying, in_place = Carrying(context, source), placement.in_place(output, result)
     surface = read_surface(context, source, in_place, exact=exact, carrying=carrying)
     frames = carrying.poses(surface.space, depsgraph_of(context))
 
     found = []  # the field and its samples
-    shown = FirstResult if placement.keeps_mesh(output, target) else Preview
+    shown = FirstResult if placement.keeps_mesh(output, result) else Preview
     preview = shown(surface) if operator.in_window else None
 
     def work(tracker):
@@ -70,7 +57,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
             after = field(before)
         if not np.isfinite(after).all():
             raise UserError("the result has vertices that are not finite; try other settings")
-        turns = surface.turns(field, before) if placement.keeps_mesh(output, target) else None
+        turns = surface.turns(field, before) if placement.keeps_mesh(output, result) else None
         found.append((field, points))
         carried = carrying.moved(native.library(), points, field, frames)
         local = surface.space.to_local(after)
@@ -82,7 +69,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
         if preview is not None:
             preview.clear()
         owner = surface.reference.get()
-        item = placement.place_result(bpy.context, owner, kind, output, target, solved, surface.local)
+        item = placement.place_result(bpy.context, owner, kind, output, result, solved, surface.local)
         applying.note(owner, *found[-1], surface.space)
         carrying.put(bpy.context, solved.carried)
         operator.warnings += [f"{owner.name}: {translated(reason)}" for reason in carrying.take_warnings()]
@@ -90,19 +77,6 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
         return describe(shown, solved.report)
 
     return Item(source.name, work, apply, preview)
-
-
-def destination(settings, operator):
-    """(output, target) of a call: what is made, and where it goes."""
-    output = effective_value("output", settings, operator)
-    return output, placement.effective_target(output, effective_value("target", settings, operator))
-
-
-def placement_refusal(source):
-    """Why a result cannot go where the object's settings say, as a UserError; None where it can."""
-    settings = settings_of(source)
-    target = placement.effective_target(settings.output, settings.target)
-    return placement.refusal(source, settings.output, target)
 
 
 class SolveOperator(JobOperator):

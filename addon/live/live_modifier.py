@@ -6,7 +6,6 @@ import numpy as np
 from ..blender import modifier_stack
 from ..blender.object_references import settings_of
 from ..core.errors import UserError
-from ..deform.solve_job import SolvedMesh
 from ..field_modifier import armatures, cache_modifier, motion
 from ..results import placement, visibility
 from .live_object import LIVE
@@ -64,7 +63,7 @@ class LiveModifier:
             and shape is not None
             and not placement.refusal(source, "WARP", target)
         ):
-            solved = SolvedMesh(shape.points.astype(np.float64), None, {"output": LIVE})
+            solved = placement.SolvedMesh(shape.points.astype(np.float64), None, {"output": LIVE})
             placement.place_result(context, source, kind, "WARP", target, solved, shape.rest)
         return source
 

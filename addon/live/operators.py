@@ -8,10 +8,10 @@ from ..blender.object_references import refusal, source_of
 from ..core.errors import UserError
 from ..core.runtime import jobs, native
 from ..core.settings.choices import LIVE_KINDS
-from ..deform.solve_job import placement_refusal
 from ..handles import empties
 from ..jobs.job_operator import busy
 from ..names import Op
+from ..results.placement import placement_refusal
 from . import sessions
 
 

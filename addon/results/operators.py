@@ -4,13 +4,18 @@ import bpy
 from ..blender import mesh_arrays, modifier_stack
 from ..blender.language import translated
 from ..blender.object_references import settings_of, source_of
+from ..blender.property_definitions import effective_value, effective_values
 from ..blender.source_operator import SourceOperator
-from ..carried import carried_objects
+from ..carried import carried_objects, rest_bones
 from ..core.errors import UserError
+from ..core.runtime.jobs import Item
+from ..core.settings.parameters import EXTRACTION
 from ..field_modifier import motion
+from ..jobs.job_operator import JobOperator
 from ..names import Op
-from ..wrap import rigs
-from . import placement, result_objects
+from ..properties.choices import extraction, surface
+from ..surface.source_surface import read_surface
+from . import placement, result_objects, visibility
 
 
 class FieldOperator(SourceOperator):
@@ -60,8 +65,7 @@ class ARAPFIELDS_OT_remove_field(FieldOperator, bpy.types.Operator):
 
     def execute(self, context):
         try:
-            for rig in rigs.of(source_of(context)):
-                rigs.reset(context, rig)
+            rest_bones.reset(context, source_of(context))
         except UserError as error:
             self.report({"WARNING"}, translated(error))
         motion.remove(source_of(context))
@@ -69,4 +73,36 @@ class ARAPFIELDS_OT_remove_field(FieldOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = [ARAPFIELDS_OT_apply_as_shape_key, ARAPFIELDS_OT_remove_field]
+class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):
+    """Make a mesh of the implicit surface itself, undeformed"""
+
+    bl_idname = Op.EXTRACT
+    bl_label = "Extract Surface"
+    bl_options = {"UNDO"}
+    title = "Extract"
+    guide = "results"
+
+    __annotations__ = {"surface": surface(options={"SKIP_SAVE"}), **extraction(options={"SKIP_SAVE"})}
+
+    def plan(self, context, source, _):
+        settings = settings_of(source)
+        shape = read_surface(context, source, exact=effective_value("surface", settings, self) == "EXACT")
+        grid = effective_values(EXTRACTION, settings, self)
+
+        def work(tracker):
+            vertices, topology = shape.extract(tracker, 0.8, **grid)
+            return shape.space.to_local(vertices), topology
+
+        def apply(mesh):
+            owner = shape.reference.get()
+            report = {"resolution": grid["resolution"], "vertices": len(mesh[0]), "triangles": len(mesh[1])}
+            item = result_objects.show(
+                bpy.context, owner, "EXTRACT", "SURFACE", result_objects.surface_mesh(owner, *mesh), report
+            )
+            said = translated("{name} with {count} triangles", name=item.name, count=f"{len(mesh[1]):,}")
+            return said + visibility.told(visibility.show_alone(owner, item))
+
+        return Item(source.name, work, apply)
+
+
+CLASSES = [ARAPFIELDS_OT_extract, ARAPFIELDS_OT_apply_as_shape_key, ARAPFIELDS_OT_remove_field]

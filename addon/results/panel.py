@@ -15,7 +15,7 @@ class ARAPFIELDS_PT_result(Advanced, bpy.types.Panel):
     def fill(self, context, source, settings):
         layout = self.layout
         layout.prop(settings, "output")
-        layout.prop(settings, "target")
+        layout.prop(settings, "result")
         layout.prop(settings, "resolution")
         layout.prop(settings, "refine_thin")
         layout.prop(settings, "normals")

@@ -2,41 +2,70 @@
 """What a solve made goes where the user wants it: a modifier, a new object, the mesh itself, a shape key."""
 
 import json
+from dataclasses import dataclass, field
 
 import bpy
+import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack
 from ..blender.object_references import settings_of
+from ..blender.property_definitions import effective_value
 from ..core.errors import UserError
+from ..core.geometry.edges import Topology
 from ..field_modifier import armatures, motion
 from ..handles import empties
 from ..names import REPORT
 from . import result_objects
 
 
-def effective_target(output, target):
+@dataclass
+class SolvedMesh:
+    """What the worker hands back, in local coordinates."""
+
+    vertices: np.ndarray
+    topology: Topology | None  # of the implicit surface; None for the source's own mesh
+    report: dict
+    turns: np.ndarray | None = None  # (n, 3) axis · angle, for free custom normals
+    carried: list = field(default_factory=list)  # what Carrying.moved made
+
+
+def destination(settings, operator):
+    """(output, result) of a call: what is made, where it goes; `target` is the earlier name of the latter."""
+    given = operator.properties.is_property_set
+    name = "target" if given("target") and not given("result") else "result"
+    output = effective_value("output", settings, operator)
+    return output, effective_result(output, effective_value(name, settings, operator))
+
+
+def placement_refusal(source):
+    """Why a result cannot go where the object's settings say, as a UserError; None where it can."""
+    settings = settings_of(source)
+    return refusal(source, settings.output, effective_result(settings.output, settings.result))
+
+
+def effective_result(output, result):
     """Where a result goes: surfaces, which no modifier can make of the mesh, go to a new object."""
-    return "NEW" if target == "MODIFIER" and output != "WARP" else target
+    return "NEW" if result == "MODIFIER" and output != "WARP" else result
 
 
-def keeps_mesh(output, target):
+def keeps_mesh(output, result):
     """Whether the source's own vertices take the result as a modifier."""
-    return output == "WARP" and target == "MODIFIER"
+    return output == "WARP" and result == "MODIFIER"
 
 
-def in_place(output, target):
+def in_place(output, result):
     """Whether the shape that is worked on is that at the modifier's place, rather than all that is shown."""
-    return output == "WARP" and target != "NEW"
+    return output == "WARP" and result != "NEW"
 
 
-def place_result(context, source, kind, output, target, moved, before):
-    """Puts `moved`, a SolvedMesh, where `target` says; `before` are the vertices at rest."""
-    if target == "NEW":
+def place_result(context, source, kind, output, result, moved, before):
+    """Puts `moved`, a SolvedMesh, where `result` says; `before` are the vertices at rest."""
+    if result == "NEW":
         return new_object(context, source, kind, output, moved, before)
-    reason = refusal(source, output, target)
+    reason = refusal(source, output, result)
     if reason is not None:
         raise reason
-    if keeps_mesh(output, target):
+    if keeps_mesh(output, result):
         motion.bind(context, source)
         motion.write(source, motion.Motion(moved.vertices - before, moved.turns))
         source[REPORT] = json.dumps(moved.report)
@@ -48,7 +77,7 @@ def place_result(context, source, kind, output, target, moved, before):
         old, source.data = source.data, mesh
         if old.users == 0:
             bpy.data.meshes.remove(old)
-    elif target == "KEY" or source.data.shape_keys is not None:
+    elif result == "KEY" or source.data.shape_keys is not None:
         single_user(source)
         if source.data.shape_keys is None:
             source.shape_key_add(name="Basis", from_mix=False)
@@ -59,7 +88,7 @@ def place_result(context, source, kind, output, target, moved, before):
     armatures.silence(source)
     motion.discard(source)  # what it moved is part of the mesh now
     source[REPORT] = json.dumps(moved.report)
-    if target == "REPLACE":
+    if result == "REPLACE":
         for entry in empties.used(source):
             empties.store_rest(source, entry)
     return source
@@ -76,11 +105,11 @@ def new_object(context, source, kind, output, moved, before):
     return item
 
 
-def refusal(source, output, target):
+def refusal(source, output, result):
     """Why the source itself cannot take the result, as a UserError; None where it can."""
-    if target == "NEW":
+    if result == "NEW":
         return None
-    if keeps_mesh(output, target):
+    if keeps_mesh(output, result):
         reason = motion.refusal(source)
     elif source.library is not None or source.data.library is not None:
         reason = UserError(
@@ -88,11 +117,11 @@ def refusal(source, output, target):
         )
     else:
         reason = None
-    if reason is None and target == "REPLACE" and settings_of(source).carried:
+    if reason is None and result == "REPLACE" and settings_of(source).carried:
         reason = UserError("{name} carries other objects; choose Modifier for the result", name=source.name)
-    if reason is None and output != "WARP" and target == "KEY":
+    if reason is None and output != "WARP" and result == "KEY":
         reason = UserError("a shape key keeps the mesh; choose Original Mesh for the output")
-    if reason is None and output == "WARP" and not keeps_mesh(output, target):
+    if reason is None and output == "WARP" and not keeps_mesh(output, result):
         reason = refusal_of_stack(source)
     return reason
 

@@ -11,13 +11,13 @@ from ..blender.source_operator import SourceOperator
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
 from ..core.settings.styles import STYLIZE
-from ..deform.solve_job import SolveOperator, destination, plan_solve_job
+from ..deform.solve_job import SolveOperator, plan_solve_job
 from ..handles import empties
 from ..handles.native_handles import native_handles
 from ..live.giving_way import give_way
 from ..names import Op
-from ..properties.item import result_properties
-from ..properties.settings import frame, style
+from ..properties.choices import frame, result_properties, style
+from ..results.placement import destination
 from . import preference
 
 

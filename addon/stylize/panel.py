@@ -5,10 +5,10 @@ from ..blender.icons import icon
 from ..blender.object_references import settings_of, source_of
 from ..blender.section import Advanced, Section, job_button, note, presets, settings_column
 from ..core.settings.styles import CUSTOM, STYLIZE
-from ..deform.solve_job import placement_refusal
 from ..live.panel import live_buttons
 from ..names import Op
-from ..properties.settings import STYLE_ITEMS
+from ..properties.choices import STYLE_ITEMS
+from ..results.placement import placement_refusal
 from . import ball, preference
 
 PLAIN = {"AXES": "EMPTY_AXIS", "OBJECT": "MESH_MONKEY"}  # icons of styles that have no picture

@@ -7,16 +7,13 @@ from ..blender.guide import Guided
 from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..blender.presets import preset_classes
-from ..blender.property_definitions import annotations, effective_value
+from ..blender.property_definitions import annotations
 from ..blender.user_preferences import fit_cache
 from ..core.runtime.jobs import Item
 from ..core.settings.fitting import FIT
 from ..jobs.job_operator import JobOperator, busy
 from ..names import Op
-from ..properties.item import refine_thin, resolution
-from ..properties.item import surface as surface_choice
-from ..properties.settings import quality
-from ..results import result_objects, visibility
+from ..properties.choices import quality
 from . import staleness
 from .source_surface import read_surface
 
@@ -57,41 +54,6 @@ class ARAPFIELDS_OT_fit(JobOperator, bpy.types.Operator):
         return Item(source.name, work, apply)
 
 
-class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):
-    """Make a mesh of the implicit surface itself, undeformed"""
-
-    bl_idname = Op.EXTRACT
-    bl_label = "Extract Surface"
-    bl_options = {"UNDO"}
-    title = "Extract"
-    guide = "results"
-
-    resolution: resolution(options={"SKIP_SAVE"})
-    refine_thin: refine_thin(options={"SKIP_SAVE"})
-    surface: surface_choice(options={"SKIP_SAVE"})
-
-    def plan(self, context, source, _):
-        exact = effective_value("surface", settings_of(source), self) == "EXACT"
-        surface = read_surface(context, source, exact=exact)
-        cells = effective_value("resolution", settings_of(source), self)
-        refine_thin = effective_value("refine_thin", settings_of(source), self)
-
-        def work(tracker):
-            vertices, topology = surface.extract(tracker, 0.8, resolution=cells, refine_thin=refine_thin)
-            return surface.space.to_local(vertices), topology
-
-        def apply(mesh):
-            owner = surface.reference.get()
-            report = {"resolution": cells, "vertices": len(mesh[0]), "triangles": len(mesh[1])}
-            item = result_objects.show(
-                bpy.context, owner, "EXTRACT", "SURFACE", result_objects.surface_mesh(owner, *mesh), report
-            )
-            said = translated("{name} with {count} triangles", name=item.name, count=f"{len(mesh[1]):,}")
-            return said + visibility.told(visibility.show_alone(owner, item))
-
-        return Item(source.name, work, apply)
-
-
 class ARAPFIELDS_OT_clear_cache(Guided, bpy.types.Operator):
     """Delete every fitted surface from disk; they are fitted again when needed"""
 
@@ -112,7 +74,6 @@ class ARAPFIELDS_OT_clear_cache(Guided, bpy.types.Operator):
 
 CLASSES = [
     ARAPFIELDS_OT_fit,
-    ARAPFIELDS_OT_extract,
     ARAPFIELDS_OT_clear_cache,
     *preset_classes("fit", "Fit", FIT, given=False),
 ]

@@ -12,16 +12,18 @@ from ..blender.object_references import settings_of, source_of
 from ..blender.presets import preset_classes
 from ..blender.property_definitions import annotations, effective_value, effective_values
 from ..blender.source_operator import SourceOperator
+from ..carried import rest_bones
 from ..core.errors import UserError
 from ..core.geometry.spaces import space_of, transform
 from ..core.runtime import native
 from ..core.settings.wrapping import WRAP
-from ..deform.solve_job import SolveOperator, destination, plan_solve_job
+from ..deform.solve_job import SolveOperator, plan_solve_job
 from ..handles.empties import matrix_of
 from ..live.giving_way import give_way
 from ..names import Op
-from ..properties.item import result_properties
-from . import landmarks, rigs
+from ..properties.choices import result_properties
+from ..results.placement import destination
+from . import landmarks
 from .properties import fit_rig
 
 onto = bpy.props.StringProperty(
@@ -71,9 +73,13 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
         space = space_of(source.matrix_world, source.name)
         other = landmarks.target_of(source, self.onto)
         fitting = below = None
-        if effective_value("fit_rig", settings.wrap, self) and self.in_place(source) and rigs.of(source):
+        if (
+            effective_value("fit_rig", settings.wrap, self)
+            and self.in_place(source)
+            and rest_bones.armatures_of(source)
+        ):
             before = landmarks.at_rest(context, source)
-            fitting, below = rigs.Fitting(source, space), rigs.Below(source)
+            fitting, below = rest_bones.Fitting(source, space), rest_bones.BeforeArmatures(source)
             self.below.append(below)
             pairs = landmarks.read(source, space, before, landmarks.at_rest(context, source))
         else:
@@ -167,14 +173,15 @@ class ARAPFIELDS_OT_reset_bones(SourceOperator, bpy.types.Operator):
 
     @classmethod
     def refuses(cls, source):
-        if any(settings_of(rig).rest_bones for rig in rigs.of(source)):
-            return None
-        return UserError("no bones were fitted to {name}", name=source.name)
+        return (
+            None
+            if rest_bones.fitted(source)
+            else UserError("no bones were fitted to {name}", name=source.name)
+        )
 
     def execute(self, context):
         try:
-            for rig in rigs.of(source_of(context)):
-                rigs.reset(context, rig)
+            rest_bones.reset(context, source_of(context))
         except UserError as error:
             self.report({"ERROR"}, translated(error))
             return {"CANCELLED"}

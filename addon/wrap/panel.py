@@ -2,13 +2,13 @@
 import bpy
 
 from ..blender import modifier_stack
-from ..blender.object_references import settings_of
 from ..blender.section import Advanced, Section, job_button, note, presets, settings_column
+from ..carried import rest_bones
 from ..core.settings.wrapping import WRAP
-from ..deform.solve_job import placement_refusal
 from ..field_modifier import inputs
 from ..names import Op
-from . import landmarks, rigs
+from ..results.placement import placement_refusal
+from . import landmarks
 
 
 class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
@@ -31,12 +31,11 @@ class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
             row.prop(entry, "on_target", text="")
             row.operator(Op.REMOVE_LANDMARK, text="", icon="X").index = index
         settings_column(layout, wrap, WRAP, advanced=False)
-        fitted = rigs.of(source)
-        if fitted:
+        if rest_bones.armatures_of(source):
             layout.prop(wrap, "fit_rig")
         job_button(layout, Op.WRAP, "MOD_SHRINKWRAP")
         factor_slider(layout, source)
-        if any(settings_of(rig).rest_bones for rig in fitted):
+        if rest_bones.fitted(source):
             layout.operator(Op.RESET_BONES, icon="BONE_DATA")
         note(layout, landmarks.refusal(source), placement_refusal(source))
 

@@ -11,6 +11,7 @@ ADDON = Path(__file__).resolve().parents[2] / "addon"
 ORDER = [
     "core",
     "blender",
+    "properties",
     "jobs",
     "field_modifier",
     "handles",

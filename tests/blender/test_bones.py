@@ -82,7 +82,7 @@ def test_a_bone_equals_a_constrained_empty_with_the_same_region():
         posed(0.7)
         scenes.activate(bar)
         asked.append(handles_of(bar))
-        assert bpy.ops.arapfields.deform(**QUICK, target="MODIFIER") == {"FINISHED"}
+        assert bpy.ops.arapfields.deform(**QUICK, result="MODIFIER") == {"FINISHED"}
         found.append(scenes.world_points(bar))
         bpy.ops.arapfields.remove_field()
     moved = np.linalg.norm(found[0] - 1.2 * rest, axis=1)
@@ -186,7 +186,7 @@ def test_a_replaced_mesh_is_not_posed_again():
     bpy.ops.arapfields.add_bones()
     rig.pose.bones["Second"].rotation_euler.z = 0.5
     scenes.activate(bar)
-    assert bpy.ops.arapfields.deform(**QUICK, target="REPLACE") == {"FINISHED"}
+    assert bpy.ops.arapfields.deform(**QUICK, result="REPLACE") == {"FINISHED"}
     once = scenes.world_points(bar)
-    assert bpy.ops.arapfields.deform(**QUICK, target="REPLACE") == {"FINISHED"}
+    assert bpy.ops.arapfields.deform(**QUICK, result="REPLACE") == {"FINISHED"}
     assert np.abs(scenes.world_points(bar) - once).max() < 0.01 and np.ptp(once, axis=0)[1] > 0.6

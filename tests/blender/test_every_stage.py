@@ -52,7 +52,7 @@ def test_nothing_breaks(action, stage, which):
 @in_blender
 def test_undone_past_live_and_back_leaves_nothing_astray(target):
     bar, _, moving = scenes.bar_with_handles()
-    bar.arapfields.target = target
+    bar.arapfields.result = target
     moving.location.z += stages.LIFT
     bpy.context.view_layer.update()
     bpy.ops.ed.undo_push(message="before")

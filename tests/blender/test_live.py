@@ -60,7 +60,7 @@ def test_off_restores_what_was_there():
 @in_blender
 def test_a_live_shape_can_be_kept(target):
     bar, _, moving = scenes.bar_with_handles()
-    bar.arapfields.target = target
+    bar.arapfields.result = target
     scenes.decorate(bar)
     whole, names = scenes.everything(bar), sorted(bpy.data.objects.keys())
     bpy.ops.arapfields.live()
@@ -131,7 +131,7 @@ def test_playback_is_followed():
 def test_a_file_saved_while_live_shows_the_same_shape_as_a_result(target):
     """On the source, or on an object of its own; the panel says so, and nothing is live."""
     bar, _, moving = scenes.bar_with_handles()
-    bar.arapfields.target = target
+    bar.arapfields.result = target
     bpy.ops.arapfields.live()
     moving.location.z += 0.4
     step()

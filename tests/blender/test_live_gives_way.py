@@ -11,9 +11,9 @@ if IN_BLENDER:
     from support.blender.live import step
 
     from addon.core.runtime import jobs
-    from addon.deform.solve_job import placement_refusal
     from addon.live import sessions
     from addon.pin_tool import drag
+    from addon.results.placement import placement_refusal
 
 FINE = 0.03  # of the bar, by which a live shape and the solve of its pose may differ
 
@@ -21,7 +21,7 @@ FINE = 0.03  # of the bar, by which a live shape and the solve of its pose may d
 def lifted(target="MODIFIER"):
     """(bar, its points at rest): live, its end lifted and the shape there."""
     bar, _, moving = scenes.bar_with_handles()
-    bar.arapfields.target = target
+    bar.arapfields.result = target
     rest = scenes.world_points(bar)
     bpy.ops.arapfields.live()
     moving.location.z += 0.4

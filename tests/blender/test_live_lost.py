@@ -18,7 +18,7 @@ if IN_BLENDER:
 @in_blender
 def test_live_ends_when_its_source_or_its_object_is_deleted(which):
     bar, _, moving = scenes.bar_with_handles()
-    bar.arapfields.target = "NEW" if which == "live object" else "MODIFIER"
+    bar.arapfields.result = "NEW" if which == "live object" else "MODIFIER"
     bpy.ops.arapfields.live()
     if which == "modifier":
         bar.modifiers.remove(bar.modifiers[0])
@@ -73,7 +73,7 @@ def test_live_waits_while_its_source_is_in_edit_mode():
 @in_blender
 def test_a_live_object_that_undo_left_in_no_scene_goes_too():
     bar, *_ = scenes.bar_with_handles()
-    bar.arapfields.target = "NEW"
+    bar.arapfields.result = "NEW"
     bpy.ops.arapfields.live()
     delete(bpy.data.objects["Bar_live"])
     bar.arapfields.results.clear()  # as in the step before

@@ -43,7 +43,7 @@ def counted(item):
 @in_blender
 def test_a_render_of_an_animation_follows_the_handles_while_live(target):
     bar = animated()
-    bar.arapfields.target = target
+    bar.arapfields.result = target
     scene, folder = camera(), Path(tempfile.mkdtemp())
     scene.frame_set(1)
     bpy.ops.arapfields.live()

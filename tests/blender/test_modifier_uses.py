@@ -77,7 +77,7 @@ def test_replacing_or_keying_supersedes_the_modifier():
         bpy.ops.arapfields.deform(**scenes.QUICK)
         moved = local_points(bar)
         scenes.activate(bar)
-        bpy.ops.arapfields.deform(target=target, **scenes.QUICK)
+        bpy.ops.arapfields.deform(result=target, **scenes.QUICK)
         assert [modifier.name for modifier in bar.modifiers] == ["Subdivision"]
         assert np.abs(local_points(bar) - moved).max() < 1e-5
 

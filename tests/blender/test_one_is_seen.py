@@ -32,7 +32,7 @@ def test_each_result_takes_the_place_of_the_one_before():
     bpy.ops.arapfields.deform(**scenes.NEW)
     assert seen() == ["Bar_deformed"]
     scenes.activate(bar)
-    bpy.ops.arapfields.deform(**scenes.QUICK, target="MODIFIER")
+    bpy.ops.arapfields.deform(**scenes.QUICK, result="MODIFIER")
     assert seen() == ["Bar"] and bar.modifiers
 
 
@@ -49,7 +49,7 @@ def test_what_the_user_has_moved_aside_or_hidden_stays_so():
     bpy.data.objects.remove(bpy.data.objects["Bar_deformed"])
     bar.arapfields.set_aside = False  # hidden by the user
     scenes.activate(bar)
-    bpy.ops.arapfields.deform(**scenes.QUICK, target="MODIFIER")
+    bpy.ops.arapfields.deform(**scenes.QUICK, result="MODIFIER")
     assert seen() == []
 
 
@@ -60,7 +60,7 @@ def test_live_mode_shows_its_shape_alone_and_gives_back_what_was_seen():
     bpy.context.view_layer.update()
     bpy.ops.arapfields.deform(**scenes.NEW)
     for target, shown in (("NEW", "Bar_live"), ("MODIFIER", "Bar")):
-        bar.arapfields.target = target
+        bar.arapfields.result = target
         scenes.activate(bar)
         bpy.ops.arapfields.live()
         step()
@@ -81,5 +81,5 @@ def test_a_render_sees_the_source_again_when_it_takes_the_result_itself():
     bpy.data.objects.remove(bpy.data.objects["Bar_deformed"])
     bar.hide_set(False)
     scenes.activate(bar)
-    bpy.ops.arapfields.deform(**scenes.QUICK, target="MODIFIER")
+    bpy.ops.arapfields.deform(**scenes.QUICK, result="MODIFIER")
     assert seen() == ["Bar"]

@@ -76,7 +76,7 @@ def test_what_a_button_would_refuse_is_said_before(case):
         bar.data.clear_geometry()
         bar.data.from_pydata(points, [], [])
     elif case == "a key of a surface":
-        ours.output, ours.target = "SURFACE", "KEY"
+        ours.output, ours.result = "SURFACE", "KEY"
     section, text = REFUSED[case]
     assert text in " ".join(drawn()[section])
 

@@ -110,10 +110,10 @@ def test_the_last_pin_takes_the_motion_with_it():
 @in_blender
 def test_what_cannot_be_pinned_is_named():
     bar = scenes.bar()
-    bar.arapfields.target = "NEW"
+    bar.arapfields.result = "NEW"
     with pytest.raises(RuntimeError, match="Bar"):
         bpy.ops.arapfields.pin_add(location=(1, 0, 0.25))
-    bar.arapfields.target = "MODIFIER"
+    bar.arapfields.result = "MODIFIER"
     assert bpy.ops.arapfields.pin_add(location=(1, 0, 0.25), radius=0.2) == {"FINISHED"}
 
 

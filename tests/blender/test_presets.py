@@ -61,7 +61,7 @@ def test_the_papers_own_settings_are_a_preset_and_the_defaults_come_back(section
     wanted = options.preset("paper")
     group.width = 100
     operator = getattr(bpy.ops.arapfields, f"{section}_given_preset")
-    before = bar.arapfields.target
+    before = bar.arapfields.result
     assert operator(preset="PAPER") == {"FINISHED"}
     shown = [name for name in group.__annotations__ if hasattr(wanted, name)]
     assert {"field", "optimizer", "learning_rate", "iterations", "bending_unit"} <= {*shown}
@@ -69,7 +69,7 @@ def test_the_papers_own_settings_are_a_preset_and_the_defaults_come_back(section
         value = getattr(group, name)
         assert value == (pytest.approx(getattr(wanted, name)) if isinstance(value, float) else value), name
         assert isinstance(value, float) or value == getattr(wanted, name), name
-    assert operator(preset="DEFAULT") == {"FINISHED"} and bar.arapfields.target == before
+    assert operator(preset="DEFAULT") == {"FINISHED"} and bar.arapfields.result == before
     assert group.width == options().width and group.optimizer == options().optimizer
 
 

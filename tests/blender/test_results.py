@@ -15,7 +15,7 @@ if IN_BLENDER:
 
     import addon.deform.operators as deform
     from addon.core.runtime import jobs
-    from addon.deform.solve_job import placement_refusal
+    from addon.results.placement import placement_refusal
 
 
 @in_blender
@@ -27,14 +27,14 @@ def test_replacing_moves_the_source_and_keeps_all_else():
     bpy.context.collection.objects.link(other)
     bar.keyframe_insert("location", frame=1)
     moving.location.z += 0.4
-    bpy.ops.arapfields.deform(target="REPLACE", **scenes.QUICK)
+    bpy.ops.arapfields.deform(result="REPLACE", **scenes.QUICK)
     moved = scenes.world_points(bar) - points
     assert scenes.everything(bar) == before
     assert np.abs(moved[points[:, 0] > 0.8].mean(axis=0) - [0, 0, 0.4]).max() < 0.1
     assert other.data != bar.data and np.array_equal(scenes.world_points(other), points)
     assert bar.animation_data.action is not None and "Bar_deformed" not in bpy.data.objects
     again = scenes.world_points(bar)
-    bpy.ops.arapfields.deform(target="REPLACE", **scenes.QUICK)  # the handles are at rest now
+    bpy.ops.arapfields.deform(result="REPLACE", **scenes.QUICK)  # the handles are at rest now
     assert np.abs(scenes.world_points(bar) - again).max() < 0.02
 
 
@@ -44,7 +44,7 @@ def test_a_shape_key_of_the_source_carries_the_motion():
     before = scenes.world_points(bar)
     moving.location.z += 0.4
     for _ in range(2):
-        bpy.ops.arapfields.deform(target="KEY", **scenes.QUICK)
+        bpy.ops.arapfields.deform(result="KEY", **scenes.QUICK)
         keys = bar.data.shape_keys.key_blocks
         assert [key.name for key in keys] == ["Basis", "ARAP Fields"]
         keys["ARAP Fields"].value = 0.0
@@ -62,9 +62,30 @@ def test_the_surface_can_take_the_sources_place():
         setattr(bar.arapfields.fit, name, value)
     moving.location.z += 0.2
     count = len(bar.data.vertices)
-    bpy.ops.arapfields.deform(target="REPLACE", output="SURFACE", resolution=40, **scenes.QUICK)
+    bpy.ops.arapfields.deform(result="REPLACE", output="SURFACE", resolution=40, **scenes.QUICK)
     assert len(bar.data.vertices) != count and len(bar.data.polygons) > 500
     assert len(bpy.data.objects) == 3
+
+
+@in_blender
+def test_the_earlier_name_of_result_still_counts():
+    """Scripts say target= and object.arapfields.result; files of all versions store it under that name."""
+    import bpy
+    import scenes
+
+    from addon.properties.choices import RESULT_ITEMS
+
+    bar, _, moving = scenes.bar_with_handles()
+    settings = bar.arapfields
+    for key, *_ in RESULT_ITEMS:
+        settings.target = key
+        assert settings.result == key
+    for key, *_ in RESULT_ITEMS:
+        settings.result = key
+        assert settings.target == key
+    moving.location.z += 0.4
+    assert bpy.ops.arapfields.deform(result="NEW", **scenes.QUICK) == {"FINISHED"}
+    assert "Bar_deformed" in bpy.data.objects and not bar.modifiers
 
 
 REFUSED = {
@@ -77,7 +98,7 @@ REFUSED = {
 @in_blender
 def test_what_the_source_cannot_take_is_refused_before_the_work(case):
     bar, *_ = scenes.bar_with_handles()
-    arguments = {"target": "KEY"}
+    arguments = {"result": "KEY"}
     if case == "a key on a surface":
         arguments["output"] = "SURFACE"
     else:
@@ -106,7 +127,7 @@ def test_linked_objects_give_results_but_are_never_written():
     with pytest.raises(RuntimeError, match="linked from another file"):
         bpy.ops.arapfields.add_handle()
     with pytest.raises(RuntimeError, match="linked from another file"):
-        bpy.ops.arapfields.stylize(target="REPLACE", **scenes.QUICK)
+        bpy.ops.arapfields.stylize(result="REPLACE", **scenes.QUICK)
     assert bpy.ops.arapfields.stylize(**scenes.NEW) == {"FINISHED"}
     result = bpy.data.objects["Linked_stylized"]
     assert result.library is None and result.data.library is None

@@ -32,7 +32,7 @@ def test_a_ball_as_a_style_changes_nothing_and_an_open_box_is_closed():
     box.data.from_pydata(corners, [], faces)
     scenes.activate(item)
     item.arapfields.stylize.style_object = box
-    bpy.ops.arapfields.stylize(style="OBJECT", target="NEW", iterations=60, samples=2000)
+    bpy.ops.arapfields.stylize(style="OBJECT", result="NEW", iterations=60, samples=2000)
     points = scenes.world_points(bpy.data.objects["Ball_stylized"])
     points -= points.mean(axis=0)
     assert np.linalg.norm(points, axis=1).max() / np.abs(points).max() > 1.25  # of a ball 1

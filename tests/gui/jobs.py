@@ -71,7 +71,7 @@ def checks(found, folder):
 def in_place(found, folder, before):
     """The mesh itself shows what there is so far, and is what it was after Cancel."""
     rest = stage.positions("Bar")
-    invoke({**LONG, "target": "MODIFIER"})
+    invoke({**LONG, "result": "MODIFIER"})
     begin = time.perf_counter()
     while np.abs(stage.positions("Bar") - rest).max() < 0.3 and time.perf_counter() - begin < 20.0:
         yield 0.2

@@ -7,7 +7,7 @@ import numpy as np
 
 QUICK = {"iterations": 40, "samples": 2000, "batch": 100, "width": 32, "layers": 2}
 
-NEW = QUICK | {"target": "NEW"}
+NEW = QUICK | {"result": "NEW"}
 
 
 def activate(*items):

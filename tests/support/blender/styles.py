@@ -10,4 +10,4 @@ def ball(name="Ball"):
     return bpy.context.object
 
 
-SETTINGS = {"target": "NEW", "iterations": 60, "samples": 2000, "batch": 200, "width": 32, "layers": 2}
+SETTINGS = {"result": "NEW", "iterations": 60, "samples": 2000, "batch": 200, "width": 32, "layers": 2}

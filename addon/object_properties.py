@@ -3,68 +3,33 @@
 
 import bpy
 
-from ..animation.properties import ARAPFIELDS_PG_bake
-from ..blender.object_references import owner_of, settings_of
-from ..blender.property_definitions import annotations
-from ..blender.selection import row_chosen
-from ..carried.properties import ARAPFIELDS_PG_carried
-from ..core.settings.choices import NORMALS, OUTPUTS, PLACEMENT_NUMBERS, PLACEMENTS, SURFACES
-from ..core.settings.parameters import EXTRACTION
-from ..handles.properties import ARAPFIELDS_PG_handle
-from ..live.properties import ARAPFIELDS_PG_secondary
-from ..names import PROPERTY
-from ..pin_tool.properties import ARAPFIELDS_PG_scene
-from ..stiffness.properties import ARAPFIELDS_PG_stiffness
-from ..wrap.properties import ARAPFIELDS_PG_wrap
-from .settings import ARAPFIELDS_PG_deform, ARAPFIELDS_PG_fit, ARAPFIELDS_PG_stylize
-
-
-def output(**extra):
-    return bpy.props.EnumProperty(
-        items=OUTPUTS, name="Output", description="What the result is made of", **extra
-    )
-
-
-def surface(**extra):
-    return bpy.props.EnumProperty(
-        items=SURFACES,
-        name="Surface",
-        description="What the implicit surface is made of, which solves sample and new meshes show",
-        **extra,
-    )
-
-
-def target(**extra):
-    items = tuple((*placement, "NONE", PLACEMENT_NUMBERS[placement[0]]) for placement in PLACEMENTS)
-    return bpy.props.EnumProperty(
-        items=items, name="Result", description="Where the result goes", default="MODIFIER", **extra
-    )
-
-
-def resolution(**extra):
-    return annotations(EXTRACTION, **extra).get("resolution")
-
-
-def refine_thin(**extra):
-    return annotations(EXTRACTION, **extra).get("refine_thin")
-
-
-def result_properties():
-    """What is made and where it goes, as a call of an operator may say it otherwise than the settings."""
-    kinds = {
-        "output": output,
-        "surface": surface,
-        "target": target,
-        "resolution": resolution,
-        "refine_thin": refine_thin,
-    }
-    return {name: kind(options={"SKIP_SAVE"}) for name, kind in kinds.items()}
+from .animation.properties import ARAPFIELDS_PG_bake
+from .blender.object_references import owner_of, settings_of
+from .blender.selection import row_chosen
+from .carried.properties import ARAPFIELDS_PG_carried
+from .core.settings.choices import NORMALS
+from .handles.properties import ARAPFIELDS_PG_handle
+from .live.properties import ARAPFIELDS_PG_secondary
+from .names import PROPERTY
+from .pin_tool.properties import ARAPFIELDS_PG_scene
+from .properties.choices import RESULT_ITEMS, extraction, output, result, surface
+from .properties.solve_settings import ARAPFIELDS_PG_deform, ARAPFIELDS_PG_fit, ARAPFIELDS_PG_stylize
+from .stiffness.properties import ARAPFIELDS_PG_stiffness
+from .wrap.properties import ARAPFIELDS_PG_wrap
 
 
 class ARAPFIELDS_PG_result(bpy.types.PropertyGroup):
     item: bpy.props.PointerProperty(type=bpy.types.Object, name="Object", description="The result object")
     kind: bpy.props.StringProperty(name="Kind", description="DEFORM, STYLIZE or EXTRACT")
     output: bpy.props.StringProperty(name="Output", description="WARP, SURFACE or REMESH")
+
+
+def get_result(settings):
+    return next(number for key, *_, number in RESULT_ITEMS if key == settings.target)
+
+
+def set_result(settings, number):
+    settings.target = next(key for key, *_, other in RESULT_ITEMS if other == number)
 
 
 class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
@@ -132,9 +97,10 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     )
     output: output()
     surface: surface()
-    target: target()
-    resolution: resolution()
-    refine_thin: refine_thin()
+    target: result()  # as files store it
+    result: result(get=get_result, set=set_result)
+    resolution: extraction().get("resolution")
+    refine_thin: extraction().get("refine_thin")
     normals: bpy.props.EnumProperty(
         items=NORMALS, name="Normals", description="How meshes of the implicit surface are shaded"
     )
@@ -157,7 +123,7 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     @property
     def in_place(self):
         """Whether a result goes onto the source's own vertices, where they are at the modifier's place."""
-        return self.output == "WARP" and self.target != "NEW"
+        return self.output == "WARP" and self.result != "NEW"
 
     @property
     def owner(self):

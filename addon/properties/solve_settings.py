@@ -6,44 +6,8 @@ import bpy
 from ..blender.property_definitions import annotations
 from ..core.settings.fitting import FIT, QUALITIES
 from ..core.settings.parameters import DEFORM
-from ..core.settings.styles import CUSTOM, STYLES, STYLIZE, style_identifier
-
-QUALITY_ITEMS = tuple((key, label, tip) for key, (label, tip, _) in QUALITIES.items())
-STYLE_ITEMS = tuple(
-    (style_identifier(name), label, "Turns the surface towards the faces of this solid")
-    for name, label in STYLES
-) + tuple((key, label, tip) for key, (label, tip) in CUSTOM.items())
-FRAMES = (
-    ("UPRIGHT", "World Upright", "The style stands upright in the world and heads where the object does"),
-    ("OBJECT", "Object", "The style stands along the object's own axes"),
-    ("WORLD", "World", "The style stands along the world's axes"),
-    ("EMPTY", "Empty", "The style stands along the axes of a chosen object"),
-)
-
-
-def quality(**extra):
-    return bpy.props.EnumProperty(
-        items=QUALITY_ITEMS,
-        name="Quality",
-        description="Sets the iterations and the network's size",
-        **({"default": "GOOD"} if QUALITY_ITEMS else {}),
-        **extra,
-    )
-
-
-def style(**extra):
-    return bpy.props.EnumProperty(
-        items=STYLE_ITEMS,
-        name="Style",
-        description="The solid whose faces the surface turns towards",
-        **extra,
-    )
-
-
-def frame(**extra):
-    return bpy.props.EnumProperty(
-        items=FRAMES, name="Orientation", description="Along which axes the style stands", **extra
-    )
+from ..core.settings.styles import STYLIZE
+from .choices import frame, quality, style
 
 
 def apply_quality(group, context):

@@ -18,7 +18,7 @@ from ..handles.movers import matrix_of
 LEAST_BONE = 1e-5  # of the object's size; Blender removes bones without a length
 
 
-def of(source):
+def armatures_of(source):
     """The armatures that pose a source, except those that it carries."""
     carried = [entry.item for entry in settings_of(source).carried]
     posing = [m.object for m in source.modifiers if modifier_stack.is_posing(source, m) and m.show_viewport]
@@ -41,7 +41,7 @@ class Fitting:
 
     def __init__(self, source, space):
         self.warnings, self.rigs, self.moved = [], [], []
-        for rig in of(source):
+        for rig in armatures_of(source):
             reason = refusal(rig)
             if reason is not None:
                 self.warnings.append(reason)
@@ -108,19 +108,22 @@ def write(context, rig, ends):
                 bones[name].align_roll(Vector(z))
 
 
-def reset(context, rig):
-    """Gives an armature's bones the rest that they had before they were fitted."""
-    noted = settings_of(rig).rest_bones
-    if not noted:
-        return
-    reason = refusal(rig)
-    if reason is not None:
-        raise reason
-    write(context, rig, json.loads(noted))
-    settings_of(rig).rest_bones = ""
+def fitted(source):
+    """The armatures of a source whose bones at rest are not where they were."""
+    return [rig for rig in armatures_of(source) if settings_of(rig).rest_bones]
 
 
-class Below:
+def reset(context, source):
+    """Gives the bones of a source's armatures the rest that they had before they were fitted."""
+    for rig in fitted(source):
+        reason = refusal(rig)
+        if reason is not None:
+            raise reason
+        write(context, rig, json.loads(settings_of(rig).rest_bones))
+        settings_of(rig).rest_bones = ""
+
+
+class BeforeArmatures:
     """The field's place before a source's armatures, taken for one wrap and given back where that fails."""
 
     def __init__(self, source):
