@@ -11,7 +11,6 @@ from . import caches, played
 
 class ARAPFIELDS_PT_animation(Advanced, bpy.types.Panel):
     bl_label = "Animation"
-    bl_idname = "ARAPFIELDS_PT_animation"
     bl_order = 4
 
     def fill(self, context, source, settings):

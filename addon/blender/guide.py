@@ -40,9 +40,24 @@ pages = {}  # pattern of Blender's names → page, while the extension is on
 
 
 class Guided:
-    """Mixin of operators: `guide` is the page that explains them, which their tooltips name."""
+    """Mixin of operators: `guide` is the page that explains them, which their tooltips name.
+
+    Where `obstacle` has a reason they are greyed out, and the tooltip says it.
+    """
 
     guide = ""
+
+    @classmethod
+    def poll(cls, context):
+        reason = cls.obstacle(context)
+        if reason:
+            cls.poll_message_set(translated(reason))
+        return not reason
+
+    @classmethod
+    def obstacle(cls, context):
+        """Why the operator cannot run now, as a UserError; None where it can."""
+        return None
 
     @classmethod
     def description(cls, context, properties):

@@ -1,23 +1,37 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Operators that work on the panel's source and say before they are pressed why they would refuse."""
 
+from ..core.errors import UserError
 from .guide import Guided
 from .language import translated
 from .object_references import refusal, source_of
 
 
 class SourceOperator(Guided):
-    """Mixin: greyed out, the reason in the tooltip, where there is no source or `refuses` has a reason."""
+    """Mixin: `change(context, source)` does the work and returns the line to report, if any.
+
+    Errors become reports. `refuses(source)` has a reason where the operator does not apply to a source.
+    """
+
+    in_edit_mode = False  # whether it works on a source in Edit Mode too
 
     @classmethod
-    def poll(cls, context):
+    def obstacle(cls, context):
         source = source_of(context)
-        reason = refusal(source) or cls.refuses(source)
-        if reason:
-            cls.poll_message_set(translated(reason))
-        return not reason
+        return refusal(source, cls.in_edit_mode) or cls.refuses(source)
 
     @classmethod
     def refuses(cls, source):
-        """Why the operator does not apply to a source, or None."""
+        """Why the operator does not apply to a source, as a UserError; None where it does."""
         return None
+
+    def execute(self, context):
+        context.view_layer.update()
+        try:
+            line = self.change(context, source_of(context))
+        except (UserError, ValueError, OSError) as error:
+            self.report({"ERROR"}, translated(error))
+            return {"CANCELLED"}
+        if line:
+            self.report({"INFO"}, line)
+        return {"FINISHED"}

@@ -2,7 +2,7 @@
 import bpy
 
 from ..blender.language import translated
-from ..blender.object_references import owner_of, settings_of, source_of
+from ..blender.object_references import owner_of, settings_of
 from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError
 from ..core.settings.choices import CARRYING
@@ -38,9 +38,8 @@ class ARAPFIELDS_OT_carry(CarriedOperator, bpy.types.Operator):
 
     way: bpy.props.EnumProperty(items=CARRYING, name="Way", description="How the objects are carried")
 
-    def execute(self, context):
-        context.view_layer.update()
-        source, added, refused = source_of(context), 0, []
+    def change(self, context, source):
+        added, refused = 0, []
         for item in context.selected_objects:
             if item == source or (item.type == "EMPTY" and owner_of(item) == source):
                 continue
@@ -49,16 +48,12 @@ class ARAPFIELDS_OT_carry(CarriedOperator, bpy.types.Operator):
                 added += 1
             except UserError as error:
                 refused.append(translated(error))
-        for text in refused:
-            self.report({"WARNING"} if added else {"ERROR"}, text)
         if not added:
-            if not refused:
-                self.report({"ERROR"}, translated("Select the objects to carry as well"))
-            return {"CANCELLED"}
-        self.report(
-            {"INFO"}, translated("{name} carries {count} more objects", name=source.name, count=added)
-        )
-        return {"FINISHED"}
+            nothing = translated("Select the objects to carry as well")
+            raise UserError("{error}", error="\n".join(refused) or nothing)
+        for text in refused:
+            self.report({"WARNING"}, text)
+        return translated("{name} carries {count} more objects", name=source.name, count=added)
 
 
 def carry(source, item, way):
@@ -85,8 +80,7 @@ class ARAPFIELDS_OT_release(CarriedOperator, bpy.types.Operator):
 
     all: bpy.props.BoolProperty(name="All", description="Every object that is carried")
 
-    def execute(self, context):
-        source = source_of(context)
+    def change(self, context, source):
         settings = settings_of(source)
         count = len(settings.carried)
         rows = range(count) if self.all else [min(max(settings.active_carried, 0), count - 1)]
@@ -95,7 +89,6 @@ class ARAPFIELDS_OT_release(CarriedOperator, bpy.types.Operator):
         settings.active_carried = max(0, min(settings.active_carried, len(settings.carried) - 1))
         if sessions.is_live(source):
             sessions.live[source.session_uid].carrying.forget(settings)
-        return {"FINISHED"}
 
 
 CLASSES = [ARAPFIELDS_OT_carry, ARAPFIELDS_OT_release]

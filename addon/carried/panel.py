@@ -31,7 +31,6 @@ class ARAPFIELDS_UL_carried(bpy.types.UIList):
 
 class ARAPFIELDS_PT_carried(Section, bpy.types.Panel):
     bl_label = "Carried Objects"
-    bl_idname = "ARAPFIELDS_PT_carried"
     bl_order = 3
     bl_options = {"DEFAULT_CLOSED"}
 

@@ -12,7 +12,6 @@ from ..results.placement import placement_refusal
 
 class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
     bl_label = "Deform"
-    bl_idname = "ARAPFIELDS_PT_deform"
     bl_order = 2
 
     def draw_header_preset(self, context):
@@ -30,7 +29,6 @@ class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
 
 class ARAPFIELDS_PT_deform_settings(Advanced, bpy.types.Panel):
     bl_label = "Deform Settings"
-    bl_idname = "ARAPFIELDS_PT_deform_settings"
     bl_order = 1
 
     def fill(self, context, source, settings):

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..blender.guide import Guided
 from ..blender.language import translated
-from ..blender.object_references import refusal, settings_of, source_of
+from ..blender.object_references import settings_of, source_of
 from ..blender.selection import select_alone
+from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError
 from ..core.geometry.handles import nothing_held
 from ..core.runtime import native
@@ -13,46 +13,33 @@ from ..names import Op
 from . import bones, counts, empties, movers, naming
 
 
-class HandleOperator(Guided):
+class HandleOperator(SourceOperator):
     """Mixin: works on the handles of the panel's source."""
 
     bl_options = {"REGISTER", "UNDO"}
     guide = "handles"
     needs_handle = True
-    in_edit_mode = False
     counts_points = False  # whether it counts what the handles hold
 
     @classmethod
-    def poll(cls, context):
-        source = source_of(context)
-        reason = native.problem() or refusal(source, cls.in_edit_mode)
-        if not reason and cls.needs_handle and not settings_of(source).handles:
-            reason = "The object has no handle"
-        reason = reason or cls.refuses(source)
-        if reason:
-            cls.poll_message_set(translated(reason))
-        return not reason
+    def obstacle(cls, context):
+        return native.problem() or super().obstacle(context)
 
     @classmethod
     def refuses(cls, source):
-        """Why this operator cannot work on a source that others can, as a UserError; else None."""
-        return None
+        without = cls.needs_handle and not settings_of(source).handles
+        return UserError("The object has no handle") if without else None
 
     def execute(self, context):
-        context.view_layer.update()
-        try:
-            source = source_of(context)
-            self.report({"INFO"}, self.change(context, source))
-            self.warn_of_empty(source)
-        except UserError as error:
-            self.report({"ERROR"}, translated(error))
-            return {"CANCELLED"}
-        return {"FINISHED"}
+        result = super().execute(context)
+        if result == {"FINISHED"} and self.counts_points:
+            self.warn_of_empty(source_of(context))
+        return result
 
     def warn_of_empty(self, source):
         """Says which handles hold nothing; a solve would refuse them."""
         names = empties.holding_nothing(source)
-        if self.counts_points and names:
+        if names:
             self.report({"WARNING"}, translated(nothing_held(names)))
 
 
@@ -176,38 +163,43 @@ class ARAPFIELDS_OT_mirror_handle(HandleOperator, bpy.types.Operator):
         return translated("{count} handles mirrored", count=len(entries))
 
 
-class ARAPFIELDS_OT_set_rest(HandleOperator, bpy.types.Operator):
+class RestOperator(HandleOperator):
+    """Mixin: works on the selected handles, or on all."""
+
+    all: bpy.props.BoolProperty(name="All", description="Every handle of the object, selected or not")
+
+    def entries(self, context, source):
+        used = empties.used(source)
+        return used if self.all else [e for e in chosen_entries(context, source) if e in used]
+
+
+class ARAPFIELDS_OT_set_rest(RestOperator, bpy.types.Operator):
     """Make where the selected handles are now their rest pose (all handles with `all`)"""
 
     bl_idname = Op.SET_REST
     bl_label = "Set Rest Pose"
     counts_points = True
 
-    all: bpy.props.BoolProperty(name="All", description="Every handle of the object, selected or not")
-
     def change(self, context, source):
-        entries = empties.used(source) if self.all else chosen_entries(context, source)
+        entries = self.entries(context, source)
         for entry in entries:
-            if movers.is_there(entry):
-                empties.store_rest(source, entry)
+            empties.store_rest(source, entry)
         counts.count_inside(context, source)
         return translated("{count} rest poses stored", count=len(entries))
 
 
-class ARAPFIELDS_OT_reset_handle(HandleOperator, bpy.types.Operator):
+class ARAPFIELDS_OT_reset_handle(RestOperator, bpy.types.Operator):
     """Move the selected handles back to their rest pose (all handles with `all`)"""
 
     bl_idname = Op.RESET_HANDLE
     bl_label = "Reset to Rest"
 
-    all: bpy.props.BoolProperty(name="All", description="Every handle of the object, selected or not")
-
     def change(self, context, source):
-        entries = empties.used(source) if self.all else chosen_entries(context, source)
+        entries = self.entries(context, source)
         for entry in entries:
-            if movers.is_there(entry) and entry.kind != "BONE":
+            if entry.kind != "BONE":
                 empties.reset(source, entry)
-        bones.reset(context, source, [e for e in entries if movers.is_there(e) and e.kind == "BONE"])
+        bones.reset(context, source, [e for e in entries if e.kind == "BONE"])
         return translated("{count} handles moved back", count=len(entries))
 
 

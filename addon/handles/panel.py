@@ -68,7 +68,6 @@ class ARAPFIELDS_MT_more_handle(bpy.types.Menu):
 
 class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
     bl_label = "Handles"
-    bl_idname = "ARAPFIELDS_PT_handles"
     bl_order = 1
 
     def fill(self, context, source, settings):

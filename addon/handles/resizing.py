@@ -6,7 +6,6 @@ import numpy as np
 from mathutils import Matrix, Vector
 
 from ..blender.guide import Guided
-from ..blender.language import translated
 from ..blender.object_references import owner_of, refusal, settings_of
 from ..core.errors import UserError
 from ..names import Op
@@ -16,8 +15,9 @@ LEAST = 0.05  # of a box's size that one drag leaves of it
 FACES = [(axis, side) for axis in range(3) for side in (-1, 1)]
 
 
-def boxed(empty):
-    """(source, entry) of the Empty of a box; UserError where it is none."""
+def boxed(context):
+    """(source, entry) of the box whose Empty is active; UserError where there is none."""
+    empty = context.view_layer.objects.active if context.view_layer else None
     source = owner_of(empty) if empty is not None and empty.type == "EMPTY" else None
     index = empties.find(source, empty) if source is not None else -1
     if index < 0 or settings_of(source).handles[index].kind != "CUBE":
@@ -57,31 +57,29 @@ class ARAPFIELDS_OT_resize_handle(Guided, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context):
-        active = context.view_layer.objects.active if context.view_layer else None
+    def obstacle(cls, context):
         try:
-            reason = refusal(boxed(active)[0])
+            return refusal(boxed(context)[0])
         except UserError as error:
-            reason = error
-        if reason:
-            cls.poll_message_set(translated(reason))
-        return not reason
+            return error
 
     def begin(self, context):
-        source, entry = boxed(context.view_layer.objects.active)
+        _, entry = boxed(context)
         rest = np.array(entry.rest, dtype=np.float64).reshape(4, 4)
         self._before = empties.current_box(entry.empty), rest, entry.empty.matrix_world.copy()
-        return source, entry
 
     def change(self, context):
-        source, entry = boxed(context.view_layer.objects.active)
+        source, entry = boxed(context)
         resize(source, entry, *self._before[:2], stretch(self.axis, self.side or 1, self.share))
 
     def execute(self, context):
-        source, _ = self.begin(context)
+        self.begin(context)
         self.change(context)
+        return self.finish(context)
+
+    def finish(self, context):
         context.view_layer.update()
-        counts.count_inside(context, source)
+        counts.count_inside(context, boxed(context)[0])
         return {"FINISHED"}
 
     def invoke(self, context, event):
@@ -110,14 +108,11 @@ class ARAPFIELDS_OT_resize_handle(Guided, bpy.types.Operator):
             self.share = moved.dot(self._pixels) / self._pixels.length_squared
             self.change(context)
         elif event.type in ("ESC", "RIGHTMOUSE"):
-            _, entry = boxed(context.view_layer.objects.active)
+            _, entry = boxed(context)
             entry.empty.matrix_world, entry.rest = self._before[2], self._before[1].ravel()
             return {"CANCELLED"}
         elif event.type in ("LEFTMOUSE", "RET", "NUMPAD_ENTER") and event.value in ("RELEASE", "PRESS"):
-            source, _ = boxed(context.view_layer.objects.active)
-            context.view_layer.update()
-            counts.count_inside(context, source)
-            return {"FINISHED"}
+            return self.finish(context)
         return {"RUNNING_MODAL"}
 
 
@@ -147,7 +142,7 @@ class ARAPFIELDS_GGT_box(bpy.types.GizmoGroup):
 
     def refresh(self, context):
         try:
-            _, entry = boxed(context.view_layer.objects.active)
+            _, entry = boxed(context)
         except UserError:
             return
         box = empties.current_box(entry.empty)

@@ -24,7 +24,6 @@ def draw_progress(layout, job):
 
 class ARAPFIELDS_PT_status(Section, bpy.types.Panel):
     bl_label = "Status"
-    bl_idname = "ARAPFIELDS_PT_status"
     bl_order = 4
     needs_source = False
 

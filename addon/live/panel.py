@@ -30,7 +30,6 @@ def live_buttons(layout, source, kind, refusal):
 
 class ARAPFIELDS_PT_secondary(Advanced, bpy.types.Panel):
     bl_label = "Secondary Motion"
-    bl_idname = "ARAPFIELDS_PT_secondary"
     bl_order = 3
 
     def fill(self, context, source, settings):

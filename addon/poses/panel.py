@@ -12,7 +12,6 @@ class ARAPFIELDS_UL_poses(bpy.types.UIList):
 
 class ARAPFIELDS_PT_poses(Advanced, bpy.types.Panel):
     bl_label = "Poses"
-    bl_idname = "ARAPFIELDS_PT_poses"
     bl_order = 4
 
     def fill(self, context, source, settings):

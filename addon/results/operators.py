@@ -3,7 +3,7 @@ import bpy
 
 from ..blender import mesh_arrays, modifier_stack
 from ..blender.language import translated
-from ..blender.object_references import settings_of, source_of
+from ..blender.object_references import settings_of
 from ..blender.property_definitions import effective_value, effective_values
 from ..blender.source_operator import SourceOperator
 from ..carried import carried_objects, rest_bones
@@ -43,8 +43,7 @@ class ARAPFIELDS_OT_apply_as_shape_key(FieldOperator, bpy.types.Operator):
     def refuses(cls, source):
         return super().refuses(source) or placement.refusal(source, "WARP", "KEY")
 
-    def execute(self, context):
-        source = source_of(context)
+    def change(self, context, source):
         with modifier_stack.evaluated_mesh(context, source, in_place=True) as mesh:
             before = mesh_arrays.positions(mesh)
         with modifier_stack.moved_mesh(context, source) as mesh:
@@ -54,7 +53,6 @@ class ARAPFIELDS_OT_apply_as_shape_key(FieldOperator, bpy.types.Operator):
             source.shape_key_add(name="Basis", from_mix=False)
         result_objects.add_warp_key(source, before, after)
         motion.discard(source)
-        return {"FINISHED"}
 
 
 class ARAPFIELDS_OT_remove_field(FieldOperator, bpy.types.Operator):
@@ -63,14 +61,13 @@ class ARAPFIELDS_OT_remove_field(FieldOperator, bpy.types.Operator):
     bl_idname = Op.REMOVE_FIELD
     bl_label = "Remove"
 
-    def execute(self, context):
+    def change(self, context, source):
         try:
-            rest_bones.reset(context, source_of(context))
+            rest_bones.reset(context, source)
         except UserError as error:
             self.report({"WARNING"}, translated(error))
-        motion.remove(source_of(context))
-        carried_objects.give_back_all(source_of(context))
-        return {"FINISHED"}
+        motion.remove(source)
+        carried_objects.give_back_all(source)
 
 
 class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):

@@ -9,7 +9,6 @@ from ..names import Op
 
 class ARAPFIELDS_PT_result(Advanced, bpy.types.Panel):
     bl_label = "Result"
-    bl_idname = "ARAPFIELDS_PT_result"
     bl_order = 3
 
     def fill(self, context, source, settings):

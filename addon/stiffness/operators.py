@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..blender.object_references import settings_of, source_of
+from ..blender.object_references import settings_of
 from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError
 from ..names import Op
@@ -26,13 +26,11 @@ class ARAPFIELDS_OT_stiffness_preset(SourceOperator, bpy.types.Operator):
     def refuses(cls, source):
         return None if source.vertex_groups else UserError("{name} has no vertex group", name=source.name)
 
-    def execute(self, context):
-        source = source_of(context)
+    def change(self, context, source):
         settings = settings_of(source).stiffness
         settings.group = settings.group or source.vertex_groups.active.name
         settings.bend_group = settings.group
         settings.times, settings.bend_times = PRESETS[self.material][2]
-        return {"FINISHED"}
 
 
 CLASSES = [ARAPFIELDS_OT_stiffness_preset]

@@ -8,7 +8,6 @@ from . import painted
 
 class ARAPFIELDS_PT_stiffness(Advanced, bpy.types.Panel):
     bl_label = "Painted Stiffness"
-    bl_idname = "ARAPFIELDS_PT_stiffness"
     bl_order = 2
 
     def fill(self, context, source, settings):

@@ -39,7 +39,6 @@ class ARAPFIELDS_MT_styles(bpy.types.Menu):
 
 class ARAPFIELDS_PT_stylize(Section, bpy.types.Panel):
     bl_label = "Stylize"
-    bl_idname = "ARAPFIELDS_PT_stylize"
     bl_order = 3
 
     def draw_header_preset(self, context):
@@ -60,7 +59,6 @@ class ARAPFIELDS_PT_stylize(Section, bpy.types.Panel):
 
 class ARAPFIELDS_PT_stylize_settings(Advanced, bpy.types.Panel):
     bl_label = "Stylize Settings"
-    bl_idname = "ARAPFIELDS_PT_stylize_settings"
     bl_order = 2
 
     def fill(self, context, source, settings):

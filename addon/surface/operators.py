@@ -62,10 +62,8 @@ class ARAPFIELDS_OT_clear_cache(Guided, bpy.types.Operator):
     guide = "jobs"
 
     @classmethod
-    def poll(cls, context):
-        if busy():
-            cls.poll_message_set(translated(busy()))
-        return not busy()
+    def obstacle(cls, context):
+        return busy()
 
     def execute(self, context):
         self.report({"INFO"}, translated("{count} fitted surfaces deleted", count=fit_cache().clear()))

@@ -16,7 +16,6 @@ from . import staleness
 
 class ARAPFIELDS_PT_source(Section, bpy.types.Panel):
     bl_label = "Source"
-    bl_idname = "ARAPFIELDS_PT_source"
     bl_order = 0
     needs_source = False
 
@@ -60,7 +59,6 @@ def remarks(source):
 
 class ARAPFIELDS_PT_advanced(Section, bpy.types.Panel):
     bl_label = "Advanced"
-    bl_idname = "ARAPFIELDS_PT_advanced"
     bl_order = 5
     bl_options = {"DEFAULT_CLOSED"}
 
@@ -70,7 +68,6 @@ class ARAPFIELDS_PT_advanced(Section, bpy.types.Panel):
 
 class ARAPFIELDS_PT_surface(Advanced, bpy.types.Panel):
     bl_label = "Implicit Surface"
-    bl_idname = "ARAPFIELDS_PT_surface"
     bl_order = 0
 
     def draw_header_preset(self, context):

@@ -6,9 +6,8 @@ import numpy as np
 
 from ..blender import mesh_arrays
 from ..blender.host import has_window
-from ..blender.language import translated
 from ..blender.native_options import options_of
-from ..blender.object_references import settings_of, source_of
+from ..blender.object_references import settings_of
 from ..blender.presets import preset_classes
 from ..blender.property_definitions import annotations, effective_value, effective_values
 from ..blender.source_operator import SourceOperator
@@ -134,15 +133,9 @@ class ARAPFIELDS_OT_add_landmark(SourceOperator, bpy.types.Operator):
         name="On the Target", description="Place on the target, in the world", subtype="TRANSLATION"
     )
 
-    def execute(self, context):
-        source = source_of(context)
-        try:
-            target = landmarks.target_of(source)
-            landmarks.place(context, source, target, np.array(self.rest), np.array(self.on_target))
-        except (UserError, ValueError) as error:
-            self.report({"ERROR"}, translated(error))
-            return {"CANCELLED"}
-        return {"FINISHED"}
+    def change(self, context, source):
+        target = landmarks.target_of(source)
+        landmarks.place(context, source, target, np.array(self.rest), np.array(self.on_target))
 
 
 class ARAPFIELDS_OT_remove_landmark(SourceOperator, bpy.types.Operator):
@@ -155,12 +148,9 @@ class ARAPFIELDS_OT_remove_landmark(SourceOperator, bpy.types.Operator):
 
     index: bpy.props.IntProperty(name="Row", description="Which of them, the first is 0", min=0)
 
-    def execute(self, context):
-        source = source_of(context)
-        if self.index >= len(settings_of(source).wrap.landmarks):
-            return {"CANCELLED"}
-        landmarks.remove(source, self.index)
-        return {"FINISHED"}
+    def change(self, context, source):
+        if self.index < len(settings_of(source).wrap.landmarks):
+            landmarks.remove(source, self.index)
 
 
 class ARAPFIELDS_OT_reset_bones(SourceOperator, bpy.types.Operator):
@@ -179,13 +169,8 @@ class ARAPFIELDS_OT_reset_bones(SourceOperator, bpy.types.Operator):
             else UserError("no bones were fitted to {name}", name=source.name)
         )
 
-    def execute(self, context):
-        try:
-            rest_bones.reset(context, source_of(context))
-        except UserError as error:
-            self.report({"ERROR"}, translated(error))
-            return {"CANCELLED"}
-        return {"FINISHED"}
+    def change(self, context, source):
+        rest_bones.reset(context, source)
 
 
 CLASSES = [

@@ -13,7 +13,6 @@ from . import landmarks
 
 class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
     bl_label = "Wrap"
-    bl_idname = "ARAPFIELDS_PT_wrap"
     bl_order = 3
     bl_options = {"DEFAULT_CLOSED"}
 
@@ -54,7 +53,6 @@ def factor_slider(layout, source):
 
 class ARAPFIELDS_PT_wrap_settings(Advanced, bpy.types.Panel):
     bl_label = "Wrap Settings"
-    bl_idname = "ARAPFIELDS_PT_wrap_settings"
     bl_order = 3
 
     def fill(self, context, source, settings):

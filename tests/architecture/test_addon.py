@@ -37,7 +37,7 @@ TOP = {
     "install_check",
     "menus",
     "names",
-    "properties",
+    "object_properties",
 }
 # Operators and panels are what a user meets: they use any feature, and only the contents page lists them.
 LEAVES = ("operators", "panel")
@@ -85,7 +85,7 @@ def test_folders_import_towards_the_core_alone():
     wrong = []
     for path in modules():
         folder = path.relative_to(ADDON).parts[0]
-        if path.parent == ADDON or is_leaf(path) or folder == "properties":
+        if path.parent == ADDON or is_leaf(path):
             continue
         allowed = {*ORDER[: ORDER.index(folder) + 1], "names"}
         if folder == "core":
@@ -96,7 +96,7 @@ def test_folders_import_towards_the_core_alone():
 
 def test_every_folder_has_its_place():
     folders = {path.name for path in ADDON.iterdir() if path.is_dir() and any(path.glob("*.py"))}
-    assert folders - {"properties"} == set(ORDER)
+    assert folders == set(ORDER)
     assert {path.stem for path in ADDON.glob("*.py")} <= TOP
 
 

@@ -15,6 +15,7 @@ if IN_BLENDER:
 
     import addon.deform.operators as deform
     from addon.core.runtime import jobs
+    from addon.properties.choices import RESULT_ITEMS
     from addon.results.placement import placement_refusal
 
 
@@ -70,11 +71,6 @@ def test_the_surface_can_take_the_sources_place():
 @in_blender
 def test_the_earlier_name_of_result_still_counts():
     """Scripts say target= and object.arapfields.result; files of all versions store it under that name."""
-    import bpy
-    import scenes
-
-    from addon.properties.choices import RESULT_ITEMS
-
     bar, _, moving = scenes.bar_with_handles()
     settings = bar.arapfields
     for key, *_ in RESULT_ITEMS:
