@@ -5,6 +5,7 @@ import bpy
 
 from .animation.properties import ARAPFIELDS_PG_bake
 from .blender.object_references import owner_of, settings_of
+from .blender.property_definitions import choice, collection, flag, integer, pointer, text
 from .blender.selection import row_chosen
 from .carried.properties import ARAPFIELDS_PG_carried
 from .core.settings.choices import NORMALS
@@ -19,9 +20,9 @@ from .wrap.properties import ARAPFIELDS_PG_wrap
 
 
 class ARAPFIELDS_PG_result(bpy.types.PropertyGroup):
-    item: bpy.props.PointerProperty(type=bpy.types.Object, name="Object", description="The result object")
-    kind: bpy.props.StringProperty(name="Kind", description="DEFORM, STYLIZE or EXTRACT")
-    output: bpy.props.StringProperty(name="Output", description="WARP, SURFACE or REMESH")
+    item: pointer(bpy.types.Object, "Object", "The result object")
+    kind: text("Kind", "DEFORM, STYLIZE or EXTRACT")
+    output: text("Output", "WARP, SURFACE or REMESH")
 
 
 def get_result(settings):
@@ -33,92 +34,49 @@ def set_result(settings, number):
 
 
 class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
-    fit: bpy.props.PointerProperty(type=ARAPFIELDS_PG_fit, name="Fit", description="Settings of the fit")
-    deform: bpy.props.PointerProperty(
-        type=ARAPFIELDS_PG_deform, name="Deform", description="Settings of the deformation"
-    )
-    stylize: bpy.props.PointerProperty(
-        type=ARAPFIELDS_PG_stylize, name="Stylize", description="Settings of the stylization"
-    )
-    wrap: bpy.props.PointerProperty(
-        type=ARAPFIELDS_PG_wrap, name="Wrap", description="Settings of the wrap, its target and landmarks"
-    )
-    bake: bpy.props.PointerProperty(
-        type=ARAPFIELDS_PG_bake, name="Bake", description="Settings of bakes, and what the last one is"
-    )
-    handles: bpy.props.CollectionProperty(
-        type=ARAPFIELDS_PG_handle,
-        name="Handles",
-        description="Empties that hold and move parts of the object",
-    )
-    hold_far: bpy.props.BoolProperty(
-        name="Hold What Is Far",
-        description="While all handles are pins and none is an anchor, what is far from them holds its place "
+    fit: pointer(ARAPFIELDS_PG_fit, "Fit", "Settings of the fit")
+    deform: pointer(ARAPFIELDS_PG_deform, "Deform", "Settings of the deformation")
+    stylize: pointer(ARAPFIELDS_PG_stylize, "Stylize", "Settings of the stylization")
+    wrap: pointer(ARAPFIELDS_PG_wrap, "Wrap", "Settings of the wrap, its target and landmarks")
+    bake: pointer(ARAPFIELDS_PG_bake, "Bake", "Settings of bakes, and what the last one is")
+    handles: collection(ARAPFIELDS_PG_handle, "Handles", "Empties that hold and move parts of the object")
+    hold_far: flag(
+        "Hold What Is Far",
+        "While all handles are pins and none is an anchor, what is far from them holds its place "
         "by itself, weakly",
     )
-    active_handle: bpy.props.IntProperty(
-        name="Active Handle", description="Row chosen in the list of handles", update=row_chosen
+    active_handle: integer("Active Handle", "Row chosen in the list of handles", update=row_chosen)
+    stiffness: pointer(ARAPFIELDS_PG_stiffness, "Stiffness", "Vertex groups that are stiffer or softer")
+    secondary: pointer(ARAPFIELDS_PG_secondary, "Secondary Motion", "How the surface swings")
+    carried: collection(ARAPFIELDS_PG_carried, "Carried Objects", "Objects that the field moves as well")
+    active_carried: integer("Active Carried Object", "Row chosen in the list of carried objects")
+    carried_by: pointer(bpy.types.Object, "Carried By", "The object whose field moves this one")
+    silenced: text(
+        "Armatures Switched Off",
+        "Armature modifiers that the field replaces, and whether they were on, as JSON",
     )
-    stiffness: bpy.props.PointerProperty(
-        type=ARAPFIELDS_PG_stiffness, name="Stiffness", description="Vertex groups that are stiffer or softer"
+    under_rig: flag(
+        "Before Armatures", "Whether the field works on the shape at rest, which armatures pose afterwards"
     )
-    secondary: bpy.props.PointerProperty(
-        type=ARAPFIELDS_PG_secondary, name="Secondary Motion", description="How the surface swings"
+    rest_bones: text(
+        "Bones at Rest", "Where an armature's bones were before they were fitted to a wrapped shape, as JSON"
     )
-    carried: bpy.props.CollectionProperty(
-        type=ARAPFIELDS_PG_carried, name="Carried Objects", description="Objects that the field moves as well"
-    )
-    active_carried: bpy.props.IntProperty(
-        name="Active Carried Object", description="Row chosen in the list of carried objects"
-    )
-    carried_by: bpy.props.PointerProperty(
-        type=bpy.types.Object, name="Carried By", description="The object whose field moves this one"
-    )
-    silenced: bpy.props.StringProperty(
-        name="Armatures Switched Off",
-        description="Armature modifiers that the field replaces, and whether they were on, as JSON",
-    )
-    under_rig: bpy.props.BoolProperty(
-        name="Before Armatures",
-        description="Whether the field works on the shape at rest, which armatures pose afterwards",
-    )
-    rest_bones: bpy.props.StringProperty(
-        name="Bones at Rest",
-        description="Where an armature's bones were before they were fitted to a wrapped shape, as JSON",
-    )
-    handle_of: bpy.props.PointerProperty(
-        type=bpy.types.Object, name="Handle Of", description="The object that this Empty is a handle of"
-    )
-    made_from: bpy.props.StringProperty(
-        name="Made From", description="Name of the object that this result was made from when it was made"
-    )
-    results: bpy.props.CollectionProperty(
-        type=ARAPFIELDS_PG_result, name="Results", description="Objects made from this one"
-    )
+    handle_of: pointer(bpy.types.Object, "Handle Of", "The object that this Empty is a handle of")
+    made_from: text("Made From", "Name of the object that this result was made from when it was made")
+    results: collection(ARAPFIELDS_PG_result, "Results", "Objects made from this one")
     output: output()
     surface: surface()
     target: result()  # as files store it
     result: result(get=get_result, set=set_result)
     resolution: extraction().get("resolution")
     refine_thin: extraction().get("refine_thin")
-    normals: bpy.props.EnumProperty(
-        items=NORMALS, name="Normals", description="How meshes of the implicit surface are shaded"
-    )
-    live_kind: bpy.props.StringProperty(name="Live", description="DEFORM or STYLIZE while the object is live")
-    live_hidden: bpy.props.StringProperty(
-        name="Hidden before Live",
-        description="Whether the object was hidden in viewport and renders, as JSON",
-    )
-    set_aside: bpy.props.BoolProperty(
-        name="Set Aside", description="Hidden since what was made of it lies in its place"
-    )
-    fit_key: bpy.props.StringProperty(name="Fit", description="Name of the object's last fit in the cache")
-    fit_options: bpy.props.StringProperty(
-        name="Fit Settings", description="Settings of the object's last fit, as JSON"
-    )
-    fit_report: bpy.props.StringProperty(
-        name="Fit Report", description="Figures of the object's last fit, as JSON"
-    )
+    normals: choice(NORMALS, "Normals", "How meshes of the implicit surface are shaded")
+    live_kind: text("Live", "DEFORM or STYLIZE while the object is live")
+    live_hidden: text("Hidden before Live", "Whether the object was hidden in viewport and renders, as JSON")
+    set_aside: flag("Set Aside", "Hidden since what was made of it lies in its place")
+    fit_key: text("Fit", "Name of the object's last fit in the cache")
+    fit_options: text("Fit Settings", "Settings of the object's last fit, as JSON")
+    fit_report: text("Fit Report", "Figures of the object's last fit, as JSON")
 
     @property
     def in_place(self):

@@ -4,7 +4,7 @@ import bpy
 from .blender import user_preferences
 from .blender.guide import Guided
 from .blender.language import translated
-from .blender.property_definitions import annotations
+from .blender.property_definitions import annotations, flag, text
 from .core.runtime import native
 from .core.settings.parameters import MACHINE
 from .names import PACKAGE, Op
@@ -14,24 +14,20 @@ class ARAPFIELDS_AP_preferences(bpy.types.AddonPreferences):
     bl_idname = PACKAGE
 
     __annotations__ = annotations(MACHINE) | {
-        "cache_folder": bpy.props.StringProperty(
-            name="Fit Folder",
-            description="Where fitted surfaces are kept; empty for Blender's own folder for this extension",
+        "cache_folder": text(
+            "Fit Folder",
+            "Where fitted surfaces are kept; empty for Blender's own folder for this extension",
             subtype="DIR_PATH",
         ),
-        "show_boxes": bpy.props.BoolProperty(
-            name="Show Boxes",
-            description="Draw the handles' boxes, at rest and now, in the viewport",
+        "show_boxes": flag(
+            "Show Boxes", "Draw the handles' boxes, at rest and now, in the viewport", default=True
+        ),
+        "show_previews": flag(
+            "Show Previews",
+            "Draw what a running job has so far in the viewport; off where drawing is slow",
             default=True,
         ),
-        "show_previews": bpy.props.BoolProperty(
-            name="Show Previews",
-            description="Draw what a running job has so far in the viewport; off where drawing is slow",
-            default=True,
-        ),
-        "was_welcomed": bpy.props.BoolProperty(
-            name="Welcomed", description="Whether it was said where the extension is", options={"HIDDEN"}
-        ),
+        "was_welcomed": flag("Welcomed", "Whether it was said where the extension is", options={"HIDDEN"}),
     }
 
     def draw(self, context):

@@ -11,6 +11,18 @@ def tells(name):
     return lambda group, _: listeners[name](group)
 
 
+def _kind(definition, *arguments):
+    """The same definition with these arguments, its name and its description by position."""
+    names = (*arguments, "name", "description")
+    return lambda *values, **extra: definition(**dict(zip(names, values, strict=True)), **extra)
+
+
+text, flag = _kind(bpy.props.StringProperty), _kind(bpy.props.BoolProperty)
+integer, number = _kind(bpy.props.IntProperty), _kind(bpy.props.FloatProperty)
+choice = _kind(bpy.props.EnumProperty, "items")
+pointer, collection = _kind(bpy.props.PointerProperty, "type"), _kind(bpy.props.CollectionProperty, "type")
+
+
 def annotations(parameters, **extra):
     """Property definitions for a class that shows these parameters."""
     return {p.name: definition(p, **extra) for p in parameters}

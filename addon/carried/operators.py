@@ -3,6 +3,7 @@ import bpy
 
 from ..blender.language import translated
 from ..blender.object_references import owner_of, settings_of
+from ..blender.property_definitions import choice, flag
 from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError
 from ..core.settings.choices import CARRYING
@@ -36,7 +37,7 @@ class ARAPFIELDS_OT_carry(CarriedOperator, bpy.types.Operator):
     bl_label = "Carry Selected"
     needs_carried = False
 
-    way: bpy.props.EnumProperty(items=CARRYING, name="Way", description="How the objects are carried")
+    way: choice(CARRYING, "Way", "How the objects are carried")
 
     def change(self, context, source):
         added, refused = 0, []
@@ -78,7 +79,7 @@ class ARAPFIELDS_OT_release(CarriedOperator, bpy.types.Operator):
     bl_idname = Op.RELEASE
     bl_label = "Release"
 
-    all: bpy.props.BoolProperty(name="All", description="Every object that is carried")
+    all: flag("All", "Every object that is carried")
 
     def change(self, context, source):
         settings = settings_of(source)

@@ -3,6 +3,7 @@
 
 import bpy
 
+from ..blender.property_definitions import choice, pointer, text
 from ..core.settings.choices import CARRYING
 
 BASE_KINDS = (
@@ -14,17 +15,10 @@ BASE_KINDS = (
 
 class ARAPFIELDS_PG_carried(bpy.types.PropertyGroup):
     # `name`, which every entry has, is the object's when it was added: it tells what was deleted
-    item: bpy.props.PointerProperty(
-        type=bpy.types.Object, name="Object", description="Moved by the field of the object that carries it"
-    )
-    way: bpy.props.EnumProperty(items=CARRYING, name="Way", description="How the object is carried")
-    base: bpy.props.StringProperty(
-        name="Own Pose",
-        description="The object's own delta transforms or pose while the field moves it, as JSON",
-    )
-    base_kind: bpy.props.EnumProperty(
-        items=BASE_KINDS, name="Kind of Own Pose", description="What the object's own pose consists of"
-    )
+    item: pointer(bpy.types.Object, "Object", "Moved by the field of the object that carries it")
+    way: choice(CARRYING, "Way", "How the object is carried")
+    base: text("Own Pose", "The object's own delta transforms or pose while the field moves it, as JSON")
+    base_kind: choice(BASE_KINDS, "Kind of Own Pose", "What the object's own pose consists of")
 
 
 CLASSES = [ARAPFIELDS_PG_carried]

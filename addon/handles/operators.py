@@ -3,6 +3,7 @@ import bpy
 
 from ..blender.language import translated
 from ..blender.object_references import settings_of, source_of
+from ..blender.property_definitions import choice, flag, text
 from ..blender.selection import select_alone
 from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError
@@ -72,15 +73,9 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
     needs_handle = False
     in_edit_mode = counts_points = True
 
-    kind: bpy.props.EnumProperty(
-        items=EMPTY_KINDS, name="Kind", description="What of the surface the handle holds"
-    )
-    place: bpy.props.EnumProperty(
-        items=HANDLE_PLACES, name="Place", description="Where the handle is", options={"SKIP_SAVE"}
-    )
-    group: bpy.props.StringProperty(
-        name="Vertex Group", description="The group to hold, for that kind; empty for the object's active one"
-    )
+    kind: choice(EMPTY_KINDS, "Kind", "What of the surface the handle holds")
+    place: choice(HANDLE_PLACES, "Place", "Where the handle is", options={"SKIP_SAVE"})
+    group: text("Vertex Group", "The group to hold, for that kind; empty for the object's active one")
 
     @classmethod
     def refuses(cls, source):
@@ -121,7 +116,7 @@ class ARAPFIELDS_OT_add_bones(HandleOperator, bpy.types.Operator):
     needs_handle = False
     counts_points = True
 
-    bones: bpy.props.EnumProperty(items=BONES, name="Bones", description="Which bones become handles")
+    bones: choice(BONES, "Bones", "Which bones become handles")
 
     @classmethod
     def refuses(cls, source):
@@ -144,10 +139,10 @@ class ARAPFIELDS_OT_mirror_handle(HandleOperator, bpy.types.Operator):
     bl_label = "Mirror Handle"
     counts_points = True
 
-    axis: bpy.props.EnumProperty(
-        items=[(axis, axis, f"Across the object's {axis} axis") for axis in "XYZ"],
-        name="Axis",
-        description="Axis of the object across which to mirror",
+    axis: choice(
+        [(axis, axis, f"Across the object's {axis} axis") for axis in "XYZ"],
+        "Axis",
+        "Axis of the object across which to mirror",
     )
 
     def change(self, context, source):
@@ -166,7 +161,7 @@ class ARAPFIELDS_OT_mirror_handle(HandleOperator, bpy.types.Operator):
 class RestOperator(HandleOperator):
     """Mixin: works on the selected handles, or on all."""
 
-    all: bpy.props.BoolProperty(name="All", description="Every handle of the object, selected or not")
+    all: flag("All", "Every handle of the object, selected or not")
 
     def entries(self, context, source):
         used = empties.used(source)
@@ -209,7 +204,7 @@ class ARAPFIELDS_OT_remove_handle(HandleOperator, bpy.types.Operator):
     bl_idname = Op.REMOVE_HANDLE
     bl_label = "Remove Handle"
 
-    delete: bpy.props.BoolProperty(name="Delete Empties", description="Delete the Empties as well")
+    delete: flag("Delete Empties", "Delete the Empties as well")
 
     def change(self, context, source):
         settings = settings_of(source)

@@ -3,6 +3,7 @@
 
 import bpy
 
+from ..blender.property_definitions import choice, flag, integer, number, pointer, text
 from ..core.settings.choices import HANDLE_KINDS
 
 
@@ -11,52 +12,47 @@ def is_armature(_, item):
 
 
 class ARAPFIELDS_PG_handle(bpy.types.PropertyGroup):
-    empty: bpy.props.PointerProperty(type=bpy.types.Object, name="Empty", description="Moves the handle")
-    rig: bpy.props.PointerProperty(
-        type=bpy.types.Object,
-        name="Armature",
-        description="The armature whose bone moves the handle, for handles of that kind",
+    empty: pointer(bpy.types.Object, "Empty", "Moves the handle")
+    rig: pointer(
+        bpy.types.Object,
+        "Armature",
+        "The armature whose bone moves the handle, for handles of that kind",
         poll=is_armature,
     )
-    bone: bpy.props.StringProperty(name="Bone", description="The bone that moves the handle")
-    kind: bpy.props.EnumProperty(
-        items=HANDLE_KINDS, name="Kind", description="What of the surface the handle holds"
+    bone: text("Bone", "The bone that moves the handle")
+    kind: choice(HANDLE_KINDS, "Kind", "What of the surface the handle holds")
+    group: text(
+        "Vertex Group", "The group that the handle holds; a bone without one holds what lies about it"
     )
-    group: bpy.props.StringProperty(
-        name="Vertex Group",
-        description="The group that the handle holds; a bone without one holds what lies about it",
-    )
-    hold_from: bpy.props.FloatProperty(
-        name="Hold From",
-        description="Weight of the vertex group from which the surface is held; less stays free to bend",
+    hold_from: number(
+        "Hold From",
+        "Weight of the vertex group from which the surface is held; less stays free to bend",
         default=0.5,
         min=0.0,
         max=1.0,
         subtype="FACTOR",
     )
-    weight: bpy.props.FloatProperty(
-        name="Weight",
-        description="How strictly this handle is followed, relative to the others",
+    weight: number(
+        "Weight",
+        "How strictly this handle is followed, relative to the others",
         default=1.0,
         min=0.0,
         soft_max=10.0,
     )
-    reach: bpy.props.FloatProperty(
-        name="Reach",
-        description="How far from what it holds the handle moves things, through the inside of the shape, "
+    reach: number(
+        "Reach",
+        "How far from what it holds the handle moves things, through the inside of the shape, "
         "in the object's own lengths; beyond, nothing moves at all. 0: as far as the shape goes",
         subtype="DISTANCE",
         default=0.0,
         min=0.0,
     )
-    allow_scale: bpy.props.BoolProperty(
-        name="Allow Scale",
-        description="What the handle holds is scaled as it is; otherwise only the handle's move and turn "
-        "count",
+    allow_scale: flag(
+        "Allow Scale",
+        "What the handle holds is scaled as it is; otherwise only the handle's move and turn count",
     )
-    anchor: bpy.props.BoolProperty(
-        name="Anchor",
-        description="The pin tool does not drag it; while there is one, nothing else is held by itself",
+    anchor: flag(
+        "Anchor", "The pin tool does not drag it; while there is one, nothing else is held by itself"
     )
     colour: bpy.props.FloatVectorProperty(
         name="Colour",
@@ -71,9 +67,9 @@ class ARAPFIELDS_PG_handle(bpy.types.PropertyGroup):
         name="Rest Box",
         description="The cube [-1, 1]³ → the object's coordinates, at rest (row by row)",
     )
-    inside: bpy.props.IntProperty(
-        name="Points Inside",
-        description="How many of 4000 points of the surface the handle held when its rest pose was stored; "
+    inside: integer(
+        "Points Inside",
+        "How many of 4000 points of the surface the handle held when its rest pose was stored; "
         "-1 when not counted",
         default=-1,
     )

@@ -7,6 +7,7 @@ from mathutils import Matrix, Vector
 
 from ..blender.guide import Guided
 from ..blender.object_references import owner_of, refusal, settings_of
+from ..blender.property_definitions import integer, number
 from ..core.errors import UserError
 from ..names import Op
 from . import counts, empties
@@ -48,13 +49,9 @@ class ARAPFIELDS_OT_resize_handle(Guided, bpy.types.Operator):
     guide = "handles"
     bl_options = {"REGISTER", "UNDO"}
 
-    axis: bpy.props.IntProperty(name="Axis", description="0, 1 or 2: X, Y or Z of the Empty", min=0, max=2)
-    side: bpy.props.IntProperty(
-        name="Side", description="-1 or 1: which of the two faces", min=-1, max=1, default=1
-    )
-    share: bpy.props.FloatProperty(
-        name="Share", description="How far the face moves outwards, of the box's size", options={"SKIP_SAVE"}
-    )
+    axis: integer("Axis", "0, 1 or 2: X, Y or Z of the Empty", min=0, max=2)
+    side: integer("Side", "-1 or 1: which of the two faces", min=-1, max=1, default=1)
+    share: number("Share", "How far the face moves outwards, of the box's size", options={"SKIP_SAVE"})
 
     @classmethod
     def obstacle(cls, context):

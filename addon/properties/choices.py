@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Choices that an object's settings hold and that a call of an operator may make otherwise."""
 
-import bpy
+from functools import partial
 
-from ..blender.property_definitions import annotations
+from ..blender.property_definitions import annotations, choice
 from ..core.settings.choices import FRAMES, OUTPUTS, PLACEMENT_NUMBERS, PLACEMENTS, SURFACES
 from ..core.settings.fitting import QUALITIES
 from ..core.settings.parameters import EXTRACTION
@@ -17,26 +17,23 @@ STYLE_ITEMS = tuple(
 RESULT_ITEMS = tuple((*placement, "NONE", PLACEMENT_NUMBERS[placement[0]]) for placement in PLACEMENTS)
 
 
-def choice(items, name, description, **default):
-    """What makes the definition of a property, with what else a class says of it."""
-    return lambda **extra: bpy.props.EnumProperty(
-        items=items, name=name, description=description, **default, **extra
-    )
-
-
-quality = choice(
+quality = partial(
+    choice,
     QUALITY_ITEMS,
     "Quality",
     "Sets the iterations and the network's size",
     **({"default": "GOOD"} if QUALITY_ITEMS else {}),
 )
-style = choice(STYLE_ITEMS, "Style", "The solid whose faces the surface turns towards")
-frame = choice(FRAMES, "Orientation", "Along which axes the style stands")
-output = choice(OUTPUTS, "Output", "What the result is made of")
-surface = choice(
-    SURFACES, "Surface", "What the implicit surface is made of, which solves sample and new meshes show"
+style = partial(choice, STYLE_ITEMS, "Style", "The solid whose faces the surface turns towards")
+frame = partial(choice, FRAMES, "Orientation", "Along which axes the style stands")
+output = partial(choice, OUTPUTS, "Output", "What the result is made of")
+surface = partial(
+    choice,
+    SURFACES,
+    "Surface",
+    "What the implicit surface is made of, which solves sample and new meshes show",
 )
-result = choice(RESULT_ITEMS, "Result", "Where the result goes", default="MODIFIER")
+result = partial(choice, RESULT_ITEMS, "Result", "Where the result goes", default="MODIFIER")
 
 
 def extraction(**extra):

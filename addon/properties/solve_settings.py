@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..blender.property_definitions import annotations
+from ..blender.property_definitions import annotations, flag, pointer, text
 from ..core.settings.fitting import FIT, QUALITIES
 from ..core.settings.parameters import DEFORM
 from ..core.settings.styles import STYLIZE
@@ -27,26 +27,17 @@ ARAPFIELDS_PG_stylize = group(
     STYLIZE,
     style=style(),
     frame=frame(),
-    frame_object=bpy.props.PointerProperty(
-        type=bpy.types.Object, name="Axes Of", description="Object along whose axes the style stands"
+    frame_object=pointer(bpy.types.Object, "Axes Of", "Object along whose axes the style stands"),
+    region=text("Region", "Vertex group whose weights say how strongly the style acts; empty for everywhere"),
+    style_object=pointer(
+        bpy.types.Object,
+        "Normals Of",
+        "Object whose axes or shape the surface turns towards, for styles of that kind",
     ),
-    region=bpy.props.StringProperty(
-        name="Region",
-        description="Vertex group whose weights say how strongly the style acts; empty for everywhere",
+    region_material=pointer(
+        bpy.types.Material, "Material", "Material on whose faces the style acts; empty for everywhere"
     ),
-    style_object=bpy.props.PointerProperty(
-        type=bpy.types.Object,
-        name="Normals Of",
-        description="Object whose axes or shape the surface turns towards, for styles of that kind",
-    ),
-    region_material=bpy.props.PointerProperty(
-        type=bpy.types.Material,
-        name="Material",
-        description="Material on whose faces the style acts; empty for everywhere",
-    ),
-    use_handles=bpy.props.BoolProperty(
-        name="Follow Handles", description="Handles hold and move their parts while the rest is stylized"
-    ),
+    use_handles=flag("Follow Handles", "Handles hold and move their parts while the rest is stylized"),
 )
 
 CLASSES = [ARAPFIELDS_PG_fit, ARAPFIELDS_PG_deform, ARAPFIELDS_PG_stylize]

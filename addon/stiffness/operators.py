@@ -2,6 +2,7 @@
 import bpy
 
 from ..blender.object_references import settings_of
+from ..blender.property_definitions import choice
 from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError
 from ..names import Op
@@ -16,10 +17,10 @@ class ARAPFIELDS_OT_stiffness_preset(SourceOperator, bpy.types.Operator):
     guide = "characters"
     bl_options = {"REGISTER", "UNDO"}
 
-    material: bpy.props.EnumProperty(
-        items=tuple((key, label, tip) for key, (label, tip, _) in PRESETS.items()),
-        name="Material",
-        description="How stiff the painted part is",
+    material: choice(
+        tuple((key, label, tip) for key, (label, tip, _) in PRESETS.items()),
+        "Material",
+        "How stiff the painted part is",
     )
 
     @classmethod

@@ -3,41 +3,30 @@
 
 import bpy
 
-from ..blender.property_definitions import tells
+from ..blender.property_definitions import number, tells, text
 
 MOST = 1e4  # how many times as stiff a part may be; single precision bears no more beside soft ones
 
 
 def factor(name, description):
-    return bpy.props.FloatProperty(
-        name=name,
-        description=description,
-        default=1.0,
-        min=1 / MOST,
-        soft_min=0.01,
-        soft_max=1000.0,
-        max=MOST,
-    )
+    return number(name, description, default=1.0, min=1 / MOST, soft_min=0.01, soft_max=1000.0, max=MOST)
 
 
 class ARAPFIELDS_PG_stiffness(bpy.types.PropertyGroup):
-    group: bpy.props.StringProperty(
-        name="Stiff Part",
-        description="Vertex group that is as many times as stiff as is chosen where its weight is 1",
+    group: text(
+        "Stiff Part", "Vertex group that is as many times as stiff as is chosen where its weight is 1"
     )
     times: factor(
         "Times as Stiff", "How stiff the group is against stretching and bending; below 1 it is softer"
     )
-    bend_group: bpy.props.StringProperty(
-        name="Bending Part", description="Vertex group whose stiffness against bending alone is another"
-    )
+    bend_group: text("Bending Part", "Vertex group whose stiffness against bending alone is another")
     bend_times: factor(
         "Times against Bending", "How stiff that group is against bending; below 1 it folds more easily"
     )
 
-    mask: bpy.props.StringProperty(
-        name="Influence",
-        description="Vertex group that says how far each point goes of the way, nowhere where its weight "
+    mask: text(
+        "Influence",
+        "Vertex group that says how far each point goes of the way, nowhere where its weight "
         "is 0; the modifier's mask",
         update=tells("mask"),
     )

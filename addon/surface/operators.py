@@ -7,7 +7,7 @@ from ..blender.guide import Guided
 from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..blender.presets import preset_classes
-from ..blender.property_definitions import annotations
+from ..blender.property_definitions import annotations, flag
 from ..blender.user_preferences import fit_cache
 from ..core.runtime.jobs import Item
 from ..core.settings.fitting import FIT
@@ -30,9 +30,7 @@ class ARAPFIELDS_OT_fit(JobOperator, bpy.types.Operator):
     __annotations__ = {
         **annotations(FIT, options={"SKIP_SAVE"}),
         "quality": quality(options={"SKIP_SAVE"}),
-        "again": bpy.props.BoolProperty(
-            name="Again", description="Fit anew even where a fit is in the cache", options={"SKIP_SAVE"}
-        ),
+        "again": flag("Again", "Fit anew even where a fit is in the cache", options={"SKIP_SAVE"}),
     }
 
     def plan(self, context, source, _):

@@ -9,7 +9,7 @@ from ..blender.host import has_window
 from ..blender.native_options import options_of
 from ..blender.object_references import settings_of
 from ..blender.presets import preset_classes
-from ..blender.property_definitions import annotations, effective_value, effective_values
+from ..blender.property_definitions import annotations, effective_value, effective_values, integer, text
 from ..blender.source_operator import SourceOperator
 from ..carried import rest_bones
 from ..core.errors import UserError
@@ -25,10 +25,8 @@ from ..results.placement import destination
 from . import landmarks
 from .properties import fit_rig
 
-onto = bpy.props.StringProperty(
-    name="Onto",
-    description="Name of the mesh object to wrap onto; empty for the one in the settings",
-    options={"SKIP_SAVE"},
+onto = text(
+    "Onto", "Name of the mesh object to wrap onto; empty for the one in the settings", options={"SKIP_SAVE"}
 )
 
 
@@ -146,7 +144,7 @@ class ARAPFIELDS_OT_remove_landmark(SourceOperator, bpy.types.Operator):
     bl_options = {"INTERNAL", "UNDO"}
     guide = "wrap"
 
-    index: bpy.props.IntProperty(name="Row", description="Which of them, the first is 0", min=0)
+    index: integer("Row", "Which of them, the first is 0", min=0)
 
     def change(self, context, source):
         if self.index < len(settings_of(source).wrap.landmarks):

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..blender.property_definitions import annotations
+from ..blender.property_definitions import annotations, collection, flag, pointer
 from ..core.settings.wrapping import WRAP
 
 
@@ -12,37 +12,28 @@ def is_target(group, item):
 
 
 def fit_rig(**extra):
-    return bpy.props.BoolProperty(
-        name="Fit Armature",
-        description="Wrap the shape at rest and move the bones of its armature along, so that it poses the "
-        "wrapped shape",
+    return flag(
+        "Fit Armature",
+        "Wrap the shape at rest and move the bones of its armature along, so that it poses the wrapped shape",
         default=True,
         **extra,
     )
 
 
 class ARAPFIELDS_PG_landmark(bpy.types.PropertyGroup):
-    rest: bpy.props.PointerProperty(
-        type=bpy.types.Object, name="Landmark", description="Empty on the object at rest"
-    )
-    on_target: bpy.props.PointerProperty(
-        type=bpy.types.Object, name="On the Target", description="Empty where it belongs on the target"
-    )
+    rest: pointer(bpy.types.Object, "Landmark", "Empty on the object at rest")
+    on_target: pointer(bpy.types.Object, "On the Target", "Empty where it belongs on the target")
 
 
 class ARAPFIELDS_PG_wrap(bpy.types.PropertyGroup):
     __annotations__ = {
-        "onto": bpy.props.PointerProperty(
-            type=bpy.types.Object,
+        "onto": pointer(
+            bpy.types.Object,
+            "Onto",
+            "Mesh object that this one is wrapped onto; it may be open and broken, as scans are",
             poll=is_target,
-            name="Onto",
-            description="Mesh object that this one is wrapped onto; it may be open and broken, as scans are",
         ),
-        "landmarks": bpy.props.CollectionProperty(
-            type=ARAPFIELDS_PG_landmark,
-            name="Landmarks",
-            description="Pairs of places that belong together",
-        ),
+        "landmarks": collection(ARAPFIELDS_PG_landmark, "Landmarks", "Pairs of places that belong together"),
         "fit_rig": fit_rig(),
         **annotations(WRAP),
     }
