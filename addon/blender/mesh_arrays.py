@@ -21,15 +21,26 @@ class MeshArrays:
     has_free_normals: bool = False  # custom normals that do not turn by themselves
 
 
+def vectors(elements, name="vector"):
+    """(n, 3) float32 of a collection whose elements have a vector of that name, as attributes' data have."""
+    flat = np.empty(3 * len(elements), dtype=np.float32)
+    elements.foreach_get(name, flat)
+    return flat.reshape(-1, 3)
+
+
+def put_vectors(elements, values, name="vector"):
+    elements.foreach_set(name, np.ascontiguousarray(values, dtype=np.float32).ravel())
+
+
+def position_vectors(mesh):
+    """The collection that holds a mesh's positions, and their name in it."""
+    attribute = mesh.attributes.get("position")
+    return (mesh.vertices, "co") if attribute is None else (attribute.data, "vector")
+
+
 def positions(mesh):
     """(n, 3) vertex positions of a mesh, as float64."""
-    flat = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-    attribute = mesh.attributes.get("position")
-    if attribute is not None:
-        attribute.data.foreach_get("vector", flat)
-    else:
-        mesh.vertices.foreach_get("co", flat)
-    return flat.reshape(-1, 3).astype(np.float64)
+    return vectors(*position_vectors(mesh)).astype(np.float64)
 
 
 def fingerprint(mesh):
@@ -41,12 +52,8 @@ def fingerprint(mesh):
 
 def set_positions(mesh, points):
     """Moves the vertices of a mesh and nothing else."""
-    flat = np.ascontiguousarray(points, dtype=np.float32).ravel()
-    attribute = mesh.attributes.get("position")
-    if attribute is not None:
-        attribute.data.foreach_set("vector", flat)
-    else:
-        mesh.vertices.foreach_set("co", flat)
+    elements, name = position_vectors(mesh)
+    put_vectors(elements, points, name)
     mesh.update()
 
 
@@ -62,10 +69,10 @@ def corner_vertices(mesh):
 def triangles_of(mesh, face):
     """(k, 3) corners of the triangles of one of the mesh's faces, as Blender draws it."""
     mesh.calc_loop_triangles()
-    found = mesh.loop_triangles  # in the faces' order
-    first = bisect_left(range(len(found)), face, key=lambda index: found[index].polygon_index)
+    drawn = mesh.loop_triangles  # in the faces' order
+    first = bisect_left(range(len(drawn)), face, key=lambda index: drawn[index].polygon_index)
     count = mesh.polygons[face].loop_total - 2
-    return np.array([found[first + index].vertices for index in range(count)]).reshape(-1, 3)
+    return np.array([drawn[first + index].vertices for index in range(count)]).reshape(-1, 3)
 
 
 def triangles(mesh):
@@ -128,7 +135,7 @@ def fill(mesh, vertices, topology):
     mesh.loops.add(topology.corners.size)
     mesh.polygons.add(len(topology.corners))
     data = mesh.attributes
-    data["position"].data.foreach_set("vector", np.ascontiguousarray(vertices, dtype=np.float32).ravel())
+    put_vectors(data["position"].data, vertices)
     data[".edge_verts"].data.foreach_set("value", topology.edges.ravel())
     data[".corner_vert"].data.foreach_set("value", topology.corners.ravel())
     data[".corner_edge"].data.foreach_set("value", topology.corner_edges.ravel())

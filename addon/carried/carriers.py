@@ -28,8 +28,8 @@ class Carrier:
 
     @staticmethod
     def is_on(item):
-        """Whether the field has put something on the object itself."""
-        return False
+        """Whether the field moves the object's points."""
+        return modifier_stack.find(item) is not None
 
     def basis(self, item, entry, depsgraph):
         """The object's own motion without the field's, where the field moves it as a whole; else None."""
@@ -60,10 +60,6 @@ class MeshCarrier(Carrier):
 
     def restore(self, item, entry, before):
         motion.restore(item, before)
-
-    @staticmethod
-    def is_on(item):
-        return modifier_stack.find(item) is not None
 
     @staticmethod
     def release(item, entry):

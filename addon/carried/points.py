@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from ..blender import modifier_stack
+from ..blender import mesh_arrays, modifier_stack
 from ..blender.removal import remove_node_modifier
 from ..core.errors import UserError
 from ..field_modifier import motion, node_group
@@ -31,7 +31,8 @@ class AttributeCarrier(Carrier):
             raise UserError("{name} follows its surface by a modifier of its own", name=item.name)
         layers = layers_of(item)
         self.counts = [len(layer["position"].data) for layer in layers]
-        return np.concatenate([vectors(layer["position"]) for layer in layers] or [np.zeros((0, 3))])
+        points = [mesh_arrays.vectors(layer["position"].data) for layer in layers]
+        return np.concatenate(points or [np.zeros((0, 3))]).astype(np.float64)
 
     def bind(self, context, item, entry):
         played_points.set_playing(item, False)
@@ -49,7 +50,7 @@ class AttributeCarrier(Carrier):
         if modifier_stack.find(item) is None:
             return None
         layers = layers_of(item)
-        return [vectors(layer[OFFSETS]) if OFFSETS in layer else None for layer in layers]
+        return [mesh_arrays.vectors(layer[OFFSETS].data) if OFFSETS in layer else None for layer in layers]
 
     def restore(self, item, entry, before):
         if before is None:
@@ -57,12 +58,8 @@ class AttributeCarrier(Carrier):
             return
         for layer, offsets in zip(layers_of(item), before, strict=True):
             if offsets is not None and OFFSETS in layer and len(layer[OFFSETS].data) == len(offsets):
-                put_vectors(layer[OFFSETS], offsets)
+                mesh_arrays.put_vectors(layer[OFFSETS].data, offsets)
         item.data.update_tag()
-
-    @staticmethod
-    def is_on(item):
-        return modifier_stack.find(item) is not None
 
     @staticmethod
     def release(item, entry):
@@ -81,24 +78,14 @@ def follows_surface(modifier):
     return modifier.show_viewport and any(node.bl_idname == SURFACE_NODE for node in nodes)
 
 
-def vectors(attribute):
-    flat = np.empty(3 * len(attribute.data), dtype=np.float32)
-    attribute.data.foreach_get("vector", flat)
-    return flat.reshape(-1, 3).astype(np.float64)
-
-
-def put_vectors(attribute, values):
-    attribute.data.foreach_set("vector", np.ascontiguousarray(values, dtype=np.float32).ravel())
-
-
 def put_offsets(item, counts, offsets):
     layers = layers_of(item)
     if counts != [len(layer["position"].data) for layer in layers]:
         raise UserError("{name} changed while it was worked on; run again", name=item.name)
     motion.written.add(item.session_uid)
     for layer, part in zip(layers, np.split(offsets, np.cumsum(counts)[:-1]), strict=True):
-        made = layer.get(OFFSETS) or layer.new(OFFSETS, "FLOAT_VECTOR", "POINT")
-        put_vectors(made, part)
+        attribute = layer.get(OFFSETS) or layer.new(OFFSETS, "FLOAT_VECTOR", "POINT")
+        mesh_arrays.put_vectors(attribute.data, part)
     item.data.update_tag()
 
 

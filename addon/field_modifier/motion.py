@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..blender import modifier_stack
+from ..blender import mesh_arrays, modifier_stack
 from ..blender.object_references import settings_of
 from ..blender.removal import remove_mesh_object, remove_node_modifier
 from ..core.errors import UserError
@@ -161,7 +161,7 @@ def write_to(mesh, motion):
             attribute = None
         if attribute is None:
             attribute = mesh.attributes.new(name, "FLOAT_VECTOR", "POINT")
-        attribute.data.foreach_set("vector", np.ascontiguousarray(vectors, dtype=np.float32).ravel())
+        mesh_arrays.put_vectors(attribute.data, vectors)
     mesh.update_tag()
 
 
@@ -173,9 +173,7 @@ def vectors(mesh, name):
     attribute = mesh.attributes.get(name)
     if attribute is None or attribute.data_type != "FLOAT_VECTOR" or attribute.domain != "POINT":
         return None
-    flat = np.empty(3 * len(attribute.data), dtype=np.float32)
-    attribute.data.foreach_get("vector", flat)
-    return flat.reshape(-1, 3)
+    return mesh_arrays.vectors(attribute.data)
 
 
 def snapshot(source):
