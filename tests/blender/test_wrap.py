@@ -11,8 +11,8 @@ import arapfields as af
 
 if IN_BLENDER:
     import bpy
-    from dressing import seen_mesh
     from support.blender import character, scenes, wraps
+    from support.blender.character import seen_mesh
     from support.blender.wraps import SMALL, bar_and_target, joints, rigged_bar, soup_of
 
     from addon.blender import modifier_stack
