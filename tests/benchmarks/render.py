@@ -45,8 +45,6 @@ HEADINGS = {
     "theirs_s": "theirs, s",
     "of_products": "time over the bare products'",
     "peak_MiB": "peak, MiB",
-    "products_GFLOPs": "bare products, GFLOP/s",
-    "at_175_s": "seconds at 175 GFLOP/s",
     "flipped": "folded",
     "flipped_share": "folded",
     "setup_s": "set-up, s",
@@ -54,7 +52,6 @@ HEADINGS = {
     "cpu_s": "processor s",
     "solves_per_s": "solves a second",
     "rest_to_70_s": "rest to 70°, s",
-    "energy_12_steps": "energy after 12 steps",
     "of_neural": "energy over the network's",
     "of_its_time": "time over the network's",
     "strength": "strength, updates a second",
@@ -76,7 +73,8 @@ HEADINGS |= {
     "within_10_percent": "area within 10°, %",
     "others_percent": "other fingertips, % of the length",
 }
-HIDDEN = {"ratio", "unit", "same_side"}  # said by another column, or a check of the run
+# Said by another column, a check of the run, or of the machine.
+HIDDEN = {"ratio", "unit", "same_side", "same_number", "products_GFLOPs", "at_175_s", "energy_12_steps"}
 PLOTTED = {"jets"}  # whose rows are bars of the plot alone
 
 

@@ -5,8 +5,8 @@
 
 A sentence ends at a full stop, a question or an exclamation mark before a space, or where its paragraph or
 list item ends; colons and semicolons end none. Not counted are headings, blocks of code, tables (their cells
-are no sentences), pictures, displayed formulas and comments. Inline code, formulas and a link's text count by
-their words; a link's target and what has no letter or digit do not count.
+are no sentences), pictures, displayed formulas and comments. A piece of inline code counts as one word;
+formulas and a link's text count by their words, a link's target and what has no letter or digit not at all.
 """
 
 import ast
@@ -35,7 +35,7 @@ def paragraphs(text):
     text = re.sub(r"\$\$.*?\$\$", "\n\n", text, flags=re.S)
     text = re.sub(r"\[?!\[[^\]]*\]\([^)]*\)(?:\{[^}]*\})?(?:\]\([^)]*\))?", "", text)
     text = re.sub(r"</?\w[^>\n]*>|\A---\n.*?^---\n", "", text, flags=re.S | re.M)
-    text = re.sub(r"\[\^\w+\](?!:)", "", text)
+    text = re.sub(r"\[\^\w+\](?!:)", "", re.sub(r"`[^`\n]+`", "code", text))
     text = re.sub(r"\]\([^)]*\)", "]", text)
     found = [""]
     for line in text.splitlines():
@@ -86,7 +86,7 @@ def test_what_counts_as_a_sentence():
 
     assert counts("# A heading\n\nOne two 3.5 four. Five six?\nSeven") == [4, 2, 1]
     assert counts("- one two\n- three\n  four: five; six\n\n| a | b |\n|---|---|\n| c | d |") == [2, 4]
-    assert counts("```sh\nmake it\n```\nSee `a b` and [the page](page.md#x), *then stop.* Go on.") == [8, 2]
+    assert counts("```sh\nmake it\n```\nSee `a b` and [the page](page.md#x), *then stop.* Go on.") == [7, 2]
     assert counts(
         "![a picture](x.png)\n\n$$ a = b $$\n\n<!-- mark -->3 s<!-- end --> it took – no more."
     ) == [6]

@@ -56,13 +56,11 @@ def test_messages_of_the_troubleshooting_page_are_in_the_code():
         if p.suffix in (".cpp", ".h", ".py")
     ]
     code = re.sub(r'"\s*\n\s*"', "", "\n".join(path.read_text() for path in sources))
-    missing = []
-    for message in re.findall(
-        r"^[|-] `([^`]+)`", (pages.ROOT / "docs" / "troubleshooting.md").read_text(), re.M
-    ):
-        missing += [
-            part for part in re.split(r"…| i | j ", message) if part.strip() and part.strip() not in code
-        ]
+    missing, page = [], (pages.ROOT / "docs" / "troubleshooting.md").read_text()
+    for item in re.findall(r"^- (`.*?`)(?:: |$)", page, re.M):
+        for message in re.findall(r"`([^`]+)`", item):
+            parts = re.split(r"…| i | j ", message)
+            missing += [part for part in parts if part.strip() and part.strip() not in code]
     assert not missing
 
 
