@@ -47,9 +47,9 @@ def place(source):
     """Where the field modifier is in the stack, or would come: at the cache that plays in its place, else
     before what only refines the shape, or before the armatures where its rest shape is worked on."""
     stack = list(source.modifiers)
-    found = next((index for index, one in enumerate(stack) if is_field(one) or is_cache(one)), None)
-    if found is not None:
-        return found
+    own = next((index for index, one in enumerate(stack) if is_field(one) or is_cache(one)), None)
+    if own is not None:
+        return own
     if settings_of(source).under_rig:
         return next((index for index, one in enumerate(stack) if is_posing(source, one)), len(stack))
     end = len(stack)

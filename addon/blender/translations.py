@@ -24,7 +24,7 @@ def translations():
     languages = {}
     for path in sorted(FOLDER.glob("*.po")):
         texts = read_po(path).items()
-        languages[path.stem] = {(context, text): told for text, told in texts for context in CONTEXTS}
+        languages[path.stem] = {(context, text): own for text, own in texts for context in CONTEXTS}
     return languages
 
 

@@ -13,7 +13,7 @@ from ..blender import modifier_stack
 from ..blender.removal import remove_mesh_object, remove_node_modifier
 from ..core.errors import UserError
 from ..field_modifier import inputs
-from ..field_modifier.node_group import Graph
+from ..field_modifier.node_group import VECTORS, Graph, kept_group
 from ..names import CACHE_MODIFIER, PLAYED_GROUP, PLAYED_SUFFIX, ROWS
 from .drawings import layers_of
 
@@ -22,47 +22,29 @@ VERSION = 1
 
 def find_or_make():
     """The node group of the modifier."""
-    for group in bpy.data.node_groups:
-        if group.get(PLAYED_GROUP) == VERSION and group.library is None:
-            return group
-    group = build()
-    group[PLAYED_GROUP] = VERSION
-    return group
+    return kept_group(PLAYED_GROUP, VERSION, build)
 
 
 def build():
-    group = bpy.data.node_groups.new(CACHE_MODIFIER, "GeometryNodeTree")
-    group.is_modifier = True
-    graph = Graph(group)
-    graph.socket("Geometry", "INPUT", "NodeSocketGeometry")
-    for name, text in (("Factor", "How far the points go of the way"), ("Mask", "How far each point goes")):
-        socket = graph.socket(name, "INPUT", "NodeSocketFloat", text)
-        socket.default_value, socket.min_value, socket.max_value, socket.subtype = 1.0, 0.0, 1.0, "FACTOR"
+    graph = Graph(CACHE_MODIFIER)
+    graph.fading_inputs("How far each point goes")
     graph.socket("Points", "INPUT", "NodeSocketObject", "Mesh that plays the points")
     graph.socket("Geometry", "OUTPUT", "NodeSocketGeometry")
 
-    given = graph.node("NodeGroupInput").outputs
-    played = graph.node("GeometryNodeObjectInfo", given["Points"]).outputs["Geometry"]
+    inputs = graph.node("NodeGroupInput").outputs
+    played = graph.node("GeometryNodeObjectInfo", inputs["Points"]).outputs["Geometry"]
     row = graph.node("GeometryNodeInputNamedAttribute", ROWS, data_type="INT").outputs[0]
     known = graph.node("ShaderNodeMath", row, 0.5, operation="GREATER_THAN").outputs[0]
     vertex = graph.node("ShaderNodeMath", row, 1.0, operation="SUBTRACT").outputs[0]
     position = graph.node("GeometryNodeInputPosition").outputs[0]
-    there = graph.node("GeometryNodeSampleIndex", data_type="FLOAT_VECTOR", domain="POINT")
-    graph.link(played, there.inputs[0])
-    graph.link(position, there.inputs["Value"])
-    graph.link(vertex, there.inputs["Index"])
-    strength = graph.node("ShaderNodeMath", given["Factor"], given["Mask"], operation="MULTIPLY").outputs[0]
-    way = graph.node("ShaderNodeVectorMath", there.outputs["Value"], position, operation="SUBTRACT").outputs[
-        0
-    ]
-    moved = graph.node("ShaderNodeVectorMath", way, operation="SCALE")
-    graph.link(strength, moved.inputs["Scale"])
-    place = graph.node("GeometryNodeSetPosition")
-    graph.link(given["Geometry"], place.inputs["Geometry"])
-    graph.link(known, place.inputs["Selection"])
-    graph.link(moved.outputs[0], place.inputs["Offset"])
-    graph.node("NodeGroupOutput", place.outputs[0])
-    return group
+    sampled = graph.node(
+        "GeometryNodeSampleIndex", played, into={"Value": position, "Index": vertex}, **VECTORS
+    ).outputs["Value"]
+    strength = graph.node("ShaderNodeMath", inputs["Factor"], inputs["Mask"], operation="MULTIPLY").outputs[0]
+    way = graph.node("ShaderNodeVectorMath", sampled, position, operation="SUBTRACT").outputs[0]
+    moved = graph.node("ShaderNodeVectorMath", way, into={"Scale": strength}, operation="SCALE").outputs[0]
+    graph.node("NodeGroupOutput", graph.set_position(inputs["Geometry"], known, moved))
+    return graph.group
 
 
 def find(item):

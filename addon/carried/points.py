@@ -37,8 +37,8 @@ class AttributeCarrier(Carrier):
     def bind(self, context, item, entry):
         played_points.set_playing(item, False)
         if modifier_stack.find(item) is None:
-            made = item.modifiers.new(FIELD_MODIFIER, "NODES")
-            made.node_group = node_group.find_or_make()
+            modifier = item.modifiers.new(FIELD_MODIFIER, "NODES")
+            modifier.node_group = node_group.find_or_make()
             item.modifiers.move(len(item.modifiers) - 1, 0)  # hair grown from these follows
 
     def write(self, item, entry, shape):
@@ -176,21 +176,21 @@ def own_points(item):
         return points
     if item.type == "LATTICE":
         return np.array([point.co_deform for point in item.data.points], dtype=np.float64).reshape(-1, 3)
-    found = []
+    points = []
     for spline in item.data.splines:
         if spline.type == "BEZIER":
-            found += [getattr(point, field) for point in spline.bezier_points for field in FIELDS]
+            points += [getattr(point, field) for point in spline.bezier_points for field in FIELDS]
         else:
-            found += [point.co[:3] for point in spline.points]
-    return np.array(found, dtype=np.float64).reshape(-1, 3)
+            points += [point.co[:3] for point in spline.points]
+    return np.array(points, dtype=np.float64).reshape(-1, 3)
 
 
 def key_points(key):
     """(n, 3) positions of a key, those of Bézier points with their handles."""
-    found = []
+    points = []
     for point in key.data:
-        found += [getattr(point, field) for field in FIELDS if hasattr(point, field)]
-    return np.array(found, dtype=np.float64).reshape(-1, 3)
+        points += [getattr(point, field) for field in FIELDS if hasattr(point, field)]
+    return np.array(points, dtype=np.float64).reshape(-1, 3)
 
 
 def put_key(key, points):

@@ -57,10 +57,10 @@ class Fitting:
             after = field(before)
             if not np.isfinite(after).all():
                 raise UserError("the result has bones that are not finite; try other settings")
-            found = posing.bone_poses(to_solve @ poses, before, after)
+            posed = posing.bone_poses(to_solve @ poses, before, after)
             heads, tails = after[0 :: len(posing.BONE_POINTS)], after[1 :: len(posing.BONE_POINTS)]
             back = inverse(to_solve)
-            axes = found[:, :3, 2] @ back[:3, :3].T
+            axes = posed[:, :3, 2] @ back[:3, :3].T
             self.moved.append((reference, names, transform(back, heads), transform(back, tails), axes))
 
     def put(self, context):

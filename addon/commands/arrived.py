@@ -54,19 +54,19 @@ def _ply(path, polygons, corners):
 
 
 def _obj(path, vertices, polygons):
-    found = {b"v": 0, b"f": 0}
+    counts = {b"v": 0, b"f": 0}
     used, last = set(), b""
     with path.open("rb") as file:
         for last in file:
             word, _, rest = last.partition(b" ")
-            if word in found:
-                found[word] += 1
+            if word in counts:
+                counts[word] += 1
             elif word == b"usemtl":
                 used.add(rest.strip())
     materials = path.with_suffix(".mtl")
     if materials.exists():
         text = materials.read_bytes()
-        made = {line[7:].strip() for line in text.splitlines() if line.startswith(b"newmtl ")}
-        if not text.endswith(b"\n") or not used <= made:
+        defined = {line[7:].strip() for line in text.splitlines() if line.startswith(b"newmtl ")}
+        if not text.endswith(b"\n") or not used <= defined:
             return False
-    return last.endswith(b"\n") and found == {b"v": vertices, b"f": polygons}
+    return last.endswith(b"\n") and counts == {b"v": vertices, b"f": polygons}

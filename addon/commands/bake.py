@@ -10,7 +10,7 @@ from ..core.errors import UserError
 from ..core.runtime import jobs
 from ..handles import empties
 from . import files
-from .single import progress, wanted
+from .single import objects_to_solve, progress
 
 EXPORTS = {".abc": "ABC", ".usdc": "USD", ".glb": "GLTF"}
 
@@ -28,7 +28,7 @@ def run_bake(options, _):
     target = options.output.resolve() if options.output else None
     folder = str(options.folder.resolve()) if options.folder else None
     files.read(options.input)
-    sources = wanted(options) if options.objects else animated(options)
+    sources = objects_to_solve(options) if options.objects else animated(options)
     given = {"kind": options.kind.upper()} if options.kind else {}
     if options.frames:
         given["start"], given["end"] = options.frames

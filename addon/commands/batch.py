@@ -35,8 +35,8 @@ def run_batch(options, launch):
     number, parts = options.shard or (1, 1)
     tasks = everything[number - 1 :: parts]
     record = Record(options.output)
-    told = described(options.solve_verb, settings, native.library().__version__)
-    options_name = digest(told)
+    description = described(options.solve_verb, settings, native.library().__version__)
+    options_name = digest(description)
     skipped = [
         t for t in tasks if not options.again and record.is_done(t.name, t.source, t.target, options_name)
     ]
@@ -50,11 +50,11 @@ def run_batch(options, launch):
         for task in todo:
             say(f"{task.name}: would become {task.target}")
         return 0
-    agree(options, record, told)
+    agree(options, record, description)
     of = f", the part {number}/{parts} of {len(everything)}" if options.shard else ""
     say(f"{len(todo)} of {len(tasks)} files to do{of}, {options.jobs} at a time")
     try:
-        counts = Work(options, settings, launch, record, told).run(todo)
+        counts = Work(options, settings, launch, record, description).run(todo)
     finally:
         record.close()
     seconds = time.perf_counter() - begin
@@ -63,9 +63,9 @@ def run_batch(options, launch):
     return 1 if counts["failed"] else 0
 
 
-def agree(options, record, told):
+def agree(options, record, description):
     """Names results of other settings or of another version in the folder; parts of one job share both."""
-    other = record.agree(told, anew=options.again or not options.shard)
+    other = record.agree(description, anew=options.again or not options.shard)
     if other and options.shard and not options.again:
         raise UserError(
             f"{options.output}: holds results made with {other}; the parts of one job must agree: "
@@ -85,11 +85,11 @@ def plan(options):
     if output.exists() and not output.is_dir():
         raise UserError(f"{output}: is a file, not a folder")
     try:
-        found = sorted(folder.rglob(options.pattern) if options.recursive else folder.glob(options.pattern))
+        paths = sorted(folder.rglob(options.pattern) if options.recursive else folder.glob(options.pattern))
     except (ValueError, NotImplementedError, IndexError) as error:
         raise UserError(f"--pattern: {options.pattern!r} is not a pattern of names ({error})") from None
     tasks = []
-    for path in found:
+    for path in paths:
         suffix = path.suffix.lower().lstrip(".")
         if suffix not in FORMATS or path.name.startswith(".") or output.resolve() in path.resolve().parents:
             continue
@@ -118,9 +118,9 @@ def refuse_twins(tasks):
 class Work:
     """Files done so many at a time, each by one batch alone; others may be at work in the same folder."""
 
-    def __init__(self, options, settings, launch, record, told):
+    def __init__(self, options, settings, launch, record, description):
         self.options, self.flags, self.launch, self.record = options, flags(settings), launch, record
-        self.digest = digest(told)
+        self.digest = digest(description)
         self.again = options.again
 
     def run(self, todo):
@@ -166,8 +166,8 @@ class Work:
             arguments = [*self.flags, "--quiet", "-i", str(task.source), "-o", str(task.target)]
             outcome = children.run(self.launch.command(self.options.solve_verb, arguments))
             if not children.stopped:
-                made = {"output": task.target.name, "options": self.digest, "source": seen}
-                self.record.note(task.name, **made, **outcome)
+                entry = {"output": task.target.name, "options": self.digest, "source": seen}
+                self.record.note(task.name, **entry, **outcome)
             return outcome
         finally:
             self.record.release(task.name)
@@ -175,14 +175,14 @@ class Work:
 
 def flags(settings):
     """Settings as the arguments of the single verbs."""
-    made = []
+    arguments = []
     for name, value in settings.items():
         flag = "--" + name.replace("_", "-")
         if isinstance(value, bool):
-            made.append(flag if value else f"--no-{flag[2:]}")
+            arguments.append(flag if value else f"--no-{flag[2:]}")
         else:
-            made += [flag, str(value.resolve() if isinstance(value, Path) else value)]
-    return made
+            arguments += [flag, str(value.resolve() if isinstance(value, Path) else value)]
+    return arguments
 
 
 def describe(outcome):

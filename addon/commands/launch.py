@@ -64,5 +64,5 @@ class Launch:
     def environment(self, jobs):
         """The processors shared between so many Blenders at work."""
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-        wanted = os.environ.get("OMP_NUM_THREADS") or str(max(1, cores // jobs))
-        return {**os.environ, "OMP_NUM_THREADS": wanted, "PYTHONUNBUFFERED": "1"}
+        threads = os.environ.get("OMP_NUM_THREADS") or str(max(1, cores // jobs))
+        return {**os.environ, "OMP_NUM_THREADS": threads, "PYTHONUNBUFFERED": "1"}

@@ -31,10 +31,10 @@ def parse(arguments):
     options = parser().parse_args(arguments)
     verb = options.verb
     if verb == "batch":
-        wanted = [name for name, given in (("stylize", options.style), ("deform", options.deform)) if given]
-        if len(wanted) != 1:
+        verbs = [name for name, given in (("stylize", options.style), ("deform", options.deform)) if given]
+        if len(verbs) != 1:
             parser().error("batch: say what to do, either --style NAME or --deform")
-        (options.solve_verb,) = wanted
+        (options.solve_verb,) = verbs
         refuse_foreign(options)
     else:
         options.solve_verb = verb
@@ -60,12 +60,12 @@ def solve_settings(options):
 
 
 def parser():
-    made = OneLineParser(
+    root = OneLineParser(
         prog="arapfields",
         description="Deform and stylize meshes in a Blender without a window.",
         epilog="Exit codes: 0 done, 1 something failed, 2 bad input or usage, 130 interrupted.",
     )
-    verbs = made.add_subparsers(dest="verb", metavar="VERB", required=True, parser_class=OneLineParser)
+    verbs = root.add_subparsers(dest="verb", metavar="VERB", required=True, parser_class=OneLineParser)
     for name, text in (
         ("deform", "deform the meshes of one file under handles"),
         ("stylize", "turn the meshes of one file towards a style"),
@@ -82,7 +82,7 @@ def parser():
     text = "say in one report what this is running on, and whether the library works here"
     check = verbs.add_parser("check", help=text, description=text)
     check.set_defaults(handles=None)
-    return made
+    return root
 
 
 def add_bake(verbs):
@@ -114,10 +114,10 @@ def add_bake(verbs):
 
 def frames(text):
     """A flag's type: "a-b", frames of a scene, which may be negative."""
-    found = re.fullmatch(r"(-?\d{1,7})-(-?\d{1,7})", text.strip())
-    if not found or int(found[2]) < int(found[1]):
+    match = re.fullmatch(r"(-?\d{1,7})-(-?\d{1,7})", text.strip())
+    if not match or int(match[2]) < int(match[1]):
         raise argparse.ArgumentTypeError(f"{text[:40]!r} is not A-B, from frame A to B, such as 1-250")
-    return int(found[1]), int(found[2])
+    return int(match[1]), int(match[2])
 
 
 def add_batch(verbs):

@@ -17,10 +17,11 @@ LOCK = "lock"
 
 def described(verb, settings, version):
     """What is done to an input, as JSON; of files among the settings the content counts, not their names."""
-    told = {"version": version, "verb": verb}
+    description = {"version": version, "verb": verb}
     for name, value in sorted(settings.items()):
-        told[name] = digest(Path(value).read_text(encoding="utf-8")) if isinstance(value, Path) else value
-    return told
+        is_file = isinstance(value, Path)
+        description[name] = digest(Path(value).read_text(encoding="utf-8")) if is_file else value
+    return description
 
 
 def digest(content):
@@ -38,8 +39,8 @@ def differences(then, now):
 
 def stamp(path):
     """What changes when a file does."""
-    found = path.stat()
-    return [found.st_size, found.st_mtime_ns]
+    status = path.stat()
+    return [status.st_size, status.st_mtime_ns]
 
 
 class Record:
@@ -111,20 +112,20 @@ class Record:
 
     def settings(self):
         """What the folder's results are made with; None where nothing tells."""
-        found = read(self.folder / BATCH).get("settings")
-        return found if isinstance(found, dict) else None
+        settings = read(self.folder / BATCH).get("settings")
+        return settings if isinstance(settings, dict) else None
 
-    def agree(self, told, anew):
+    def agree(self, description, anew):
         """What differs between these settings and those of the folder, which become these where `anew`."""
         from arapfields._locks import lock
 
         with contextlib.suppress(OSError):
             lock(self._locks(), byte_of(BATCH))
         try:
-            there = self.settings()
-            other = differences(there, told) if there else ""
-            if not there or (other and anew):
-                self._write(self.folder / BATCH, {"settings": told})
+            earlier = self.settings()
+            other = differences(earlier, description) if earlier else ""
+            if not earlier or (other and anew):
+                self._write(self.folder / BATCH, {"settings": description})
             return other
         finally:
             self.release(BATCH)

@@ -29,28 +29,28 @@ def run_single(options, _):
     """Exit code 0 when every object came out, 1 when some did; UserError when there is nothing to do."""
     files.check(options.output)
     files.read(options.input)
-    sources = wanted(options)
+    sources = objects_to_solve(options)
     if options.handles:
         for source in sources:
             add_handles(source, options.handles)
-    outcomes, made = [], []
+    outcomes, results = [], []
     with progress(options.quiet):
         for source in sources:
             outcome, item = solve(source, options)
             outcomes.append(outcome)
-            made += [item] if item else []
-    if made:
-        finish_names(options, made)
-        files.write(options.output, [item for _, item in made])
+            results += [item] if item else []
+    if results:
+        finish_names(options, results)
+        files.write(options.output, [item for _, item in results])
     if options.report:
         write_json(options.report, {"input": str(options.input), "objects": outcomes})
     for outcome in outcomes:
         stream = sys.stdout if outcome["status"] == "done" else sys.stderr
         print(f"arapfields: {outcome['message']}", file=stream, flush=True)
-    return 0 if len(made) == len(outcomes) else 1
+    return 0 if len(results) == len(outcomes) else 1
 
 
-def wanted(options):
+def objects_to_solve(options):
     """The objects to work on."""
     meshes = [item for item in bpy.context.view_layer.objects if item.type == "MESH"]
     meshes = [item for item in meshes if not settings_of(item).made_from]
@@ -58,8 +58,8 @@ def wanted(options):
         by_name = {item.name: item for item in meshes}
         unknown = [name for name in options.objects if name not in by_name]
         if unknown:
-            there = ", ".join(sorted(by_name)) or "none"
-            raise UserError(f"{options.input}: no mesh object named {unknown[0]}; there are: {there}")
+            known = ", ".join(sorted(by_name)) or "none"
+            raise UserError(f"{options.input}: no mesh object named {unknown[0]}; there are: {known}")
         meshes = [by_name[name] for name in options.objects]
     elif options.solve_verb == "deform" and not options.handles:
         meshes = [item for item in meshes if empties.used(item)]
@@ -75,22 +75,21 @@ def add_handles(source, path):
     from arapfields.cli.handles import build_handles, read_handles
 
     af = native.library()
-    described = read_handles(path)
+    descriptions = read_handles(path)
     corners = np.array(
         [source.matrix_world @ Matrix.Translation(c).to_translation() for c in source.bound_box]
     )
-    for made, (name, item) in zip(
-        build_handles(described, np.array([corners.min(axis=0), corners.max(axis=0)])), described, strict=True
-    ):
-        point = isinstance(made, af.Point)
-        rest, target = (np.eye(4), np.eye(4)) if point else (np.array(made.rest), np.array(made.target))
+    handles = build_handles(descriptions, np.array([corners.min(axis=0), corners.max(axis=0)]))
+    for handle, (name, item) in zip(handles, descriptions, strict=True):
+        point = isinstance(handle, af.Point)
+        rest, target = (np.eye(4), np.eye(4)) if point else (np.array(handle.rest), np.array(handle.target))
         if point:
             rest[:3, :3] *= max(np.ptp(corners, axis=0).max(), 1e-6) / 100
             target[:3, :3] = rest[:3, :3]
-            rest[:3, 3], target[:3, 3] = made.rest, made.target
+            rest[:3, 3], target[:3, 3] = handle.rest, handle.target
         kind = "POINT" if point else "CUBE"
-        held = naming.name_for(source, rest[:3, 3], kind)
-        empty = empties.make_empty(bpy.context, source, Matrix(rest.tolist()), 1.0, held)
+        handle_name = naming.name_for(source, rest[:3, 3], kind)
+        empty = empties.make_empty(bpy.context, source, Matrix(rest.tolist()), 1.0, handle_name)
         if not np.allclose(empty.matrix_world, rest, rtol=1e-4, atol=1e-6 * np.abs(rest).max()):
             raise UserError(f"{name}: its box is sheared; an Empty cannot be")
         entry = empties.add(source, empty, kind)
@@ -130,11 +129,11 @@ def solve(source, options):
     return outcome, (source, item)
 
 
-def finish_names(options, made):
+def finish_names(options, results):
     """In a mesh file a result bears its source's name."""
     if options.output.suffix.lower() == ".blend":
         return
-    for source, item in made:
+    for source, item in results:
         name, mesh = source.name, source.data.name
         source.name, source.data.name = f"{name}.source", f"{mesh}.source"
         item.name, item.data.name = name, mesh

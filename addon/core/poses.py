@@ -58,11 +58,11 @@ def from_bytes(content, name):
     """The pose of a file's content; UserError that names it where that is none."""
     af = native.library()
     try:
-        with np.load(io.BytesIO(content), allow_pickle=False) as found:
-            if int(found["version"]) != VERSION:
+        with np.load(io.BytesIO(content), allow_pickle=False) as file:
+            if int(file["version"]) != VERSION:
                 raise UserError("{name} was written by a newer version", name=name)
-            matrix = np.array(found["local_to_solve"], dtype=np.float64).reshape(4, 4)
-            points, normals, written = found["points"], found["normals"], found["field"].tobytes()
+            matrix = np.array(file["local_to_solve"], dtype=np.float64).reshape(4, 4)
+            points, normals, written = file["points"], file["normals"], file["field"].tobytes()
         if not np.isfinite(matrix).all() or not abs(np.linalg.det(matrix)) > 0:
             raise UserError("{name} holds no pose", name=name)
         with tempfile.TemporaryDirectory() as folder:

@@ -73,7 +73,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
         applying.note(owner, *found[-1], surface.space)
         carrying.put(bpy.context, solved.carried)
         operator.warnings += [f"{owner.name}: {translated(reason)}" for reason in carrying.take_warnings()]
-        shown = item.name + visibility.told(visibility.show_alone(owner, item))
+        shown = item.name + visibility.hidden_note(visibility.show_alone(owner, item))
         return describe(shown, solved.report)
 
     return Item(source.name, work, apply, preview)

@@ -14,14 +14,14 @@ def slot(modifier, name):
 
 
 def get(modifier, name):
-    found = slot(modifier, name)
-    return found.value if found is not None else modifier[identifier(modifier, name)]
+    socket = slot(modifier, name)
+    return socket.value if socket is not None else modifier[identifier(modifier, name)]
 
 
 def put(modifier, name, value):
-    found = slot(modifier, name)
-    if found is not None:
-        found.value = value
+    socket = slot(modifier, name)
+    if socket is not None:
+        socket.value = value
     else:
         modifier[identifier(modifier, name)] = value
     modifier.id_data.update_tag()
@@ -29,19 +29,19 @@ def put(modifier, name, value):
 
 def get_attribute(modifier, name):
     """Name of the attribute or vertex group that an input takes; "" where it is a plain value."""
-    found = slot(modifier, name)
-    if found is not None:
-        return found.attribute_name if found.type == "ATTRIBUTE" else ""
+    socket = slot(modifier, name)
+    if socket is not None:
+        return socket.attribute_name if socket.type == "ATTRIBUTE" else ""
     key = identifier(modifier, name)
     return modifier[f"{key}_attribute_name"] if modifier.get(f"{key}_use_attribute") else ""
 
 
 def put_attribute(modifier, name, attribute):
     """Has an input take an attribute or vertex group, or with "" its plain value."""
-    found = slot(modifier, name)
-    if found is not None:
-        found.type = "ATTRIBUTE" if attribute else "VALUE"
-        found.attribute_name = attribute
+    socket = slot(modifier, name)
+    if socket is not None:
+        socket.type = "ATTRIBUTE" if attribute else "VALUE"
+        socket.attribute_name = attribute
     else:
         key = identifier(modifier, name)
         modifier[f"{key}_use_attribute"] = bool(attribute)

@@ -44,13 +44,13 @@ def bind(context, source):
     """
     modifier = modifier_stack.find(source)
     armatures.silence(source)
-    made = None
+    copied = None
     cache_modifier.suspend(source)
     with modifier_stack.evaluated_mesh(context, source, in_place=True) as mesh:
         normals, count = modifier_stack.free_normals(mesh), len(mesh.vertices)
     on_mesh = lies_on_mesh(source)
     if not on_mesh:
-        made = modifier_stack.mesh_copy(context, source, in_place=True)
+        copied = modifier_stack.mesh_copy(context, source, in_place=True)
     if modifier is None:
         modifier = add(source, normals)
     else:
@@ -59,7 +59,7 @@ def bind(context, source):
     if on_mesh:
         forget_helper(modifier)
     else:
-        take_helper(source, modifier, made)
+        take_helper(source, modifier, copied)
     mesh = carrier(source, modifier)
     if len(mesh.vertices) != count:
         raise UserError("{name} changed while it was worked on; run again", name=source.name)

@@ -13,51 +13,46 @@ from ..blender.modifier_stack import FREE_NORMALS
 from ..names import FIELD_GROUP, FIELD_MODIFIER, OFFSETS, TURNS
 
 VERSION = 1
+VECTORS = {"data_type": "FLOAT_VECTOR", "domain": "POINT"}  # of nodes that sample points
 PLAIN = ""  # of the groups: the one that turns no normals; the others are named by the normals' domain
 
 
 def find_or_make(normals=PLAIN):
     """The group for a mesh whose free custom normals lie on that domain (POINT, FACE, CORNER, or none)."""
-    mark = f"{VERSION} {normals}"
+    name = f"{FIELD_MODIFIER} {normals.title()} Normals" if normals else FIELD_MODIFIER
+    return kept_group(FIELD_GROUP, f"{VERSION} {normals}", lambda: build(name, normals))
+
+
+def kept_group(key, mark, build):
+    """The file's own group with this mark under its custom property `key`; built where there is none."""
     for group in bpy.data.node_groups:
-        if group.get(FIELD_GROUP) == mark and group.library is None:
+        if group.get(key) == mark and group.library is None:
             return group
-    group = build(f"{FIELD_MODIFIER} {normals.title()} Normals" if normals else FIELD_MODIFIER, normals)
-    group[FIELD_GROUP] = mark
+    group = build()
+    group[key] = mark
     return group
 
 
 def build(name, normals):
-    group = bpy.data.node_groups.new(name, "GeometryNodeTree")
-    group.is_modifier = True
-    graph = Graph(group)
-    graph.socket("Geometry", "INPUT", "NodeSocketGeometry")
-    factor = graph.socket("Factor", "INPUT", "NodeSocketFloat", "How far the points go of the way")
-    factor.default_value, factor.min_value, factor.max_value, factor.subtype = 1.0, 0.0, 1.0, "FACTOR"
-    mask = graph.socket("Mask", "INPUT", "NodeSocketFloat", "How far each point goes; takes a vertex group")
-    mask.default_value, mask.min_value, mask.max_value, mask.subtype = 1.0, 0.0, 1.0, "FACTOR"
+    graph = Graph(name)
+    graph.fading_inputs("How far each point goes; takes a vertex group")
     helper = graph.socket("Offsets", "INPUT", "NodeSocketObject", "Mesh that carries the offsets, if any")
     helper.hide_in_modifier = True
     graph.socket("Geometry", "OUTPUT", "NodeSocketGeometry")
 
-    given = graph.node("NodeGroupInput").outputs
-    source = AttributeSource(graph, given["Geometry"], given["Offsets"])
-    strength = graph.node("ShaderNodeMath", given["Factor"], given["Mask"], operation="MULTIPLY").outputs[0]
-    moved = graph.node("ShaderNodeVectorMath", operation="SCALE")
-    graph.link(source.vectors(OFFSETS), moved.inputs["Vector"])
-    graph.link(strength, moved.inputs["Scale"])
-    acts = graph.node("FunctionNodeCompare", data_type="FLOAT", operation="NOT_EQUAL")
-    graph.link(strength, acts.inputs["A"])
-    acts.inputs["Epsilon"].default_value = 0.0  # elsewhere the points stay bit for bit
-    place = graph.node("GeometryNodeSetPosition")
-    graph.link(given["Geometry"], place.inputs["Geometry"])
-    graph.link(acts.outputs[0], place.inputs["Selection"])
-    graph.link(moved.outputs[0], place.inputs["Offset"])
-    result = place.outputs[0]
+    inputs = graph.node("NodeGroupInput").outputs
+    source = AttributeSource(graph, inputs["Geometry"], inputs["Offsets"])
+    strength = graph.node("ShaderNodeMath", inputs["Factor"], inputs["Mask"], operation="MULTIPLY").outputs[0]
+    vector = source.vectors(OFFSETS)
+    offset = graph.node("ShaderNodeVectorMath", into={"Vector": vector, "Scale": strength}, operation="SCALE")
+    acts = graph.node(  # elsewhere the points stay bit for bit
+        "FunctionNodeCompare", into={"A": strength, "Epsilon": 0.0}, data_type="FLOAT", operation="NOT_EQUAL"
+    )
+    result = graph.set_position(inputs["Geometry"], acts.outputs[0], offset.outputs[0])
     if normals:
         result = turn_normals(graph, result, source.vectors(TURNS), strength, normals)
     graph.node("NodeGroupOutput", result)
-    return group
+    return graph.group
 
 
 def turn_normals(graph, geometry, turns, strength, domain):
@@ -65,42 +60,53 @@ def turn_normals(graph, geometry, turns, strength, domain):
     angle = graph.node("ShaderNodeVectorMath", turns, operation="LENGTH").outputs["Value"]
     part = graph.node("ShaderNodeMath", angle, strength, operation="MULTIPLY").outputs[0]
     normal = graph.node("GeometryNodeInputNamedAttribute", FREE_NORMALS, data_type="FLOAT_VECTOR").outputs[0]
-    turned = graph.node("ShaderNodeVectorRotate", rotation_type="AXIS_ANGLE")
-    for output, name in ((normal, "Vector"), (turns, "Axis"), (part, "Angle")):
-        graph.link(output, turned.inputs[name])
-    store = graph.node("GeometryNodeSetMeshNormal", mode="FREE", domain=domain)
-    graph.link(geometry, store.inputs["Mesh"])
-    graph.link(turned.outputs[0], store.inputs["Custom Normal"])
-    return store.outputs[0]
+    into = {"Vector": normal, "Axis": turns, "Angle": part}
+    turned = graph.node("ShaderNodeVectorRotate", into=into, rotation_type="AXIS_ANGLE").outputs[0]
+    into = {"Mesh": geometry, "Custom Normal": turned}
+    return graph.node("GeometryNodeSetMeshNormal", into=into, mode="FREE", domain=domain).outputs[0]
 
 
 class Graph:
-    """Makes nodes and links, from left to right."""
+    """A new group that takes and gives geometry; makes nodes and links, from left to right."""
 
-    def __init__(self, group):
-        self.group, self.count = group, 0
+    def __init__(self, name):
+        self.group, self.count = bpy.data.node_groups.new(name, "GeometryNodeTree"), 0
+        self.group.is_modifier = True
+        self.socket("Geometry", "INPUT", "NodeSocketGeometry")
 
     def socket(self, name, way, kind, description=""):
-        made = self.group.interface.new_socket(name, in_out=way, socket_type=kind)
-        made.description = description
-        return made
+        socket = self.group.interface.new_socket(name, in_out=way, socket_type=kind)
+        socket.description = description
+        return socket
 
-    def node(self, kind, *inputs, **settings):
-        """A node with these settings, then these outputs or values in its first inputs."""
-        made = self.group.nodes.new(kind)
-        made.location = 190 * (self.count % 8), -220 * (self.count // 8)
+    def fading_inputs(self, mask):
+        """Factor and Mask, each from 0 to 1; `mask` is the latter's tooltip."""
+        for name, text in (("Factor", "How far the points go of the way"), ("Mask", mask)):
+            one = self.socket(name, "INPUT", "NodeSocketFloat", text)
+            one.default_value, one.min_value, one.max_value, one.subtype = 1.0, 0.0, 1.0, "FACTOR"
+
+    def node(self, kind, *inputs, into=(), **settings):
+        """A node with these settings, then these outputs or values in its first inputs, or in named ones."""
+        node = self.group.nodes.new(kind)
+        node.location = 190 * (self.count % 8), -220 * (self.count // 8)
         self.count += 1
         for name, value in settings.items():
-            setattr(made, name, value)
-        for socket, value in zip(made.inputs, inputs, strict=False):
-            if isinstance(value, bpy.types.NodeSocket):
-                self.link(value, socket)
-            else:
-                socket.default_value = value
-        return made
+            setattr(node, name, value)
+        named = [(node.inputs[name], value) for name, value in dict(into).items()]
+        for socket, value in [*zip(node.inputs, inputs, strict=False), *named]:
+            self.put(socket, value)
+        return node
 
-    def link(self, output, socket):
-        self.group.links.new(output, socket)
+    def put(self, socket, value):
+        """Gives an input a value, or links an output to it."""
+        if isinstance(value, bpy.types.NodeSocket):
+            self.group.links.new(value, socket)
+        else:
+            socket.default_value = value
+
+    def set_position(self, geometry, selection, offset):
+        into = {"Geometry": geometry, "Selection": selection, "Offset": offset}
+        return self.node("GeometryNodeSetPosition", into=into).outputs[0]
 
 
 class AttributeSource:
@@ -116,28 +122,22 @@ class AttributeSource:
 
     def compare(self, a, b, operation):
         node = self.graph.node("FunctionNodeCompare", data_type="INT", operation=operation)
-        used = [socket for socket in node.inputs if socket.enabled]
-        self.graph.link(a, used[0])
-        if isinstance(b, int):
-            used[1].default_value = b
-        else:
-            self.graph.link(b, used[1])
+        enabled = [socket for socket in node.inputs if socket.enabled]
+        for socket, value in zip(enabled, (a, b), strict=False):
+            self.graph.put(socket, value)
         return node.outputs[0]
 
     def choose(self, condition, otherwise, chosen):
-        node = self.graph.node("GeometryNodeSwitch", input_type="VECTOR")
-        for name, output in (("Switch", condition), ("False", otherwise), ("True", chosen)):
-            self.graph.link(output, node.inputs[name])
-        return node.outputs[0]
+        into = {"Switch": condition, "False": otherwise, "True": chosen}
+        return self.graph.node("GeometryNodeSwitch", into=into, input_type="VECTOR").outputs[0]
 
     def vectors(self, name):
         graph = self.graph
         own = graph.node("GeometryNodeInputNamedAttribute", name, data_type="FLOAT_VECTOR").outputs[0]
-        index = graph.node("GeometryNodeSampleIndex", data_type="FLOAT_VECTOR", domain="POINT")
-        nearest = graph.node("GeometryNodeSampleNearestSurface", data_type="FLOAT_VECTOR")
-        graph.link(graph.node("GeometryNodeInputIndex").outputs[0], index.inputs["Index"])
-        for node in (index, nearest):
-            graph.link(self.helper, node.inputs[0])
-            graph.link(own, node.inputs["Value"])
+        index = graph.node("GeometryNodeSampleIndex", self.helper, into={"Value": own}, **VECTORS)
+        nearest = graph.node(
+            "GeometryNodeSampleNearestSurface", self.helper, into={"Value": own}, data_type="FLOAT_VECTOR"
+        )
+        graph.put(index.inputs["Index"], graph.node("GeometryNodeInputIndex").outputs[0])
         of_helper = self.choose(self.same, nearest.outputs["Value"], index.outputs["Value"])
         return self.choose(self.exists, own, of_helper)

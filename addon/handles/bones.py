@@ -20,12 +20,12 @@ def armature_of(context, source):
     selected = [item for item in context.selected_objects if item.type == "ARMATURE"]
     moved_by = [m.object for m in source.modifiers if m.type == "ARMATURE" and in_scene(m.object)]
     parents = [source.parent] if source.parent is not None and source.parent.type == "ARMATURE" else []
-    found = next(iter([*selected, *moved_by, *parents]), None)
-    if found is None:
+    rig = next(iter([*selected, *moved_by, *parents]), None)
+    if rig is None:
         raise UserError("{name} follows no armature; select one as well", name=source.name)
-    if found.pose is None or not len(found.pose.bones):
-        raise UserError("the armature {rig} has no bones to pose", rig=found.name)
-    return found
+    if rig.pose is None or not len(rig.pose.bones):
+        raise UserError("the armature {rig} has no bones to pose", rig=rig.name)
+    return rig
 
 
 def is_selected(rig, name):

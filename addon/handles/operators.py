@@ -90,8 +90,8 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
         if self.kind == "GROUP" and not group:
             raise UserError("{name} has no vertex group", name=source.name)
         selected = [item for item in context.selected_objects if item.type == "EMPTY"]
-        made = not selected or self.place != "AUTO" or source.mode == "EDIT"
-        if made:
+        is_new = not selected or self.place != "AUTO" or source.mode == "EDIT"
+        if is_new:
             selected = [empties.new_empty(context, source, self.kind, group, self.place)]
         others = {settings_of(empty).handle_of for empty in selected} - {None, source}
         for empty in selected:
@@ -99,7 +99,7 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
                 empty.name = naming.name_for(source, empty.matrix_world.translation, self.kind)
             entry = empties.add(source, empty, self.kind)
             entry.group = group if self.kind == "GROUP" else ""
-        if made:
+        if is_new:
             select_alone(context, selected[0])  # to be moved at once
         counts.count_inside(context, source)
         for other in sorted(item.name for item in others):

@@ -97,7 +97,7 @@ class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):
                 bpy.context, owner, "EXTRACT", "SURFACE", result_objects.surface_mesh(owner, *mesh), report
             )
             said = translated("{name} with {count} triangles", name=item.name, count=f"{len(mesh[1]):,}")
-            return said + visibility.told(visibility.show_alone(owner, item))
+            return said + visibility.hidden_note(visibility.show_alone(owner, item))
 
         return Item(source.name, work, apply)
 

@@ -12,8 +12,8 @@ from ..blender.object_references import in_scene, settings_of
 
 def family(source):
     """The source, and its results that are in a scene."""
-    made = [entry.item for entry in settings_of(source).results if in_scene(entry.item)]
-    return [source, *(item for item in made if item != source)]
+    results = [entry.item for entry in settings_of(source).results if in_scene(entry.item)]
+    return [source, *(item for item in results if item != source)]
 
 
 def show_alone(source, shown, for_now=False):
@@ -31,7 +31,7 @@ def show_alone(source, shown, for_now=False):
     return names
 
 
-def told(names):
+def hidden_note(names):
     """That these are hidden now, to be put behind the name of a result; empty where none is."""
     if not names:
         return ""

@@ -52,15 +52,15 @@ def read(source, space, seen=None, rest=None):
     `seen` and `rest`, (n, 3) in the world: the shape that the landmarks were put on, and the one to be
     wrapped, where a pose lies between. A landmark goes with its nearest vertex.
     """
-    found = []
-    posed = seen is not None and len(seen) == len(rest) and not np.array_equal(seen, rest)
+    pairs = []
+    is_posed = seen is not None and len(seen) == len(rest) and not np.array_equal(seen, rest)
     for entry in used(source):
         ends = [matrix_of(item)[:3, 3] for item in (entry.rest, entry.on_target)]
-        if posed:
+        if is_posed:
             nearest = ((seen - ends[0]) ** 2).sum(axis=1).argmin()
             ends[0] = ends[0] + rest[nearest] - seen[nearest]
-        found.append(tuple(transform(space.world_to_solve, end[None])[0] for end in ends))
-    return found
+        pairs.append(tuple(transform(space.world_to_solve, end[None])[0] for end in ends))
+    return pairs
 
 
 def place(context, source, target, rest, on_target):

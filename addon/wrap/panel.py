@@ -44,9 +44,9 @@ def factor_slider(layout, source):
     modifier = modifier_stack.find(source)
     if modifier is None:
         return
-    found = inputs.slot(modifier, "Factor")
-    if found is not None:
-        layout.prop(found, "value", text="Factor", slider=True)
+    socket = inputs.slot(modifier, "Factor")
+    if socket is not None:
+        layout.prop(socket, "value", text="Factor", slider=True)
     else:
         layout.prop(modifier, f'["{inputs.identifier(modifier, "Factor")}"]', text="Factor", slider=True)
 

@@ -38,13 +38,13 @@ def bone_points(poses, lengths):
 def bone_poses(poses, before, after):
     """(k, 4, 4) poses of bones whose points move: heads follow, bones point at their moved tails."""
     before, after = (points.reshape(-1, len(BONE_POINTS), 3) for points in (before, after))
-    found = poses.copy()
-    for pose, one, other in zip(found, before, after, strict=True):
+    moved = poses.copy()
+    for pose, one, other in zip(moved, before, after, strict=True):
         turn = best_rotation(one, other)
         turn = shortest_turn(turn @ (one[1] - one[0]), other[1] - other[0]) @ turn
         pose[:3, :3] = turn @ pose[:3, :3]
         pose[:3, 3] = other[0]
-    return found
+    return moved
 
 
 def shortest_turn(a, b):
@@ -61,11 +61,11 @@ def shortest_turn(a, b):
 
 def posed(rest, parents, bases):
     """(k, 4, 4) where bones come by their own motions; the other way round than `chained`."""
-    found = np.empty_like(bases)
+    poses = np.empty_like(bases)
     for index, parent in enumerate(parents):
-        bound = rest[index] if parent < 0 else found[parent] @ inverse(rest[parent]) @ rest[index]
-        found[index] = bound @ bases[index]
-    return found
+        bound = rest[index] if parent < 0 else poses[parent] @ inverse(rest[parent]) @ rest[index]
+        poses[index] = bound @ bases[index]
+    return poses
 
 
 def chained(rest, parents, targets, connected):

@@ -31,11 +31,11 @@ def read_table():
     Empty where neither is at hand, in an installation of the source code alone: there is then nothing to set,
     and core/runtime/native.py says what to install.
     """
-    here = Path(__file__).resolve()
-    shipped = here.with_name("options.json")
+    path = Path(__file__).resolve()
+    shipped = path.with_name("options.json")
     if shipped.exists():
         return json.loads(shipped.read_text(encoding="utf-8"))
-    clone = here.parents[3] / "native" / "options" / "table.py"
+    clone = path.parents[3] / "native" / "options" / "table.py"
     if not clone.exists():
         return {}
     spec = importlib.util.spec_from_file_location("arapfields_options_table", clone)
