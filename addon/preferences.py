@@ -56,7 +56,6 @@ class ARAPFIELDS_AP_preferences(bpy.types.AddonPreferences):
 class ARAPFIELDS_OT_copy_report(Guided, bpy.types.Operator):
     """Copy what is known about the native library and this machine, for a bug report"""
 
-    bl_idname = Op.COPY_REPORT
     bl_label = "Copy Report"
     guide = "jobs"
 

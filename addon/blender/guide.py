@@ -47,6 +47,12 @@ class Guided:
 
     guide = ""
 
+    def __init_subclass__(cls):
+        """ARAPFIELDS_OT_fit is arapfields.fit, which names.py lists."""
+        super().__init_subclass__()
+        if cls.__name__.startswith("ARAPFIELDS_OT_"):
+            cls.bl_idname = cls.__name__.replace("ARAPFIELDS_OT_", "arapfields.")
+
     @classmethod
     def poll(cls, context):
         reason = cls.obstacle(context)

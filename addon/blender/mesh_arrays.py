@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..core.errors import UserError
+from ..core.errors import UserError, refuse
 from . import modifier_stack
 
 
@@ -106,9 +106,7 @@ def read(context, source, in_place=False):
     """What there is to work on of an object; UserError that names it when there is nothing."""
     with modifier_stack.evaluated_mesh(context, source, in_place) as mesh:
         arrays = MeshArrays(positions(mesh), triangles(mesh), bool(modifier_stack.free_normals(mesh)))
-    reason = nothing_in(source.name, len(arrays.vertices), len(arrays.triangles))
-    if reason is not None:
-        raise reason
+    refuse(nothing_in(source.name, len(arrays.vertices), len(arrays.triangles)))
     if not np.isfinite(arrays.vertices).all():
         broken = np.flatnonzero(~np.isfinite(arrays.vertices).all(axis=1))
         raise UserError(

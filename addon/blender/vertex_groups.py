@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 from mathutils.kdtree import KDTree
 
-from ..core.errors import UserError
+from ..core.errors import UserError, refuse
 from ..core.runtime.coroutines import Pause
 from . import modifier_stack
 from .object_references import ObjectReference
@@ -22,8 +22,7 @@ def missing(source, names):
 def read_weights(context, source, names, in_place=False):
     """Coroutine that reads the vertex groups with these names: {name: (n,) weights of the vertices}."""
     names = list(dict.fromkeys(names))
-    if missing(source, names):
-        raise missing(source, names)
+    refuse(missing(source, names))
     if not names:
         return {}
     reference, shown = ObjectReference(source), None

@@ -9,7 +9,7 @@ rest, now and parent are (4, 4) matrices to solve space, `after` the points ther
 import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack
-from ..core.errors import UserError
+from ..core.errors import UserError, refuse
 from ..core.geometry.spaces import inverse, transform
 from ..field_modifier import motion
 
@@ -43,9 +43,7 @@ class MeshCarrier(Carrier):
     """A mesh, by the field's modifier."""
 
     def read(self, context, item):
-        reason = motion.refusal(item)
-        if reason is not None:
-            raise reason
+        refuse(motion.refusal(item))
         with modifier_stack.evaluated_mesh(context, item, in_place=True) as mesh:
             return mesh_arrays.positions(mesh)
 

@@ -5,7 +5,7 @@ import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack
 from ..blender.object_references import ObjectReference, settings_of
-from ..core.errors import UserError
+from ..core.errors import UserError, refuse
 from ..core.geometry.spaces import transform
 from ..field_modifier import masks, motion
 from . import refusals
@@ -25,9 +25,7 @@ class Carrying:
         self.rigs = modifier_stack.handle_rigs(source)
         for entry in settings_of(source).carried:
             try:
-                reason = refusals.of_entry(source, entry)
-                if reason is not None:
-                    raise reason
+                refuse(refusals.of_entry(source, entry))
                 self.objects.append(CarriedObject(context, entry))
             except (UserError, ValueError) as error:
                 self.warnings.append(error)

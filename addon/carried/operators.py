@@ -5,10 +5,9 @@ from ..blender.language import translated
 from ..blender.object_references import owner_of, settings_of
 from ..blender.property_definitions import choice, flag
 from ..blender.source_operator import SourceOperator
-from ..core.errors import UserError
+from ..core.errors import UserError, refuse
 from ..core.settings.choices import CARRYING
 from ..live import sessions
-from ..names import Op
 from . import carried_objects, refusals
 
 
@@ -33,7 +32,6 @@ class CarriedOperator(SourceOperator):
 class ARAPFIELDS_OT_carry(CarriedOperator, bpy.types.Operator):
     """Have the active object's field move the other selected objects as well"""
 
-    bl_idname = Op.CARRY
     bl_label = "Carry Selected"
     needs_carried = False
 
@@ -59,9 +57,7 @@ class ARAPFIELDS_OT_carry(CarriedOperator, bpy.types.Operator):
 
 def carry(source, item, way):
     """Puts an object on a source's list, or gives it another way there; UserError where that cannot be."""
-    reason = refusals.of_item(source, item)
-    if reason is not None:
-        raise reason
+    refuse(refusals.of_item(source, item))
     other = settings_of(item).carried_by
     if other is not None and other != source and carried_objects.find(other, item) is not None:
         raise UserError("{name} is carried by {other} already", name=item.name, other=other.name)
@@ -76,7 +72,6 @@ def carry(source, item, way):
 class ARAPFIELDS_OT_release(CarriedOperator, bpy.types.Operator):
     """Take the chosen object off the list, or all of them: each is again as it was before it was carried"""
 
-    bl_idname = Op.RELEASE
     bl_label = "Release"
 
     all: flag("All", "Every object that is carried")

@@ -10,7 +10,7 @@ from mathutils import Vector
 
 from ..blender import modifier_stack
 from ..blender.object_references import ObjectReference, settings_of
-from ..core.errors import UserError
+from ..core.errors import UserError, refuse
 from ..core.geometry import posing
 from ..core.geometry.spaces import inverse, transform
 from ..handles.movers import matrix_of
@@ -116,9 +116,7 @@ def fitted(source):
 def reset(context, source):
     """Gives the bones of a source's armatures the rest that they had before they were fitted."""
     for rig in fitted(source):
-        reason = refusal(rig)
-        if reason is not None:
-            raise reason
+        refuse(refusal(rig))
         write(context, rig, json.loads(settings_of(rig).rest_bones))
         settings_of(rig).rest_bones = ""
 

@@ -10,3 +10,9 @@ class UserError(Exception):
     def __init__(self, template, **values):
         super().__init__(template.format(**values) if values else template)
         self.template, self.values = template, values
+
+
+def refuse(reason):
+    """Raises a reason, where there is one."""
+    if reason is not None:
+        raise reason

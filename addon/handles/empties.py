@@ -9,7 +9,7 @@ from ..blender import mesh_arrays, modifier_stack, vertex_groups
 from ..blender.object_references import in_scene, settings_of
 from ..blender.property_definitions import from_single_precision
 from ..blender.selection import choose_row
-from ..core.errors import UserError
+from ..core.errors import UserError, refuse
 from ..core.geometry.handles import far_handle, solve_handle
 from ..core.geometry.spaces import inverse, transform
 from ..core.runtime.coroutines import run_to_completion
@@ -74,9 +74,8 @@ def solve_handles(source, space, weights=None, where=matrix_of):
     `weights` are those of the vertex groups by name; without them, groups say only where they go.
     `where(object, bone)` is the world matrix of an object or of its posed bone.
     """
-    handles, lost = [], lost_bone(source)
-    if lost is not None:
-        raise lost
+    refuse(lost_bone(source))
+    handles = []
     for entry in used(source):
         boxes = rest_box(source, entry, where), box_now(entry, where)
         held = weights[entry.group] if weights and entry.group and entry.kind in ("GROUP", "BONE") else None

@@ -10,7 +10,6 @@ from ..core.errors import UserError
 from ..core.geometry.handles import nothing_held
 from ..core.runtime import native
 from ..core.settings.choices import BONES, EMPTY_KINDS, HANDLE_PLACES
-from ..names import Op
 from . import bones, counts, empties, movers, naming
 
 
@@ -68,7 +67,6 @@ def is_selected(context, entry):
 class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
     """Make the selected Empties handles of the object, or make a new box at the cursor or around vertices"""
 
-    bl_idname = Op.ADD_HANDLE
     bl_label = "Add Handle"
     needs_handle = False
     in_edit_mode = counts_points = True
@@ -111,7 +109,6 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
 class ARAPFIELDS_OT_add_bones(HandleOperator, bpy.types.Operator):
     """Make handles of an armature's bones: posing it moves what they hold"""
 
-    bl_idname = Op.ADD_BONES
     bl_label = "From Armature"
     needs_handle = False
     counts_points = True
@@ -135,7 +132,6 @@ class ARAPFIELDS_OT_add_bones(HandleOperator, bpy.types.Operator):
 class ARAPFIELDS_OT_mirror_handle(HandleOperator, bpy.types.Operator):
     """Make handles like the selected ones on the other side of the object"""
 
-    bl_idname = Op.MIRROR_HANDLE
     bl_label = "Mirror Handle"
     counts_points = True
 
@@ -171,7 +167,6 @@ class RestOperator(HandleOperator):
 class ARAPFIELDS_OT_set_rest(RestOperator, bpy.types.Operator):
     """Make where the selected handles are now their rest pose (all handles with `all`)"""
 
-    bl_idname = Op.SET_REST
     bl_label = "Set Rest Pose"
     counts_points = True
 
@@ -186,7 +181,6 @@ class ARAPFIELDS_OT_set_rest(RestOperator, bpy.types.Operator):
 class ARAPFIELDS_OT_reset_handle(RestOperator, bpy.types.Operator):
     """Move the selected handles back to their rest pose (all handles with `all`)"""
 
-    bl_idname = Op.RESET_HANDLE
     bl_label = "Reset to Rest"
 
     def change(self, context, source):
@@ -201,7 +195,6 @@ class ARAPFIELDS_OT_reset_handle(RestOperator, bpy.types.Operator):
 class ARAPFIELDS_OT_remove_handle(HandleOperator, bpy.types.Operator):
     """Take the selected handles off the list (or the one chosen in it); with `delete`, their Empties too"""
 
-    bl_idname = Op.REMOVE_HANDLE
     bl_label = "Remove Handle"
 
     delete: flag("Delete Empties", "Delete the Empties as well")

@@ -44,7 +44,6 @@ def resize(source, entry, box, rest, change):
 class ARAPFIELDS_OT_resize_handle(Guided, bpy.types.Operator):
     """Move a face of the handle's box: what it holds at rest changes, where it has been moved stays"""
 
-    bl_idname = Op.RESIZE_HANDLE
     bl_label = "Resize Box"
     guide = "handles"
     bl_options = {"REGISTER", "UNDO"}

@@ -12,7 +12,6 @@ from ..core.runtime.jobs import Item
 from ..core.settings.parameters import EXTRACTION
 from ..field_modifier import motion
 from ..jobs.job_operator import JobOperator
-from ..names import Op
 from ..properties.choices import extraction, surface
 from ..surface.source_surface import read_surface
 from . import placement, result_objects, visibility
@@ -36,7 +35,6 @@ class FieldOperator(SourceOperator):
 class ARAPFIELDS_OT_apply_as_shape_key(FieldOperator, bpy.types.Operator):
     """Turn the ARAP Fields modifier, as it acts now, into a shape key; Blender's own operator refuses it"""
 
-    bl_idname = Op.APPLY_KEY
     bl_label = "Apply as Shape Key"
 
     @classmethod
@@ -58,7 +56,6 @@ class ARAPFIELDS_OT_apply_as_shape_key(FieldOperator, bpy.types.Operator):
 class ARAPFIELDS_OT_remove_field(FieldOperator, bpy.types.Operator):
     """Take the ARAP Fields modifier away, with the motion that it carries"""
 
-    bl_idname = Op.REMOVE_FIELD
     bl_label = "Remove"
 
     def change(self, context, source):
@@ -73,7 +70,6 @@ class ARAPFIELDS_OT_remove_field(FieldOperator, bpy.types.Operator):
 class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):
     """Make a mesh of the implicit surface itself, undeformed"""
 
-    bl_idname = Op.EXTRACT
     bl_label = "Extract Surface"
     bl_options = {"UNDO"}
     title = "Extract"

@@ -10,7 +10,7 @@ import numpy as np
 from ..blender import mesh_arrays, modifier_stack
 from ..blender.object_references import settings_of
 from ..blender.property_definitions import effective_value
-from ..core.errors import UserError
+from ..core.errors import UserError, refuse
 from ..core.geometry.edges import Topology
 from ..field_modifier import armatures, motion
 from ..handles import empties
@@ -62,9 +62,7 @@ def place_result(context, source, kind, output, result, moved, before):
     """Puts `moved`, a SolvedMesh, where `result` says; `before` are the vertices at rest."""
     if result == "NEW":
         return new_object(context, source, kind, output, moved, before)
-    reason = refusal(source, output, result)
-    if reason is not None:
-        raise reason
+    refuse(refusal(source, output, result))
     if keeps_mesh(output, result):
         motion.bind(context, source)
         motion.write(source, motion.Motion(moved.vertices - before, moved.turns))

@@ -5,14 +5,12 @@ from ..blender.object_references import settings_of
 from ..blender.property_definitions import choice
 from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError
-from ..names import Op
 from .painted import PRESETS
 
 
 class ARAPFIELDS_OT_stiffness_preset(SourceOperator, bpy.types.Operator):
     """Make the painted part of this material: the active vertex group where none is chosen"""
 
-    bl_idname = Op.STIFFNESS_PRESET
     bl_label = "Material"
     guide = "characters"
     bl_options = {"REGISTER", "UNDO"}

@@ -5,6 +5,7 @@ import numpy as np
 
 from ..blender import vertex_groups
 from ..blender.object_references import settings_of
+from ..core.errors import refuse
 from ..core.runtime.coroutines import run_to_completion
 
 # name, label, tip: (times as stiff, times as stiff against bending)
@@ -29,8 +30,7 @@ def names(source):
 
 def read(context, source, in_place):
     """((n,) factors of the vertices' stiffness, (n,) of that against bending); None each where all are 1."""
-    if refusal(source):
-        raise refusal(source)
+    refuse(refusal(source))
     settings = settings_of(source).stiffness
     weights = run_to_completion(vertex_groups.read_weights(context, source, names(source), in_place))
     pairs = (settings.group, settings.times), (settings.bend_group, settings.bend_times)

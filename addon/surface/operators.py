@@ -12,7 +12,6 @@ from ..blender.user_preferences import fit_cache
 from ..core.runtime.jobs import Item
 from ..core.settings.fitting import FIT
 from ..jobs.job_operator import JobOperator, busy
-from ..names import Op
 from ..properties.choices import quality
 from . import staleness
 from .source_surface import read_surface
@@ -21,7 +20,6 @@ from .source_surface import read_surface
 class ARAPFIELDS_OT_fit(JobOperator, bpy.types.Operator):
     """Fit a smooth implicit surface to the active mesh; kept until the mesh or the settings change"""
 
-    bl_idname = Op.FIT
     bl_label = "Fit Surface"
     bl_options = {"UNDO"}
     title = "Fit"
@@ -55,7 +53,6 @@ class ARAPFIELDS_OT_fit(JobOperator, bpy.types.Operator):
 class ARAPFIELDS_OT_clear_cache(Guided, bpy.types.Operator):
     """Delete every fitted surface from disk; they are fitted again when needed"""
 
-    bl_idname = Op.CLEAR_CACHE
     bl_label = "Clear Fits"
     guide = "jobs"
 

@@ -9,7 +9,6 @@ from ..blender.language import translated
 from ..blender.object_references import ObjectReference, settings_of, source_of
 from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError
-from ..names import Op
 from . import landmarks
 
 AROUND = np.arange(0, 2 * np.pi, np.pi / 4)
@@ -36,7 +35,6 @@ def is_navigation(context, region, spot):
 class ARAPFIELDS_OT_click_landmarks(SourceOperator, bpy.types.Operator):
     """Click a place on the object, then where it belongs on the target, again and again"""
 
-    bl_idname = Op.CLICK_LANDMARKS
     bl_label = "Click Landmarks"
     bl_options = {"UNDO"}
     guide = "wrap"

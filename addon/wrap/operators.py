@@ -19,7 +19,6 @@ from ..core.settings.wrapping import WRAP
 from ..deform.solve_job import SolveOperator, plan_solve_job
 from ..handles.empties import matrix_of
 from ..live.giving_way import give_way
-from ..names import Op
 from ..properties.choices import result_properties
 from ..results.placement import destination
 from . import landmarks
@@ -33,7 +32,6 @@ onto = text(
 class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
     """Lay the object onto another, as rigidly as possible; UVs, groups and shape keys come along"""
 
-    bl_idname = Op.WRAP
     bl_label = "Wrap"
     bl_options = {"UNDO"}
     title = "Wrap"
@@ -119,7 +117,6 @@ def read_target(context, target, space):
 class ARAPFIELDS_OT_add_landmark(SourceOperator, bpy.types.Operator):
     """Add a pair of landmarks, at the places of both surfaces that are nearest to two locations"""
 
-    bl_idname = Op.ADD_LANDMARK
     bl_label = "Add Landmark"
     bl_options = {"REGISTER", "UNDO"}
     guide = "wrap"
@@ -139,7 +136,6 @@ class ARAPFIELDS_OT_add_landmark(SourceOperator, bpy.types.Operator):
 class ARAPFIELDS_OT_remove_landmark(SourceOperator, bpy.types.Operator):
     """Remove a pair of landmarks with its Empties"""
 
-    bl_idname = Op.REMOVE_LANDMARK
     bl_label = "Remove Landmark"
     bl_options = {"INTERNAL", "UNDO"}
     guide = "wrap"
@@ -154,7 +150,6 @@ class ARAPFIELDS_OT_remove_landmark(SourceOperator, bpy.types.Operator):
 class ARAPFIELDS_OT_reset_bones(SourceOperator, bpy.types.Operator):
     """Put the bones at rest back to where they were before they were fitted to the wrapped shape"""
 
-    bl_idname = Op.RESET_BONES
     bl_label = "Reset Bones"
     bl_options = {"UNDO"}
     guide = "wrap"
