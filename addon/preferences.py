@@ -5,6 +5,7 @@ from .blender import user_preferences
 from .blender.guide import Guided
 from .blender.language import translated
 from .blender.property_definitions import annotations, flag, text
+from .blender.section import draw_settings
 from .core.runtime import native
 from .core.settings.parameters import MACHINE
 from .names import PACKAGE, Op
@@ -33,11 +34,8 @@ class ARAPFIELDS_AP_preferences(bpy.types.AddonPreferences):
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
-        for parameter in MACHINE:
-            layout.prop(self, parameter.name)
-        layout.prop(self, "cache_folder")
-        layout.prop(self, "show_boxes")
-        layout.prop(self, "show_previews")
+        machine = (parameter.name for parameter in MACHINE)
+        draw_settings(layout, self, *machine, "cache_folder", "show_boxes", "show_previews")
         cache = user_preferences.fit_cache()
         layout.label(
             text=translated(

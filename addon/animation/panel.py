@@ -3,7 +3,7 @@ import bpy
 
 from ..blender import modifier_stack
 from ..blender.language import translated
-from ..blender.section import Advanced, note, wrapped
+from ..blender.section import Advanced, job_button, modifier_row, note, wrapped
 from ..live import animated
 from ..names import Op
 from . import caches, played
@@ -28,16 +28,10 @@ class ARAPFIELDS_PT_animation(Advanced, bpy.types.Panel):
         if bake.format != "KEYS":
             layout.prop(bake, "folder")
         wrapped(layout, weight(context, source, bake))
-        row = layout.row(align=True)
-        row.operator(Op.BAKE, icon="REC")
-        row.operator_menu_enum(Op.BAKE, "scope", text="", icon="DOWNARROW_HLT")
+        job_button(layout, Op.BAKE, "REC")
         modifier = modifier_stack.find_cache(source)
         if modifier is not None:
-            row = layout.row(align=True)
-            row.label(text=modifier.name, icon="MOD_MESHDEFORM", translate=False)
-            row.prop(modifier, "show_viewport", text="")
-            row.prop(modifier, "show_render", text="")
-            row.operator(Op.REMOVE_BAKE, text="", icon="X")
+            modifier_row(layout, modifier, "MOD_MESHDEFORM", Op.REMOVE_BAKE)
             layout.prop(modifier, "filepath", text="")
             note(layout, played.problem(source))
         layout.operator_menu_enum(Op.EXPORT, "format", icon="EXPORT")

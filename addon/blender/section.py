@@ -39,10 +39,30 @@ class Advanced(Section):
 
 def settings_column(layout, group, parameters, advanced):
     """The everyday parameters, or the advanced ones."""
-    column = layout.column()
-    for parameter in parameters:
-        if parameter.advanced == advanced:
-            column.prop(group, parameter.name)
+    draw_settings(layout.column(), group, *(p.name for p in parameters if p.advanced == advanced))
+
+
+def draw_settings(layout, group, *names):
+    for name in names:
+        layout.prop(group, name)
+
+
+def modifier_row(layout, modifier, icon, remove):
+    """A modifier of ours: its name, where it is seen, and the operator that takes it away."""
+    row = layout.row(align=True)
+    row.label(text=modifier.name, icon=icon, translate=False)
+    for name in ("show_viewport", "show_render"):
+        row.prop(modifier, name, text="")
+    row.operator(remove, text="", icon="X")
+
+
+def group_row(layout, group, name, source, further=""):
+    """The choice of a vertex group of the source, and below it a number that counts where one is chosen."""
+    layout.prop_search(group, name, source, "vertex_groups")
+    if further:
+        row = layout.row()
+        row.enabled = bool(getattr(group, name))
+        row.prop(group, further)
 
 
 def note(layout, *reasons):

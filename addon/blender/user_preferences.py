@@ -23,16 +23,10 @@ def machine_options():
     return {"threads": stored.threads, "device": stored.device} if stored else {}
 
 
-def show_boxes():
-    """Whether the handles' boxes are drawn in the viewport."""
+def shows(name):
+    """Whether the preference of that name, show_boxes or show_previews, is on, as it is at first."""
     stored = preferences()
-    return stored is None or stored.show_boxes
-
-
-def show_previews():
-    """Whether what a running job has so far is drawn in the viewport."""
-    stored = preferences()
-    return stored is None or stored.show_previews
+    return stored is None or getattr(stored, name)
 
 
 def cache_folder():

@@ -2,6 +2,7 @@
 """One command from its arguments to its exit code."""
 
 import contextlib
+import importlib
 import signal
 import sys
 
@@ -34,21 +35,8 @@ def run(arguments, script=None):
 
 def verb(name):
     """The function behind a verb; bpy is imported for single files alone."""
-    if name == "batch":
-        from .batch import run_batch
-
-        return run_batch
-    if name == "check":
-        from .check import run_check
-
-        return run_check
-    if name == "bake":
-        from .bake import run_bake
-
-        return run_bake
-    from .single import run_single
-
-    return run_single
+    module = name if name in ("batch", "check", "bake") else "single"
+    return getattr(importlib.import_module(f".{module}", __package__), f"run_{module}")
 
 
 def fail(reason, code):

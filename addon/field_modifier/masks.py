@@ -9,8 +9,7 @@ from . import inputs
 
 def group_of(source):
     """Name of the source's mask: the one chosen in the panel, else the one of its field's modifier; or ""."""
-    chosen, modifier = settings_of(source).stiffness.mask, modifier_stack.find(source)
-    return chosen or ("" if modifier is None else inputs.get_attribute(modifier, "Mask"))
+    return settings_of(source).stiffness.mask or group_of_field(source) or ""
 
 
 def take(source):
@@ -49,11 +48,7 @@ def put_carried(item, group):
     if item.type in ("MESH", "CURVES", "POINTCLOUD", "GREASEPENCIL"):
         put(item, group)
     for modifier in item.modifiers:
-        if (
-            modifier.type == "NODES"
-            and modifier.node_group is not None
-            and PLAYED_GROUP in modifier.node_group
-        ):
+        if modifier.type == "NODES" and PLAYED_GROUP in (modifier.node_group or ()):
             inputs.put_attribute(modifier, "Mask", group)
     keys = item.data.shape_keys if item.type == "LATTICE" else None
     if keys is not None and WARP_KEY in keys.key_blocks:

@@ -7,10 +7,8 @@ from mathutils import Matrix
 
 from ..blender import modifier_stack
 from ..blender.object_references import in_scene, settings_of
-from ..blender.selection import choose_row
 from ..core.errors import UserError
 from . import empties, movers
-from .palette import free_colour
 
 HOLD_FROM = 0.8  # weight of a bone's group from which it holds; between two bones the surface bends freely
 
@@ -68,18 +66,13 @@ def add(source, rig, name, groups):
 
     `groups` are the names of the vertex groups that hold something.
     """
-    settings, index = settings_of(source), find(source, rig, name)
-    is_new = index < 0
-    if is_new:
-        index, colour = len(settings.handles), free_colour(settings.handles)
-        settings.handles.add().colour = colour
-    entry = settings.handles[index]
+    index = find(source, rig, name)
+    entry = empties.choose_or_add(settings_of(source), index)
     entry.kind, entry.rig, entry.bone = "BONE", rig, name
-    if is_new:
+    if index < 0:
         entry.group = name if name in groups else ""
         entry.hold_from = HOLD_FROM
     entry.rest = (np.linalg.inv(empties.matrix_of(source)) @ rest_in_world(rig, name)).ravel()
-    choose_row(settings, index)
     return entry
 
 

@@ -5,7 +5,6 @@ Counted at once; for large meshes in a window by a worker, while the window goes
 """
 
 import bpy
-import numpy as np
 
 from ..blender import mesh_arrays, timers, vertex_groups
 from ..blender.host import has_window
@@ -66,7 +65,7 @@ def counting(context, source):
 
 def region_of(entry, weights):
     """A handle where it is at rest, in the source's coordinates."""
-    rest = np.array(entry.rest, dtype=np.float64).reshape(4, 4)
+    rest = movers.rest_of(entry)
     return Handle("", entry.kind, rest, rest, weights.get(entry.group), hold_from=entry.hold_from)
 
 

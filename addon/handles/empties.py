@@ -20,7 +20,7 @@ from .palette import free_colour
 
 def rest_box(source, entry, where=matrix_of):
     """The cube [-1, 1]³ → world, of a handle's rest box; it goes where the source goes."""
-    return where(source) @ np.array(entry.rest, dtype=np.float64).reshape(4, 4)
+    return where(source) @ movers.rest_of(entry)
 
 
 def store_rest(source, entry):
@@ -107,17 +107,21 @@ def add(source, empty, kind="CUBE"):
     owner = settings_of(empty).handle_of
     if owner is not None and owner != source and find(owner, empty) >= 0:  # a copy of a handle is none
         remove(owner, find(owner, empty))
-    index = find(source, empty)
-    if index < 0:
-        index, colour = len(settings.handles), free_colour(settings.handles)
-        settings.handles.add().colour = colour
-    entry = settings.handles[index]
+    entry = choose_or_add(settings, find(source, empty))
     entry.empty, entry.kind, entry.rig, entry.bone = empty, kind, None, ""
     settings_of(empty).handle_of = source
     empty.empty_display_type = SHAPES[kind]
     store_rest(source, entry)
-    choose_row(settings, index)
     return entry
+
+
+def choose_or_add(settings, index):
+    """The handle in that row, or where it is -1 a new one, as the chosen one."""
+    if index < 0:
+        index, colour = len(settings.handles), free_colour(settings.handles)
+        settings.handles.add().colour = colour
+    choose_row(settings, index)
+    return settings.handles[index]
 
 
 def make_empty(context, source, matrix, size, name):
@@ -189,7 +193,7 @@ def mirror(context, source, entry, axis):
     group = bpy.utils.flip_name(entry.group) if entry.kind == "GROUP" else ""
     if group and group not in source.vertex_groups:
         raise UserError("{name} has no vertex group {group}", name=source.name, group=group)
-    rest = flip @ np.array(entry.rest, dtype=np.float64).reshape(4, 4) @ flip
+    rest = flip @ movers.rest_of(entry) @ flip
     current = flip @ inverse(world) @ matrix_of(entry.empty) @ flip
     name, size = entry.empty.name, entry.empty.empty_display_size
     flipped = bpy.utils.flip_name(name)

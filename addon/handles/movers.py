@@ -13,6 +13,11 @@ def matrix_of(item, bone=""):
     return matrix @ np.array(item.pose.bones[bone].matrix, dtype=np.float64) if bone else matrix
 
 
+def rest_of(entry):
+    """The cube [-1, 1]³ → the source's coordinates, of a handle's rest box."""
+    return np.array(entry.rest, dtype=np.float64).reshape(4, 4)
+
+
 def current_box(empty, where=matrix_of):
     """The cube [-1, 1]³ → world, of an Empty where it is now."""
     return box_matrix(where(empty), empty.empty_display_size)

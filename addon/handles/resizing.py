@@ -10,7 +10,7 @@ from ..blender.object_references import owner_of, refusal, settings_of
 from ..blender.property_definitions import integer, number
 from ..core.errors import UserError
 from ..names import Op
-from . import counts, empties
+from . import counts, empties, movers
 
 LEAST = 0.05  # of a box's size that one drag leaves of it
 FACES = [(axis, side) for axis in range(3) for side in (-1, 1)]
@@ -61,7 +61,7 @@ class ARAPFIELDS_OT_resize_handle(Guided, bpy.types.Operator):
 
     def begin(self, context):
         _, entry = boxed(context)
-        rest = np.array(entry.rest, dtype=np.float64).reshape(4, 4)
+        rest = movers.rest_of(entry)
         self._before = empties.current_box(entry.empty), rest, entry.empty.matrix_world.copy()
 
     def change(self, context):

@@ -37,7 +37,7 @@ class Display:
     def show(self, context, job):
         """Redraws the viewport for a new preview and the sidebar for new words, each when it is due."""
         now = time.monotonic()
-        if self._preview_throttle.is_due(now) and user_preferences.show_previews():
+        if self._preview_throttle.is_due(now) and user_preferences.shows("show_previews"):
             item, count, points = job.preview_points()
             if count and (item, count) != self._seen and item.preview is not None:
                 self._seen = item, count

@@ -3,7 +3,7 @@ import bpy
 
 from ..blender import modifier_stack
 from ..blender.object_references import in_scene
-from ..blender.section import Advanced
+from ..blender.section import Advanced, draw_settings, modifier_row
 from ..names import Op
 
 
@@ -13,19 +13,11 @@ class ARAPFIELDS_PT_result(Advanced, bpy.types.Panel):
 
     def fill(self, context, source, settings):
         layout = self.layout
-        layout.prop(settings, "output")
-        layout.prop(settings, "result")
-        layout.prop(settings, "resolution")
-        layout.prop(settings, "refine_thin")
-        layout.prop(settings, "normals")
+        draw_settings(layout, settings, "output", "result", "resolution", "refine_thin", "normals")
         layout.operator(Op.EXTRACT, icon="OUTLINER_OB_SURFACE")
         modifier = modifier_stack.find(source)
         if modifier is not None:
-            row = layout.row(align=True)
-            row.label(text=modifier.name, icon="GEOMETRY_NODES", translate=False)
-            row.prop(modifier, "show_viewport", text="")
-            row.prop(modifier, "show_render", text="")
-            row.operator(Op.REMOVE_FIELD, text="", icon="X")
+            modifier_row(layout, modifier, "GEOMETRY_NODES", Op.REMOVE_FIELD)
             layout.operator(Op.APPLY_KEY, icon="SHAPEKEY_DATA")
         for entry in settings.results:
             if in_scene(entry.item):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..blender.section import Advanced, note
+from ..blender.section import Advanced, group_row, note
 from ..names import Op
 from . import painted
 
@@ -13,15 +13,9 @@ class ARAPFIELDS_PT_stiffness(Advanced, bpy.types.Panel):
     def fill(self, context, source, settings):
         layout, group = self.layout, settings.stiffness
         layout.operator_menu_enum(Op.STIFFNESS_PRESET, "material", icon="MATERIAL")
-        layout.prop_search(group, "group", source, "vertex_groups")
-        row = layout.row()
-        row.enabled = bool(group.group)
-        row.prop(group, "times")
-        layout.prop_search(group, "bend_group", source, "vertex_groups")
-        row = layout.row()
-        row.enabled = bool(group.bend_group)
-        row.prop(group, "bend_times")
-        layout.prop_search(group, "mask", source, "vertex_groups")
+        group_row(layout, group, "group", source, "times")
+        group_row(layout, group, "bend_group", source, "bend_times")
+        group_row(layout, group, "mask", source)
         note(layout, painted.refusal(source))
 
 

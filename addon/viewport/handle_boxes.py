@@ -124,7 +124,11 @@ def draw_lines(shader, colour, width, batch, strength=1.0):
 def draw():
     context = bpy.context
     source = source_of(context) if context.region_data is not None else None
-    if source is None or not context.space_data.overlay.show_overlays or not user_preferences.show_boxes():
+    if (
+        source is None
+        or not context.space_data.overlay.show_overlays
+        or not user_preferences.shows("show_boxes")
+    ):
         return
     across = np.array(context.region_data.view_rotation.to_matrix()).T[:2]
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
