@@ -4,45 +4,18 @@
 Energies are the unit cube's, lengths the mesh's. `report["bend"]` reads report.bend; to_dict() is for JSON.
 """
 
-import dataclasses
-import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, ClassVar, Generic, Literal, NamedTuple, Self, TypeAlias, TypeVar
+from typing import Any, Generic, Literal, NamedTuple, Self, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from ._report import Report as Report
+from .wrap_report import WrapReport as WrapReport
+
 StoppedBy: TypeAlias = Literal["iterations", "time_budget", "target_error", "callback", "diverged"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Report:
-    """What all reports have."""
-
-    kinds: ClassVar[dict[str, type["Report"]]] = {}
-
-    def __init_subclass__(cls) -> None:
-        Report.kinds[cls.__name__] = cls
-
-    def __getitem__(self, name: str) -> Any:
-        if name not in self.keys():
-            raise KeyError(name)
-        return getattr(self, name)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.keys())
-
-    @classmethod
-    def keys(cls) -> tuple[str, ...]:
-        """The fields' names, in order."""
-        return tuple(field.name for field in dataclasses.fields(cls))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain numbers, texts, lists and dicts by name."""
-        plain: dict[str, Any] = json.loads(json.dumps(dataclasses.asdict(self)))
-        return plain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -244,6 +217,3 @@ class Iteration:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "terms", MappingProxyType(dict(self.terms)))
-
-
-from .wrap_report import WrapReport as WrapReport  # noqa: E402  it needs Report

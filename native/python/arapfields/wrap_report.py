@@ -3,7 +3,7 @@
 
 from dataclasses import dataclass
 
-from .reports import Report
+from ._report import Report
 
 
 @dataclass(frozen=True, kw_only=True)
