@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Limits that single files do not show: circles, classes over several sources, declarations of several."""
+
+import ast
+import re
+from collections import Counter
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+NATIVE = ROOT / "native"
+PACKAGES = [ROOT / "addon", NATIVE / "python" / "arapfields"]
+# A class is as long as its parts in all sources together, and that is what one file may be.
+LONGEST = {"C++": 350, "Python": 250}
+# Lines that these have today: they only get shorter.
+TO_SPLIT = {"RadialSolver::State": 800, "Session": 490, "Following": 260}
+LISTS = 87  # declarations of several members or functions that native headers have today: only fewer
+
+
+def name(path):
+    return path.relative_to(ROOT).as_posix()
+
+
+def includes(path):
+    """The files of ours that a C++ file includes."""
+    for text in re.findall(r'^\s*#include\s+[<"]([^">]+)[">]', path.read_text(), flags=re.M):
+        found = (root / text for root in (path.parent, NATIVE, NATIVE / "include"))
+        yield from (file for file in found if file.is_file())
+
+
+def imports(path, package):
+    """The files of a Python package that one of its files imports, within functions too."""
+    inside = path.relative_to(package).parent.parts
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            folders = (*inside[: len(inside) - node.level + 1], *filter(None, (node.module or "").split(".")))
+            base = package.joinpath(*folders)
+            for alias in node.names:
+                within = (base / f"{alias.name}.py", base / alias.name / "__init__.py")
+                around = (base.with_suffix(".py"), base / "__init__.py")
+                yield next(file for file in (*within, *around, path) if file.is_file())
+
+
+@pytest.mark.parametrize("language", ["C++", "Python"])
+def test_no_file_needs_itself_by_way_of_others(language):
+    if language == "C++":
+        files = [path for path in NATIVE.rglob("*") if path.suffix in (".h", ".cpp", ".cu")]
+        graph = {path: set(includes(path)) for path in files}
+    else:
+        graph = {p: {*imports(p, root)} - {p} for root in PACKAGES for p in root.rglob("*.py")}
+    assert sum(map(len, graph.values())) > 300
+    TopologicalSorter({name(path): {*map(name, needed)} for path, needed in graph.items()}).prepare()
+
+
+def native_lengths():
+    """Lines of the definitions of each class's functions, over all sources."""
+    lines = Counter()
+    for path in NATIVE.rglob("*.cpp"):
+        owner = None
+        for line in path.read_text().splitlines():
+            if line[:1] not in " \t}#/":
+                found = re.match(r"[^=;]*?\b([A-Z]\w*(?:::[A-Z]\w*)*)(?:<[^()]*>)?::~?\w+\(", line)
+                owner = found[1] if found else owner
+            if owner:
+                lines[owner] += 1
+            owner = None if line.startswith("}") else owner
+    return lines
+
+
+def python_lengths():
+    """Lines of each class of the add-on, with those of the mixins that no other class has."""
+    classes, users = {}, Counter()
+    for path in PACKAGES[0].rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ClassDef):
+                bases = [getattr(base, "id", getattr(base, "attr", "")) for base in node.bases]
+                classes[node.name] = node.end_lineno - node.lineno + 1, bases
+                users.update(bases)
+
+    def length(name):
+        own, bases = classes[name]
+        return own + sum(length(base) for base in bases if base in classes and users[base] == 1)
+
+    return {name: length(name) for name in classes}
+
+
+@pytest.mark.parametrize("language", LONGEST)
+def test_a_class_over_several_sources_counts_as_one(language):
+    lengths = native_lengths() if language == "C++" else python_lengths()
+    assert len(lengths) > 50
+    too_long = {n: k for n, k in lengths.items() if k > TO_SPLIT.get(n, LONGEST[language])}
+    assert not too_long, too_long
+
+
+SCOPE = re.compile(
+    r"(template\s*<.*>\s*)?(inline\s+)?(namespace|class|struct|union|extern)\b(?!.*[=(])", re.S
+)
+
+
+ACCESS = ("public", "private", "protected")
+
+
+def declarations(text):
+    """What stands before each semicolon of a header, outside of functions and of initialisers."""
+    text = re.sub(r"//[^\n]*|/\*.*?\*/", " ", text, flags=re.S)
+    text = re.sub(r'"(?:[^"\\\n]|\\.)*"', '""', text)
+    text = re.sub(r"^\s*#(?:[^\n]*\\\n)*[^\n]*", " ", text, flags=re.M)
+    statement, scopes = "", []  # of each open brace, whether it holds declarations
+    for place, letter in enumerate(text):
+        if letter == "{":
+            scopes.append(all(scopes) and bool(SCOPE.match(statement.strip())))
+            statement = "" if scopes[-1] else statement
+        elif letter == "}":
+            ends = scopes.pop() or (all(scopes) and text[place + 1 :].lstrip()[:1] not in tuple(";,{"))
+            statement = "" if ends else statement
+        elif not all(scopes):
+            continue
+        elif letter == ";":
+            yield " ".join(statement.split())
+            statement = ""
+        else:
+            statement = "" if statement.strip() in ACCESS and letter == ":" else statement + letter
+
+
+def lists_several(declaration):
+    """Whether a declaration has a comma that stands in no brackets."""
+    before = ""
+    while before != declaration:
+        before, declaration = declaration, re.sub(r"\([^()]*\)|\[[^][]*\]|(?<=\w)<[^<>]*>", "", declaration)
+    return "," in declaration and not re.match(r"(using|friend|static_assert|enum)\b", declaration)
+
+
+def test_a_declaration_in_a_native_header_has_one_name():
+    assert lists_several("int a, b") and lists_several("void f(int), g()")
+    assert not lists_several("std::map<int, int> f(int a, int b = g(1, 2))")
+    headers = sorted(NATIVE.rglob("*.h"))
+    found = [f"{name(p)}: {d}" for p in headers for d in declarations(p.read_text()) if lists_several(d)]
+    assert len(headers) > 100 and len(found) <= LISTS, "\n".join(found)
