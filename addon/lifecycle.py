@@ -20,6 +20,7 @@ from .pin_tool import drawing as pin_drawing
 from .pin_tool import tool
 from .pin_tool.hover import hover
 from .poses import applying
+from .stylize import style_object
 from .surface import staleness
 from .viewport import handle_boxes, previews
 
@@ -117,6 +118,7 @@ PARTS = (  # what begins with the extension, and how it ends
 # Timers are started by blender/timers.py, threads by core/runtime/threads.py.
 STATE = (jobs.board, display, sessions.live, counts.pending, staleness.changed, motion.written)
 STATE += (hover, warm, applying.solved, previews.shown, first_result.steps, rows.seen, timers)
+STATE += (style_object.cache,)
 
 LONGEST = 10.0  # seconds that the end of the process waits for a thread
 

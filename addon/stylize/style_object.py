@@ -13,7 +13,7 @@ from ..handles.empties import matrix_of
 
 MOST_NORMALS = 64  # of an object without a volume; more are no preference
 KEPT = 8  # objects, or placings of one, whose styles are remembered
-_kept = {}  # key → ObjectStyle or (k, 3) normals
+cache = {}  # key → ObjectStyle or (k, 3) normals
 
 
 def refusal(item):
@@ -34,11 +34,11 @@ def style_of(item, where=matrix_of):
     mesh = seen.to_mesh()
     try:
         key = mesh_arrays.fingerprint(mesh), linear.tobytes()
-        if key not in _kept:
-            while len(_kept) >= KEPT:
-                del _kept[next(iter(_kept))]
-            _kept[key] = _read(item.name, mesh, linear)
-        return _kept[key], key
+        if key not in cache:
+            while len(cache) >= KEPT:
+                del cache[next(iter(cache))]
+            cache[key] = _read(item.name, mesh, linear)
+        return cache[key], key
     finally:
         seen.to_mesh_clear()
 
