@@ -48,7 +48,7 @@ def test_parts_in_any_order_make_the_cache_that_one_process_makes(scene):
     shared.mkdir()
     parts = ["--folder", shared, "--shard"]
     said = run(*parts, "2/3").stdout
-    assert "3 of 5 frames to come" in said or "4 of 5 frames to come" in said
+    assert "3 of 5 frames to come" in said  # of 2 and 5
     assert not (shared / "Bar.pc2").exists()
     frames = sorted((shared / ".Bar.pc2.frames").iterdir())
     kept = [path for path in frames if path.name != "lock"]

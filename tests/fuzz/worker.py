@@ -74,13 +74,14 @@ def run_files(target, seed, first, count, say):
 def run_api(seed, first, count, say):
     import arapfields as af
     from tests.fuzz import api
+    from tests.fuzz.odd import make_things
 
     documented = (af.InvalidInput, OSError, af.Cancelled, af.Diverged, TypeError)
     limit_memory()
     signal.signal(signal.SIGALRM, interrupt)
     for number in range(first, first + count):
         rng = np.random.default_rng([seed, 1, number])
-        things = api.make_things() if number == first else things  # noqa: F821
+        things = make_things() if number == first else things  # noqa: F821
         with only_errors(documented) as outcome, np.errstate(all="ignore"):
             name, function, arguments = api.case(rng, things)
             say(number)

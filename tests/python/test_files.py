@@ -63,43 +63,48 @@ def test_the_issues_lift_and_network(examples, tmp_path):
         assert name in refusal(path, archives.packed(texts, {**arrays, name: arrays[name][:-1]}))
     slopes = {**arrays, "embedding.slopes": np.ascontiguousarray(arrays["embedding.slopes"][:, :6])}
     assert "embedding.slopes" in refusal(path, archives.packed(texts, slopes))
-    for width in (0, -1.0, 1e400, None, "wide"):
+    for width, reason in {
+        0: "width",
+        -1.0: "width",
+        1e400: "not JSON",
+        None: "width",
+        "wide": "width",
+    }.items():
         changed = copy.deepcopy(texts)
         changed["structure"]["embedding"]["width"] = width
-        assert "width" in refusal(path, archives.packed(changed, arrays)) or width == 1e400
+        print("P3", width, refusal(path, archives.packed(changed, arrays)))
+        assert reason in refusal(path, archives.packed(changed, arrays))
     texts, arrays = archives.read(examples["neural"])
-    for member, value in [
-        ("width", 8192),
-        ("layers", 64),
-        ("octaves", 32),
-        ("width", 10**15),
-        ("width", 8.5),
+    for member, value, reason in [
+        ("width", 8192, "layers.0.weight"),
+        ("layers", 64, "layers.1.weight"),
+        ("octaves", 32, "layers.0.weight"),
+        ("width", 10**15, "network.width"),
+        ("width", 8.5, "network.width"),
     ]:
         changed = copy.deepcopy(texts)
         changed["structure"]["network"][member] = value
         said = refusal(tmp_path / "neural.safetensors", archives.packed(changed, arrays))
+        print("P4", member, value, said)
         assert "layers" in said or member in said
 
 
-HEADERS = {
-    "no object": b"[1, 2]",
-    "not JSON": b'{"a": ',
-    "nested deeper": b'{"a": ' + b"[" * 100000,
-    "twice": b'{"__metadata__": {"format": "a", "format": "b"}}',
-    "'__metadata__' is missing": b"{}",
-    "an object is needed": b'{"__metadata__": 3}',
-    "a text is needed": b'{"__metadata__": {"format": 3}}',
-    "does not begin with an object": b" {}",
-    "ill-formed UTF-8": b'{"\xff": 1}',
-}
+HEADERS = [  # what is wrong with the header, and the header
+    ("does not begin with an object", b"[1, 2]"),
+    ("not JSON", b'{"a": '),
+    ("nested deeper", b'{"a": ' + b"[" * 100000),
+    ("twice", b'{"__metadata__": {"format": "a", "format": "b"}}'),
+    ("'__metadata__' is missing", b"{}"),
+    ("an object is needed", b'{"__metadata__": 3}'),
+    ("a text is needed", b'{"__metadata__": {"format": 3}}'),
+    ("does not begin with an object", b" {}"),
+    ("ill-formed UTF-8", b'{"\xff": 1}'),
+]
 
 
-@pytest.mark.parametrize("text", HEADERS)
-def test_headers_that_are_none(text, tmp_path):
-    assert (
-        text.split("'")[-1] in refusal(tmp_path / "x", archives.joined(HEADERS[text], b""))
-        or text == "no object"
-    )
+@pytest.mark.parametrize(("text", "header"), HEADERS, ids=[text for text, _ in HEADERS])
+def test_headers_that_are_none(text, header, tmp_path):
+    assert text in refusal(tmp_path / "x", archives.joined(header, b""))
 
 
 def test_sizes_are_checked_before_memory_is_asked_for(examples, tmp_path):

@@ -88,6 +88,11 @@ def test_bad_input_is_named(tmp_path):
             af.sdf_grid(Ball(), 4, bounds=bounds)
     with pytest.raises(af.InvalidInput, match="extension"):
         af.save_grid(tmp_path / "grid.txt", *af.sdf_grid(Ball(), 4))
+    grid = dict(zip(("values", "origin", "spacing"), af.sdf_grid(Ball(), 4), strict=True))
+    for name in grid:
+        with pytest.raises(af.InvalidInput, match=name):
+            af.save_grid(tmp_path / "grid.npz", **{**grid, name: np.ones((3, 3, 3), object)})
+    assert not list(tmp_path.iterdir())
 
 
 def test_cancel():

@@ -95,6 +95,9 @@ def save_grid(path: FilePath, values: ArrayLike, origin: ArrayLike, spacing: flo
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
         raise InvalidInput(f"{path}: unknown extension; allowed are {', '.join(SUFFIXES)}")
+    for name, given in (("values", values), ("origin", origin), ("spacing", spacing)):
+        if np.asarray(given).dtype.kind not in "biuf":
+            raise InvalidInput(f"{name}: dtype {np.asarray(given).dtype}; expected real numbers")
     openvdb = openvdb_module() if suffix == ".vdb" else None
     with whole_file(path) as partial:
         if openvdb is None:

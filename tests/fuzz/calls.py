@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Good calls of the public interface, by the names of functions, classes and members."""
+
+from functools import partial
+
+import numpy as np
+
+import arapfields as af
+
+from .odd import CIRCLE, FACES, NORMALS, PLAIN, ROWS, TETRAHEDRON, TINY, WRAP, by_name, odd_options
+
+
+def calls(rng, things):
+    """{name: (function, arguments)}: all of the interface, each argument good."""
+    t, task, moved = things, af.Task(), np.eye(4)
+    fit = {"iterations": 2, "batch": 64, "near_points": 100, "uniform_points": 100, **TINY}
+    live = {"samples": 50, "coarse_centers": 5, "fine_centers": 5, "iterations": 2, "threads": 1}
+    return (
+        options(rng, t)
+        | members(t)
+        | live_calls(t)
+        | {
+            "signed_distance": lambda: (
+                by_name(af.signed_distance, "threads", "task"),
+                [TETRAHEDRON, FACES, ROWS, 1, task],
+            ),
+            "winding_number": lambda: (
+                by_name(af.winding_number, "threads", "task"),
+                [TETRAHEDRON, FACES, ROWS, 1, task],
+            ),
+            "fit_sdf": lambda: (
+                by_name(af.fit_sdf, "callback", "task"),
+                [TETRAHEDRON, FACES, odd_options(rng, t, af.FitOptions, **fit), None, task],
+            ),
+            "NeuralSdf.from_layers": lambda: (
+                af.NeuralSdf.from_layers,
+                [[np.ones((8, 12)), np.ones((1, 8))], [np.ones(8), np.ones(1)], 2, 1.0, 30.0],
+            ),
+            "NeuralSdf.__call__": lambda: (t["sdf"], [ROWS]),
+            "NeuralSdf.gradient": lambda: (t["sdf"].gradient, [ROWS]),
+            "sample_mesh": lambda: (by_name(af.sample_mesh, "seed"), [TETRAHEDRON, FACES, 50, 0]),
+            "sample_surface": lambda: (
+                by_name(af.sample_surface, "seed", "threads", "task"),
+                [t["sdf"], 20, 0, 1, task],
+            ),
+            "SurfaceSamples": lambda: (af.SurfaceSamples, [ROWS, NORMALS, t["frame"]]),
+            "CuboidHandle": lambda: (af.Cuboid, [np.eye(4), moved, 1.0]),
+            "PointHandle": lambda: (af.Point, [ROWS[0], ROWS[1], 1.0]),
+            "RegionHandle": lambda: (af.Region, [[0, 1], np.eye(4), moved, 1.0]),
+            "Frame": lambda: (af.Frame, [ROWS[0], 1.0]),
+            "Frame.to_cube": lambda: (t["frame"].to_cube, [ROWS]),
+            "deform": lambda: (
+                by_name(af.deform, "energies", "callback", "task"),
+                [
+                    t["samples"],
+                    t["handles"],
+                    odd_options(rng, t, af.DeformOptions, iterations=2, batch=20, **TINY),
+                    [],
+                    None,
+                    task,
+                ],
+            ),
+            "stylize": lambda: (
+                by_name(
+                    af.stylize, "weights", "handles", "orientation", "up", "energies", "callback", "task"
+                ),
+                [
+                    t["samples"],
+                    "cube",
+                    odd_options(rng, t, af.StylizeOptions, iterations=2, batch=20, **TINY),
+                    *[np.ones(60), t["handles"][:1], np.eye(3), np.ones(3), [], None, task],
+                ],
+            ),
+            "train_inverse": lambda: (
+                by_name(af.train_inverse, "task"),
+                [
+                    t["field"],
+                    t["samples"],
+                    odd_options(rng, t, af.InverseOptions, iterations=2, batch=20, **TINY),
+                    task,
+                ],
+            ),
+            "DeformationField.__call__": lambda: (t["field"], [ROWS]),
+            "DeformationField.jacobian": lambda: (t["field"].jacobian, [ROWS]),
+            "DeformationField.hessian": lambda: (t["field"].hessian, [ROWS]),
+            "DeformationField.inverse": lambda: (
+                by_name(t["field"].inverse, "tolerance", "task"),
+                [ROWS[:5], 1e-6, task],
+            ),
+            "arap_energy": lambda: (af.arap_energy, [t["field"], ROWS]),
+            "distortion": lambda: (af.distortion, [t["field"], ROWS]),
+            "gauss_preference": lambda: (
+                by_name(af.gauss_preference, "sharpness"),
+                [NORMALS, np.eye(3), 5.0],
+            ),
+            "style_sharpness": lambda: (af.style_sharpness, [NORMALS]),
+            "preferred_normals": lambda: (af.preferred_normals, ["cube"]),
+            "extract_surface": lambda: (
+                by_name(af.extract_surface, "threads", "task"),
+                [t["sdf"], 9, 1, task],
+            ),
+            "extract_deformed": lambda: (
+                by_name(af.extract_deformed, "inverse", "threads", "task"),
+                [t["sdf"], t["field"], 9, None, 1, task],
+            ),
+            "LiveDeformer": lambda: (
+                by_name(af.LiveDeformer, "task"),
+                [t["samples"], t["handles"], odd_options(rng, t, af.LiveOptions, **live), task],
+            ),
+            "sample_curve": lambda: (by_name(af.sample_curve, "closed"), [CIRCLE, 50, True]),
+            "CurveHandle": lambda: (af.CurveHandle, [[0, 1], np.eye(3), 1.0]),
+            "deform_curve": lambda: (
+                by_name(af.deform_curve, "task"),
+                [
+                    t["curve"].points,
+                    [t["curve_handle"]],
+                    odd_options(rng, t, af.CurveOptions, threads=1, spacing=0.3),
+                    task,
+                ],
+            ),
+            "Task.watch": lambda: (af.Task().watch, [ROWS, 0.1]),
+            "Task.report": lambda: (af.Task().report, [0.5, "x"]),
+            "sdf_grid": lambda: (
+                by_name(af.sdf_grid, "bounds", "task"),
+                [t["sdf"], 3, [[-1, -1, -1], [1, 1, 1]], task],
+            ),
+            "NeuralSdf.load": lambda: (af.NeuralSdf.load, ["/nonexistent"]),
+            "DeformationField.load": lambda: (af.DeformationField.load, ["/nonexistent"]),
+            "NeuralSdf.save": lambda: (t["sdf"].save, ["/nonexistent/x"]),
+        }
+    )
+
+
+def live_calls(t):
+    task, live = af.Task(), t["live"]
+    return {
+        "LiveDeformer.solve": lambda: (
+            by_name(live.solve, "iterations", "tolerance", "task"),
+            [[ROWS[1]], 2, 0.1, task],
+        ),
+        "LiveDeformer.track": lambda: (live.track, [ROWS]),
+        "LiveDeformer.set_style": lambda: (
+            by_name(live.set_style, "sharpness", "weights", "up"),
+            ["cube", 0.5, 5.0, np.ones(60), np.ones(3)],
+        ),
+        "LiveDeformer.set_handles": lambda: (live.set_handles, [t["handles"][:1]]),
+        "LiveDeformer.follow": lambda: (
+            by_name(live.follow, "iterations", "tolerance", "task"),
+            [[ROWS[1]], 2, 0.1, task],
+        ),
+        "LiveDeformer.step": lambda: (
+            by_name(live.step, "coordinates", "task"),
+            [[ROWS[1]], 0.01, None, task],
+        ),
+        "LiveDeformer.tracked": lambda: (live.tracked, []),
+        "LiveDeformer.set_weights": lambda: (live.set_weights, [np.ones(60), np.ones(60)]),
+        "LiveDeformer.set_symmetry": lambda: (by_name(live.set_symmetry, "task"), ["x", task]),
+        "LiveDeformer.set_secondary_motion": lambda: (
+            by_name(live.set_secondary_motion, "masses", "up", "ground"),
+            [af.SecondaryMotionOptions(), np.ones(60), np.ones(3), -2.0],
+        ),
+    }
+
+
+def options(rng, things):
+    """Of each class of options: itself with an odd value, its presets, its values."""
+    found = {}
+    for name, cls in vars(af).items():
+        if not name.endswith("Options") or cls.__name__ != name:  # an alias
+            continue
+        found[name] = lambda cls=cls: (partial(odd_options, rng, things, cls), [])
+        found[f"{name}.to_dict"] = lambda cls=cls: (cls.to_dict, [cls()])
+        if hasattr(cls, "preset"):
+            found[f"{name}.preset"] = lambda cls=cls: (cls.preset, ["paper"])
+    return found
+
+
+def members(t):
+    """Calls of objects that others make, and of functions with few arguments."""
+    writer = af.PointCacheWriter
+    moved = ROWS + 0.1
+    return {
+        "MeshSdf": lambda: (by_name(af.MeshSdf, "task"), [TETRAHEDRON, FACES, af.Task()]),
+        "MeshSdf.__call__": lambda: (t["mesh_sdf"], [ROWS]),
+        "MeshSdf.gradient": lambda: (t["mesh_sdf"].gradient, [ROWS]),
+        "MeshSdf.save": lambda: (t["mesh_sdf"].save, ["/nonexistent/x"]),
+        "ObjectStyle": lambda: (by_name(af.ObjectStyle, "task"), [TETRAHEDRON, FACES, af.Task()]),
+        "ObjectStyle.normals": lambda: (t["style"].normals, [NORMALS]),
+        "ObjectStyle.turned": lambda: (t["style"].turned, [np.eye(3)]),
+        "Attachment": lambda: (by_name(af.Attachment, "task"), [t["samples"], ROWS[:5], af.Task()]),
+        "Attachment.positions": lambda: (t["attachment"].positions, [t["field"]]),
+        "CurveField.__call__": lambda: (t["curve_field"], [ROWS]),
+        "CurveField.jacobian": lambda: (t["curve_field"].jacobian, [ROWS]),
+        "DeformationField.apply": lambda: (by_name(t["field"].apply, "strength"), [ROWS, 0.5]),
+        "DeformationField.save": lambda: (t["field"].save, ["/nonexistent/x"]),
+        "Frame.to_mesh": lambda: (t["frame"].to_mesh, [ROWS]),
+        "SurfaceSamples.with_weights": lambda: (t["samples"].with_weights, [np.ones(60), np.ones(60)]),
+        "Task": lambda: (af.Task, []),
+        "Task.cancel": lambda: (af.Task.cancel, [af.Task()]),
+        "rigid_motion": lambda: (by_name(af.rigid_motion, "weights"), [ROWS, moved, np.ones(60)]),
+        "sample_meshes": lambda: (
+            by_name(af.sample_meshes, "seed", "weights", "bend_weights"),
+            [[(TETRAHEDRON, FACES)], 50, 0, None, None],
+        ),
+        "save_grid": lambda: (af.save_grid, ["grid.npz", np.zeros((3, 3, 3)), np.zeros(3), 0.1]),
+        "wrap": lambda: (
+            by_name(af.wrap, "task"),
+            [t["samples"], t["mesh_sdf"], [], af.WrapOptions(**WRAP), af.Task()],
+        ),
+        "PointCacheReader": lambda: (af.PointCacheReader, ["/nonexistent"]),
+        "PointCacheWriter": lambda: (
+            by_name(writer, "start", "step"),
+            ["/nonexistent/x.pc2", 4, 2, 1.0, 1.0],
+        ),
+        "PointCacheWriter.write": lambda: (lambda *given: with_writer("write", *given), [TETRAHEDRON]),
+        "PointCacheWriter.finish": lambda: (lambda: with_writer("finish"), []),
+        "PointCacheWriter.commit": lambda: (lambda: with_writer("commit"), []),
+        "PointCacheWriter.discard": lambda: (lambda: with_writer("discard"), []),
+        **{name: partial(lambda name: (getattr(af, name), []), name) for name in PLAIN},
+    }
+
+
+def with_writer(member, *given):
+    """A member of a writer of one frame of four points, which leaves nothing behind."""
+    writer = af.PointCacheWriter("motion.pc2", 4, 1)
+    try:
+        getattr(writer, member)(*given)
+    finally:
+        writer.discard()
