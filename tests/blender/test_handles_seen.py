@@ -136,7 +136,6 @@ def test_sixteen_handles_have_sixteen_distinct_colours():
     bpy.ops.arapfields.add_handle(place="CURSOR")
     added = tuple(bar.arapfields.handles[-1].colour)
     others = [tuple(entry.colour) for entry in list(bar.arapfields.handles)[:-1]]
-    print("P7", added == freed, len(set(others)), len(others))
     assert added == freed and added not in others and len(set(others)) == 15
 
 

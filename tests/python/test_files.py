@@ -72,7 +72,6 @@ def test_the_issues_lift_and_network(examples, tmp_path):
     }.items():
         changed = copy.deepcopy(texts)
         changed["structure"]["embedding"]["width"] = width
-        print("P3", width, refusal(path, archives.packed(changed, arrays)))
         assert reason in refusal(path, archives.packed(changed, arrays))
     texts, arrays = archives.read(examples["neural"])
     for member, value, reason in [
@@ -84,9 +83,7 @@ def test_the_issues_lift_and_network(examples, tmp_path):
     ]:
         changed = copy.deepcopy(texts)
         changed["structure"]["network"][member] = value
-        said = refusal(tmp_path / "neural.safetensors", archives.packed(changed, arrays))
-        print("P4", member, value, said)
-        assert "layers" in said or member in said
+        assert reason in refusal(tmp_path / "neural.safetensors", archives.packed(changed, arrays))
 
 
 HEADERS = [  # what is wrong with the header, and the header

@@ -84,7 +84,6 @@ def test_fields_and_solvers(tmp_path: Path) -> None:
     assert af.gauss_preference(samples.normals, af.preferred_normals("cube"), sharpness=4.0).shape == (200,)
     training = af.InverseTrainingOptions(iterations=2, width=8, layers=1)
     inverse = af.train_inverse(field, samples, training)
-    print("P6", inverse.report.error_mean)
     assert 0 < inverse.report.error_mean < 1
     moved = af.extract_deformed(Cube(), field, 16, inverse=inverse, threads=1)
     assert moved.report.inverted > 0

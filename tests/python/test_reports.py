@@ -50,7 +50,6 @@ def test_a_report_is_frozen_typed_and_plain(made, kind):
         setattr(report, fields[0].name, 1.0)
     for field in fields:
         value = getattr(report, field.name)
-        print("P5", kind, field.name, report[field.name] is value, report[field.name] == value)
         assert report[field.name] == value
         if field.type in (int, float, bool, str):
             assert type(value) is field.type, field.name

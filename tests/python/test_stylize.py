@@ -33,7 +33,6 @@ def mean_preference(field, samples, preferred, sharpness=0.0):
 def test_strength_zero_is_the_identity(ball):
     field = af.stylize(ball, "cube", quick(strength=0.0))
     points = np.random.default_rng(0).uniform(-1, 1, size=(200, 3))
-    print("P1", np.abs(field(points) - points).max(), np.array_equal(field(points), points))
     assert np.abs(field(points) - points).max() < 1e-15  # rounding of the map to the cube and back
     assert np.array_equal(field.jacobian(points), np.broadcast_to(np.eye(3), (200, 3, 3)))
 
@@ -50,7 +49,6 @@ def test_a_style_shows_a_first_result(ball):
     task.watch(ball.points, seconds=0.0)
     field = af.stylize(ball, "cube", af.StylizeOptions(iterations=10), task=task)
     off = np.abs(task.watched - field(ball.points)).max()
-    print("P2", task.looks, off)
     assert task.looks == 2 and off < 1e-3
 
 
