@@ -45,12 +45,6 @@ def test_the_modifier_does_what_the_field_does_by_hand(case):
             else np.array([v.co.x <= 0.5 for v in bar.data.vertices])
         )
         assert left.any() and np.array_equal(masked[left], rest[left])
-        print(
-            "P8",
-            case,
-            np.array_equal(masked[~left], moved[~left]),
-            np.abs(masked[~left] - moved[~left]).max(),
-        )
         assert np.array_equal(masked[~left], moved[~left])
     group.remove([v.index for v in bar.data.vertices])
     assert local_points(bar).tobytes() == rest.tobytes()
