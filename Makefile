@@ -11,8 +11,8 @@ PY := $(VENV)/bin/python
 SOURCES := $(shell find native cmake -type f) CMakeLists.txt pyproject.toml
 PIP := $(PY) -m pip install --disable-pip-version-check
 PYTEST := $(PY) -m pytest
-# Files of tests are dealt out to as many processes as there are processors; each needs some memory.
-ALL_TESTS := $(PYTEST) -n logical --maxprocesses 4 --dist loadfile
+# Files of tests are dealt out, long ones first, to as many processes as there are processors; each needs memory.
+ALL_TESTS := $(PYTEST) -n logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 NATIVE_TESTS := build/wheel/tests/native_tests
 
 .PHONY: help setup build examples demo test test-slow test-windows test-arm64 fuzz bench sanitize format lint wheel workflows extension repository blenders gallery docs clean

@@ -3,15 +3,20 @@
 
 import os
 import signal
-import sys
 from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("ARAPFIELDS_DATA", ROOT.parent / "shared" / "data"))
+
+
+LONG_FIRST = ("docs", "packaging", "native", "blender", "python", "fuzz", "architecture", "addon_core")
+
+
+def pytest_collection_modifyitems(items):
+    """Folders with long files first: processes that take files one by one then end at about the same time."""
+    items.sort(key=lambda item: LONG_FIRST.index(item.path.relative_to(ROOT / "tests").parts[0]))
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -182,3 +182,16 @@ def test_top_level_folders_are_documented():
     folders = {line.split("/")[0] for line in tracked.splitlines() if "/" in line and line[0] != "."}
     undocumented = {folder for folder in folders if f"{folder}/" not in text}
     assert not undocumented, undocumented
+
+
+def test_test_files_import_helpers_alone():
+    """What several use lies in tests/support; a test in Blender imports at the top, as other files do."""
+    for path in (ROOT / "tests").rglob("test_*.py"):
+        tree = ast.parse(path.read_text())
+        imported = [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
+        names = [alias.name for node in imported for alias in node.names]
+        names += [node.module or "" for node in imported if isinstance(node, ast.ImportFrom)]
+        assert not [one for one in names if one.split(".")[-1].startswith("test_")], name(path)
+        inner = {id(node) for top in tree.body if isinstance(top, ast.FunctionDef) for node in ast.walk(top)}
+        local = [ast.unparse(node) for node in imported if id(node) in inner]
+        assert not [line for line in local if "bpy" in line or "support" in line], (name(path), local)

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pages
 import pytest
+from support.geometry.meshes import sphere
 
 SHORT = {  # flags that keep a run brief: that it runs is tested, not how well it solves
     "fit": "--iterations 40 --width 32 --near-points 4000 --uniform-points 1000",
@@ -79,7 +80,6 @@ def test_commands_of_blender_are_understood():
 
 def test_commands_of_the_package_run(tmp_path):
     import trimesh
-    from support.geometry.meshes import sphere
 
     page = pages.ROOT / "docs" / "command-line.md"
     (pose,) = blocks(page, "json")

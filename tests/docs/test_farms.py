@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pages
 import pytest
+from support.geometry.meshes import sphere
 from support.programs.batches import starts, statuses
 
 import arapfields as af
@@ -102,8 +103,6 @@ def test_openjd_runs_the_template(place):
 def test_the_dask_example_runs(tmp_path):
     pytest.importorskip("distributed", reason="Dask is not installed")
     trimesh = pytest.importorskip("trimesh")
-    from support.geometry.meshes import sphere
-
     (tmp_path / "in").mkdir()
     for i in range(3):
         vertices, triangles = sphere(1.0 + i, 2)

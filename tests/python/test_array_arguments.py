@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 from support.geometry import cases
+from support.geometry.meshes import sphere
 
 import arapfields as af
 
@@ -97,8 +98,6 @@ def test_tensors_serve_every_kind_of_argument():
 
 
 def cases_mesh():
-    from support.geometry.meshes import sphere
-
     return sphere(1.0, 2)
 
 

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from support.geometry.bar import LEFT, RIGHT
+from support.geometry.bar import LEFT, RIGHT, bar_samples
 from support.geometry.cases import box, moved, shift
 from support.geometry.characters import FOOT, HIP, LEG, trousers
 from support.tolerances import TRACKED
@@ -65,8 +65,6 @@ def test_an_anchor_holds_and_a_handle_without_reach_frees_all(body):
 
 
 def test_boxes_and_regions_reach_from_what_they_hold():
-    from support.geometry.bar import bar_samples
-
     samples = bar_samples()
     target = shift([0, 0, 0.3]) @ RIGHT
     inside = np.flatnonzero(samples.points[:, 0] > 1.5)
