@@ -14,13 +14,13 @@ from .deform import first_result
 from .field_modifier import motion
 from .handles import counts, rows
 from .jobs.display import display
-from .live import leftovers, sessions
-from .live.warm import warm
+from .live import recovery, rendering, sessions
+from .live.prefetch import prefetch
 from .pin_tool import drawing as pin_drawing
 from .pin_tool import tool
 from .pin_tool.hover import hover
 from .poses import applying
-from .stylize import style_object
+from .solver import style_object
 from .surface import staleness
 from .viewport import handle_boxes, previews
 
@@ -28,7 +28,7 @@ from .viewport import handle_boxes, previews
 @persistent
 def before_load(*_):
     """The file is about to go: whatever works on it ends, and nothing of it is applied."""
-    passing = (jobs.board, counts.pending, staleness.changed, rows.seen, warm)
+    passing = (jobs.board, counts.pending, staleness.changed, rows.seen, prefetch)
     for state in (*passing, applying.solved, first_result.steps):
         state.clear()
     sessions.stop_all()
@@ -50,7 +50,7 @@ def before_save(*_):
 def after_load(*_):
     hover.clear()
     first_result.steps.recover()
-    sessions.recover(leave=leftovers.adopt)
+    recovery.after_load()
 
 
 @persistent
@@ -58,7 +58,7 @@ def after_restore(*_):
     """A step was undone or redone."""
     hover.clear()
     first_result.steps.recover()
-    sessions.recover()
+    recovery.after_undo()
 
 
 @persistent
@@ -84,9 +84,9 @@ def after_render(*_):
 @persistent
 def after_frame(scene, depsgraph):
     if sessions.live.is_rendering:
-        sessions.follow_frame(depsgraph)
+        rendering.follow_frame(depsgraph)
     elif sessions.live and not modifier_stack.is_stage(scene):
-        sessions.show_frame()
+        rendering.show_frame()
 
 
 HANDLERS = {  # of bpy.app.handlers
@@ -117,7 +117,7 @@ PARTS = (  # what begins with the extension, and how it ends
 # What may be there when the extension is disabled, in the order in which it ends; each has clear().
 # Timers are started by blender/timers.py, threads by core/runtime/threads.py.
 STATE = (jobs.board, display, sessions.live, counts.pending, staleness.changed, motion.written)
-STATE += (hover, warm, applying.solved, previews.shown, first_result.steps, rows.seen, timers)
+STATE += (hover, prefetch, applying.solved, previews.shown, first_result.steps, rows.seen, timers)
 STATE += (style_object.cache,)
 
 LONGEST = 10.0  # seconds that the end of the process waits for a thread

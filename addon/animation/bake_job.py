@@ -9,7 +9,6 @@ from ..core.errors import UserError
 from ..core.runtime.coroutines import Pause
 from ..core.runtime.jobs import Item
 from ..core.runtime.progress import JobCancelled
-from ..live.simulation import played
 from .frames import FrameFeed
 
 AHEAD = 8  # frames that are read before they are solved, where each has positions of its own
@@ -24,10 +23,9 @@ class BakePass:
 
     def __init__(self, bakes, frames):
         self.bakes, self.frames = bakes, frames
-        starts = [bake.session.start for bake in bakes if bake.simulation is not None]
-        # With secondary motion, also the frames that lead to those that are baked.
-        self.played = played(frames, min(starts)) if starts else list(frames)
-        moving = any(bake.session.moves_by_itself or bake.session.carrying.objects for bake in bakes)
+        starts = [bake.simulation.start for bake in bakes if bake.simulation is not None]
+        self.played = frames.with_those_before(min(starts)) if starts else list(frames)
+        moving = any(bake.reader.moves_by_itself or bake.reader.carrying.objects for bake in bakes)
         self.feed = FrameFeed(AHEAD if moving else len(self.played))
 
     def item(self, context, job, failures):
@@ -56,7 +54,7 @@ class BakePass:
     def work(self, tracker):
         """On the worker."""
         task, count = tracker.start("Solving", 1.0), len(self.played)
-        wanted = set(self.frames)
+        baked = set(self.frames)
         try:
             for bake in self.bakes:
                 bake.attempt(bake.prepare)
@@ -66,7 +64,7 @@ class BakePass:
                 for bake, request in zip(self.bakes, requests, strict=True):
                     if task.cancelled:
                         raise JobCancelled
-                    bake.attempt(bake.add, frame, request, frame in wanted)
+                    bake.attempt(bake.add, frame, request, frame in baked)
                 if all(bake.error is not None for bake in self.bakes):
                     break
             for bake in self.bakes:

@@ -10,7 +10,7 @@ from ..core.runtime.coroutines import Pause
 from ..core.runtime.progress import JobCancelled
 from ..handles import empties
 from ..jobs.job_operator import JobOperator, with_progress
-from ..stylize import preference
+from ..solver import style_settings
 from . import frames, object_bake
 from .bake_job import BakePass
 
@@ -69,7 +69,7 @@ class BakeOperator(JobOperator):
                 if reason is not None:
                     raise reason
                 bake = bakes_of(source, kind, found)
-                yield from with_progress(job, bake.session.reading, source.name)
+                yield from with_progress(job, bake.reader.read_setup(context), source.name)
                 bakes.append(bake)
             except (UserError, ValueError, OSError) as error:
                 text = translated(error)
@@ -86,4 +86,4 @@ def effective_kind(source, operator=None):
 
 def refusal_of(source, kind):
     """Why there is nothing to bake of a source, as a UserError; None where there is."""
-    return empties.require_handles(source) if kind == "DEFORM" else preference.refusal(source)
+    return empties.require_handles(source) if kind == "DEFORM" else style_settings.refusal(source)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where caches lie, and what frames weigh."""
+"""Where the frames of a bake go, and what they weigh."""
 
 import contextlib
 import re
@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 
 from ..core.errors import UserError
+from ..field_modifier import cache_modifier
 from .properties import FOLDER
 
 SUFFIXES = {"PC2": ".pc2", "MDD": ".mdd"}
@@ -15,13 +16,75 @@ BARRED = re.compile(r'[\x00-\x1f/\\:*?"<>|]')  # letters that a file's name cann
 HEAVY = 500e6  # bytes of shape keys, above which a cache would serve better
 
 
+class ShapeKeys:
+    """The frames of one object, kept in memory for its shape keys."""
+
+    def __init__(self):
+        self.shapes = []
+
+    def open(self, solver):
+        """Before the first frame; on the worker, as all but `commit`."""
+
+    def add(self, points):
+        self.shapes.append(points)
+
+    def finish(self):
+        """After the last frame."""
+
+    def discard(self):
+        self.shapes.clear()
+
+
+class CacheFile:
+    """The frames of one object in a point cache, which takes its place when it is committed.
+
+    `modifier_path` is the same path as a modifier has it.
+    """
+
+    def __init__(self, path, modifier_path, frames, fps):
+        self.path, self.modifier_path, self.frames, self._fps = path, modifier_path, frames, fps
+        self._writer = None
+
+    def open(self, solver):
+        self.open_for(len(solver.rest))
+
+    def open_for(self, points):
+        """For so many points."""
+        from arapfields.point_cache import PointCacheWriter
+
+        frames, times = self.frames, {"start": self.frames.start, "step": self.frames.step, "fps": self._fps}
+        self._writer = PointCacheWriter(self.path, points, frames.count, **times)
+
+    def add(self, points):
+        self._writer.write(points)
+
+    def finish(self):
+        self._writer.finish()
+
+    def commit(self):
+        """Puts the cache in its place; on the main thread."""
+        try:
+            self._writer.commit()
+        except OSError as error:
+            raise UserError("{error}", error=error) from error
+
+    def discard(self):
+        """Removes what is not in its place; the cache of an earlier bake stays as it is."""
+        if self._writer is not None:
+            self._writer.discard()
+
+    def play_on(self, item):
+        """Has an object play the cache."""
+        cache_modifier.play(item, self.modifier_path, self.frames.start, self.frames.step)
+
+
 def cache_path(source, suffix, folder, filepath=""):
     """(absolute path, the same as the modifier has it) of an object's cache; UserError where none can be."""
     name = BARRED.sub("_", source.name)
-    told = filepath or f"{folder.rstrip('/') or '/'}/{name}{suffix}"
-    if told.startswith("//") and not bpy.data.filepath:
+    shown = filepath or f"{folder.rstrip('/') or '/'}/{name}{suffix}"
+    if shown.startswith("//") and not bpy.data.filepath:
         raise UserError("save the .blend first, or choose a folder: the cache lies beside it")
-    path = Path(bpy.path.abspath(told))
+    path = Path(bpy.path.abspath(shown))
     if path.suffix.lower() != suffix:
         raise UserError("{path}: the format needs the extension {suffix}", path=path, suffix=suffix)
     if not filepath and folder == FOLDER:
@@ -30,14 +93,14 @@ def cache_path(source, suffix, folder, filepath=""):
         raise UserError("{folder}: no such folder", folder=path.parent)
     if bpy.data.filepath:
         with contextlib.suppress(ValueError):  # on another drive
-            told = bpy.path.relpath(str(path))
-    return path, told
+            shown = bpy.path.relpath(str(path))
+    return path, shown
 
 
-def cache_beside(path, told, name):
+def cache_beside(path, shown, name):
     """The same as cache_path, of an object that goes along: beside the other's cache, with both names."""
     file = f"{path.stem} {BARRED.sub('_', name)}{path.suffix}"
-    return path.with_name(file), told.removesuffix(path.name) + file
+    return path.with_name(file), shown.removesuffix(path.name) + file
 
 
 def plain(frame):

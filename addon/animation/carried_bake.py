@@ -19,7 +19,7 @@ from ..core.errors import UserError
 from ..core.runtime.coroutines import Pause
 from ..field_modifier import cache_modifier
 from ..results import result_objects, visibility
-from .caches import plain
+from .caches import CacheFile, plain
 
 BAKED_KEY = "ARAP Fields frame "  # how baked keys of curves and lattices begin
 
@@ -32,39 +32,35 @@ class CarriedBake:
     """
 
     def __init__(self, carrying, frames, cache_of, fps, is_shared):
-        self.carrying, self.frames, self.fps, self.warnings = carrying, frames, fps, []
-        self.shapes, self.writers, self.places = {}, {}, {}
+        self.carrying, self.frames, self.warnings = carrying, frames, []
+        self.shapes, self.caches = {}, {}  # by carried object
         for carried in list(carrying.objects):
             name = carried.reference.name
             if is_shared:
                 carrying.leave(carried, UserError("{name} is not baked in parts; bake it whole", name=name))
             elif cache_of is not None and isinstance(carried.carrier, (MeshCarrier, AttributeCarrier)):
-                self.places[carried] = cache_of(name)
+                self.caches[carried] = CacheFile(*cache_of(name), frames, fps)
 
     def prepare(self):
         """Opens the caches; on the worker."""
-        from arapfields.point_cache import PointCacheWriter
-
-        frames = {"start": self.frames.start, "step": self.frames.step, "fps": self.fps}
-        for carried, (path, _) in self.places.items():
-            points = len(carried.carrier.points)
-            self.writers[carried] = PointCacheWriter(path, points, self.frames.count, **frames)
+        for carried, cache in self.caches.items():
+            cache.open_for(len(carried.carrier.points))
 
     def add(self, shapes):
         """Takes what one frame's shape carries; on the worker."""
         for carried, shape in shapes:
-            if carried in self.writers:
-                self.writers[carried].write(shape)
+            if carried in self.caches:
+                self.caches[carried].add(shape)
             else:
                 self.shapes.setdefault(carried, []).append(shape)
 
     def finish(self):
-        for writer in self.writers.values():
-            writer.finish()
+        for cache in self.caches.values():
+            cache.finish()
 
     def discard(self):
-        for writer in self.writers.values():
-            writer.discard()
+        for cache in self.caches.values():
+            cache.discard()
         self.shapes.clear()
 
     def place(self, context, source, job):
@@ -75,7 +71,7 @@ class CarriedBake:
                 item, entry = carried.reference.get(), find(source, carried.reference.get())
                 if entry is None:
                     raise UserError("{name} is no longer carried", name=item.name)
-                if carried in self.writers:
+                if carried in self.caches:
                     self.play(carried, item)
                 elif len(self.shapes.get(carried, ())) != self.frames.count:
                     raise UserError("{name} was not there at every frame", name=item.name)
@@ -96,10 +92,10 @@ class CarriedBake:
         self.warnings += self.carrying.take_warnings()
 
     def play(self, carried, item):
-        self.writers[carried].commit()
+        self.caches[carried].commit()
         if isinstance(carried.carrier, AttributeCarrier):
             item = played_points.play(item, carried.carrier.points, carried.carrier.counts)
-        cache_modifier.play(item, self.places[carried][1], self.frames.start, self.frames.step)
+        self.caches[carried].play_on(item)
 
     def add_object(self, context, carried, item):
         shapes, frames = self.shapes[carried], [plain(frame) for frame in self.frames]

@@ -108,7 +108,7 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
     def play(self, context, bake, stack):
         """The object that plays a bake until the stack is left."""
         source = bake.unchanged_source()
-        bake.commit()
+        bake.store.commit()
         player = source
         if bake.in_place:
             stack.callback(cache_modifier.restore, source, cache_modifier.snapshot(source))
@@ -117,7 +117,7 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
             context.scene.collection.objects.link(player)
             stack.callback(result_objects.discard, player)
             result_objects.place(context, source, player)
-        bake.play(player)
+        bake.store.play_on(player)
         return player
 
     def coroutine(self, context):

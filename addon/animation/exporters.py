@@ -11,7 +11,7 @@ from mathutils import Matrix
 from ..blender import mesh_arrays
 from ..core.errors import UserError
 from ..core.runtime.coroutines import Pause
-from ..live.animated import curves_of
+from ..solver.frame_range import curves_of
 from . import export_checks
 from .caches import plain, size_text
 

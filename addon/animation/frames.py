@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ..core.errors import UserError
 from ..core.runtime.progress import JobCancelled
-from ..live import animated
+from ..solver import frame_range
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,11 @@ class Frames:
     def __iter__(self):
         return (self.start + i * self.step for i in range(self.count))
 
+    def with_those_before(self, start):
+        """The frames and every whole one from `start` on that leads to them, in order."""
+        last = int(self.start + (self.count - 1) * self.step)
+        return sorted({*self, *map(float, range(min(start, last), last + 1))})
+
 
 def choose(context, sources, values):
     """The Frames that the settings ask for: `sources` are (object, kind), `values` the settings by name.
@@ -29,7 +34,7 @@ def choose(context, sources, values):
     scene, which = context.scene, values["range"]
     first, last = values.get("start"), values.get("end")
     if first is None or last is None:
-        span = animation(sources) if which == "HANDLES" else animated.scene_range(scene)
+        span = animation(sources) if which == "HANDLES" else frame_range.scene_range(scene)
         first, last = span[0] if first is None else first, span[1] if last is None else last
     if last < first:
         raise UserError("the last frame, {last}, comes before the first, {first}", first=first, last=last)
@@ -38,7 +43,7 @@ def choose(context, sources, values):
 
 
 def animation(sources):
-    spans = [span for span in (animated.frame_range(*one) for one in sources) if span is not None]
+    spans = [span for span in (frame_range.animation_range(*one) for one in sources) if span is not None]
     if not spans:
         names = ", ".join(source.name for source, _ in sources)
         raise UserError("nothing that moves {names} is animated; choose another range", names=names)

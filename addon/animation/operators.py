@@ -71,8 +71,8 @@ class ARAPFIELDS_OT_bake(BakeOperator, bpy.types.Operator):
             return []
 
     def warn_of_weight(self, bake):
-        weight = caches.keys_weight(len(bake.session.surface.local), bake.frames.count)
-        if bake.path is None and weight > caches.HEAVY:
+        weight = caches.keys_weight(len(bake.reader.surface.local), bake.frames.count)
+        if isinstance(bake.store, caches.ShapeKeys) and weight > caches.HEAVY:
             told = translated(
                 "shape keys of {size} in the .blend and in memory; a cache would take neither",
                 size=caches.size_text(weight),

@@ -4,8 +4,8 @@ import bpy
 from ..blender import modifier_stack
 from ..blender.language import translated
 from ..blender.section import Advanced, job_button, modifier_row, note, wrapped
-from ..live import animated
 from ..names import Op
+from ..solver import frame_range
 from . import caches, played
 
 
@@ -39,7 +39,7 @@ class ARAPFIELDS_PT_animation(Advanced, bpy.types.Panel):
 
 def weight(context, source, bake):
     """What the frames would weigh, as far as it is known before they are read."""
-    first, last = (bake.start, bake.end) if bake.range == "CUSTOM" else animated.scene_range(context.scene)
+    first, last = (bake.start, bake.end) if bake.range == "CUSTOM" else frame_range.scene_range(context.scene)
     count = max(0, (last - first) * bake.subframes // bake.step + 1)
     size = caches.size_text(caches.keys_weight(len(source.data.vertices), count - 1))
     if bake.range == "HANDLES":

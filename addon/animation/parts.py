@@ -3,68 +3,70 @@
 comes when all are there makes the cache. A killed process's frames stay, so the next one goes on."""
 
 import hashlib
+import time
 
 import numpy as np
 
-from ..live.session import Session
+from .caches import CacheFile
 
 
-class SharedFrames:
-    """The frames of one object's bake: `part` is (i, n), the i-th of n, 1 ≤ i ≤ n."""
+class SharedCache(CacheFile):
+    """`part` is (i, n), the i-th of n, 1 ≤ i ≤ n; `missing`: how many frames others are still to solve."""
 
-    def __init__(self, path, session, points, part):
+    def __init__(self, path, modifier_path, frames, fps, part):
+        super().__init__(path, modifier_path, frames, fps)
+        self.part, self.missing, self._began = part, 0, time.time()
+        self._store, self._points, self._places, self._digested = None, 0, [], (None, b"")
+
+    def open(self, solver):
         from arapfields import __version__
         from arapfields.cli.frames import FrameStore
 
-        self.part, self.places, self._last = part, [], (None, b"")
-        surface = session.surface
-        common = [
-            __version__,
-            session.kind,
-            session.output,
-            surface.exact,
-            surface.fit.options,
-            session.cells,
-        ]
+        setup, region, surface = solver.sampled.setup, solver.sampled.region, solver.sampled.setup.surface
+        common = [__version__, setup.kind, surface.exact, surface.fit.options, setup.cells]
         content = repr(common).encode() + surface.vertices.tobytes() + surface.triangles.tobytes()
-        content += session.rest.tobytes() + b"".join(held(handle) for handle in session.handles)
-        if session.weights is not None:
-            content += session.weights.tobytes()
-        self._store = FrameStore(path, points, content)
+        content += solver.rest.tobytes() + b"".join(handle_bytes(handle) for handle in setup.handles)
+        if region is not None:
+            content += region.tobytes()
+        self._points = len(solver.rest)
+        self._store = FrameStore(self.path, self._points, content)
 
-    def add(self, session: Session, request):
+    def add_request(self, solver, request):
         """Solves a frame where it is this part's and nobody has it yet."""
         number, parts = self.part
-        index = len(self.places)
+        index = len(self._places)
         place = self._store.place(index, self._key(request))
-        self.places.append(place)
+        self._places.append(place)
         if index % parts == number - 1 and not self._store.has(place):
-            self._store.put(place, session.solve_from_rest(request).points)
+            self._store.put(place, solver.solve_from_rest(request).points)
 
     def _key(self, request):
         """Arrays that tell this request from others."""
-        if self._last[0] is not request.points:
-            self._last = request.points, hashlib.blake2b(request.points.tobytes(), digest_size=16).digest()
-        further = repr([request.style and request.style[0], sorted(request.energy.items())]).encode()
-        digest = hashlib.blake2b(further + self._last[1], digest_size=16).digest()
+        if self._digested[0] is not request.points:
+            digest = hashlib.blake2b(request.points.tobytes(), digest_size=16).digest()
+            self._digested = request.points, digest
+        further = repr([request.style_key, sorted(request.energy.items())]).encode()
+        digest = hashlib.blake2b(further + self._digested[1], digest_size=16).digest()
         return [*request.targets, np.frombuffer(digest, np.uint8)]
 
-    def alone(self):
-        return self._store.alone()
+    def finish(self):
+        """Makes the cache where all of its frames are there."""
+        with self._store.alone():
+            self.missing = sum(not self._store.has(place) for place in self._places)
+            if self.missing and self.path.exists() and self.path.stat().st_mtime > self._began:
+                self.missing = 0  # another process has made it meanwhile
+            elif not self.missing:
+                self.open_for(self._points)
+                for place in self._places:
+                    self.add(self._store.get(place))
+                self._writer.commit()
+                self._store.remove(self._places)
 
-    def missing(self):
-        """How many frames are still to be solved, by others."""
-        return sum(not self._store.has(place) for place in self.places)
-
-    def __iter__(self):
-        return (self._store.get(place) for place in self.places)
-
-    def remove(self):
-        """They are in the cache now."""
-        self._store.remove(self.places)
+    def commit(self):
+        """The worker has put it in its place."""
 
 
-def held(handle):
+def handle_bytes(handle):
     """Bytes that stand for a handle at rest."""
     parts = [handle.kind, handle.weight, handle.rest, getattr(handle, "weights", None)]
     return b"".join(part.tobytes() if isinstance(part, np.ndarray) else repr(part).encode() for part in parts)

@@ -12,7 +12,7 @@ from ..core.runtime import native
 from ..core.settings.parameters import DEFORM
 from ..handles import empties, scaling
 from ..handles.native_handles import native_handles
-from ..live.giving_way import give_way
+from ..live.sessions import end_for_job
 from ..names import Op
 from ..properties.choices import result_properties
 from ..results.placement import destination
@@ -41,7 +41,7 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
         return empties.group_names(source)
 
     def plan(self, context, source, weights):
-        give_way(context, source, *destination(settings_of(source), self))
+        end_for_job(context, source, *destination(settings_of(source), self))
         context.view_layer.update()
         values = effective_values(DEFORM, settings_of(source).deform, self)
         af = native.library()

@@ -7,7 +7,8 @@ from ..blender import vertex_groups
 from ..blender.language import translated
 from ..blender.section import Advanced, note, settings_column
 from ..names import Op
-from . import body, sessions
+from ..solver import secondary_motion
+from . import sessions
 from .properties import SECONDARY
 
 
@@ -45,7 +46,7 @@ class ARAPFIELDS_PT_secondary(Advanced, bpy.types.Panel):
         height = row.row()
         height.enabled = group.use_ground
         height.prop(group, "ground", text="")
-        note(layout, vertex_groups.missing(source, body.group_names(source)))
+        note(layout, vertex_groups.missing(source, secondary_motion.group_names(source)))
 
 
 CLASSES = [ARAPFIELDS_PT_secondary]

@@ -7,8 +7,6 @@ end(context, source), or end(context, source, keep=True) where the shape shall s
 """
 
 import contextlib
-import functools
-import time
 
 import bpy
 
@@ -18,13 +16,11 @@ from ..blender.object_references import settings_of
 from ..blender.redraw import redraw
 from ..core.errors import UserError
 from ..core.runtime import jobs
-from ..field_modifier import motion
-from ..handles import empties, movers
-from . import leftovers
-from .animated import scene_range
-from .following import scene_frame
-from .session import Changed, Session
-from .setup import moves
+from ..results import placement
+from ..solver.frame_range import scene_range
+from ..solver.source_reader import SourceChanged
+from .edits import Updates
+from .session import Session
 
 INTERVAL = 1 / 60  # seconds between looks
 WAIT = 30.0  # seconds at most that a script waits for the first shape
@@ -62,9 +58,9 @@ def begin(context, source, kind="DEFORM", keeps=False):
         earlier.stop()
     session = None
     try:
-        session = Session(context, source, kind, earlier=earlier, keeps=keeps)
+        session = Session(context, source, kind, earlier, keeps)
         session.advance()  # a small mesh is read at once
-        tell(session)
+        warn(session)
     except UserError:
         if session or earlier:
             take_away(session or earlier)
@@ -86,6 +82,21 @@ def end(context, source, keep=False):
     return None
 
 
+def end_for_job(context, source, output, result):
+    """Ends live mode before a solve that goes on from the same handles, and whose result goes there.
+
+    Where the result moves the same modifier, the live shape is seen until it comes, and stays if it never
+    does; otherwise the source is what it was before live mode.
+    """
+    session = live.get(source.session_uid)
+    if session is None:
+        settings_of(source).live_kind = ""  # what a file or an undone step says, with nothing behind it
+        return
+    stays = session.display.in_place and settings_of(source).target == result
+    end(context, source, keep=stays and placement.keeps_mesh(output, result))
+    context.view_layer.update()
+
+
 def stop_all():
     """Ends every worker; what is in the file stays as it is."""
     live.is_rendering = False
@@ -101,14 +112,14 @@ def update(context, wait=0.0, refined=False):
             if wait:
                 session.wait(wait, refined)
             session.show()
-            tell(session)
-        except Changed:
+            warn(session)
+        except SourceChanged:
             restart(context, uid, session)
         except (UserError, ValueError, ReferenceError) as error:
             give_up(uid, session, error)
 
 
-def tell(session):
+def warn(session):
     """Names the carried objects that are left out."""
     for reason in session.carrying.take_warnings():
         jobs.add_message("WARNING", f"{session.source.name}: {translated(reason)}")
@@ -117,8 +128,8 @@ def tell(session):
 def give_up(uid, session, error):
     live.pop(uid, None)
     session.stop()
-    told = translated("{error}; live mode ended", error=translated(error))
-    jobs.add_message("ERROR", f"{session.source.name}: {told}")
+    text = translated("{error}; live mode ended", error=translated(error))
+    jobs.add_message("ERROR", f"{session.source.name}: {text}")
     take_away(session)
 
 
@@ -130,22 +141,10 @@ def take_away(session):
 
 def watch(depsgraph):
     """Looks through what Blender has just updated for edits of live sources, and motion before the field."""
-    if not live:
-        return
-    updated = [(u.id.original, u.is_updated_geometry) for u in depsgraph.updates]
-    meshes = {item.session_uid for item, shape in updated if shape and isinstance(item, bpy.types.Mesh)}
-    objects = {item.session_uid for item, shape in updated if shape and isinstance(item, bpy.types.Object)}
-    data = {item.session_uid for item, _ in updated if not isinstance(item, bpy.types.Object)}
-    for session in live.values():
-        session.carrying.watch(objects, data)
-        source = session.source.find()
-        if source is None:
-            continue
-        if source.data.session_uid in meshes:
-            session.may_be_edited |= source.session_uid not in motion.written
-            session.edited_at = time.monotonic()
-        elif session.moves_by_itself and any(moves(item, source) for item, _ in updated):
-            session.may_have_moved = True
+    if live:
+        updates = Updates.of(depsgraph)
+        for session in live.values():
+            session.edits.note(updates)
 
 
 def restart(context, uid, session):
@@ -164,8 +163,9 @@ def poll_live():
     if not live.is_rendering:
         update(bpy.context)
         for session in live.values():
-            if session.frames is not None and session.frames.has_news:
-                session.frames.has_news = False
+            frames = session.playback.frames
+            if frames is not None and frames.has_news:
+                frames.has_news = False
                 redraw(bpy.context, "UI")
     return INTERVAL
 
@@ -173,76 +173,8 @@ def poll_live():
 def solved_frames(source, scene):
     """(how many of the scene's frames live mode has solved, how many there are); None where none is."""
     session = live.get(source.session_uid)
-    if session is None or session.frames is None:
+    frames = None if session is None else session.playback.frames
+    if frames is None:
         return None
     first, last = scene_range(scene)
-    return session.frames.count(first, last), last - first + 1
-
-
-def follow_frame(depsgraph):
-    """Shows every live shape as it is at the frame that is about to be rendered."""
-    for uid, session in list(live.items()):
-        try:
-            source = session.source.get()
-            if session.worker is None or source.mode != "OBJECT":
-                continue
-            if session.moves_by_itself:
-                session.read_points(bpy.context, source)
-            warn_of_hidden(source, session, depsgraph)
-            seen = source.evaluated_get(depsgraph)
-            where = functools.partial(rendered_matrix, depsgraph=depsgraph)
-            request = session.current_request(bpy.context, source, where, seen, depsgraph)
-            session.take(request, scene_frame(depsgraph.scene))
-            session.worker.wait(WAIT, refined=True)
-            session.wait_for_frame(None)  # a picture of another frame would be none
-            session.show()
-        except Changed:
-            continue
-        except (UserError, ValueError, ReferenceError) as error:
-            give_up(uid, session, error)
-
-
-def show_frame():
-    """Shows what is known at the frame that the scene has come to, in the same picture."""
-    for session in list(live.values()):
-        with contextlib.suppress(Changed, UserError, ValueError, ReferenceError):  # the timer tells
-            session.show_frame(bpy.context)
-
-
-def warn_of_hidden(source, session, depsgraph):
-    """Says once which handles a render does not see, and so cannot follow."""
-    there = {item.original.session_uid for item in depsgraph.ids}
-    used = empties.used(source)
-    hidden = [movers.name_of(e) for e in used if movers.mover_of(e).session_uid not in there]
-    if hidden and session.handles:
-        text = translated(
-            "{names} is hidden in renders, which therefore do not follow it", names=", ".join(hidden)
-        )
-        message = "WARNING", f"{source.name}: {text}"
-        if message not in jobs.messages():
-            jobs.add_message(*message)
-
-
-def rendered_matrix(item, bone="", *, depsgraph):
-    return empties.matrix_of(item.original.evaluated_get(depsgraph), bone)
-
-
-def recover(leave=leftovers.clear):
-    """After a load or an undone step: ends what no session or no source knows as live any more.
-
-    `leave(source)` deals with one that is said to be live, and is not.
-    """
-    for uid, session in list(live.items()):
-        source = session.source.find()
-        if source is None or not settings_of(source).live_kind:
-            live.pop(uid)
-            session.stop()
-            if not session.display.in_place:
-                take_away(session)
-        else:
-            session.restored()  # what it wrote may have been undone
-    for source in bpy.data.objects:
-        if settings_of(source).live_kind and not is_live(source):
-            with contextlib.suppress(UserError, RuntimeError, AttributeError):
-                leave(source)
-                settings_of(source).live_kind = ""
+    return frames.count(first, last), last - first + 1

@@ -6,7 +6,7 @@ from ..blender.object_references import owner_of, source_of
 from ..blender.redraw import redraw
 from ..core.errors import UserError
 from ..live import sessions
-from ..live.warm import warm
+from ..live.prefetch import prefetch
 from ..names import TOOL, Op
 from . import drag, pins
 from .hover import View, hover, under
@@ -54,7 +54,7 @@ class ARAPFIELDS_OT_pin_hover(PinOperator, bpy.types.Operator):
                 context.region.tag_redraw()
             source = hover.target.source.find() if hover.target is not None else None
             if source is not None and hover.target.kind == "SURFACE" and not sessions.is_live(source):
-                warm.prepare(context, source)
+                prefetch.prepare(context, source)
         return {"PASS_THROUGH"}
 
 

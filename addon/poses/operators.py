@@ -80,7 +80,8 @@ class ARAPFIELDS_OT_save_pose(OfSource, bpy.types.Operator):
         session = sessions.live.get(source.session_uid)
         if session is not None:
             sessions.update(context, wait=sessions.WAIT, refined=True)
-            pose = Pose(session.solver.field, session.samples, session.surface.space.local_to_solve)
+            to_solve = session.reader.surface.space.local_to_solve
+            pose = Pose(session.solver.field, session.solver.samples, to_solve)
         else:
             pose = applying.solved.get(source.session_uid)
         if pose is None:

@@ -6,7 +6,7 @@ import numpy as np
 from ..blender import icons
 from ..core.errors import UserError
 from ..core.runtime import native
-from . import style_object
+from ..solver import style_object
 
 SIZE, FINER = 32, 2
 # As in the pictures of the other styles (blender_scripts/style_icons.py): from where, the light, the colours.

@@ -14,11 +14,11 @@ from ..core.settings.styles import STYLIZE
 from ..deform.solve_job import SolveOperator, plan_solve_job
 from ..handles import empties
 from ..handles.native_handles import native_handles
-from ..live.giving_way import give_way
+from ..live.sessions import end_for_job
 from ..names import Op
 from ..properties.choices import frame, result_properties, style
 from ..results.placement import destination
-from . import preference
+from ..solver import style_settings
 
 
 class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
@@ -40,22 +40,22 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
     @classmethod
     def refuses(cls, source):
         """As the settings ask; a script may ask for another style."""
-        return super().refuses(source) or (preference.refusal(source) if has_window() else None)
+        return super().refuses(source) or (style_settings.refusal(source) if has_window() else None)
 
     def groups_of(self, source):
-        return preference.group_names(source, settings_of(source).stylize)
+        return style_settings.group_names(source, settings_of(source).stylize)
 
     def plan(self, context, source, of_groups):
-        give_way(context, source, *destination(settings_of(source), self))
+        end_for_job(context, source, *destination(settings_of(source), self))
         context.view_layer.update()
         settings = settings_of(source).stylize
         values = effective_values(STYLIZE, settings, self)
         af = native.library()
         options = options_of("stylize", values)
         space = space_of(source.matrix_world, source.name)
-        style = preference.requested_style(settings, space, self)
+        style = style_settings.requested_style(settings, space, self)
         handles = empties.solve_handles(source, space, of_groups) if settings.use_handles else []
-        weights = preference.region_weights(context, source, settings, of_groups, self.in_place(source))
+        weights = style_settings.region_weights(context, source, settings, of_groups, self.in_place(source))
 
         def solve(tracker, rest, samples, weight):
             blend = (

@@ -9,7 +9,8 @@ from ..live.panel import live_buttons
 from ..names import Op
 from ..properties.choices import STYLE_ITEMS
 from ..results.placement import placement_refusal
-from . import ball, preference
+from ..solver import style_settings
+from . import ball
 
 PLAIN = {"AXES": "EMPTY_AXIS", "OBJECT": "MESH_MONKEY"}  # icons of styles that have no picture
 
@@ -51,7 +52,7 @@ class ARAPFIELDS_PT_stylize(Section, bpy.types.Panel):
         if style.style in CUSTOM:
             layout.prop(style, "style_object")
         settings_column(layout, style, STYLIZE, advanced=False)
-        reason = preference.refusal(source)
+        reason = style_settings.refusal(source)
         live_buttons(layout, source, "STYLIZE", reason)
         job_button(layout, Op.STYLIZE, "MOD_EDGESPLIT")
         note(layout, reason, placement_refusal(source))

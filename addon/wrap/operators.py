@@ -18,7 +18,7 @@ from ..core.runtime import native
 from ..core.settings.wrapping import WRAP
 from ..deform.solve_job import SolveOperator, plan_solve_job
 from ..handles.empties import matrix_of
-from ..live.giving_way import give_way
+from ..live.sessions import end_for_job
 from ..properties.choices import result_properties
 from ..results.placement import destination
 from . import landmarks
@@ -60,7 +60,7 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
 
     def plan(self, context, source, weights):
         settings = settings_of(source)
-        give_way(context, source, *destination(settings, self))
+        end_for_job(context, source, *destination(settings, self))
         context.view_layer.update()
         values = effective_values(WRAP, settings.wrap, self)
         af = native.library()

@@ -19,12 +19,12 @@ if IN_BLENDER:
     from addon.core.runtime import jobs, native, threads
     from addon.handles import counts
     from addon.jobs.display import display
-    from addon.live.warm import warm
+    from addon.live.prefetch import prefetch
     from addon.pin_tool import drag, hover, tool
     from addon.viewport import previews
 
 ROUNDS = 20
-STATES = ["idle", "live", "job", "counting", "drag", "warm"]
+STATES = ["idle", "live", "job", "counting", "drag", "prefetch"]
 
 
 def remains():
@@ -81,7 +81,7 @@ def pin_tools():
 
 def is_busy(state):
     """Whether one of lifecycle.STATE holds anything."""
-    if state is warm:
+    if state is prefetch:
         return state._thread is not None
     if state is hover.hover:
         return state.target is not None or state.drag is not None
@@ -99,8 +99,8 @@ def enter(state):
     bar, *_ = scenes.bar_with_handles()
     if state == "live":
         assert bpy.ops.arapfields.live() == {"FINISHED"}
-    elif state == "warm":
-        warm.prepare(bpy.context, bar)
+    elif state == "prefetch":
+        prefetch.prepare(bpy.context, bar)
     elif state == "drag":
         before = drag.Before(bpy.context, bar)
         hover.hover.drag = drag.Drag(bpy.context, before, bpy.data.objects["Moving"])

@@ -13,7 +13,7 @@ if IN_BLENDER:
 
     from addon.blender import mesh_arrays, modifier_stack
     from addon.field_modifier import inputs, motion
-    from addon.live import sessions
+    from addon.live import recovery, sessions
 
 BY_HAND = 1e-5  # single precision of positions of size one
 
@@ -33,13 +33,13 @@ def test_the_field_is_evaluated_where_the_modifiers_before_have_the_points():
         step(refined=True)
         with modifier_stack.evaluated_mesh(bpy.context, bar, in_place=True) as mesh:
             points = mesh_arrays.positions(mesh)
-        space, field = session.surface.space, session.solver.field
+        space, field = session.reader.surface.space, session.solver.field
         expected = space.to_local(field(space.to_solve(points)))
         assert np.abs(local_points(bar) - expected).max() < BY_HAND
         assert np.abs(expected - points).max() > 0.2
     assert sessions.live[bar.session_uid] is session and len(bpy.data.scenes) == 1
     reads = []
-    session.read_points = lambda *given: reads.append(given)
+    session.reader.read_points = lambda *given: reads.append(given)
     for _ in range(5):
         step()
     assert not reads  # what live mode does itself moves nothing before it
@@ -118,9 +118,9 @@ def test_undone_steps_end_or_refresh_live_mode():
     step()
     shown = scenes.world_points(bar)
     motion.write(bar, motion.Motion(np.zeros((len(bar.data.vertices), 3), np.float32)))
-    sessions.recover()
+    recovery.after_undo()
     step()
     assert sessions.is_live(bar) and np.abs(scenes.world_points(bar) - shown).max() < 0.05
     bar.arapfields.live_kind = ""
-    sessions.recover()
+    recovery.after_undo()
     assert not sessions.live

@@ -12,7 +12,7 @@ if IN_BLENDER:
     from support.blender.pins import pin, state
 
     from addon.live import sessions
-    from addon.live.warm import warm
+    from addon.live.prefetch import prefetch
     from addon.pin_tool import drag
 
 TOP = (0.0, 0.0, 0.25)  # on the bar
@@ -120,16 +120,16 @@ def test_what_cannot_be_pinned_is_named():
 @in_blender
 def test_a_solver_set_up_beforehand_gives_the_same_shape():
     shapes = []
-    for is_warm, moved_on in ((False, False), (True, False), (True, True)):
+    for is_prefetched, moved_on in ((False, False), (True, False), (True, True)):
         bar = scenes.bar()
-        if is_warm:
-            warm.prepare(bpy.context, bar)
+        if is_prefetched:
+            prefetch.prepare(bpy.context, bar)
         if moved_on:  # another mesh than that which was read
             bar.data.vertices[0].co.x += 0.01
             bar.data.update()
         pin(bar, (1.0, 0.0, 0.25), target=(1.0, 0.0, 0.6))
         step(refined=True)
-        assert warm.take(sessions.live[bar.session_uid].surface, {}) is None
+        assert prefetch.take(sessions.live[bar.session_uid].reader.setup) is None
         shapes.append(scenes.world_points(bar))
         bpy.data.objects.remove(bar.arapfields.handles[0].empty)
         bpy.data.objects.remove(bar)

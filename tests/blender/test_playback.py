@@ -131,14 +131,14 @@ def test_every_animated_setting_of_a_style_changes_what_is_solved():
 def test_live_playback_keeps_solved_frames_and_tells_how_many():
     bar = turning()
     first = live_at(bar, "DEFORM", [10])
-    frames = sessions.live[bar.session_uid].frames
+    frames = sessions.live[bar.session_uid].playback.frames
     for frame in (11, 12):
         bpy.context.scene.frame_set(frame)
         step(refined=True)
-    solved = frames._solving.solver.report
+    solved = frames._solver.solver.report
     assert frames.count(1, 40) >= 3
     bpy.context.scene.frame_set(10)  # shown at once, without another solve
-    assert np.array_equal(local_points(bar), first) and frames._solving.solver.report == solved
+    assert np.array_equal(local_points(bar), first) and frames._solver.solver.report == solved
     moving = bpy.data.objects["Moving"]
     moving.location.y = 0.5
     moving.keyframe_insert("location", frame=10)
@@ -153,9 +153,9 @@ def test_a_drag_at_a_frame_goes_on_from_the_shape_at_hand():
     bar = turning()
     before = live_at(bar, "DEFORM", [20])
     session = sessions.live[bar.session_uid]
-    assert session.follows_animation
+    assert session.solver.is_playing
     bpy.data.objects["Moving"].location.y += 0.2
     step(refined=True)
-    assert not session.follows_animation
+    assert not session.solver.is_playing
     shift = (local_points(bar) - before)[before[:, 0] > 0.9]
     assert np.abs(shift.mean(axis=0)[1] - 0.2) < 0.05

@@ -121,11 +121,11 @@ def test_what_goes_together_resists_and_is_held():
         scenes.activate(rod, bar)
         bpy.ops.arapfields.live()
         session = sessions.live[bar.session_uid]
-        assert bool(session.surface.solids) == (way == "TOGETHER") and not session.carrying.warnings
+        assert bool(session.reader.surface.solids) == (way == "TOGETHER") and not session.carrying.warnings
         moving.location.z, moving.rotation_euler.y = 0.5, -0.6
         step(refined=True)
         found.append(scenes.world_points(rod))
-        on_rod = session.samples.mesh_indices == 1 if way == "TOGETHER" else np.zeros(1)
+        on_rod = session.solver.samples.mesh_indices == 1 if way == "TOGETHER" else np.zeros(1)
         assert (on_rod.mean() > 0.05) == (way == "TOGETHER")
         bpy.ops.arapfields.live()
         moving.location.z, moving.rotation_euler.y = 0.0, 0.0

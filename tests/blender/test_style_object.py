@@ -9,8 +9,8 @@ if IN_BLENDER:
     from support.blender import scenes
     from support.blender.styles import SETTINGS, ball
 
+    from addon.solver import style_object
     from addon.stylize import ball as picture
-    from addon.stylize import style_object
 
 
 @in_blender

@@ -32,8 +32,8 @@ def settled(name, limit=30.0):
 def rate(found, folder):
     """Moves a handle of a mesh of 50,000 vertices: how often the viewport shows a new shape."""
     from addon.field_modifier import motion
-    from addon.live import session as live_session
     from addon.live import sessions
+    from addon.solver.frame_solver import FrameSolver
 
     stage.empty_file()
     with stage.override():
@@ -41,7 +41,7 @@ def rate(found, folder):
         stage.dense_bar()
         bpy.ops.view3d.view_all()
         scenes.activate(bar)
-        solves = stage.Meter().watch(live_session.Session, "solve")
+        solves = stage.Meter().watch(FrameSolver, "follow")
         begin = time.perf_counter()
         bpy.ops.arapfields.live("INVOKE_DEFAULT")
         found["live_click_s"] = round(time.perf_counter() - begin, 4)
@@ -101,7 +101,7 @@ def without_drawing(moving, sessions):
         moving.location.z = 0.6 * abs(np.sin(0.05 * count))
         bpy.context.view_layer.update()
         sessions.update(bpy.context)
-        while session.reached is not session.requested:
+        while session.solver.reached is not session.requested:
             time.sleep(0.0003)
         session.show()
         bpy.context.view_layer.update()

@@ -154,7 +154,7 @@ def first_and_rate(found, folder):
 
     from addon.field_modifier import motion
     from addon.live import sessions
-    from addon.live.warm import warm
+    from addon.live.prefetch import prefetch
     from addon.pin_tool import drag as dragging
     from addon.pin_tool import hover as hovering
 
@@ -167,7 +167,7 @@ def first_and_rate(found, folder):
     spot = pixel((0.6, -0.25, -0.1))
     looks, begins = stage.Meter().watch(hovering, "surface"), stage.Meter().watch(dragging, "of_new_pin")
     yield from hover(spot)
-    yield from until(lambda: warm.is_ready())
+    yield from until(lambda: prefetch.is_ready())
     shown, given = [], ["sleep", 0.02, "mousemove", spot[0], spot[1] - 6]
     original, motion.write = (
         motion.write,

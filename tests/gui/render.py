@@ -46,7 +46,7 @@ def calm(bar):
 def is_at_rest(session):
     if session is None or session.worker is None or not session.worker.resting:
         return False
-    return session.frames is None or not session.follows_animation or session.exact is not None
+    return session.playback.is_shown()
 
 
 def one(found, folder, target):

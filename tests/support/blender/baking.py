@@ -13,7 +13,9 @@ import addon.animation.operators as bake
 from addon.animation.bake_operator import BakeOperator
 from addon.core.runtime import jobs
 from addon.core.runtime.coroutines import Pause, run_to_completion
-from addon.live.session import Session
+from addon.solver.frame_solver import FrameSolver
+from addon.solver.setup import sampled
+from addon.solver.source_reader import SourceReader
 
 EXACT = 1e-6  # single precision of positions of size one
 RUN = {"field": "radial", "samples": 1500, "iterations": 15}
@@ -78,14 +80,14 @@ def at(item, frame):
 
 def solved(source, frame, kind="DEFORM"):
     """(n, 3) the solver's own answer at a frame, in local coordinates."""
-    session = Session(bpy.context, source, kind, shown=False, follow=False, in_place=True)
-    run_to_completion(session.reading)
+    reader = SourceReader(bpy.context, source, kind, in_place=True)
+    run_to_completion(reader.read_setup(bpy.context))
     whole = int(frame // 1)
     bpy.context.scene.frame_set(whole, subframe=frame - whole)
-    if session.moves_by_itself:
-        session.read_points(bpy.context, source)
-    session.prepare()
-    return session.solve_from_rest(session.current_request(bpy.context, source)).points
+    if reader.moves_by_itself:
+        reader.read_points(bpy.context, source)
+    solver = FrameSolver(sampled(reader.setup), reader.carrying)
+    return solver.solve_from_rest(reader.request(bpy.context)).points
 
 
 def cache_file():

@@ -91,4 +91,4 @@ def shown(item):
 
 def taken(session, points):
     """Where a live session's field takes (n, 3) points."""
-    return arapfields.Attachment(session.samples, points).positions(session.solver.field)
+    return arapfields.Attachment(session.solver.samples, points).positions(session.solver.field)

@@ -15,30 +15,30 @@ class Moment(NamedTuple):
     """What the next frame goes on from."""
 
     state: Any  # native MotionState
-    body: Any  # body.Body, with where the source was in the world
+    motion: Any  # SecondaryMotion, with where the source was in the world
     is_exact: bool  # whether every frame from the start frame on led here
 
 
 class Simulation:
-    """`solving` is a Solving with a solver of its own; not for several threads at once."""
+    """The moments of an animation that begins at a frame; not for several threads at once."""
 
-    def __init__(self, solving, start, fps):
-        self.solving, self.start, self.fps = solving, start, fps
+    def __init__(self, start, fps):
+        self.start, self.fps = start, fps
         self.moments = {}  # whole frame: Moment
         self.edition = 0  # how often moments were forgotten
 
-    def shape(self, frame, request, task=None):
-        """The shape of a frame, kept as what later ones go on from where it is a whole one."""
+    def shape(self, solver, frame, request, task=None):
+        """The shape of a frame, by a FrameSolver; kept as what later ones go on from where it is whole."""
         before, edition = self.before(frame), self.edition
         if before is None:
-            shape = self.solving.solve_from_rest(request, task)
-            is_exact = frame <= self.start
+            shape, is_exact = solver.solve_from_rest(request, task), frame <= self.start
         else:
             moment = self.moments[before]
-            shape = self.solving.step_from(moment, request, (frame - before) / self.fps, task)
+            solver.step(request, (frame - before) / self.fps, moment.motion, moment.state, task)
+            shape = solver.exact_shape(request)
             is_exact = moment.is_exact and frame - before <= 1
         if frame == int(frame) and edition == self.edition:
-            self.moments[int(frame)] = Moment(self.solving.solver.motion_state, request.body, is_exact)
+            self.moments[int(frame)] = Moment(solver.solver.motion_state, request.motion, is_exact)
         return shape
 
     def before(self, frame):
@@ -61,9 +61,3 @@ class Simulation:
         self.edition += 1
         for one in [one for one in list(self.moments) if one >= frame]:
             del self.moments[one]
-
-
-def played(frames, start):
-    """The frames of a bake, and every whole one that leads to them, in order."""
-    last = frames.start + (frames.count - 1) * frames.step
-    return sorted({*frames, *map(float, range(min(start, int(last)), int(last) + 1))})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Secondary motion of a live source: what its settings ask of the solver."""
+"""Secondary motion of a source, as its settings ask for it."""
 
 from typing import NamedTuple
 
@@ -10,8 +10,8 @@ from ..blender.property_definitions import from_single_precision
 from ..core.geometry.spaces import inverse, pose
 
 
-class Body(NamedTuple):
-    """What a source is as a body, in solve space; where two are equal, so is what they feel."""
+class SecondaryMotion(NamedTuple):
+    """Options of the motion, and where the source is in the world; in solve space."""
 
     options: tuple  # ((name, value) of the native options)
     up: tuple  # (3,) the world's
@@ -22,43 +22,41 @@ class Body(NamedTuple):
         """(4, 4) rigid: solve space then → solve space now, where the source has moved in the world."""
         if self.world == earlier.world:
             return None
-        matrices = [np.reshape(one.world, (4, 4)) for one in (self, earlier)]
-        return pose(inverse(matrices[0]) @ matrices[1])
+        now, then = (np.reshape(motion.world, (4, 4)) for motion in (self, earlier))
+        return pose(inverse(now) @ then)
 
 
-def is_body(source):
+def is_used(source):
     settings = settings_of(source).secondary
     return settings.use and settings.strength > 0.0
 
 
-def body_of(settings, space):
-    """The Body that the settings, maybe as a render has them, ask for; None for none."""
+def motion_of(settings, space):
+    """The SecondaryMotion that an object's settings, maybe as a render has them, ask for; or None."""
     group = settings.secondary
     if not group.use or group.strength == 0.0:
         return None
     world = space.solve_to_world
     scale = float(np.cbrt(abs(np.linalg.det(world[:3, :3]))))
-    up = world[2, :3] / scale
-    strength, damping, gravity = (
-        from_single_precision(value) for value in (group.strength, group.damping, group.gravity)
+    strength, damping, gravity, ground = (
+        from_single_precision(value) for value in (group.strength, group.damping, group.gravity, group.ground)
     )
     options = (("strength", strength), ("damping", damping), ("gravity", gravity / scale))
-    ground = (from_single_precision(group.ground) - world[2, 3]) / scale if group.use_ground else None
-    return Body(options, tuple(map(float, up)), ground, tuple(map(float, world.ravel())))
+    height = (ground - world[2, 3]) / scale if group.use_ground else None
+    up = tuple((world[2, :3] / scale).tolist())
+    return SecondaryMotion(options, up, height, tuple(world.ravel().tolist()))
 
 
 def group_names(source):
     """The vertex group that says how much of the motion each part has, if there is one."""
     group = settings_of(source).secondary.group
-    return [group] if is_body(source) and group else []
+    return [group] if is_used(source) and group else []
 
 
 def layout_of(source, scene):
-    """What the frames that were simulated have in common; where it changes, they are made anew."""
+    """What all simulated frames have in common; where it changes, they are solved again."""
     settings = settings_of(source).secondary
-    if not is_body(source):
-        return None
-    return settings.group, settings.start, frame_rate(scene)
+    return (settings.group, settings.start, frame_rate(scene)) if is_used(source) else None
 
 
 def frame_rate(scene):

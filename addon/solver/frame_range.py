@@ -5,7 +5,7 @@ from ..blender.object_references import settings_of
 from ..handles import empties, movers
 
 
-def frame_range(source, kind):
+def animation_range(source, kind):
     """(first, last) frame of all that moves the handles, the style or the source; None where nothing does."""
     ranges = [span for item in involved(source, kind) for span in ranges_of(item)]
     return (min(first for first, _ in ranges), max(last for _, last in ranges)) if ranges else None
@@ -26,18 +26,18 @@ def involved(source, kind):
         used += [movers.mover_of(entry) for entry in empties.used(source)]
     if kind == "STYLIZE":
         used += [item for item in (style.frame_object, style.style_object) if item is not None]
-    found = {}
+    objects = {}
     while used:
         item = used.pop()
-        if item.name_full in found:
+        if item.name_full in objects:
             continue
-        found[item.name_full] = item
+        objects[item.name_full] = item
         used += [] if item.parent is None else [item.parent]
         targets = [getattr(constraint, "target", None) for constraint in item.constraints]
         targets += [getattr(modifier, "object", None) for modifier in item.modifiers]
         used += [target for target in targets if target is not None]
         used += drivers(item)
-    return list(found.values())
+    return list(objects.values())
 
 
 def drivers(item):

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Frames of a live source that were solved once, and the thread that solves them beside the window.
 
-A frame's shape is that of its request alone, solved from rest (Solving.solve_from_rest): it does not matter
-in which order frames are seen. Each shape is kept with its request, so a frame whose handles, style or points
-have changed since is never shown.
+A frame's shape is that of its request alone, solved from rest: the order in which frames are seen does not
+matter. Each shape is kept with its request, so that a frame is never shown whose handles, style or points
+have changed since.
 """
 
 import threading
@@ -11,19 +11,21 @@ import threading
 from ..core.errors import UserError
 from ..core.runtime import native
 from ..core.runtime.threads import start_thread
-from .request import alike
-from .simulation import Simulation
+from ..solver.simulation import Simulation
 
 LARGEST = 1 << 30  # bytes of shapes that one source keeps
 
 
 class SolvedFrames:
-    """{frame: shape}, filled by a thread for the frames that are asked for, the newest first."""
+    """{frame: shape}, filled by a thread for the frames that are requested, the newest first.
 
-    def __init__(self, make, low_priority=False):
-        self._make, self._solving = make, None  # a Solving of the thread's own
+    `clone()` makes the thread's own FrameSolver.
+    """
+
+    def __init__(self, clone, low_priority=False):
+        self._clone, self._solver = clone, None
         self._changed = threading.Condition()
-        self._wanted, self._kept = {}, {}  # frame: request; frame: (request, shape or error, edition)
+        self._requests, self._kept = {}, {}  # frame: request; frame: (request, shape or error, edition)
         self._task, self._ended, self._edition, self._bytes = native.library().Task(), False, 0, 0
         self.has_news = False  # whether another frame was solved since somebody looked
         self._thread = start_thread("frames", self._run, low_priority)
@@ -34,7 +36,7 @@ class SolvedFrames:
             kept = self._kept.get(frame)
             if kept is None:
                 return None
-            if not alike(kept[0], request):
+            if not kept[0].is_like(request):
                 self._edition += 1  # the animation was edited: what is not seen again counts no more
                 self._drop(frame)
                 return None
@@ -43,18 +45,18 @@ class SolvedFrames:
                 raise UserError("{error}", error=kept[1])
             return kept[1]
 
-    def ask(self, frame, request):
+    def request(self, frame, request):
         """Has that frame solved next."""
         with self._changed:
-            self._wanted.pop(frame, None)
-            self._wanted[frame] = request
+            self._requests.pop(frame, None)
+            self._requests[frame] = request
             self._changed.notify_all()
 
     def wait(self, frame, request, timeout):
-        """The shape of that frame, asked for if need be; None when it takes longer than so many seconds."""
+        """The shape of that frame, requested if need be; None when it takes longer than so many seconds."""
         shape = self.get(frame, request)
         if shape is None:
-            self.ask(frame, request)
+            self.request(frame, request)
             with self._changed:
                 self._changed.wait_for(lambda: frame in self._kept or self._ended, timeout)
             shape = self.get(frame, request)
@@ -77,36 +79,36 @@ class SolvedFrames:
         self._thread.join()
 
     def _next(self):
-        return self._wanted.popitem()
+        return self._requests.popitem()
 
     def _solve(self, frame, request):
-        return self._solving.solve_from_rest(request, self._task)
+        return self._solver.solve_from_rest(request, self._task)
 
     def _drop(self, frame):
-        self._bytes -= size(self._kept.pop(frame)[1])
+        self._bytes -= bytes_of(self._kept.pop(frame)[1])
 
     def _run(self):
         while True:
             with self._changed:
-                self._changed.wait_for(lambda: self._wanted or self._ended)
+                self._changed.wait_for(lambda: self._requests or self._ended)
                 if self._ended:
                     return
                 frame, request = self._next()
                 edition = self._edition
             try:
-                self._solving = self._solving or self._make()
+                self._solver = self._solver or self._clone()
                 shape = self._solve(frame, request)
-            except Exception as error:  # told where the frame is shown
+            except Exception as error:  # raised where the frame is shown
                 shape = error
             with self._changed:
                 if self._ended:
                     return
                 if frame in self._kept:
-                    self._bytes -= size(self._kept.pop(frame)[1])
-                while self._kept and self._bytes + size(shape) > LARGEST:
+                    self._bytes -= bytes_of(self._kept.pop(frame)[1])
+                while self._kept and self._bytes + bytes_of(shape) > LARGEST:
                     self._drop(next(iter(self._kept)))  # the one that was solved first
                 self._kept[frame] = request, shape, edition
-                self._bytes += size(shape)
+                self._bytes += bytes_of(shape)
                 self.has_news = True
                 self._changed.notify_all()
 
@@ -117,15 +119,15 @@ class SimulatedFrames(SolvedFrames):
     A frame that was made without all that lead to it is made again once those are there.
     """
 
-    def __init__(self, make, start, fps, low_priority=False):
-        self._simulation = Simulation(None, start, fps)
+    def __init__(self, clone, start, fps, low_priority=False):
+        self._simulation = Simulation(start, fps)
         self._rough = set()  # frames that were made without all that lead to them
-        super().__init__(make, low_priority)
+        super().__init__(clone, low_priority)
 
     def get(self, frame, request):
         with self._changed:
             kept = self._kept.get(frame)
-            if kept is not None and not alike(kept[0], request):
+            if kept is not None and not kept[0].is_like(request):
                 for later in [one for one in self._kept if one > frame]:
                     self._drop(later)
                 self._simulation.forget(frame)
@@ -134,15 +136,14 @@ class SimulatedFrames(SolvedFrames):
         return super().get(frame, request)
 
     def _next(self):
-        frame = min(self._wanted)
-        return frame, self._wanted.pop(frame)
+        frame = min(self._requests)
+        return frame, self._requests.pop(frame)
 
     def _solve(self, frame, request):
         simulation = self._simulation
-        simulation.solving = self._solving
         edition, is_exact = simulation.edition, simulation.could_be_exact(frame)
         try:
-            return simulation.shape(frame, request, self._task)
+            return simulation.shape(self._solver, frame, request, self._task)
         finally:
             with self._changed:
                 if not is_exact or edition != simulation.edition:  # or edited meanwhile
@@ -153,7 +154,7 @@ class SimulatedFrames(SolvedFrames):
         self._rough.discard(frame)
 
 
-def size(shape):
+def bytes_of(shape):
     """Bytes that belong to a shape alone."""
     parts = getattr(shape, "points", None), getattr(shape, "turns", None)
     carried = sum(part.nbytes for _, part in getattr(shape, "carried", ()))

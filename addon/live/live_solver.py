@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a live session's worker does: each shape goes on from the one before, and gets better in pauses."""
+
+import time
+
+import numpy as np
+
+from ..solver.frame_solver import FINE_TOLERANCE, FrameSolver
+from ..solver.setup import sampled
+from .prefetch import prefetch
+
+# Quasi-Newton steps to the first shape of a request, and from there to the next. Each solve begins where the
+# last one ended: after three the shape is behind by a quarter of what the handles moved since then.
+FIRST_STEPS, FURTHER_STEPS = 3, 9
+REFINEMENTS, STEPS_AT_ONCE = 40, 10
+PACE = 1 / 60  # seconds from one shape to the next in secondary motion
+MOST_PACES = 3  # that a step in real time stands for; fewer lengths of steps, fewer preconditioners
+STILL, STILL_STEPS = 1e-3, 20  # of the size a second, so many steps in turn: it has come to rest
+
+
+class LiveSolver:
+    """Made on the main thread; `prepare`, `solve` and `refine` run on the worker."""
+
+    def __init__(self, reader):
+        self._reader, self.frame_solver = reader, None
+        self.reached = None  # the request of the last shape
+        self.is_playing = False  # whether the newest request is a frame's, which another thread solves
+        self._stepped_at = None  # when the last step in real time ended; None: the next begins at rest
+        self._stepped_motion = None
+
+    @property
+    def samples(self):
+        return self.frame_solver.sampled.samples
+
+    @property
+    def field(self):
+        return self.frame_solver.solver.field
+
+    @property
+    def report(self):
+        return self.frame_solver.solver.report
+
+    def prepare(self):
+        """Sets the solver up, or takes the one that was prefetched."""
+        setup, carrying = self._reader.setup, self._reader.carrying
+        ready = prefetch.take(setup)
+        self.frame_solver = ready.reuse(setup, carrying) if ready else FrameSolver(sampled(setup), carrying)
+
+    def begin_at_rest(self):
+        """Has the next step of secondary motion begin at rest."""
+        self._stepped_at = None
+
+    def solve(self, request):
+        """Yields a shape for this request, quickly, and then a better one."""
+        if request.motion is not None:
+            self._step(request)
+            self.reached = request
+            yield self.frame_solver.tracked_shape(request)
+            return
+        for steps in (FIRST_STEPS, FURTHER_STEPS):
+            taken = self.frame_solver.follow(request, iterations=steps)
+            shape, self.reached = self.frame_solver.tracked_shape(request), request
+            yield shape
+            if taken < steps:
+                break
+
+    def refine(self, request, token):
+        """Yields better and better shapes, until the energy falls no more or the motion has ended."""
+        if self.is_playing:
+            return
+        if request.motion is not None:
+            yield from self._settle(request, token)
+            return
+        for _ in range(REFINEMENTS):
+            taken = self.frame_solver.follow(request, iterations=STEPS_AT_ONCE, tolerance=FINE_TOLERANCE)
+            if token.cancelled:
+                return
+            if taken < STEPS_AT_ONCE:
+                break
+            yield self.frame_solver.tracked_shape(request)
+        yield self.frame_solver.exact_shape(request)
+
+    def _step(self, request):
+        """Steps to the request in as many seconds as have passed since the last step."""
+        now, before = time.monotonic(), self._stepped_at
+        if before is None:
+            self.frame_solver.solver.solve(self.frame_solver.apply_request(request))
+        else:
+            paces = int(np.clip(round((now - before) / PACE), 1, MOST_PACES))
+            self.frame_solver.step(request, PACE * paces, self._stepped_motion)
+        self._stepped_at, self._stepped_motion = now, request.motion
+
+    def _settle(self, request, token):
+        """Yields shapes in real time until it has come to rest."""
+        still, size = 0, np.ptp(self.samples.points, axis=0).max()
+        while still < STILL_STEPS and not token.cancelled:
+            began = time.monotonic()
+            self._step(request)
+            still = still + 1 if self.report.speed < STILL * size else 0
+            yield self.frame_solver.tracked_shape(request)
+            time.sleep(max(0.0, began + PACE - time.monotonic()))

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a file, or a step that was undone, says of live mode where no session stands behind it."""
+
+import contextlib
+
+import bpy
+
+from ..blender.language import translated
+from ..blender.object_references import in_scene, settings_of
+from ..core.errors import UserError
+from ..core.runtime import jobs
+from ..field_modifier import motion
+from ..names import RESULT_SUFFIX
+from ..results import result_objects, visibility
+from . import live_object
+from .sessions import is_live, live, take_away
+
+
+def after_undo():
+    """A step was undone or redone: sessions go on with what it has, a live object without one goes."""
+    recover(discard_live_object)
+
+
+def after_load():
+    """A file was loaded: what was live when it was saved is a result now."""
+    recover(adopt)
+
+
+def recover(clear):
+    """Ends what no session or no source knows as live any more; `clear(source)` deals with one that is said
+    to be live, and is not."""
+    for uid, session in list(live.items()):
+        source = session.source.find()
+        if source is None or not settings_of(source).live_kind:
+            live.pop(uid)
+            session.stop()
+            if not session.display.in_place:
+                take_away(session)
+        else:
+            session.restored()  # what it wrote may have been undone
+    for source in bpy.data.objects:
+        if settings_of(source).live_kind and not is_live(source):
+            with contextlib.suppress(UserError, RuntimeError, AttributeError):
+                clear(source)
+                settings_of(source).live_kind = ""
+
+
+def discard_live_object(source):
+    """The modifier has what that step says."""
+    item = live_object.forget(source)
+    if item is not None:
+        result_objects.discard(item)
+
+
+def adopt(source):
+    """Keeps the shape that was seen as a result."""
+    settings, kind = settings_of(source), settings_of(source).live_kind
+    item = next((entry.item for entry in settings.results if entry.kind == live_object.LIVE), None)
+    if item is not None and not in_scene(item):
+        discard_live_object(source)
+        return
+    visibility.forget(source)
+    if item is not None:
+        live_object.forget(source)
+        item.name = item.data.name = f"{source.name}{RESULT_SUFFIX[kind]}"
+        result_objects.register(source, kind, settings.output, item)
+    elif not is_moved(source):
+        return
+    text = translated("it was live when the file was saved; its shape is kept as a result")
+    jobs.add_message("INFO", f"{source.name}: {text}")
+
+
+def is_moved(source):
+    shown = motion.snapshot(source)
+    return shown is not None and shown.offsets is not None and bool(shown.offsets.any())

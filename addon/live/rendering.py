@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live shapes at the frame that the scene has come to: in renders exactly, in the window as far as solved."""
+
+import contextlib
+
+import bpy
+
+from ..blender.language import translated
+from ..core.errors import UserError
+from ..core.runtime import jobs
+from ..handles import empties, movers
+from ..solver.source_reader import SourceChanged
+from .playback import scene_frame
+from .sessions import WAIT, give_up, live
+
+
+def follow_frame(depsgraph):
+    """Shows every live shape as it is at the frame that is about to be rendered."""
+    for uid, session in list(live.items()):
+        try:
+            source = session.source.get()
+            if session.worker is None or source.mode != "OBJECT":
+                continue
+            if session.reader.moves_by_itself:
+                session.reader.read_points(bpy.context, source)
+            warn_of_hidden(source, session, depsgraph)
+            session.take(session.reader.request(bpy.context, depsgraph), scene_frame(depsgraph.scene))
+            session.worker.wait(WAIT, refined=True)
+            session.playback.wait(session.requested, None)  # a picture of another frame would be none
+            session.show()
+        except SourceChanged:
+            continue
+        except (UserError, ValueError, ReferenceError) as error:
+            give_up(uid, session, error)
+
+
+def show_frame():
+    """Shows what is known at the frame that the scene has come to, in the same picture."""
+    for session in list(live.values()):
+        with contextlib.suppress(UserError, ValueError, ReferenceError):  # the timer tells
+            session.show_frame(bpy.context)
+
+
+def warn_of_hidden(source, session, depsgraph):
+    """Says once which handles a render does not see, and so cannot follow."""
+    visible = {item.original.session_uid for item in depsgraph.ids}
+    used = empties.used(source)
+    hidden = [movers.name_of(e) for e in used if movers.mover_of(e).session_uid not in visible]
+    if hidden and session.reader.handles:
+        text = translated(
+            "{names} is hidden in renders, which therefore do not follow it", names=", ".join(hidden)
+        )
+        message = "WARNING", f"{source.name}: {text}"
+        if message not in jobs.messages():
+            jobs.add_message(*message)

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The solver of live mode, bakes and exports: a request in, a shape out."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..blender.native_options import options_of
+from ..core.errors import UserError
+from ..core.geometry.edges import Topology
+from ..core.runtime import native
+from ..core.settings.parameters import presets
+from ..handles.native_handles import native_handles
+from .setup import at_samples
+
+REST_STEPS, FINE_TOLERANCE = 400, 1e-6  # of a solve from rest: until the energy falls no more
+STYLE = presets("live").get("STYLE")  # label, tip, and options for a style, which acts everywhere
+LEAST_RIGIDITY = 1e-3  # of a style
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What a request leads to, in local coordinates, single precision."""
+
+    points: np.ndarray  # (n, 3)
+    rest: np.ndarray | None  # (n, 3) where the source's own points are without the field; None for surfaces
+    turns: np.ndarray | None = None  # (n, 3) axis · angle, for free custom normals
+    topology: Topology | None = None
+    carried: list = field(default_factory=list)  # what Carrying.moved made
+
+
+class FrameSolver:
+    """Turns requests into shapes; for one thread at a time, each other needs a `clone`.
+
+    `sampled` is a setup.SampledSource. A solve goes on from the one before, unless it begins at rest.
+    """
+
+    def __init__(self, sampled, carrying, handles=None, energy=None):
+        setup = sampled.setup
+        self.sampled, self.carrying = sampled, carrying
+        self.solver = self.points = self.rest = None
+        handles = setup.handles if handles is None else handles
+        if sampled.topology is None:
+            self.set_points(setup.surface.local, setup.surface.vertices)
+        else:
+            self.rest = sampled.rest
+        self._make_solver(handles, setup.energy if energy is None else energy)
+
+    def clone(self):
+        """The same with a native solver of its own, for another thread."""
+        return FrameSolver(self.sampled, self.carrying, self.handles, self.energy)
+
+    def reuse(self, setup, carrying):
+        """This solver for another setup with the same surface and energy, read anew."""
+        masses = at_samples(setup, setup.masses, self.sampled.samples)
+        self.sampled, self.carrying = replace(self.sampled, setup=setup, masses=masses), carrying
+        self.set_points(setup.surface.local, setup.surface.vertices)
+        return self
+
+    def set_points(self, points, rest):
+        """(n, 3) points of the source to be moved, in local coordinates and in solve space."""
+        self.points, self.rest = points, rest
+        self._single = np.asarray(points, dtype=np.float32)
+
+    def _make_solver(self, handles, energy):
+        """A native solver for these handles and weights of the energy's terms, which moves nothing yet."""
+        af, options, setup = native.library(), {**energy}, self.sampled.setup
+        if setup.kind == "STYLIZE":
+            options |= STYLE[2]
+            # The native energy has stretch and bend with weight 1: all others are relative to it.
+            rigidity = max(options.pop("rigidity"), LEAST_RIGIDITY)
+            options["gauss_weight"] = af.LiveOptions().gauss_weight
+            for name in ("barrier", "gauss_weight", "keep_stance", "handle_weight"):
+                options[name] /= rigidity
+        options["interior"] = setup.kind == "DEFORM" or bool(handles)  # a style alone acts everywhere alike
+        held = self._native_handles(handles)
+        self.solver = af.LiveDeformer(self.sampled.samples, held, options_of("live", options, setup.machine))
+        self.solver.track(self.rest)
+        self.handles, self.energy, self.style_key, self.motion = handles, energy, None, None
+
+    def _native_handles(self, handles):
+        setup = self.sampled.setup
+        has_reach = setup.kind == "DEFORM"
+        return native_handles(native.library(), handles, setup.surface, self.sampled.samples, has_reach)
+
+    def apply_request(self, request):
+        """Has the native solver know all of a request but where its handles are; returns that."""
+        if request.points is not self.points and self.sampled.topology is None:
+            self.set_points(request.points, self.sampled.setup.surface.space.to_solve(request.points))
+            self.solver.track(self.rest)
+        if request.energy != self.energy:
+            self._make_solver(request.handles, request.energy)
+        if request.handles is not self.handles:
+            self.solver.set_handles(self._native_handles(request.handles))
+            self.handles = request.handles
+        if request.style is not None and request.style.key != self.style_key:
+            self.style_key, directions, strength, sharpness, up = request.style
+            weights = self.sampled.region
+            self.solver.set_style(directions, strength, sharpness=sharpness, weights=weights, up=up)
+        if request.motion != self.motion:
+            self._set_motion(request.motion)
+        return request.targets if request.handles else None
+
+    def _set_motion(self, motion):
+        self.motion = motion
+        if motion is None:
+            self.solver.set_secondary_motion(None)
+            return
+        options = options_of("secondary", dict(motion.options), self.sampled.setup.machine)
+        further = {"masses": self.sampled.masses, "up": motion.up, "ground": motion.ground}
+        self.solver.set_secondary_motion(options, **further)
+
+    def follow(self, request, **options):
+        """Goes on towards a request from the shape before; returns the steps that were taken."""
+        return self.solver.follow(self.apply_request(request), **options)
+
+    def step(self, request, seconds, earlier, state=None, task=None):
+        """Integrates secondary motion over so many seconds; `earlier` is the motion of the request before.
+
+        `state`: the native state to begin with, in place of that of the step before.
+        """
+        targets = self.apply_request(request)
+        if state is not None:
+            self.solver.motion_state = state
+        coordinates = request.motion.coordinates_since(earlier)
+        self.solver.step(targets, seconds, coordinates=coordinates, task=task)
+
+    def solve_from_rest(self, request, task=None):
+        """The request's own shape, whatever was solved before it: the same bits on any thread."""
+        self.solver.reset()
+        self.follow(request, iterations=REST_STEPS, tolerance=FINE_TOLERANCE, task=task)
+        return self.exact_shape(request)
+
+    def tracked_shape(self, request):
+        """The request's shape as the solver tracks it, in single precision."""
+        return self._shape(request, self.solver.tracked())
+
+    def exact_shape(self, request):
+        """The request's shape by the field itself."""
+        return self._shape(request, self.solver.field(self.rest))
+
+    def _shape(self, request, solved):
+        surface, topology = self.sampled.setup.surface, self.sampled.topology
+        moved = self.solver.field if request.carried or surface.has_free_normals else None
+        carried = self.carrying.moved(native.library(), self.sampled.samples, moved, request.carried)
+        if topology is not None:
+            return Shape(self.to_local(solved), None, topology=topology, carried=carried)
+        turns = surface.turns(moved, self.rest) if surface.in_place else None
+        # What does not move stays bit for bit.
+        points = in_single(surface.space.moved_to_local(require_finite(solved), self.rest, self.points))
+        return Shape(points, self._single, turns, carried=carried)
+
+    def to_local(self, points):
+        """(n, 3) from solve space to local coordinates, in single precision."""
+        return in_single(self.sampled.setup.surface.space.to_local(require_finite(points)))
+
+
+def require_finite(points):
+    if not np.isfinite(points).all():
+        raise UserError("the shape has vertices that are NaN or infinite; move the handles less far")
+    return points
+
+
+def in_single(points):
+    return np.ascontiguousarray(points, dtype=np.float32)

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a solver is set up from, read on the main thread; and what a worker derives from it once."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..blender import vertex_groups
+from ..blender.property_definitions import effective_values
+from ..core.geometry.edges import Topology
+from ..core.runtime import native
+from ..core.runtime.progress import ProgressTracker
+from ..core.settings.parameters import DEFORM
+from ..core.settings.styles import STYLIZE
+from ..surface.source_surface import SourceSurface
+
+SAMPLES = 6000
+# Options of the panels that weigh the terms of the energy.
+ENERGY = {"bending", "bending_unit", "barrier", "handle_weight", "symmetry", "rigidity", "keep_stance"}
+
+
+@dataclass(frozen=True)
+class SolverSetup:
+    """A source with its handles at rest; (n,) weights are those of the vertices, None for 1 everywhere."""
+
+    kind: str  # DEFORM or STYLIZE
+    surface: SourceSurface
+    cells: int | None  # resolution of the implicit surface that is moved; None: the source's points are
+    energy: dict  # weights of the energy's terms, by name
+    machine: dict  # options that depend on the machine
+    handles: list = ()
+    region: np.ndarray | None = None  # weights with which a style acts
+    masses: np.ndarray | None = None  # how much of the secondary motion each vertex has
+    start: int = 1  # frame at which secondary motion begins
+    fps: float = 24.0
+
+
+@dataclass(frozen=True)
+class SampledSource:
+    """A setup's samples, and what belongs to them; several solvers may share it."""
+
+    setup: SolverSetup
+    samples: object
+    region: np.ndarray | None  # weights of the samples
+    masses: np.ndarray | None
+    rest: np.ndarray | None = None  # (k, 3) vertices of the implicit surface, where that is moved
+    topology: Topology | None = None
+
+
+def sampled(setup):
+    """The SampledSource of a setup; on a worker."""
+    surface, tracker = setup.surface, ProgressTracker(native.library().Task)
+    moves_points = setup.cells is None
+    samples = surface.samples(tracker, SAMPLES, 0, own_triangles=surface.exact and moves_points)
+    weights = [at_samples(setup, values, samples) for values in (setup.region, setup.masses)]
+    if moves_points:
+        return SampledSource(setup, samples, *weights)
+    return SampledSource(setup, samples, *weights, *surface.extract(tracker, 0.1, resolution=setup.cells))
+
+
+def at_samples(setup, weights, samples):
+    """Weights of the vertices taken to the samples."""
+    if weights is None:
+        return None
+    return vertex_groups.at_points(setup.surface.vertices, weights, samples.points)
+
+
+def energy_weights(settings, kind):
+    """The weights of the energy's terms by name, as the panel of that kind of solve has them."""
+    shown, group = (DEFORM, settings.deform) if kind == "DEFORM" else (STYLIZE, settings.stylize)
+    weights = effective_values([option for option in shown if option.name in ENERGY], group)
+    held = [option for option in DEFORM if option.name == "handle_weight"]
+    return weights | effective_values(held, settings.deform)

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reads a source and its handles for a solver, on the main thread: the setup once, then requests."""
+
+import numpy as np
+
+from ..blender import mesh_arrays, modifier_stack, user_preferences, vertex_groups
+from ..blender.object_references import ObjectReference, settings_of
+from ..blender.property_definitions import from_single_precision
+from ..carried.carrying import Carrying, Reshaped
+from ..carried.world_matrices import depsgraph_of
+from ..core.errors import UserError
+from ..core.geometry.spaces import space_of
+from ..core.runtime import native
+from ..handles import empties
+from ..surface.source_surface import read_surface
+from . import secondary_motion, style_settings
+from .request import Request, StyleTerm
+from .setup import SolverSetup, energy_weights
+
+PREVIEW_CELLS = 96  # at most, of the implicit surface that is moved
+
+
+class SourceChanged(UserError):
+    """The source was edited, or its handles or settings: the solver must be set up again."""
+
+    def __init__(self, name):
+        super().__init__("{name} changed while it was worked on; run again", name=name)
+
+
+class SourceReader:
+    """The surface is read at once; `read_setup` reads the vertex groups, which may take a while.
+
+    `in_place`: whether the shape at the modifier's place is worked on, rather than all that is shown.
+    """
+
+    def __init__(self, context, source, kind, in_place):
+        context.view_layer.update()
+        self.reference, self.kind = ObjectReference(source), kind
+        self.carrying = Carrying(context, source)
+        self.surface = read_surface(context, source, in_place, carrying=self.carrying)
+        self.moves_by_itself = in_place and has_motion_before(source)
+        self.fingerprint = mesh_arrays.fingerprint(source.data)
+        self.points = self.surface.local  # where the modifiers before have them now
+        self.handles, self.setup = [], None
+
+    def read_setup(self, context):
+        """Coroutine (core/coroutines.py) that reads the vertex groups, and makes `setup`."""
+        source, in_place = self.reference.get(), self.surface.in_place
+        if self.kind == "STYLIZE":
+            held = style_settings.group_names(source, settings_of(source).stylize)
+        else:
+            held = empties.group_names(source)
+        soft, region = secondary_motion.group_names(source), None
+        weights = yield from vertex_groups.read_weights(context, source, [*held, *soft], in_place)
+        source = self.reference.get()
+        settings = settings_of(source)
+        if uses_handles(settings, self.kind):
+            self.read_handles(source, weights)
+        if self.kind == "STYLIZE":
+            region = style_settings.region_weights(context, source, settings.stylize, weights, in_place)
+        self.setup = SolverSetup(
+            kind=self.kind,
+            surface=self.surface,
+            cells=None if settings.output == "WARP" else min(settings.resolution, PREVIEW_CELLS),
+            energy=energy_weights(settings, self.kind),
+            machine=user_preferences.machine_options(),
+            handles=self.handles,
+            region=region,
+            masses=weights[soft[0]] if soft else None,
+            start=settings.secondary.start,
+            fps=secondary_motion.frame_rate(context.scene),
+        )
+
+    def read_handles(self, source, weights=None):
+        """The handles at rest; `weights` are those of the vertex groups, where any of them needs one."""
+        self.handles = empties.solve_handles(source, self.surface.space, weights)
+
+    def read_points(self, context, source):
+        """Where the modifiers before have the points now: the field is evaluated there."""
+        with modifier_stack.evaluated_mesh(context, source, in_place=True) as mesh:
+            points = mesh_arrays.positions(mesh)
+        if len(points) != len(self.points):
+            raise SourceChanged(source.name)
+        if not np.array_equal(points, self.points):
+            self.points = points
+
+    def refresh_carried(self, context):
+        """Reads again what of the carried objects may have been edited."""
+        try:
+            self.carrying.refresh(context)
+        except Reshaped:
+            raise SourceChanged(self.reference.name) from None
+
+    def request(self, context, rendered=None):
+        """The Request of the present handles and settings; `rendered`: as a render's depsgraph has them."""
+        source = seen = self.reference.get()
+        where = empties.matrix_of
+        if rendered is not None:
+            seen = source.evaluated_get(rendered)
+
+            def where(item, bone=""):
+                return empties.matrix_of(item.original.evaluated_get(rendered), bone)
+
+        settings, space, targets = settings_of(seen), space_of(where(source), source.name), []
+        if self.handles:
+            current = empties.solve_handles(source, space, where=where)
+            targets = [h.target[:3, 3] if h.kind == "POINT" else h.target for h in current]
+        carried = self.carrying.poses(space, rendered or depsgraph_of(context))
+        return Request(
+            targets,
+            style_term(settings.stylize, space, where) if self.kind == "STYLIZE" else None,
+            self.points,
+            self.handles,
+            energy_weights(settings, self.kind),
+            carried,
+            secondary_motion.motion_of(settings, space),
+        )
+
+
+def style_term(settings, space, where):
+    style = style_settings.requested_style(settings, space, where=where)
+    strength, sharpness = map(from_single_precision, (settings.strength, settings.sharpness))
+    key, directions = (*style.key(), strength, sharpness), style.directions(native.library())
+    return StyleTerm(key, directions, strength, sharpness, style.up)
+
+
+def uses_handles(settings, kind):
+    return kind == "DEFORM" or settings.stylize.use_handles
+
+
+def has_motion_before(source):
+    """Whether the points at the field's place may move without an edit of the mesh."""
+    return bool(modifier_stack.shown_before(source, in_place=True)) or source.data.shape_keys is not None
