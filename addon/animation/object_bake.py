@@ -46,7 +46,7 @@ class ObjectBake:
 
     def __init__(self, context, source, kind, frames, path=None, modifier_path="", part=None):
         settings, fps = settings_of(source), secondary_motion.frame_rate(context.scene)
-        self.in_place = placement.in_place(settings.output, settings.target) and path is not None
+        self.in_place = placement.in_place(settings.output, settings.result) and path is not None
         self.reader = SourceReader(context, source, kind, self.in_place)
         self.frames, self.solver, self.error = frames, None, None
         beside = None if path is None else functools.partial(cache_beside, path, modifier_path)

@@ -17,7 +17,7 @@ def layout_of(source, kind, scene):
         for e in empties.used(source)
     ]
     style, stiffness = settings.stylize, settings.stiffness
-    further = (settings.output, settings.target, settings.surface)
+    further = (settings.output, settings.result, settings.surface)
     further += (stiffness.group, stiffness.times, stiffness.bend_group, stiffness.bend_times)
     if kind == "STYLIZE":
         further += (style.region, style.region_material, style.use_handles)

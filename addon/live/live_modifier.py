@@ -57,14 +57,11 @@ class LiveModifier:
         settings = settings_of(source)
         settings.live_kind = ""
         visibility.forget(source)
-        target, shape = settings.target, self.shown
-        if (
-            target in ("REPLACE", "KEY")
-            and shape is not None
-            and not placement.refusal(source, "WARP", target)
-        ):
+        result, shape = settings.result, self.shown
+        is_placed = result in ("REPLACE", "KEY") and shape is not None
+        if is_placed and not placement.refusal(source, "WARP", result):
             solved = placement.SolvedMesh(shape.points.astype(np.float64), None, {"output": LIVE})
-            placement.place_result(context, source, kind, "WARP", target, solved, shape.rest)
+            placement.place_result(context, source, kind, "WARP", result, solved, shape.rest)
         return source
 
 

@@ -27,7 +27,7 @@ class SolverPrefetch:
         settings = settings_of(source)
         if self._uid == source.session_uid or len(source.data.vertices) > LARGEST:
             return
-        if not placement.in_place(settings.output, settings.target):
+        if not placement.in_place(settings.output, settings.result):
             return
         self.clear()
         self._uid = source.session_uid

@@ -34,7 +34,7 @@ class Session:
 
     def __init__(self, context, source, kind="DEFORM", earlier=None, keeps=False):
         settings = settings_of(source)
-        in_place = placement.in_place(settings.output, settings.target)
+        in_place = placement.in_place(settings.output, settings.result)
         self.keeps, self.layout = keeps, layout_of(source, kind, context.scene)
         self.reader = SourceReader(context, source, kind, in_place)
         self.edits, self.solver, self.worker = EditWatch(self.reader), LiveSolver(self.reader), None

@@ -92,7 +92,7 @@ def end_for_job(context, source, output, result):
     if session is None:
         settings_of(source).live_kind = ""  # what a file or an undone step says, with nothing behind it
         return
-    stays = session.display.in_place and settings_of(source).target == result
+    stays = session.display.in_place and settings_of(source).result == result
     end(context, source, keep=stays and placement.keeps_mesh(output, result))
     context.view_layer.update()
 
