@@ -9,7 +9,7 @@ from ..core.errors import UserError
 from ..core.runtime.coroutines import Pause
 from ..core.runtime.jobs import Item
 from ..core.runtime.progress import JobCancelled
-from .frames import FrameFeed
+from .frames import FrameFeed, playing
 
 AHEAD = 8  # frames that are read before they are solved, where each has positions of its own
 
@@ -34,22 +34,15 @@ class BakePass:
 
     def play(self, context, job):
         """Coroutine that plays the frames and notes what each asks for; the scene ends where it was."""
-        scene = context.scene
-        present = scene.frame_current, scene.frame_subframe
-        try:
+        with contextlib.closing(self.feed), playing(context.scene) as show:
             for frame in self.played:
                 while self.feed.is_full and not job.done:
                     yield Pause.WORKER
                 if job.done:  # cancelled, or every object failed
                     return
-                whole = int(frame // 1)
-                scene.frame_set(whole, subframe=frame - whole)
+                show(frame)
                 self.feed.put([bake.request(context) for bake in self.bakes])
                 yield Pause.REDRAW
-        finally:
-            self.feed.close()
-            with contextlib.suppress(ReferenceError):
-                scene.frame_set(present[0], subframe=present[1])
 
     def work(self, tracker):
         """On the worker."""

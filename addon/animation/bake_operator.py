@@ -5,9 +5,7 @@ from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..blender.property_definitions import effective_value
 from ..core.errors import UserError
-from ..core.runtime import jobs, native
-from ..core.runtime.coroutines import Pause
-from ..core.runtime.progress import JobCancelled
+from ..core.runtime import jobs
 from ..handles import empties
 from ..jobs.job_operator import JobOperator, with_progress
 from ..solver import style_settings
@@ -24,29 +22,29 @@ class BakeOperator(JobOperator):
     def refuses(cls, source):
         return refusal_of(source, effective_kind(source))
 
+    frames_pass = None  # BakePass, where frames are solved
+
     def coroutine(self, context):
         """All that the main thread does; returns the operator's result."""
-        self.failures, self.warnings, self.successes, self.passed = [], [], [], None
-        job = jobs.Job(self.title, [], native.library().Task, low_priority=self.in_window)
-        jobs.begin(job, start=False)
         try:
-            try:
-                items = yield from self.prepare(context, job)
-                job.start(items)
-                if self.passed is not None:
-                    yield from self.passed.play(context, job)
-            except JobCancelled:
-                self.add_message("INFO", translated("{job} cancelled", job=translated(self.title)))
-                return {"CANCELLED"}
-            while not job.done:
-                yield Pause.WORKER
-            return (yield from self.conclude(context, job))
+            return (yield from super().coroutine(context))
         finally:
-            if self.passed is not None:
-                self.passed.feed.close()
-                job.cancel()
-                job.join()
-                self.passed.discard()
+            if self.frames_pass is not None:
+                self.frames_pass.feed.close()
+                jobs.stop()
+                self.frames_pass.discard()
+
+    def prepare(self, context, job):
+        """Coroutine: the job's items by `plan_frames(context, job)`; what cannot be planned is a failure."""
+        try:
+            return (yield from self.plan_frames(context, job))
+        except (UserError, ValueError, OSError) as error:
+            self.failures.append(translated(error))
+            return []
+
+    def work_beside(self, context, job):
+        if self.frames_pass is not None:
+            yield from self.frames_pass.play(context, job)
 
     def values(self, source):
         """The settings by name; `start` and `end` where they were given or the range is one's own."""
@@ -61,14 +59,13 @@ class BakeOperator(JobOperator):
     def begin(self, context, job, sources, values, bakes_of):
         """Coroutine: reads the sources, (object, kind), each made an ObjectBake by `bakes_of(source, kind,
         frames)`; the job's items."""
-        found = frames.choose(context, sources, values)
-        bakes = []
+        chosen, bakes = frames.choose(context, sources, values), []
         for source, kind in sources:
             reason = refusal_of(source, kind)
             try:
                 if reason is not None:
                     raise reason
-                bake = bakes_of(source, kind, found)
+                bake = bakes_of(source, kind, chosen)
                 yield from with_progress(job, bake.reader.read_setup(context), source.name)
                 bakes.append(bake)
             except (UserError, ValueError, OSError) as error:
@@ -76,8 +73,8 @@ class BakeOperator(JobOperator):
                 self.failures.append(text if source.name in text else f"{source.name}: {text}")
         if not bakes:
             return []
-        self.passed = BakePass(bakes, found)
-        return [self.passed.item(context, job, self.failures)]
+        self.frames_pass = BakePass(bakes, chosen)
+        return [self.frames_pass.item(context, job, self.failures)]
 
 
 def effective_kind(source, operator=None):

@@ -6,8 +6,6 @@ point clouds and Grease Pencil, by a mesh of their points. Curves and lattices g
 objects and bones keyframes.
 """
 
-import contextlib
-
 from ..blender import modifier_stack
 from ..blender.language import translated
 from ..carried import played_points
@@ -20,6 +18,7 @@ from ..core.runtime.coroutines import Pause
 from ..field_modifier import cache_modifier
 from ..results import result_objects, visibility
 from .caches import CacheFile, plain
+from .frames import playing
 
 BAKED_KEY = "ARAP Fields frame "  # how baked keys of curves and lattices begin
 
@@ -134,23 +133,18 @@ class CarriedBake:
 
     def add_keyframes(self, context, source, moved, job):
         """Plays the frames: deltas and poses are keyed over what the objects' own animation gives."""
-        scene = context.scene
-        present = scene.frame_current, scene.frame_subframe
-        try:
+        with playing(context.scene) as show:
             for number, frame in enumerate(self.frames):
                 job.report_main_thread(
                     number / self.frames.count, translated("Storing frame {frame}", frame=plain(frame))
                 )
-                scene.frame_set(int(frame // 1), subframe=frame - frame // 1)
+                show(frame)
                 for carried in moved:
                     item, entry = carried.reference.get(), find(source, carried.reference.get())
                     carried.carrier.bind(context, item, entry)
                     carried.carrier.write(item, entry, self.shapes[carried][number])
                     insert(item, carried.carrier, frame)
                 yield Pause.REDRAW
-        finally:
-            with contextlib.suppress(ReferenceError):
-                scene.frame_set(present[0], subframe=present[1])
 
 
 def remove(item):

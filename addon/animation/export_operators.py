@@ -48,21 +48,14 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
         """What plays a cache is exported as it is; what does not is solved first."""
         return None if cache_modifier.is_playing(source) else super().refuses(source)
 
-    def prepare(self, context, job):
-        try:
-            active = source_of(context)
-            sources = self.sources(context)
-            suffix = exporters.SUFFIXES[self.format]
-            path, _ = caches.cache_path(active, suffix, "//", self.filepath)
-            self.found = frames.choose(
-                context, [(source, effective_kind(source, self)) for source in sources], self.values(active)
-            )
-            self.items = [ObjectReference(source) for source in sources]
-            unsolved = [source for source in sources if self.is_unsolved(source)]
-            return (yield from self.plan(context, job, path, unsolved))
-        except (UserError, ValueError, OSError) as error:
-            self.failures.append(translated(error))
-            return []
+    def plan_frames(self, context, job):
+        active, sources = source_of(context), self.sources(context)
+        path, _ = caches.cache_path(active, exporters.SUFFIXES[self.format], "//", self.filepath)
+        kinds = [(source, effective_kind(source, self)) for source in sources]
+        self.frames = frames.choose(context, kinds, self.values(active))
+        self.items = [ObjectReference(source) for source in sources]
+        unsolved = [source for source in sources if self.is_unsolved(source)]
+        return (yield from self.plan(context, job, path, unsolved))
 
     def is_unsolved(self, source):
         """Whether a source must be solved first; UserError where its cache does not fit."""
@@ -79,9 +72,9 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
             return [Item(names, lambda _: None, lambda _: self.export(context, job, path))]
         self.folder = Path(tempfile.mkdtemp(prefix=f".{path.stem}-frames-", dir=path.parent))
 
-        def make(source, kind, found):
+        def make(source, kind, chosen):
             cache = self.folder / f"{source.session_uid}.pc2"
-            return ObjectBake(context, source, kind, found, cache, str(cache))
+            return ObjectBake(context, source, kind, chosen, cache, str(cache))
 
         kinds = [(source, effective_kind(source, self)) for source in unsolved]
         items = yield from self.begin(context, job, kinds, self.values(unsolved[0]), make)
@@ -93,14 +86,14 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
         """Coroutine: what was solved plays for as long as the exporter runs; then all is as it was."""
         with contextlib.ExitStack() as stack:
             shown = {reference.uid: reference.get() for reference in self.items}
-            for bake in self.passed.bakes if self.passed is not None else ():
+            for bake in self.frames_pass.bakes if self.frames_pass is not None else ():
                 if bake.error is not None:
                     raise bake.error
                 shown[bake.reference.uid] = self.play(context, bake, stack)
-            yield from exporters.write(context, self.format, path, list(shown.values()), self.found)
+            yield from exporters.write(context, self.format, path, list(shown.values()), self.frames)
         return translated(
             "{count} frames exported to {path} ({size})",
-            count=exporters.count_of(self.format, self.found),
+            count=exporters.count_of(self.format, self.frames),
             path=path.name,
             size=caches.size_text(path.stat().st_size),
         )

@@ -14,6 +14,7 @@ from ..core.runtime.coroutines import Pause
 from ..solver.frame_range import curves_of
 from . import export_checks
 from .caches import plain, size_text
+from .frames import playing
 
 SUFFIXES = {"ABC": ".abc", "USD": ".usdc", "GLTF": ".glb"}
 
@@ -38,8 +39,9 @@ def write(context, kind, path, items, frames):
             try:
                 CALLS[kind](context, str(partial), frames)
             except (AttributeError, RuntimeError) as error:  # the former where the exporter is switched off
-                told = [line for line in str(error).splitlines() if line and not line.startswith("Location:")]
-                reason = told[-1].removeprefix("Error: ") if told else ""
+                lines = [line for line in str(error).splitlines() if line]
+                lines = [line for line in lines if not line.startswith("Location:")]
+                reason = lines[-1].removeprefix("Error: ") if lines else ""
                 raise UserError(
                     "{path}: Blender cannot write it ({reason})", path=path, reason=reason
                 ) from error
@@ -127,16 +129,12 @@ class MorphingCopy:
 
     def add(self, frames):
         """Coroutine that plays the frames; the scene ends where it was."""
-        scene, keys = self.context.scene, []
-        present = scene.frame_current, scene.frame_subframe
-        try:
+        keys = []
+        with playing(self.context.scene) as show:
             for number, frame in enumerate(frames):
-                whole = int(frame // 1)
-                scene.frame_set(whole, subframe=frame - whole)
+                show(frame)
                 keys.append(self.key(number, frame))
                 yield Pause.REDRAW
-        finally:
-            scene.frame_set(present[0], subframe=present[1])
         self.animate(keys, list(frames))
 
     def key(self, number, frame):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which frames are baked, and how they come from the main thread, which reads them, to the worker."""
 
+import contextlib
 import threading
 from dataclasses import dataclass
 
@@ -48,6 +49,17 @@ def animation(sources):
         names = ", ".join(source.name for source, _ in sources)
         raise UserError("nothing that moves {names} is animated; choose another range", names=names)
     return round(min(first for first, _ in spans)), round(max(last for _, last in spans))
+
+
+@contextlib.contextmanager
+def playing(scene):
+    """Gives a function that takes the scene to a frame; at the end it is back where it was."""
+    present = scene.frame_current, scene.frame_subframe
+    try:
+        yield lambda frame: scene.frame_set(int(frame // 1), subframe=frame - frame // 1)
+    finally:
+        with contextlib.suppress(ReferenceError):  # the file was left
+            scene.frame_set(present[0], subframe=present[1])
 
 
 class FrameFeed:

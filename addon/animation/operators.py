@@ -43,41 +43,33 @@ class ARAPFIELDS_OT_bake(BakeOperator, bpy.types.Operator):
         ),
     }
 
-    def prepare(self, context, job):
-        try:
-            active = source_of(context)
-            sources = [(source, effective_kind(source, self)) for source in self.sources(context)]
-            if self.filepath and len(sources) > 1:
-                raise UserError("one file cannot take several objects; choose a folder")
-            values, part = self.values(active), tuple(self.part) if any(self.part) else None
-            if part is not None and (values["format"] == "KEYS" or not 1 <= part[0] <= part[1]):
-                raise UserError(
-                    "part {i} of {n}: caches alone have parts, from 1 of N to N of N", i=part[0], n=part[1]
-                )
+    def plan_frames(self, context, job):
+        active = source_of(context)
+        sources = [(source, effective_kind(source, self)) for source in self.sources(context)]
+        if self.filepath and len(sources) > 1:
+            raise UserError("one file cannot take several objects; choose a folder")
+        values, part = self.values(active), tuple(self.part) if any(self.part) else None
+        if part is not None and (values["format"] == "KEYS" or not 1 <= part[0] <= part[1]):
+            raise UserError(
+                "part {i} of {n}: caches alone have parts, from 1 of N to N of N", i=part[0], n=part[1]
+            )
+        suffix = caches.SUFFIXES.get(values["format"])
+        place = effective_value("folder", settings_of(active).bake, self)
 
-            def make(source, kind, found):
-                suffix = caches.SUFFIXES.get(values["format"])
-                where = ()
-                if suffix is not None:
-                    place = effective_value("folder", settings_of(active).bake, self)
-                    where = caches.cache_path(source, suffix, place, self.filepath)
-                bake = ObjectBake(context, source, kind, found, *where, part=part)
-                self.warn_of_weight(bake)
-                return bake
+        def make(source, kind, frames):
+            paths = caches.cache_path(source, suffix, place, self.filepath) if suffix is not None else ()
+            bake = ObjectBake(context, source, kind, frames, *paths, part=part)
+            self.warn_of_weight(bake)
+            return bake
 
-            return (yield from self.begin(context, job, sources, values, make))
-        except (UserError, ValueError, OSError) as error:
-            self.failures.append(translated(error))
-            return []
+        return (yield from self.begin(context, job, sources, values, make))
 
     def warn_of_weight(self, bake):
         weight = caches.keys_weight(len(bake.reader.surface.local), bake.frames.count)
         if isinstance(bake.store, caches.ShapeKeys) and weight > caches.HEAVY:
-            told = translated(
-                "shape keys of {size} in the .blend and in memory; a cache would take neither",
-                size=caches.size_text(weight),
-            )
-            self.warnings.append(f"{bake.name}: {told}")
+            size = caches.size_text(weight)
+            text = "shape keys of {size} in the .blend and in memory; a cache would take neither"
+            self.warnings.append(f"{bake.name}: {translated(text, size=size)}")
 
 
 class ARAPFIELDS_OT_remove_bake(SourceOperator, bpy.types.Operator):

@@ -11,6 +11,7 @@ from ..blender.property_definitions import effective_value
 from ..carried.carrying import Carrying
 from ..carried.world_matrices import depsgraph_of
 from ..core.errors import UserError
+from ..core.poses import Pose
 from ..core.runtime import native
 from ..core.runtime.jobs import Item
 from ..jobs.job_operator import JobOperator
@@ -33,18 +34,16 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
     extraction = {name: effective_value(name, settings, operator) for name in ("resolution", "refine_thin")}
     carrying, in_place = Carrying(context, source), placement.in_place(output, result)
     surface = read_surface(context, source, in_place, exact=exact, carrying=carrying)
-    frames = carrying.poses(surface.space, depsgraph_of(context))
-
-    found = []  # the field and its samples
-    shown = FirstResult if placement.keeps_mesh(output, result) else Preview
-    preview = shown(surface) if operator.in_window else None
+    carried = carrying.poses(surface.space, depsgraph_of(context))
+    preview = None
+    if operator.in_window:
+        preview = (FirstResult if placement.keeps_mesh(output, result) else Preview)(surface)
 
     def work(tracker):
         if preview is not None:
             tracker.rest_preview_points = preview.points
-        own_triangles = surface.exact and output == "WARP"
         weight = 1.0 if output == "WARP" else 0.7  # of the solve in what is left to do
-        points = surface.samples(tracker, samples, seed, own_triangles)
+        points = surface.samples(tracker, samples, seed, own_triangles=surface.exact and output == "WARP")
         field = solve(tracker, surface, points, weight)
         topology, report = None, {"output": output, **field.report.to_dict()}
         if output == "REMESH":
@@ -58,19 +57,20 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
         if not np.isfinite(after).all():
             raise UserError("the result has vertices that are not finite; try other settings")
         turns = surface.turns(field, before) if placement.keeps_mesh(output, result) else None
-        found.append((field, points))
-        carried = carrying.moved(native.library(), points, field, frames)
+        moved = carrying.moved(native.library(), points, field, carried)
         local = surface.space.to_local(after)
         if output == "WARP":
             local = surface.space.moved_to_local(after, before, surface.local)
-        return SolvedMesh(local, topology, report, turns, carried)
+        pose = Pose(field, points, surface.space.local_to_solve)
+        return SolvedMesh(local, topology, report, turns, moved), pose
 
-    def apply(solved):
+    def apply(work_result):
+        solved, pose = work_result
         if preview is not None:
             preview.clear()
         owner = surface.reference.get()
         item = placement.place_result(bpy.context, owner, kind, output, result, solved, surface.local)
-        applying.note(owner, *found[-1], surface.space)
+        applying.solved[owner.session_uid] = pose
         carrying.put(bpy.context, solved.carried)
         operator.warnings += [f"{owner.name}: {translated(reason)}" for reason in carrying.take_warnings()]
         shown = item.name + visibility.hidden_note(visibility.show_alone(owner, item))

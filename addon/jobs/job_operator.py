@@ -88,14 +88,18 @@ class JobOperator(ModalRun, Guided):
         job = jobs.Job(self.title, [], native.library().Task, low_priority=self.in_window)
         jobs.begin(job, start=False)
         try:
-            items = yield from self.prepare(context, job)
+            job.start((yield from self.prepare(context, job)))
+            yield from self.work_beside(context, job)
         except JobCancelled:
             self.add_message("INFO", translated("{job} cancelled", job=translated(self.title)))
             return {"CANCELLED"}
-        job.start(items)
         while not job.done:
             yield Pause.WORKER
         return (yield from self.conclude(context, job))
+
+    def work_beside(self, context, job):
+        """Coroutine of what the main thread does while the worker is at work."""
+        yield from ()
 
     def execute(self, context):
         coroutine = self.coroutine(context)

@@ -3,7 +3,7 @@
 
 A tool or script makes an object live with begin(context, source), has it look and show the newest shape with
 update(context) (in a window a timer does; `wait` seconds for the shape to follow), and ends it with
-end(context, source), or end(context, source, keep=True) where the shape shall stay.
+end(context, source), or end(context, source, keep=True) where the shape is to stay.
 """
 
 import contextlib

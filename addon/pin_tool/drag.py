@@ -93,7 +93,7 @@ class Drag:
     def is_settled(self):
         """Whether the shape has reached the handle, and is as good as it gets."""
         session = self.session()
-        return session is None or (session.worker is not None and session.worker.resting)
+        return session is None or (session.worker is not None and session.worker.is_settled)
 
     def end(self, context):
         """What is shown now stays; a press without a move changes no shape."""

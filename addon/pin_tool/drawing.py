@@ -88,13 +88,13 @@ def draw():
 
 def ghosts(handles):
     """((r, g, b), shape, (3,) location) of these [(source, entry)] where Symmetry mirrors them to."""
-    found = []
+    mirrored = []
     for source, entry in handles:
         mirror, now = symmetry.mirror_of(source), movers.box_now(entry)
         if mirror is not None and not symmetry.is_on_plane(mirror, now):
             shape = SQUARE if entry.anchor else CIRCLE
-            found.append((tuple(entry.colour), shape, (mirror @ now)[:3, 3]))
-    return found
+            mirrored.append((tuple(entry.colour), shape, (mirror @ now)[:3, 3]))
+    return mirrored
 
 
 def draw_surface(brush, target):

@@ -83,16 +83,18 @@ def under(context, view, lights=False):
 
     `lights`: also what of a surface lights up, which takes a while on a large mesh.
     """
-    found = pins.handles_in_view(context)
+    handles = pins.handles_in_view(context)
     spots = screen.project(
-        view.perspective, view.size, [e.empty.matrix_world.translation for _, e in found] or np.empty((0, 3))
+        view.perspective,
+        view.size,
+        [e.empty.matrix_world.translation for _, e in handles] or np.empty((0, 3)),
     )
     index = screen.nearest(spots, view.pixel, REACH * view.scale)
     if index >= 0:
-        source, entry = found[index]
+        source, entry = handles[index]
         return Target("HANDLE", ObjectReference(source), ObjectReference(entry.empty))
     active = pins.chosen(context)
-    for (source, entry), spot in zip(found, spots, strict=True):
+    for (source, entry), spot in zip(handles, spots, strict=True):
         away = np.linalg.norm(spot - view.pixel) - RING * view.scale
         if entry.empty == active and not entry.anchor and abs(away) <= RING_REACH * view.scale:
             return Target("RING", ObjectReference(source), ObjectReference(active))

@@ -46,12 +46,12 @@ def is_mesh(item):
 
 def handles_in_view(context):
     """[(source, entry)] of all handles that are seen."""
-    found = []
+    handles = []
     for source in context.view_layer.objects:
         if source.type == "MESH" and settings_of(source).handles:
             entries = [entry for entry in empties.used(source) if entry.kind != "BONE"]
-            found += [(source, entry) for entry in entries if entry.empty.visible_get()]
-    return found
+            handles += [(source, entry) for entry in entries if entry.empty.visible_get()]
+    return handles
 
 
 def chosen(context):
@@ -92,10 +92,10 @@ def place(context, source, location, radius, face=None, face_count=None, anchor=
     settings = settings_of(source)
     if not empties.used(source):
         settings.hold_far = True
-    found = places.find(context, source, location, radius, face, face_count)
+    place = places.find(context, source, location, radius, face, face_count)
     now, rest = np.eye(4), np.eye(4)
-    now[:3, :3], now[:3, 3], rest[:3, 3] = found.turn, found.now, found.rest
-    empty = empties.make_empty(context, source, Matrix(now.tolist()), radius, name(source, found.weights))
+    now[:3, :3], now[:3, 3], rest[:3, 3] = place.turn, place.now, place.rest
+    empty = empties.make_empty(context, source, Matrix(now.tolist()), radius, name(source, place.weights))
     entry = empties.add(source, empty, "PIN")
     entry.rest = (inverse(empties.matrix_of(source)) @ box_matrix(rest, radius)).ravel()
     entry.anchor = anchor

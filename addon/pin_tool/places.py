@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From a place on the shown surface back to the rest shape: where it is there, and how it has turned since.
+"""From a place on the shown surface back to the rest shape: where it rests, and how it has turned since.
 
 The field's modifier only moves points, so that faces and their corners before and after it are the same.
 """
@@ -16,7 +16,7 @@ from ..core.geometry.spaces import transform
 from ..handles.empties import matrix_of
 
 CANDIDATES = 64  # triangles that are looked at where the face is not known
-LEAST = 12  # points of which the turn of a place is told, at least
+LEAST = 12  # points from which the turn of a place is measured, at least
 
 
 @dataclass(frozen=True)
@@ -45,10 +45,10 @@ def find(context, source, location, radius, face=None, face_count=None):
             chosen = mesh_arrays.triangles_of(mesh, face)
         else:
             chosen = near(now, mesh_arrays.triangles(mesh), location)
-        at_rest, there = map_back(now, rest, chosen, location)
+        at_rest, moved = map_back(now, rest, chosen, location)
         about = around(rest, at_rest, radius)
         weights = group_weights(source, mesh, about)
-    return Place(at_rest, there, best_rotation(rest[about], now[about]), weights)
+    return Place(at_rest, moved, best_rotation(rest[about], now[about]), weights)
 
 
 def near(points, triangles, location):
@@ -60,18 +60,18 @@ def near(points, triangles, location):
 
 def map_back(now, rest, triangles, location):
     """((3,) the place at rest of the point of these triangles nearest to the location, (3,) that point)."""
-    best, where, found = np.inf, Vector(location), triangles[0]
+    best, nearest, triangle = np.inf, Vector(location), triangles[0]
     for corners in triangles:
         point = closest_point_on_tri(Vector(location), *(Vector(now[i]) for i in corners))
         away = (point - Vector(location)).length
         if away < best:
-            best, where, found = away, point, corners
-    ends = [Vector(now[i]) for i in found], [Vector(rest[i]) for i in found]
-    mapped = np.array(barycentric_transform(where, *ends[0], *ends[1]))
+            best, nearest, triangle = away, point, corners
+    ends = [Vector(now[i]) for i in triangle], [Vector(rest[i]) for i in triangle]
+    mapped = np.array(barycentric_transform(nearest, *ends[0], *ends[1]))
     if not np.isfinite(mapped).all():  # the triangle has no area
-        closest = found[np.linalg.norm(now[found] - where, axis=1).argmin()]
+        closest = triangle[np.linalg.norm(now[triangle] - nearest, axis=1).argmin()]
         mapped = rest[closest]
-    return mapped, np.array(where)
+    return mapped, np.array(nearest)
 
 
 def around(rest, place, radius):

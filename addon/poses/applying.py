@@ -11,20 +11,14 @@ from ..carried.world_matrices import array, depsgraph_of
 from ..core.errors import UserError
 from ..core.geometry import rotations
 from ..core.geometry.spaces import Space
-from ..core.poses import Pose
 from ..core.runtime import native
 from ..field_modifier import motion
 
-solved = {}  # session_uid of a source → the Pose of its last solve, for it to be saved
-
-
-def note(source, field, samples, space):
-    """Keeps what a source's solve has found, until it is solved anew or the file is left."""
-    solved[source.session_uid] = Pose(field, samples, space.local_to_solve)
+solved = {}  # session_uid of a source → the Pose of its last solve, until the file is left
 
 
 def apply(context, source, pose, strength):
-    """Moves the source's points by the pose's field, so much of the way; returns UserErrors that are told."""
+    """Moves the source's points by the pose's field, so much of the way; returns warnings."""
     reason = motion.refusal(source)
     if reason is None and settings_of(source).live_kind:
         reason = UserError("{name} is live; end live mode first", name=source.name)
@@ -48,8 +42,8 @@ def apply(context, source, pose, strength):
         turns = strength * rotations.turns(pose.field.jacobian(rest), pose.local_to_solve)
     carrying = Carrying(context, source)
     space = Space(pose.local_to_solve, array(source.matrix_world) @ np.linalg.inv(pose.local_to_solve))
-    frames = carrying.poses(space, depsgraph_of(context))
-    shapes = carrying.moved(native.library(), pose.samples, pose.field, frames, strength)
+    carried = carrying.poses(space, depsgraph_of(context))
+    shapes = carrying.moved(native.library(), pose.samples, pose.field, carried, strength)
     motion.bind(context, source)
     motion.write(source, motion.Motion(offsets, turns))
     carrying.put(context, shapes)

@@ -23,14 +23,11 @@ def kept_poses(context):
 
 def chosen(context, name):
     """The kept pose of that name, or the one chosen in the list; UserError where there is none."""
-    found, group = kept_poses(context), context.scene.arapfields
-    if name:
-        entry = found.get(name)
-    else:
-        entry = found[group.active_pose] if 0 <= group.active_pose < len(found) else None
-    if entry is None:
+    kept = kept_poses(context)
+    index = kept.find(name) if name else context.scene.arapfields.active_pose
+    if not 0 <= index < len(kept):
         raise UserError("there is no pose {name}", name=name) if name else UserError("Save a pose first")
-    return entry
+    return kept[index]
 
 
 def keep(context, name, content):
@@ -120,8 +117,7 @@ class ARAPFIELDS_OT_apply_pose(OfSource, bpy.types.Operator):
         else:
             entry = chosen(context, self.pose)
             name, content = entry.name, poses.from_text(entry.data, entry.name)
-        told = applying.apply(context, source, poses.from_bytes(content, name), self.strength)
-        for reason in told:
+        for reason in applying.apply(context, source, poses.from_bytes(content, name), self.strength):
             self.report({"WARNING"}, translated(reason))
         return translated("{pose} applied to {name}", pose=name, name=source.name)
 

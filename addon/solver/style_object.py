@@ -62,18 +62,20 @@ def _read(name, mesh, linear):
 def _closed(points, corners):
     """The same with what lies at one place as one, and its holes filled."""
     points, which = np.unique(points, axis=0, return_inverse=True)
-    made = bmesh.new()
-    vertices = [made.verts.new(point) for point in points]
+    closed = bmesh.new()
+    vertices = [closed.verts.new(point) for point in points]
     for a, b, c in which.reshape(-1)[corners]:
-        if len({a, b, c}) == 3 and not made.faces.get((vertices[a], vertices[b], vertices[c])):
-            made.faces.new((vertices[a], vertices[b], vertices[c]))
-    bmesh.ops.holes_fill(made, edges=[edge for edge in made.edges if edge.is_boundary], sides=0)
-    bmesh.ops.recalc_face_normals(made, faces=made.faces)
-    bmesh.ops.triangulate(made, faces=made.faces)
-    made.verts.index_update()
-    points = np.array([vertex.co for vertex in made.verts], dtype=np.float64).reshape(-1, 3)
-    corners = np.array([[v.index for v in face.verts] for face in made.faces], dtype=np.int64).reshape(-1, 3)
-    made.free()
+        if len({a, b, c}) == 3 and not closed.faces.get((vertices[a], vertices[b], vertices[c])):
+            closed.faces.new((vertices[a], vertices[b], vertices[c]))
+    bmesh.ops.holes_fill(closed, edges=[edge for edge in closed.edges if edge.is_boundary], sides=0)
+    bmesh.ops.recalc_face_normals(closed, faces=closed.faces)
+    bmesh.ops.triangulate(closed, faces=closed.faces)
+    closed.verts.index_update()
+    points = np.array([vertex.co for vertex in closed.verts], dtype=np.float64).reshape(-1, 3)
+    corners = np.array([[v.index for v in face.verts] for face in closed.faces], dtype=np.int64).reshape(
+        -1, 3
+    )
+    closed.free()
     return points, corners
 
 

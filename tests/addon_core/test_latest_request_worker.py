@@ -43,7 +43,7 @@ def test_a_request_at_rest_is_refined_and_a_new_one_cancels_that():
     worker.request("a")
     assert begun.wait(LIMIT)
     worker.request("b")
-    assert worker.wait(LIMIT, refined=True) and worker.resting
+    assert worker.wait(LIMIT, refined=True) and worker.is_settled
     assert last[-1] == "b" and worker.poll() == ("b3", "")
     worker.stop()
 

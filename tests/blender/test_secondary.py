@@ -95,10 +95,10 @@ def test_a_dragged_handle_lets_it_swing_and_settle():
     while time.monotonic() < end:
         sessions.update(bpy.context)
         shapes.append(local_points(bar))
-        if len(shapes) > 20 and session.worker.resting:
+        if len(shapes) > 20 and session.worker.is_settled:
             break
         time.sleep(0.01)
-    assert session.worker.resting  # and takes no more time
+    assert session.worker.is_settled  # and takes no more time
     far = before[:, 0] > 0.9
     heights = [shape[far, 2].mean() - before[far, 2].mean() for shape in shapes]
     assert max(heights) > 0.42  # it overshoots

@@ -25,7 +25,7 @@ def settled(name, limit=30.0):
         session = sessions.live.get(bpy.data.objects[name].session_uid)
         if session is None:
             return
-        calm = calm + 1 if session.worker.resting else 0
+        calm = calm + 1 if session.worker.is_settled else 0
         yield 0.1
 
 
@@ -46,7 +46,7 @@ def rate(found, folder):
         bpy.ops.arapfields.live("INVOKE_DEFAULT")
         found["live_click_s"] = round(time.perf_counter() - begin, 4)
     session = sessions.live[bar.session_uid]
-    while not session.worker.resting:
+    while not session.worker.is_settled:
         yield 0.01
     found["live_first_shape_s"] = round(time.perf_counter() - begin, 4)
     found["live_vertices"] = len(bar.data.vertices)

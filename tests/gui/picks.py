@@ -88,7 +88,7 @@ def enter(name, bar):
 
 
 def is_at_rest(session):
-    return session is not None and session.worker is not None and session.worker.resting
+    return session is not None and session.worker is not None and session.worker.is_settled
 
 
 def clicks(cell, mesh, empties, rest):

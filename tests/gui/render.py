@@ -44,7 +44,7 @@ def calm(bar):
 
 
 def is_at_rest(session):
-    if session is None or session.worker is None or not session.worker.resting:
+    if session is None or session.worker is None or not session.worker.is_settled:
         return False
     return session.playback.is_shown()
 

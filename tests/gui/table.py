@@ -188,7 +188,7 @@ def calm():
     from addon.live import sessions
 
     yield 0.1
-    yield from until(lambda: all(s.worker and s.worker.resting for s in sessions.live.values()), 20.0)
+    yield from until(lambda: all(s.worker and s.worker.is_settled for s in sessions.live.values()), 20.0)
     yield 0.1
 
 

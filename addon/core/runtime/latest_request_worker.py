@@ -10,7 +10,7 @@ REST = 0.4  # seconds without a new request after which the result is refined
 
 
 class CancellationToken:
-    """Tells a refinement that a newer request is there; cancels the native tasks that it runs."""
+    """Tells a refinement that a newer request has come; cancels the native tasks that it runs."""
 
     def __init__(self):
         self._lock = threading.Lock()
@@ -38,7 +38,7 @@ class CancellationToken:
 class LatestRequestWorker:
     """Runs `prepare()` once, then `solve(request)` for the newest request, skipping those between.
 
-    `solve` yields better and better results, of which no more are asked for once a newer request is there.
+    `solve` yields better and better results; it is left where a newer request has come.
     After `rest` seconds without a new request, `refine(request, token)` yields better and better results
     until the token is cancelled. `poll` returns the newest result, or the error.
     """
@@ -60,9 +60,9 @@ class LatestRequestWorker:
     def poll(self):
         """(result or None, error text) since the last call."""
         with self._changed:
-            found = self._result, self._error or ""
+            newest = self._result, self._error or ""
             self._result = self._error = None
-            return found
+            return newest
 
     def wait_for_result(self, timeout):
         """Until there is something to poll or nothing left to do, so many seconds at most."""
@@ -89,7 +89,7 @@ class LatestRequestWorker:
                 self._waiting -= 1
 
     @property
-    def resting(self):
+    def is_settled(self):
         """Whether nothing is left to do for the newest request."""
         with self._changed:
             return self._is_idle() and (self._refined or self._refine is None)

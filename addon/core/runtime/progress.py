@@ -19,7 +19,7 @@ class ProgressTracker:
         self._begun = self._weight = 0.0
         self._cancelled = False
         self.warnings = []  # UserErrors that do not spoil the result, for the user to read
-        self.rest_preview_points = None  # (n, 3) whose moved positions every native call shall publish
+        self.rest_preview_points = None  # (n, 3) whose moved positions every native call publishes
 
     def start(self, name, weight):
         """A task for the next native call, which is about this part, `weight`, of the work that is left.

@@ -100,8 +100,8 @@ CHECKS = {
 }
 
 
-def expect(found, wanted, tolerance):
-    worst = np.abs(np.asarray(found, float) - np.asarray(wanted, float)).max()
+def expect(result, expected, tolerance):
+    worst = np.abs(np.asarray(result, float) - np.asarray(expected, float)).max()
     if not worst <= tolerance:
         raise AssertionError(f"off by {worst:.3g}, allowed is {tolerance:.3g}")
 

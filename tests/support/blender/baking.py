@@ -36,7 +36,8 @@ def stepped(**given):
 
     class Operator(BakeOperator):
         title, in_window, scope, filepath = "Bake", False, "ACTIVE", given.pop("filepath", "")
-        prepare, warn_of_weight = bake.ARAPFIELDS_OT_bake.prepare, bake.ARAPFIELDS_OT_bake.warn_of_weight
+        plan_frames = bake.ARAPFIELDS_OT_bake.plan_frames
+        warn_of_weight = bake.ARAPFIELDS_OT_bake.warn_of_weight
         part = (0, 0)
         properties = types.SimpleNamespace(is_property_set=lambda name: name in given)
 
