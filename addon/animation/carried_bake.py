@@ -13,7 +13,7 @@ from ..carried.carried_objects import KINDS, find
 from ..carried.carriers import MeshCarrier
 from ..carried.points import AttributeCarrier, KeyCarrier, drop_key, key_points, own_key, put_key
 from ..carried.transforms import BonesCarrier
-from ..core.errors import UserError
+from ..core.errors import UserError, as_user_error
 from ..core.runtime.coroutines import Pause
 from ..field_modifier import cache_modifier
 from ..results import result_objects, visibility
@@ -75,7 +75,8 @@ class CarriedBake:
                 elif len(self.shapes.get(carried, ())) != self.frames.count:
                     raise UserError("{name} was not there at every frame", name=item.name)
                 elif isinstance(carried.carrier, AttributeCarrier):
-                    yield from self.add_points(carried, item)
+                    played = played_points.play(item, carried.carrier.points, carried.carrier.counts)
+                    yield from self.add_frames(carried, played)
                 elif isinstance(carried.carrier, MeshCarrier):
                     yield from self.add_object(context, carried, item)
                 elif isinstance(carried.carrier, KeyCarrier):
@@ -83,9 +84,7 @@ class CarriedBake:
                 else:
                     moved.append(carried)
             except (UserError, OSError, RuntimeError) as error:
-                self.warnings.append(
-                    error if isinstance(error, UserError) else UserError("{error}", error=error)
-                )
+                self.warnings.append(as_user_error(error))
         if moved:
             yield from self.add_keyframes(context, source, moved, job)
         self.warnings += self.carrying.take_warnings()
@@ -97,20 +96,16 @@ class CarriedBake:
         self.caches[carried].play_on(item)
 
     def add_object(self, context, carried, item):
-        shapes, frames = self.shapes[carried], [plain(frame) for frame in self.frames]
-        mesh = result_objects.shown_mesh(context, item, len(shapes[0]))
-        report = {"frames": len(frames)}
+        mesh = result_objects.shown_mesh(context, item, len(self.shapes[carried][0]))
+        report = {"frames": self.frames.count}
         baked = result_objects.show(context, item, "BAKE", "BAKE", mesh, report, select=False)
-        for number, shape in enumerate(shapes):
-            result_objects.add_frame(baked, frames, number, shape)
-            yield Pause.REDRAW
+        yield from self.add_frames(carried, baked)
         visibility.show_alone(item, baked)
 
-    def add_points(self, carried, item):
-        played = played_points.play(item, carried.carrier.points, carried.carrier.counts)
+    def add_frames(self, carried, item):
         frames = [plain(frame) for frame in self.frames]
         for number, shape in enumerate(self.shapes[carried]):
-            result_objects.add_frame(played, frames, number, shape)
+            result_objects.add_frame(item, frames, number, shape)
             yield Pause.REDRAW
 
     def add_keys(self, carried, item):

@@ -2,7 +2,7 @@
 """Which frames are baked, and how they come from the main thread, which reads them, to the worker."""
 
 import contextlib
-import threading
+import queue
 from dataclasses import dataclass
 
 from ..core.errors import UserError
@@ -68,30 +68,25 @@ class FrameFeed:
     PATIENCE = 0.05  # seconds between looks whether the job was cancelled
 
     def __init__(self, ahead):
-        self._ahead, self._frames, self._changed = ahead, [], threading.Condition()
-        self._broken = False
+        self._frames, self._is_closed = queue.Queue(ahead), False
 
     @property
     def is_full(self):
-        with self._changed:
-            return len(self._frames) >= self._ahead
+        return self._frames.full()
 
     def put(self, frame):
-        with self._changed:
-            self._frames.append(frame)
-            self._changed.notify()
+        self._frames.put_nowait(frame)
 
     def close(self):
         """No more frames come: the main thread was stopped."""
-        with self._changed:
-            self._broken = True
-            self._changed.notify()
+        self._is_closed = True
 
     def take(self, task):
         """The next frame; JobCancelled where the task is cancelled first, or none comes any more."""
-        with self._changed:
-            while not self._frames:
-                if task.cancelled or self._broken:
-                    raise JobCancelled
-                self._changed.wait(self.PATIENCE)
-            return self._frames.pop(0)
+        while self._frames.empty() and not task.cancelled and not self._is_closed:
+            with contextlib.suppress(queue.Empty):
+                return self._frames.get(timeout=self.PATIENCE)
+        try:
+            return self._frames.get_nowait()
+        except queue.Empty:
+            raise JobCancelled from None

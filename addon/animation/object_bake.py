@@ -8,7 +8,7 @@ import json
 from ..blender import mesh_arrays
 from ..blender.language import translated
 from ..blender.object_references import settings_of
-from ..core.errors import UserError
+from ..core.errors import UserError, as_user_error
 from ..core.runtime.coroutines import Pause
 from ..handles import empties
 from ..live import sessions
@@ -112,7 +112,7 @@ class ObjectBake:
         except MemoryError:
             self.error = UserError("not enough memory for these settings")
         except (UserError, ValueError, OSError) as error:
-            self.error = error if isinstance(error, UserError) else UserError("{error}", error=error)
+            self.error = as_user_error(error)
         if self.error is not None:
             self.discard()
 

@@ -12,6 +12,11 @@ class UserError(Exception):
         self.template, self.values = template, values
 
 
+def as_user_error(error):
+    """The same as a UserError."""
+    return error if isinstance(error, UserError) else UserError("{error}", error=error)
+
+
 def refuse(reason):
     """Raises a reason, where there is one."""
     if reason is not None:
