@@ -14,8 +14,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 CHROOT = Path(os.environ.get("ARAPFIELDS_BLENDER52", "/opt/blender52"))
-PROJECT = ("addon", "native/options", "tests/gui")  # what runs in there
-SCRIPTS = [ROOT / "tests/gui" / name for name in ("film.py", "mouse.py", "stage.py")]
+PROJECT = ("addon", "native/options", "tests/gui", "tests/support")  # what runs in there
+SCRIPTS = [ROOT / "tests/gui" / name for name in ("film.py", "mouse.py", "stage.py", "window.py")]
 SIZE = (880, 620)  # pixels of the window
 PATIENCE = 900  # seconds, for a busy machine
 SESSION = """
@@ -24,7 +24,7 @@ mkdir -p $HOME
 Xvfb $DISPLAY -screen 0 {1}x{2}x24 & screen=$!
 sleep 2
 timeout {3} blender --python-use-system-env --factory-startup --window-geometry 0 0 {1} {2} \
-  --python {0}/project/tests/gui/film.py -- {0}/film {0}/scene.blend
+  --python {0}/project/tests/gui/window.py -- {0}/film film={0}/scene.blend
 status=$?
 kill $screen
 exit $status
@@ -53,7 +53,7 @@ def unpack(target):
 
 
 def record(scene, folder):
-    """Runs tests/gui/film.py on a .blend; its pictures and film.json come to a folder that is made."""
+    """Runs the film of tests/gui on a .blend; its pictures and film.json come to a folder that is made."""
     there = CHROOT / "tmp" / f"arapfields-film-{os.getpid()}"
     shutil.rmtree(there, ignore_errors=True)
     there.mkdir(parents=True)
@@ -62,8 +62,6 @@ def record(scene, folder):
         for name in PROJECT:
             leave = shutil.ignore_patterns("__pycache__")
             shutil.copytree(ROOT / name, there / "project" / name, ignore=leave)
-        (there / "project/tests/support/blender").mkdir(parents=True)
-        shutil.copy(ROOT / "tests/support/blender/scenes.py", there / "project/tests/support/blender")
         shutil.copy(scene, there / "scene.blend")
         inside = Path("/") / there.relative_to(CHROOT)
         session = SESSION.format(inside, *SIZE, PATIENCE)

@@ -36,7 +36,7 @@ def loop(output):
     with tempfile.TemporaryDirectory() as folder:
         film = Path(folder) / "film"
         windowed.record("out/examples/pins.blend", film)
-        found = json.loads((film / "found.json").read_text())
+        found = json.loads((film / "checks.json").read_text())
         if "error" in found:
             raise RuntimeError(found["error"])
         frames, taken = json.loads((film / "film.json").read_text()), []

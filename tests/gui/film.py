@@ -1,16 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The pin page's steps in a window, by mouse, a picture of it after each move: frames of a film.
 
-blender --factory-startup --window-geometry 0 0 880 620 --python tests/gui/film.py -- FOLDER PINS.blend
+blender --factory-startup --window-geometry 0 0 880 620 --python tests/gui/window.py -- FOLDER film=PINS.blend
 Writes FOLDER/NNN.png and film.json: where the cursor was in each, which the pictures do not show, and
 whether its button was down.
 """
 
 import json
-import sys
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+import bpy
+import mouse
+import numpy as np
+import stage
+from mathutils import Euler
+from support.blender import scenes
+
 FEET = ((0.33, -0.05, 0.10), (-0.24, -0.10, 0.10))
 DRAGS = (((0.15, -0.80, 1.42), (-22, -58)), ((0.02, 1.30, 0.84), (-24, -104)))  # where, pixels to go
 BACKGROUND = (0.16, 0.17, 0.19)
@@ -36,11 +40,6 @@ class Film:
 
 def set_view(item):
     """The creature alone, from its front and side, no grid; the tool in hand."""
-    import bpy
-    import stage
-    from mathutils import Euler
-    from support.blender import scenes
-
     bpy.data.collections["Studio"].hide_viewport = True
     scenes.activate(item)
     with stage.override():
@@ -70,7 +69,6 @@ def set_view(item):
 
 def glide(film, start, end, steps=3):
     """The cursor on its way, without its button."""
-    import stage
 
     for step in range(1, steps + 1):
         spot = [round(a + step / steps * (b - a)) for a, b in zip(start, end, strict=True)]
@@ -79,13 +77,8 @@ def glide(film, start, end, steps=3):
         film.take(spot)
 
 
-def steps(film, path, found):
-    import bpy
-    import mouse
-    import numpy as np
-    import stage
-    from support.blender import scenes
-
+def checks(path, found, folder):
+    film = Film(folder)
     bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False)
     yield 1.0
     dinosaur = bpy.data.objects["Dinosaur"]
@@ -124,21 +117,4 @@ def steps(film, path, found):
     film.take(spot, hold=10)
     found["pins"] = [[entry.empty.name, entry.anchor] for entry in dinosaur.arapfields.handles]
     found["moved"] = round(float(np.linalg.norm(scenes.world_points(dinosaur) - rest, axis=1).max()), 3)
-
-
-def main():
-    folder, path = Path(sys.argv[-2]), Path(sys.argv[-1])
-    sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests/gui")]
-    import stage
-
-    film, found = Film(folder), {}
-
-    def ended(error):
-        found.update({"error": error} if error else {"finished": True})
-        (folder / "found.json").write_text(json.dumps(found, indent=1))
-        film.write()
-
-    stage.start(lambda: steps(film, path, found), ended, folder)
-
-
-main()
+    film.write()

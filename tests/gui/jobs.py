@@ -6,7 +6,12 @@ import time
 import bpy
 import numpy as np
 import stage
+from mouse import until, until_idle
 from support.blender import scenes
+
+from addon.core.runtime import jobs
+from addon.jobs.job_operator import JobOperator
+from addon.viewport import previews
 
 LONG = {**scenes.NEW, "iterations": 200000}
 
@@ -17,19 +22,11 @@ def invoke(settings):
         return str(bpy.ops.arapfields.deform("INVOKE_DEFAULT", **settings))
 
 
-def until_idle(limit):
-    from addon.core.runtime import jobs
-
-    begin = time.perf_counter()
-    while jobs.running() is not None and time.perf_counter() - begin < limit:
-        yield 0.01
+def checks(found, folder, ending=False):
+    yield from (endings if ending else running)(found, folder)
 
 
-def checks(found, folder):
-    from addon.core.runtime import jobs
-    from addon.jobs.job_operator import JobOperator
-    from addon.viewport import previews
-
+def running(found, folder):
     stage.empty_file()
     with stage.override():
         _, _, moving = scenes.bar_with_handles()
@@ -53,8 +50,8 @@ def checks(found, folder):
     seconds = time.perf_counter() - begin
     found["running"], found["progress"] = jobs.running() is not None, jobs.progress()
     stage.picture(folder, "running-apart")
-    found["main_thread_at_once"], previews = ours.end(), shown.end()
-    found["previews_per_second"] = round(previews["calls"] / seconds, 2)
+    found["main_thread_at_once"], shown = ours.end(), shown.end()
+    found["previews_per_second"] = round(shown["calls"] / seconds, 2)
     found["looks_per_second"] = round(jobs.running().preview_points()[1] / seconds, 2)
     begin = time.perf_counter()
     bpy.ops.arapfields.cancel()
@@ -72,9 +69,7 @@ def in_place(found, folder, before):
     """The mesh itself shows what there is so far, and is what it was after Cancel."""
     rest = stage.positions("Bar")
     invoke({**LONG, "result": "MODIFIER"})
-    begin = time.perf_counter()
-    while np.abs(stage.positions("Bar") - rest).max() < 0.3 and time.perf_counter() - begin < 20.0:
-        yield 0.2
+    yield from until(lambda: np.abs(stage.positions("Bar") - rest).max() > 0.3)
     yield 1.0
     stage.picture(folder, "running")
     found["shown_on_the_mesh"] = round(float(np.abs(stage.positions("Bar") - rest).max()), 3)
@@ -97,12 +92,10 @@ def escape(found, before):
 
 
 def result(found, folder):
-    from addon.viewport import previews
-
     invoke(scenes.NEW)
     yield from until_idle(120)
     modal = stage.positions("Bar_deformed")
-    found["preview_gone"] = not previews.shown.mesh is not None
+    found["preview_gone"] = previews.shown.mesh is None
     yield 0.5
     stage.picture(folder, "result")
     there = "Bar_deformed" in bpy.data.objects
@@ -116,10 +109,8 @@ def result(found, folder):
     found["modal_against_blocking"] = float(np.abs(stage.positions("Bar_deformed") - modal).max())
 
 
-def endings(found):
+def endings(found, folder):
     """A job while a step is undone, a file is loaded, the add-on is switched off."""
-    from addon.core.runtime import jobs
-
     for name, act in (
         ("undo", lambda: bpy.ops.ed.undo()),
         ("load", lambda: bpy.ops.wm.read_homefile(use_empty=True)),

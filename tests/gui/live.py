@@ -6,7 +6,12 @@ import time
 import bpy
 import numpy as np
 import stage
+from mouse import until_live_rests
 from support.blender import scenes
+
+from addon.field_modifier import motion
+from addon.live import sessions
+from addon.solver.frame_solver import FrameSolver
 
 SECONDS = 5.0
 
@@ -16,25 +21,8 @@ def checks(found, folder):
     yield from drag(found, folder)
 
 
-def settled(name, limit=30.0):
-    """Until the live shape of that object is refined and shown, if it is live."""
-    from addon.live import sessions
-
-    begin, calm = time.perf_counter(), 0
-    while calm < 3 and time.perf_counter() - begin < limit:
-        session = sessions.live.get(bpy.data.objects[name].session_uid)
-        if session is None:
-            return
-        calm = calm + 1 if session.worker.is_settled else 0
-        yield 0.1
-
-
 def rate(found, folder):
     """Moves a handle of a mesh of 50,000 vertices: how often the viewport shows a new shape."""
-    from addon.field_modifier import motion
-    from addon.live import sessions
-    from addon.solver.frame_solver import FrameSolver
-
     stage.empty_file()
     with stage.override():
         bar, _, moving = scenes.bar_with_handles()
@@ -55,13 +43,13 @@ def rate(found, folder):
         area.spaces.active.overlay.show_overlays = overlays
         bpy.context.preferences.system.viewport_aa = samples
         yield 1.0
-        yield from one_rate(found, name, moving, sessions, motion)
+        yield from one_rate(found, name, moving)
     found["live_solve_and_warp_on_worker"] = solves.end()
-    found["live_without_drawing"] = without_drawing(moving, sessions)
+    found["live_without_drawing"] = without_drawing(moving)
     stage.picture(folder, "live-plain")
     area.spaces.active.overlay.show_overlays = True
     bpy.context.preferences.system.viewport_aa = "8"
-    yield from settled("Bar")
+    yield from until_live_rests()
     found["live_refined"] = {"converged": session.solver.report.converged}
     yield 1.0
     stage.picture(folder, "live")
@@ -69,7 +57,7 @@ def rate(found, folder):
         sessions.end(bpy.context, bar)
 
 
-def one_rate(found, name, moving, sessions, motion):
+def one_rate(found, name, moving):
     shown, ticks = stage.Meter(), stage.Meter()
     ticks.watch(sessions, "update")
     shown.watch(motion, "write")
@@ -89,7 +77,7 @@ def one_rate(found, name, moving, sessions, motion):
     }
 
 
-def without_drawing(moving, sessions):
+def without_drawing(moving):
     """Updates a second where nothing is drawn: solve, warp, mesh and dependency graph, one after another.
 
     Each is the first shape for that place of the handle.
@@ -110,8 +98,6 @@ def without_drawing(moving, sessions):
 
 def drag(found, folder):
     """A drag with the mouse, as a user does it: one undo step, and the shape returns with it."""
-    from addon.live import sessions
-
     stage.empty_file()
     with stage.override():
         bar, _, moving = scenes.bar_with_handles()
@@ -123,7 +109,7 @@ def drag(found, folder):
         scenes.activate(moving)
         moving["mark"] = 1
         bpy.ops.ed.undo_push(message="mark")
-    yield from settled("Bar")
+    yield from until_live_rests()
     rest = stage.positions("Bar")
     stage.tool("mousemove", 600, 500)
     yield 0.3
@@ -134,7 +120,7 @@ def drag(found, folder):
         yield 0.15
     stage.tool("click", 1)
     yield 1.0
-    yield from settled("Bar")
+    yield from until_live_rests()
     moving = bpy.data.objects["Moving"]
     moved = stage.positions("Bar")
     stage.picture(folder, "dragged")
@@ -143,7 +129,7 @@ def drag(found, folder):
     with stage.override():
         bpy.ops.ed.undo()
     yield 1.0
-    yield from settled("Bar")
+    yield from until_live_rests()
     found["live_after_undo"] = sessions.is_live(bpy.data.objects["Bar"])
     moving = bpy.data.objects["Moving"]
     back = np.allclose(moving.location, (1, 0, 0), atol=1e-6) and moving.get("mark") == 1

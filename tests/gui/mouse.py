@@ -5,13 +5,33 @@ import time
 
 import stage
 from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Vector
+
+from addon.core.runtime import jobs
+from addon.live import sessions
+from addon.pin_tool.hover import hover as hovering
 
 
 def pixel(point):
-    """Where a point of the world is on the screen; the window fills it."""
+    """Where a point of the world is on the screen, from its top left; the window fills it."""
     window, area, region = stage.view()
-    spot = location_3d_to_region_2d(region, area.spaces.active.region_3d, point)
-    return int(region.x + spot[0]), int(window.height - region.y - spot[1])
+    spot = location_3d_to_region_2d(region, area.spaces.active.region_3d, Vector(point))
+    return round(region.x + spot.x), round(window.height - region.y - spot.y)
+
+
+def click(spot, button=1, pause=0.6):
+    stage.tool("mousemove", spot[0] - 3, spot[1])
+    yield 0.3
+    stage.tool("mousemove", *spot)
+    yield 0.3
+    stage.tool("click", button)
+    yield pause
+
+
+def keys(*names, pause=0.4):
+    for name in names:
+        stage.tool("key", name)
+        yield pause
 
 
 def hover(spot):
@@ -29,17 +49,24 @@ def until(reached, limit=20.0):
     yield 0.05
 
 
+def until_idle(limit=60.0):
+    yield from until(lambda: jobs.running() is None, limit)
+
+
+def until_live_rests(limit=30.0):
+    """Until the live shapes are refined and shown, if there are any."""
+    yield 0.1
+    yield from until(lambda: all(s.worker and s.worker.is_settled for s in sessions.live.values()), limit)
+    yield 0.1
+
+
 def is_followed():
     """Whether the shape has reached the handle that is dragged."""
-    from addon.live import sessions
-
     return all(s.worker is not None and s.worker.wait(0.0) for s in sessions.live.values())
 
 
 def is_dragging():
-    from addon.pin_tool.hover import hover
-
-    return hover.drag is not None
+    return hovering.drag is not None
 
 
 def release():

@@ -4,6 +4,9 @@
 import bpy
 import stage
 
+from addon.preferences import ARAPFIELDS_AP_preferences
+from addon.registration import CLASSES
+
 PANEL, ADVANCED = "ARAPFIELDS_PT_", "ARAPFIELDS_PT_advanced"
 HEADER, STEP = (1120, 97), 28.4  # the sidebar's first header, and from one closed section to the next
 INNER = 26.0  # from one closed section within Advanced to the next
@@ -37,8 +40,6 @@ def checks(found, folder):
 
 def rows(parent=None):
     """The sections that are drawn now, top to bottom: all, or those within another."""
-    from addon.registration import CLASSES
-
     with stage.override():
         found = [c for c in CLASSES if c.__name__.startswith(PANEL) and c.poll(bpy.context)]
     found = [c for c in found if getattr(c, "bl_parent_id", None) == parent]
@@ -96,7 +97,6 @@ def press(row, inner=0):
 
 def preferences(folder, name):
     """The add-on's preferences, drawn in a popup of their own."""
-    from addon.preferences import ARAPFIELDS_AP_preferences
 
     class Shown(bpy.types.Operator):
         bl_idname, bl_label = "wm.arapfields_preferences_shown", "ARAP Fields"

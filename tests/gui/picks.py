@@ -10,9 +10,11 @@ import numpy as np
 import stage
 from bpy_extras.view3d_utils import location_3d_to_region_2d, region_2d_to_origin_3d, region_2d_to_vector_3d
 from mathutils import Vector
-from mouse import until
+from mouse import pixel, until, until_live_rests
 from support.blender import scenes
-from use import edge_points, pixel
+from use import edge_points
+
+from addon.live import sessions
 
 ON_MESH, ON_HANDLE, ON_NOTHING = 4, 2, 2  # clicks; on each of the two handles
 BESIDE = 20.0  # pixels from an Empty's line at which a click can only mean what is behind it
@@ -31,11 +33,11 @@ STAGES = {  # one after another, and what is seen at each
 IN_PLACE = ("deformed", "in place", "live in place")
 
 
-def checks(found, folder, names=tuple(STAGES)):
+def checks(found, folder, in_place=False):
     stage.empty_file()
     with stage.override():
         bar, fixed, moving = scenes.bar_with_handles()
-        bar.arapfields.target = "NEW"
+        bar.arapfields.result = "NEW"
         moving.location.z += 0.6
         bpy.context.view_layer.update()
         scenes.activate(bar)
@@ -43,7 +45,7 @@ def checks(found, folder, names=tuple(STAGES)):
         bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
     yield 1.0
     rest, told = scenes.world_points(bar), {}
-    for name in names:
+    for name in IN_PLACE if in_place else STAGES:
         with stage.override():
             choose(bar)
         yield from enter(name, bar)
@@ -67,8 +69,6 @@ def choose(bar):
 
 
 def enter(name, bar):
-    from addon.live import sessions
-
     with stage.override():
         if name.startswith("live"):
             bpy.ops.arapfields.live("INVOKE_DEFAULT")
@@ -79,16 +79,13 @@ def enter(name, bar):
         elif name == "stylized":
             bpy.ops.arapfields.stylize("EXEC_DEFAULT", style="CUBE", **scenes.QUICK)
         elif name == "in place":
-            bar.arapfields.target = "MODIFIER"
+            bar.arapfields.result = "MODIFIER"
             bpy.ops.arapfields.deform("EXEC_DEFAULT", **scenes.QUICK)
     yield 0.5
     if name.startswith("live"):
-        yield from until(lambda: is_at_rest(sessions.live.get(bar.session_uid)), 60.0)
+        assert sessions.is_live(bar), name
+        yield from until_live_rests(60.0)
     yield 0.5
-
-
-def is_at_rest(session):
-    return session is not None and session.worker is not None and session.worker.is_settled
 
 
 def clicks(cell, mesh, empties, rest):

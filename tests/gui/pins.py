@@ -5,17 +5,25 @@ import subprocess
 import time
 
 import bpy
+import live
 import numpy as np
 import stage
 from mouse import drag, hover, is_followed, pixel, release, until
 from support.blender import scenes
 
+from addon.field_modifier import motion
+from addon.live import sessions
+from addon.live.prefetch import prefetch
+from addon.pin_tool import drag as dragging
+from addon.pin_tool import hover as hovering
+
 SECONDS = 5.0
 END = (0.9, -0.25, 0.0)  # on the bar's front
 
 
-def checks(found, folder):
-    yield from by_hand(found, folder)
+def checks(found, folder, rate_alone=False):
+    if not rate_alone:
+        yield from by_hand(found, folder)
     yield from first_and_rate(found, folder)
 
 
@@ -43,8 +51,6 @@ def state():
 
 
 def by_hand(found, folder):
-    from addon.live import sessions
-
     bar = set_stage()
     yield 0.5
     rest, before = scenes.world_points(bar), state()
@@ -150,14 +156,6 @@ def first_and_rate(found, folder):
 
     The solver has been set up while the cursor lay on the mesh.
     """
-    import live
-
-    from addon.field_modifier import motion
-    from addon.live import sessions
-    from addon.live.prefetch import prefetch
-    from addon.pin_tool import drag as dragging
-    from addon.pin_tool import hover as hovering
-
     bar = set_stage(dense=True)
     _, area, _ = stage.view()
     area.spaces.active.overlay.show_overlays = False
@@ -205,7 +203,7 @@ def first_and_rate(found, folder):
     area.spaces.active.overlay.show_overlays = True
     empty = bar.arapfields.handles[0].empty
     own = time.process_time()
-    found["pins_without_drawing"] = live.without_drawing(empty, sessions)
+    found["pins_without_drawing"] = live.without_drawing(empty)
     rate = found["pins_without_drawing"]["updates_per_second"]
     own = (time.process_time() - own) / (rate * live.SECONDS / 2)
     found["pins_without_drawing"]["per_processor_second"] = round(1 / own, 1)

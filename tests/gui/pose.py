@@ -2,7 +2,7 @@
 """A dog of our own is posed with the pin tool, by seven clicks and drags; a picture after each.
 
 python tests/gui/pose.py DOG.npz writes the dog's mesh (it needs scikit-image);
-blender --factory-startup --python tests/gui/pose.py -- OUTPUT_FOLDER DOG.npz poses it, by xdotool.
+blender --factory-startup --python tests/gui/window.py -- OUTPUT_FOLDER pose=DOG.npz poses it, by xdotool.
 """
 
 import sys
@@ -52,7 +52,7 @@ def load(path):
     return dog
 
 
-def steps(folder, path, found):
+def checks(path, found, folder):
     import bpy
     import mouse
     import numpy as np
@@ -95,28 +95,9 @@ def steps(folder, path, found):
         stage.picture(folder, f"pose-{number}")
     found["names"] = [entry.empty.name for entry in dog.arapfields.handles]
     found["anchors"] = [entry.anchor for entry in dog.arapfields.handles]
-    found["actions"], found["pins"] = len(ACTIONS), len(dog.arapfields.handles)
     found["moved"] = round(float(np.linalg.norm(scenes.world_points(dog) - rest, axis=1).max()), 3)
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "pose.blend"))
 
 
-def main():
-    import json
-
-    folder, path = Path(sys.argv[-2]), sys.argv[-1]
-    sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests/gui")]
-    import stage
-
-    found = {}
-
-    def ended(error):
-        found.update({"error": error} if error else {"finished": True})
-        (folder / "pose.json").write_text(json.dumps(found, indent=1))
-
-    stage.start(lambda: steps(folder, path, found), ended, folder)
-
-
-if "--" in sys.argv:
-    main()
-elif __name__ == "__main__":
+if __name__ == "__main__":
     write(sys.argv[1])

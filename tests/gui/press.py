@@ -6,7 +6,11 @@ import time
 import bpy
 import numpy as np
 import stage
+from mouse import until, until_idle
 from support.blender import scenes
+
+from addon.core.runtime import jobs
+from addon.field_modifier import motion
 
 LIMIT = 60.0  # seconds until a result is given up
 ROUNDS = 2
@@ -58,9 +62,6 @@ def shape(bar):
 
 def one(rounds, name, folder):
     """Seconds to the first picture of a moved mesh and to the last one, and how they differ."""
-    from addon.core.runtime import jobs
-    from addon.field_modifier import motion
-
     bar = set_stage()
     yield 2.0
     before, rest, written = stage.everything(), shape(bar), []
@@ -111,19 +112,11 @@ def seconds_to(drawn, written, begin):
 
 
 def until_shown(bar, rest):
-    from addon.core.runtime import jobs
-
-    begin = time.perf_counter()
-    while jobs.running() is not None and time.perf_counter() - begin < LIMIT:
-        yield 0.01
-        if not np.array_equal(shape(bar), rest):
-            return
+    yield from until(lambda: jobs.running() is None or not np.array_equal(shape(bar), rest), LIMIT)
 
 
 def cancelled(name, folder):
     """A job that is cancelled when its first result is there, over nothing and over a result before it."""
-    from addon.core.runtime import jobs
-
     exact = []
     for earlier in (False, True):
         bar = set_stage()
@@ -136,8 +129,7 @@ def cancelled(name, folder):
         yield from until_shown(bar, rest)
         was_shown = jobs.running() is not None
         bpy.ops.arapfields.cancel()
-        while jobs.running() is not None:
-            yield 0.02
+        yield from until_idle()
         yield 0.3
         exact.append(was_shown and stage.everything() == before and np.array_equal(shape(bar), rest))
     return exact
@@ -145,16 +137,13 @@ def cancelled(name, folder):
 
 def with_steps_between(found):
     """A step that was pushed while the first result was shown holds nothing of it."""
-    from addon.core.runtime import jobs
-
     bar = set_stage()
     yield 1.0
     before, rest = stage.everything(), shape(bar)
     press("deform")
     yield from until_shown(bar, rest)
     bpy.ops.ed.undo_push(message="between")
-    while jobs.running() is not None:
-        yield 0.02
+    yield from until_idle()
     yield 0.3
     moved = not np.array_equal(shape(bar), rest)
     with stage.override():

@@ -8,6 +8,8 @@ import stage
 from mouse import until
 from support.blender import scenes
 
+from addon.live import sessions
+
 FIRST, LAST = 1, 5
 SIZE, WIDTH = 240, 3.2  # of a picture in pixels, and of what it shows
 AGREES = 1.5 * WIDTH / SIZE  # one and a half pixels
@@ -25,7 +27,7 @@ def set_stage(target):
         for frame, height in ((FIRST, 0.0), (LAST, 0.5)):
             moving.location.z = height
             moving.keyframe_insert("location", frame=frame)
-        bar.arapfields.target = target
+        bar.arapfields.result = target
         scenes.activate(bar)
         scene = scenes.camera(SIZE)
         scene.frame_set(FIRST)
@@ -36,8 +38,6 @@ def set_stage(target):
 
 
 def calm(bar):
-    from addon.live import sessions
-
     yield 0.3
     yield from until(lambda: is_at_rest(sessions.live.get(bar.session_uid)), 30.0)
     yield 0.3
@@ -50,8 +50,6 @@ def is_at_rest(session):
 
 
 def one(found, folder, target):
-    from addon.live import sessions
-
     bar, scene = set_stage(target)
     yield from calm(bar)
     name = "Bar" if target == "MODIFIER" else "Bar_live"

@@ -2,6 +2,7 @@
 """What the checks in Blender's window share: where to act, pictures, meters of time."""
 
 import contextlib
+import json
 import os
 import subprocess
 import time
@@ -10,38 +11,46 @@ import traceback
 import bpy
 import numpy as np
 from support.blender import scenes
+from verdicts import failures
+
+import addon
+from addon.names import PROPERTY
 
 PATIENCE = float(os.environ.get("ARAPFIELDS_PATIENCE", "1"))  # times the pauses, for a busy machine
 TAB = (1299, 340)  # where the sidebar's last tab lies in a window of 1600 × 1000
 
 
-def start(steps, ended, folder):
-    """Runs the generator `steps()` of pauses in seconds beside Blender's events, with the add-on switched on
-    unless it is installed.
-
-    Then calls `ended(error)`, the error being a traceback or None, and leaves Blender.
+def start(steps, names, folder):
+    """Runs the generator `steps(found, folder)` of pauses in seconds beside Blender's events, with the add-on
+    switched on unless it is installed. Then leaves Blender; exit code 1, and a line each, for what is wrong.
     """
-    import addon.names
-
+    found = {}
     bpy.context.preferences.view.show_splash = False
     folder.mkdir(parents=True, exist_ok=True)
-    if not hasattr(bpy.types.Object, addon.names.PROPERTY):
+    if not hasattr(bpy.types.Object, PROPERTY):
         addon.register()
-    sequence = steps()
+    sequence = steps(found, folder)
 
     def drive():
-        error = None
         try:
             return PATIENCE * next(sequence)
         except StopIteration:
             pass
         except Exception:
-            error = traceback.format_exc()
-        ended(error)
-        bpy.ops.wm.quit_blender()
+            found["error"] = traceback.format_exc()
+        end(found, names, folder)
         return None
 
     bpy.app.timers.register(drive, first_interval=1.0, persistent=True)
+
+
+def end(found, names, folder):
+    wrong = failures(found, names)
+    (folder / "checks.json").write_text(json.dumps({**found, "wrong": wrong}, indent=1))
+    print("\n".join(f"WRONG {line}" for line in wrong) or f"{', '.join(names)}: as expected", flush=True)
+    if wrong:
+        os._exit(1)  # quit_blender() gives no exit code
+    bpy.ops.wm.quit_blender()
 
 
 def view():

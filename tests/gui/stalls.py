@@ -11,7 +11,11 @@ import time
 import bpy
 import numpy as np
 import stage
+from mouse import until_idle
 from support.blender import scenes
+
+from addon.core.runtime import jobs, threads
+from addon.jobs import display, modal
 
 LONG = {**scenes.NEW, "field": "neural", "iterations": 100000, "width": 256, "layers": 4, "batch": 300}
 SECONDS = 4.0
@@ -28,9 +32,6 @@ def checks(found, folder):
 
 
 def parts(found):
-    from addon.core.runtime import threads
-    from addon.jobs import display, modal
-
     yield from scene()
     yield from lateness(found, "at_rest")
     for kind in ("nothing", "STATUSBAR", "UI", "WINDOW"):
@@ -61,8 +62,6 @@ def scene():
 
 
 def with_a_job(found, name):
-    from addon.core.runtime import jobs
-
     with stage.override():
         scenes.activate(bpy.data.objects["Bar"])
         bpy.ops.arapfields.deform("INVOKE_DEFAULT", **LONG)
@@ -77,8 +76,7 @@ def with_a_job(found, name):
         for kind in ("UI", "WINDOW"):
             yield from one_redraw(found[name], kind)
     bpy.ops.arapfields.cancel()
-    while jobs.running() is not None:
-        yield 0.05
+    yield from until_idle()
     yield from at_rest()
 
 

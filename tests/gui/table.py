@@ -10,8 +10,11 @@ import subprocess
 
 import bpy
 import stage
-from mouse import until
+from mouse import until_idle, until_live_rests
 from support.blender import scenes, stages
+
+from addon.core.runtime import jobs
+from addon.live import sessions
 
 WHICH = ("source", "handle", "result")
 STAGES = ("idle", "job", "live", "bake")
@@ -99,8 +102,6 @@ ACTIONS |= {function.__name__: function for function in (deleted, duplicated, hi
 
 
 def one(cell, which, action, name):
-    from addon.core.runtime import jobs
-
     with stage.override():
         bpy.ops.wm.read_homefile(use_empty=True, load_ui=False)
     yield 0.2
@@ -110,12 +111,12 @@ def one(cell, which, action, name):
     with stages.watched() as errors:
         ACTIONS[action](item_of(which))
         yield 0.3
-        yield from until(lambda: jobs.running() is None, LIMIT)
-        yield from calm()
+        yield from until_idle(LIMIT)
+        yield from until_live_rests(20.0)
         if name == "live":
             drag_on()
             yield 0.2
-            yield from calm()
+            yield from until_live_rests(20.0)
         said = " ".join(text for _, text in jobs.messages())
         if name in ("job", "bake") and action in stages.ENDS_WORK and not said:
             said = "ended"
@@ -126,8 +127,6 @@ def one(cell, which, action, name):
 
 
 def judge(cell, action, name, which, said):
-    from addon.core.runtime import jobs
-
     try:
         stages.after(action, name, which, said)
         with stage.override():
@@ -158,7 +157,7 @@ def begin(which, name):
         bpy.ops.ed.undo_push(message="before")
         if name == "live":
             bpy.ops.arapfields.live("INVOKE_DEFAULT")
-    yield from calm()
+    yield from until_live_rests(20.0)
     with stage.override():
         if name == "live":
             bpy.ops.ed.undo_push(message="live")
@@ -177,19 +176,7 @@ def item_of(which):
 
 
 def at_stage(name):
-    from addon.core.runtime import jobs
-    from addon.live import sessions
-
     return {"idle": True, "live": bool(sessions.live)}.get(name, jobs.running() is not None)
-
-
-def calm():
-    """Until the live shape has come to rest, where there is one."""
-    from addon.live import sessions
-
-    yield 0.1
-    yield from until(lambda: all(s.worker and s.worker.is_settled for s in sessions.live.values()), 20.0)
-    yield 0.1
 
 
 def drag_on():
@@ -200,8 +187,6 @@ def drag_on():
 
 
 def seen(said):
-    from addon.live import sessions
-
     item = stages.source()
     parts = []
     if item is not None:

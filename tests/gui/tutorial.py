@@ -1,24 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The tutorial of docs/tutorial.md, step by step in a real Blender's window; makes its pictures.
 
-blender --factory-startup --python tests/gui/tutorial.py -- OUTPUT_FOLDER
 Pictures need ImageMagick's `import`, and xdotool for the mouse. A window of 1600 × 1000 is assumed.
 """
 
 import math
-import sys
-from pathlib import Path
 
 import bpy
+import numpy as np
+import panel
+import stage
 from mathutils import Euler, Matrix, Vector
-
-ROOT = Path(__file__).resolve().parents[2]
-OUTPUT = Path(sys.argv[sys.argv.index("--") + 1])
-sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests/gui")]
-
-import panel  # noqa: E402
-import stage  # noqa: E402
-from support.blender import scenes  # noqa: E402
+from support.blender import scenes
 
 JAW = ((0.0, -0.35, -0.52), (0.50, 0.62, 0.46))
 EAR = ((1.12, 0.32, 0.17), (0.30, 0.36, 0.40))
@@ -34,14 +27,14 @@ def look():
         view.view_rotation = Euler((math.radians(76), 0, math.radians(24))).to_quaternion()
 
 
-def picture(name, sections):
+def picture(folder, name, sections):
     yield from panel.open_alone(sections)
     stage.tool("mousemove", 500, 940)
     yield 4.0
-    stage.picture(OUTPUT, f"tutorial-{name}", SHOWN)
+    stage.picture(folder, f"tutorial-{name}", SHOWN)
 
 
-def steps():
+def checks(found, folder):
     stage.empty_file()
     with stage.override():
         bpy.ops.mesh.primitive_monkey_add()
@@ -58,22 +51,20 @@ def steps():
             Matrix.Translation((0.1, 0, 0.12)) @ pivot @ turn @ pivot.inverted() @ ear.matrix_world
         )
         scenes.activate(suzanne)
+    found["handles"] = len(suzanne.arapfields.handles)
+    rest = scenes.world_points(suzanne)
     look()
     yield from stage.open_sidebar()
-    yield from picture("handles", {"source", "handles", "deform"})
+    yield from picture(folder, "handles", {"source", "handles", "deform"})
     with stage.override():
         bpy.ops.arapfields.deform(output="WARP")
-    yield from picture("deformed", {"source", "deform"})
+    deformed = scenes.world_points(suzanne)
+    found["deformed_by"] = round(float(np.abs(deformed - rest).max()), 3)
+    yield from picture(folder, "deformed", {"source", "deform"})
     with stage.override():
         scenes.activate(suzanne)
         bpy.ops.arapfields.stylize(style="CUBE")
+        found["stylized_by"] = round(float(np.abs(scenes.world_points(suzanne) - deformed).max()), 3)
         for item in bpy.data.objects:
             item.hide_set(item != suzanne)
-    yield from picture("style", {"source", "stylize"})
-
-
-def ended(error):
-    print(error or "tutorial done", flush=True)
-
-
-stage.start(steps, ended, OUTPUT)
+    yield from picture(folder, "style", {"source", "stylize"})

@@ -42,7 +42,7 @@ def checks(found, folder, kinds=("rested", "within", "escaped")):
 KINDS = ("objects", "meshes", "node_groups", "scenes", "collections")
 
 
-def told(found, name, exact):
+def record(found, name, exact):
     found[f"undo_{name}"] = {"exact": sum(exact), "of": len(exact)}
     if len(exact) % STRIDE == 0:
         print(name, found[f"undo_{name}"], flush=True)
@@ -56,7 +56,7 @@ def rested(found, before, after):
             stage.tool("key", key)
             yield from until(lambda wanted=wanted: state() == wanted, 5.0)
             exact.append(state() == wanted)
-            told(found, "after_drags", exact)
+            record(found, "after_drags", exact)
 
 
 def within(found, after):
@@ -78,14 +78,14 @@ def within(found, after):
         stage.tool("key", "ctrl+z")
         yield from until(lambda: state() == after and not is_dragging(), 5.0)
         exact.append(held and state() == after)
-        told(found, "within_drags", exact)
+        record(found, "within_drags", exact)
         stage.tool("key", "ctrl+shift+z")
         yield from until(lambda: state() != after, 5.0)
         again = state()
         stage.tool("key", "ctrl+z")
         yield from until(lambda: state() == after, 5.0)
         exact.append(again != after and len(bpy.data.objects) == 2 and state() == after)
-        told(found, "within_drags", exact)
+        record(found, "within_drags", exact)
 
 
 def escaped(found, after):
@@ -102,4 +102,4 @@ def escaped(found, after):
             stage.tool("key", "ctrl+z")
         yield from until(lambda: state() == after, 5.0)
         exact.append(state() == after)
-        told(found, "escaped", exact)
+        record(found, "escaped", exact)

@@ -2,10 +2,13 @@
 """Faces of boxes, search and the status bar, as the mouse finds them."""
 
 import bpy
+import jobs as window_jobs
 import stage
-from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
+from mouse import pixel, until_idle
 from support.blender import scenes
+
+from addon.core.runtime import jobs
 
 CANCEL = (45, 12)  # pixels from the window's lower right corner to the middle of the status bar's button
 
@@ -14,13 +17,6 @@ def checks(found, folder):
     yield from face(found, folder)
     yield from search(found, folder)
     yield from cancel(found, folder)
-
-
-def pixel(point):
-    """Where a point of the world is on the screen, from its top left."""
-    window, _, region = stage.view()
-    seen = location_3d_to_region_2d(region, stage.view()[1].spaces.active.region_3d, Vector(point))
-    return round(region.x + seen.x), round(window.height - region.y - seen.y)
 
 
 def edge_points(empty, count):
@@ -82,10 +78,6 @@ def search(found, folder):
 
 def cancel(found, folder):
     """The status bar's button ends a job, whatever the sidebar shows."""
-    import jobs as window_jobs
-
-    from addon.core.runtime import jobs
-
     window, area, _ = stage.view()
     area.spaces.active.show_region_ui = False
     window_jobs.invoke(window_jobs.LONG)
@@ -93,7 +85,7 @@ def cancel(found, folder):
     stage.picture(folder, "status-bar")
     running = jobs.running() is not None
     stage.tool("mousemove", window.width - CANCEL[0], window.height - CANCEL[1], "click", 1)
-    yield from window_jobs.until_idle(20)
+    yield from until_idle(20)
     found["cancelled_in_the_status_bar"] = running and jobs.running() is None
     area.spaces.active.show_region_ui = True
     yield 1.0

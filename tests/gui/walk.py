@@ -1,43 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The tutorial walked by mouse and keys alone, and what a newcomer finds us by; a picture after each step.
 
-blender --python tests/gui/walk.py -- OUTPUT_FOLDER
 For the first words that the extension says, it is installed; else the add-on of this clone is switched on. A
 window of 1600 × 1000 is assumed.
 """
 
-import json
-import sys
-from pathlib import Path
-
 import bpy
 import numpy as np
+import panel
+import stage
+import use
+from mouse import click, keys, pixel, until, until_idle
+from support.blender import scenes
+from tutorial import EAR, JAW
 
-ROOT = Path(__file__).resolve().parents[2]
-OUTPUT = Path(sys.argv[sys.argv.index("--") + 1])
-sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests/gui")]
-
-import panel  # noqa: E402
-import stage  # noqa: E402
-import use  # noqa: E402
-from mouse import until  # noqa: E402
-from support.blender import scenes  # noqa: E402
-
-FOUND = {}
 F3, MINUS = "69", "20"  # their codes: by their names the X server may press Alt too
 MIDDLE = (560, 520)  # of the 3D view
-JAW = ((0.0, -0.35, -0.52), (0.50, 0.62, 0.46))
-EAR = ((1.12, 0.32, 0.17), (0.30, 0.36, 0.40))
 # In the sidebar with one section open alone: the list's + and its rows, Deform and Stylize.
 PLUS, FROM_EMPTIES, SECOND_ROW = (1261, 159), (1340, 180), (1130, 181)
 DEFORM, STYLIZE = (1140, 223), (1140, 313)
 FIT, FIT_SURFACE = (1252, 25), (1130, 80)  # below the header of Implicit Surface, within Advanced
-
-
-def keys(*names, pause=0.4):
-    for name in names:
-        stage.tool("key", name)
-        yield pause
 
 
 def words(text, pause=1.0):
@@ -53,15 +35,6 @@ def number(value):
     yield from keys("Return", pause=0.6)
 
 
-def click(x, y, button=1, pause=1.2):
-    stage.tool("mousemove", x - 3, y)
-    yield 0.3
-    stage.tool("mousemove", x, y)
-    yield 0.3
-    stage.tool("click", button)
-    yield pause
-
-
 def over_the_view():
     stage.tool("mousemove", *MIDDLE)
     yield 0.5
@@ -74,25 +47,25 @@ def searched(text):
     yield from words(text, 2.0)
 
 
-def shot(name):
+def shot(folder, name):
     yield 0.6
-    stage.picture(OUTPUT, f"walk-{name}")
+    stage.picture(folder, f"walk-{name}")
 
 
-def found_by_name():
-    yield from shot("welcome")
+def found_by_name(found, folder):
+    yield from shot(folder, "welcome")
     yield from keys("Escape")
     for text in ("arap", "pin", "deform", "stylize"):
         yield from searched(text)
-        yield from shot(f"f3-{text}")
+        yield from shot(folder, f"f3-{text}")
         yield from keys("Escape", "Escape")
     with stage.override():
         bpy.ops.wm.call_menu(name="VIEW3D_MT_empty_add")
-    yield from shot("empties")
+    yield from shot(folder, "empties")
     yield from keys("Escape", pause=1.0)
 
 
-def monkey():
+def monkey(found, folder):
     for item in list(bpy.data.objects):  # the tutorial begins with Suzanne alone
         item.select_set(item.type == "MESH")
     yield from over_the_view()
@@ -100,7 +73,7 @@ def monkey():
     yield from keys("Return", pause=1.0)
     yield from searched("add mesh monkey")
     yield from keys("Return", pause=2.0)
-    FOUND["suzanne"] = [item.name for item in bpy.data.objects if item.type == "MESH"]
+    found["suzanne"] = [item.name for item in bpy.data.objects if item.type == "MESH"]
     yield from over_the_view()
     yield from keys("ctrl+2", pause=1.5)
     yield from searched("shade smooth")
@@ -109,17 +82,17 @@ def monkey():
     yield from keys("n", pause=1.5)
     stage.tool("mousemove", *stage.TAB, "click", 1)
     yield 1.5
-    FOUND["modifiers"] = [m.type for m in bpy.context.object.modifiers]
-    yield from shot("suzanne")
+    found["modifiers"] = [m.type for m in bpy.context.object.modifiers]
+    yield from shot(folder, "suzanne")
 
 
-def cube_empty(location, scale, picture=""):
+def cube_empty(folder, location, scale, picture=""):
     """Add › Empty › Cube by what is typed into the menu, then G and S an axis at a time."""
     yield from over_the_view()
     yield from keys("shift+a", pause=1.5)
     yield from words("empty cube", 1.5)
     if picture:
-        yield from shot(picture)
+        yield from shot(folder, picture)
     yield from keys("Return", pause=1.0)
     yield from over_the_view()
     for key, values in (("g", location), ("s", scale)):
@@ -131,51 +104,53 @@ def cube_empty(location, scale, picture=""):
 def spot(item):
     """A pixel at which a click means that object."""
     if item.type == "EMPTY":
-        return use.pixel(next(use.edge_points(item, 1)))
+        return pixel(next(use.edge_points(item, 1)))
     points = scenes.world_points(item)
-    x, y = use.pixel(points[points[:, 2].argmax()])
+    x, y = pixel(points[points[:, 2].argmax()])
     return x, y + 15  # just below the top of her head
 
 
-def handles():
-    yield from cube_empty(*JAW, picture="add-empty")
-    yield from cube_empty(*EAR)
+def handles(found, folder):
+    yield from cube_empty(folder, *JAW, picture="add-empty")
+    yield from cube_empty(folder, *EAR)
     empties = [item for item in bpy.data.objects if item.type == "EMPTY"]
-    FOUND["empties"] = [[round(v, 3) for v in (*item.location, *item.scale)] for item in empties]
+    found["empties"] = [[round(v, 3) for v in (*item.location, *item.scale)] for item in empties]
     suzanne = next(item for item in bpy.data.objects if item.type == "MESH")
     for place, item in enumerate((*empties, suzanne)):
         if place == 1:
             stage.tool("keydown", "shift")
-        yield from click(*spot(item))
+        yield from click(spot(item), pause=1.2)
     stage.tool("keyup", "shift")
-    FOUND["selected"] = [item.name for item in bpy.context.selected_objects]
-    FOUND["active"] = bpy.context.object.name
+    found["selected"] = [item.name for item in bpy.context.selected_objects]
+    found["active"] = bpy.context.object.name
     yield from panel.open_alone({"handles"})
-    yield from click(*PLUS)
-    yield from shot("plus")
-    yield from click(*FROM_EMPTIES)
-    FOUND["handles"] = [(e.empty.name, e.inside) for e in suzanne.arapfields.handles]
-    yield from click(*SECOND_ROW)
-    FOUND["row_selects"] = bpy.context.object.name
-    yield from shot("handles")
+    yield from click(PLUS, pause=1.2)
+    yield from shot(folder, "plus")
+    yield from click(FROM_EMPTIES, pause=1.2)
+    found["handles"] = [(e.empty.name, e.inside) for e in suzanne.arapfields.handles]
+    yield from click(SECOND_ROW, pause=1.2)
+    found["row_selects"] = bpy.context.object.name
+    yield from shot(folder, "handles")
     yield from over_the_view()
     for names, value in ((("r", "y"), -55), (("g", "x"), 0.08), (("g", "z"), 0.38)):
         yield from keys(*names, pause=0.3)
         yield from number(value)
 
 
-def surface():
+def surface(found, folder):
     """The tutorial's fifth step as far as the fit."""
     suzanne = next(item for item in bpy.data.objects if item.type == "MESH")
     yield from panel.open_alone({"advanced"})
     row = panel.rows().index("advanced") + 1
     y = yield from inner("surface", row)
-    yield from click(FIT[0], y + FIT[1])
-    yield from shot("surface")
-    yield from click(FIT_SURFACE[0], y + FIT_SURFACE[1], pause=0.5)
-    yield from until_idle()
-    yield from shot("fitted")
-    FOUND["fitted"] = bool(suzanne.arapfields.fit_report)
+    yield from click((FIT[0], y + FIT[1]), pause=1.2)
+    yield from shot(folder, "surface")
+    yield from click((FIT_SURFACE[0], y + FIT_SURFACE[1]), pause=0.5)
+    yield 1.0
+    yield from until_idle(300.0)
+    yield 1.5
+    yield from shot(folder, "fitted")
+    found["fitted"] = bool(suzanne.arapfields.fit_report)
 
 
 def inner(section, row):
@@ -185,46 +160,32 @@ def inner(section, row):
     return round(panel.HEADER[1] + panel.STEP * row + panel.INNER * place)
 
 
-def results():
+def results(found, folder):
     suzanne = next(item for item in bpy.data.objects if item.type == "MESH")
     rest = scenes.world_points(suzanne)
     yield from panel.open_alone({"deform"})
-    yield from click(*DEFORM, button=3, pause=1.5)
-    yield from shot("right-click")
+    yield from click(DEFORM, button=3, pause=1.5)
+    yield from shot(folder, "right-click")
     yield from keys("Escape", pause=1.0)
-    yield from click(*DEFORM, pause=0.0)
+    yield from click(DEFORM, pause=0.0)
     yield from until(lambda: "ARAP Fields" in suzanne.modifiers, 10.0)
-    yield from shot("deforming")
-    yield from until_idle()
-    FOUND["deformed_by"] = round(float(np.abs(scenes.world_points(suzanne) - rest).max()), 3)
-    FOUND["stack"] = [m.name for m in suzanne.modifiers]
-    yield from shot("deformed")
+    yield from shot(folder, "deforming")
+    yield 1.0
+    yield from until_idle(300.0)
+    yield 1.5
+    found["deformed_by"] = round(float(np.abs(scenes.world_points(suzanne) - rest).max()), 3)
+    found["stack"] = [m.name for m in suzanne.modifiers]
+    yield from shot(folder, "deformed")
     deformed = scenes.world_points(suzanne)
     yield from panel.open_alone({"stylize"})
-    yield from click(*STYLIZE, pause=0.0)
-    yield from until_idle()
-    FOUND["stylized_by"] = round(float(np.abs(scenes.world_points(suzanne) - deformed).max()), 3)
-    yield from shot("stylized")
-
-
-def until_idle():
+    yield from click(STYLIZE, pause=0.0)
     yield 1.0
-    yield from until(lambda: not bpy.ops.arapfields.cancel.poll(), 300.0)
+    yield from until_idle(300.0)
     yield 1.5
+    found["stylized_by"] = round(float(np.abs(scenes.world_points(suzanne) - deformed).max()), 3)
+    yield from shot(folder, "stylized")
 
 
-def steps():
-    yield from found_by_name()
-    yield from monkey()
-    yield from handles()
-    yield from results()
-    yield from surface()
-
-
-def ended(error):
-    FOUND.update({"error": error} if error else {"finished": True})
-    (OUTPUT / "walk.json").write_text(json.dumps(FOUND, indent=1))
-    print(error or "walked", flush=True)
-
-
-stage.start(steps, ended, OUTPUT)
+def checks(found, folder):
+    for part in (found_by_name, monkey, handles, results, surface):
+        yield from part(found, folder)

@@ -1,88 +1,76 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run by a real Blender with a window: jobs, live mode, the panel. docs/development.md says how.
+"""Run by a real Blender with a window: the parts named, or all that share one. docs/development.md says how.
 
 blender --factory-startup --python tests/gui/window.py -- OUTPUT_FOLDER [PART ...]
-Parts are panel, use, picks, jobs, stalls, live, press, pins, undo, render, table, wrap and endings; all where
-none is named. Of some there are shorter ones: picks-in-place, pins-rate, undo-within and undo-escaped. Writes
-checks.json, and pictures where ImageMagick's `import` is at hand; xdotool moves the mouse.
-Ends with a job running, which must not hold it.
+blender --factory-startup --python tests/gui/window.py -- OUTPUT_FOLDER film=PINS.blend
+Writes checks.json and pictures, says what is wrong, and leaves Blender with exit code 1 for that.
+tests/gui/verdicts.py has what each part must find. ImageMagick's `import` takes pictures; xdotool moves the
+mouse.
 """
 
-import json
+import functools
+import importlib
 import sys
 from pathlib import Path
 
 import bpy
 
 ROOT = Path(__file__).resolve().parents[2]
-OUTPUT, *PARTS = sys.argv[sys.argv.index("--") + 1 :]
-OUTPUT = Path(OUTPUT)
+OUTPUT, *GIVEN = sys.argv[sys.argv.index("--") + 1 :]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests/gui")]
 
-import jobs  # noqa: E402
-import live  # noqa: E402
-import panel  # noqa: E402
-import picks  # noqa: E402
-import pins  # noqa: E402
-import press  # noqa: E402
-import render  # noqa: E402
 import stage  # noqa: E402
-import stalls  # noqa: E402
-import table  # noqa: E402
-import undo  # noqa: E402
-import use  # noqa: E402
-import wrapping  # noqa: E402
 from support.blender import scenes  # noqa: E402
 
 import addon  # noqa: E402
 
-FOUND = {}
-WITHIN_OTHERS = ("picks-in-place", "pins-rate", "undo-within", "undo-escaped")
+TOGETHER = {name: (name, {}) for name in ("panel", "use", "picks", "jobs", "stalls", "live", "press", "pins")}
+TOGETHER |= {name: (name, {}) for name in ("undo", "render", "table")} | {"wrap": ("wrapping", {})}
+TOGETHER |= {"endings": ("jobs", {"ending": True})}
+SHORTER = {
+    "picks-in-place": ("picks", {"in_place": True}),
+    "pins-rate": ("pins", {"rate_alone": True}),
+    "undo-within": ("undo", {"kinds": ("within",)}),
+    "undo-escaped": ("undo", {"kinds": ("escaped",)}),
+}
+ALONE = ("film", "pose", "walk", "tutorial")  # each in a Blender of its own
 
 
-def steps():
-    """Yields seconds to wait; between them Blender's event loop runs."""
-    parts = {
-        "panel": lambda: panel.checks(FOUND, OUTPUT),
-        "use": lambda: use.checks(FOUND, OUTPUT),
-        "picks": lambda: picks.checks(FOUND, OUTPUT),
-        "picks-in-place": lambda: picks.checks(FOUND, OUTPUT, picks.IN_PLACE),
-        "jobs": lambda: jobs.checks(FOUND, OUTPUT),
-        "stalls": lambda: stalls.checks(FOUND, OUTPUT),
-        "live": lambda: live.checks(FOUND, OUTPUT),
-        "press": lambda: press.checks(FOUND, OUTPUT),
-        "pins": lambda: pins.checks(FOUND, OUTPUT),
-        "pins-rate": lambda: pins.first_and_rate(FOUND, OUTPUT),
-        "undo": lambda: undo.checks(FOUND, OUTPUT),
-        "undo-within": lambda: undo.checks(FOUND, OUTPUT, ("within",)),
-        "undo-escaped": lambda: undo.checks(FOUND, OUTPUT, ("escaped",)),
-        "render": lambda: render.checks(FOUND, OUTPUT),
-        "table": lambda: table.checks(FOUND, OUTPUT),
-        "wrap": lambda: wrapping.checks(FOUND, OUTPUT),
-        "endings": lambda: jobs.endings(FOUND),
-    }
+def checks(module, **given):
+    return functools.partial(importlib.import_module(module).checks, **given)
+
+
+def together(found, folder, names):
+    """Yields seconds to wait, in which Blender's event loop runs. Ends with a job, which must not hold it."""
     stage.empty_file()
     with stage.override():
         scenes.bar_with_handles()
         bpy.ops.view3d.view_all()
     yield from stage.open_sidebar()
-    for name in PARTS or [name for name in parts if name not in WITHIN_OTHERS]:
-        yield from parts[name]()
+    for name in names:
+        module, given = {**TOGETHER, **SHORTER}[name]
+        yield from checks(module, **given)(found, folder)
     addon.unregister()
-    FOUND["switched_off"] = not hasattr(bpy.types.Object, "arapfields")
+    found["switched_off"] = not hasattr(bpy.types.Object, "arapfields")
     addon.register()
     stage.empty_file()
     with stage.override():
         scenes.bar_with_handles()
         bpy.ops.arapfields.live("INVOKE_DEFAULT")
-        bpy.data.objects["Bar"].arapfields.target = "NEW"  # the live one itself would refuse
-    jobs.invoke(jobs.LONG)
+        bpy.data.objects["Bar"].arapfields.result = "NEW"  # the live one itself would refuse
+        bpy.ops.arapfields.deform("INVOKE_DEFAULT", **scenes.NEW | {"iterations": 200000})
     yield 0.5
 
 
-def ended(error):
-    FOUND.update({"error": error} if error else {"finished": True})
-    (OUTPUT / "checks.json").write_text(json.dumps(FOUND, indent=1))
+def main():
+    names = [given.split("=")[0] for given in GIVEN] or list(TOGETHER)
+    if names[0] in ALONE:
+        steps = functools.partial(
+            checks(names[0]), *(Path(given.split("=")[1]) for given in GIVEN if "=" in given)
+        )
+    else:
+        steps = functools.partial(together, names=names)
+    stage.start(steps, names, Path(OUTPUT))
 
 
-stage.start(steps, ended, OUTPUT)
+main()

@@ -9,8 +9,11 @@ import numpy as np
 import panel
 import stage
 from mathutils import Vector
-from mouse import pixel, until
+from mouse import click, keys, pixel, until_idle
 from support.blender import character, scenes, wraps
+
+from addon.blender import modifier_stack
+from addon.core.runtime import jobs
 
 SCAN_AT = Vector((2.0, 0, 0))
 # In the sidebar, of a window of 1600 × 1000, with Wrap alone open.
@@ -65,20 +68,6 @@ def choose_target(found, folder):
     found["wrap_target_by_eyedropper"] = body.arapfields.wrap.onto == scan
 
 
-def click(spot, button=1, pause=0.6):
-    stage.tool("mousemove", spot[0] - 3, spot[1])
-    yield 0.3
-    stage.tool("mousemove", *spot)
-    yield 0.3
-    stage.tool("click", button)
-    yield pause
-
-
-def key(name, pause=0.6):
-    stage.tool("key", name)
-    yield pause
-
-
 def click_landmarks(found, folder):
     """Five pairs; the first half and the first pair are taken back by Backspace and clicked again."""
     entries = bpy.data.objects["Body"].arapfields.wrap.landmarks
@@ -87,16 +76,16 @@ def click_landmarks(found, folder):
     yield from click(BUTTON)
     yield from click(inward(pairs[0][0], middle[0]))
     stage.picture(folder, "wrap-half-a-pair")
-    yield from key("BackSpace")
+    yield from keys("BackSpace")
     for number, pair in enumerate((pairs[0], *pairs)):
         for end, inner in zip(pair, middle, strict=True):
             yield from click(inward(end, inner))
         if number == 0:
             found["wrap_first_pair"] = len(entries)
-            yield from key("BackSpace")
+            yield from keys("BackSpace")
             found["wrap_taken_back"] = len(entries)
     stage.picture(folder, "wrap-clicked")
-    yield from key("Return")
+    yield from keys("Return")
     away = [
         round(float((Vector(end.matrix_world.translation) - where).length), 3)
         for entry, pair in zip(entries, pairs, strict=True)
@@ -122,16 +111,16 @@ def press(found, folder):
     body, rig = bpy.data.objects["Body"], bpy.data.objects["Rig"]
     rest, bones = shape(), wraps.joints(rig, posed=False)
     yield from click(WRAP, pause=1.0)
-    was_running = running()
+    was_running = jobs.running() is not None
     stage.tool("mousemove", 600, 500)
-    yield from key("Escape", pause=0.1)
-    yield from until(lambda: not running(), 20.0)
+    yield from keys("Escape", pause=0.1)
+    yield from until_idle(20.0)
     yield 0.5
     found["wrap_escape"] = was_running and np.array_equal(shape(), rest) and not fielded(body)
     begin = time.perf_counter()
     yield from click(WRAP, pause=1.0)
     stage.picture(folder, "wrap-running")
-    yield from until(lambda: not running(), 120.0)
+    yield from until_idle(120.0)
     found["wrap_press_s"] = round(time.perf_counter() - begin, 1)
     yield 1.0
     stage.tool("mousemove", 500, 850)
@@ -139,11 +128,11 @@ def press(found, folder):
     stage.picture(folder, "wrap-wrapped")
     wrapped, moved = shape(), wraps.joints(rig, posed=False)
     found["wrap_moves"] = [round(float(np.abs(a - b).max()), 3) for a, b in ((wrapped, rest), (moved, bones))]
-    yield from key("ctrl+z", pause=1.5)
+    yield from keys("ctrl+z", pause=1.5)
     body, rig = bpy.data.objects["Body"], bpy.data.objects["Rig"]
     found["wrap_undone"] = np.array_equal(shape(), rest) and not fielded(body)
     found["wrap_undone_bones"] = np.allclose(wraps.joints(rig, posed=False), bones, atol=1e-6)
-    yield from key("ctrl+shift+z", pause=1.5)
+    yield from keys("ctrl+shift+z", pause=1.5)
     body, rig = bpy.data.objects["Body"], bpy.data.objects["Rig"]
     found["wrap_redone"] = np.array_equal(shape(), wrapped)
     found["wrap_redone_bones"] = np.allclose(wraps.joints(rig, posed=False), moved, atol=1e-6)
@@ -158,9 +147,9 @@ def press(found, folder):
 def target_gone(found, folder):
     """The target is deleted while the object is wrapped onto it again; then the file is opened again."""
     yield from click(WRAP, pause=1.0)
-    was_running = running()
+    was_running = jobs.running() is not None
     bpy.data.objects.remove(bpy.data.objects["Scan"])
-    yield from until(lambda: not running(), 120.0)
+    yield from until_idle(120.0)
     yield 1.0
     stage.picture(folder, "wrap-target-gone")
     found["wrap_outlives_its_target"] = was_running and fielded(bpy.data.objects["Body"])
@@ -171,13 +160,5 @@ def target_gone(found, folder):
     found["wrap_opened_again"] = np.array_equal(shape(), before)
 
 
-def running():
-    from addon.core.runtime import jobs
-
-    return jobs.running() is not None
-
-
 def fielded(item):
-    from addon.blender import modifier_stack
-
     return modifier_stack.find(item) is not None

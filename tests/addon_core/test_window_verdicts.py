@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The verdicts on the checks in Blender's window (tests/gui), without a window."""
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.gui.__main__ import groups
+from tests.gui.verdicts import EXPECTED, TRUE, above, failures, having, is_, near
+
+ROOT = Path(__file__).resolve().parents[2]
+SCRIPTS = sorted((ROOT / "tests/gui").glob("*.py"))
+
+
+def found_keys(path):
+    """Names, said in full, under which a script puts what it has found."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Store):
+            is_found = isinstance(node.value, ast.Name) and node.value.id == "found"
+            if is_found and isinstance(node.slice, ast.Constant):
+                yield node.slice.value
+
+
+def test_each_finding_of_each_script_has_its_verdict():
+    expected = {name for rules in EXPECTED.values() for name in rules} | {"error"}
+    found = {key for path in SCRIPTS for key in found_keys(path)}
+    assert len(found) > 80 and not found - expected, found - expected
+
+
+@pytest.mark.parametrize(
+    ("rule", "good", "bad"),
+    [
+        (TRUE, True, [False, None, 1.5]),
+        (is_((["Bar"], [])), [["Bar"], []], [["Bar"], ["X"]]),
+        (above(0.2), 0.3, [0.2, None, "x"]),
+        (near(45.0, 10.0), -44.0, [30.0]),
+        (TRUE.each(2), [True, True], [[True], [True, False], None]),
+        (having(exact=TRUE), {"exact": True, "more": 1}, [{}, {"exact": False}, []]),
+    ],
+)
+def test_rules(rule, good, bad, monkeypatch):
+    monkeypatch.setitem(EXPECTED, "part", {"name": rule})
+    assert failures({"name": good}, ["part"]) == []
+    for value in bad:
+        (line,) = failures({"name": value}, ["part"])
+        assert line.startswith("part: name is ") and rule.text in line
+    assert failures({}, ["part"]) == [f"part: name is missing; {rule.text} is expected"]
+    assert failures({"name": good, "error": "Traceback"}, ["part"]) == ["Traceback"]
+
+
+def test_scripts_that_need_a_blender_of_their_own_get_one():
+    assert groups(["jobs", "walk", "pins", "film=x"]) == [["jobs", "pins"], ["walk"], ["film=x"]]
+    with pytest.raises(SystemExit, match="no check is named nonsense"):
+        groups(["nonsense"])
+
+
+@pytest.mark.parametrize("code", [0, 1])
+def test_the_runner_ends_as_its_blenders_do(code, tmp_path):
+    blender = tmp_path / "blender.py"
+    blender.write_text(f"import sys; sys.exit({code})")
+    environment = {**os.environ, "ARAPFIELDS_WINDOW": f"{sys.executable} {blender}"}
+    command = [sys.executable, "-m", "tests.gui", "--output", str(tmp_path), "use", "tutorial"]
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert done.returncode == code
+    assert ("FAILED: use; tutorial" in done.stdout) == bool(code)

@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What each check in Blender's window must have found, and the verdict on it. Needs no Blender."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A condition on what a check found, and how it reads."""
+
+    text: str
+    holds: Callable
+
+    def each(self, count=None):
+        """The same of every entry of a list, of so many if that is said."""
+        return Rule(
+            f"each {self.text}", lambda found: count in (None, len(found)) and all(map(self.holds, found))
+        )
+
+
+def is_(value):
+    return Rule(f"is {value!r}", lambda found: plain(found) == plain(value))
+
+
+def above(least):
+    return Rule(f"above {least:g}", lambda found: found > least)
+
+
+def below(most):
+    return Rule(f"below {most:g}", lambda found: found < most)
+
+
+def near(value, by):
+    """Of either sign: turns depend on the side that a view is from."""
+    return Rule(f"{value:g} ± {by:g}", lambda found: abs(abs(found) - value) <= by)
+
+
+def having(**rules):
+    """A dictionary with at least these entries."""
+    text = ", ".join(f"{name} {rule.text}" for name, rule in rules.items())
+    return Rule(text, lambda found: all(rule.holds(found[name]) for name, rule in rules.items()))
+
+
+def plain(value):
+    """As a file of JSON keeps it: pairs are lists."""
+    return json.loads(json.dumps(value))
+
+
+TRUE, EMPTY, FIGURE = is_(True), is_([]), Rule("a figure", lambda found: found is not None)
+ONCE = having(one_undo_step=TRUE, moved_by=above(0.01), shapes=above(0), first_picture_s=FIGURE)
+ALL_EXACT = Rule("exact each time", lambda found: found["exact"] == found["of"] > 0)
+MOVES = having(updates_per_second=above(0))
+RENDERED = having(each_once=TRUE, frames_differ=TRUE, agrees=TRUE, still_live=TRUE)
+PINS_RATE = {
+    "pins_vertices": above(40_000),
+    "pins_first_shape_s": below(5.0),
+    "pins_drag": having(shapes_per_second=above(1)),
+    "pins_main_thread": FIGURE,
+    "pins_without_drawing": MOVES,
+}
+PICKS = {"picks": FIGURE, "picks_right": TRUE}
+UNDONE = {
+    **{f"undo_stray_{kind}": EMPTY for kind in ("objects", "meshes", "node_groups", "scenes", "collections")},
+    "undo_to_the_start": TRUE,
+    "undo_leaves": is_((["Bar"], [])),
+}
+WITHIN, ESCAPED = {"undo_within_drags": ALL_EXACT}, {"undo_escaped": ALL_EXACT}
+EXPECTED = {  # of each part, every entry that it finds
+    "panel": {"languages": above(0), "sections": above(10)},
+    "use": {
+        "face_dragged": above(1.2),
+        "face_holds_more": TRUE,
+        "face_is_one_undo_step": TRUE,
+        "searched": TRUE,
+        "cancelled_in_the_status_bar": TRUE,
+    },
+    "picks": PICKS,
+    "picks-in-place": PICKS,
+    "jobs": {
+        "redraw_s": FIGURE,
+        "late_without_a_job": FIGURE,
+        "invoke": is_("{'RUNNING_MODAL'}"),
+        "click_s": below(2.0),
+        "late_with_a_job": FIGURE,
+        "running": TRUE,
+        "progress": FIGURE,
+        "main_thread_at_once": FIGURE,
+        "previews_per_second": above(0),
+        "looks_per_second": above(0),
+        "cancel_s": below(10.0),
+        "exact_after_cancel": TRUE,
+        "shown_on_the_mesh": above(0.3),
+        "exact_after_cancel_in_place": TRUE,
+        "escape_s": below(10.0),
+        "exact_after_escape": TRUE,
+        "preview_gone": TRUE,
+        "one_undo_step": TRUE,
+        "modal_against_blocking": is_(0.0),
+    },
+    "stalls": {"window": FIGURE, "plain": FIGURE, "as_it_opens": FIGURE},
+    "live": {
+        "live_click_s": below(5.0),
+        "live_first_shape_s": below(20.0),
+        "live_vertices": above(40_000),
+        "live_as_it_opens": MOVES,
+        "live_plain": MOVES,
+        "live_solve_and_warp_on_worker": FIGURE,
+        "live_without_drawing": MOVES,
+        "live_refined": is_({"converged": True}),
+        "drag_moved_handle": Rule("moved", lambda found: abs(found) > 0.01),
+        "drag_moved_shape": above(0.05),
+        "live_after_undo": TRUE,
+        "drag_is_one_undo_step": TRUE,
+        "shape_returns_with_undo": below(1e-3),
+        "off_restores": TRUE,
+    },
+    "press": {
+        "press_deform": ONCE.each(),
+        "press_stylize": ONCE.each(),
+        "cancel_deform": TRUE.each(2),
+        "cancel_stylize": TRUE.each(2),
+        "step_between_holds_nothing": TRUE,
+        "step_between_shape": TRUE,
+    },
+    "pins": {
+        "pins_drag_moves": above(0.2),
+        "pins_escape_of_a_new_pin": TRUE,
+        "pins_after_the_drag": FIGURE.each(1),
+        "pins_escape_of_a_drag": TRUE,
+        "pins_anchor": TRUE,
+        "pins_ring_turns_degrees": near(45.0, 10.0),
+        "pins_r_turns_degrees": Rule("turned", lambda found: abs(found) > 5),
+        "pins_wheel_during_a_drag": having(
+            zooms=TRUE,
+            pin_moves_pixels=Rule("30 across", lambda found: abs(found[0] - 30) + abs(found[1]) <= 6),
+            reach_before_and_after_ctrl=Rule("changed", lambda found: found[0] != found[1]),
+        ),
+        "pins_ctrl_click_deletes": TRUE,
+        "pins_x_deletes_the_last": TRUE,
+        "pins_no_stray_object": TRUE,
+        **PINS_RATE,
+    },
+    "pins-rate": PINS_RATE,
+    "undo": {"undo_after_drags": ALL_EXACT, **WITHIN, **ESCAPED, **UNDONE},
+    "undo-within": {**WITHIN, **UNDONE},
+    "undo-escaped": {**ESCAPED, **UNDONE},
+    "render": {"render_MODIFIER": RENDERED, "render_NEW": RENDERED},
+    "table": {"table": having(wrong=is_({})), "table_not_at_that_stage": EMPTY},
+    "wrap": {
+        "wrap_target_by_eyedropper": TRUE,
+        "wrap_first_pair": is_(1),
+        "wrap_taken_back": is_(0),
+        "wrap_landmarks_off_by": below(0.15).each(5),
+        "wrap_escape": TRUE,
+        "wrap_press_s": FIGURE,
+        "wrap_moves": above(0.05).each(2),
+        "wrap_undone": TRUE,
+        "wrap_undone_bones": TRUE,
+        "wrap_redone": TRUE,
+        "wrap_redone_bones": TRUE,
+        "wrap_stack": Rule("a field and an armature", lambda found: {"NODES", "ARMATURE"} <= {*found}),
+        "wrap_outlives_its_target": TRUE,
+        "wrap_opened_again": TRUE,
+    },
+    "endings": {
+        **dict.fromkeys(("ends_on_undo", "ends_on_load"), TRUE),
+        **dict.fromkeys(("ends_on_undo_s", "ends_on_load_s"), below(5.0)),
+        "switched_off": TRUE,
+    },
+    "film": {"pins": FIGURE.each(4), "moved": above(0.2)},
+    "pose": {
+        "names": FIGURE.each(6),
+        "anchors": is_([True, True, False, False, False, False]),
+        "moved": above(0.2),
+    },
+    "walk": {
+        "suzanne": is_(["Suzanne"]),
+        "modifiers": is_(["SUBSURF"]),
+        "empties": is_([[0.0, -0.35, -0.52, 0.5, 0.62, 0.46], [1.12, 0.32, 0.17, 0.3, 0.36, 0.4]]),
+        "selected": FIGURE.each(3),
+        "active": is_("Suzanne"),
+        "handles": Rule("holds something", lambda found: found[1] > 0).each(2),
+        "row_selects": is_("Empty.001"),
+        "deformed_by": above(0.1),
+        "stack": Rule("with the field", lambda found: "ARAP Fields" in found),
+        "stylized_by": above(0.01),
+        "fitted": TRUE,
+    },
+    "tutorial": {"handles": is_(2), "deformed_by": above(0.1), "stylized_by": above(0.01)},
+}
+
+
+def failures(found, parts):
+    """Lines that name what is wrong: an error, what is missing, and what is not as expected."""
+    lines = [found["error"]] if "error" in found else []
+    for part in parts:
+        for name, rule in EXPECTED[part].items():
+            if name not in found:
+                lines.append(f"{part}: {name} is missing; {rule.text} is expected")
+            elif not holds(rule, found[name]):
+                lines.append(f"{part}: {name} is {found[name]!r}; {rule.text} is expected")
+    return lines
+
+
+def holds(rule, value):
+    try:
+        return bool(rule.holds(value))
+    except (TypeError, KeyError, IndexError):
+        return False
