@@ -28,8 +28,8 @@ def test_files_are_found_by_suffix_pattern_and_depth(folders):
         "b.ply",
         "sub/d.ply",
     ]
-    (made,) = plan(batch(folders, "--pattern", "a*", "--format", "blend"))
-    assert made.target == folders / "out/a.blend"
+    (item,) = plan(batch(folders, "--pattern", "a*", "--format", "blend"))
+    assert item.target == folders / "out/a.blend"
     inside = plan(batch(folders, "--recursive", output="in/sub"))
     assert [task.name for task in inside] == ["a.obj", "b.ply", "c.STL"]  # results are no sources
 

@@ -35,8 +35,8 @@ def start(folder, *flags):
 
 
 def complete(folder):
-    found = statuses(folder / "out")
-    return len(found) == COUNT and set(found.values()) == {"done"}
+    done = statuses(folder / "out")
+    return len(done) == COUNT and set(done.values()) == {"done"}
 
 
 @pytest.mark.parametrize("order", [(1, 2, 3, 4), (3, 1, 4, 2)])

@@ -93,10 +93,10 @@ def test_a_newer_request_ends_the_better_results_of_the_one_before():
 
     worker = LatestRequestWorker(solve)
     worker.request("a")
-    found = (None, "")
-    while found[0] is None:
-        found = worker.poll()
-    assert found == (("a", 0), "")
+    answer = (None, "")
+    while answer[0] is None:
+        answer = worker.poll()
+    assert answer == (("a", 0), "")
     worker.request("b")
     first.set()
     assert worker.wait(LIMIT) and worker.poll() == (("b", 2), "")

@@ -16,19 +16,19 @@ ROOT = Path(__file__).resolve().parents[2]
 SCRIPTS = sorted((ROOT / "tests/gui").glob("*.py"))
 
 
-def found_keys(path):
+def figure_names(path):
     """Names, said in full, under which a script puts what it has found."""
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Store):
-            is_found = isinstance(node.value, ast.Name) and node.value.id == "found"
-            if is_found and isinstance(node.slice, ast.Constant):
+            is_figure = isinstance(node.value, ast.Name) and node.value.id == "figures"
+            if is_figure and isinstance(node.slice, ast.Constant):
                 yield node.slice.value
 
 
 def test_each_finding_of_each_script_has_its_verdict():
     expected = {name for rules in EXPECTED.values() for name in rules} | {"error"}
-    found = {key for path in SCRIPTS for key in found_keys(path)}
-    assert len(found) > 80 and not found - expected, found - expected
+    keys = {key for path in SCRIPTS for key in figure_names(path)}
+    assert len(keys) > 80 and not keys - expected, keys - expected
 
 
 @pytest.mark.parametrize(

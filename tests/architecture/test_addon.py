@@ -116,24 +116,26 @@ def test_every_folder_has_its_place():
 def test_nothing_but_the_contents_page_needs_operators_or_panels():
     wrong = []
     for path in modules():
-        found = [one for one in imports(path) if one.split(".")[-1] in LEAVES]
+        leaves = [one for one in imports(path) if one.split(".")[-1] in LEAVES]
         if path.stem == "panel":
-            found = [one for one in found if not one.endswith(".panel")]  # sections draw parts of one another
-        wrong += [f"{name(path)} imports {one}" for one in found]
+            leaves = [
+                one for one in leaves if not one.endswith(".panel")
+            ]  # sections draw parts of one another
+        wrong += [f"{name(path)} imports {one}" for one in leaves]
     assert not wrong, wrong
 
 
 def test_properties_know_choices_and_tables_alone():
     allowed = ("core.settings", "names", "blender.property_definitions", "blender.object_references")
     allowed += ("blender.selection",)
-    found = [path for path in modules() if path.stem == "properties" or path.parent.name == "properties"]
+    sources = [path for path in modules() if path.stem == "properties" or path.parent.name == "properties"]
     wrong = [
         f"{name(path)} imports {one}"
-        for path in found
+        for path in sources
         for one in imports(path)
         if not one.startswith(allowed) and "properties" not in one.split(".")
     ]
-    assert found and not wrong, wrong
+    assert sources and not wrong, wrong
 
 
 def test_the_contents_page_lists_all_that_is_registered():

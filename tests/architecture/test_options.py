@@ -25,9 +25,9 @@ COMMON = {"samples", "field", "start", "count", "margin", "strength", "interior"
 def tracked(*suffixes):
     command = ["git", "ls-files", "native", "addon", "blender_scripts", "docs", "README.md"]
     names = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split("\n")
-    found = [ROOT / name for name in names if name.endswith(suffixes) and (ROOT / name).is_file()]
-    assert len(found) > 20
-    return found
+    sources = [ROOT / name for name in names if name.endswith(suffixes) and (ROOT / name).is_file()]
+    assert len(sources) > 20
+    return sources
 
 
 def declared(folder, kind):
@@ -117,8 +117,8 @@ def test_ranges_stand_in_the_table_alone():
     sources = [
         path for path in tracked(".cpp", ".h") if "core" not in path.parts
     ]  # which lies under the table
-    found = [(path.name, name) for path in sources for name in checks.findall(path.read_text())]
-    wrong = [(path, name) for path, name in found if name in NAMES - COMMON]
+    calls = [(path.name, name) for path in sources for name in checks.findall(path.read_text())]
+    wrong = [(path, name) for path, name in calls if name in NAMES - COMMON]
     for path in tracked(".py"):
         text = path.read_text()
         if path.is_relative_to(ROOT / "addon"):

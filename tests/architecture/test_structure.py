@@ -34,11 +34,11 @@ SOURCE_FOLDERS = ["native", "addon", "blender_scripts", "cmake", "tests"]
 
 
 def sources(*suffixes):
-    found = []
+    files = []
     for folder in SOURCE_FOLDERS:
-        found += [p for p in sorted((ROOT / folder).rglob("*")) if p.suffix in suffixes and p.is_file()]
-    assert found, f"no {suffixes} files under {ROOT}"
-    return found
+        files += [p for p in sorted((ROOT / folder).rglob("*")) if p.suffix in suffixes and p.is_file()]
+    assert files, f"no {suffixes} files under {ROOT}"
+    return files
 
 
 def name(path):

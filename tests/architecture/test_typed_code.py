@@ -158,20 +158,20 @@ def test_examples_and_public_calls_pass_mypy_strict(checked, name):
 
 @pytest.mark.parametrize("expression", REVEALED)
 def test_revealed_types_are_exact(checked, expression):
-    found = [re.search(r'Revealed type is "(.*)"', line)[1] for line in checked["reveals"]]
+    types = [re.search(r'Revealed type is "(.*)"', line)[1] for line in checked["reveals"]]
     expected = REVEALED[expression].format(
         array=ARRAY,
         integers=INTEGERS,
         extraction="arapfields.reports.Extraction[arapfields.reports.ExtractionReport]",
     )
-    assert plain(dict(zip(REVEALED, found, strict=True))[expression]) == plain(expected)
+    assert plain(dict(zip(REVEALED, types, strict=True))[expression]) == plain(expected)
 
 
 @pytest.mark.parametrize("number", range(len(WRONG)), ids=[call for call, _ in WRONG])
 def test_mistakes_are_found(checked, number):
     line = SUBJECTS.count("\n") + 1 + number
-    found = [text for text in checked["wrong"] if f"wrong.py:{line}:" in text and "error" in text]
-    assert any(f"[{WRONG[number][1]}]" in text for text in found), found
+    errors = [text for text in checked["wrong"] if f"wrong.py:{line}:" in text and "error" in text]
+    assert any(f"[{WRONG[number][1]}]" in text for text in errors), errors
 
 
 def annotations():
@@ -195,8 +195,8 @@ def test_the_stub_says_any_only_where_anything_is_meant():
 
 
 def test_the_styles_of_the_stub_are_those_that_there_are():
-    found = re.search(r"^StyleName: typing\.TypeAlias = typing\.Literal\[(.*)\]$", STUB.read_text(), re.M)
-    assert re.findall(r"'([^']+)'", found[1]) == arapfields.style_names()
+    alias = re.search(r"^StyleName: typing\.TypeAlias = typing\.Literal\[(.*)\]$", STUB.read_text(), re.M)
+    assert re.findall(r"'([^']+)'", alias[1]) == arapfields.style_names()
 
 
 def test_the_marker_ships():

@@ -56,7 +56,7 @@ def test_many_keys_say_what_they_weigh():
         assert bpy.ops.arapfields.bake(format="KEYS", start=1, end=2) == {"FINISHED"}
     finally:
         caches.HEAVY = 500e6
-    told = [text for level, text in jobs.messages() if level == "WARNING"]
-    assert told == ["Bar: shape keys of 13.9 kB in the .blend and in memory; a cache would take neither"], (
-        told
-    )
+    warnings = [text for level, text in jobs.messages() if level == "WARNING"]
+    assert warnings == [
+        "Bar: shape keys of 13.9 kB in the .blend and in memory; a cache would take neither"
+    ], warnings

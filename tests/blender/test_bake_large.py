@@ -60,11 +60,11 @@ def test_a_long_bake_of_a_large_mesh_takes_little_memory_and_plays_anywhere():
     item, folder = torus(), Path(tempfile.mkdtemp())
     bpy.context.scene.frame_set(1)
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "large.blend"))
-    idle, found, ended = memory(), [], threading.Event()
+    idle, sizes, ended = memory(), [], threading.Event()
 
     def watch():
         while not ended.wait(0.02):
-            found.append((jobs.progress()[0], memory() - idle))
+            sizes.append((jobs.progress()[0], memory() - idle))
 
     thread = threading.Thread(target=watch)
     thread.start()
@@ -73,8 +73,8 @@ def test_a_long_bake_of_a_large_mesh_takes_little_memory_and_plays_anywhere():
     finally:
         ended.set()
         thread.join()
-    assert max(taken for _, taken in found) < MOST
-    early, late = ([taken for share, taken in found if a < share <= b] for a, b in ((0.1, 0.4), (0.7, 1.0)))
+    assert max(taken for _, taken in sizes) < MOST
+    early, late = ([taken for share, taken in sizes if a < share <= b] for a, b in ((0.1, 0.4), (0.7, 1.0)))
     assert max(late) <= max(early) + NOISE
     size = (folder / "cache/Torus.pc2").stat().st_size
     assert size == 32 + 12 * SIDE * SIDE * FRAMES

@@ -68,7 +68,7 @@ def test_a_bone_equals_a_constrained_empty_with_the_same_region():
         rig.pose.bones["Bone"].location.z = 0.3 * angle
         bpy.context.view_layer.update()
 
-    found, asked = [], []
+    motions, asked = [], []
     for kind in ("BONE", "GROUP"):
         posed(0.0)
         if kind == "GROUP":
@@ -83,13 +83,13 @@ def test_a_bone_equals_a_constrained_empty_with_the_same_region():
         scenes.activate(bar)
         asked.append(handles_of(bar))
         assert bpy.ops.arapfields.deform(**QUICK, result="MODIFIER") == {"FINISHED"}
-        found.append(scenes.world_points(bar))
+        motions.append(scenes.world_points(bar))
         bpy.ops.arapfields.remove_field()
-    moved = np.linalg.norm(found[0] - 1.2 * rest, axis=1)
+    moved = np.linalg.norm(motions[0] - 1.2 * rest, axis=1)
     for (held, motion), (same_held, same_motion) in zip(*asked, strict=True):
         assert np.array_equal(held, same_held) and len(held) > 100
         assert np.abs(motion - same_motion).max() < SAME
-    assert np.abs(found[0] - found[1]).max() < STOPPED and moved.max() > 0.4
+    assert np.abs(motions[0] - motions[1]).max() < STOPPED and moved.max() > 0.4
 
 
 @in_blender

@@ -22,11 +22,11 @@ CLOSE = 1e-5  # single precision of positions of size one
 
 def from_another_file(*kinds):
     """The objects of these kinds, linked from a file of their own, in the scene."""
-    made = [rider(kind) for kind in kinds]
-    names = [item.name for item in made]
+    items = [rider(kind) for kind in kinds]
+    names = [item.name for item in items]
     path = f"{tempfile.mkdtemp()}/other.blend"
-    bpy.data.libraries.write(path, set(made))
-    for item in made:
+    bpy.data.libraries.write(path, set(items))
+    for item in items:
         bpy.data.objects.remove(item)
     with bpy.data.libraries.load(path, link=True) as (_, into):
         into.objects = names
@@ -81,12 +81,12 @@ def test_library_overrides_are_carried_or_named(kind):
     moving.location.z += 0.4
     step(refined=True)
     assert sessions.is_live(bar)
-    told = "\n".join(text for _, text in jobs.messages())
+    messages = "\n".join(text for _, text in jobs.messages())
     if kind in ("CURVES", "CURVE"):
-        assert f"{item.name} is linked from another file; make it local to carry it" in told
+        assert f"{item.name} is linked from another file; make it local to carry it" in messages
         assert np.array_equal(shown(item), before)
     else:
-        assert item.name not in told and np.abs(shown(item) - before - [0, 0, 0.4]).max() < 0.1
+        assert item.name not in messages and np.abs(shown(item) - before - [0, 0, 0.4]).max() < 0.1
     bpy.ops.arapfields.live()
     assert np.abs(shown(item) - before).max() < CLOSE
 
@@ -110,8 +110,11 @@ def test_one_that_is_hidden_or_deleted_while_live_is_named_and_nothing_of_the_re
     for _ in range(3):
         step(refined=True)
     assert sessions.is_live(bar)
-    told = "\n".join(text for _, text in jobs.messages())
-    assert "Hair, which Bar carries, was deleted" in told and "Cage, which Bar carries, was deleted" in told
+    messages = "\n".join(text for _, text in jobs.messages())
+    assert (
+        "Hair, which Bar carries, was deleted" in messages
+        and "Cage, which Bar carries, was deleted" in messages
+    )
     items[0].hide_set(True)  # it is seen again where the field has it meanwhile
     moving.location.z += 0.1
     step(refined=True)

@@ -52,14 +52,14 @@ def test_bad_ones_are_named_and_the_rest_goes_on():
     before = shown(good)
     scenes.activate(bar)
     assert bpy.ops.arapfields.live() == {"FINISHED"}
-    told = "\n".join(text for _, text in jobs.messages())
+    messages = "\n".join(text for _, text in jobs.messages())
     for words in (
         "Hollow is empty",
         "Gone, which Bar carries, was deleted",
         "Dark is hidden",
         "Torn has points",
     ):
-        assert words in told, told
+        assert words in messages, messages
     moving.location.z += 0.4
     step()
     assert np.abs(shown(good) - before - [0, 0, 0.4]).max() < 0.1

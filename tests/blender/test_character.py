@@ -21,17 +21,20 @@ STEPS = 4  # of live mode, in which its solver comes to rest
 @pytest.mark.slow  # about ten seconds
 @in_blender
 def test_a_character_moves_whole():
-    made = character.build()
-    rest = {item.name: character.seen_mesh(item)[0] for item in (made.body, made.shirt, made.hat, *made.eyes)}
-    skin = rest["Body"], character.seen_mesh(made.body)[2]
-    strands = hair_points(made.hair)
+    person = character.build()
+    rest = {
+        item.name: character.seen_mesh(item)[0]
+        for item in (person.body, person.shirt, person.hat, *person.eyes)
+    }
+    skin = rest["Body"], character.seen_mesh(person.body)[2]
+    strands = hair_points(person.hair)
     jobs.board.messages.clear()
     assert bpy.ops.arapfields.live() == {"FINISHED"}
     for share in np.linspace(0, 1, 4)[1:]:
-        character.pose(made, neck=share * np.pi / 4, arm=share * np.pi / 3)
+        character.pose(person, neck=share * np.pi / 4, arm=share * np.pi / 3)
         for _ in range(STEPS):
             step(refined=True)
-    assert sessions.is_live(made.body) and not jobs.messages(), jobs.messages()
+    assert sessions.is_live(person.body) and not jobs.messages(), jobs.messages()
     now = {name: character.seen_mesh(bpy.data.objects[name])[0] for name in rest}
     posed = now["Body"], skin[1]
     figures = {}
@@ -43,7 +46,7 @@ def test_a_character_moves_whole():
     hand = rest["Body"][:, 0] > 0.75
     figures["hand raised"] = (now["Body"][hand] - rest["Body"][hand])[:, 2].mean()
 
-    for eye in made.eyes:
+    for eye in person.eyes:
         before, after = rest[eye.name], now[eye.name]
         center = before.mean(axis=0)
         socket = np.linalg.norm(rest["Body"] - center, axis=1) < 2.5 * character.EYE
@@ -59,7 +62,7 @@ def test_a_character_moves_whole():
     figures["shirt's mean distance changes"] = abs(off[1].mean() / off[0].mean() - 1)
     figures["shirt's least distance, of its own"] = (off[1] / off[0]).min()
 
-    roots = hair_points(made.hair)[:, 0]
+    roots = hair_points(person.hair)[:, 0]
     figures["hair roots off the scalp, of the size"] = (
         np.abs(distances(*posed, roots)).max() / character.HEIGHT
     )
@@ -72,7 +75,7 @@ def test_a_character_moves_whole():
         print(f"{name}: {figure:.3g}")
 
     assert 40 < figures["head turned, degrees"] < 50 and figures["hand raised"] > 0.4
-    for eye in made.eyes:
+    for eye in person.eyes:
         assert figures[f"{eye.name} off its socket, of its radius"] < 0.02
         assert not figures[f"{eye.name} cut by the skin, vertices"]
     assert figures["shirt's distance changes on average"] <= 0.03
@@ -80,7 +83,7 @@ def test_a_character_moves_whole():
     assert figures["hair roots off the scalp, of the size"] <= 1e-4
     assert figures["hat off the head's motion, of the size"] < 0.02
     bpy.ops.arapfields.live()
-    character.pose(made, 0, 0)
+    character.pose(person, 0, 0)
     for name, before in rest.items():
         assert np.abs(character.seen_mesh(bpy.data.objects[name])[0] - before).max() < 1e-4
 

@@ -26,8 +26,12 @@ def clicker():
     item.arapfields.wrap.onto = target
     bpy.context.view_layer.update()
     names = ("modal", "click", "struck", "take_back", "tell", "end")
-    made = type("Clicker", (), {name: vars(Operator)[name] for name in names})()
-    made.ends, made.clicked, made.report = [ObjectReference(item), ObjectReference(target)], {}, print
+    operator = type("Clicker", (), {name: vars(Operator)[name] for name in names})()
+    operator.ends, operator.clicked, operator.report = (
+        [ObjectReference(item), ObjectReference(target)],
+        {},
+        print,
+    )
     turn = Matrix(((1, 0, 0, 0), (0, 0, 1, 0), (0, -1, 0, -10), (0, 0, 0, 1)))
     flat = Matrix.Diagonal((0.2, 0.2, -0.01, 1)) @ turn
     view = SimpleNamespace(
@@ -53,7 +57,7 @@ def clicker():
 
     def click(x, z):
         event = SimpleNamespace(type="LEFTMOUSE", value="PRESS", mouse_x=500 + 100 * x, mouse_y=500 + 100 * z)
-        return made.modal(context, event), sorted(made.clicked)
+        return operator.modal(context, event), sorted(operator.clicked)
 
     return item, click
 

@@ -86,8 +86,8 @@ def test_stylize_a_file(script, tmp_path, suffix):
     before, after = read(source), read(target)
     assert before[1].shape == after[1].shape
     assert flatness(*after) > flatness(*before) + 0.03
-    (found,) = json.loads((tmp_path / "report.json").read_text())["objects"]
-    assert found["status"] == "done" and found["figures"]["iterations"] == 60
+    (report,) = json.loads((tmp_path / "report.json").read_text())["objects"]
+    assert report["status"] == "done" and report["figures"]["iterations"] == 60
     assert [path.name for path in target.parent.iterdir()] == [target.name]  # nothing partial
     if suffix == ".obj":
         assert target.read_text().count("\nvt ") and "o Ball\n" in target.read_text()

@@ -143,12 +143,12 @@ def test_a_second_run_updates_the_same_object():
 def test_same_seed_same_result():
     bar, _, moving = scenes.bar_with_handles()
     moving.location.z += 0.4
-    found = []
+    reports = []
     for _ in range(2):
         scenes.activate(bar)
         bpy.ops.arapfields.deform(output="WARP", **scenes.NEW)
-        found.append(scenes.world_points(bpy.data.objects["Bar_deformed"]))
-    assert np.array_equal(*found)
+        reports.append(scenes.world_points(bpy.data.objects["Bar_deformed"]))
+    assert np.array_equal(*reports)
 
 
 @in_blender

@@ -67,11 +67,11 @@ def scene_to_export():
 
 def shown(item, frames):
     """{frame: (n, 3) world points}."""
-    found = {}
+    contents = {}
     for frame in frames:
         bpy.context.scene.frame_set(frame)
-        found[frame] = scenes.world_points(item)
-    return found
+        contents[frame] = scenes.world_points(item)
+    return contents
 
 
 def state(item):
@@ -105,15 +105,15 @@ def test_what_is_exported_is_read_back(kind):
     command = [sys.executable, "-c", READER, kind, str(path), str(out), "25", "2", "5"]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 7, done.stdout + done.stderr
-    found = np.load(out)
+    read = np.load(out)
     size = np.ptp(expected[2], axis=0).max()
-    index = found["index"].astype(int) if kind == "GLTF" else slice(None)
+    index = read["index"].astype(int) if kind == "GLTF" else slice(None)
     for frame, points in expected.items():
-        assert np.abs(found[str(frame)] - points[index]).max() <= EXACT * size, frame
+        assert np.abs(read[str(frame)] - points[index]).max() <= EXACT * size, frame
     if kind == "GLTF":
         assert set(index) == set(range(len(bar.data.vertices)))
     else:
-        assert found["range"].tolist() == [2, 5]
+        assert read["range"].tolist() == [2, 5]
 
 
 @in_blender
@@ -122,11 +122,11 @@ def test_the_times_of_a_gltf_are_the_frames_seconds():
     bpy.ops.arapfields.export_animation(format="GLTF", filepath=str(folder / "a.glb"))
     content = (folder / "a.glb").read_bytes()
     (length,) = struct.unpack("<I", content[12:16])
-    told = json.loads(content[20 : 20 + length])
-    (animation,) = told["animations"]
-    times = told["accessors"][animation["samplers"][0]["input"]]
+    header = json.loads(content[20 : 20 + length])
+    (animation,) = header["animations"]
+    times = header["accessors"][animation["samplers"][0]["input"]]
     assert np.allclose([*times["min"], *times["max"]], [2 / 25, 5 / 25]) and times["count"] == 4
-    assert len(told["meshes"][0]["primitives"][0]["targets"]) == 4
+    assert len(header["meshes"][0]["primitives"][0]["targets"]) == 4
 
 
 @in_blender
@@ -140,10 +140,10 @@ def test_the_times_of_an_alembic_are_seconds():
     command = [sys.executable, "-c", READER, "ABC", str(path), str(out), "50", "4", "10"]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 7, done.stdout + done.stderr
-    found = np.load(out)
-    assert found["range"].tolist() == [4, 10]
+    read = np.load(out)
+    assert read["range"].tolist() == [4, 10]
     for frame, points in expected.items():
-        assert np.abs(found[str(2 * frame)] - points).max() <= EXACT * np.ptp(points, axis=0).max(), frame
+        assert np.abs(read[str(2 * frame)] - points).max() <= EXACT * np.ptp(points, axis=0).max(), frame
 
 
 @in_blender

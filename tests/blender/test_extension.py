@@ -34,10 +34,10 @@ def extension(tmp_path_factory):
 
 @pytest.fixture
 def blender(request, tmp_path):
-    found = blenders.find(request.param, tmp_path)
-    yield found
-    if found.folder != tmp_path:
-        shutil.rmtree(found.folder)
+    program = blenders.find(request.param, tmp_path)
+    yield program
+    if program.folder != tmp_path:
+        shutil.rmtree(program.folder)
 
 
 def served(extension):

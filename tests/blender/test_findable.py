@@ -82,8 +82,8 @@ def test_every_operator_names_its_page_and_every_page_exists():
     own = [cls for cls in own if not cls.bl_idname.endswith("_preset")]
     assert len(own) > 15
     for cls in own:
-        told = cls.description(bpy.context, None)
-        assert told.startswith(cls.__doc__) and f"Guide: {guide.LABELS[cls.guide]}" in told, cls
+        tooltip = cls.description(bpy.context, None)
+        assert tooltip.startswith(cls.__doc__) and f"Guide: {guide.LABELS[cls.guide]}" in tooltip, cls
         assert page(f"bpy.ops.{cls.bl_idname}").startswith(cls.guide)
     assert page("bpy.types.ARAPFIELDS_PG_deform.bending").startswith("deform")
     assert page("bpy.types.ARAPFIELDS_PG_object.target").startswith("results")

@@ -30,11 +30,11 @@ def test_ghosts_are_where_the_other_side_is_held_and_goes():
     assert np.allclose(np.sort(ends, axis=0), np.sort(box_lines(mirror @ rest), axis=0), atol=1e-6)
     moving.location.z += 0.3
     bpy.context.view_layer.update()
-    found = ghosts(bar)
-    assert len(found) == 2 and len(segments(bar)) == 3
-    now = np.array(found[1][2][:24])
+    shapes = ghosts(bar)
+    assert len(shapes) == 2 and len(segments(bar)) == 3
+    now = np.array(shapes[1][2][:24])
     assert np.allclose(now.mean(axis=0), [-1, 0, 0.3], atol=1e-6)
-    assert np.allclose(np.array(found[0][2]).mean(axis=0), [-1, 0, 0], atol=1e-6)
+    assert np.allclose(np.array(shapes[0][2]).mean(axis=0), [-1, 0, 0], atol=1e-6)
     bpy.ops.arapfields.live()
     step(refined=True)
     field = sessions.live[bar.session_uid].solver.field

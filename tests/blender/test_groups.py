@@ -27,8 +27,8 @@ def test_weights_of_groups_are_read_in_slices():
         coroutine = vertex_groups.read_weights(bpy.context, bar, ["Other", "Group"])
         slices = sum(1 for _ in coroutine)
         assert slices == -(-len(bar.data.vertices) // 50)
-        found = run_to_completion(vertex_groups.read_weights(bpy.context, bar, ["Other", "Group"]))
-        assert np.array_equal(found["Group"], expected) and found["Other"].sum() == 0.5
+        weights = run_to_completion(vertex_groups.read_weights(bpy.context, bar, ["Other", "Group"]))
+        assert np.array_equal(weights["Group"], expected) and weights["Other"].sum() == 0.5
         coroutine = vertex_groups.read_weights(bpy.context, bar, ["Group"])
         next(coroutine)
         bar.data.clear_geometry()
@@ -44,8 +44,8 @@ def test_weights_of_groups_are_read_in_slices():
     bar.modifiers.new("Subdivision", "SUBSURF")
     bpy.context.view_layer.update()
     meshes = set(bpy.data.meshes.keys())
-    found = run_to_completion(vertex_groups.read_weights(bpy.context, bar, ["Group"]))["Group"]
-    assert len(found) == len(scenes.world_points(bar)) and 0 < found.max() <= 1
+    weights = run_to_completion(vertex_groups.read_weights(bpy.context, bar, ["Group"]))["Group"]
+    assert len(weights) == len(scenes.world_points(bar)) and 0 < weights.max() <= 1
     assert set(bpy.data.meshes.keys()) == meshes
 
 

@@ -34,15 +34,15 @@ def test_what_a_handle_holds_is_scaled_where_asked(allow):
     held = rest[:, 0] > 0.8
     expected = rest[held] + ([0.5, 0.5, 0.5] * (rest[held] - [1, 0, 0]) if allow else 0.0)
     bpy.ops.arapfields.deform(**RUN)
-    found = [local_points(bar)]
+    shapes = [local_points(bar)]
     bpy.ops.arapfields.live()
     step(refined=True)
-    found.append(local_points(bar))
+    shapes.append(local_points(bar))
     bpy.ops.arapfields.live()
     moving.keyframe_insert("scale", frame=1)
     bpy.ops.arapfields.bake(start=1, end=1, filepath=cache_file())
-    found.append(local_points(bar))
-    for after in found:
+    shapes.append(local_points(bar))
+    for after in shapes:
         error = np.abs(after[held] - expected).max()
         print(allow, error)
         assert error < (0.03 if allow else 0.01)  # handles are followed nearly

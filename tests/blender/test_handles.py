@@ -17,12 +17,12 @@ if IN_BLENDER:
 @in_blender
 def test_selected_empties_become_handles_and_anchors_at_first():
     bar, fixed, moving = scenes.bar_with_handles()
-    found = empties.solve_handles(bar, space_of(bar.matrix_world))
-    assert [h.name for h in found] == ["Fixed", "Moving"] and all(h.is_anchor for h in found)
+    handles = empties.solve_handles(bar, space_of(bar.matrix_world))
+    assert [h.name for h in handles] == ["Fixed", "Moving"] and all(h.is_anchor for h in handles)
     moving.location.z += 1
     bpy.context.view_layer.update()
-    found = empties.solve_handles(bar, space_of(bar.matrix_world))
-    assert [h.is_anchor for h in found] == [True, False]
+    handles = empties.solve_handles(bar, space_of(bar.matrix_world))
+    assert [h.is_anchor for h in handles] == [True, False]
     assert all(entry.inside > 0 for entry in bar.arapfields.handles)
     assert fixed.arapfields.handle_of == bar and fixed.empty_display_type == "CUBE"
 
@@ -55,8 +55,8 @@ def test_set_rest_makes_the_present_pose_the_rest():
     bar, _, moving = scenes.bar_with_handles()
     moving.location.y += 0.1
     bpy.ops.arapfields.set_rest(all=True)
-    found = empties.solve_handles(bar, space_of(bar.matrix_world))
-    assert all(h.is_anchor for h in found)
+    handles = empties.solve_handles(bar, space_of(bar.matrix_world))
+    assert all(h.is_anchor for h in handles)
 
 
 @in_blender

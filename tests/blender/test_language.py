@@ -24,14 +24,14 @@ def test_every_text_is_translated():
     def fields(text):
         return sorted(field for _, field, _, _ in string.Formatter().parse(text) if field)
 
-    found = translations()
-    assert "de_DE" in found
-    for language, told in found.items():
-        missing = [text for text in texts if ("*", text) not in told]
+    tables = translations()
+    assert "de_DE" in tables
+    for language, table in tables.items():
+        missing = [text for text in texts if ("*", text) not in table]
         assert not missing, (language, missing)
-        stale = {text for _, text in told} - set(texts) - strings.UNTRANSLATED
+        stale = {text for _, text in table} - set(texts) - strings.UNTRANSLATED
         assert not stale, (language, stale)
-        for (_, text), translated in told.items():
+        for (_, text), translated in table.items():
             assert translated and fields(text) == fields(translated), text
 
 

@@ -46,8 +46,8 @@ def remains():
         for cls in base.__subclasses__()
         if of_addon(cls) and cls.is_registered
     ]
-    found = {f"handler {name}": functions for name, functions in handlers.items()}
-    return found | {
+    remaining = {f"handler {name}": functions for name, functions in handlers.items()}
+    return remaining | {
         "types": types + subclasses,
         "operators": dir(bpy.ops.arapfields),
         "property": [o for o in (bpy.types.Object, bpy.types.Scene) if hasattr(o, "arapfields")],
@@ -125,10 +125,10 @@ def enter(state):
 def test_nothing_is_left_when_the_extension_is_disabled(state):
     enabled, points_inside = None, counts.points_inside
     for _ in range(ROUNDS):
-        there = {kind: len(names) for kind, names in remains().items()}
-        enabled = enabled or there
-        assert there == enabled  # nothing is there twice
-        assert there["types"] > 25 and there["handler load_pre"] == 1
+        left = {kind: len(names) for kind, names in remains().items()}
+        enabled = enabled or left
+        assert left == enabled  # nothing is left twice
+        assert left["types"] > 25 and left["handler load_pre"] == 1
         enter(state)
         addon.unregister()
         for kind, names in remains().items():

@@ -71,8 +71,8 @@ def test_a_live_shape_can_be_kept(target):
     assert bpy.ops.arapfields.live_keep() == {"FINISHED"}
     kept = bpy.data.objects["Bar_deformed"] if target == "NEW" else bar
     assert np.abs(scenes.world_points(kept) - shown).max() < 0.1
-    found = scenes.everything(kept)
-    assert {key: value for key, value in found.items() if key[0] != "ARAP Fields"} == whole
+    contents = scenes.everything(kept)
+    assert {key: value for key, value in contents.items() if key[0] != "ARAP Fields"} == whole
     assert len(bar.modifiers) == (target == "MODIFIER") and (bar.data.shape_keys is None) == (target != "KEY")
     if target == "NEW":
         assert "Bar_live" not in bpy.data.objects and bar.hide_render and bar.hide_get()

@@ -60,8 +60,8 @@ def test_nothing_but_a_modifier_an_attribute_and_a_group_is_added():
     for _ in range(2):
         scenes.activate(bar)
         bpy.ops.arapfields.deform(**scenes.QUICK)
-    found = scenes.everything(bar)
-    assert {key: value for key, value in found.items() if key[0] != "ARAP Fields"} == before
+    contents = scenes.everything(bar)
+    assert {key: value for key, value in contents.items() if key[0] != "ARAP Fields"} == before
     assert sorted(o.name for o in bpy.data.objects) == ["Bar", "Fixed", "Moving"]
     assert [g.name for g in bpy.data.node_groups] == ["ARAP Fields"] and len(bar.modifiers) == 1
     assert not bar.hide_render and not bar.hide_get()

@@ -20,9 +20,9 @@ if IN_BLENDER:
 def test_everyday_sections_come_first_and_numbers_are_under_advanced():
     prepared("handles")
     jobs.add_message("INFO", "Bar: done")
-    found = drawn()
+    shown_texts = drawn()
     jobs.board.messages.clear()
-    panels = {name: getattr(bpy.types, name) for name in found if "_PT_" in name}
+    panels = {name: getattr(bpy.types, name) for name in shown_texts if "_PT_" in name}
     first = {n: cls.bl_order for n, cls in panels.items() if not hasattr(cls, "bl_parent_id")}
     order = ["source", "handles", "deform", "stylize", "wrap", "carried", "status", "advanced"]
     assert sorted(first, key=first.get) == [f"ARAPFIELDS_PT_{name}" for name in order]
@@ -30,10 +30,10 @@ def test_everyday_sections_come_first_and_numbers_are_under_advanced():
     folded = {f"ARAPFIELDS_PT_{name}" for name in ("advanced", "carried", "wrap")}
     assert closed == {*panels} - {*first} | folded
     jargon = {"Samples", "Iterations", "Network Width", "Handle Weight", "Output", "Resolution", "Time Limit"}
-    for name, texts in found.items():
+    for name, texts in shown_texts.items():
         if name in first:
             assert not jargon & {*texts}, name
-    assert jargon <= {text for texts in found.values() for text in texts}
+    assert jargon <= {text for texts in shown_texts.values() for text in texts}
 
 
 REFUSED = {
@@ -111,9 +111,9 @@ def test_a_menu_offers_what_the_mesh_has():
 def test_a_fit_tells_its_errors():
     prepared("fitted")
     texts = drawn()["ARAPFIELDS_PT_surface"]
-    told = [text for text in texts if "error at the surface" in text]
+    errors = [text for text in texts if "error at the surface" in text]
     report = json.loads(bpy.data.objects["Bar"].arapfields.fit_report)
-    assert told == [
+    assert errors == [
         f"Mean error at the surface: {report['near_mean']:.2g}",
         f"Largest error at the surface: {report['near_max']:.2g}",
     ]

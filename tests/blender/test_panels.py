@@ -95,8 +95,8 @@ def test_every_grey_button_says_why():
                 try:
                     operator()
                 except RuntimeError as error:
-                    told = str(error).split("poll()")[-1].strip()
-                    assert not told.startswith("failed, context is incorrect"), (cls.__name__, state)
+                    reason = str(error).split("poll()")[-1].strip()
+                    assert not reason.startswith("failed, context is incorrect"), (cls.__name__, state)
         finally:
             undo()
         assert refused > 0, state

@@ -39,10 +39,10 @@ def test_a_pin_on_a_deformed_mesh_is_at_rest_where_its_place_was(turn):
     rest = empties.rest_box(bar, entry)
     assert np.abs(rest[:3, 3] - transform(world, place[None])[0]).max() < 1e-5
     assert np.abs(rest[:3, :3] - 0.2 * np.eye(3)).max() < 1e-6
-    there = np.array(entry.empty.matrix_world)
-    assert np.abs(there[:3, 3] - now).max() < 1e-5
+    placed = np.array(entry.empty.matrix_world)
+    assert np.abs(placed[:3, 3] - now).max() < 1e-5
     turned = (world @ move @ np.linalg.inv(world))[:3, :3]
-    assert np.abs(there[:3, :3] - turned).max() < 1e-4
+    assert np.abs(placed[:3, :3] - turned).max() < 1e-4
 
 
 @in_blender
@@ -58,8 +58,8 @@ def test_a_known_face_decides_where_surfaces_touch():
     motion.write(item, motion.Motion(np.array([(0, 0, -z) for *_, z in points], float)))
     bpy.context.view_layer.update()
     for face in (0, 1):
-        found = places.find(bpy.context, item, np.array([0.3, 0.4, 0.0]), 0.1, face, 2)
-        assert np.allclose(found.rest, [0.3, 0.4, face], atol=1e-6)
+        place = places.find(bpy.context, item, np.array([0.3, 0.4, 0.0]), 0.1, face, 2)
+        assert np.allclose(place.rest, [0.3, 0.4, face], atol=1e-6)
 
 
 @in_blender

@@ -68,32 +68,32 @@ def live_at(item, kind, frames):
 
 def every_way(item, kind):
     """{way: (n, 3) points of frame 37}."""
-    scene, found = camera(8), {}
+    scene, shapes = camera(8), {}
     for name, frames in (("played", range(34, 38)), ("back", [38, 37]), ("jumped", [37])):
-        found[name] = live_at(item, kind, frames)
+        shapes[name] = live_at(item, kind, frames)
         bpy.ops.arapfields.live(kind=kind)
     live_at(item, kind, [30])
     scene.frame_start = scene.frame_end = 37
     scene.render.filepath = tempfile.mkdtemp() + "/frame"
     bpy.ops.render.render(animation=True)
     scene.frame_set(37)
-    found["rendered"] = local_points(item)
+    shapes["rendered"] = local_points(item)
     bpy.ops.arapfields.live(kind=kind)
     for start in (37, 1):
         path = f"{tempfile.mkdtemp()}/bake.pc2"
         bpy.ops.arapfields.bake(kind=kind, start=start, end=37, step=36, filepath=path)
         scene.frame_set(37)
-        found[f"baked from {start}"] = local_points(item)
-    return found
+        shapes[f"baked from {start}"] = local_points(item)
+    return shapes
 
 
 @in_blender
 def test_a_frame_is_the_same_played_jumped_to_baked_and_rendered():
     bar = turning()
-    found = every_way(bar, "DEFORM")
-    size = np.ptp(found["jumped"], axis=0).max()
-    for way, points in found.items():
-        away = np.abs(points - found["jumped"]).max()
+    shapes = every_way(bar, "DEFORM")
+    size = np.ptp(shapes["jumped"], axis=0).max()
+    for way, points in shapes.items():
+        away = np.abs(points - shapes["jumped"]).max()
         assert away <= SAME * size, (way, away)
 
 
@@ -101,9 +101,9 @@ def test_a_frame_is_the_same_played_jumped_to_baked_and_rendered():
 @in_blender
 def test_a_frame_of_an_animated_style_is_the_same_in_every_way():
     ball = styled()
-    found = every_way(ball, "STYLIZE")
-    for way, points in found.items():
-        away = np.abs(points - found["jumped"]).max()
+    shapes = every_way(ball, "STYLIZE")
+    for way, points in shapes.items():
+        away = np.abs(points - shapes["jumped"]).max()
         assert away <= SAME * 2, (way, away)
 
 

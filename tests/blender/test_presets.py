@@ -58,15 +58,15 @@ def test_the_papers_own_settings_are_a_preset_and_the_defaults_come_back(section
     bar = scenes.bar()
     group = getattr(bar.arapfields, section)
     options = {"deform": af.DeformOptions, "stylize": af.StylizeOptions}[section]
-    wanted = options.preset("paper")
+    preset = options.preset("paper")
     group.width = 100
     operator = getattr(bpy.ops.arapfields, f"{section}_given_preset")
     before = bar.arapfields.result
     assert operator(preset="PAPER") == {"FINISHED"}
-    shown = [name for name in group.__annotations__ if hasattr(wanted, name)]
+    shown = [name for name in group.__annotations__ if hasattr(preset, name)]
     assert {"field", "optimizer", "learning_rate", "iterations", "bending_unit"} <= {*shown}
     for name in shown:
-        assert getattr(group, name) == pytest.approx(getattr(wanted, name)), name  # texts and flags: equal
+        assert getattr(group, name) == pytest.approx(getattr(preset, name)), name  # texts and flags: equal
     assert operator(preset="DEFAULT") == {"FINISHED"} and bar.arapfields.result == before
     assert group.width == options().width and group.optimizer == options().optimizer
 

@@ -31,12 +31,12 @@ def nodding(frames=6):
 
 def live_shapes(bar, frames):
     """{frame: (n, 3)} of what live mode shows as the scene comes by these frames."""
-    found = {}
+    shapes = {}
     for frame in frames:
         bpy.context.scene.frame_set(frame)
         sessions.update(bpy.context, wait=600)  # on however busy a machine
-        found[frame] = local_points(bar)
-    return found
+        shapes[frame] = local_points(bar)
+    return shapes
 
 
 @in_blender

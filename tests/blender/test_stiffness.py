@@ -60,11 +60,11 @@ def test_live_follows_the_brush_and_presets():
     before = np.array([vertex.co for vertex in bar.data.vertices])
     bpy.ops.arapfields.live()
     step(refined=True)
-    found = [stretch(bar, before, 0.2, 0.7)]
+    stretches = [stretch(bar, before, 0.2, 0.7)]
     assert bpy.ops.arapfields.stiffness_preset(material="WOOD") == {"FINISHED"}
     for _ in range(2):
         step(refined=True)
-    found.append(stretch(bar, before, 0.2, 0.7))
+    stretches.append(stretch(bar, before, 0.2, 0.7))
     bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
     bar.vertex_groups["Bone"].add(range(len(bar.data.vertices)), 0.01, "REPLACE")
     bar.data.update()
@@ -72,9 +72,9 @@ def test_live_follows_the_brush_and_presets():
     __import__("time").sleep(0.4)
     for _ in range(3):
         step(refined=True)
-    found.append(stretch(bar, before, 0.2, 0.7))
-    print(found)
-    assert found[1] < 0.1 * found[0] and found[2] > 0.5 * found[0]
+    stretches.append(stretch(bar, before, 0.2, 0.7))
+    print(stretches)
+    assert stretches[1] < 0.1 * stretches[0] and stretches[2] > 0.5 * stretches[0]
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.ops.arapfields.live()
     bar.vertex_groups.remove(bar.vertex_groups["Bone"])

@@ -75,10 +75,10 @@ def test_extraction_lies_on_the_source_in_world_space():
         setattr(bar.arapfields.fit, name, value)
     bpy.ops.arapfields.extract(resolution=48, surface="FIT")
     result = bpy.data.objects["Bar_implicit"]
-    made, source = scenes.world_points(result), scenes.world_points(bar)
+    surface, source = scenes.world_points(result), scenes.world_points(bar)
     assert len(result.data.polygons) > 500 and all(face.use_smooth for face in result.data.polygons)
-    assert np.abs(made.mean(axis=0) - source.mean(axis=0)).max() < NEAR
-    assert np.abs(np.ptp(made, axis=0) - np.ptp(source, axis=0)).max() < 4 * NEAR
+    assert np.abs(surface.mean(axis=0) - source.mean(axis=0)).max() < NEAR
+    assert np.abs(np.ptp(surface, axis=0) - np.ptp(source, axis=0)).max() < 4 * NEAR
     assert [m.name for m in result.data.materials] == ["skin"]
     centre = np.array(result.matrix_local.inverted() @ bar.location)
     outward = [f.normal.dot(f.center) > 0 for f in result.data.polygons]
@@ -144,16 +144,16 @@ def test_a_remeshed_surface_is_even_where_the_shape_is_stretched():
         setattr(bar.arapfields.fit, name, value)
     moving.location.x += 0.8
     settings = scenes.NEW | {"iterations": 120, "resolution": 48}
-    made = {}
+    results = {}
     for output in ("SURFACE", "REMESH"):
         scenes.activate(bar)
         bpy.ops.arapfields.deform(output=output, **settings)
-        made[output] = bpy.context.view_layer.objects.active
-    assert made["SURFACE"] != made["REMESH"] and len(bar.arapfields.results) == 2
-    assert json.loads(made["REMESH"]["arapfields_report"])["failures"] == 0
-    moved, even = lengths(made["SURFACE"]), lengths(made["REMESH"])
-    step = np.ptp(scenes.world_points(made["REMESH"]), axis=0).max() / 48
+        results[output] = bpy.context.view_layer.objects.active
+    assert results["SURFACE"] != results["REMESH"] and len(bar.arapfields.results) == 2
+    assert json.loads(results["REMESH"]["arapfields_report"])["failures"] == 0
+    moved, even = lengths(results["SURFACE"]), lengths(results["REMESH"])
+    step = np.ptp(scenes.world_points(results["REMESH"]), axis=0).max() / 48
     assert even.max() < 2.5 * step and moved.max() / np.median(moved) > even.max() / np.median(even)
-    tree = BVHTree.FromObject(made["SURFACE"], bpy.context.evaluated_depsgraph_get())
-    off = [tree.find_nearest(v.co)[3] for v in made["REMESH"].data.vertices]
+    tree = BVHTree.FromObject(results["SURFACE"], bpy.context.evaluated_depsgraph_get())
+    off = [tree.find_nearest(v.co)[3] for v in results["REMESH"].data.vertices]
     assert np.mean(off) < NEAR

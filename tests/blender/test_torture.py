@@ -87,34 +87,34 @@ ODD = [
 @in_blender
 def test_odd_meshes_deform(case):
     item, _, moving = scenes.bar_with_handles("Mesh")
-    made = bmesh.new()
-    made.from_mesh(item.data)
-    made.verts.ensure_lookup_table()
-    made.faces.ensure_lookup_table()
+    edited = bmesh.new()
+    edited.from_mesh(item.data)
+    edited.verts.ensure_lookup_table()
+    edited.faces.ensure_lookup_table()
     if case == "open":
-        bmesh.ops.delete(made, geom=made.faces[:40], context="FACES")
+        bmesh.ops.delete(edited, geom=edited.faces[:40], context="FACES")
     elif case == "non-manifold":
-        made.faces.new([made.verts[0], made.verts[20], made.verts[60]])
-        made.faces.new([made.verts[0], made.verts[20], made.verts[90]])
+        edited.faces.new([edited.verts[0], edited.verts[20], edited.verts[60]])
+        edited.faces.new([edited.verts[0], edited.verts[20], edited.verts[90]])
     elif case == "n-gons":
-        bmesh.ops.dissolve_limit(made, angle_limit=0.1, verts=made.verts, edges=made.edges)
+        bmesh.ops.dissolve_limit(edited, angle_limit=0.1, verts=edited.verts, edges=edited.edges)
     elif case == "loose parts beside":
-        loose = [made.verts.new((0, 0, z)) for z in (1, 2)]
-        made.edges.new(loose)
-        made.verts.new((0, 2, 0))
+        loose = [edited.verts.new((0, 0, z)) for z in (1, 2)]
+        edited.edges.new(loose)
+        edited.verts.new((0, 2, 0))
     elif case == "zero-area faces":
-        point = made.verts[0].co.copy()
-        made.faces.new([made.verts.new(point) for _ in range(3)])
+        point = edited.verts[0].co.copy()
+        edited.faces.new([edited.verts.new(point) for _ in range(3)])
     elif case == "inside out":
-        bmesh.ops.reverse_faces(made, faces=made.faces)
+        bmesh.ops.reverse_faces(edited, faces=edited.faces)
     elif case == "two islands":
-        copied = bmesh.ops.duplicate(made, geom=[*made.verts, *made.edges, *made.faces])["geom"]
+        copied = bmesh.ops.duplicate(edited, geom=[*edited.verts, *edited.edges, *edited.faces])["geom"]
         moved = [v for v in copied if isinstance(v, bmesh.types.BMVert)]
-        bmesh.ops.translate(made, vec=(0, 1.2, 0), verts=moved)
+        bmesh.ops.translate(edited, vec=(0, 1.2, 0), verts=moved)
     elif case == "doubled vertices":
-        bmesh.ops.split_edges(made, edges=made.edges)
-    made.to_mesh(item.data)
-    made.free()
+        bmesh.ops.split_edges(edited, edges=edited.edges)
+    edited.to_mesh(item.data)
+    edited.free()
     if case == "multi-user":
         other = bpy.data.objects.new("Other", item.data)
         bpy.context.collection.objects.link(other)
@@ -141,7 +141,7 @@ def test_odd_meshes_deform(case):
 @in_blender
 def test_tiny_and_huge_units(scale):
     """Geometry itself of that size, and the scene's unit scale: results are the plain ones, scaled."""
-    found = {}
+    results = {}
     for size in (1.0, scale):
         item, fixed, moving = scenes.bar_with_handles("Mesh")
         bpy.context.scene.unit_settings.scale_length = 1 / size
@@ -153,10 +153,10 @@ def test_tiny_and_huge_units(scale):
         moving.location.z += 0.3 * size
         scenes.activate(item)
         bpy.ops.arapfields.deform(output="WARP", **scenes.NEW)
-        found[size] = scenes.world_points(bpy.context.view_layer.objects.active) / size
+        results[size] = scenes.world_points(bpy.context.view_layer.objects.active) / size
         for other in list(bpy.data.objects):
             bpy.data.objects.remove(other)
-    assert np.abs(found[scale] - found[1.0]).max() < 0.02
+    assert np.abs(results[scale] - results[1.0]).max() < 0.02
 
 
 @in_blender

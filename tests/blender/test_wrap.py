@@ -25,13 +25,13 @@ if IN_BLENDER:
 @in_blender
 def test_the_object_comes_to_lie_on_the_target_and_the_factor_goes_back():
     item, target = bar_and_target()
-    rest, there = scenes.world_points(item), scenes.world_points(target)
+    rest, goal = scenes.world_points(item), scenes.world_points(target)
     for index in (0, len(rest) // 2, len(rest) - 1):
-        assert bpy.ops.arapfields.add_landmark(rest=rest[index], on_target=there[index]) == {"FINISHED"}
+        assert bpy.ops.arapfields.add_landmark(rest=rest[index], on_target=goal[index]) == {"FINISHED"}
     kept = scenes.everything(item)
     assert bpy.ops.arapfields.wrap(**SMALL) == {"FINISHED"}
     after = scenes.world_points(item)
-    assert np.linalg.norm(after - there, axis=1).mean() < 0.15
+    assert np.linalg.norm(after - goal, axis=1).mean() < 0.15
     now = scenes.everything(item)
     assert all(now[name] == value for name, value in kept.items())
     modifier = modifier_stack.find(item)
@@ -43,15 +43,15 @@ def test_the_object_comes_to_lie_on_the_target_and_the_factor_goes_back():
 @in_blender
 def test_landmarks_are_pairs_of_empties_that_move_with_both():
     item, target = bar_and_target()
-    rest, there = scenes.world_points(item), scenes.world_points(target)
-    bpy.ops.arapfields.add_landmark(rest=rest[0] + 0.01, on_target=there[0] - 0.01)
+    rest, goal = scenes.world_points(item), scenes.world_points(target)
+    bpy.ops.arapfields.add_landmark(rest=rest[0] + 0.01, on_target=goal[0] - 0.01)
     (entry,) = landmarks.used(item)
     assert entry.rest.parent == item and entry.on_target.parent == target
     assert np.abs(np.array(entry.rest.matrix_world.translation) - rest[0]).max() < 0.02
     target.location.z += 1.0
     bpy.context.view_layer.update()
     ((_, moved),) = landmarks.read(item, space_of(item.matrix_world, item.name))
-    assert abs(moved[2] - there[0][2] - 1.0) < 0.02
+    assert abs(moved[2] - goal[0][2] - 1.0) < 0.02
     assert bpy.ops.arapfields.remove_landmark(index=0) == {"FINISHED"}
     assert not landmarks.used(item) and not [o for o in bpy.data.objects if o.type == "EMPTY"]
 

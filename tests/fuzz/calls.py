@@ -164,15 +164,15 @@ def live_calls(t):
 
 def options(rng, things):
     """Of each class of options: itself with an odd value, its presets, its values."""
-    found = {}
+    named = {}
     for name, cls in vars(af).items():
         if not name.endswith("Options") or cls.__name__ != name:  # an alias
             continue
-        found[name] = lambda cls=cls: (partial(odd_options, rng, things, cls), [])
-        found[f"{name}.to_dict"] = lambda cls=cls: (cls.to_dict, [cls()])
+        named[name] = lambda cls=cls: (partial(odd_options, rng, things, cls), [])
+        named[f"{name}.to_dict"] = lambda cls=cls: (cls.to_dict, [cls()])
         if hasattr(cls, "preset"):
-            found[f"{name}.preset"] = lambda cls=cls: (cls.preset, ["paper"])
-    return found
+            named[f"{name}.preset"] = lambda cls=cls: (cls.preset, ["paper"])
+    return named
 
 
 def members(t):

@@ -81,7 +81,7 @@ class Meshes(Target):
     """Meshes as the command line reads them, and their vertices moved as it writes them."""
 
     def make(self):
-        made = {}
+        examples = {}
         box = trimesh.creation.box()
         for suffix in ("ply", "off", "stl"):
             box.export(self.folder / f"box.{suffix}")
@@ -92,8 +92,8 @@ class Meshes(Target):
         lines += ["f " + " ".join(f"{i + 1}/1/1" for i in row) for row in box.faces]
         (self.folder / "box.obj").write_text("\n".join(lines) + "\n")
         for path in self.folder.glob("*.*"):
-            made[path.name] = path
-        return made
+            examples[path.name] = path
+        return examples
 
     def use(self, path):
         mesh = files.read_mesh(path)

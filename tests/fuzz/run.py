@@ -81,15 +81,15 @@ def refusals(
     folder="native/io", names=("archive", "json", "document", "network_file", "field_file", "input_file")
 ):
     """Of each refusal in the reader's source: file, line, and the fixed parts of its text."""
-    found = []
+    refused = []
     for name in names:
         text = (ROOT / folder / f"{name}.cpp").read_text()
         for call in re.finditer(r"\b(?:require|throw InvalidInput)\((?:[^;\"]|\"(?:\\.|[^\"\\])*\")*;", text):
             parts = re.findall(r'"((?:\\.|[^"\\])*)"', call[0])
             parts = [part.strip() for part in parts if len(part.strip()) >= 8]
             if parts:
-                found.append((name, text[: call.start()].count("\n") + 1, parts))
-    return found
+                refused.append((name, text[: call.start()].count("\n") + 1, parts))
+    return refused
 
 
 def unreached(texts, folder="native/io"):

@@ -34,11 +34,11 @@ def findings():
 
 @pytest.mark.parametrize("target", COUNTS)
 def test_nothing_but_documented_errors(target, findings):
-    found = findings[target] = run_target(target, seed=3, count=COUNTS[target])
-    assert sum(found.outcomes.values()) == COUNTS[target]
-    assert not found.failures, found.failures[:3]
+    outcome = findings[target] = run_target(target, seed=3, count=COUNTS[target])
+    assert sum(outcome.outcomes.values()) == COUNTS[target]
+    assert not outcome.failures, outcome.failures[:3]
     if target != "records":  # which count as damaged instead
-        assert found.outcomes["refused"] > COUNTS[target] // 10
+        assert outcome.outcomes["refused"] > COUNTS[target] // 10
 
 
 def test_the_readers_refusals_are_reached(findings):

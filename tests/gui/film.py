@@ -77,7 +77,7 @@ def glide(film, start, end, steps=3):
         film.take(spot)
 
 
-def checks(path, found, folder):
+def checks(path, figures, folder):
     film = Film(folder)
     bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False)
     yield 1.0
@@ -115,6 +115,6 @@ def checks(path, found, folder):
         yield from mouse.release()
         yield 0.3
     film.take(spot, hold=10)
-    found["pins"] = [[entry.empty.name, entry.anchor] for entry in dinosaur.arapfields.handles]
-    found["moved"] = round(float(np.linalg.norm(scenes.world_points(dinosaur) - rest, axis=1).max()), 3)
+    figures["pins"] = [[entry.empty.name, entry.anchor] for entry in dinosaur.arapfields.handles]
+    figures["moved"] = round(float(np.linalg.norm(scenes.world_points(dinosaur) - rest, axis=1).max()), 3)
     film.write()

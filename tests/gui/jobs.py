@@ -22,11 +22,11 @@ def invoke(settings):
         return str(bpy.ops.arapfields.deform("INVOKE_DEFAULT", **settings))
 
 
-def checks(found, folder, ending=False):
-    yield from (endings if ending else running)(found, folder)
+def checks(figures, folder, ending=False):
+    yield from (endings if ending else running)(figures, folder)
 
 
-def running(found, folder):
+def running(figures, folder):
     stage.empty_file()
     with stage.override():
         _, _, moving = scenes.bar_with_handles()
@@ -37,49 +37,49 @@ def running(found, folder):
     bpy.context.view_layer.update()
     before = stage.everything()
     bpy.ops.ed.undo_push(message="before")
-    found["redraw_s"] = stage.redraw_seconds()
-    yield from stage.gaps(3.0, found, "late_without_a_job")
+    figures["redraw_s"] = stage.redraw_seconds()
+    yield from stage.gaps(3.0, figures, "late_without_a_job")
     ours, shown = stage.Meter(), stage.Meter()
     ours.watch(JobOperator, "advance").watch(previews, "draw")
     shown.watch(previews.Preview, "show")
     begin = time.perf_counter()
-    found["invoke"] = invoke(LONG)
-    found["click_s"] = round(time.perf_counter() - begin, 4)
+    figures["invoke"] = invoke(LONG)
+    figures["click_s"] = round(time.perf_counter() - begin, 4)
     begin = time.perf_counter()
-    yield from stage.gaps(6.0, found, "late_with_a_job")
+    yield from stage.gaps(6.0, figures, "late_with_a_job")
     seconds = time.perf_counter() - begin
-    found["running"], found["progress"] = jobs.running() is not None, jobs.progress()
+    figures["running"], figures["progress"] = jobs.running() is not None, jobs.progress()
     stage.picture(folder, "running-apart")
-    found["main_thread_at_once"], shown = ours.end(), shown.end()
-    found["previews_per_second"] = round(shown["calls"] / seconds, 2)
-    found["looks_per_second"] = round(jobs.running().preview_points()[1] / seconds, 2)
+    figures["main_thread_at_once"], shown = ours.end(), shown.end()
+    figures["previews_per_second"] = round(shown["calls"] / seconds, 2)
+    figures["looks_per_second"] = round(jobs.running().preview_points()[1] / seconds, 2)
     begin = time.perf_counter()
     bpy.ops.arapfields.cancel()
     yield from until_idle(30)
-    found["cancel_s"] = round(time.perf_counter() - begin, 4)
-    found["exact_after_cancel"] = stage.everything() == before
+    figures["cancel_s"] = round(time.perf_counter() - begin, 4)
+    figures["exact_after_cancel"] = stage.everything() == before
     yield 4.0  # sections of the panel slide to where they stay
     stage.picture(folder, "cancelled")
-    yield from in_place(found, folder, before)
-    yield from escape(found, before)
-    yield from result(found, folder)
+    yield from in_place(figures, folder, before)
+    yield from escape(figures, before)
+    yield from result(figures, folder)
 
 
-def in_place(found, folder, before):
+def in_place(figures, folder, before):
     """The mesh itself shows what there is so far, and is what it was after Cancel."""
     rest = stage.positions("Bar")
     invoke({**LONG, "result": "MODIFIER"})
     yield from until(lambda: np.abs(stage.positions("Bar") - rest).max() > 0.3)
     yield 1.0
     stage.picture(folder, "running")
-    found["shown_on_the_mesh"] = round(float(np.abs(stage.positions("Bar") - rest).max()), 3)
+    figures["shown_on_the_mesh"] = round(float(np.abs(stage.positions("Bar") - rest).max()), 3)
     bpy.ops.arapfields.cancel()
     yield from until_idle(30)
-    found["exact_after_cancel_in_place"] = stage.everything() == before
+    figures["exact_after_cancel_in_place"] = stage.everything() == before
     yield 1.0
 
 
-def escape(found, before):
+def escape(figures, before):
     """Cancelled by the key instead of the button."""
     invoke(LONG)
     stage.tool("mousemove", 600, 500)
@@ -87,29 +87,29 @@ def escape(found, before):
     begin = time.perf_counter()
     stage.tool("key", "Escape")
     yield from until_idle(30)
-    found["escape_s"] = round(time.perf_counter() - begin, 4)
-    found["exact_after_escape"] = stage.everything() == before
+    figures["escape_s"] = round(time.perf_counter() - begin, 4)
+    figures["exact_after_escape"] = stage.everything() == before
 
 
-def result(found, folder):
+def result(figures, folder):
     invoke(scenes.NEW)
     yield from until_idle(120)
     modal = stage.positions("Bar_deformed")
-    found["preview_gone"] = previews.shown.mesh is None
+    figures["preview_gone"] = previews.shown.mesh is None
     yield 0.5
     stage.picture(folder, "result")
-    there = "Bar_deformed" in bpy.data.objects
+    was_made = "Bar_deformed" in bpy.data.objects
     with stage.override():
         bpy.ops.ed.undo()
     gone = "Bar_deformed" not in bpy.data.objects
-    found["one_undo_step"] = there and gone and abs(bpy.data.objects["Moving"].location.z - 0.5) < 1e-6
+    figures["one_undo_step"] = was_made and gone and abs(bpy.data.objects["Moving"].location.z - 0.5) < 1e-6
     with stage.override():
         scenes.activate(bpy.data.objects["Bar"])
         bpy.ops.arapfields.deform("EXEC_DEFAULT", **scenes.NEW)
-    found["modal_against_blocking"] = float(np.abs(stage.positions("Bar_deformed") - modal).max())
+    figures["modal_against_blocking"] = float(np.abs(stage.positions("Bar_deformed") - modal).max())
 
 
-def endings(found, folder):
+def endings(figures, folder):
     """A job while a step is undone, a file is loaded, the add-on is switched off."""
     for name, act in (
         ("undo", lambda: bpy.ops.ed.undo()),
@@ -126,6 +126,6 @@ def endings(found, folder):
         begin = time.perf_counter()
         with stage.override():
             act()
-        found[f"ends_on_{name}"] = running and jobs.running() is None
-        found[f"ends_on_{name}_s"] = round(time.perf_counter() - begin, 4)
+        figures[f"ends_on_{name}"] = running and jobs.running() is None
+        figures[f"ends_on_{name}_s"] = round(time.perf_counter() - begin, 4)
         yield 1.0

@@ -16,12 +16,12 @@ from addon.solver.frame_solver import FrameSolver
 SECONDS = 5.0
 
 
-def checks(found, folder):
-    yield from rate(found, folder)
-    yield from drag(found, folder)
+def checks(figures, folder):
+    yield from rate(figures, folder)
+    yield from drag(figures, folder)
 
 
-def rate(found, folder):
+def rate(figures, folder):
     """Moves a handle of a mesh of 50,000 vertices: how often the viewport shows a new shape."""
     stage.empty_file()
     with stage.override():
@@ -32,32 +32,32 @@ def rate(found, folder):
         solves = stage.Meter().watch(FrameSolver, "follow")
         begin = time.perf_counter()
         bpy.ops.arapfields.live("INVOKE_DEFAULT")
-        found["live_click_s"] = round(time.perf_counter() - begin, 4)
+        figures["live_click_s"] = round(time.perf_counter() - begin, 4)
     session = sessions.live[bar.session_uid]
     while not session.worker.is_settled:
         yield 0.01
-    found["live_first_shape_s"] = round(time.perf_counter() - begin, 4)
-    found["live_vertices"] = len(bar.data.vertices)
+    figures["live_first_shape_s"] = round(time.perf_counter() - begin, 4)
+    figures["live_vertices"] = len(bar.data.vertices)
     _, area, _ = stage.view()
     for name, overlays, samples in (("as_it_opens", True, "8"), ("plain", False, "OFF")):
         area.spaces.active.overlay.show_overlays = overlays
         bpy.context.preferences.system.viewport_aa = samples
         yield 1.0
-        yield from one_rate(found, name, moving)
-    found["live_solve_and_warp_on_worker"] = solves.end()
-    found["live_without_drawing"] = without_drawing(moving)
+        yield from one_rate(figures, name, moving)
+    figures["live_solve_and_warp_on_worker"] = solves.end()
+    figures["live_without_drawing"] = without_drawing(moving)
     stage.picture(folder, "live-plain")
     area.spaces.active.overlay.show_overlays = True
     bpy.context.preferences.system.viewport_aa = "8"
     yield from until_live_rests()
-    found["live_refined"] = {"converged": session.solver.report.converged}
+    figures["live_refined"] = {"converged": session.solver.report.converged}
     yield 1.0
     stage.picture(folder, "live")
     with stage.override():
         sessions.end(bpy.context, bar)
 
 
-def one_rate(found, name, moving):
+def one_rate(figures, name, moving):
     shown, ticks = stage.Meter(), stage.Meter()
     ticks.watch(sessions, "update")
     shown.watch(motion, "write")
@@ -69,7 +69,7 @@ def one_rate(found, name, moving):
         yield 0.004
     stop()
     updates = shown.end()
-    found[f"live_{name}"] = {
+    figures[f"live_{name}"] = {
         "updates_per_second": updates["calls"] / SECONDS,
         "draws_per_second": len(times) / SECONDS,
         "main_thread_each_look": ticks.end(),
@@ -96,7 +96,7 @@ def without_drawing(moving):
     return {"updates_per_second": round(count / (time.perf_counter() - begin), 1)}
 
 
-def drag(found, folder):
+def drag(figures, folder):
     """A drag with the mouse, as a user does it: one undo step, and the shape returns with it."""
     stage.empty_file()
     with stage.override():
@@ -124,20 +124,20 @@ def drag(found, folder):
     moving = bpy.data.objects["Moving"]
     moved = stage.positions("Bar")
     stage.picture(folder, "dragged")
-    found["drag_moved_handle"] = round(float(np.linalg.norm(moving.location - bar.location) - 1), 4)
-    found["drag_moved_shape"] = round(float(np.abs(moved - rest).max()), 4)
+    figures["drag_moved_handle"] = round(float(np.linalg.norm(moving.location - bar.location) - 1), 4)
+    figures["drag_moved_shape"] = round(float(np.abs(moved - rest).max()), 4)
     with stage.override():
         bpy.ops.ed.undo()
     yield 1.0
     yield from until_live_rests()
-    found["live_after_undo"] = sessions.is_live(bpy.data.objects["Bar"])
+    figures["live_after_undo"] = sessions.is_live(bpy.data.objects["Bar"])
     moving = bpy.data.objects["Moving"]
     back = np.allclose(moving.location, (1, 0, 0), atol=1e-6) and moving.get("mark") == 1
-    found["drag_is_one_undo_step"] = bool(back)
-    found["shape_returns_with_undo"] = round(float(np.abs(stage.positions("Bar") - rest).max()), 6)
+    figures["drag_is_one_undo_step"] = bool(back)
+    figures["shape_returns_with_undo"] = round(float(np.abs(stage.positions("Bar") - rest).max()), 6)
     bar = bpy.data.objects["Bar"]
     del moving["mark"]
     with stage.override():
         scenes.activate(bar)
         sessions.end(bpy.context, bar)
-    found["off_restores"] = stage.everything() == before and not bar.modifiers
+    figures["off_restores"] = stage.everything() == before and not bar.modifiers

@@ -14,7 +14,7 @@ STYLES = (1150, 127)  # the menu of styles below the header of its section, were
 SIDEBAR = (1028, 84, 258, 820)  # left, top, width, height
 
 
-def checks(found, folder):
+def checks(figures, folder):
     bar, moving = bpy.data.objects["Bar"], bpy.data.objects["Moving"]
     bar.modifiers.new("Subdivision", "SUBSURF")
     moving.location.z, moving.rotation_euler.y = 0.45, -0.5
@@ -22,7 +22,7 @@ def checks(found, folder):
     yield 4.0  # sections slide to where they stay
     stage.picture(folder, "handles")
     yield from sections(folder, "panel")
-    found["languages"] = len(bpy.app.translations.locales)
+    figures["languages"] = len(bpy.app.translations.locales)
     if "de_DE" in bpy.app.translations.locales:
         view = bpy.context.preferences.view
         view.language = "de_DE"
@@ -35,16 +35,16 @@ def checks(found, folder):
     yield from open_alone({"source", "handles", "deform", "stylize"})
     bar.modifiers.clear()
     bar.arapfields.surface = "EXACT"
-    found["sections"] = len(rows()) + len(rows(ADVANCED))
+    figures["sections"] = len(rows()) + len(rows(ADVANCED))
 
 
 def rows(parent=None):
     """The sections that are drawn now, top to bottom: all, or those within another."""
     with stage.override():
-        found = [c for c in CLASSES if c.__name__.startswith(PANEL) and c.poll(bpy.context)]
-    found = [c for c in found if getattr(c, "bl_parent_id", None) == parent]
-    found.sort(key=lambda c: c.bl_order)
-    return [c.__name__[len(PANEL) :].replace("_", "-") for c in found]
+        shown = [c for c in CLASSES if c.__name__.startswith(PANEL) and c.poll(bpy.context)]
+    shown = [c for c in shown if getattr(c, "bl_parent_id", None) == parent]
+    shown.sort(key=lambda c: c.bl_order)
+    return [c.__name__[len(PANEL) :].replace("_", "-") for c in shown]
 
 
 def sections(folder, name):

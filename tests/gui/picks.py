@@ -33,7 +33,7 @@ STAGES = {  # one after another, and what is seen at each
 IN_PLACE = ("deformed", "in place", "live in place")
 
 
-def checks(found, folder, in_place=False):
+def checks(figures, folder, in_place=False):
     stage.empty_file()
     with stage.override():
         bar, fixed, moving = scenes.bar_with_handles()
@@ -44,7 +44,7 @@ def checks(found, folder, in_place=False):
         bpy.ops.view3d.view_all()
         bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
     yield 1.0
-    rest, told = scenes.world_points(bar), {}
+    rest, cells = scenes.world_points(bar), {}
     for name in IN_PLACE if in_place else STAGES:
         with stage.override():
             choose(bar)
@@ -55,10 +55,10 @@ def checks(found, folder, in_place=False):
         cell = {"seen": seen, "alone": seen == rendered == [STAGES[name]]}
         yield from clicks(cell, bpy.data.objects[seen[0]], (fixed, moving), rest)
         stage.picture(folder, f"picks-{name.replace(' ', '-')}")
-        told[name] = cell
+        cells[name] = cell
         print(name, cell, flush=True)
-    found["picks"] = told
-    found["picks_right"] = all(cell["alone"] and cell["hits"] == cell["of"] for cell in told.values())
+    figures["picks"] = cells
+    figures["picks_right"] = all(cell["alone"] and cell["hits"] == cell["of"] for cell in cells.values())
 
 
 def choose(bar):
@@ -89,11 +89,11 @@ def enter(name, bar):
 
 
 def clicks(cell, mesh, empties, rest):
-    wanted = [(mesh, point) for point in visible_vertices(mesh, ON_MESH, empties)]
-    wanted += [(empty, point) for empty in empties for point in edge_points(empty, ON_HANDLE)]
-    wanted += [(None, point) for point in left_behind(rest, empties, ON_NOTHING)]
+    targets = [(mesh, point) for point in visible_vertices(mesh, ON_MESH, empties)]
+    targets += [(empty, point) for empty in empties for point in edge_points(empty, ON_HANDLE)]
+    targets += [(None, point) for point in left_behind(rest, empties, ON_NOTHING)]
     hits, missed = 0, []
-    for item, point in wanted:
+    for item, point in targets:
         with stage.override():
             for other in bpy.context.selected_objects:
                 other.select_set(False)
@@ -105,7 +105,7 @@ def clicks(cell, mesh, empties, rest):
         hits += active == item
         if active != item:
             missed.append((item and item.name, active and active.name, pixel(point)))
-    cell |= {"hits": hits, "of": len(wanted), "missed": missed}
+    cell |= {"hits": hits, "of": len(targets), "missed": missed}
 
 
 def corners(empty):
@@ -131,7 +131,7 @@ def visible_vertices(item, count, empties):
     _, area, region = stage.view()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     eye = area.spaces.active.region_3d
-    found = []
+    points = []
     for point in scenes.world_points(item):
         flat = location_3d_to_region_2d(region, eye, Vector(point))
         if flat is None or not 90 < flat.x < region.width - 330 or not 60 < flat.y < region.height - 60:
@@ -142,14 +142,14 @@ def visible_vertices(item, count, empties):
             continue
         hit, where, *_ = bpy.context.scene.ray_cast(depsgraph, origin, way.normalized())
         if hit and (where - Vector(point)).length < 0.02:
-            found.append(point)
-    return [found[index] for index in np.linspace(0, len(found) - 1, count + 2).astype(int)[1:-1]]
+            points.append(point)
+    return [points[index] for index in np.linspace(0, len(points) - 1, count + 2).astype(int)[1:-1]]
 
 
 def left_behind(rest, empties, count):
     """Points where the mesh was at rest, at which nothing is seen now."""
     _, area, region = stage.view()
-    depsgraph, eye, found = bpy.context.evaluated_depsgraph_get(), area.spaces.active.region_3d, []
+    depsgraph, eye, points = bpy.context.evaluated_depsgraph_get(), area.spaces.active.region_3d, []
     for point in rest:
         flat = location_3d_to_region_2d(region, eye, Vector(point))
         if flat is None or not is_clear(point, empties):
@@ -158,5 +158,5 @@ def left_behind(rest, empties, count):
         around = [Vector((x, y)) for x in (-BESIDE, 0, BESIDE) for y in (-BESIDE, 0, BESIDE)]
         ways = [region_2d_to_vector_3d(region, eye, flat + step) for step in around]
         if not any(bpy.context.scene.ray_cast(depsgraph, origin, way)[0] for way in ways):
-            found.append(point)
-    return found[:: max(1, len(found) // count)][:count]
+            points.append(point)
+    return points[:: max(1, len(points) // count)][:count]

@@ -21,10 +21,10 @@ SECONDS = 5.0
 END = (0.9, -0.25, 0.0)  # on the bar's front
 
 
-def checks(found, folder, rate_alone=False):
+def checks(figures, folder, rate_alone=False):
     if not rate_alone:
-        yield from by_hand(found, folder)
-    yield from first_and_rate(found, folder)
+        yield from by_hand(figures, folder)
+    yield from first_and_rate(figures, folder)
 
 
 def set_stage(dense=False):
@@ -50,7 +50,7 @@ def state():
     return stage.everything(), handles, scenes.world_points(bar).tobytes()
 
 
-def by_hand(found, folder):
+def by_hand(figures, folder):
     bar = set_stage()
     yield 0.5
     rest, before = scenes.world_points(bar), state()
@@ -59,31 +59,31 @@ def by_hand(found, folder):
     stage.picture(folder, "pins-hover")
     yield from drag(spot, (spot[0], spot[1] - 120), hold=True)
     stage.picture(folder, "pins-drag")
-    found["pins_drag_moves"] = round(float(np.abs(scenes.world_points(bar) - rest).max()), 3)
+    figures["pins_drag_moves"] = round(float(np.abs(scenes.world_points(bar) - rest).max()), 3)
     stage.tool("key", "Escape")
     yield from release()
-    found["pins_escape_of_a_new_pin"] = state() == before
+    figures["pins_escape_of_a_new_pin"] = state() == before
     yield from drag(spot, (spot[0], spot[1] - 120))
     placed = state()
-    found["pins_after_the_drag"] = [entry.empty.name for entry in bar.arapfields.handles]
+    figures["pins_after_the_drag"] = [entry.empty.name for entry in bar.arapfields.handles]
     spot = pixel(bar.arapfields.handles[0].empty.location)
     yield from drag(spot, (spot[0] - 60, spot[1] + 90), hold=True)
     moved = state() != placed
     stage.tool("key", "Escape")
     yield from release()
-    found["pins_escape_of_a_drag"] = moved and state() == placed
-    yield from anchor_turn_delete(found, folder, bar)
+    figures["pins_escape_of_a_drag"] = moved and state() == placed
+    yield from anchor_turn_delete(figures, folder, bar)
     with stage.override():
         sessions.end(bpy.context, bar)
 
 
-def anchor_turn_delete(found, folder, bar):
+def anchor_turn_delete(figures, folder, bar):
     stage.tool("keydown", "shift")
     yield from hover(pixel((-0.9, -0.25, 0.0)))
     stage.tool("click", 1)
     yield 0.5
     stage.tool("keyup", "shift")
-    found["pins_anchor"] = [entry.anchor for entry in bar.arapfields.handles] == [False, True]
+    figures["pins_anchor"] = [entry.anchor for entry in bar.arapfields.handles] == [False, True]
     pin = bar.arapfields.handles[0].empty
     spot, before = pixel(pin.location), pin.rotation_euler.copy()
     yield from hover(spot)
@@ -92,7 +92,7 @@ def anchor_turn_delete(found, folder, bar):
     ring = (spot[0] + 46, spot[1])
     yield from drag(ring, (spot[0] + 33, spot[1] + 33))
     turned = np.degrees(pin.rotation_euler.y - before.y)
-    found["pins_ring_turns_degrees"] = round(float(turned), 1)
+    figures["pins_ring_turns_degrees"] = round(float(turned), 1)
     stage.tool("key", "r")
     yield 0.5
     for step in range(8):
@@ -100,9 +100,9 @@ def anchor_turn_delete(found, folder, bar):
         yield 0.1
     stage.tool("click", 1)
     yield 0.8
-    found["pins_r_turns_degrees"] = round(float(np.degrees(pin.rotation_euler.y - before.y) - turned), 1)
+    figures["pins_r_turns_degrees"] = round(float(np.degrees(pin.rotation_euler.y - before.y) - turned), 1)
     stage.picture(folder, "pins-turned")
-    yield from navigation(found, folder, bar)
+    yield from navigation(figures, folder, bar)
     count = len(bpy.data.objects)
     yield from hover(pixel(bar.arapfields.handles[1].empty.location))
     stage.tool("keydown", "ctrl")
@@ -110,14 +110,16 @@ def anchor_turn_delete(found, folder, bar):
     stage.tool("click", 1)
     yield from until(lambda: len(bar.arapfields.handles) == 1, 5.0)
     stage.tool("keyup", "ctrl")
-    found["pins_ctrl_click_deletes"] = len(bar.arapfields.handles) == 1 and len(bpy.data.objects) == count - 1
+    figures["pins_ctrl_click_deletes"] = (
+        len(bar.arapfields.handles) == 1 and len(bpy.data.objects) == count - 1
+    )
     stage.tool("key", "x")
     yield from until(lambda: not bar.arapfields.handles, 5.0)
-    found["pins_x_deletes_the_last"] = not bar.arapfields.handles and not bar.modifiers
-    found["pins_no_stray_object"] = [item.name for item in bpy.data.objects] == ["Bar"]
+    figures["pins_x_deletes_the_last"] = not bar.arapfields.handles and not bar.modifiers
+    figures["pins_no_stray_object"] = [item.name for item in bpy.data.objects] == ["Bar"]
 
 
-def navigation(found, folder, bar):
+def navigation(figures, folder, bar):
     """The wheel during a drag zooms, and the pin stays under the cursor; with Ctrl it changes its reach."""
     _, area, _ = stage.view()
     view, pin = area.spaces.active.region_3d, bar.arapfields.handles[0].empty
@@ -140,7 +142,7 @@ def navigation(found, folder, bar):
     stage.picture(folder, "pins-reach")
     nearer = bar.arapfields.handles[0].reach
     yield from release()
-    found["pins_wheel_during_a_drag"] = {
+    figures["pins_wheel_during_a_drag"] = {
         "zooms": view.view_distance < distance,
         "pin_moves_pixels": [b - a for a, b in zip(middle, after, strict=True)],
         "reach_before_and_after_ctrl": [round(reach, 3), round(nearer, 3)],
@@ -151,7 +153,7 @@ def navigation(found, folder, bar):
     yield 0.6
 
 
-def first_and_rate(found, folder):
+def first_and_rate(figures, folder):
     """On 50,000 vertices: from the press to a shape that follows, and shapes a second in a drag.
 
     The solver has been set up while the cursor lay on the mesh.
@@ -161,7 +163,7 @@ def first_and_rate(found, folder):
     area.spaces.active.overlay.show_overlays = False
     bpy.context.preferences.system.viewport_aa = "OFF"
     yield 2.0
-    found["pins_vertices"] = len(bar.data.vertices)
+    figures["pins_vertices"] = len(bar.data.vertices)
     spot = pixel((0.6, -0.25, -0.1))
     looks, begins = stage.Meter().watch(hovering, "surface"), stage.Meter().watch(dragging, "of_new_pin")
     yield from hover(spot)
@@ -176,7 +178,7 @@ def first_and_rate(found, folder):
     while not shown and time.perf_counter() - begin < 10:
         yield 0.005
     stage.picture(folder, "pins-first")
-    found["pins_first_shape_s"] = round(shown[0] - begin, 3)
+    figures["pins_first_shape_s"] = round(shown[0] - begin, 3)
     yield 1.0
     times, stop = stage.draws()
     del shown[:]
@@ -189,21 +191,21 @@ def first_and_rate(found, folder):
     moving.kill()
     stop()
     motion.write = original
-    found["pins_drag"] = {
+    figures["pins_drag"] = {
         "shapes_per_second": round(len(shown) / took, 1),
         "draws_per_second": round(len(times) / took, 1),
         "shapes_per_processor_second": round(len(shown) / own, 1),
         "window": [bpy.context.window_manager.windows[0].width, bpy.context.window_manager.windows[0].height],
         "bare_redraw_s": stage.redraw_seconds(),
     }
-    found["pins_main_thread"] = {"hover": looks.end(), "press": begins.end()}
+    figures["pins_main_thread"] = {"hover": looks.end(), "press": begins.end()}
     stage.tool("mouseup", 1)
     yield 2.0
     stage.picture(folder, "pins-dense")
     area.spaces.active.overlay.show_overlays = True
     empty = bar.arapfields.handles[0].empty
     own = time.process_time()
-    found["pins_without_drawing"] = live.without_drawing(empty)
-    rate = found["pins_without_drawing"]["updates_per_second"]
+    figures["pins_without_drawing"] = live.without_drawing(empty)
+    rate = figures["pins_without_drawing"]["updates_per_second"]
     own = (time.process_time() - own) / (rate * live.SECONDS / 2)
-    found["pins_without_drawing"]["per_processor_second"] = round(1 / own, 1)
+    figures["pins_without_drawing"]["per_processor_second"] = round(1 / own, 1)

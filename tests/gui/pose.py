@@ -52,7 +52,7 @@ def load(path):
     return dog
 
 
-def checks(path, found, folder):
+def checks(path, figures, folder):
     import bpy
     import mouse
     import numpy as np
@@ -93,9 +93,9 @@ def checks(path, found, folder):
                 yield from mouse.drag(mouse.pixel(now), mouse.pixel(np.add(now, (0, *by))))
         yield 0.3
         stage.picture(folder, f"pose-{number}")
-    found["names"] = [entry.empty.name for entry in dog.arapfields.handles]
-    found["anchors"] = [entry.anchor for entry in dog.arapfields.handles]
-    found["moved"] = round(float(np.linalg.norm(scenes.world_points(dog) - rest, axis=1).max()), 3)
+    figures["names"] = [entry.empty.name for entry in dog.arapfields.handles]
+    figures["anchors"] = [entry.anchor for entry in dog.arapfields.handles]
+    figures["moved"] = round(float(np.linalg.norm(scenes.world_points(dog) - rest, axis=1).max()), 3)
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "pose.blend"))
 
 

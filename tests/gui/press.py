@@ -16,13 +16,13 @@ LIMIT = 60.0  # seconds until a result is given up
 ROUNDS = 2
 
 
-def checks(found, folder):
+def checks(figures, folder):
     for name in ("deform", "stylize"):
-        found[f"press_{name}"] = rounds = []
+        figures[f"press_{name}"] = rounds = []
         for number in range(ROUNDS):
             yield from one(rounds, name, folder if number == 0 else None)
-        found[f"cancel_{name}"] = yield from cancelled(name, folder)
-    yield from with_steps_between(found)
+        figures[f"cancel_{name}"] = yield from cancelled(name, folder)
+    yield from with_steps_between(figures)
 
 
 def round_off(bar):
@@ -135,7 +135,7 @@ def cancelled(name, folder):
     return exact
 
 
-def with_steps_between(found):
+def with_steps_between(figures):
     """A step that was pushed while the first result was shown holds nothing of it."""
     bar = set_stage()
     yield 1.0
@@ -150,5 +150,5 @@ def with_steps_between(found):
         bpy.ops.ed.undo()
     yield 0.5
     bar = bpy.data.objects["Bar"]
-    found["step_between_holds_nothing"] = moved and stage.everything() == before
-    found["step_between_shape"] = np.array_equal(shape(bar), rest)
+    figures["step_between_holds_nothing"] = moved and stage.everything() == before
+    figures["step_between_shape"] = np.array_equal(shape(bar), rest)

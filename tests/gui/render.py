@@ -15,9 +15,9 @@ SIZE, WIDTH = 240, 3.2  # of a picture in pixels, and of what it shows
 AGREES = 1.5 * WIDTH / SIZE  # one and a half pixels
 
 
-def checks(found, folder):
+def checks(figures, folder):
     for target in ("MODIFIER", "NEW"):
-        yield from one(found, folder, target)
+        yield from one(figures, folder, target)
 
 
 def set_stage(target):
@@ -49,7 +49,7 @@ def is_at_rest(session):
     return session.playback.is_shown()
 
 
-def one(found, folder, target):
+def one(figures, folder, target):
     bar, scene = set_stage(target)
     yield from calm(bar)
     name = "Bar" if target == "MODIFIER" else "Bar_live"
@@ -82,13 +82,13 @@ def one(found, folder, target):
     yield 1.0
     frames = range(FIRST, LAST + 1)
     seen = [height_in(folder / f"render-{target.lower()}-{frame:04}.png") for frame in frames]
-    wanted = [float(viewport[frame][:, 2].max()) for frame in frames]
-    away = float(np.abs(np.subtract(seen, wanted)).max())
-    found[f"render_{target}"] = {
+    expected = [float(viewport[frame][:, 2].max()) for frame in frames]
+    away = float(np.abs(np.subtract(seen, expected)).max())
+    figures[f"render_{target}"] = {
         "meshes_in_the_depsgraph": meshes,
         "each_once": len(meshes) == len(frames) and all(len(names) == 1 for names in meshes.values()),
         "heights_rendered": [round(height, 3) for height in seen],
-        "heights_in_the_viewport": [round(height, 3) for height in wanted],
+        "heights_in_the_viewport": [round(height, 3) for height in expected],
         "frames_differ": bool(np.all(np.diff(seen) > 0.03)),
         "agrees": away < AGREES,
         "still_live": sessions.is_live(bar),

@@ -24,12 +24,12 @@ def start(steps, names, folder):
     """Runs the generator `steps(found, folder)` of pauses in seconds beside Blender's events, with the add-on
     switched on unless it is installed. Then leaves Blender; exit code 1, and a line each, for what is wrong.
     """
-    found = {}
+    figures = {}
     bpy.context.preferences.view.show_splash = False
     folder.mkdir(parents=True, exist_ok=True)
     if not hasattr(bpy.types.Object, PROPERTY):
         addon.register()
-    sequence = steps(found, folder)
+    sequence = steps(figures, folder)
 
     def drive():
         try:
@@ -37,16 +37,16 @@ def start(steps, names, folder):
         except StopIteration:
             pass
         except Exception:
-            found["error"] = traceback.format_exc()
-        end(found, names, folder)
+            figures["error"] = traceback.format_exc()
+        end(figures, names, folder)
         return None
 
     bpy.app.timers.register(drive, first_interval=1.0, persistent=True)
 
 
-def end(found, names, folder):
-    wrong = failures(found, names)
-    (folder / "checks.json").write_text(json.dumps({**found, "wrong": wrong}, indent=1))
+def end(figures, names, folder):
+    wrong = failures(figures, names)
+    (folder / "checks.json").write_text(json.dumps({**figures, "wrong": wrong}, indent=1))
     print("\n".join(f"WRONG {line}" for line in wrong) or f"{', '.join(names)}: as expected", flush=True)
     if wrong:
         os._exit(1)  # quit_blender() gives no exit code
@@ -120,12 +120,12 @@ def dense_bar(cuts=91):
     """Makes the bar one of some 50,000 vertices."""
     import bmesh
 
-    mesh, made = bpy.data.objects["Bar"].data, bmesh.new()
-    bmesh.ops.create_cube(made, size=1.0)
-    bmesh.ops.subdivide_edges(made, edges=made.edges, cuts=cuts, use_grid_fill=True)
-    bmesh.ops.scale(made, vec=(2, 0.5, 0.5), verts=made.verts)
-    made.to_mesh(mesh)
-    made.free()
+    mesh, cube = bpy.data.objects["Bar"].data, bmesh.new()
+    bmesh.ops.create_cube(cube, size=1.0)
+    bmesh.ops.subdivide_edges(cube, edges=cube.edges, cuts=cuts, use_grid_fill=True)
+    bmesh.ops.scale(cube, vec=(2, 0.5, 0.5), verts=cube.verts)
+    cube.to_mesh(mesh)
+    cube.free()
     mesh.update()
 
 
@@ -166,14 +166,14 @@ class Meter:
         }
 
 
-def gaps(seconds, found, name):
+def gaps(seconds, figures, name):
     """The longest time that a timer of 10 ms was late, while the event loop runs so long."""
     late, begin, last = [], time.perf_counter(), time.perf_counter()
     while time.perf_counter() - begin < seconds:
         yield 0.01
         late.append(time.perf_counter() - last - 0.01)
         last = time.perf_counter()
-    found[name] = {"longest_s": round(max(late), 4), "median_s": round(float(np.median(late)), 4)}
+    figures[name] = {"longest_s": round(max(late), 4), "median_s": round(float(np.median(late)), 4)}
 
 
 def redraw_seconds(count=5):

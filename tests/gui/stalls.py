@@ -21,21 +21,21 @@ LONG = {**scenes.NEW, "field": "neural", "iterations": 100000, "width": 256, "la
 SECONDS = 4.0
 
 
-def checks(found, folder):
+def checks(figures, folder):
     window = bpy.context.window_manager.windows[0]
-    found["window"] = f"{window.width} x {window.height}"
+    figures["window"] = f"{window.width} x {window.height}"
     samples = bpy.context.preferences.system.viewport_aa
     for name, anti_aliasing, overlays in (("plain", "OFF", False), ("as_it_opens", samples, True)):
         bpy.context.preferences.system.viewport_aa = anti_aliasing
         stage.view()[1].spaces.active.overlay.show_overlays = overlays
-        yield from parts(found.setdefault(name, {}))
+        yield from parts(figures.setdefault(name, {}))
 
 
-def parts(found):
+def parts(figures):
     yield from scene()
-    yield from lateness(found, "at_rest")
+    yield from lateness(figures, "at_rest")
     for kind in ("nothing", "STATUSBAR", "UI", "WINDOW"):
-        yield from one_redraw(found, kind)
+        yield from one_redraw(figures, kind)
     equal = (threads, "lower_thread_priority", lambda: None)
     silent = (modal.ModalRun, "show_progress", lambda *_: None)
     unseen = (display.user_preferences, "show_previews", lambda: False)
@@ -48,7 +48,7 @@ def parts(found):
         with contextlib.ExitStack() as stack:
             for change in changes:
                 stack.enter_context(replaced(*change))
-            yield from with_a_job(found, name)
+            yield from with_a_job(figures, name)
 
 
 def scene():
@@ -61,20 +61,20 @@ def scene():
     yield from at_rest()
 
 
-def with_a_job(found, name):
+def with_a_job(figures, name):
     with stage.override():
         scenes.activate(bpy.data.objects["Bar"])
         bpy.ops.arapfields.deform("INVOKE_DEFAULT", **LONG)
     yield from at_rest(limit=6.0)
     job = jobs.running()
     begun, begin = job.fraction, time.perf_counter()
-    yield from lateness(found, name)
-    found[name]["job_percent_per_second"] = round(
+    yield from lateness(figures, name)
+    figures[name]["job_percent_per_second"] = round(
         100 * (job.fraction - begun) / (time.perf_counter() - begin), 4
     )
     if name.startswith("job_not_shown"):
         for kind in ("UI", "WINDOW"):
-            yield from one_redraw(found[name], kind)
+            yield from one_redraw(figures[name], kind)
     bpy.ops.arapfields.cancel()
     yield from until_idle()
     yield from at_rest()
@@ -91,7 +91,7 @@ def at_rest(calm=0.6, limit=60.0):
     stop()
 
 
-def lateness(found, name):
+def lateness(figures, name):
     """How late a timer of 10 ms is, and how much of the time the event loop was held for over 50 ms."""
     late = []
     drawn, stop = stage.draws()
@@ -103,7 +103,7 @@ def lateness(found, name):
         last = now
     stop()
     late = np.array(late)
-    found[name] = {
+    figures[name] = {
         "longest_ms": round(1e3 * float(late.max()), 1),
         "median_ms": round(1e3 * float(np.median(late)), 1),
         "over_50_ms": int((late > 0.05).sum()),
@@ -112,7 +112,7 @@ def lateness(found, name):
     }
 
 
-def one_redraw(found, kind):
+def one_redraw(figures, kind):
     """One redraw of a kind of region alone, by what it takes until the event loop comes round again."""
     times = []
     for number in range(5):
@@ -127,7 +127,7 @@ def one_redraw(found, kind):
         times.append(time.perf_counter() - begin)
     bpy.context.workspace.status_text_set(None)
     yield from at_rest()
-    found[f"redraw_{kind}_ms"] = round(1e3 * float(np.median(times)), 1)
+    figures[f"redraw_{kind}_ms"] = round(1e3 * float(np.median(times)), 1)
 
 
 @contextlib.contextmanager

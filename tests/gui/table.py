@@ -24,7 +24,7 @@ LIMIT = 120.0  # seconds until a stage has to end
 WIDTH = 320  # pixels of a cell's picture
 
 
-def checks(found, folder):
+def checks(figures, folder):
     cells = {}
     bpy.context.preferences.system.viewport_aa = "OFF"  # a cell is no sight: its pictures are small
     for which in WHICH:
@@ -41,17 +41,19 @@ def checks(found, folder):
         write(cells, folder / "table.md")
         sheet(folder, which)
     wrong = {" ".join(key): cell["wrong"] for key, cell in cells.items() if cell.get("wrong")}
-    found["table"] = {"cells": len(cells), "wrong": wrong}
-    found["table_not_at_that_stage"] = [" ".join(key) for key, cell in cells.items() if not cell.get("at_it")]
+    figures["table"] = {"cells": len(cells), "wrong": wrong}
+    figures["table_not_at_that_stage"] = [
+        " ".join(key) for key, cell in cells.items() if not cell.get("at_it")
+    ]
 
 
 def picture(file):
     """Of the 3D view alone, small."""
     window, _, region = stage.view()
-    told = subprocess.run(
+    geometry = subprocess.run(
         ["xdotool", "getdisplaygeometry"], check=False, capture_output=True, text=True
     ).stdout
-    top = int(told.split()[1]) - (window.y + region.y + region.height)
+    top = int(geometry.split()[1]) - (window.y + region.y + region.height)
     crop = f"{region.width}x{region.height}+{window.x + region.x}+{top}"
     command = ["import", "-window", "root", "-crop", crop, "+repage", "-resize", f"{WIDTH}x", str(file)]
     subprocess.run(command, check=False)
@@ -194,8 +196,8 @@ def seen(said):
         parts += ["live"] if sessions.is_live(item) else []
         parts += ["modifier"] if "ARAP Fields" in item.modifiers else []
     shown = sorted(one.name for one in bpy.context.view_layer.objects if one.visible_get())
-    told = f"; said: {said}" if said else ""
-    return f"{', '.join(parts) or 'no source'}; seen: {', '.join(shown)}{told}"
+    report = f"; said: {said}" if said else ""
+    return f"{', '.join(parts) or 'no source'}; seen: {', '.join(shown)}{report}"
 
 
 def write(cells, path):
@@ -210,14 +212,14 @@ def write(cells, path):
 
 
 def text(cell):
-    told = cell.get("seen", "not run")
-    told = f"WRONG {cell['wrong']}: {told}" if cell.get("wrong") else told
-    return told.replace("|", "/").replace("\n", " ")
+    cell_text = cell.get("seen", "not run")
+    cell_text = f"WRONG {cell['wrong']}: {cell_text}" if cell.get("wrong") else cell_text
+    return cell_text.replace("|", "/").replace("\n", " ")
 
 
 def sheet(folder, which):
     """One picture of all cells of a kind of object, by ImageMagick's montage."""
     files = [folder / f"cell-{which}-{action}-{name}.png" for action in ACTIONS for name in STAGES]
-    there = [word for file in files if file.exists() for word in ("-label", file.stem[5:], str(file))]
-    command = ["montage", *there, "-tile", f"{len(STAGES)}x", "-geometry", "+2+2"]
+    words = [word for file in files if file.exists() for word in ("-label", file.stem[5:], str(file))]
+    command = ["montage", *words, "-tile", f"{len(STAGES)}x", "-geometry", "+2+2"]
     subprocess.run([*command, str(folder / f"table-{which}.png")], check=False)

@@ -34,7 +34,7 @@ def picture(folder, name, sections):
     stage.picture(folder, f"tutorial-{name}", SHOWN)
 
 
-def checks(found, folder):
+def checks(figures, folder):
     stage.empty_file()
     with stage.override():
         bpy.ops.mesh.primitive_monkey_add()
@@ -51,7 +51,7 @@ def checks(found, folder):
             Matrix.Translation((0.1, 0, 0.12)) @ pivot @ turn @ pivot.inverted() @ ear.matrix_world
         )
         scenes.activate(suzanne)
-    found["handles"] = len(suzanne.arapfields.handles)
+    figures["handles"] = len(suzanne.arapfields.handles)
     rest = scenes.world_points(suzanne)
     look()
     yield from stage.open_sidebar()
@@ -59,12 +59,12 @@ def checks(found, folder):
     with stage.override():
         bpy.ops.arapfields.deform(output="WARP")
     deformed = scenes.world_points(suzanne)
-    found["deformed_by"] = round(float(np.abs(deformed - rest).max()), 3)
+    figures["deformed_by"] = round(float(np.abs(deformed - rest).max()), 3)
     yield from picture(folder, "deformed", {"source", "deform"})
     with stage.override():
         scenes.activate(suzanne)
         bpy.ops.arapfields.stylize(style="CUBE")
-        found["stylized_by"] = round(float(np.abs(scenes.world_points(suzanne) - deformed).max()), 3)
+        figures["stylized_by"] = round(float(np.abs(scenes.world_points(suzanne) - deformed).max()), 3)
         for item in bpy.data.objects:
             item.hide_set(item != suzanne)
     yield from picture(folder, "style", {"source", "stylize"})

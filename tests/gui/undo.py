@@ -14,7 +14,7 @@ ROUNDS = 100
 STRIDE = 5  # states from one print to the next
 
 
-def checks(found, folder, kinds=("rested", "within", "escaped")):
+def checks(figures, folder, kinds=("rested", "within", "escaped")):
     """`kinds`: which rounds are played, of these."""
     bpy.context.preferences.system.viewport_aa = "OFF"  # it is the steps that are looked at
     bar = set_stage()
@@ -24,42 +24,42 @@ def checks(found, folder, kinds=("rested", "within", "escaped")):
     after = state()
     known = {name: set(getattr(bpy.data, name).keys()) for name in KINDS}
     if "rested" in kinds:
-        yield from rested(found, before, after)
+        yield from rested(figures, before, after)
     if "within" in kinds:
-        yield from within(found, after)
+        yield from within(figures, after)
     if "escaped" in kinds:
-        yield from escaped(found, after)
+        yield from escaped(figures, after)
     for name, names in known.items():
-        found[f"undo_stray_{name}"] = sorted(set(getattr(bpy.data, name).keys()) - names)
+        figures[f"undo_stray_{name}"] = sorted(set(getattr(bpy.data, name).keys()) - names)
     stage.picture(folder, "undo")
     stage.tool("key", "ctrl+z")
     yield from until(lambda: state() == before, 5.0)
-    found["undo_to_the_start"] = state() == before
+    figures["undo_to_the_start"] = state() == before
     bar = bpy.data.objects["Bar"]
-    found["undo_leaves"] = [item.name for item in bpy.data.objects], [m.name for m in bar.modifiers]
+    figures["undo_leaves"] = [item.name for item in bpy.data.objects], [m.name for m in bar.modifiers]
 
 
 KINDS = ("objects", "meshes", "node_groups", "scenes", "collections")
 
 
-def record(found, name, exact):
-    found[f"undo_{name}"] = {"exact": sum(exact), "of": len(exact)}
+def record(figures, name, exact):
+    figures[f"undo_{name}"] = {"exact": sum(exact), "of": len(exact)}
     if len(exact) % STRIDE == 0:
-        print(name, found[f"undo_{name}"], flush=True)
+        print(name, figures[f"undo_{name}"], flush=True)
 
 
-def rested(found, before, after):
+def rested(figures, before, after):
     """Undo and redo of a drag that has come to rest."""
     exact = []
     for _ in range(ROUNDS):
-        for key, wanted in (("ctrl+z", before), ("ctrl+shift+z", after)):
+        for key, expected in (("ctrl+z", before), ("ctrl+shift+z", after)):
             stage.tool("key", key)
-            yield from until(lambda wanted=wanted: state() == wanted, 5.0)
-            exact.append(state() == wanted)
-            record(found, "after_drags", exact)
+            yield from until(lambda expected=expected: state() == expected, 5.0)
+            exact.append(state() == expected)
+            record(figures, "after_drags", exact)
 
 
-def within(found, after):
+def within(figures, after):
     """Keys pressed while the button is down go nowhere; undo right after the release takes that drag back,
     redo brings it again, and undo takes it back."""
     exact = []
@@ -78,17 +78,17 @@ def within(found, after):
         stage.tool("key", "ctrl+z")
         yield from until(lambda: state() == after and not is_dragging(), 5.0)
         exact.append(held and state() == after)
-        record(found, "within_drags", exact)
+        record(figures, "within_drags", exact)
         stage.tool("key", "ctrl+shift+z")
         yield from until(lambda: state() != after, 5.0)
         again = state()
         stage.tool("key", "ctrl+z")
         yield from until(lambda: state() == after, 5.0)
         exact.append(again != after and len(bpy.data.objects) == 2 and state() == after)
-        record(found, "within_drags", exact)
+        record(figures, "within_drags", exact)
 
 
-def escaped(found, after):
+def escaped(figures, after):
     """Esc in the midst of a drag."""
     exact = []
     for number in range(ROUNDS):
@@ -102,4 +102,4 @@ def escaped(found, after):
             stage.tool("key", "ctrl+z")
         yield from until(lambda: state() == after, 5.0)
         exact.append(state() == after)
-        record(found, "escaped", exact)
+        record(figures, "escaped", exact)

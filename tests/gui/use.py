@@ -13,10 +13,10 @@ from addon.core.runtime import jobs
 CANCEL = (45, 12)  # pixels from the window's lower right corner to the middle of the status bar's button
 
 
-def checks(found, folder):
-    yield from face(found, folder)
-    yield from search(found, folder)
-    yield from cancel(found, folder)
+def checks(figures, folder):
+    yield from face(figures, folder)
+    yield from search(figures, folder)
+    yield from cancel(figures, folder)
 
 
 def edge_points(empty, count):
@@ -26,7 +26,7 @@ def edge_points(empty, count):
         yield empty.matrix_world @ (0.7 * Vector(a) + 0.3 * Vector(b))
 
 
-def face(found, folder):
+def face(figures, folder):
     """A face of the active box is dragged outwards: one undo step, and the handle holds more."""
     stage.empty_file()
     with stage.override():
@@ -52,15 +52,15 @@ def face(found, folder):
     stage.tool("mouseup", 1)
     yield 1.0
     stage.picture(folder, "face-dragged")
-    found["face_dragged"] = round(bpy.data.objects["Fixed"].scale.x / before, 3)
-    found["face_holds_more"] = bpy.data.objects["Bar"].arapfields.handles[0].inside > held
+    figures["face_dragged"] = round(bpy.data.objects["Fixed"].scale.x / before, 3)
+    figures["face_holds_more"] = bpy.data.objects["Bar"].arapfields.handles[0].inside > held
     with stage.override():
         bpy.ops.ed.undo()
     yield 0.5
-    found["face_is_one_undo_step"] = abs(bpy.data.objects["Fixed"].scale.x - before) < 1e-6
+    figures["face_is_one_undo_step"] = abs(bpy.data.objects["Fixed"].scale.x - before) < 1e-6
 
 
-def search(found, folder):
+def search(figures, folder):
     """Blender's search finds us by our name and by what we do."""
     for words in ("arap", "deform", "stylize"):
         stage.tool("mousemove", 400, 600)
@@ -73,10 +73,10 @@ def search(found, folder):
         stage.picture(folder, f"search-{words}")
         stage.tool("key", "Escape")
         yield 0.7
-    found["searched"] = True
+    figures["searched"] = True
 
 
-def cancel(found, folder):
+def cancel(figures, folder):
     """The status bar's button ends a job, whatever the sidebar shows."""
     window, area, _ = stage.view()
     area.spaces.active.show_region_ui = False
@@ -86,6 +86,6 @@ def cancel(found, folder):
     running = jobs.running() is not None
     stage.tool("mousemove", window.width - CANCEL[0], window.height - CANCEL[1], "click", 1)
     yield from until_idle(20)
-    found["cancelled_in_the_status_bar"] = running and jobs.running() is None
+    figures["cancelled_in_the_status_bar"] = running and jobs.running() is None
     area.spaces.active.show_region_ui = True
     yield 1.0

@@ -16,31 +16,32 @@ class Rule:
     def each(self, count=None):
         """The same of every entry of a list, of so many if that is said."""
         return Rule(
-            f"each {self.text}", lambda found: count in (None, len(found)) and all(map(self.holds, found))
+            f"each {self.text}",
+            lambda figures: count in (None, len(figures)) and all(map(self.holds, figures)),
         )
 
 
 def is_(value):
-    return Rule(f"is {value!r}", lambda found: plain(found) == plain(value))
+    return Rule(f"is {value!r}", lambda figures: plain(figures) == plain(value))
 
 
 def above(least):
-    return Rule(f"above {least:g}", lambda found: found > least)
+    return Rule(f"above {least:g}", lambda figures: figures > least)
 
 
 def below(most):
-    return Rule(f"below {most:g}", lambda found: found < most)
+    return Rule(f"below {most:g}", lambda figures: figures < most)
 
 
 def near(value, by):
     """Of either sign: turns depend on the side that a view is from."""
-    return Rule(f"{value:g} ± {by:g}", lambda found: abs(abs(found) - value) <= by)
+    return Rule(f"{value:g} ± {by:g}", lambda figures: abs(abs(figures) - value) <= by)
 
 
 def having(**rules):
     """A dictionary with at least these entries."""
     text = ", ".join(f"{name} {rule.text}" for name, rule in rules.items())
-    return Rule(text, lambda found: all(rule.holds(found[name]) for name, rule in rules.items()))
+    return Rule(text, lambda figures: all(rule.holds(figures[name]) for name, rule in rules.items()))
 
 
 def plain(value):
@@ -48,9 +49,9 @@ def plain(value):
     return json.loads(json.dumps(value))
 
 
-TRUE, EMPTY, FIGURE = is_(True), is_([]), Rule("a figure", lambda found: found is not None)
+TRUE, EMPTY, FIGURE = is_(True), is_([]), Rule("a figure", lambda figures: figures is not None)
 ONCE = having(one_undo_step=TRUE, moved_by=above(0.01), shapes=above(0), first_picture_s=FIGURE)
-ALL_EXACT = Rule("exact each time", lambda found: found["exact"] == found["of"] > 0)
+ALL_EXACT = Rule("exact each time", lambda figures: figures["exact"] == figures["of"] > 0)
 MOVES = having(updates_per_second=above(0))
 RENDERED = having(each_once=TRUE, frames_differ=TRUE, agrees=TRUE, still_live=TRUE)
 PINS_RATE = {
@@ -109,7 +110,7 @@ EXPECTED = {  # of each part, every entry that it finds
         "live_solve_and_warp_on_worker": FIGURE,
         "live_without_drawing": MOVES,
         "live_refined": is_({"converged": True}),
-        "drag_moved_handle": Rule("moved", lambda found: abs(found) > 0.01),
+        "drag_moved_handle": Rule("moved", lambda figures: abs(figures) > 0.01),
         "drag_moved_shape": above(0.05),
         "live_after_undo": TRUE,
         "drag_is_one_undo_step": TRUE,
@@ -131,11 +132,11 @@ EXPECTED = {  # of each part, every entry that it finds
         "pins_escape_of_a_drag": TRUE,
         "pins_anchor": TRUE,
         "pins_ring_turns_degrees": near(45.0, 10.0),
-        "pins_r_turns_degrees": Rule("turned", lambda found: abs(found) > 5),
+        "pins_r_turns_degrees": Rule("turned", lambda figures: abs(figures) > 5),
         "pins_wheel_during_a_drag": having(
             zooms=TRUE,
-            pin_moves_pixels=Rule("30 across", lambda found: abs(found[0] - 30) + abs(found[1]) <= 6),
-            reach_before_and_after_ctrl=Rule("changed", lambda found: found[0] != found[1]),
+            pin_moves_pixels=Rule("30 across", lambda figures: abs(figures[0] - 30) + abs(figures[1]) <= 6),
+            reach_before_and_after_ctrl=Rule("changed", lambda figures: figures[0] != figures[1]),
         ),
         "pins_ctrl_click_deletes": TRUE,
         "pins_x_deletes_the_last": TRUE,
@@ -160,7 +161,7 @@ EXPECTED = {  # of each part, every entry that it finds
         "wrap_undone_bones": TRUE,
         "wrap_redone": TRUE,
         "wrap_redone_bones": TRUE,
-        "wrap_stack": Rule("a field and an armature", lambda found: {"NODES", "ARMATURE"} <= {*found}),
+        "wrap_stack": Rule("a field and an armature", lambda figures: {"NODES", "ARMATURE"} <= {*figures}),
         "wrap_outlives_its_target": TRUE,
         "wrap_opened_again": TRUE,
     },
@@ -181,10 +182,10 @@ EXPECTED = {  # of each part, every entry that it finds
         "empties": is_([[0.0, -0.35, -0.52, 0.5, 0.62, 0.46], [1.12, 0.32, 0.17, 0.3, 0.36, 0.4]]),
         "selected": FIGURE.each(3),
         "active": is_("Suzanne"),
-        "handles": Rule("holds something", lambda found: found[1] > 0).each(2),
+        "handles": Rule("holds something", lambda figures: figures[1] > 0).each(2),
         "row_selects": is_("Empty.001"),
         "deformed_by": above(0.1),
-        "stack": Rule("with the field", lambda found: "ARAP Fields" in found),
+        "stack": Rule("with the field", lambda figures: "ARAP Fields" in figures),
         "stylized_by": above(0.01),
         "fitted": TRUE,
     },
@@ -192,15 +193,15 @@ EXPECTED = {  # of each part, every entry that it finds
 }
 
 
-def failures(found, parts):
+def failures(figures, parts):
     """Lines that name what is wrong: an error, what is missing, and what is not as expected."""
-    lines = [found["error"]] if "error" in found else []
+    lines = [figures["error"]] if "error" in figures else []
     for part in parts:
         for name, rule in EXPECTED[part].items():
-            if name not in found:
+            if name not in figures:
                 lines.append(f"{part}: {name} is missing; {rule.text} is expected")
-            elif not holds(rule, found[name]):
-                lines.append(f"{part}: {name} is {found[name]!r}; {rule.text} is expected")
+            elif not holds(rule, figures[name]):
+                lines.append(f"{part}: {name} is {figures[name]!r}; {rule.text} is expected")
     return lines
 
 

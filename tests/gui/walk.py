@@ -52,7 +52,7 @@ def shot(folder, name):
     stage.picture(folder, f"walk-{name}")
 
 
-def found_by_name(found, folder):
+def found_by_name(figures, folder):
     yield from shot(folder, "welcome")
     yield from keys("Escape")
     for text in ("arap", "pin", "deform", "stylize"):
@@ -65,7 +65,7 @@ def found_by_name(found, folder):
     yield from keys("Escape", pause=1.0)
 
 
-def monkey(found, folder):
+def monkey(figures, folder):
     for item in list(bpy.data.objects):  # the tutorial begins with Suzanne alone
         item.select_set(item.type == "MESH")
     yield from over_the_view()
@@ -73,7 +73,7 @@ def monkey(found, folder):
     yield from keys("Return", pause=1.0)
     yield from searched("add mesh monkey")
     yield from keys("Return", pause=2.0)
-    found["suzanne"] = [item.name for item in bpy.data.objects if item.type == "MESH"]
+    figures["suzanne"] = [item.name for item in bpy.data.objects if item.type == "MESH"]
     yield from over_the_view()
     yield from keys("ctrl+2", pause=1.5)
     yield from searched("shade smooth")
@@ -82,7 +82,7 @@ def monkey(found, folder):
     yield from keys("n", pause=1.5)
     stage.tool("mousemove", *stage.TAB, "click", 1)
     yield 1.5
-    found["modifiers"] = [m.type for m in bpy.context.object.modifiers]
+    figures["modifiers"] = [m.type for m in bpy.context.object.modifiers]
     yield from shot(folder, "suzanne")
 
 
@@ -110,26 +110,26 @@ def spot(item):
     return x, y + 15  # just below the top of her head
 
 
-def handles(found, folder):
+def handles(figures, folder):
     yield from cube_empty(folder, *JAW, picture="add-empty")
     yield from cube_empty(folder, *EAR)
     empties = [item for item in bpy.data.objects if item.type == "EMPTY"]
-    found["empties"] = [[round(v, 3) for v in (*item.location, *item.scale)] for item in empties]
+    figures["empties"] = [[round(v, 3) for v in (*item.location, *item.scale)] for item in empties]
     suzanne = next(item for item in bpy.data.objects if item.type == "MESH")
     for place, item in enumerate((*empties, suzanne)):
         if place == 1:
             stage.tool("keydown", "shift")
         yield from click(spot(item), pause=1.2)
     stage.tool("keyup", "shift")
-    found["selected"] = [item.name for item in bpy.context.selected_objects]
-    found["active"] = bpy.context.object.name
+    figures["selected"] = [item.name for item in bpy.context.selected_objects]
+    figures["active"] = bpy.context.object.name
     yield from panel.open_alone({"handles"})
     yield from click(PLUS, pause=1.2)
     yield from shot(folder, "plus")
     yield from click(FROM_EMPTIES, pause=1.2)
-    found["handles"] = [(e.empty.name, e.inside) for e in suzanne.arapfields.handles]
+    figures["handles"] = [(e.empty.name, e.inside) for e in suzanne.arapfields.handles]
     yield from click(SECOND_ROW, pause=1.2)
-    found["row_selects"] = bpy.context.object.name
+    figures["row_selects"] = bpy.context.object.name
     yield from shot(folder, "handles")
     yield from over_the_view()
     for names, value in ((("r", "y"), -55), (("g", "x"), 0.08), (("g", "z"), 0.38)):
@@ -137,7 +137,7 @@ def handles(found, folder):
         yield from number(value)
 
 
-def surface(found, folder):
+def surface(figures, folder):
     """The tutorial's fifth step as far as the fit."""
     suzanne = next(item for item in bpy.data.objects if item.type == "MESH")
     yield from panel.open_alone({"advanced"})
@@ -150,7 +150,7 @@ def surface(found, folder):
     yield from until_idle(300.0)
     yield 1.5
     yield from shot(folder, "fitted")
-    found["fitted"] = bool(suzanne.arapfields.fit_report)
+    figures["fitted"] = bool(suzanne.arapfields.fit_report)
 
 
 def inner(section, row):
@@ -160,7 +160,7 @@ def inner(section, row):
     return round(panel.HEADER[1] + panel.STEP * row + panel.INNER * place)
 
 
-def results(found, folder):
+def results(figures, folder):
     suzanne = next(item for item in bpy.data.objects if item.type == "MESH")
     rest = scenes.world_points(suzanne)
     yield from panel.open_alone({"deform"})
@@ -173,8 +173,8 @@ def results(found, folder):
     yield 1.0
     yield from until_idle(300.0)
     yield 1.5
-    found["deformed_by"] = round(float(np.abs(scenes.world_points(suzanne) - rest).max()), 3)
-    found["stack"] = [m.name for m in suzanne.modifiers]
+    figures["deformed_by"] = round(float(np.abs(scenes.world_points(suzanne) - rest).max()), 3)
+    figures["stack"] = [m.name for m in suzanne.modifiers]
     yield from shot(folder, "deformed")
     deformed = scenes.world_points(suzanne)
     yield from panel.open_alone({"stylize"})
@@ -182,10 +182,10 @@ def results(found, folder):
     yield 1.0
     yield from until_idle(300.0)
     yield 1.5
-    found["stylized_by"] = round(float(np.abs(scenes.world_points(suzanne) - deformed).max()), 3)
+    figures["stylized_by"] = round(float(np.abs(scenes.world_points(suzanne) - deformed).max()), 3)
     yield from shot(folder, "stylized")
 
 
-def checks(found, folder):
+def checks(figures, folder):
     for part in (found_by_name, monkey, handles, results, surface):
-        yield from part(found, folder)
+        yield from part(figures, folder)

@@ -40,7 +40,7 @@ def checks(module, **given):
     return functools.partial(importlib.import_module(module).checks, **given)
 
 
-def together(found, folder, names):
+def together(figures, folder, names):
     """Yields seconds to wait, in which Blender's event loop runs. Ends with a job, which must not hold it."""
     stage.empty_file()
     with stage.override():
@@ -49,9 +49,9 @@ def together(found, folder, names):
     yield from stage.open_sidebar()
     for name in names:
         module, given = {**TOGETHER, **SHORTER}[name]
-        yield from checks(module, **given)(found, folder)
+        yield from checks(module, **given)(figures, folder)
     addon.unregister()
-    found["switched_off"] = not hasattr(bpy.types.Object, "arapfields")
+    figures["switched_off"] = not hasattr(bpy.types.Object, "arapfields")
     addon.register()
     stage.empty_file()
     with stage.override():

@@ -21,11 +21,11 @@ EYEDROPPER, BUTTON, WRAP = (1263, 240), (1155, 265), (1155, 494)
 SETTLED = 1.5  # seconds in which the sidebar's sections slide to where they stay
 
 
-def checks(found, folder):
+def checks(figures, folder):
     yield from set_stage()
-    yield from choose_target(found, folder)
-    yield from click_landmarks(found, folder)
-    yield from press(found, folder)
+    yield from choose_target(figures, folder)
+    yield from click_landmarks(figures, folder)
+    yield from press(figures, folder)
 
 
 def set_stage():
@@ -60,18 +60,18 @@ def chequered():
     return material
 
 
-def choose_target(found, folder):
+def choose_target(figures, folder):
     """With the eyedropper beside Onto, on the scan."""
     body, scan = bpy.data.objects["Body"], bpy.data.objects["Scan"]
     yield from click(EYEDROPPER)
     yield from click(pixel(SCAN_AT + Vector((0, -0.2, 1.2))))
-    found["wrap_target_by_eyedropper"] = body.arapfields.wrap.onto == scan
+    figures["wrap_target_by_eyedropper"] = body.arapfields.wrap.onto == scan
 
 
-def click_landmarks(found, folder):
+def click_landmarks(figures, folder):
     """Five pairs; the first half and the first pair are taken back by Backspace and clicked again."""
     entries = bpy.data.objects["Body"].arapfields.wrap.landmarks
-    pairs = [(Vector(rest), SCAN_AT + Vector(there)) for rest, there in wraps.landmarks_of_people()]
+    pairs = [(Vector(rest), SCAN_AT + Vector(goal)) for rest, goal in wraps.landmarks_of_people()]
     middle = [Vector((0, 0, 1.0)), SCAN_AT + Vector((0, 0, 1.2))]
     yield from click(BUTTON)
     yield from click(inward(pairs[0][0], middle[0]))
@@ -81,9 +81,9 @@ def click_landmarks(found, folder):
         for end, inner in zip(pair, middle, strict=True):
             yield from click(inward(end, inner))
         if number == 0:
-            found["wrap_first_pair"] = len(entries)
+            figures["wrap_first_pair"] = len(entries)
             yield from keys("BackSpace")
-            found["wrap_taken_back"] = len(entries)
+            figures["wrap_taken_back"] = len(entries)
     stage.picture(folder, "wrap-clicked")
     yield from keys("Return")
     away = [
@@ -91,7 +91,7 @@ def click_landmarks(found, folder):
         for entry, pair in zip(entries, pairs, strict=True)
         for end, where in zip((entry.rest, entry.on_target), pair, strict=True)
     ]
-    found["wrap_landmarks_off_by"] = away
+    figures["wrap_landmarks_off_by"] = away
     stage.tool("mousemove", 500, 850)
     yield 0.6
     stage.picture(folder, "wrap-landmarks")
@@ -106,7 +106,7 @@ def shape():
     return scenes.world_points(bpy.data.objects["Body"])
 
 
-def press(found, folder):
+def press(figures, folder):
     """Esc during the first wrap, then one to its end: undone, redone, posed, with its target gone."""
     body, rig = bpy.data.objects["Body"], bpy.data.objects["Rig"]
     rest, bones = shape(), wraps.joints(rig, posed=False)
@@ -116,35 +116,37 @@ def press(found, folder):
     yield from keys("Escape", pause=0.1)
     yield from until_idle(20.0)
     yield 0.5
-    found["wrap_escape"] = was_running and np.array_equal(shape(), rest) and not fielded(body)
+    figures["wrap_escape"] = was_running and np.array_equal(shape(), rest) and not fielded(body)
     begin = time.perf_counter()
     yield from click(WRAP, pause=1.0)
     stage.picture(folder, "wrap-running")
     yield from until_idle(120.0)
-    found["wrap_press_s"] = round(time.perf_counter() - begin, 1)
+    figures["wrap_press_s"] = round(time.perf_counter() - begin, 1)
     yield 1.0
     stage.tool("mousemove", 500, 850)
     yield 0.6
     stage.picture(folder, "wrap-wrapped")
     wrapped, moved = shape(), wraps.joints(rig, posed=False)
-    found["wrap_moves"] = [round(float(np.abs(a - b).max()), 3) for a, b in ((wrapped, rest), (moved, bones))]
+    figures["wrap_moves"] = [
+        round(float(np.abs(a - b).max()), 3) for a, b in ((wrapped, rest), (moved, bones))
+    ]
     yield from keys("ctrl+z", pause=1.5)
     body, rig = bpy.data.objects["Body"], bpy.data.objects["Rig"]
-    found["wrap_undone"] = np.array_equal(shape(), rest) and not fielded(body)
-    found["wrap_undone_bones"] = np.allclose(wraps.joints(rig, posed=False), bones, atol=1e-6)
+    figures["wrap_undone"] = np.array_equal(shape(), rest) and not fielded(body)
+    figures["wrap_undone_bones"] = np.allclose(wraps.joints(rig, posed=False), bones, atol=1e-6)
     yield from keys("ctrl+shift+z", pause=1.5)
     body, rig = bpy.data.objects["Body"], bpy.data.objects["Rig"]
-    found["wrap_redone"] = np.array_equal(shape(), wrapped)
-    found["wrap_redone_bones"] = np.allclose(wraps.joints(rig, posed=False), moved, atol=1e-6)
-    found["wrap_stack"] = [m.type for m in body.modifiers]
+    figures["wrap_redone"] = np.array_equal(shape(), wrapped)
+    figures["wrap_redone_bones"] = np.allclose(wraps.joints(rig, posed=False), moved, atol=1e-6)
+    figures["wrap_stack"] = [m.type for m in body.modifiers]
     with stage.override():
         character.pose(types.SimpleNamespace(rig=rig))
     yield 1.0
     stage.picture(folder, "wrap-posed")
-    yield from target_gone(found, folder)
+    yield from target_gone(figures, folder)
 
 
-def target_gone(found, folder):
+def target_gone(figures, folder):
     """The target is deleted while the object is wrapped onto it again; then the file is opened again."""
     yield from click(WRAP, pause=1.0)
     was_running = jobs.running() is not None
@@ -152,12 +154,12 @@ def target_gone(found, folder):
     yield from until_idle(120.0)
     yield 1.0
     stage.picture(folder, "wrap-target-gone")
-    found["wrap_outlives_its_target"] = was_running and fielded(bpy.data.objects["Body"])
+    figures["wrap_outlives_its_target"] = was_running and fielded(bpy.data.objects["Body"])
     before, path = shape(), str(folder / "wrapped.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
     yield 2.0
-    found["wrap_opened_again"] = np.array_equal(shape(), before)
+    figures["wrap_opened_again"] = np.array_equal(shape(), before)
 
 
 def fielded(item):

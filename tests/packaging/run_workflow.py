@@ -79,9 +79,9 @@ def interpreter(version, path):
     """A Python that starts: of `path`, where pyenv's names may lead to none, or pyenv's own."""
     candidates = [shutil.which(f"python{version}", path=path)]
     candidates += sorted(Path.home().glob(f".pyenv/versions/{version}.*/bin/python{version}"))
-    for found in filter(None, candidates):
-        if subprocess.run([found, "-c", ""], capture_output=True).returncode == 0:
-            return found
+    for candidate in filter(None, candidates):
+        if subprocess.run([candidate, "-c", ""], capture_output=True).returncode == 0:
+            return candidate
     raise RuntimeError(f"there is no python{version} here")
 
 
@@ -107,8 +107,8 @@ class Job:
         """The folder of programs of an environment with this Python, as a fresh machine has it."""
         place = self.folder / f"python{version}"
         if not place.exists():
-            found = interpreter(version, self.environment["PATH"])
-            subprocess.run([found, "-m", "venv", place], check=True, capture_output=True)
+            python = interpreter(version, self.environment["PATH"])
+            subprocess.run([python, "-m", "venv", place], check=True, capture_output=True)
         return place / "bin"
 
     def run(self, step):
@@ -180,12 +180,12 @@ def set_up_python(job, given):
 def upload(job, given):
     """Copies what GitHub would keep; nothing to keep is an error where the step says so."""
     patterns = filled(given["path"], job.values)
-    found = [path for pattern in patterns.split() for path in sorted(job.clone.glob(pattern))]
-    if not found and given.get("if-no-files-found") == "error":
+    files = [path for pattern in patterns.split() for path in sorted(job.clone.glob(pattern))]
+    if not files and given.get("if-no-files-found") == "error":
         raise RuntimeError(f"there is nothing like {patterns}")
     place = job.folder / "artifacts" / filled(given["name"], job.values)
     place.mkdir(parents=True, exist_ok=True)
-    for path in found:
+    for path in files:
         shutil.copy2(path, place)
 
 

@@ -65,13 +65,13 @@ def test_import_ends_with_that_line(tmp_path):
             link.parent.mkdir(exist_ok=True)
             link.symlink_to(other)
     beside(tmp_path / "arapfields", "2.8.0")
-    made = subprocess.run(
+    build = subprocess.run(
         [sys.executable, "-c", "import arapfields"],
         cwd=tmp_path,
         capture_output=True,
         text=True,
         env={"PYTHONPATH": str(tmp_path)},
     )
-    assert made.returncode == 1
-    last = made.stderr.strip().splitlines()[-1]
+    assert build.returncode == 1
+    last = build.stderr.strip().splitlines()[-1]
     assert last.startswith("ImportError: arapfields was built against torch 2.8.0") and BUILT_AGAINST in last

@@ -165,12 +165,12 @@ def test_the_manifest_says_that_it_was_not_run():
 @pytest.fixture(scope="session")
 def built(tmp_path_factory):
     """The zip that make extension PLATFORM=macos-arm64 left, and its libraries."""
-    found = sorted((ROOT / "dist").glob("*-macos-arm64.zip"))
+    zips = sorted((ROOT / "dist").glob("*-macos-arm64.zip"))
     given = os.environ.get("ARAPFIELDS_MACOS_EXTENSION")
-    if not given and not found:
+    if not given and not zips:
         pytest.skip("no zip for macOS is built")
     pytest.importorskip("ziglang", reason="ziglang, which lists libSystem's symbols, is not installed")
-    path = Path(given) if given else found[-1]
+    path = Path(given) if given else zips[-1]
     return path, macos_check.native_files(path, tmp_path_factory.mktemp("macos"))[0]
 
 

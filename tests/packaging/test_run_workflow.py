@@ -56,10 +56,10 @@ def test_steps_run_in_order_with_what_those_before_left(tmp_path, capsys):
     assert run(WORKFLOW, tmp_path) == 0
     kept = {path.parent.name: path.read_text() for path in (tmp_path / "runs").glob("*/artifacts/*/out.txt")}
     assert kept == {"a": "hello a\n", "b": "hello bextra again\n"}
-    told = capsys.readouterr().out
-    assert "| small elsewhere | all steps | left out | needs windows-2022 |" in told
-    assert "installs packages of the system: sudo apt-get" in told
-    assert "somebody/else has no substitute here" in told
+    output = capsys.readouterr().out
+    assert "| small elsewhere | all steps | left out | needs windows-2022 |" in output
+    assert "installs packages of the system: sudo apt-get" in output
+    assert "somebody/else has no substitute here" in output
 
 
 @pytest.mark.parametrize(

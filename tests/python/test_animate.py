@@ -65,18 +65,18 @@ def said(capsys):
 
 def test_each_frame_is_the_solve_of_its_own_pose(place):
     assert animate(place, "all.pc2", solve=SMALL) == 0
-    found = frames(place / "all.pc2")
+    baked = frames(place / "all.pc2")
     vertices, triangles = read_mesh(place / "bar.ply")
     handles = [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)]
     options = af.LiveOptions(**SAME)
     for i in (4, 0, 2):
         live = af.LiveDeformer(af.sample_mesh(vertices, triangles, seed=0), handles, options)
         field = live.solve([LEFT, poses()[i]], iterations=STEPS, tolerance=TOLERANCE)
-        assert np.array_equal(found[i], field(vertices).astype(np.float32))
-    assert np.abs(found[0] - vertices).max() < 1e-6  # the first pose is that of rest
-    assert np.abs(found[-1] - vertices).max() > 0.5
+        assert np.array_equal(baked[i], field(vertices).astype(np.float32))
+    assert np.abs(baked[0] - vertices).max() < 1e-6  # the first pose is that of rest
+    assert np.abs(baked[-1] - vertices).max() > 0.5
     assert animate(place, "some.pc2", "--frames", "3", "4", solve=SMALL) == 0
-    assert np.array_equal(frames(place / "some.pc2"), found[2:4])
+    assert np.array_equal(frames(place / "some.pc2"), baked[2:4])
     with af.PointCacheReader(place / "some.pc2") as cache:
         assert cache.times.tolist() == [3.0, 4.0]
     assert names(place) == ["all.pc2", "bar.ply", "some.pc2", "tracks.json"]
@@ -176,11 +176,11 @@ def test_usd_is_read_back(suffix, place):
     assert mesh.GetPath() == "/bar"
     _, triangles = read_mesh(place / "bar.ply")
     assert np.array_equal(np.array(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3), triangles)
-    found = np.array([np.array(mesh.GetPointsAttr().Get(1 + i)) for i in range(FRAMES)])
+    points = np.array([np.array(mesh.GetPointsAttr().Get(1 + i)) for i in range(FRAMES)])
     # As text a number has six or more digits.
-    np.testing.assert_allclose(found, frames(place / "x.pc2"), atol=2e-6 if suffix == "usda" else 0)
+    np.testing.assert_allclose(points, frames(place / "x.pc2"), atol=2e-6 if suffix == "usda" else 0)
     low, high = np.array(mesh.GetExtentAttr().Get(3))
-    np.testing.assert_allclose([low, high], [found[2].min(0), found[2].max(0)], atol=2e-6)
+    np.testing.assert_allclose([low, high], [points[2].min(0), points[2].max(0)], atol=2e-6)
 
 
 def test_usd_without_its_package_is_named(place, monkeypatch, capsys):

@@ -29,9 +29,9 @@ def test_rotations_equal_those_of_singular_values():
     rng = np.random.default_rng(0)
     jacobians = signed_jacobians(1001, rng)
     block = np.ascontiguousarray(np.moveaxis(jacobians, 2, 0))
-    found = jacobians_of(np.concatenate([block[:1], testing.closest_rotations(block)]))
+    rotations = jacobians_of(np.concatenate([block[:1], testing.closest_rotations(block)]))
     assert (np.linalg.det(jacobians) < 0).mean() > 0.1
-    assert np.abs(found - polar(torch.tensor(jacobians))).max() < FLOAT64_ROTATION
+    assert np.abs(rotations - polar(torch.tensor(jacobians))).max() < FLOAT64_ROTATION
 
 
 def test_rotation_of_degenerate_matrices_is_a_best_one():
@@ -43,12 +43,12 @@ def test_rotation_of_degenerate_matrices_is_a_best_one():
     )
     jacobians = turns @ (sigmas[:, :, None] * random_rotations(7, rng))
     block = np.ascontiguousarray(np.moveaxis(jacobians, 2, 0))
-    found = jacobians_of(np.concatenate([block[:1], testing.closest_rotations(block)])).numpy()
-    assert np.allclose(found @ np.swapaxes(found, 1, 2), np.eye(3), atol=1e-13)
-    assert np.allclose(np.linalg.det(found), 1)
+    rotations = jacobians_of(np.concatenate([block[:1], testing.closest_rotations(block)])).numpy()
+    assert np.allclose(rotations @ np.swapaxes(rotations, 1, 2), np.eye(3), atol=1e-13)
+    assert np.allclose(np.linalg.det(rotations), 1)
     best = sigmas.sum(1)
-    assert np.allclose(np.einsum("nij,nij->n", found, jacobians), best, rtol=1e-12, atol=1e-12)
-    assert np.array_equal(found[2], np.eye(3))
+    assert np.allclose(np.einsum("nij,nij->n", rotations, jacobians), best, rtol=1e-12, atol=1e-12)
+    assert np.array_equal(rotations[2], np.eye(3))
 
 
 @pytest.mark.parametrize("bending", [0.0, 0.01, 1.0])

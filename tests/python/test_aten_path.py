@@ -48,11 +48,11 @@ def jets_of(sigma, rng, count=70):
 def test_rigidity_equals_the_kernels(sigma):
     jets = jets_of(sigma, np.random.default_rng(0))
     for bending in (0.0, 0.01, 1.0):
-        found = testing.arap_energy(jets, bending, 0.7, aten=True)
-        agree(found, testing.arap_energy(jets, bending, 0.7), tolerances.COMPOSED)
+        energy = testing.arap_energy(jets, bending, 0.7, aten=True)
+        agree(energy, testing.arap_energy(jets, bending, 0.7), tolerances.COMPOSED)
     first = np.ascontiguousarray(jets[:4])
-    found = testing.arap_energy(first, 0.0, aten=True)
-    agree(found, testing.arap_energy(first, 0.0), tolerances.COMPOSED)
+    energy = testing.arap_energy(first, 0.0, aten=True)
+    agree(energy, testing.arap_energy(first, 0.0), tolerances.COMPOSED)
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
@@ -66,8 +66,8 @@ def test_ambiguous_rotations_stay_finite(sigma, dtype):
 
 def test_rigidity_in_single_precision():
     jets = jets_of([1.2, 1.0, 0.7], np.random.default_rng(2)).astype(np.float32)
-    found = testing.arap_energy(jets, 0.01, aten=True)
-    agree(found, testing.arap_energy(jets, 0.01), tolerances.FLOAT32_ENERGY)
+    energy = testing.arap_energy(jets, 0.01, aten=True)
+    agree(energy, testing.arap_energy(jets, 0.01), tolerances.FLOAT32_ENERGY)
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
@@ -82,10 +82,10 @@ def test_gauss_and_barrier_equal_the_kernels(sigma, dtype):
         tolerance *= 100
     for weights in (np.zeros(0), rng.uniform(size=jets.shape[1])):
         arguments = jets, normals, STYLE, 5.0, 0.6, weights.astype(dtype)
-        found = testing.gauss_energy(*arguments, aten=True)
-        agree(found, testing.gauss_energy(*arguments), tolerance)
-    found = testing.fold_barrier(jets, 0.9, 0.6, aten=True)
-    agree(found, testing.fold_barrier(jets, 0.9, 0.6), tolerance)
+        barrier = testing.gauss_energy(*arguments, aten=True)
+        agree(barrier, testing.gauss_energy(*arguments), tolerance)
+    barrier = testing.fold_barrier(jets, 0.9, 0.6, aten=True)
+    agree(barrier, testing.fold_barrier(jets, 0.9, 0.6), tolerance)
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
@@ -94,8 +94,8 @@ def test_handles_equal_the_kernels(dtype):
     handles = testing.BoundHandles(cases.bar_handles(30.0), cases.bar_samples(200).points)
     jets = rng.normal(size=(1, len(handles.sources), 3)).astype(dtype)
     tolerance = tolerances.COMPOSED if dtype is np.float64 else tolerances.FLOAT32_ENERGY
-    found = testing.handle_energy(jets, handles, 0.6, aten=True)
-    agree(found, testing.handle_energy(jets, handles, 0.6), tolerance)
+    energy = testing.handle_energy(jets, handles, 0.6, aten=True)
+    agree(energy, testing.handle_energy(jets, handles, 0.6), tolerance)
 
 
 TERMS = {
@@ -126,11 +126,11 @@ def test_a_solve_arrives_where_the_kernels_do(optimizer):
     samples, handles = cases.bar_samples(600), cases.bar_handles(40.0)
     expected = af.deform(samples, handles, af.DeformOptions(**options)).report
     with aten_path():
-        found = af.deform(samples, handles, af.DeformOptions(**options)).report
-    assert [i for i, _ in found["loss"]] == [i for i, _ in expected["loss"]]
-    assert found["loss"][0][1] == pytest.approx(expected["loss"][0][1], rel=tolerances.FLOAT32_ENERGY)
-    assert found["loss"][-1][1] == pytest.approx(expected["loss"][-1][1], rel=tolerances.COMPOSED_SOLVE)
-    assert found["energy"] == pytest.approx(expected["energy"], rel=tolerances.COMPOSED_SOLVE)
+        report = af.deform(samples, handles, af.DeformOptions(**options)).report
+    assert [i for i, _ in report["loss"]] == [i for i, _ in expected["loss"]]
+    assert report["loss"][0][1] == pytest.approx(expected["loss"][0][1], rel=tolerances.FLOAT32_ENERGY)
+    assert report["loss"][-1][1] == pytest.approx(expected["loss"][-1][1], rel=tolerances.COMPOSED_SOLVE)
+    assert report["energy"] == pytest.approx(expected["energy"], rel=tolerances.COMPOSED_SOLVE)
 
 
 def test_stylize_and_fit_arrive_where_the_kernels_do():

@@ -201,8 +201,8 @@ def test_rigid_motions():
     rng = np.random.default_rng(4)
     points = rng.normal(size=(50, 3))
     rotation = random_rotations(1, rng)[0]
-    found = af.rigid_motion(points, points @ rotation.T + [1, 2, 3])
-    assert np.abs(found[:3, :3] - rotation).max() < 1e-11 and np.allclose(found[:3, 3], [1, 2, 3])
+    motion = af.rigid_motion(points, points @ rotation.T + [1, 2, 3])
+    assert np.abs(motion[:3, :3] - rotation).max() < 1e-11 and np.allclose(motion[:3, 3], [1, 2, 3])
     mirrored = af.rigid_motion(points, points * [-1, 1, 1])
     assert np.linalg.det(mirrored[:3, :3]) == pytest.approx(1)
     assert np.array_equal(af.rigid_motion([[1, 2, 3]], [[3, 2, 1]]), shift([2, 0, -2]))

@@ -46,15 +46,15 @@ every_call = pytest.mark.parametrize("name", CALLS)
 @every_call
 def test_each_iteration_is_told_once_with_terms_that_make_its_loss(name):
     call, changes, terms = CALLS[name]
-    told = []
-    report = call(told.append, **changes).report
-    assert [record.iteration for record in told] == list(range(1, report.iterations + 1))
-    for record in told:
+    calls = []
+    report = call(calls.append, **changes).report
+    assert [record.iteration for record in calls] == list(range(1, report.iterations + 1))
+    for record in calls:
         assert set(record.terms) == terms
         assert sum(record.terms.values()) == pytest.approx(record.loss, rel=TERMS_OF_LOSS)
-    assert [r.seconds for r in told] == sorted(r.seconds for r in told)
+    assert [r.seconds for r in calls] == sorted(r.seconds for r in calls)
     if hasattr(report, "loss") and "radial" not in name:
-        assert [loss for _, loss in report.loss] == pytest.approx([r.loss for r in told][: len(report.loss)])
+        assert [loss for _, loss in report.loss] == pytest.approx([r.loss for r in calls][: len(report.loss)])
 
 
 @every_call

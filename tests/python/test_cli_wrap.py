@@ -17,10 +17,10 @@ SMALL = ["--centers", "50", "--stages", "2", "--iterations", "5", "--samples", "
 @pytest.fixture
 def pair(tmp_path):
     v, f = cases.figure(2)
-    there = cases.moved(v)
+    target = cases.moved(v)
     trimesh.Trimesh(v, f, process=False).export(tmp_path / "template.obj")
-    trimesh.Trimesh(there, f, process=False).export(tmp_path / "scan.ply")
-    rows = [(v[i], there[i]) for i in (0, 1, 20, 50)]
+    trimesh.Trimesh(target, f, process=False).export(tmp_path / "scan.ply")
+    rows = [(v[i], target[i]) for i in (0, 1, 20, 50)]
     (tmp_path / "pairs.json").write_text(json.dumps(np.array(rows).tolist()))
     np.savetxt(tmp_path / "pairs.txt", np.array(rows).reshape(-1, 6))
     np.save(tmp_path / "pairs.npy", np.array(rows))

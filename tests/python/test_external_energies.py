@@ -74,21 +74,21 @@ def test_our_own_stretch_in_python_is_a_second_share_of_it(kind):
     """Half of the stretch is ours, half is the library's: a solve with rigidity 2 is the same one."""
     vertices, triangles = sphere(10.0, 3)
     samples = af.sample_mesh(vertices + np.array([3, 0, -2]), triangles, 600)
-    told = {"own": [], "ours": []}
+    calls = {"own": [], "ours": []}
     styled = dict(field=kind, strength=1.0, barrier=0.0, bending=0.0, **{k: v for k, v in settings().items()})
     styled["iterations"] = 15 if kind == "neural" else 200
     for key, rigidity, energies in [("own", 1.0, [Stretch(1.0)]), ("ours", 2.0, [])]:
         options = af.StylizeOptions(rigidity=rigidity, **styled)
-        af.stylize(samples, "cube", options, energies=energies, callback=told[key].append)
+        af.stylize(samples, "cube", options, energies=energies, callback=calls[key].append)
     if kind == "neural":
-        losses = [[record.loss for record in told[key]] for key in told]
+        losses = [[record.loss for record in calls[key]] for key in calls]
         assert losses[0] == pytest.approx(losses[1], rel=ENERGY_IN_PYTHON)
-        for record in told["own"]:
+        for record in calls["own"]:
             assert record.terms["energies[0]"] == pytest.approx(
                 record.terms["stretch"], rel=ENERGY_IN_PYTHON, abs=1e-9
             )
     else:  # the preconditioner differs: the same minimum by another way
-        assert told["own"][-1].loss == pytest.approx(told["ours"][-1].loss, rel=0.05)
+        assert calls["own"][-1].loss == pytest.approx(calls["ours"][-1].loss, rel=0.05)
 
 
 class Curvature(af.Energy):
@@ -205,7 +205,7 @@ def test_what_it_raises_comes_through_unchanged(kind):
 
 def test_style_and_energy_together():
     samples = af.sample_mesh(*sphere(1.0, 2), 400)
-    told = []
+    calls = []
     options = af.StylizeOptions(**settings(iterations=5))
-    af.stylize(samples, "cube", options, energies=[Spring([0, 0, 0], 1.0)], callback=told.append)
-    assert {"style", "energies[0]"} <= set(told[0].terms)
+    af.stylize(samples, "cube", options, energies=[Spring([0, 0, 0], 1.0)], callback=calls.append)
+    assert {"style", "energies[0]"} <= set(calls[0].terms)

@@ -46,16 +46,16 @@ class Deadly:
 
 @pytest.mark.slow
 def test_outcomes_are_in_order_and_failures_stop_no_other(client):
-    told = []
-    outcomes = farm.map(volume, [3.0, -1.0, 1.0, 2.0], client, on_done=told.append)
+    calls = []
+    outcomes = farm.map(volume, [3.0, -1.0, 1.0, 2.0], client, on_done=calls.append)
     assert [outcome.item for outcome in outcomes] == [3.0, -1.0, 1.0, 2.0]
     assert [outcome.done for outcome in outcomes] == [True, False, True, True]
     assert isinstance(outcomes[1].error, ValueError) and "scale -1.0" in str(outcomes[1].error)
     here = [volume(scale)[0] for scale in (3.0, 1.0, 2.0)]
-    found = [outcome.value for outcome in outcomes if outcome.done]
-    assert [size for size, _, _ in found] == here  # to the last bit
-    assert {threads for _, threads, _ in found} == {1} and os.getpid() not in {pid for *_, pid in found}
-    assert sorted(map(id, told)) == sorted(map(id, outcomes))
+    values = [outcome.value for outcome in outcomes if outcome.done]
+    assert [size for size, _, _ in values] == here  # to the last bit
+    assert {threads for _, threads, _ in values} == {1} and os.getpid() not in {pid for *_, pid in values}
+    assert sorted(map(id, calls)) == sorted(map(id, outcomes))
     assert farm.map(volume, [], client) == []
 
 

@@ -122,12 +122,12 @@ def test_bad_points_are_named(bent):
 
 def test_distortion_at_points(bent, samples):
     points = samples.points[:300]
-    found = af.distortion(bent, points)
+    measured = af.distortion(bent, points)
     stretches = np.linalg.svd(bent.jacobian(points), compute_uv=False)
     determinants = np.linalg.det(bent.jacobian(points))
-    assert found.min_determinant == pytest.approx(determinants.min(), rel=1e-6)
-    assert found.flipped_share == (determinants <= 0).mean()
-    assert found.max_stretch == pytest.approx(stretches.max(), rel=1e-6)
-    assert found.min_stretch == pytest.approx(stretches.min(), rel=1e-6)
+    assert measured.min_determinant == pytest.approx(determinants.min(), rel=1e-6)
+    assert measured.flipped_share == (determinants <= 0).mean()
+    assert measured.max_stretch == pytest.approx(stretches.max(), rel=1e-6)
+    assert measured.min_stretch == pytest.approx(stretches.min(), rel=1e-6)
     with pytest.raises(af.InvalidInput, match=r"samples|points"):
         af.distortion(bent, np.zeros((0, 3)))

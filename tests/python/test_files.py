@@ -35,9 +35,9 @@ NAMES = ["sdf", "neural", "exact", "refined", "invertible", "composed", "radial"
 @pytest.mark.parametrize("name", NAMES)
 def test_any_reader_of_safetensors_opens_them(name, examples):
     texts, arrays = archives.read(examples[name])
-    found = safetensors.numpy.load_file(examples[name])
-    assert found.keys() == arrays.keys()
-    assert all(np.array_equal(found[key], arrays[key]) for key in arrays)
+    loaded = safetensors.numpy.load_file(examples[name])
+    assert loaded.keys() == arrays.keys()
+    assert all(np.array_equal(loaded[key], arrays[key]) for key in arrays)
     with safetensors.safe_open(examples[name], "np") as file:
         assert file.metadata()["format"] == "arapfields" and file.metadata()["version"] == "1"
     assert texts["kind"] == ("sdf" if name == "sdf" else "field")

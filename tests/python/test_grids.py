@@ -47,11 +47,11 @@ def test_mesh_distance_has_the_frame_of_its_samples():
 
 
 def test_npz(tmp_path):
-    made = af.sdf_grid(Ball(), 8)
-    af.save_grid(tmp_path / "grid.npz", *made)
+    grid = af.sdf_grid(Ball(), 8)
+    af.save_grid(tmp_path / "grid.npz", *grid)
     with np.load(tmp_path / "grid.npz") as read:
-        assert np.array_equal(read["values"], made[0])
-        assert np.array_equal(read["origin"], made[1]) and read["spacing"] == made[2]
+        assert np.array_equal(read["values"], grid[0])
+        assert np.array_equal(read["origin"], grid[1]) and read["spacing"] == grid[2]
 
 
 def test_vdb_is_a_level_set_at_its_place(tmp_path):

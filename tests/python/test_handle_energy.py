@@ -118,11 +118,11 @@ def test_distortion_measures_and_barrier():
     jets = np.zeros((4, 300, 3))
     jets[1:4] = np.moveaxis(jacobians, 2, 0)
     sigma, det = np.linalg.svd(jacobians, compute_uv=False), np.linalg.det(jacobians)
-    found = testing.distortion(jets)
-    assert found.min_determinant == pytest.approx(det.min())
-    assert found.flipped_share == pytest.approx((det <= 0).mean()) and found.flipped_share > 0
-    assert found.max_stretch == pytest.approx(sigma.max())
-    assert found.min_stretch == pytest.approx(sigma.min(), rel=1e-5)
+    measured = testing.distortion(jets)
+    assert measured.min_determinant == pytest.approx(det.min())
+    assert measured.flipped_share == pytest.approx((det <= 0).mean()) and measured.flipped_share > 0
+    assert measured.max_stretch == pytest.approx(sigma.max())
+    assert measured.min_stretch == pytest.approx(sigma.min(), rel=1e-5)
     value, cotangents = testing.fold_barrier(jets, 0.4)
     assert value == pytest.approx(np.mean(np.maximum(0, 1 - det / 0.4) ** 2))
     direction = rng.normal(size=jets.shape)

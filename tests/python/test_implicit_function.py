@@ -195,14 +195,14 @@ def test_one_thread_at_a_time_is_let_in():
             inside.pop()
             return values
 
-    ball, made = Counts(), []
-    workers = [threading.Thread(target=lambda: made.append(af.extract_surface(ball, 24))) for _ in range(4)]
+    ball, counts = Counts(), []
+    workers = [threading.Thread(target=lambda: counts.append(af.extract_surface(ball, 24))) for _ in range(4)]
     for worker in workers:
         worker.start()
     for worker in workers:
         worker.join()
-    assert len(made) == 4 and max(most) == 1
-    assert all(np.array_equal(mesh.vertices, made[0].vertices) for mesh in made)
+    assert len(counts) == 4 and max(most) == 1
+    assert all(np.array_equal(mesh.vertices, counts[0].vertices) for mesh in counts)
 
 
 def test_a_function_may_call_the_library_itself():

@@ -73,5 +73,5 @@ def test_what_is_small_and_far_changes_nothing(at_rest):
     v, f = body()
     small, g = meshes.sphere(0.02, subdivisions=1)
     both = np.concatenate([v, small + np.array([40.0, 25.0, -10.0])])
-    found = motion(np.eye(4), both, np.concatenate([f, g + len(v)]))[: len(v)]
-    assert off(found, at_rest) < SAME
+    shape = motion(np.eye(4), both, np.concatenate([f, g + len(v)]))[: len(v)]
+    assert off(shape, at_rest) < SAME

@@ -134,10 +134,10 @@ def test_files_hold_it_whole(bent, tmp_path):
 def test_the_deformed_surface_is_that_of_the_moved_mesh(bent):
     vertices, triangles, _ = bar()
     resolution = 48
-    made = af.extract_deformed(af.MeshSdf(vertices, triangles), bent, resolution=resolution)
-    assert made.report.inverted > 0 and made.report.failures == 0
+    extraction = af.extract_deformed(af.MeshSdf(vertices, triangles), bent, resolution=resolution)
+    assert extraction.report.inverted > 0 and extraction.report.failures == 0
     moved = af.MeshSdf(bent(vertices), triangles)
-    off = np.abs(moved(made.vertices)) / made.report.spacing
+    off = np.abs(moved(extraction.vertices)) / extraction.report.spacing
     assert off.mean() < 0.1 and np.quantile(off, 0.95) < 0.5
 
 
@@ -214,13 +214,13 @@ def test_the_bunnys_inverse_is_exact_and_newtons(data_dir):
         assert np.abs(field.inverse(field(points)) - points).max() <= 1e-5
         assert np.linalg.det(field.jacobian(points)).min() > 0
     moved = field(samples.points[:4000])
-    found, voxel = moved.copy(), 2 / 128
+    point, voxel = moved.copy(), 2 / 128
     for _ in range(60):  # Newton's method from the moved point itself, in steps of 0.1 at most
-        step = np.linalg.solve(field.jacobian(found), (field(found) - moved)[..., None])[..., 0]
-        found -= step * np.minimum(1, 0.1 / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-12))
-    met = np.abs(field(found) - moved).max(1) < 1e-5
+        step = np.linalg.solve(field.jacobian(point), (field(point) - moved)[..., None])[..., 0]
+        point -= step * np.minimum(1, 0.1 / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-12))
+    met = np.abs(field(point) - moved).max(1) < 1e-5
     assert met.mean() > 0.99
-    assert np.linalg.norm(found - field.inverse(moved), axis=1)[met].max() <= 0.5 * voxel
+    assert np.linalg.norm(point - field.inverse(moved), axis=1)[met].max() <= 0.5 * voxel
 
 
 @pytest.mark.slow

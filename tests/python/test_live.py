@@ -77,8 +77,8 @@ def test_returning_to_a_pose_returns_its_solution(samples):
     rng = np.random.default_rng(2)
     for _ in range(60):
         live.solve([LEFT, turned(rng.normal() * 25, 0) @ turned(rng.normal() * 25, 1) @ RIGHT])
-    found = live.solve(pose, iterations=300, tolerance=1e-9)(samples.points[:500])
-    assert np.abs(found - expected).max() < LIVE_DRIFT * 4  # the bar is 4 long
+    shape = live.solve(pose, iterations=300, tolerance=1e-9)(samples.points[:500])
+    assert np.abs(shape - expected).max() < LIVE_DRIFT * 4  # the bar is 4 long
 
 
 def test_same_seed_same_bits(samples):

@@ -36,8 +36,8 @@ def test_ten_thousand_motions_leave_no_trace():
         if i == 1000:
             memory = resident_mebibytes()
     assert resident_mebibytes() < memory + 2
-    found = live.solve(pose, iterations=300, tolerance=1e-9)(samples.points[:500])
-    assert np.abs(found - expected).max() < LIVE_DRIFT * 4  # the bar is 4 long
+    shape = live.solve(pose, iterations=300, tolerance=1e-9)(samples.points[:500])
+    assert np.abs(shape - expected).max() < LIVE_DRIFT * 4  # the bar is 4 long
     live.reset()
     assert np.abs(live.field(samples.points) - samples.points).max() < 1e-8
 

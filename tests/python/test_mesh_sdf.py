@@ -43,14 +43,14 @@ def dense_crossings(V, F, n):
     grid = np.stack(np.meshgrid(t, t, t, indexing="ij"), -1).reshape(-1, 3)
     values = af.signed_distance(V, F, frame.to_mesh(grid.astype(np.float32)))
     grid, values = grid.reshape(n, n, n, 3), (values / frame.scale).astype(np.float32).reshape(n, n, n)
-    found = []
+    results = []
     for axis in range(3):
         low, high = (np.take(values, range(a, n - 1 + a), axis).astype(float) for a in (0, 1))
         x, y = (np.take(grid, range(a, n - 1 + a), axis) for a in (0, 1))
         crossed = (low < 0) != (high < 0)
         share = (low[crossed] / (low[crossed] - high[crossed]))[:, None]
-        found.append(x[crossed] + share * (y[crossed] - x[crossed]))
-    return frame.to_mesh(np.concatenate(found))
+        results.append(x[crossed] + share * (y[crossed] - x[crossed]))
+    return frame.to_mesh(np.concatenate(results))
 
 
 @pytest.mark.parametrize("n", [33, 64, 96])

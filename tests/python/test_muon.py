@@ -35,11 +35,11 @@ def test_a_step_evens_out_the_singular_values(width, layers):
     for old, new, (gradient, u, v) in list(zip(weights, after, gradients, strict=True))[:-1]:
         rows, columns = old.shape
         step = (old - new) / (RATE * max(1.0, rows / columns) ** 0.5)
-        found = u.T @ step @ v
-        values = np.diag(found)
+        gram = u.T @ step @ v
+        values = np.diag(gram)
         # The step has the gradient's singular vectors alone:
-        assert np.abs(found - np.diag(values)).max() < SAME_VECTORS
-        assert np.abs(step - u @ found @ v.T).max() < SAME_VECTORS
+        assert np.abs(gram - np.diag(values)).max() < SAME_VECTORS
+        assert np.abs(step - u @ gram @ v.T).max() < SAME_VECTORS
         assert np.abs(values - 1).max() < EVENED
         given = np.linalg.svd(gradient, compute_uv=False)
         assert given[-1] < 0.1 * given[0] and given[-1] > 0.01

@@ -178,7 +178,7 @@ def test_the_command_line_takes_an_object(tmp_path, capsys):
     points -= points.mean(0)
     assert np.abs(points[:, 0]).max() > 1.1 * np.abs(points @ [0.5**0.5, 0.5**0.5, 0]).max()
     assert run(*command, "--style-object", open_box, *small) == 2
-    assert "open.obj" in (told := capsys.readouterr().err) and "open" in told
+    assert "open.obj" in (errors := capsys.readouterr().err) and "open" in errors
 
 
 @pytest.mark.slow

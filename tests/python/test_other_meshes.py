@@ -88,16 +88,16 @@ def test_warp_moves_points_and_curves(meshes, saved, tmp_path, suffix):
     if suffix == "obj":
         text = output.read_text()
         assert text.startswith("# a curve") and "l 1 2 3" in text
-        found = np.array([line.split()[1:] for line in text.splitlines() if line[0] == "v"], float)
+        read_points = np.array([line.split()[1:] for line in text.splitlines() if line[0] == "v"], float)
     elif suffix == "npy":
-        found = np.load(output)
+        read_points = np.load(output)
     elif suffix == "npz":
-        found = np.load(output)["points"]
+        read_points = np.load(output)["points"]
     elif suffix == "ply":
-        found = np.frombuffer(output.read_bytes()[-200 * 24 :], "<f8").reshape(-1, 3)
+        read_points = np.frombuffer(output.read_bytes()[-200 * 24 :], "<f8").reshape(-1, 3)
     else:
-        found = np.loadtxt(output, delimiter="," if suffix == "csv" else None)
-    assert np.abs(found - field.apply(points, strength=0.5)).max() < 1e-6
+        read_points = np.loadtxt(output, delimiter="," if suffix == "csv" else None)
+    assert np.abs(read_points - field.apply(points, strength=0.5)).max() < 1e-6
 
 
 def test_warp_carries_what_belongs_to_a_body(meshes, saved, tmp_path, capsys):
@@ -128,9 +128,9 @@ def test_symmetry_weights_scale_and_reach_by_flags(meshes, tmp_path):
     foot = ["--box", "0,-1,-1", "1,1,0.2", "--turn", "1,0,0", "20"]
     head = ["--box", "-1,-1,1", "1,1,2"]
     assert run(*common, *head, *foot, "--symmetry", "x", "--weights", stiff, "--bend-weights", stiff) == 0
-    made, flip = af.DeformationField.load(field), np.array([-1, 1, 1])
-    assert np.abs(made(V * flip) - made(V) * flip).max() < 1e-6
-    assert np.abs(made(V) - V).max() > 0.03
+    loaded, flip = af.DeformationField.load(field), np.array([-1, 1, 1])
+    assert np.abs(loaded(V * flip) - loaded(V) * flip).max() < 1e-6
+    assert np.abs(loaded(V) - V).max() > 0.03
     assert run(*common, *head, "--box", "0,-1,-1", "1,1,0.2", "--scale", "1.5") == 0
     low = V[(V[:, 2] < 0.2) & (V[:, 0] > 0)]
     assert np.ptp(af.DeformationField.load(field)(low)[:, 1]) > 1.3 * np.ptp(low[:, 1])

@@ -39,9 +39,9 @@ def test_meshes_distances_and_samples() -> None:
 def test_fits_and_files(tmp_path: Path) -> None:
     V, F = af.extract_surface(Cube(), 16)
     options = af.FitOptions(iterations=3, width=8, layers=1, near_points=500, uniform_points=100)
-    told: list[af.Iteration] = []
-    sdf = af.fit_sdf(V, F, options, callback=told.append)
-    assert len(told) == sdf.report.iterations == 3
+    iterations: list[af.Iteration] = []
+    sdf = af.fit_sdf(V, F, options, callback=iterations.append)
+    assert len(iterations) == sdf.report.iterations == 3
     sdf.save(tmp_path / "sdf")
     again = af.NeuralSdf.load(str(tmp_path / "sdf"))
     assert again.report == sdf.report

@@ -128,10 +128,10 @@ def test_bend_weights_move_the_bend(samples):
 
 
 def test_terms_that_are_told_have_their_weights(samples):
-    told = []
+    calls = []
     stiff = samples.with_weights(np.where(samples.points[:, 0] > 0, 10.0, 1.0))
-    af.deform(stiff, bend(), af.DeformOptions(centers=200), callback=told.append)
-    last = told[-1]
+    af.deform(stiff, bend(), af.DeformOptions(centers=200), callback=calls.append)
+    last = calls[-1]
     assert sum(last.terms.values()) == pytest.approx(last.loss, rel=1e-9)
     assert all(value >= 0 for value in last.terms.values())
 

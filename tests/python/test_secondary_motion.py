@@ -83,30 +83,30 @@ def test_the_total_energy_does_not_rise(samples, rate, seconds):
 
 
 def test_frame_rates_change_neither_period_nor_decay(samples):
-    found = {}
+    tops = {}
     for rate in (24, 60):
         times, heights, energies = swung(released(samples, further={"damping": 1.0}), 2.5, rate)
-        found[rate] = period_of(times, heights), decay_of(times, energies)
-    assert found[24][0] == pytest.approx(found[60][0], rel=ALIKE)
-    assert found[24][1] == pytest.approx(found[60][1], rel=ALIKE)
-    assert found[60][1] == pytest.approx(1.0, rel=DECAY)  # what was asked for
+        tops[rate] = period_of(times, heights), decay_of(times, energies)
+    assert tops[24][0] == pytest.approx(tops[60][0], rel=ALIKE)
+    assert tops[24][1] == pytest.approx(tops[60][1], rel=ALIKE)
+    assert tops[60][1] == pytest.approx(1.0, rel=DECAY)  # what was asked for
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("damping", "seconds"), [(0.0, 3.0), (2.0, 3.0), (3.0, LEFT_OF_3)])
 def test_periods_hold_from_360_to_1500_centers_and_from_24_to_240_frames_a_second(damping, seconds):
-    found = []
+    speeds = []
     for fine, coarse, rate in ((300, 60, 24), (300, 60, 240), (1250, 250, 60)):
         size = {"samples": 6000, "fine_centers": fine, "coarse_centers": coarse}
         live = released(bar_samples(12000), further={"damping": damping}, **size)
         times, heights, energies = swung(live, seconds, rate)
-        found.append((period_of(times, heights), decay_of(times, energies)))
-    for period, decay in found[1:]:
-        assert period == pytest.approx(found[0][0], rel=ALIKE)
+        speeds.append((period_of(times, heights), decay_of(times, energies)))
+    for period, decay in speeds[1:]:
+        assert period == pytest.approx(speeds[0][0], rel=ALIKE)
         if damping:
-            assert decay == pytest.approx(found[0][1], rel=ALIKE)
+            assert decay == pytest.approx(speeds[0][1], rel=ALIKE)
         else:  # of the amplitude as much is left
-            assert np.exp(-seconds * decay) == pytest.approx(np.exp(-seconds * found[0][1]), rel=ALIKE)
+            assert np.exp(-seconds * decay) == pytest.approx(np.exp(-seconds * speeds[0][1]), rel=ALIKE)
 
 
 @pytest.mark.slow
@@ -176,9 +176,9 @@ def test_an_object_that_moves_drags_its_surface_along(samples):
     for live in (world, local):
         live.set_secondary_motion(af.SecondaryMotionOptions())
         live.solve()
-    there = world.step([turn @ LEFT], 1 / 24)(TIP)
+    tip = world.step([turn @ LEFT], 1 / 24)(TIP)
     here = local.step([LEFT], 1 / 24, coordinates=np.linalg.inv(turn))(TIP)
-    assert np.abs(here @ turn[:3, :3].T + turn[:3, 3] - there).max() < 0.01
+    assert np.abs(here @ turn[:3, :3].T + turn[:3, 3] - tip).max() < 0.01
     assert np.abs(here - TIP).max() > 0.1
 
 

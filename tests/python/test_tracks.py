@@ -27,9 +27,9 @@ def tracks(*handles, **changed):
 def test_frames_are_numbered_and_boxes_may_be_open(tmp_path):
     held = {"type": "cuboid", "corners": [[None] * 3, [-1.5, None, None]], "frames": [np.eye(4).tolist()] * 3}
     (tmp_path / "t.json").write_text(json.dumps(tracks(handle(weight=2.0), start=-5)))
-    found = read_tracks(tmp_path / "t.json")
-    assert (found.fps, found.start, found.count) == (24.0, -5, 3)
-    (end,) = found.handles(2, BOUNDS)
+    read = read_tracks(tmp_path / "t.json")
+    assert (read.fps, read.start, read.count) == (24.0, -5, 3)
+    (end,) = read.handles(2, BOUNDS)
     assert np.array_equal(end.target, RIGHT) and end.weight == 2
     (tmp_path / "t.json").write_text(json.dumps(tracks(held)))
     with pytest.raises(af.InvalidInput, match=r"t\.json: frame 1, handle handles\[0\]: .*rigid"):
@@ -68,9 +68,9 @@ def test_what_is_wrong_with_json_is_named(content, text, tmp_path):
     path = tmp_path / "t.json"
     path.write_text(content if isinstance(content, str) else json.dumps(content))
     with pytest.raises(af.InvalidInput, match=text) as error:
-        found = read_tracks(path)
-        for index in range(found.count):
-            found.handles(index, BOUNDS)
+        read = read_tracks(path)
+        for index in range(read.count):
+            read.handles(index, BOUNDS)
     assert str(error.value).startswith(f"{path}: ")
 
 
@@ -99,9 +99,9 @@ def test_what_is_wrong_with_arrays_is_named(arrays, text, tmp_path):
     path = tmp_path / "t.npz"
     np.savez(path, **arrays)
     with pytest.raises(af.InvalidInput, match=text) as error:
-        found = read_tracks(path)
-        for index in range(found.count):
-            found.handles(index, BOUNDS)
+        tracks = read_tracks(path)
+        for index in range(tracks.count):
+            tracks.handles(index, BOUNDS)
     assert str(error.value).startswith(f"{path}: ")
 
 

@@ -24,17 +24,17 @@ def samples(figure):
 @pytest.mark.parametrize("landmarks", [0, 4])
 def test_a_moved_scaled_and_bent_shape_is_found_again(figure, samples, landmarks):
     v, f = figure
-    there = cases.moved(v)
+    target_v = cases.moved(v)
     chosen = np.linspace(0, len(v) - 1, landmarks, dtype=int)
     options = af.WrapOptions(**cases.SMALL)
-    field = af.wrap(samples, af.MeshSdf(there, f), [(v[i], there[i]) for i in chosen], options)
-    (mean, _), (back, _) = cases.distances(field(v), f, there, f, 2000)
+    field = af.wrap(samples, af.MeshSdf(target_v, f), [(v[i], target_v[i]) for i in chosen], options)
+    (mean, _), (back, _) = cases.distances(field(v), f, target_v, f, 2000)
     assert max(mean, back) < FOUND_AGAIN
     report = field.report
     assert report.flipped_share == 0 and report.matched_share == 1 and not report.notes
     assert abs(report.scale - 3) < 0.2 and len(report.landmarks) == landmarks
-    assert abs(report.diagonal / np.linalg.norm(np.ptp(there, axis=0)) - 1) < 0.02
-    away = np.linalg.norm(field(v) - there, axis=1).mean() / report.diagonal
+    assert abs(report.diagonal / np.linalg.norm(np.ptp(target_v, axis=0)) - 1) < 0.02
+    away = np.linalg.norm(field(v) - target_v, axis=1).mean() / report.diagonal
     assert away < 0.08  # its points too, nearly: nothing but rigidity keeps them from sliding along it
 
 
@@ -160,5 +160,5 @@ def test_cancel_and_progress(figure, samples):
 def test_the_number_of_threads_changes_nothing(figure, samples):
     v, f = figure
     target = af.MeshSdf(cases.moved(v), f)
-    found = [af.wrap(samples, target, [], af.WrapOptions(threads=n, **cases.SMALL))(v) for n in (1, 2)]
-    assert np.array_equal(*found)
+    results = [af.wrap(samples, target, [], af.WrapOptions(threads=n, **cases.SMALL))(v) for n in (1, 2)]
+    assert np.array_equal(*results)

@@ -40,25 +40,25 @@ def clicks(v, facing):
     along, aside, up = v @ ahead, v @ left, v[:, 2]
     low, middle = up < up.min() + 0.1 * np.ptp(up), np.median(aside)
     amid = (along[low].min() + along[low].max()) / 2
-    found = {"nose": v[along.argmax()], "tail": v[along.argmin()]}
+    marks = {"nose": v[along.argmax()], "tail": v[along.argmin()]}
     for side, sign in (("left", 1), ("right", -1)):
         for place, way in (("front", 1), ("hind", -1)):
             foot = low & ((along - amid) * way > 0) & ((aside - middle) * sign > 0)
-            found[f"{place} {side}"] = nearest(v, v[foot].mean(0) - [0, 0, 0.05])
+            marks[f"{place} {side}"] = nearest(v, v[foot].mean(0) - [0, 0, 0.05])
         half = (aside - middle) * sign > 0.02
-        found[f"ear {side}"] = v[half][up[half].argmax()]
-    return found
+        marks[f"ear {side}"] = v[half][up[half].argmax()]
+    return marks
 
 
 def whale_clicks(v):
     """Fins stand for front feet, flukes for hind ones."""
-    found = {"nose": v[v[:, 1].argmin()], "tail": nearest(v, [0, 0.6, 0.05])}
+    marks = {"nose": v[v[:, 1].argmin()], "tail": nearest(v, [0, 0.6, 0.05])}
     for side, sign in (("left", 1), ("right", -1)):
         fin = (v[:, 1] < 0.1) & (v[:, 0] * sign > 0.1)
-        found[f"front {side}"] = v[fin][v[fin][:, 2].argmin()]
+        marks[f"front {side}"] = v[fin][v[fin][:, 2].argmin()]
         fluke = (v[:, 1] > v[:, 1].max() - 0.25) & (v[:, 0] * sign > 0)
-        found[f"hind {side}"] = v[fluke][(v[fluke][:, 0] * sign).argmax()]
-    return found
+        marks[f"hind {side}"] = v[fluke][(v[fluke][:, 0] * sign).argmax()]
+    return marks
 
 
 def landmarks(name, v):
@@ -76,8 +76,8 @@ def test_published_shapes_onto_each_other(data_dir, pair, seed):
     field = af.wrap(af.sample_mesh(v, f), target, pairs, af.WrapOptions(seed=seed))
     wrapped = field(v)
     exact = cases.distances(wrapped, f, onto_v, onto_f, 20000)
-    told = field.report.to_target_mean, field.report.from_target_mean
-    for (mean, most), reported in zip(exact, told, strict=True):
+    distances = field.report.to_target_mean, field.report.from_target_mean
+    for (mean, most), reported in zip(exact, distances, strict=True):
         assert mean <= NEAR and most <= NEARLY_ALL
         assert abs(100 * reported - mean) <= TOLD
     assert cases.crossing_share(wrapped, f) <= CROSSING
@@ -86,9 +86,9 @@ def test_published_shapes_onto_each_other(data_dir, pair, seed):
 
 def test_a_cow_moved_scaled_and_bent_is_found_again_without_landmarks(data_dir):
     _, v, f = surface(data_dir, "spot")
-    there = cases.moved(v)
-    field = af.wrap(af.sample_mesh(v, f), af.MeshSdf(there, f))
-    (mean, _), (back, _) = cases.distances(field(v), f, there, f, 20000)
+    target_v = cases.moved(v)
+    field = af.wrap(af.sample_mesh(v, f), af.MeshSdf(target_v, f))
+    (mean, _), (back, _) = cases.distances(field(v), f, target_v, f, 20000)
     assert max(mean, back) < 0.5 and not field.report.notes
 
 

@@ -93,10 +93,10 @@ def find(name, folder):
         return Blender([str(python_of(name))], folder, libtorch=library)
     if os.geteuid() or not (CHROOT / "usr/bin/blender").exists():
         pytest.skip(f"no Blender in {CHROOT}, or no right to enter it")
-    there = CHROOT / "tmp" / f"arapfields-{os.getpid()}-{folder.name}"
-    shutil.rmtree(there, ignore_errors=True)
-    there.mkdir(parents=True)
+    folder_inside = CHROOT / "tmp" / f"arapfields-{os.getpid()}-{folder.name}"
+    shutil.rmtree(folder_inside, ignore_errors=True)
+    folder_inside.mkdir(parents=True)
     command = ["chroot", str(CHROOT), "blender", "--background", "--factory-startup"]
     command += ["--python-exit-code", "1", "--python"]
     libtorch = CHROOT / "torch/lib/libtorch_cpu.so"
-    return Blender(command, there, CHROOT, "/torch/lib/libtorch_cpu.so" if libtorch.exists() else "")
+    return Blender(command, folder_inside, CHROOT, "/torch/lib/libtorch_cpu.so" if libtorch.exists() else "")

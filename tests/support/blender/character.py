@@ -47,17 +47,17 @@ def half_body():
     shape = Capsules(PARTS, af.Frame([0, 0, 0.9], 1.0))
     vertices, corners = af.extract_surface(shape, resolution=80)[:2]
     mesh = bpy.data.meshes.new("Body")
-    made = bmesh.new()
-    points = [made.verts.new(vertex) for vertex in vertices.tolist()]
+    edited = bmesh.new()
+    points = [edited.verts.new(vertex) for vertex in vertices.tolist()]
     for corner in corners.tolist():
-        made.faces.new([points[i] for i in corner])
-    cut = [*made.verts, *made.edges, *made.faces]
-    bmesh.ops.bisect_plane(made, geom=cut, plane_co=(0, 0, 0), plane_no=(1, 0, 0), clear_inner=True)
-    bmesh.ops.remove_doubles(made, verts=made.verts, dist=2e-3)
-    for vertex in made.verts:
+        edited.faces.new([points[i] for i in corner])
+    cut = [*edited.verts, *edited.edges, *edited.faces]
+    bmesh.ops.bisect_plane(edited, geom=cut, plane_co=(0, 0, 0), plane_no=(1, 0, 0), clear_inner=True)
+    bmesh.ops.remove_doubles(edited, verts=edited.verts, dist=2e-3)
+    for vertex in edited.verts:
         vertex.co.x = 0.0 if vertex.co.x < 2e-3 else vertex.co.x
-    made.to_mesh(mesh)
-    made.free()
+    edited.to_mesh(mesh)
+    edited.free()
     mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
     return mesh
 
@@ -89,35 +89,35 @@ def hat():
 def build():
     """The character at rest, in T-pose, its bones handles of the body, all else carried."""
     body = link("Body", half_body())
-    made = SimpleNamespace(body=body, rig=rig(BONES))
+    person = SimpleNamespace(body=body, rig=rig(BONES))
     weigh(body, BONES)
     mirror = body.modifiers.new("Mirror", "MIRROR")
     mirror.use_clip = True
-    body.modifiers.new("Armature", "ARMATURE").object = made.rig
+    body.modifiers.new("Armature", "ARMATURE").object = person.rig
     subdivision = body.modifiers.new("Subdivision", "SUBSURF")
     subdivision.levels = subdivision.render_levels = 1
-    made.eyes = []
+    person.eyes = []
     for place, side in zip(EYES, "RL", strict=True):
         bpy.ops.mesh.primitive_uv_sphere_add(segments=16, ring_count=12, radius=EYE, location=place)
         bpy.context.object.name = f"Eye.{side}"
-        made.eyes.append(bpy.context.object)
-    made.shirt = shirt(body)
-    made.hair = strands(body, lambda middles: (middles[:, 2] > 1.66) & (middles[:, 1] > -0.05))
-    made.hat, made.cage = hat()
-    scenes.activate(made.rig, body)
+        person.eyes.append(bpy.context.object)
+    person.shirt = shirt(body)
+    person.hair = strands(body, lambda middles: (middles[:, 2] > 1.66) & (middles[:, 1] > -0.05))
+    person.hat, person.cage = hat()
+    scenes.activate(person.rig, body)
     bpy.ops.arapfields.add_bones()
-    scenes.activate(*made.eyes, body)
+    scenes.activate(*person.eyes, body)
     bpy.ops.arapfields.carry(way="RIGID")
-    scenes.activate(made.shirt, made.hair, made.cage, body)
+    scenes.activate(person.shirt, person.hair, person.cage, body)
     bpy.ops.arapfields.carry(way="FOLLOW")
     scenes.activate(body)
-    return made
+    return person
 
 
-def pose(made, neck=np.pi / 4, arm=np.pi / 3):
+def pose(person, neck=np.pi / 4, arm=np.pi / 3):
     """Turns the neck sideways, and raises the left arm."""
     for name, axis, angle in (("Neck", (0, 0, 1), neck), ("Upper Arm.L", (0, -1, 0), arm)):
-        bone = made.rig.pose.bones[name]
+        bone = person.rig.pose.bones[name]
         head = Matrix.Translation(bone.bone.head_local)
         turn = head @ Matrix.Rotation(angle, 4, Vector(axis)) @ head.inverted()
         bone.matrix = turn @ bone.bone.matrix_local

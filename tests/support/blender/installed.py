@@ -115,18 +115,18 @@ def switch_off_and_remove():
 
 
 def main():
-    wanted = arguments()
+    options = arguments()
     sys.meta_path.insert(0, FromTheExtension)
-    if wanted.torch == "before":
-        other_torch(wanted.library)
+    if options.torch == "before":
+        other_torch(options.library)
     sys.path.insert(0, str(TESTS))
     import bpy
     import numpy
 
-    install(wanted.zip)
+    install(options.zip)
     use()
-    if wanted.torch:
-        other_torch(wanted.library)
+    if options.torch:
+        other_torch(options.library)
         extract(bpy.data.objects["Bar"], 24)
     switch_off_and_remove()
     print(f"USED {bpy.app.version_string}, Python {sys.version.split()[0]}, NumPy {numpy.__version__}")

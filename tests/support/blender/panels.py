@@ -70,19 +70,19 @@ class Layout:
 
 def drawn():
     """The texts of all sections that show, by section; menus are drawn as well."""
-    found = {}
+    sections = {}
     for module in registration.MODULES:
         for cls in getattr(module, "CLASSES", []):
             if not issubclass(cls, (bpy.types.Panel, bpy.types.Menu)) or "preset" in cls.__name__:
                 continue
             if issubclass(cls, bpy.types.Panel) and not cls.poll(bpy.context):
                 continue
-            texts = found[cls.__name__] = []
+            texts = sections[cls.__name__] = []
             stand_in = type("Section", (), {"layout": Layout(texts), "fill": getattr(cls, "fill", None)})()
             if hasattr(cls, "draw_header_preset"):
                 cls.draw_header_preset(stand_in, bpy.context)
             cls.draw(stand_in, bpy.context)
-    return found
+    return sections
 
 
 def prepared(state):

@@ -22,12 +22,12 @@ def activate(*items):
 def bar(name="Bar", length=1.0):
     """A bar along x from -length to length, 0.5 wide, of 8 × 4 × 4 quads a side."""
     mesh = bpy.data.meshes.new(name)
-    made = bmesh.new()
-    bmesh.ops.create_cube(made, size=1.0)
-    bmesh.ops.subdivide_edges(made, edges=made.edges, cuts=7, use_grid_fill=True)
-    bmesh.ops.scale(made, vec=(2 * length, 0.5, 0.5), verts=made.verts)
-    made.to_mesh(mesh)
-    made.free()
+    cube = bmesh.new()
+    bmesh.ops.create_cube(cube, size=1.0)
+    bmesh.ops.subdivide_edges(cube, edges=cube.edges, cuts=7, use_grid_fill=True)
+    bmesh.ops.scale(cube, vec=(2 * length, 0.5, 0.5), verts=cube.verts)
+    cube.to_mesh(mesh)
+    cube.free()
     item = bpy.data.objects.new(name, mesh)
     bpy.context.collection.objects.link(item)
     bpy.context.view_layer.update()
@@ -124,7 +124,7 @@ SIZES = {"vector": {"FLOAT_VECTOR": 3, "FLOAT2": 2}, "color": {"BYTE_COLOR": 4, 
 
 def everything(item):
     """All that is on an object's mesh except positions, comparable: {name: bytes or list}."""
-    mesh, found = item.data, {}
+    mesh, contents = item.data, {}
     for attribute in mesh.attributes:
         if attribute.name == "position":
             continue
@@ -135,7 +135,7 @@ def everything(item):
         if attribute.data_type == "BOOLEAN":
             flat = flat.astype(bool)
         attribute.data.foreach_get(field, flat)
-        found[attribute.name, attribute.domain, attribute.data_type] = flat.tobytes()
+        contents[attribute.name, attribute.domain, attribute.data_type] = flat.tobytes()
     for what, field, width in (
         ("loops", "vertex_index", 1),
         ("edges", "vertices", 2),
@@ -143,11 +143,11 @@ def everything(item):
     ):
         flat = np.empty(width * len(getattr(mesh, what)), dtype=np.int32)
         getattr(mesh, what).foreach_get(field, flat)
-        found[what] = flat.tobytes()
-    found["materials"] = [m.name if m else None for m in mesh.materials]
-    found["group names"] = [g.name for g in item.vertex_groups]
-    found["groups"] = [[(g.group, g.weight) for g in v.groups] for v in mesh.vertices]
-    return found
+        contents[what] = flat.tobytes()
+    contents["materials"] = [m.name if m else None for m in mesh.materials]
+    contents["group names"] = [g.name for g in item.vertex_groups]
+    contents["groups"] = [[(g.group, g.weight) for g in v.groups] for v in mesh.vertices]
+    return contents
 
 
 def set_positions(mesh, points):

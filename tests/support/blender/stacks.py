@@ -41,13 +41,13 @@ def add_modifier(bar, kind):
             for index, weight in enumerate(np.clip(0.5 + side * x, 0, 1).tolist()):
                 group.add([index], weight, "REPLACE")
         scenes.activate(bar)
-    made = bar.modifiers.new(kind.title(), kind)
+    modifier = bar.modifiers.new(kind.title(), kind)
     if kind == "ARMATURE":
-        made.object = rig
+        modifier.object = rig
     elif kind == "SUBSURF":
-        made.levels = made.render_levels = 1
+        modifier.levels = modifier.render_levels = 1
     elif kind == "MIRROR":
-        made.use_axis, made.use_mirror_merge = (False, False, True), False
+        modifier.use_axis, modifier.use_mirror_merge = (False, False, True), False
     bpy.context.view_layer.update()
 
 
@@ -112,6 +112,6 @@ def by_hand(bar, field, share=1.0):
         copied.modifiers.remove(copied.modifiers[name])
     bpy.context.collection.objects.link(copied)
     bpy.context.view_layer.update()
-    found = local_points(copied)
+    points = local_points(copied)
     bpy.data.objects.remove(copied)
-    return found
+    return points

@@ -55,8 +55,8 @@ class Operator:
         self.properties = type("Given", (), {"is_property_set": staticmethod(values.__contains__)})
 
     def __getattr__(self, name):
-        found = getattr(self.cls, name)
-        return found.__get__(self) if hasattr(found, "__get__") else found
+        member = getattr(self.cls, name)
+        return member.__get__(self) if hasattr(member, "__get__") else member
 
     def add_message(self, level, text):
         self.said.append(text)
@@ -239,7 +239,7 @@ def again():
 
 def stray():
     """Names of what nobody sees: live objects, scenes and helper meshes of ours."""
-    found = [item.name for item in bpy.data.objects if item.name.endswith("_live")]
-    found += [scene.name for scene in bpy.data.scenes if scene.name.startswith("ARAP")]
+    strays = [item.name for item in bpy.data.objects if item.name.endswith("_live")]
+    strays += [scene.name for scene in bpy.data.scenes if scene.name.startswith("ARAP")]
     used = {group.name for group in bpy.data.node_groups if group.users == 0 and "ARAP" in group.name}
-    return [*found, *used, *(str(uid) for uid in sessions.live)]
+    return [*strays, *used, *(str(uid) for uid in sessions.live)]

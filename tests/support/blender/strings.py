@@ -88,5 +88,5 @@ def literal(node):
 
 
 def every():
-    found = {*of_classes(registration.MODULES), *of_source(), tool.bl_label, tool.bl_description}
-    return sorted(found - UNTRANSLATED)
+    texts = {*of_classes(registration.MODULES), *of_source(), tool.bl_label, tool.bl_description}
+    return sorted(texts - UNTRANSLATED)

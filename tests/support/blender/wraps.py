@@ -118,10 +118,10 @@ ENDS = {  # of the character and of the other person: crown, hands, feet
 
 
 def landmarks_of_people():
-    found = [ENDS["crown"]]
+    pairs = [ENDS["crown"]]
     for rest, there in (ENDS["hand"], ENDS["foot"]):
-        found += [((s * rest[0], *rest[1:]), (s * there[0], *there[1:])) for s in (-1, 1)]
-    return found
+        pairs += [((s * rest[0], *rest[1:]), (s * there[0], *there[1:])) for s in (-1, 1)]
+    return pairs
 
 
 def joints(armature, posed):

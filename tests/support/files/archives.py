@@ -78,7 +78,7 @@ def make_examples(folder):
     onto = af.MeshSdf(ends, np.arange(len(ends) - 3)[:, None] + [0, 1, 2])
     flow = af.WrapOptions(centers=20, stages=2, iterations=1, alignment="rigid", threads=1)
     live = {"samples": 200, "coarse_centers": 8, "fine_centers": 20, "iterations": 3, "threads": 1}
-    made = {
+    examples = {
         "sdf": sdf,
         "neural": af.deform(samples, handles, af.DeformOptions(**small)),
         "exact": af.deform(samples, handles, af.DeformOptions(exact_handles=True, **small)),
@@ -88,9 +88,9 @@ def make_examples(folder):
         "composed": af.wrap(samples, onto, options=flow),
         "embedded": af.LiveDeformer(samples, handles, af.LiveOptions(interior=True, **live)).solve(),
     }
-    for name, thing in made.items():
+    for name, thing in examples.items():
         thing.save(folder / f"{name}.safetensors")
-    return {name: folder / f"{name}.safetensors" for name in made}
+    return {name: folder / f"{name}.safetensors" for name in examples}
 
 
 def load(path):

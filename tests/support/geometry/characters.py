@@ -17,12 +17,12 @@ class Capsules(af.ImplicitFunction):
 
     def distances(self, points):
         """(parts, n) to each capsule."""
-        found = []
+        solids = []
         for start, end, radius in self.parts:
             way = end - start
             share = np.clip((points - start) @ way / (way @ way), 0, 1)
-            found.append(np.linalg.norm(points - start - share[:, None] * way, axis=1) - radius)
-        return np.array(found)
+            solids.append(np.linalg.norm(points - start - share[:, None] * way, axis=1) - radius)
+        return np.array(solids)
 
     def __call__(self, points):
         distances = self.distances(points)

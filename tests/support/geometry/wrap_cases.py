@@ -38,15 +38,15 @@ def moved(points, scale=3.0, angle=2.0):
 def distances(vertices, triangles, onto_vertices, onto_triangles, count=5000):
     """((mean, 95 %) to the target, (mean, 95 %) from it), exact, in % of the target's diagonal."""
     diagonal = np.linalg.norm(np.ptp(onto_vertices, axis=0))
-    found = []
+    pairs = []
     for mesh, other in (
         ((vertices, triangles), (onto_vertices, onto_triangles)),
         ((onto_vertices, onto_triangles), (vertices, triangles)),
     ):
         points = af.sample_mesh(*mesh, count).points
         away = 100 * np.abs(af.MeshSdf(*other)(points)) / diagonal
-        found.append((away.mean(), np.quantile(away, 0.95)))
-    return tuple(found)
+        pairs.append((away.mean(), np.quantile(away, 0.95)))
+    return tuple(pairs)
 
 
 def crossing_share(vertices, triangles):
