@@ -13,7 +13,7 @@ if IN_BLENDER:
     from addon.live import sessions
     from addon.pin_tool import drag
 
-ROUNDS = 20
+ROUNDS = 8
 
 
 @in_blender

@@ -7,7 +7,8 @@ import sys
 
 import numpy as np
 import pytest
-from support.oracles.network import Network, small_layers
+from support.geometry.layers import small_layers
+from support.oracles.network import Network
 from support.tolerances import PUBLISHED_GRADIENT, PUBLISHED_VALUE
 
 import arapfields as af
@@ -59,7 +60,7 @@ def test_saved_and_loaded_is_the_same_bit_for_bit(sdf, tmp_path):
 def test_kernels_for_every_instruction_set_agree(level):
     code = (
         "import numpy as np, sys; sys.path.insert(0, 'tests')\n"
-        "from arapfields import _native; from support.oracles.network import small_layers\n"
+        "from arapfields import _native; from support.geometry.layers import small_layers\n"
         "from arapfields._native import testing\n"
         "w, b = small_layers(width=37)\n"
         "x = np.random.default_rng(0).uniform(-1, 1, (100, 3)); c = np.cos(np.arange(1000))\n"

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The network in plain PyTorch, double precision, differentiated by PyTorch: slow and obviously right."""
 
-from itertools import pairwise
-
 import numpy as np
 import torch
 
@@ -58,11 +56,3 @@ class Network:
         return np.concatenate(
             [(zero(t) if t.grad is None else t.grad).numpy().ravel() for pair in pairs for t in pair]
         )
-
-
-def small_layers(seed=0, width=8, layers=2, octaves=4):
-    """(weights, biases) of a small network with random entries."""
-    rng = np.random.default_rng(seed)
-    sizes = [6 * octaves, *[width] * layers, 1]
-    weights = [rng.normal(size=(b, a)) / a**0.5 for a, b in pairwise(sizes)]
-    return weights, [rng.normal(size=b) * 0.1 for b in sizes[1:]]
