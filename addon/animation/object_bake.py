@@ -26,7 +26,7 @@ STYLE_PATH = "arapfields.stylize"  # of what is keyframed of a style
 
 
 def kind_of(source, kind):
-    """DEFORM or STYLIZE: what is baked of a source where AUTO is asked for."""
+    """DEFORM or STYLIZE: what is baked of a source, by itself where `kind` is AUTO."""
     settings = settings_of(source)
     if kind != "AUTO":
         return kind
@@ -72,7 +72,7 @@ class ObjectBake:
         return self.reference.name
 
     def request(self, context):
-        """What is asked for at the scene's frame, or the error that ends this object's bake."""
+        """The Request at the scene's frame, or the error that ends this object's bake."""
         try:
             source = self.reference.get()
             if self.reader.moves_by_itself:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bakes that several processes share: each solves a part of the frames, kept beside the cache, and whoever
-comes when all are there makes the cache. A killed process's frames stay, so the next one goes on."""
+"""Bakes that several processes share. Each solves a part of the frames and keeps them beside the cache; the
+process that completes them makes the cache. A killed process's frames stay, so the next one goes on."""
 
 import hashlib
 import time
@@ -50,7 +50,7 @@ class SharedCache(CacheFile):
         return [*request.targets, np.frombuffer(digest, np.uint8)]
 
     def finish(self):
-        """Makes the cache where all of its frames are there."""
+        """Makes the cache once all of its frames are solved."""
         with self._store.alone():
             self.missing = sum(not self._store.has(place) for place in self._places)
             if self.missing and self.path.exists() and self.path.stat().st_mtime > self._began:

@@ -48,7 +48,7 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
         options = options_of("deform", values)
         handles = empties.solve_handles(source, space_of(source.matrix_world, source.name), weights)
 
-        require_reach_heeded(handles, values)
+        require_reach_supported(handles, values)
         scaled = scaling.ignored(source)
         if scaled is not None:
             self.warnings.append(f"{source.name}: {translated(scaled)}")
@@ -60,8 +60,8 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
         return plan_solve_job(context, self, source, "DEFORM", values["samples"], values["seed"], solve)
 
 
-def require_reach_heeded(handles, values):
-    """UserError where a handle has a reach that these settings do not heed."""
+def require_reach_supported(handles, values):
+    """UserError where a handle has a reach that these settings do not support."""
     if values["field"].lower() not in ("neural", "invertible") and not values["exact_handles"]:
         return
     for handle in handles:

@@ -84,7 +84,7 @@ class SolveOperator(JobOperator):
 
     @classmethod
     def refuses(cls, source):
-        """Told before the button is pressed; a script's own arguments are looked at when they are there."""
+        """Checked before the button is pressed; a script's own arguments are checked when it calls."""
         return placement_refusal(source) if has_window() else None
 
     def in_place(self, source):

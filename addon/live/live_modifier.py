@@ -23,7 +23,7 @@ class LiveModifier:
         self.bind(context, source)
 
     def bind(self, context, source):
-        """Also when the source has changed: what was there before stays to be restored."""
+        """Also when the source has changed: the motion before live mode stays to be restored."""
         motion.bind(context, source)
         visibility.show_alone(source, source, for_now=True)
 

@@ -23,7 +23,7 @@ class LiveSolver:
 
     def __init__(self, reader):
         self._reader, self.frame_solver = reader, None
-        self.reached = None  # the request of the last shape
+        self.solved_request = None  # the request of the last shape
         self.is_playing = False  # whether the newest request is a frame's, which another thread solves
         self._stepped_at = None  # when the last step in real time ended; None: the next begins at rest
         self._stepped_motion = None
@@ -54,12 +54,12 @@ class LiveSolver:
         """Yields a shape for this request, quickly, and then a better one."""
         if request.motion is not None:
             self._step(request)
-            self.reached = request
+            self.solved_request = request
             yield self.frame_solver.tracked_shape(request)
             return
         for steps in (FIRST_STEPS, FURTHER_STEPS):
             taken = self.frame_solver.follow(request, iterations=steps)
-            shape, self.reached = self.frame_solver.tracked_shape(request), request
+            shape, self.solved_request = self.frame_solver.tracked_shape(request), request
             yield shape
             if taken < steps:
                 break

@@ -33,7 +33,7 @@ class Playback:
         return not self._is_requested
 
     def advance(self, request, frame):
-        """The scene is at this frame now; has it solved where it is a frame's shape that is asked for."""
+        """The scene is at this frame now; requests its shape where the animation has moved the handles."""
         self.frame = frame
         if self._solver.is_playing and not self._is_requested and self._solver.frame_solver is not None:
             if self.frames is None:
@@ -75,5 +75,5 @@ class Playback:
 
 
 def scene_frame(scene):
-    """The scene's frame, with its part beyond the whole one, as all frames are told apart."""
+    """The scene's frame with its fraction, rounded so that equal frames compare equal."""
     return round(scene.frame_current + scene.frame_subframe, 4)

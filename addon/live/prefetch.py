@@ -60,7 +60,7 @@ class SolverPrefetch:
         return solver if solver is not None and is_same(solver.sampled.setup, setup) else None
 
     def clear(self):
-        """Waits for the thread; returns the solver that there was, or None."""
+        """Waits for the thread; returns its solver, or None."""
         if self._thread is not None:
             self._thread.join()
         solver = self._solver

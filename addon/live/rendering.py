@@ -11,7 +11,7 @@ from ..core.runtime import jobs
 from ..handles import empties, movers
 from ..solver.source_reader import SourceChanged
 from .playback import scene_frame
-from .sessions import WAIT, give_up, live
+from .sessions import WAIT, end_with_error, live
 
 
 def follow_frame(depsgraph):
@@ -24,14 +24,14 @@ def follow_frame(depsgraph):
             if session.reader.moves_by_itself:
                 session.reader.read_points(bpy.context, source)
             warn_of_hidden(source, session, depsgraph)
-            session.take(session.reader.request(bpy.context, depsgraph), scene_frame(depsgraph.scene))
+            session.set_request(session.reader.request(bpy.context, depsgraph), scene_frame(depsgraph.scene))
             session.worker.wait(WAIT, refined=True)
             session.playback.wait(session.requested, None)  # a picture of another frame would be none
             session.show()
         except SourceChanged:
             continue
         except (UserError, ValueError, ReferenceError) as error:
-            give_up(uid, session, error)
+            end_with_error(uid, session, error)
 
 
 def show_frame():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One source that is live: what it is asked for, the worker that solves it, and where its shape is shown."""
+"""One source that is live: its requests, the worker that solves them, and where the shape is shown."""
 
 import contextlib
 
@@ -28,17 +28,17 @@ PATIENCE = 1.0  # seconds at most that playback waits for a frame of secondary m
 class Session:
     """Reads its source when made, on the main thread; everything that takes time is done by the worker.
 
-    What is shown of an `earlier` session of the source is used again. `keeps`: what it shows is the user's
-    work, which stays: bit for bit until a handle moves, and at the end.
+    What is shown of an `earlier` session of the source is used again. `keeps_shape`: what it shows is the
+    user's work, which stays: bit for bit until a handle moves, and at the end.
     """
 
-    def __init__(self, context, source, kind="DEFORM", earlier=None, keeps=False):
+    def __init__(self, context, source, kind="DEFORM", earlier=None, keeps_shape=False):
         settings = settings_of(source)
         in_place = placement.in_place(settings.output, settings.result)
-        self.keeps, self.layout = keeps, layout_of(source, kind, context.scene)
+        self.keeps_shape, self.layout = keeps_shape, layout_of(source, kind, context.scene)
         self.reader = SourceReader(context, source, kind, in_place)
         self.edits, self.solver, self.worker = EditWatch(self.reader), LiveSolver(self.reader), None
-        is_still = keeps or animation_range(source, kind) is None
+        is_still = keeps_shape or animation_range(source, kind) is None
         self.playback = Playback(self.solver, scene_frame(context.scene) if is_still else None)
         self.requested = None  # the newest Request
         self.is_restored = False  # whether the handles are where an undone step or a cancelled drag put them
@@ -83,7 +83,7 @@ class Session:
         """Until the worker has reached the newest request, so many seconds at most."""
         if self.worker is None:
             run_to_completion(self._reading)
-        self.look(bpy.context)
+        self.update(bpy.context)
         self.worker.wait(seconds, refined)
         if refined or self.has_motion:
             self.playback.wait(self.requested, seconds)
@@ -99,7 +99,7 @@ class Session:
         """Whether what is requested has secondary motion."""
         return self.requested is not None and self.requested.motion is not None
 
-    def look(self, context):
+    def update(self, context):
         """Sends a new request to the worker; SourceChanged where the solver must be set up anew."""
         if not self.advance():
             return
@@ -117,13 +117,13 @@ class Session:
             self.layout = layout
             self.reader.read_handles(source)
         self.edits.require_unedited(context, source)
-        self.take(self.reader.request(context), scene_frame(context.scene))
+        self.set_request(self.reader.request(context), scene_frame(context.scene))
         if self.is_restored:
             self.is_restored, self.is_quiet = False, True
             self.display.before = motion.snapshot(source)
             self.carrying.renew()
 
-    def take(self, request, frame):
+    def set_request(self, request, frame):
         """Goes for this request, which was read at that frame of the scene."""
         is_new = self.requested is None or self.playback.steps_motion(request, frame)
         if is_new or not request.is_like(self.requested):
@@ -135,9 +135,9 @@ class Session:
     def restored(self):
         """What the source and its handles are now came from elsewhere: an undone step, a cancelled drag.
 
-        The solver goes there too, but shows nothing until a handle moves.
+        The solver follows, but shows nothing until a handle moves.
         """
-        if self.keeps:
+        if self.keeps_shape:
             self.is_restored = self.is_quiet = True
         else:
             self.requested = None
@@ -159,7 +159,7 @@ class Session:
         """Shows a frame that is solved already, or one of secondary motion, which is waited for."""
         if self.playback.frames is None and not self.has_motion:
             return
-        self.look(context)
+        self.update(context)
         if self.has_motion:
             self.playback.wait(self.requested, PATIENCE)
         self.show()
@@ -171,7 +171,7 @@ class Session:
 
     def take_away(self, source):
         """Everything looks as it did before; `source` is None where it is gone."""
-        if self.keeps and source is not None:
+        if self.keeps_shape and source is not None:
             visibility.forget(source)
         self.display.take_away(source)
         self.carrying.take_away()

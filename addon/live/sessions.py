@@ -48,17 +48,17 @@ def is_live(source, kind=None):
     return session is not None and kind in (None, session.kind)
 
 
-def begin(context, source, kind="DEFORM", keeps=False):
+def begin(context, source, kind="DEFORM", keeps_shape=False):
     """Makes the source live; UserError when that cannot be. The shape appears when the worker has it.
 
-    `keeps`: what is shown stays when live mode ends.
+    `keeps_shape`: what is shown stays when live mode ends.
     """
     earlier = live.pop(source.session_uid, None)
     if earlier is not None:
         earlier.stop()
     session = None
     try:
-        session = Session(context, source, kind, earlier, keeps)
+        session = Session(context, source, kind, earlier, keeps_shape)
         session.advance()  # a small mesh is read at once
         warn(session)
     except UserError:
@@ -108,7 +108,7 @@ def update(context, wait=0.0, refined=False):
     """Looks at every live source once, waiting at most so many seconds for the shapes to follow."""
     for uid, session in list(live.items()):
         try:
-            session.look(context)
+            session.update(context)
             if wait:
                 session.wait(wait, refined)
             session.show()
@@ -116,7 +116,7 @@ def update(context, wait=0.0, refined=False):
         except SourceChanged:
             restart(context, uid, session)
         except (UserError, ValueError, ReferenceError) as error:
-            give_up(uid, session, error)
+            end_with_error(uid, session, error)
 
 
 def warn(session):
@@ -125,7 +125,7 @@ def warn(session):
         jobs.add_message("WARNING", f"{session.source.name}: {translated(reason)}")
 
 
-def give_up(uid, session, error):
+def end_with_error(uid, session, error):
     live.pop(uid, None)
     session.stop()
     text = translated("{error}; live mode ended", error=translated(error))
@@ -151,7 +151,7 @@ def restart(context, uid, session):
     """The source or its handles changed: the solver is set up anew, the shape stays where it is."""
     source = session.source.get()
     try:
-        begin(context, source, session.kind, session.keeps)
+        begin(context, source, session.kind, session.keeps_shape)
     except UserError as error:
         jobs.add_message("ERROR", f"{source.name}: {translated(error)}")
 

@@ -116,12 +116,12 @@ class SolvedFrames:
 class SimulatedFrames(SolvedFrames):
     """The same for a source with secondary motion, whose frames follow from those before them.
 
-    A frame that was made without all that lead to it is made again once those are there.
+    A frame that was solved without all that lead to it is solved again once those are known.
     """
 
     def __init__(self, clone, start, fps, low_priority=False):
         self._simulation = Simulation(start, fps)
-        self._rough = set()  # frames that were made without all that lead to them
+        self._rough = set()  # frames that were solved without all that lead to them
         super().__init__(clone, low_priority)
 
     def get(self, frame, request):

@@ -9,11 +9,11 @@ from ..field_modifier import motion
 from ..live import sessions
 from . import pins
 
-MOMENT, FIRST_MOMENT = 0.015, 0.1  # seconds that a picture waits for its shape; that of the first move
+SHAPE_WAIT, FIRST_SHAPE_WAIT = 0.015, 0.1  # seconds that a redraw waits for its shape; and the first one
 TRANSFORMS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
 
 
-class Before:
+class Snapshot:
     """What a drag changes, as it was: begun before the pin is placed."""
 
     def __init__(self, context, source):
@@ -24,7 +24,7 @@ class Before:
         self.active = ObjectReference(layer.objects.active) if layer.objects.active else None
         self.selected = [ObjectReference(item) for item in context.selected_objects]
 
-    def choose(self, context):
+    def restore_selection(self, context):
         """Selects what was selected."""
         for item in context.selected_objects:
             item.select_set(False)
@@ -34,7 +34,7 @@ class Before:
                 item.select_set(True)
         context.view_layer.objects.active = self.active.find() if self.active else None
 
-    def show(self, context):
+    def restore_shape(self, context):
         """Makes the shape what it was; the solver follows."""
         source = self.source.get()
         if self.motion is None:
@@ -42,7 +42,7 @@ class Before:
             motion.write_to(motion.carrier(source, modifier), motion.Motion(None))
         else:
             motion.restore(source, self.motion)
-        stay(context, source.session_uid)
+        hold_shape(context, source.session_uid)
 
 
 class Drag:
@@ -55,8 +55,8 @@ class Drag:
         self.values = {name: tuple(getattr(empty, name)) for name in TRANSFORMS}
         source = before.source.get()
         if not sessions.is_live(source, "DEFORM"):
-            sessions.begin(context, source, keeps=True)
-        sessions.live[source.session_uid].keeps = True
+            sessions.begin(context, source, keeps_shape=True)
+        sessions.live[source.session_uid].keeps_shape = True
 
     def move(self, context, location):
         """Takes the Empty to a location (3,) in world space."""
@@ -76,7 +76,7 @@ class Drag:
         self.empty.get().matrix_world = matrix
         sessions.update(context)
         if session is not None and session.worker is not None:
-            session.worker.wait_for_result(MOMENT if self.has_moved else FIRST_MOMENT)
+            session.worker.wait_for_result(SHAPE_WAIT if self.has_moved else FIRST_SHAPE_WAIT)
             sessions.update(context)
         self.has_moved = True
 
@@ -99,12 +99,12 @@ class Drag:
         """What is shown now stays; a press without a move changes no shape."""
         session = self.session()
         if not self.has_moved:
-            self.before.show(context)
+            self.before.restore_shape(context)
         elif session is not None:
             session.wait(sessions.WAIT, refined=False)
             session.show()
-            stay(context, self.before.source.uid)
-            keep_frame(context, self.empty.get())
+            hold_shape(context, self.before.source.uid)
+            insert_keys(context, self.empty.get())
 
     def cancel(self, context):
         """All is as it was before the press, bit for bit."""
@@ -117,21 +117,21 @@ class Drag:
             pins.entry_of(empty).reach = self.reach
         settings = settings_of(source)
         settings.hold_far, settings.active_handle = self.before.hold_far, self.before.row
-        self.before.choose(context)
+        self.before.restore_selection(context)
         if sessions.is_live(source):
-            self.before.show(context)
+            self.before.restore_shape(context)
             if not self.before.was_live:
                 sessions.end(context, source)
 
 
-def stay(context, uid):
+def hold_shape(context, uid):
     """Has the live shape of that source stay as it is until a handle moves."""
     if uid in sessions.live:  # else it ended with an error, which the panel tells
         sessions.live[uid].restored()
         sessions.update(context)
 
 
-def keep_frame(context, empty):
+def insert_keys(context, empty):
     """Keys the handle where Blender's automatic keys are on."""
     if context.scene.tool_settings.use_keyframe_insert_auto:
         turn = {"QUATERNION": "quaternion", "AXIS_ANGLE": "axis_angle"}.get(empty.rotation_mode, "euler")
@@ -140,20 +140,20 @@ def keep_frame(context, empty):
 
 
 def of_entry(context, source, entry):
-    """A drag of a handle that is there."""
-    before = Before(context, source)
+    """A drag of an existing handle."""
+    before = Snapshot(context, source)
     pins.select(context, entry.empty)
     return Drag(context, before, entry.empty)
 
 
 def of_new_pin(context, source, location, radius, **further):
     """A drag of a new pin."""
-    before = Before(context, source)
+    before = Snapshot(context, source)
     entry = pins.place(context, source, location, radius, **further)
     try:
         return Drag(context, before, entry.empty, is_new=True)
     except Exception:
         pins.discard(source, entry.empty)
         settings_of(source).hold_far = before.hold_far
-        before.choose(context)
+        before.restore_selection(context)
         raise

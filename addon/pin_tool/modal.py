@@ -55,16 +55,16 @@ class Dragging(PinOperator):
     def start(self, context, view, dragged, kind):
         self.drag, self.kind, self.timer = dragged, kind, None
         hover.drag = dragged
-        self.take(view, view.pixel)
+        self.grab(view, view.pixel)
         context.window_manager.modal_handler_add(self)
         redraw(context, "WINDOW", "UI")
         return {"RUNNING_MODAL"}
 
-    def take(self, view, pixel):
-        """The handle is taken where it is now, by that pixel, as the view is now."""
+    def grab(self, view, pixel):
+        """The handle is held where it is now, by that pixel, as the view is now."""
         matrix = self.drag.empty.get().matrix_world
         spot = view.pixel_of(matrix.translation)
-        self.taken, self.deep = np.subtract(spot, pixel), matrix.translation.copy()
+        self.grab_offset, self.grab_point = np.subtract(spot, pixel), matrix.translation.copy()
         self.drag.start, self.pressed, self.center = matrix.copy(), pixel, spot
         self.last = pixel
 
@@ -106,7 +106,7 @@ class Dragging(PinOperator):
 
     def moved(self, context, view):
         if self.turned:
-            self.take(view, self.last)
+            self.grab(view, self.last)
             self.turned = False
         if view.pixel == self.last:
             return
@@ -115,7 +115,7 @@ class Dragging(PinOperator):
             angle = screen.turn_between(self.center, self.pressed, view.pixel)
             self.drag.turn(context, view.towards, angle)
         else:
-            self.drag.move(context, view.beside(self.deep, self.taken))
+            self.drag.move(context, view.beside(self.grab_point, self.grab_offset))
 
     def settle(self, context, event):
         """The button is up: the shape comes to rest, or until the user goes on."""

@@ -186,10 +186,10 @@ class ARAPFIELDS_OT_pin_turn(PinOperator, bpy.types.Operator):
         source = owner_of(empty)
         try:
             if not sessions.is_live(source, "DEFORM"):
-                sessions.begin(context, source, keeps=True)
+                sessions.begin(context, source, keeps_shape=True)
         except (UserError, ValueError) as error:
             return self.refuse(error)
-        sessions.live[source.session_uid].keeps = True
+        sessions.live[source.session_uid].keeps_shape = True
         return bpy.ops.transform.rotate("INVOKE_DEFAULT") and {"FINISHED"}
 
 

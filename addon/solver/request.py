@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a solver is asked for, read on the main thread."""
+"""A pose that a solver turns into a shape, read on the main thread."""
 
 from typing import NamedTuple
 

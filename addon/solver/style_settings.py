@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a stylization is asked for: preferred normals, their axes, and where on the object it acts."""
+"""The style that an object's settings choose: preferred normals, their axes, and where it acts."""
 
 from dataclasses import dataclass
 

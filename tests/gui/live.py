@@ -89,7 +89,7 @@ def without_drawing(moving):
         moving.location.z = 0.6 * abs(np.sin(0.05 * count))
         bpy.context.view_layer.update()
         sessions.update(bpy.context)
-        while session.solver.reached is not session.requested:
+        while session.solver.solved_request is not session.requested:
             time.sleep(0.0003)
         session.show()
         bpy.context.view_layer.update()
