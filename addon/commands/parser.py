@@ -6,8 +6,7 @@ import re
 import sys
 from pathlib import Path, PurePath
 
-from ..core.settings.fitting import QUALITIES
-from ..core.settings.parameters import DEFORM, EXTRACTION
+from ..core.settings.parameters import DEFORM, EXTRACTION, QUALITIES
 from ..core.settings.styles import STYLES, STYLIZE
 
 FORMATS = ("ply", "obj", "stl", "blend")

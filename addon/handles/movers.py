@@ -32,8 +32,8 @@ def box_now(entry, where=matrix_of):
 
 def bone_box(bone):
     """The cube [-1, 1]³ → a bone's own coordinates: as long as the bone, as wide as its envelope reaches."""
-    reach = max(bone.envelope_distance + (bone.head_radius + bone.tail_radius) / 2, 0.2 * bone.length)
-    box = np.diag([reach, bone.length / 2, reach, 1.0])
+    half_width = max(bone.envelope_distance + (bone.head_radius + bone.tail_radius) / 2, 0.2 * bone.length)
+    box = np.diag([half_width, bone.length / 2, half_width, 1.0])
     box[1, 3] = bone.length / 2
     return box
 

@@ -4,9 +4,8 @@
 from functools import partial
 
 from ..blender.property_definitions import annotations, choice
-from ..core.settings.choices import FRAMES, OUTPUTS, PLACEMENT_NUMBERS, PLACEMENTS, SURFACES
-from ..core.settings.fitting import QUALITIES
-from ..core.settings.parameters import EXTRACTION
+from ..core.settings.choices import ORIENTATIONS, OUTPUTS, PLACEMENT_NUMBERS, PLACEMENTS, SURFACES
+from ..core.settings.parameters import EXTRACTION, QUALITIES
 from ..core.settings.styles import CUSTOM, STYLES, style_identifier
 
 QUALITY_ITEMS = tuple((key, label, tip) for key, (label, tip, _) in QUALITIES.items())
@@ -25,7 +24,7 @@ quality = partial(
     **({"default": "GOOD"} if QUALITY_ITEMS else {}),
 )
 style = partial(choice, STYLE_ITEMS, "Style", "The solid whose faces the surface turns towards")
-frame = partial(choice, FRAMES, "Orientation", "Along which axes the style stands")
+orientation = partial(choice, ORIENTATIONS, "Orientation", "Along which axes the style stands")
 output = partial(choice, OUTPUTS, "Output", "What the result is made of")
 surface = partial(
     choice,

@@ -4,10 +4,9 @@
 import bpy
 
 from ..blender.property_definitions import annotations, flag, pointer, text
-from ..core.settings.fitting import FIT, QUALITIES
-from ..core.settings.parameters import DEFORM
+from ..core.settings.parameters import DEFORM, FIT, QUALITIES
 from ..core.settings.styles import STYLIZE
-from .choices import frame, quality, style
+from .choices import orientation, quality, style
 
 
 def apply_quality(group, context):
@@ -26,7 +25,7 @@ ARAPFIELDS_PG_stylize = group(
     "ARAPFIELDS_PG_stylize",
     STYLIZE,
     style=style(),
-    frame=frame(),
+    frame=orientation(),
     frame_object=pointer(bpy.types.Object, "Axes Of", "Object along whose axes the style stands"),
     region=text("Region", "Vertex group whose weights say how strongly the style acts; empty for everywhere"),
     style_object=pointer(

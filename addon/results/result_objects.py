@@ -73,15 +73,8 @@ def show(context, source, kind, output, mesh, report, select=True):
     return item
 
 
-CHANNELS = (
-    "rotation_mode",
-    "location",
-    "rotation_euler",
-    "rotation_quaternion",
-    "rotation_axis_angle",
-    "scale",
-)
-DELTAS = ("delta_location", "delta_rotation_euler", "delta_rotation_quaternion", "delta_scale")
+CHANNELS = ("rotation_mode", "location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle")
+CHANNELS += ("scale", "delta_location", "delta_rotation_euler", "delta_rotation_quaternion", "delta_scale")
 
 
 def place(context, source, item):
@@ -94,7 +87,7 @@ def place(context, source, item):
     if source.parent_type in ("VERTEX", "VERTEX_3"):
         item.parent_vertices = source.parent_vertices
     item.matrix_parent_inverse = source.matrix_parent_inverse
-    for channel in (*CHANNELS, *DELTAS):
+    for channel in CHANNELS:
         setattr(item, channel, getattr(source, channel))
     context.view_layer.update()
     if not np.allclose(item.matrix_world, source.matrix_world, rtol=1e-6, atol=1e-6):
@@ -153,7 +146,7 @@ def add_frame(item, frames, number, shape):
     if number == 0:
         item.shape_key_add(name="Basis", from_mix=False)
     key = item.shape_key_add(name=f"frame {frames[number]}", from_mix=False)
-    key.data.foreach_set("co", np.ascontiguousarray(shape, dtype=np.float32).ravel())
+    mesh_arrays.put_vectors(key.data, shape, "co")
     for frame in frames[max(0, number - 1) : number + 2]:
         key.value = float(frame == frames[number])
         key.keyframe_insert("value", frame=frame)
@@ -173,9 +166,7 @@ def add_warp_key(item, before, after):
     if old is not None:
         item.shape_key_remove(old)
     key = item.shape_key_add(name=WARP_KEY, from_mix=False)
-    basis = np.empty(3 * len(before), dtype=np.float32)
-    key.relative_key.data.foreach_get("co", basis)
-    moved = basis.reshape(-1, 3) + (after - before)
-    key.data.foreach_set("co", np.ascontiguousarray(moved, dtype=np.float32).ravel())
+    basis = mesh_arrays.vectors(key.relative_key.data, "co")
+    mesh_arrays.put_vectors(key.data, basis + (after - before), "co")
     key.value = 1.0
     item.data.update()

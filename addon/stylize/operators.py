@@ -16,7 +16,7 @@ from ..handles import empties
 from ..handles.native_handles import native_handles
 from ..live.sessions import end_for_job
 from ..names import Op
-from ..properties.choices import frame, result_properties, style
+from ..properties.choices import orientation, result_properties, style
 from ..results.placement import destination
 from ..solver import style_settings
 
@@ -33,7 +33,7 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
     __annotations__ = {
         **annotations(STYLIZE, options={"SKIP_SAVE"}),
         "style": style(options={"SKIP_SAVE"}),
-        "frame": frame(options={"SKIP_SAVE"}),
+        "frame": orientation(options={"SKIP_SAVE"}),
         **result_properties(),
     }
 

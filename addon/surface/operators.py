@@ -10,7 +10,7 @@ from ..blender.presets import preset_classes
 from ..blender.property_definitions import annotations, flag
 from ..blender.user_preferences import fit_cache
 from ..core.runtime.jobs import Item
-from ..core.settings.fitting import FIT
+from ..core.settings.parameters import FIT
 from ..jobs.job_operator import JobOperator, busy
 from ..properties.choices import quality
 from . import staleness

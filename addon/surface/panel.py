@@ -8,7 +8,7 @@ from ..blender.language import translated
 from ..blender.section import Advanced, Section, job_button, presets, settings_column, wrapped
 from ..blender.user_preferences import fit_cache
 from ..core.runtime import jobs, native
-from ..core.settings.fitting import FIT
+from ..core.settings.parameters import FIT
 from ..jobs.panel import draw_progress
 from ..names import Op
 from . import staleness

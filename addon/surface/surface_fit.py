@@ -9,8 +9,7 @@ from ..blender.property_definitions import effective_values
 from ..core.errors import UserError
 from ..core.runtime import native
 from ..core.runtime.fit_cache import fit_key
-from ..core.settings.fitting import FIT, QUALITIES
-from ..core.settings.parameters import native_options
+from ..core.settings.parameters import FIT, QUALITIES, native_options
 
 VERSION = 1  # raised whenever fits of older versions must not be used
 

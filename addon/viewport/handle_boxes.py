@@ -41,20 +41,19 @@ def circle_lines(center, radius, across):
 
 
 def shown_handles(source):
-    """Those whose Empties are seen, and of those that bones move the one chosen in the list."""
+    """(entry, its box at rest, its box now) of each handle whose Empty is seen, and of a chosen bone's."""
     settings = settings_of(source)
     for index, entry in enumerate(settings.handles):
         if not movers.is_there(entry) or not movers.mover_of(entry).visible_get():
             continue
         if entry.kind != "BONE" or index == settings.active_handle:
-            yield entry
+            yield entry, empties.rest_box(source, entry), movers.box_now(entry)
 
 
 def segments(source, across=FLAT):
     """((r, g, b), width, line ends in world space) of all handles of a source."""
     lines = []
-    for entry in shown_handles(source):
-        rest, now = empties.rest_box(source, entry), movers.box_now(entry)
+    for entry, rest, now in shown_handles(source):
         is_chosen = entry.kind == "BONE" or entry.empty.select_get()
         parts = outline(entry.kind, rest, now, CHOSEN if is_chosen else THICK)
         if is_chosen and entry.reach > 0:
@@ -94,8 +93,7 @@ def ghosts(source, across=FLAT):
     if mirror is None:
         return []
     lines = []
-    for entry in shown_handles(source):
-        rest, now = empties.rest_box(source, entry), movers.box_now(entry)
+    for entry, rest, now in shown_handles(source):
         if symmetry.is_on_plane(mirror, rest) and symmetry.is_on_plane(mirror, now):
             continue
         rest, now = mirror @ rest, mirror @ now

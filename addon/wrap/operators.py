@@ -15,7 +15,7 @@ from ..carried import rest_bones
 from ..core.errors import UserError
 from ..core.geometry.spaces import space_of, transform
 from ..core.runtime import native
-from ..core.settings.wrapping import WRAP
+from ..core.settings.parameters import WRAP
 from ..deform.solve_job import SolveOperator, plan_solve_job
 from ..handles.empties import matrix_of
 from ..live.sessions import end_for_job

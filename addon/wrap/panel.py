@@ -4,7 +4,7 @@ import bpy
 from ..blender import modifier_stack
 from ..blender.section import Advanced, Section, job_button, note, presets, settings_column
 from ..carried import rest_bones
-from ..core.settings.wrapping import WRAP
+from ..core.settings.parameters import WRAP
 from ..field_modifier import inputs
 from ..names import Op
 from ..results.placement import placement_refusal

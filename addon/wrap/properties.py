@@ -4,7 +4,7 @@
 import bpy
 
 from ..blender.property_definitions import annotations, collection, flag, pointer
-from ..core.settings.wrapping import WRAP
+from ..core.settings.parameters import WRAP
 
 
 def is_target(group, item):

@@ -11,8 +11,7 @@ if IN_BLENDER:
 
     import addon.registration as registration
     from addon.blender.property_definitions import effective_values
-    from addon.core.settings.fitting import FIT
-    from addon.core.settings.parameters import DEFORM, TABLE
+    from addon.core.settings.parameters import DEFORM, FIT, TABLE
     from addon.core.settings.styles import STYLIZE
 
 

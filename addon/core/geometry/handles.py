@@ -12,7 +12,7 @@ PIN_SAMPLES = 12  # of the surface that a pin holds at least: those nearest to i
 FAR_SHARE = 0.5  # of the largest distance from all pins: what is farther is far
 FAR_WEIGHT = 0.02  # with which what is far holds its place, relative to a pin
 BONE_GAP = 0.25  # of a bone's width by which what it holds is nearer to it than to any other bone
-BONE_REACH = 4.0  # widths within which a bone that holds nothing takes what is nearest
+BONE_LIMIT = 4.0  # widths within which a bone that holds nothing takes what is nearest
 ANCHOR_TOLERANCE = 1e-5  # motion, relative to the box, below which a handle is an anchor
 LEAST_VOLUME = 1e-6  # of a box that may scale, relative to a cube as long as its longest side
 MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
@@ -64,7 +64,7 @@ class Handle:
         if len(held):
             return held
         nearest = np.argsort(away, kind="stable")[:PIN_SAMPLES]
-        return np.sort(nearest[away[nearest] <= BONE_REACH])
+        return np.sort(nearest[away[nearest] <= BONE_LIMIT])
 
     def _from_bone(self, points):
         """(n,) distances from the line along the box's y axis, in widths of the box."""

@@ -65,7 +65,7 @@ PLACEMENTS = (  # of a result
     ("KEY", "Shape Key", "One more shape key of the source, which can be blended and animated"),
 )
 PLACEMENT_NUMBERS = {"NEW": 0, "REPLACE": 1, "KEY": 2, "MODIFIER": 3}  # as files store them
-FRAMES = (  # of a style
+ORIENTATIONS = (  # of a style
     ("UPRIGHT", "World Upright", "The style stands upright in the world and heads where the object does"),
     ("OBJECT", "Object", "The style stands along the object's own axes"),
     ("WORLD", "World", "The style stands along the world's axes"),

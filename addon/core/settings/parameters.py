@@ -82,9 +82,8 @@ def presets(operation):
     return {key.upper(): (p["label"], p["sentence"], p["values"]) for key, p in given.items()}
 
 
-DEFORM = parameters("deform")
-MACHINE = parameters("machine")
-EXTRACTION = parameters("extraction")
+FIT, DEFORM, WRAP, EXTRACTION, MACHINE = map(parameters, ("fit", "deform", "wrap", "extraction", "machine"))
+QUALITIES = presets("fit")  # identifier → label, tip, what it sets
 
 
 def native_options(operation, values):
