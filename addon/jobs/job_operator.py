@@ -32,13 +32,10 @@ class JobOperator(ModalRun, Guided):
     )
 
     @classmethod
-    def poll(cls, context):
+    def obstacle(cls, context):
         source = source_of(context)
         reason = native.problem() or refusal(source) or busy() or mesh_arrays.refusal(source)
-        reason = reason or cls.refuses(source)
-        if reason:
-            cls.poll_message_set(translated(reason))
-        return not reason
+        return reason or cls.refuses(source)
 
     @classmethod
     def refuses(cls, source):

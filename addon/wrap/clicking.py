@@ -43,10 +43,12 @@ class ARAPFIELDS_OT_click_landmarks(SourceOperator, bpy.types.Operator):
     def refuses(cls, source):
         return landmarks.refusal(source)
 
+    def change(self, context, source):
+        raise UserError("a 3D view is needed")
+
     def invoke(self, context, event):
         if context.area is None or context.area.type != "VIEW_3D":
-            self.report({"ERROR"}, translated(UserError("a 3D view is needed")))
-            return {"CANCELLED"}
+            return self.execute(context)
         source = source_of(context)
         self.ends = [ObjectReference(source), ObjectReference(landmarks.target_of(source))]
         self.clicked = {}
