@@ -12,7 +12,7 @@ from .blender.host import has_window
 from .core.runtime import jobs, threads
 from .deform import first_result
 from .field_modifier import motion
-from .handles import counts, rows
+from .handles import held_counts, row_selection
 from .jobs.display import display
 from .live import recovery, rendering, sessions
 from .live.prefetch import prefetch
@@ -28,7 +28,7 @@ from .viewport import handle_boxes, previews
 @persistent
 def before_load(*_):
     """The file is about to go: whatever works on it ends, and nothing of it is applied."""
-    passing = (jobs.board, counts.pending, staleness.changed, rows.seen, prefetch)
+    passing = (jobs.board, held_counts.pending, staleness.changed, row_selection.seen, prefetch)
     for state in (*passing, applying.solved, first_result.steps):
         state.clear()
     sessions.stop_all()
@@ -68,7 +68,7 @@ def after_update(scene, depsgraph):
         sessions.watch(depsgraph)
         motion.written.clear()
         if not sessions.live.is_rendering:
-            rows.follow(bpy.context)
+            row_selection.follow(bpy.context)
 
 
 @persistent
@@ -116,8 +116,8 @@ PARTS = (  # what begins with the extension, and how it ends
 )
 # What may be there when the extension is disabled, in the order in which it ends; each has clear().
 # Timers are started by blender/timers.py, threads by core/runtime/threads.py.
-STATE = (jobs.board, display, sessions.live, counts.pending, staleness.changed, motion.written)
-STATE += (hover, prefetch, applying.solved, previews.shown, first_result.steps, rows.seen, timers)
+STATE = (jobs.board, display, sessions.live, held_counts.pending, staleness.changed, motion.written)
+STATE += (hover, prefetch, applying.solved, previews.shown, first_result.steps, row_selection.seen, timers)
 STATE += (style_object.cache,)
 
 LONGEST = 10.0  # seconds that the end of the process waits for a thread

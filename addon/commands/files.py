@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 
 from ..core.errors import UserError
-from .arrived import is_whole
+from .export_check import is_whole
 from .parser import FORMATS
 
 AXES = {"forward_axis": "Y", "up_axis": "Z"}  # coordinates stay as they are in the file

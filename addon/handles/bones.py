@@ -89,8 +89,8 @@ def mirror(context, source, entry):
         raise UserError(
             "the armature {rig} has no bone on the other side of {bone}", rig=entry.rig.name, bone=entry.bone
         )
-    kept = movers.asked_of(entry)
-    movers.ask(add(source, entry.rig, name, holding_groups(context, source)), kept)
+    kept = movers.user_settings(entry)
+    movers.put_user_settings(add(source, entry.rig, name, holding_groups(context, source)), kept)
 
 
 def reset(context, source, entries):

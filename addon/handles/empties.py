@@ -14,7 +14,7 @@ from ..core.geometry.handles import far_handle, solve_handle
 from ..core.geometry.spaces import inverse, transform
 from ..core.runtime.coroutines import run_to_completion
 from . import movers, naming
-from .movers import box_now, current_box, is_there, matrix_of, name_of
+from .movers import box_now, current_box, has_mover, matrix_of, name_of
 from .palette import free_colour
 
 
@@ -31,13 +31,13 @@ def store_rest(source, entry):
 
 def used(source):
     """The handles whose Empties or bones are still there."""
-    return [entry for entry in settings_of(source).handles if is_there(entry)]
+    return [entry for entry in settings_of(source).handles if has_mover(entry)]
 
 
 def lost_bone(source):
     """The UserError that names a bone that its armature has no more; None where all are there."""
     for entry in settings_of(source).handles:
-        if entry.kind == "BONE" and in_scene(entry.rig) and not is_there(entry):
+        if entry.kind == "BONE" and in_scene(entry.rig) and not has_mover(entry):
             names = {"rig": entry.rig.name, "bone": entry.bone}
             return UserError("the armature {rig} has no bone {bone}; take that handle off the list", **names)
     return None
@@ -197,12 +197,12 @@ def mirror(context, source, entry, axis):
     current = flip @ inverse(world) @ matrix_of(entry.empty) @ flip
     name, size = entry.empty.name, entry.empty.empty_display_size
     flipped = bpy.utils.flip_name(name)
-    kept, kind = movers.asked_of(entry), entry.kind
+    kept, kind = movers.user_settings(entry), entry.kind
     new_name = flipped if flipped != name else f"{name}_mirrored"
     empty = make_empty(context, source, Matrix((world @ current).tolist()), size, new_name)
     mirrored = add(source, empty, kind)
     mirrored.rest, mirrored.group = rest.ravel(), group
-    movers.ask(mirrored, kept)
+    movers.put_user_settings(mirrored, kept)
     return mirrored
 
 

@@ -38,7 +38,7 @@ def bone_box(bone):
     return box
 
 
-def is_there(entry):
+def has_mover(entry):
     if entry.kind != "BONE":
         return in_scene(entry.empty)
     return in_scene(entry.rig) and entry.rig.pose is not None and entry.bone in entry.rig.pose.bones
@@ -53,15 +53,15 @@ def name_of(entry):
     return entry.bone if entry.kind == "BONE" else entry.empty.name
 
 
-ASKED = ("weight", "hold_from", "reach", "allow_scale")
+USER_SETTINGS = ("weight", "hold_from", "reach", "allow_scale")
 
 
-def asked_of(entry):
-    """{property: value} of what the user asks of a handle, whatever moves it."""
-    return {name: getattr(entry, name) for name in ASKED}
+def user_settings(entry):
+    """{property: value} of what the user sets of a handle, whatever moves it."""
+    return {name: getattr(entry, name) for name in USER_SETTINGS}
 
 
-def ask(entry, values):
+def put_user_settings(entry, values):
     for name, value in values.items():
         setattr(entry, name, value)
 

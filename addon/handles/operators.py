@@ -10,7 +10,7 @@ from ..core.errors import UserError
 from ..core.geometry.handles import nothing_held
 from ..core.runtime import native
 from ..core.settings.choices import BONES, EMPTY_KINDS, HANDLE_PLACES
-from . import bones, counts, empties, movers, naming
+from . import bones, empties, held_counts, movers, naming
 
 
 class HandleOperator(SourceOperator):
@@ -99,7 +99,7 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
             entry.group = group if self.kind == "GROUP" else ""
         if is_new:
             select_alone(context, selected[0])  # to be moved at once
-        counts.count_inside(context, source)
+        held_counts.count_inside(context, source)
         for other in sorted(item.name for item in others):
             text = translated("handles of {other} were taken over by {name}", other=other, name=source.name)
             self.report({"WARNING"}, text)
@@ -125,7 +125,7 @@ class ARAPFIELDS_OT_add_bones(HandleOperator, bpy.types.Operator):
         names = bones.chosen(rig, self.bones, groups)
         for name in names:
             bones.add(source, rig, name, groups)
-        counts.count_inside(context, source)
+        held_counts.count_inside(context, source)
         return translated("{count} handles added to {name}", count=len(names), name=source.name)
 
 
@@ -142,7 +142,7 @@ class ARAPFIELDS_OT_mirror_handle(HandleOperator, bpy.types.Operator):
     )
 
     def change(self, context, source):
-        entries = [e for e in chosen_entries(context, source) if movers.is_there(e)]
+        entries = [e for e in chosen_entries(context, source) if movers.has_mover(e)]
         keys = [movers.key_of(entry) for entry in entries]
         for key in keys:  # entries move in memory as others are added
             entry = next(entry for entry in empties.used(source) if movers.key_of(entry) == key)
@@ -150,7 +150,7 @@ class ARAPFIELDS_OT_mirror_handle(HandleOperator, bpy.types.Operator):
                 bones.mirror(context, source, entry)
             else:
                 empties.mirror(context, source, entry, "XYZ".index(self.axis))
-        counts.count_inside(context, source)
+        held_counts.count_inside(context, source)
         return translated("{count} handles mirrored", count=len(entries))
 
 
@@ -174,7 +174,7 @@ class ARAPFIELDS_OT_set_rest(RestOperator, bpy.types.Operator):
         entries = self.entries(context, source)
         for entry in entries:
             empties.store_rest(source, entry)
-        counts.count_inside(context, source)
+        held_counts.count_inside(context, source)
         return translated("{count} rest poses stored", count=len(entries))
 
 

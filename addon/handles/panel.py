@@ -13,7 +13,7 @@ ICONS = {"CUBE": "CUBE", "POINT": "DOT", "GROUP": "GROUP_VERTEX", "PIN": "PINNED
 class ARAPFIELDS_UL_handles(bpy.types.UIList):
     def draw_item(self, context, layout, data, item, icon, active_data, active_propname, index):
         row = layout.row(align=True)
-        if not movers.is_there(item):
+        if not movers.has_mover(item):
             row.label(text="(deleted)", icon="ERROR")
             return
         swatch = row.row()

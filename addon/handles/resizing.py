@@ -10,7 +10,7 @@ from ..blender.object_references import owner_of, refusal, settings_of
 from ..blender.property_definitions import integer, number
 from ..core.errors import UserError
 from ..names import Op
-from . import counts, empties, movers
+from . import empties, held_counts, movers
 
 LEAST = 0.05  # of a box's size that one drag leaves of it
 FACES = [(axis, side) for axis in range(3) for side in (-1, 1)]
@@ -75,7 +75,7 @@ class ARAPFIELDS_OT_resize_handle(Guided, bpy.types.Operator):
 
     def finish(self, context):
         context.view_layer.update()
-        counts.count_inside(context, boxed(context)[0])
+        held_counts.count_inside(context, boxed(context)[0])
         return {"FINISHED"}
 
     def invoke(self, context, event):

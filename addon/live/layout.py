@@ -13,7 +13,7 @@ def layout_of(source, kind, scene):
     be animated."""
     settings = settings_of(source)
     held = [
-        (movers.key_of(e), e.kind, e.group, tuple(movers.asked_of(e).values()), tuple(e.rest))
+        (movers.key_of(e), e.kind, e.group, tuple(movers.user_settings(e).values()), tuple(e.rest))
         for e in empties.used(source)
     ]
     style, stiffness = settings.stylize, settings.stiffness

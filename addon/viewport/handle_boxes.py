@@ -44,7 +44,7 @@ def shown_handles(source):
     """(entry, its box at rest, its box now) of each handle whose Empty is seen, and of a chosen bone's."""
     settings = settings_of(source)
     for index, entry in enumerate(settings.handles):
-        if not movers.is_there(entry) or not movers.mover_of(entry).visible_get():
+        if not movers.has_mover(entry) or not movers.mover_of(entry).visible_get():
             continue
         if entry.kind != "BONE" or index == settings.active_handle:
             yield entry, empties.rest_box(source, entry), movers.box_now(entry)

@@ -41,7 +41,7 @@ def used(source):
     return [e for e in settings_of(source).wrap.landmarks if in_scene(e.rest) and in_scene(e.on_target)]
 
 
-def at_rest(context, source):
+def world_vertices_at_rest(context, source):
     """(n, 3) vertices of the shape that a field works on, in the world."""
     return transform(matrix_of(source), mesh_arrays.read(context, source, in_place=True).vertices)
 
@@ -66,21 +66,18 @@ def read(source, space, seen=None, rest=None):
 def place(context, source, target, rest, on_target):
     """A new pair at the places of both surfaces that are nearest to two in the world, (3,) each."""
     number = len(settings_of(source).wrap.landmarks) + 1
+    at_rest = places.find(context, source, rest, 0.0).rest
+    at_target = places.find(context, target, on_target, 0.0).now
     ends = [
-        stand(context, source, places.find(context, source, rest, 0.0).rest, f"Landmark {number}"),
-        stand(
-            context,
-            target,
-            places.find(context, target, on_target, 0.0).now,
-            f"Landmark {number} {target.name}",
-        ),
+        empty_at(context, source, at_rest, f"Landmark {number}"),
+        empty_at(context, target, at_target, f"Landmark {number} {target.name}"),
     ]
     entry = settings_of(source).wrap.landmarks.add()
     entry.rest, entry.on_target = ends
     return entry
 
 
-def stand(context, owner, where, name):
+def empty_at(context, owner, where, name):
     """An Empty at a place in the world that moves with its owner."""
     world = matrix_of(owner)
     corners = transform(world, np.array(owner.bound_box))

@@ -73,10 +73,10 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
             and self.in_place(source)
             and rest_bones.armatures_of(source)
         ):
-            before = landmarks.at_rest(context, source)
+            before = landmarks.world_vertices_at_rest(context, source)
             fitting, below = rest_bones.Fitting(source, space), rest_bones.BeforeArmatures(source)
             self.below.append(below)
-            pairs = landmarks.read(source, space, before, landmarks.at_rest(context, source))
+            pairs = landmarks.read(source, space, before, landmarks.world_vertices_at_rest(context, source))
         else:
             pairs = landmarks.read(source, space)
         vertices, triangles = read_target(context, other, space)

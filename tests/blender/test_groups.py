@@ -13,7 +13,7 @@ if IN_BLENDER:
     from addon.blender import vertex_groups
     from addon.core.errors import UserError
     from addon.core.runtime.coroutines import run_to_completion
-    from addon.handles import counts
+    from addon.handles import held_counts
 
 
 @in_blender
@@ -59,13 +59,13 @@ def test_a_window_counts_large_meshes_aside():
     assert min(at_once) > 0
     for entry in entries:
         entry.inside = -1
-    counts.pending[bar.session_uid] = counts.counting(bpy.context, bar)
-    while counts.poll_counts() is not None:
+    held_counts.pending[bar.session_uid] = held_counts.counting(bpy.context, bar)
+    while held_counts.poll_counts() is not None:
         time.sleep(0.005)
     assert [entry.inside for entry in entries] == at_once
-    coroutine = counts.counting(bpy.context, bar)
+    coroutine = held_counts.counting(bpy.context, bar)
     next(coroutine)
     bpy.data.objects.remove(fixed)  # between a count and its end
-    counts.pending[bar.session_uid] = coroutine
-    while counts.poll_counts() is not None:
+    held_counts.pending[bar.session_uid] = coroutine
+    while held_counts.poll_counts() is not None:
         time.sleep(0.005)

@@ -17,7 +17,7 @@ if IN_BLENDER:
     from addon import lifecycle
     from addon.blender import host, icons, library_loading, timers
     from addon.core.runtime import jobs, native, threads
-    from addon.handles import counts
+    from addon.handles import held_counts
     from addon.jobs.display import display
     from addon.live.prefetch import prefetch
     from addon.pin_tool import drag, hover, tool
@@ -114,8 +114,8 @@ def enter(state):
 
         jobs.begin(jobs.Job("Deform", [jobs.Item("Bar", work)], native.library().Task))
     elif state == "counting":
-        counts.points_inside = lambda *_: time.sleep(0.1) or {}
-        coroutine = counts.pending[bar.session_uid] = counts.counting(bpy.context, bar)
+        held_counts.points_inside = lambda *_: time.sleep(0.1) or {}
+        coroutine = held_counts.pending[bar.session_uid] = held_counts.counting(bpy.context, bar)
         while not any("counting" in thread.name for thread in threads.own_threads()):
             next(coroutine)
 
@@ -123,7 +123,7 @@ def enter(state):
 @pytest.mark.parametrize("state", STATES)
 @in_blender
 def test_nothing_is_left_when_the_extension_is_disabled(state):
-    enabled, points_inside = None, counts.points_inside
+    enabled, points_inside = None, held_counts.points_inside
     for _ in range(ROUNDS):
         left = {kind: len(names) for kind, names in remains().items()}
         enabled = enabled or left
@@ -133,7 +133,7 @@ def test_nothing_is_left_when_the_extension_is_disabled(state):
         addon.unregister()
         for kind, names in remains().items():
             assert not names, (state, kind, names)
-        counts.points_inside = points_inside
+        held_counts.points_inside = points_inside
         bpy.ops.wm.read_factory_settings(use_empty=True)
         addon.register()
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from addon.commands.arrived import is_whole
+from addon.commands.export_check import is_whole
 
 CORNERS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1)]
 FACES = [(0, 1, 2, 3), (0, 1, 4), (1, 2, 4)]
