@@ -6,6 +6,7 @@ import re
 import sys
 from pathlib import Path, PurePath
 
+from ..core.settings.choices import BAKE_FORMATS, LIVE_KINDS, ORIENTATIONS, OUTPUTS, SURFACES
 from ..core.settings.parameters import DEFORM, EXTRACTION, QUALITIES
 from ..core.settings.styles import STYLES, STYLIZE
 
@@ -96,11 +97,11 @@ def add_bake(verbs):
         help="a .blend that plays the caches; .abc, .usdc or .glb",
     )
     bake.add_argument("--folder", type=Path, help="of the caches [cache, beside the .blend]")
-    bake.add_argument("--format", choices=("pc2", "mdd"), default="pc2", help="of the caches [pc2]")
+    bake.add_argument("--format", choices=lower(BAKE_FORMATS[:2]), default="pc2", help="of the caches [pc2]")
     bake.add_argument(
         "--objects", nargs="+", metavar="NAME", help="only these [all with handles or keyed styles]"
     )
-    bake.add_argument("--kind", choices=("deform", "stylize"), help="what is baked [each object's own]")
+    bake.add_argument("--kind", choices=lower(LIVE_KINDS), help="what is baked [each object's own]")
     bake.add_argument("--frames", type=frames, metavar="A-B", help="from frame A to B [the scene's]")
     bake.add_argument("--step", type=count, metavar="N", help="frames from one sample to the next")
     bake.add_argument("--subframes", type=count, metavar="N", help="samples a step, for motion blur")
@@ -145,7 +146,7 @@ def add_solve_flags(one, verbs):
         names = ", ".join(name for name, _ in STYLES)
         group.add_argument("--style", type=style, metavar="NAME", help=names)
         group.add_argument(
-            "--frame", choices=("upright", "object", "world"), help="whose axes the style stands along"
+            "--frame", choices=lower(ORIENTATIONS[:3]), help="whose axes the style stands along"
         )
     if "deform" in verbs:
         group.add_argument(
@@ -155,21 +156,22 @@ def add_solve_flags(one, verbs):
         one.set_defaults(handles=None)
     if "stylize" not in verbs:
         one.set_defaults(style=None, frame=None)
-    group.add_argument(
-        "--result", choices=("warp", "surface", "remesh"), help="the mesh itself moved, or a new one"
-    )
-    group.add_argument("--surface", choices=("exact", "fit"), help="the triangles, or a fit of them")
-    group.add_argument("--resolution", type=count, metavar="N", help="cells of a new mesh's grid")
+    group.add_argument("--result", choices=lower(OUTPUTS), help="the mesh itself moved, or a new one")
+    group.add_argument("--surface", choices=lower(SURFACES), help="the triangles, or a fit of them")
     for parameter in EXTRACTION:
-        if parameter.name != "resolution":
-            add_parameter(group, parameter)
-    group.add_argument("--quality", choices=[name.lower() for name in QUALITIES], help="of a fit")
+        add_parameter(group, parameter)
+    group.add_argument("--quality", choices=lower(QUALITIES), help="of a fit")
     done = set()
     for verb in verbs:
         for parameter in PARAMETERS[verb]:
             if parameter.name not in done:
                 add_parameter(group, parameter)
                 done.add(parameter.name)
+
+
+def lower(choices):
+    """What a flag takes, of choices whose identifiers are Blender's."""
+    return [(choice if isinstance(choice, str) else choice[0]).lower() for choice in choices]
 
 
 def add_parameter(group, p):
