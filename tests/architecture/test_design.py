@@ -15,7 +15,7 @@ PACKAGES = [ROOT / "addon", NATIVE / "python" / "arapfields"]
 # A class is as long as its parts in all sources together, and that is what one file may be.
 LONGEST = {"C++": 350, "Python": 250}
 # Lines that these have today: they only get shorter.
-TO_SPLIT = {"RadialSolver::State": 800, "Session": 490, "Following": 260}
+TO_SPLIT = {"RadialSolver::State": 800}
 LISTS = 87  # declarations of several members or functions that native headers have today: only fewer
 
 
