@@ -83,7 +83,7 @@ def cache_path(source, suffix, folder, filepath=""):
     name = BARRED.sub("_", source.name)
     shown = filepath or f"{folder.rstrip('/') or '/'}/{name}{suffix}"
     if shown.startswith("//") and not bpy.data.filepath:
-        raise UserError("save the .blend first, or choose a folder: the cache lies beside it")
+        raise UserError("Save the .blend first, or choose a folder: the cache lies beside it")
     path = Path(bpy.path.abspath(shown))
     if path.suffix.lower() != suffix:
         raise UserError("{path}: the format needs the extension {suffix}", path=path, suffix=suffix)

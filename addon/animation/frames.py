@@ -38,7 +38,7 @@ def choose(context, sources, values):
         span = animation(sources) if which == "HANDLES" else frame_range.scene_range(scene)
         first, last = span[0] if first is None else first, span[1] if last is None else last
     if last < first:
-        raise UserError("the last frame, {last}, comes before the first, {first}", first=first, last=last)
+        raise UserError("The last frame, {last}, comes before the first, {first}", first=first, last=last)
     step = values["step"] / values["subframes"]
     return Frames(float(first), step, int((last - first) / step + 1e-9) + 1)
 
@@ -47,7 +47,7 @@ def animation(sources):
     spans = [span for span in (frame_range.animation_range(*one) for one in sources) if span is not None]
     if not spans:
         names = ", ".join(source.name for source, _ in sources)
-        raise UserError("nothing that moves {names} is animated; choose another range", names=names)
+        raise UserError("Nothing that moves {names} is animated; choose another range", names=names)
     return round(min(first for first, _ in spans)), round(max(last for _, last in spans))
 
 

@@ -110,7 +110,7 @@ class ObjectBake:
         try:
             call(*given)
         except MemoryError:
-            self.error = UserError("not enough memory for these settings")
+            self.error = UserError("Not enough memory for these settings")
         except (UserError, ValueError, OSError) as error:
             self.error = as_user_error(error)
         if self.error is not None:

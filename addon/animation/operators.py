@@ -47,11 +47,11 @@ class ARAPFIELDS_OT_bake(BakeOperator, bpy.types.Operator):
         active = source_of(context)
         sources = [(source, effective_kind(source, self)) for source in self.sources(context)]
         if self.filepath and len(sources) > 1:
-            raise UserError("one file cannot take several objects; choose a folder")
+            raise UserError("One file cannot take several objects; choose a folder")
         values, part = self.values(active), tuple(self.part) if any(self.part) else None
         if part is not None and (values["format"] == "KEYS" or not 1 <= part[0] <= part[1]):
             raise UserError(
-                "part {i} of {n}: caches alone have parts, from 1 of N to N of N", i=part[0], n=part[1]
+                "Part {i} of {n}: caches alone have parts, from 1 of N to N of N", i=part[0], n=part[1]
             )
         suffix = caches.SUFFIXES.get(values["format"])
         place = effective_value("folder", settings_of(active).bake, self)
@@ -68,7 +68,7 @@ class ARAPFIELDS_OT_bake(BakeOperator, bpy.types.Operator):
         weight = caches.keys_weight(len(bake.reader.surface.local), bake.frames.count)
         if isinstance(bake.store, caches.ShapeKeys) and weight > caches.HEAVY:
             size = caches.size_text(weight)
-            text = "shape keys of {size} in the .blend and in memory; a cache would take neither"
+            text = "Shape keys of {size} in the .blend and in memory; a cache would take neither"
             self.warnings.append(f"{bake.name}: {translated(text, size=size)}")
 
 

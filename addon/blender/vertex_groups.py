@@ -52,7 +52,7 @@ def _read(reference, shown, names):
     for name in names:
         if not weights[name].any():
             raise UserError(
-                "the vertex group {group} of {name} holds no vertex", group=name, name=reference.name
+                "The vertex group {group} of {name} holds no vertex", group=name, name=reference.name
             )
     return weights
 

@@ -113,7 +113,7 @@ class Carrying:
             attached = carried.attached = pose.points, pose.rest, attachment
         after = np.asarray(attached[2].positions(field))
         if not np.isfinite(after).all():
-            raise UserError("the shape has vertices that are NaN or infinite; move the handles less far")
+            raise UserError("The shape has vertices that are NaN or infinite; move the handles less far")
         if strength != 1.0:
             rest = transform(pose.rest, pose.points)
             after = rest + strength * (after - rest)

@@ -43,7 +43,7 @@ class AttributeCarrier(Carrier):
 
     def write(self, item, entry, shape):
         if modifier_stack.find(item) is None:
-            raise UserError("the modifier of {name} was removed", name=item.name)
+            raise UserError("The modifier of {name} was removed", name=item.name)
         put_offsets(item, self.counts, shape - self.points.astype(np.float32))
 
     def snapshot(self, item, entry):
@@ -112,7 +112,7 @@ class KeyCarrier(Carrier):
     def write(self, item, entry, shape):
         key = own_key(item)
         if key is None:
-            raise UserError("the shape key of {name} was removed", name=item.name)
+            raise UserError("The shape key of {name} was removed", name=item.name)
         if len(shape) != sum(width * count for width, count in parts_of(item)):
             raise UserError("{name} changed while it was worked on; run again", name=item.name)
         motion.written.add(item.session_uid)

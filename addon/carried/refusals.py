@@ -38,7 +38,7 @@ def of_item(source, item):
         return UserError("{name} is a handle of {source} itself", name=item.name, source=source.name)
     rigs = handle_rigs(source)
     if item in rigs:
-        return UserError("the bones of {name} are handles of {source}", name=item.name, source=source.name)
+        return UserError("The bones of {name} are handles of {source}", name=item.name, source=source.name)
     if constrained_to(item, rigs):
         return UserError("{name} follows the armature by a constraint; it is not carried", name=item.name)
     return moves_anyway(source, item)

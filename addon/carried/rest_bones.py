@@ -28,11 +28,11 @@ def armatures_of(source):
 def refusal(rig):
     """Why an armature's bones cannot be fitted, as a UserError; None where they can."""
     if rig.library is not None or rig.data.library is not None or rig.override_library is not None:
-        return UserError("the bones of {rig} stay: it is linked from another file", rig=rig.name)
+        return UserError("The bones of {rig} stay: it is linked from another file", rig=rig.name)
     if rig.mode == "EDIT":
-        return UserError("the bones of {rig} stay: it is in Edit Mode", rig=rig.name)
+        return UserError("The bones of {rig} stay: it is in Edit Mode", rig=rig.name)
     if bpy.context.view_layer.objects.get(rig.name) != rig:
-        return UserError("the bones of {rig} stay: it is not in the view layer", rig=rig.name)
+        return UserError("The bones of {rig} stay: it is not in the view layer", rig=rig.name)
     return None
 
 
@@ -56,7 +56,7 @@ class Fitting:
             before = transform(to_solve, points)
             after = field(before)
             if not np.isfinite(after).all():
-                raise UserError("the result has bones that are not finite; try other settings")
+                raise UserError("The result has bones that are not finite; try other settings")
             posed = posing.bone_poses(to_solve @ poses, before, after)
             heads, tails = after[0 :: len(posing.BONE_POINTS)], after[1 :: len(posing.BONE_POINTS)]
             back = inverse(to_solve)

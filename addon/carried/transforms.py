@@ -117,7 +117,7 @@ class BonesCarrier(PoseCarrier):
 
     def read(self, context, item):
         if item.pose is None or not len(item.pose.bones):
-            raise UserError("the armature {rig} has no bones to pose", rig=item.name)
+            raise UserError("The armature {rig} has no bones to pose", rig=item.name)
         bones = list(item.pose.bones)  # parents come before their children
         self.names = [bone.name for bone in bones]
         self.parents = [self.names.index(bone.parent.name) if bone.parent else -1 for bone in bones]

@@ -55,7 +55,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
                 before, topology = surface.extract(tracker, 0.1, **extraction)
             after = field(before)
         if not np.isfinite(after).all():
-            raise UserError("the result has vertices that are not finite; try other settings")
+            raise UserError("The result has vertices that are not finite; try other settings")
         turns = surface.turns(field, before) if placement.keeps_mesh(output, result) else None
         moved = carrying.moved(native.library(), points, field, carried)
         local = surface.space.to_local(after)

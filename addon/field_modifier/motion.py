@@ -141,7 +141,7 @@ def write(source, motion):
     """Moves the object's points; UserError where its modifier is gone or the points are others."""
     modifier = modifier_stack.find(source)
     if modifier is None:
-        raise UserError("the modifier of {name} was removed", name=source.name)
+        raise UserError("The modifier of {name} was removed", name=source.name)
     written.add(source.session_uid)
     mesh = carrier(source, modifier)
     if len(mesh.vertices) != len(motion.offsets):

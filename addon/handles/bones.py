@@ -22,7 +22,7 @@ def armature_of(context, source):
     if rig is None:
         raise UserError("{name} follows no armature; select one as well", name=source.name)
     if rig.pose is None or not len(rig.pose.bones):
-        raise UserError("the armature {rig} has no bones to pose", rig=rig.name)
+        raise UserError("The armature {rig} has no bones to pose", rig=rig.name)
     return rig
 
 
@@ -44,7 +44,7 @@ def chosen(rig, which, holding):
         names = [bone.name for bone in rig.data.bones if bone.use_deform]
         names = [name for name in names if name in holding] or names
     if not names:
-        raise UserError("no bone of {rig} is selected, or deforms", rig=rig.name)
+        raise UserError("No bone of {rig} is selected, or deforms", rig=rig.name)
     return names
 
 
@@ -87,7 +87,7 @@ def mirror(context, source, entry):
     name = bpy.utils.flip_name(entry.bone)
     if name == entry.bone or name not in entry.rig.data.bones:
         raise UserError(
-            "the armature {rig} has no bone on the other side of {bone}", rig=entry.rig.name, bone=entry.bone
+            "The armature {rig} has no bone on the other side of {bone}", rig=entry.rig.name, bone=entry.bone
         )
     kept = movers.user_settings(entry)
     movers.put_user_settings(add(source, entry.rig, name, holding_groups(context, source)), kept)

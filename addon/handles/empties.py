@@ -39,7 +39,7 @@ def lost_bone(source):
     for entry in settings_of(source).handles:
         if entry.kind == "BONE" and in_scene(entry.rig) and not has_mover(entry):
             names = {"rig": entry.rig.name, "bone": entry.bone}
-            return UserError("the armature {rig} has no bone {bone}; take that handle off the list", **names)
+            return UserError("The armature {rig} has no bone {bone}; take that handle off the list", **names)
     return None
 
 

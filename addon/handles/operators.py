@@ -101,7 +101,7 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
             select_alone(context, selected[0])  # to be moved at once
         held_counts.count_inside(context, source)
         for other in sorted(item.name for item in others):
-            text = translated("handles of {other} were taken over by {name}", other=other, name=source.name)
+            text = translated("Handles of {other} were taken over by {name}", other=other, name=source.name)
             self.report({"WARNING"}, text)
         return translated("{count} handles added to {name}", count=len(selected), name=source.name)
 

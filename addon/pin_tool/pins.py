@@ -33,7 +33,7 @@ def refusal(item):
     settings = settings_of(item) if error is None else None
     if settings is not None and not placement.in_place(settings.output, settings.target):
         error = UserError(
-            "pins move {name} itself; choose Original Mesh as its output, and no New Object as its result",
+            "Pins move {name} itself; choose Original Mesh as its output, and no New Object as its result",
             name=item.name,
         )
     return error

@@ -26,7 +26,7 @@ def chosen(context, name):
     kept = kept_poses(context)
     index = kept.find(name) if name else context.scene.arapfields.active_pose
     if not 0 <= index < len(kept):
-        raise UserError("there is no pose {name}", name=name) if name else UserError("Save a pose first")
+        raise UserError("There is no pose {name}", name=name) if name else UserError("Save a pose first")
     return kept[index]
 
 
@@ -82,7 +82,7 @@ class ARAPFIELDS_OT_save_pose(OfSource, bpy.types.Operator):
         else:
             pose = applying.solved.get(source.session_uid)
         if pose is None:
-            raise UserError("deform {name} first, or make it live: its field is saved", name=source.name)
+            raise UserError("Deform {name} first, or make it live: its field is saved", name=source.name)
         keep(context, self.pose, poses.to_bytes(pose))
         return translated("{name} kept", name=self.pose)
 

@@ -157,7 +157,7 @@ class FrameSolver:
 
 def require_finite(points):
     if not np.isfinite(points).all():
-        raise UserError("the shape has vertices that are NaN or infinite; move the handles less far")
+        raise UserError("The shape has vertices that are NaN or infinite; move the handles less far")
     return points
 
 

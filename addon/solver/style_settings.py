@@ -49,11 +49,11 @@ def missing_object(which, frame, settings):
     """The UserError of a style, or of axes, for which no object is chosen; None where there is one."""
     if which in CUSTOM:
         if settings.style_object is None:
-            return UserError("choose the object that gives the style its normals")
+            return UserError("Choose the object that gives the style its normals")
         if which == "OBJECT":
             return style_object.refusal(settings.style_object)
     elif frame == "EMPTY" and settings.frame_object is None:
-        return UserError("choose the object along whose axes the style stands")
+        return UserError("Choose the object along whose axes the style stands")
     return None
 
 
@@ -105,7 +105,7 @@ def region_weights(context, source, settings, of_groups, in_place):
         held = material_weights(context, source, settings.region_material, in_place)
         weights = held if weights is None else weights * held
     if weights is not None and not weights.any():
-        raise UserError("the region of {name} holds no vertex", name=source.name)
+        raise UserError("The region of {name} holds no vertex", name=source.name)
     return weights
 
 

@@ -94,7 +94,7 @@ def warn_of_pieces(tracker, report):
         figures = {"pieces": report.pieces, "resolution": report.holding_resolution}
         tracker.warnings.append(
             UserError(
-                "thin parts came apart into {pieces} pieces; resolution {resolution} or Refine Thin Parts "
+                "Thin parts came apart into {pieces} pieces; resolution {resolution} or Refine Thin Parts "
                 "holds them together",
                 **figures,
             )
@@ -103,7 +103,7 @@ def warn_of_pieces(tracker, report):
 
 def checked_mesh(vertices, corners):
     if not len(corners):
-        raise UserError("the fitted surface is empty; fit with more quality")
+        raise UserError("The fitted surface is empty; fit with more quality")
     return vertices, build_edges(corners)
 
 

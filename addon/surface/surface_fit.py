@@ -44,7 +44,7 @@ class SurfaceFit:
         try:
             self._cache.save(self.key, sdf.save)
         except (ValueError, OSError) as error:
-            tracker.warnings.append(UserError("the fit is used, but could not be kept: {error}", error=error))
+            tracker.warnings.append(UserError("The fit is used, but could not be kept: {error}", error=error))
         return sdf
 
 

@@ -44,7 +44,7 @@ class ARAPFIELDS_OT_click_landmarks(SourceOperator, bpy.types.Operator):
         return landmarks.refusal(source)
 
     def change(self, context, source):
-        raise UserError("a 3D view is needed")
+        raise UserError("A 3D view is needed")
 
     def invoke(self, context, event):
         if context.area is None or context.area.type != "VIEW_3D":

@@ -19,9 +19,9 @@ def target_of(source, name=""):
     """The object that a source is wrapped onto; UserError where there is none that will do."""
     target = bpy.data.objects.get(name) if name else settings_of(source).wrap.onto
     if name and target is None:
-        raise UserError("there is no object {name}", name=name)
+        raise UserError("There is no object {name}", name=name)
     if not in_scene(target):
-        raise UserError("choose the object to wrap {name} onto", name=source.name)
+        raise UserError("Choose the object to wrap {name} onto", name=source.name)
     if target.type != "MESH" or target == source:
         raise UserError("{name} is no other mesh object to wrap onto", name=target.name)
     return target

@@ -159,7 +159,7 @@ class ARAPFIELDS_OT_reset_bones(SourceOperator, bpy.types.Operator):
         return (
             None
             if rest_bones.fitted(source)
-            else UserError("no bones were fitted to {name}", name=source.name)
+            else UserError("No bones were fitted to {name}", name=source.name)
         )
 
     def change(self, context, source):

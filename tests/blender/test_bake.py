@@ -58,5 +58,5 @@ def test_many_keys_say_what_they_weigh():
         caches.HEAVY = 500e6
     warnings = [text for level, text in jobs.messages() if level == "WARNING"]
     assert warnings == [
-        "Bar: shape keys of 13.9 kB in the .blend and in memory; a cache would take neither"
+        "Bar: Shape keys of 13.9 kB in the .blend and in memory; a cache would take neither"
     ], warnings

@@ -137,7 +137,7 @@ def test_what_is_wrong_with_bones_is_named():
         bpy.ops.arapfields.add_bones()
     bpy.data.objects.remove(bar)
     bar, rig = rigged_bar()
-    with pytest.raises(RuntimeError, match="no bone of Armature is selected"):
+    with pytest.raises(RuntimeError, match="No bone of Armature is selected"):
         for bone in rig.data.bones:
             bone.select = False
         bpy.ops.arapfields.add_bones(bones="SELECTED")
@@ -151,7 +151,7 @@ def test_what_is_wrong_with_bones_is_named():
     empty = bpy.data.objects.new("Hollow", bpy.data.armatures.new("Hollow"))
     bpy.context.collection.objects.link(empty)
     scenes.activate(empty, bar)
-    with pytest.raises(RuntimeError, match="the armature Hollow has no bones to pose"):
+    with pytest.raises(RuntimeError, match="The armature Hollow has no bones to pose"):
         bpy.ops.arapfields.add_bones()
     bpy.data.objects.remove(rig)
     scenes.activate(bar)

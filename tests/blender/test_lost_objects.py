@@ -63,7 +63,7 @@ def test_taking_a_handle_from_another_mesh_is_said():
     other = scenes.bar("Other")
     scenes.activate(moving, other)
     said = reports(operators.ARAPFIELDS_OT_add_handle, kind="CUBE", place="AUTO", group="")
-    assert said["WARNING"][0] == "handles of Bar were taken over by Other"
+    assert said["WARNING"][0] == "Handles of Bar were taken over by Other"
     assert len(bar.arapfields.handles) == 1 and len(other.arapfields.handles) == 1
 
 
@@ -73,7 +73,7 @@ def test_a_handle_that_holds_nothing_is_said():
     far = scenes.cube_empty((30, 0, 0), (1, 1, 1), "Far")
     scenes.activate(far, bar)
     said = reports(operators.ARAPFIELDS_OT_add_handle, kind="CUBE", place="AUTO", group="")
-    assert said["WARNING"] == ["no part of the surface lies in the rest region of Far"]
+    assert said["WARNING"] == ["No part of the surface lies in the rest region of Far"]
 
 
 def reports(operator, **properties):

@@ -39,9 +39,9 @@ def test_everyday_sections_come_first_and_numbers_are_under_advanced():
 REFUSED = {
     "no handle": ("ARAPFIELDS_PT_deform", "Add a handle first"),
     "no group": ("ARAPFIELDS_PT_deform", "Bar has no vertex group gone"),
-    "holds nothing": ("ARAPFIELDS_PT_deform", "no part of the surface lies in the rest region of Far"),
-    "no style object": ("ARAPFIELDS_PT_stylize", "choose the object that gives the style its normals"),
-    "no axes": ("ARAPFIELDS_PT_stylize", "choose the object along whose axes the style stands"),
+    "holds nothing": ("ARAPFIELDS_PT_deform", "No part of the surface lies in the rest region of Far"),
+    "no style object": ("ARAPFIELDS_PT_stylize", "Choose the object that gives the style its normals"),
+    "no axes": ("ARAPFIELDS_PT_stylize", "Choose the object along whose axes the style stands"),
     "no region": ("ARAPFIELDS_PT_stylize", "Bar has no vertex group gone"),
     "follows no handle": ("ARAPFIELDS_PT_stylize", "Add a handle first"),
     "no faces": ("ARAPFIELDS_PT_source", "Bar: the mesh has no faces"),

@@ -19,7 +19,7 @@ BROKEN = {  # name → what the message says
     "not finite": "Mesh: 1 vertices have no finite position, the first is 5",
     "flat object": "Mesh: its scale flattens it",
     "no handle": "Add a handle first",
-    "handle outside": "no part of the surface lies in the rest region of Moving",
+    "handle outside": "No part of the surface lies in the rest region of Moving",
     "edit mode": "Mesh is in Edit Mode",
     "all faces degenerate": "Mesh: ",
 }

@@ -77,7 +77,7 @@ def test_what_cannot_be_wrapped_onto_is_named_and_nothing_is_lost():
     with pytest.raises(RuntimeError, match=r"landmarks\[0\]"):
         bpy.ops.arapfields.wrap(**SMALL)
     bpy.data.objects.remove(target)
-    with pytest.raises(RuntimeError, match="choose the object to wrap Bar onto"):
+    with pytest.raises(RuntimeError, match="Choose the object to wrap Bar onto"):
         bpy.ops.arapfields.wrap(**SMALL)
     assert scenes.everything(item) == kept and not item.modifiers
 
@@ -179,5 +179,5 @@ def test_bones_that_cannot_be_fitted_and_wraps_that_fail_leave_the_stack():
         home.objects.unlink(rig)
     jobs.board.messages.clear()
     assert bpy.ops.arapfields.wrap(**SMALL) == {"FINISHED"}
-    assert any("the bones of Rig stay" in str(text) for text in jobs.messages())
+    assert any("The bones of Rig stay" in str(text) for text in jobs.messages())
     assert np.array_equal(joints(rig, posed=False), rest)

@@ -126,7 +126,7 @@ def require_held(counts):
 
 def nothing_held(names):
     """The UserError that names handles which hold nothing."""
-    return UserError("no part of the surface lies in the rest region of {names}", names=", ".join(names))
+    return UserError("No part of the surface lies in the rest region of {names}", names=", ".join(names))
 
 
 def far_handle():

@@ -158,7 +158,7 @@ def run_item(item, tracker):
     except (ValueError, OSError) as error:
         outcome.error = UserError("{error}", error=error)
     except MemoryError:
-        outcome.error = UserError("not enough memory for these settings")
+        outcome.error = UserError("Not enough memory for these settings")
     except Exception as error:
         if type(error).__name__ == "Cancelled":
             outcome.cancelled = True
