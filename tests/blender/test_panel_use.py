@@ -123,9 +123,9 @@ def test_a_fit_tells_its_errors():
 @in_blender
 def test_the_status_bar_shows_the_job_and_its_cancel():
     def texts():
-        found = []
-        status_bar.draw(type("Header", (), {"layout": Layout(found)})(), bpy.context)
-        return found
+        labels = []
+        status_bar.draw(type("Header", (), {"layout": Layout(labels)})(), bpy.context)
+        return labels
 
     assert texts() == []
     undo = prepared("running")

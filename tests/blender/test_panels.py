@@ -55,10 +55,10 @@ def test_the_panel_draws(state):
     jobs.board.messages.clear()
     undo = prepared(state)
     try:
-        found = drawn()
+        texts_of = drawn()
     finally:
         undo()
-    shown = [name for name in found if "_PT_" in name]
+    shown = [name for name in texts_of if "_PT_" in name]
     if state == "library missing" or state in ("nothing", "a camera"):
         assert shown == ["ARAPFIELDS_PT_source"]
     else:
@@ -68,7 +68,7 @@ def test_the_panel_draws(state):
         )
     if state in EXPECTED:
         section, text = EXPECTED[state]
-        assert text in " ".join(found[section]), found[section]  # long texts take several labels
+        assert text in " ".join(texts_of[section]), texts_of[section]  # long texts take several labels
 
 
 @in_blender

@@ -115,7 +115,7 @@ def test_what_goes_together_resists_and_is_held():
     rod.location.z, rod.scale = 0.4, (1.0, 0.4, 0.4)
     bpy.context.view_layer.update()
     scenes.activate(rod, bar)
-    found = []
+    shapes = []
     for way in ("FOLLOW", "TOGETHER"):
         assert bpy.ops.arapfields.carry(way=way) == {"FINISHED"}
         scenes.activate(rod, bar)
@@ -124,10 +124,10 @@ def test_what_goes_together_resists_and_is_held():
         assert bool(session.reader.surface.solids) == (way == "TOGETHER") and not session.carrying.warnings
         moving.location.z, moving.rotation_euler.y = 0.5, -0.6
         step(refined=True)
-        found.append(scenes.world_points(rod))
+        shapes.append(scenes.world_points(rod))
         on_rod = session.solver.samples.mesh_indices == 1 if way == "TOGETHER" else np.zeros(1)
         assert (on_rod.mean() > 0.05) == (way == "TOGETHER")
         bpy.ops.arapfields.live()
         moving.location.z, moving.rotation_euler.y = 0.0, 0.0
         bpy.context.view_layer.update()
-    assert np.abs(found[0] - found[1]).max() > 0.005
+    assert np.abs(shapes[0] - shapes[1]).max() > 0.005
