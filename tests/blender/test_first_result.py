@@ -29,9 +29,9 @@ def test_what_is_shown_is_put_back_bit_for_bit():
         for share in (0.5, 1.0):
             first.show((first.points + share * (moved - first.points)).astype(np.float32))
         shown = scenes.world_points(bar)
-        wanted = first._surface.space.solve_to_world
-        wanted = moved @ wanted[:3, :3].T + wanted[:3, 3]
-        assert np.abs(shown - wanted).max() < 1e-5  # single precision
+        expected = first._surface.space.solve_to_world
+        expected = moved @ expected[:3, :3].T + expected[:3, 3]
+        assert np.abs(shown - expected).max() < 1e-5  # single precision
         first.clear()
         assert state(bar) == before
         first.clear()

@@ -73,17 +73,17 @@ def test_a_flat_or_mirrored_scale_is_refused_by_name_and_by_axis_it_may_differ()
 def test_a_scale_that_counts_for_nothing_is_said():
     said = "Moving is scaled, which counts only with Allow Scale"
 
-    def told():
+    def warnings():
         return said in " ".join(drawn()["ARAPFIELDS_PT_handles"])
 
     bar, moving = enlarged(False)
-    assert told()
+    assert warnings()
     assert bpy.ops.arapfields.deform(**RUN) == {"FINISHED"}
     assert any(level == "WARNING" and said in text for level, text in jobs.messages())
     bar.arapfields.handles[1].allow_scale = True
-    assert not told()
+    assert not warnings()
     bar.arapfields.handles[1].allow_scale = False
     moving.scale = [s / 1.5 for s in moving.scale]
     moving.rotation_euler = (0.3, 0.2, 0.1)
     bpy.context.view_layer.update()
-    assert not told()
+    assert not warnings()

@@ -108,8 +108,8 @@ def test_a_rigged_character_goes_onto_a_scan_with_its_bones():
     body, rig = wraps.rigged_character()
     body.arapfields.wrap.onto, shape = wraps.scan_of(wraps.grown_parts())
     scenes.activate(body)
-    for rest, there in wraps.landmarks_of_people():
-        bpy.ops.arapfields.add_landmark(rest=rest, on_target=there)
+    for rest, on_target in wraps.landmarks_of_people():
+        bpy.ops.arapfields.add_landmark(rest=rest, on_target=on_target)
 
     def depths(posed=True):
         points, _, triangles = seen_mesh(body)
