@@ -71,8 +71,8 @@ def test_a_character_moves_whole():
     figures["hat off the head's motion, of the size"] = (
         np.linalg.norm(now["Hat"] - on_head, axis=1).max() / character.HEIGHT
     )
-    for name, figure in figures.items():
-        print(f"{name}: {figure:.3g}")
+    for name, value in figures.items():
+        print(f"{name}: {value:.3g}")
 
     assert 40 < figures["head turned, degrees"] < 50 and figures["hand raised"] > 0.4
     for eye in person.eyes:

@@ -46,7 +46,7 @@ REFUSED = {
     "follows no handle": ("ARAPFIELDS_PT_stylize", "Add a handle first"),
     "no faces": ("ARAPFIELDS_PT_source", "Bar: the mesh has no faces"),
     "empty": ("ARAPFIELDS_PT_source", "Bar: the mesh is empty"),
-    "a key of a surface": ("ARAPFIELDS_PT_stylize", "a shape key keeps the mesh"),
+    "a key of a surface": ("ARAPFIELDS_PT_stylize", "A shape key keeps the mesh"),
 }
 
 

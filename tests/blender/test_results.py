@@ -85,7 +85,7 @@ def test_the_earlier_name_of_result_still_counts():
 
 
 REFUSED = {
-    "a key on a surface": "a shape key keeps the mesh",
+    "a key on a surface": "A shape key keeps the mesh",
     "a modifier": "Mirror of Bar change its vertices before; apply them, or choose Modifier",
 }
 
