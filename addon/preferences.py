@@ -2,10 +2,10 @@
 import bpy
 
 from .blender import user_preferences
-from .blender.guide import Guided
 from .blender.language import translated
 from .blender.property_definitions import annotations, flag, text
 from .blender.section import draw_settings
+from .blender.source_operator import ReportingOperator
 from .core.runtime import native
 from .core.settings.parameters import MACHINE
 from .names import PACKAGE, Op
@@ -51,16 +51,15 @@ class ARAPFIELDS_AP_preferences(bpy.types.AddonPreferences):
         box.operator(Op.COPY_REPORT, icon="COPYDOWN")
 
 
-class ARAPFIELDS_OT_copy_report(Guided, bpy.types.Operator):
+class ARAPFIELDS_OT_copy_report(ReportingOperator, bpy.types.Operator):
     """Copy what is known about the native library and this machine, for a bug report"""
 
     bl_label = "Copy Report"
     guide = "jobs"
 
-    def execute(self, context):
+    def change(self, context, source):
         lines = [f"Blender {bpy.app.version_string}", *native.report()]
         context.window_manager.clipboard = "\n".join(lines)
-        return {"FINISHED"}
 
 
 CLASSES = [ARAPFIELDS_AP_preferences, ARAPFIELDS_OT_copy_report]

@@ -8,11 +8,11 @@ import bpy
 
 from ..blender.language import translated
 from ..blender.object_references import ObjectReference, source_of
+from ..blender.property_definitions import choice, text
 from ..core.errors import UserError
 from ..core.runtime.jobs import Item
 from ..core.settings.choices import EXPORT_FORMATS
 from ..field_modifier import cache_modifier
-from ..names import Op
 from ..results import result_objects
 from . import caches, exporters, frames, played
 from .bake_operator import BakeOperator, effective_kind, refusal_of
@@ -23,7 +23,6 @@ from .properties import settings
 class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
     """Write what the object does, frame by frame, to a file that other programs read"""
 
-    bl_idname = Op.EXPORT
     bl_label = "Export Animation"
     bl_options = set()
     title = "Export"
@@ -32,12 +31,10 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
 
     __annotations__ = {
         **{name: one for name, one in settings(options={"SKIP_SAVE"}).items() if name != "format"},
-        "format": bpy.props.EnumProperty(
-            items=EXPORT_FORMATS, name="Format", description="What kind of file", options={"SKIP_SAVE"}
-        ),
-        "filepath": bpy.props.StringProperty(
-            name="File",
-            description="Where it goes; empty for a file with the object's name beside the .blend",
+        "format": choice(EXPORT_FORMATS, "Format", "What kind of file", options={"SKIP_SAVE"}),
+        "filepath": text(
+            "File",
+            "Where it goes; empty for a file with the object's name beside the .blend",
             subtype="FILE_PATH",
             options={"SKIP_SAVE"},
         ),

@@ -4,11 +4,10 @@ import bpy
 from ..blender import modifier_stack
 from ..blender.language import translated
 from ..blender.object_references import settings_of, source_of
-from ..blender.property_definitions import effective_value
+from ..blender.property_definitions import effective_value, text
 from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError
 from ..field_modifier import cache_modifier
-from ..names import Op
 from . import caches, carried_bake
 from .bake_operator import BakeOperator, effective_kind
 from .object_bake import ObjectBake
@@ -18,7 +17,6 @@ from .properties import folder, settings
 class ARAPFIELDS_OT_bake(BakeOperator, bpy.types.Operator):
     """Solve the frames of an animation and keep them, so that they play anywhere, without this extension"""
 
-    bl_idname = Op.BAKE
     bl_label = "Bake Animation"
     bl_options = {"UNDO"}
     title = "Bake"
@@ -27,9 +25,9 @@ class ARAPFIELDS_OT_bake(BakeOperator, bpy.types.Operator):
     __annotations__ = {
         **settings(options={"SKIP_SAVE"}),
         "folder": folder(options={"SKIP_SAVE"}),
-        "filepath": bpy.props.StringProperty(
-            name="File",
-            description="Where one object's cache goes; empty for a file with its name in the folder",
+        "filepath": text(
+            "File",
+            "Where one object's cache goes; empty for a file with its name in the folder",
             subtype="FILE_PATH",
             options={"SKIP_SAVE"},
         ),
@@ -75,7 +73,6 @@ class ARAPFIELDS_OT_bake(BakeOperator, bpy.types.Operator):
 class ARAPFIELDS_OT_remove_bake(SourceOperator, bpy.types.Operator):
     """Take the modifiers that play the bake away, of carried objects too; the caches' files stay"""
 
-    bl_idname = Op.REMOVE_BAKE
     bl_label = "Remove Bake"
     bl_options = {"REGISTER", "UNDO"}
     guide = "animation"
@@ -85,13 +82,11 @@ class ARAPFIELDS_OT_remove_bake(SourceOperator, bpy.types.Operator):
         played = modifier_stack.find_cache(source)
         return UserError("{name} plays no bake", name=source.name) if played is None else None
 
-    def execute(self, context):
-        source = source_of(context)
+    def change(self, context, source):
         cache_modifier.remove(source)
         for entry in settings_of(source).carried:
             if entry.item is not None and entry.item.library is None:
                 carried_bake.remove(entry.item)
-        return {"FINISHED"}
 
 
 CLASSES = [ARAPFIELDS_OT_bake, ARAPFIELDS_OT_remove_bake]

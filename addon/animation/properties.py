@@ -3,6 +3,7 @@
 
 import bpy
 
+from ..blender.property_definitions import choice, integer, text
 from ..core.settings.choices import BAKE_FORMATS, BAKE_KINDS, BAKE_RANGES
 
 FOLDER = "//cache"
@@ -11,21 +12,15 @@ FOLDER = "//cache"
 def settings(**extra):
     """Properties that the object has and that an operator's arguments replace for one call."""
     return {
-        "format": bpy.props.EnumProperty(
-            items=BAKE_FORMATS, name="Format", description="What plays the frames", **extra
-        ),
-        "kind": bpy.props.EnumProperty(items=BAKE_KINDS, name="Bake", description="What is baked", **extra),
-        "range": bpy.props.EnumProperty(
-            items=BAKE_RANGES, name="Range", description="Which frames are baked", **extra
-        ),
-        "start": bpy.props.IntProperty(name="Start", description="First frame", default=1, **extra),
-        "end": bpy.props.IntProperty(name="End", description="Last frame", default=250, **extra),
-        "step": bpy.props.IntProperty(
-            name="Step", description="Frames from one sample to the next", default=1, min=1, max=100, **extra
-        ),
-        "subframes": bpy.props.IntProperty(
-            name="Samples per Step",
-            description="More than one for motion blur of what moves fast: samples between the frames",
+        "format": choice(BAKE_FORMATS, "Format", "What plays the frames", **extra),
+        "kind": choice(BAKE_KINDS, "Bake", "What is baked", **extra),
+        "range": choice(BAKE_RANGES, "Range", "Which frames are baked", **extra),
+        "start": integer("Start", "First frame", default=1, **extra),
+        "end": integer("End", "Last frame", default=250, **extra),
+        "step": integer("Step", "Frames from one sample to the next", default=1, min=1, max=100, **extra),
+        "subframes": integer(
+            "Samples per Step",
+            "More than one for motion blur of what moves fast: samples between the frames",
             default=1,
             min=1,
             max=100,
@@ -35,9 +30,9 @@ def settings(**extra):
 
 
 def folder(**extra):
-    return bpy.props.StringProperty(
-        name="Folder",
-        description="Where the caches lie; // is the .blend's own folder",
+    return text(
+        "Folder",
+        "Where the caches lie; // is the .blend's own folder",
         subtype="DIR_PATH",
         default=FOLDER,
         **extra,
@@ -48,10 +43,8 @@ class ARAPFIELDS_PG_bake(bpy.types.PropertyGroup):
     __annotations__ = {
         **settings(),
         "folder": folder(),
-        "uid": bpy.props.IntProperty(
-            name="Modifier", description="Which modifier plays the bake; 0 for none"
-        ),
-        "record": bpy.props.StringProperty(name="Record", description="What the bake is of, as JSON"),
+        "uid": integer("Modifier", "Which modifier plays the bake; 0 for none"),
+        "record": text("Record", "What the bake is of, as JSON"),
     }
 
 

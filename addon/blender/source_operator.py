@@ -7,11 +7,29 @@ from .language import translated
 from .object_references import refusal, source_of
 
 
-class SourceOperator(Guided):
+class ReportingOperator(Guided):
     """Mixin: `change(context, source)` does the work and returns the line to report, if any.
 
-    Errors become reports. `refuses(source)` has a reason where the operator does not apply to a source.
+    Errors become reports. `source` is the panel's; None where there is none.
     """
+
+    def execute(self, context):
+        context.view_layer.update()
+        try:
+            line = self.change(context, source_of(context))
+        except (UserError, ValueError, OSError) as error:
+            return self.refuse(error)
+        if line:
+            self.report({"INFO"}, line)
+        return {"FINISHED"}
+
+    def refuse(self, error):
+        self.report({"ERROR"}, translated(error))
+        return {"CANCELLED"}
+
+
+class SourceOperator(ReportingOperator):
+    """Mixin: needs a source, to which it applies where `refuses` has no reason."""
 
     in_edit_mode = False  # whether it works on a source in Edit Mode too
 
@@ -24,14 +42,3 @@ class SourceOperator(Guided):
     def refuses(cls, source):
         """Why the operator does not apply to a source, as a UserError; None where it does."""
         return None
-
-    def execute(self, context):
-        context.view_layer.update()
-        try:
-            line = self.change(context, source_of(context))
-        except (UserError, ValueError, OSError) as error:
-            self.report({"ERROR"}, translated(error))
-            return {"CANCELLED"}
-        if line:
-            self.report({"INFO"}, line)
-        return {"FINISHED"}

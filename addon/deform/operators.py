@@ -13,7 +13,6 @@ from ..core.settings.parameters import DEFORM
 from ..handles import empties, scaling
 from ..handles.native_handles import native_handles
 from ..live.sessions import end_for_job
-from ..names import Op
 from ..properties.choices import result_properties
 from ..results.placement import destination
 from .solve_job import SolveOperator, plan_solve_job
@@ -22,7 +21,6 @@ from .solve_job import SolveOperator, plan_solve_job
 class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
     """Deform the object as rigidly as its handles allow"""
 
-    bl_idname = Op.DEFORM
     bl_label = "Deform"
     bl_options = {"UNDO"}
     title = "Deform"

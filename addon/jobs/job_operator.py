@@ -3,12 +3,11 @@
 
 import types
 
-import bpy
-
 from ..blender import mesh_arrays, vertex_groups
 from ..blender.guide import Guided
 from ..blender.language import translated
 from ..blender.object_references import ObjectReference, owner_of, refusal, source_of
+from ..blender.property_definitions import choice
 from ..core.errors import UserError
 from ..core.runtime import jobs, native
 from ..core.runtime.coroutines import Pause, run_to_completion
@@ -27,9 +26,7 @@ class JobOperator(ModalRun, Guided):
 
     title = ""
 
-    scope: bpy.props.EnumProperty(
-        items=SCOPES, name="Objects", description="Which objects to work on", options={"SKIP_SAVE"}
-    )
+    scope: choice(SCOPES, "Objects", "Which objects to work on", options={"SKIP_SAVE"})
 
     @classmethod
     def obstacle(cls, context):

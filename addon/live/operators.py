@@ -2,40 +2,33 @@
 import bpy
 
 from ..blender import mesh_arrays
-from ..blender.guide import Guided
 from ..blender.language import translated
 from ..blender.object_references import refusal, source_of
+from ..blender.property_definitions import choice
+from ..blender.source_operator import ReportingOperator
 from ..core.errors import UserError
 from ..core.runtime import jobs, native
 from ..core.settings.choices import LIVE_KINDS
 from ..handles import empties
 from ..jobs.job_operator import busy
-from ..names import Op
 from ..results.placement import placement_refusal
 from . import sessions
 
 
-class ARAPFIELDS_OT_live(Guided, bpy.types.Operator):
+class ARAPFIELDS_OT_live(ReportingOperator, bpy.types.Operator):
     """Let the shape follow handles or style while these change; again to stop, which takes that back"""
 
-    bl_idname = Op.LIVE
     bl_label = "Live"
     guide = "deform"
     bl_options = {"UNDO"}
 
-    kind: bpy.props.EnumProperty(
-        items=LIVE_KINDS, name="Kind", description="What the shape follows", options={"SKIP_SAVE"}
-    )
+    kind: choice(LIVE_KINDS, "Kind", "What the shape follows", options={"SKIP_SAVE"})
 
     @classmethod
-    def poll(cls, context):
+    def obstacle(cls, context):
         source = source_of(context)
         reason = native.problem() or refusal(source) or busy() or mesh_arrays.refusal(source)
-        if not reason and not sessions.is_live(source):
-            reason = placement_refusal(source)
-        if reason:
-            cls.poll_message_set(translated(reason))
-        return not reason
+        return reason or (None if sessions.is_live(source) else placement_refusal(source))
 
     def execute(self, context):
         return self.toggle(context, sessions.WAIT)
@@ -57,8 +50,7 @@ class ARAPFIELDS_OT_live(Guided, bpy.types.Operator):
             context.view_layer.update()
             sessions.begin(context, source, self.kind)
         except (UserError, ValueError) as error:
-            self.report({"ERROR"}, translated(error))
-            return {"CANCELLED"}
+            return self.refuse(error)
         if wait:
             sessions.update(context, wait)
             if not sessions.is_live(source):
@@ -67,30 +59,19 @@ class ARAPFIELDS_OT_live(Guided, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ARAPFIELDS_OT_live_keep(Guided, bpy.types.Operator):
+class ARAPFIELDS_OT_live_keep(ReportingOperator, bpy.types.Operator):
     """End live mode and keep the shape as the result"""
 
-    bl_idname = Op.LIVE_KEEP
     bl_label = "Keep Shape"
     guide = "deform"
     bl_options = {"UNDO"}
 
     @classmethod
-    def poll(cls, context):
-        if not sessions.is_live(source_of(context)):
-            cls.poll_message_set(translated("The object is not live"))
-            return False
-        return True
+    def obstacle(cls, context):
+        return None if sessions.is_live(source_of(context)) else UserError("The object is not live")
 
-    def execute(self, context):
-        source = source_of(context)
-        try:
-            item = sessions.end(context, source, keep=True)
-        except UserError as error:
-            self.report({"ERROR"}, translated(error))
-            return {"CANCELLED"}
-        self.report({"INFO"}, translated("{name} kept", name=item.name))
-        return {"FINISHED"}
+    def change(self, context, source):
+        return translated("{name} kept", name=sessions.end(context, source, keep=True).name)
 
 
 CLASSES = [ARAPFIELDS_OT_live, ARAPFIELDS_OT_live_keep]

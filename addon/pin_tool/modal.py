@@ -4,9 +4,8 @@
 import numpy as np
 
 from ..blender import timers
-from ..blender.guide import Guided
-from ..blender.language import translated
 from ..blender.redraw import redraw
+from ..blender.source_operator import ReportingOperator
 from ..core.errors import UserError
 from ..core.runtime import native
 from ..live import sessions
@@ -28,23 +27,15 @@ def reach_steps(event):
     return 0
 
 
-class PinOperator(Guided):
+class PinOperator(ReportingOperator):
     """Mixin: works in a 3D view in Object Mode."""
 
     guide = "pins"
 
     @classmethod
-    def poll(cls, context):
-        reason = native.problem()
-        if not reason and context.mode != "OBJECT":
-            reason = "Leave this mode first"
-        if reason:
-            cls.poll_message_set(translated(reason))
-        return not reason
-
-    def refuse(self, error):
-        self.report({"ERROR"}, translated(error))
-        return {"CANCELLED"}
+    def obstacle(cls, context):
+        wrong_mode = None if context.mode == "OBJECT" else UserError("Leave this mode first")
+        return native.problem() or wrong_mode
 
 
 class Dragging(PinOperator):

@@ -2,12 +2,13 @@
 import bpy
 import numpy as np
 
-from ..blender.object_references import owner_of, source_of
+from ..blender.object_references import owner_of
+from ..blender.property_definitions import flag, number
 from ..blender.redraw import redraw
 from ..core.errors import UserError
 from ..live import sessions
 from ..live.prefetch import prefetch
-from ..names import TOOL, Op
+from ..names import TOOL
 from . import drag, pins
 from .hover import View, hover, under
 from .modal import Dragging, PinOperator
@@ -30,20 +31,17 @@ def drag_of_new_pin(context, source, target, **further):
 class ARAPFIELDS_OT_pin_tool(PinOperator, bpy.types.Operator):
     """Take the tool that pins the surface and drags it, in the toolbar"""
 
-    bl_idname = Op.PIN_TOOL
     bl_label = "ARAP Pin Tool"
 
-    def execute(self, context):
+    def change(self, context, source):
         if bpy.app.background:
-            return self.refuse(UserError("A window is needed"))
+            raise UserError("A window is needed")
         bpy.ops.wm.tool_set_by_id(name=TOOL, space_type="VIEW_3D")
-        return {"FINISHED"}
 
 
 class ARAPFIELDS_OT_pin_hover(PinOperator, bpy.types.Operator):
     """Light up what lies under the cursor"""
 
-    bl_idname = Op.PIN_HOVER
     bl_label = "ARAP Pin: Light Up"
     bl_options = {"INTERNAL"}
 
@@ -61,7 +59,6 @@ class ARAPFIELDS_OT_pin_hover(PinOperator, bpy.types.Operator):
 class ARAPFIELDS_OT_pin_drag(Dragging, bpy.types.Operator):
     """Place a pin on the surface under the cursor, or take the one that is there, and drag it"""
 
-    bl_idname = Op.PIN_DRAG
     bl_label = "ARAP Pin: Drag"
 
     def invoke(self, context, event):
@@ -85,7 +82,6 @@ class ARAPFIELDS_OT_pin_drag(Dragging, bpy.types.Operator):
 class ARAPFIELDS_OT_pin_anchor(PinOperator, bpy.types.Operator):
     """Place an anchor on the surface under the cursor, or make the pin there an anchor or a pin again"""
 
-    bl_idname = Op.PIN_ANCHOR
     bl_label = "ARAP Pin: Anchor"
     bl_options = {"UNDO"}
 
@@ -111,48 +107,34 @@ class ARAPFIELDS_OT_pin_anchor(PinOperator, bpy.types.Operator):
 class ARAPFIELDS_OT_pin_add(PinOperator, bpy.types.Operator):
     """Place a pin on the object, at the place of its shown surface that is nearest to a location"""
 
-    bl_idname = Op.PIN_ADD
     bl_label = "ARAP Pin: Add"
     bl_options = {"REGISTER", "UNDO"}
 
     location: bpy.props.FloatVectorProperty(
         name="Location", description="Where the pin is placed, in the world", subtype="TRANSLATION"
     )
-    radius: bpy.props.FloatProperty(
-        name="Radius",
-        description="Of the region that the pin holds, in the world",
-        subtype="DISTANCE",
-        default=0.1,
-        min=1e-6,
+    radius: number(
+        "Radius", "Of the region that the pin holds, in the world", subtype="DISTANCE", default=0.1, min=1e-6
     )
-    anchor: bpy.props.BoolProperty(name="Anchor", description="Place an anchor")
+    anchor: flag("Anchor", "Place an anchor")
 
     def invoke(self, context, event):
         self.location = context.scene.cursor.location
         return self.execute(context)
 
-    def execute(self, context):
-        source = source_of(context)
-        try:
-            if source is None:
-                raise UserError("Select a mesh object")
-            context.view_layer.update()
-            pins.place(context, source, np.array(self.location), self.radius, anchor=self.anchor)
-        except (UserError, ValueError) as error:
-            return self.refuse(error)
-        return {"FINISHED"}
+    def change(self, context, source):
+        if source is None:
+            raise UserError("Select a mesh object")
+        pins.place(context, source, np.array(self.location), self.radius, anchor=self.anchor)
 
 
 class ARAPFIELDS_OT_pin_delete(PinOperator, bpy.types.Operator):
     """Delete the chosen pin or handle with its Empty, or the one under the cursor"""
 
-    bl_idname = Op.PIN_DELETE
     bl_label = "ARAP Pin: Delete"
     bl_options = {"UNDO"}
 
-    under: bpy.props.BoolProperty(
-        name="Under the Cursor", description="The one under the cursor", options={"SKIP_SAVE"}
-    )
+    under: flag("Under the Cursor", "The one under the cursor", options={"SKIP_SAVE"})
 
     def invoke(self, context, event):
         if not self.under:
@@ -176,7 +158,6 @@ class ARAPFIELDS_OT_pin_delete(PinOperator, bpy.types.Operator):
 class ARAPFIELDS_OT_pin_turn(PinOperator, bpy.types.Operator):
     """Turn the chosen pin, by the mouse or about an axis as Blender's R does; the shape follows"""
 
-    bl_idname = Op.PIN_TURN
     bl_label = "ARAP Pin: Turn"
 
     def invoke(self, context, event):

@@ -3,19 +3,16 @@
 
 import bpy
 
+from ..blender.property_definitions import collection, integer
 from ..poses.properties import ARAPFIELDS_PG_pose
 
 
 class ARAPFIELDS_PG_scene(bpy.types.PropertyGroup):
-    poses: bpy.props.CollectionProperty(
-        type=ARAPFIELDS_PG_pose, name="Poses", description="Fields that are kept with the file"
-    )
-    active_pose: bpy.props.IntProperty(
-        name="Active Pose", description="Row chosen in the list of poses", options={"SKIP_SAVE"}
-    )
-    pin_radius: bpy.props.IntProperty(
-        name="Radius",
-        description="Radius of the region that a new pin holds, on the screen",
+    poses: collection(ARAPFIELDS_PG_pose, "Poses", "Fields that are kept with the file")
+    active_pose: integer("Active Pose", "Row chosen in the list of poses", options={"SKIP_SAVE"})
+    pin_radius: integer(
+        "Radius",
+        "Radius of the region that a new pin holds, on the screen",
         subtype="PIXEL",
         default=24,
         min=2,

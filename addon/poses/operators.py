@@ -3,15 +3,13 @@ from pathlib import Path
 
 import bpy
 
-from ..blender.guide import Guided
 from ..blender.language import translated
-from ..blender.object_references import source_of
-from ..blender.source_operator import SourceOperator
+from ..blender.property_definitions import number, text
+from ..blender.source_operator import ReportingOperator, SourceOperator
 from ..core import poses
 from ..core.errors import UserError
 from ..core.poses import Pose
 from ..live import sessions
-from ..names import Op
 from . import applying
 
 SUFFIX = ".arappose"
@@ -45,19 +43,11 @@ def read(path):
         raise UserError("{path}: {error}", path=path, error=error.strerror) from error
 
 
-class PoseOperator(Guided):
-    """Mixin: runs `change(context)`, which returns the line to report; errors become reports."""
+class PoseOperator(ReportingOperator):
+    """Mixin of all of them."""
 
     bl_options = {"REGISTER", "UNDO"}
     guide = "characters"
-
-    def execute(self, context):
-        try:
-            self.report({"INFO"}, self.change(context))
-        except (UserError, ValueError, OSError) as error:
-            self.report({"ERROR"}, translated(error))
-            return {"CANCELLED"}
-        return {"FINISHED"}
 
 
 class OfSource(PoseOperator, SourceOperator):
@@ -67,13 +57,11 @@ class OfSource(PoseOperator, SourceOperator):
 class ARAPFIELDS_OT_save_pose(OfSource, bpy.types.Operator):
     """Keep the field that deforms the object, with the file, to apply it to other meshes of this shape"""
 
-    bl_idname = Op.SAVE_POSE
     bl_label = "Save Pose"
 
-    pose: bpy.props.StringProperty(name="Name", description="Name of the pose", default="Pose")
+    pose: text("Name", "Name of the pose", default="Pose")
 
-    def change(self, context):
-        source = source_of(context)
+    def change(self, context, source):
         session = sessions.live.get(source.session_uid)
         if session is not None:
             sessions.update(context, wait=sessions.WAIT, refined=True)
@@ -93,24 +81,13 @@ class ARAPFIELDS_OT_save_pose(OfSource, bpy.types.Operator):
 class ARAPFIELDS_OT_apply_pose(OfSource, bpy.types.Operator):
     """Put the object where a kept pose's field takes it; other meshes of the same shape do as well"""
 
-    bl_idname = Op.APPLY_POSE
     bl_label = "Apply Pose"
 
-    pose: bpy.props.StringProperty(name="Name", description="Name of the pose; empty for the chosen one")
-    filepath: bpy.props.StringProperty(
-        name="File", description="A pose's file, in place of a kept pose", subtype="FILE_PATH"
-    )
-    strength: bpy.props.FloatProperty(
-        name="Strength",
-        description="How far of the way the points go",
-        default=1.0,
-        soft_min=0.0,
-        soft_max=1.0,
-    )
+    pose: text("Name", "Name of the pose; empty for the chosen one")
+    filepath: text("File", "A pose's file, in place of a kept pose", subtype="FILE_PATH")
+    strength: number("Strength", "How far of the way the points go", default=1.0, soft_min=0.0, soft_max=1.0)
 
-    def change(self, context):
-        context.view_layer.update()
-        source = source_of(context)
+    def change(self, context, source):
         if self.filepath:
             name = Path(self.filepath).name
             content = read(self.filepath)
@@ -126,22 +103,18 @@ class OfPose(PoseOperator):
     """Mixin of those that need a kept pose."""
 
     @classmethod
-    def poll(cls, context):
-        if not kept_poses(context):
-            cls.poll_message_set(translated("Save a pose first"))
-            return False
-        return True
+    def obstacle(cls, context):
+        return None if kept_poses(context) else UserError("Save a pose first")
 
 
 class ARAPFIELDS_OT_remove_pose(OfPose, bpy.types.Operator):
     """Take the chosen pose off the list; what it was applied to stays"""
 
-    bl_idname = Op.REMOVE_POSE
     bl_label = "Remove Pose"
 
-    pose: bpy.props.StringProperty(name="Name", description="Name of the pose; empty for the chosen one")
+    pose: text("Name", "Name of the pose; empty for the chosen one")
 
-    def change(self, context):
+    def change(self, context, source):
         group, name = context.scene.arapfields, chosen(context, self.pose).name
         group.poses.remove(group.poses.find(name))
         group.active_pose = max(0, min(group.active_pose, len(group.poses) - 1))
@@ -151,10 +124,8 @@ class ARAPFIELDS_OT_remove_pose(OfPose, bpy.types.Operator):
 class PoseFile:
     """Mixin: a file is chosen in a window."""
 
-    filepath: bpy.props.StringProperty(name="File", description="The pose's file", subtype="FILE_PATH")
-    filter_glob: bpy.props.StringProperty(
-        name="Filter", description="Files that are shown", default=f"*{SUFFIX}", options={"HIDDEN"}
-    )
+    filepath: text("File", "The pose's file", subtype="FILE_PATH")
+    filter_glob: text("Filter", "Files that are shown", default=f"*{SUFFIX}", options={"HIDDEN"})
 
     def invoke(self, context, event):
         context.window_manager.fileselect_add(self)
@@ -164,10 +135,9 @@ class PoseFile:
 class ARAPFIELDS_OT_export_pose(PoseFile, OfPose, bpy.types.Operator):
     """Write the chosen pose to a file, for other files and scripts"""
 
-    bl_idname = Op.EXPORT_POSE
     bl_label = "Export Pose"
 
-    def change(self, context):
+    def change(self, context, source):
         entry = chosen(context, "")
         path = Path(bpy.path.abspath(self.filepath)).with_suffix(SUFFIX)
         partial = path.with_name(f"{path.name}.partial")
@@ -182,10 +152,9 @@ class ARAPFIELDS_OT_export_pose(PoseFile, OfPose, bpy.types.Operator):
 class ARAPFIELDS_OT_import_pose(PoseFile, PoseOperator, bpy.types.Operator):
     """Add a pose from a file to the list"""
 
-    bl_idname = Op.IMPORT_POSE
     bl_label = "Import Pose"
 
-    def change(self, context):
+    def change(self, context, source):
         content, name = read(self.filepath), Path(self.filepath).stem
         poses.from_bytes(content, Path(self.filepath).name)
         keep(context, name, content)

@@ -3,11 +3,11 @@
 
 import bpy
 
+from ..blender.property_definitions import text
+
 
 class ARAPFIELDS_PG_pose(bpy.types.PropertyGroup):
-    data: bpy.props.StringProperty(
-        name="Field", description="The field, with samples of the shape that it was solved on"
-    )
+    data: text("Field", "The field, with samples of the shape that it was solved on")
 
 
 CLASSES = [ARAPFIELDS_PG_pose]

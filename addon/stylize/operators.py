@@ -4,7 +4,7 @@ import bpy
 from ..blender import vertex_groups
 from ..blender.host import has_window
 from ..blender.native_options import options_of
-from ..blender.object_references import settings_of, source_of
+from ..blender.object_references import settings_of
 from ..blender.presets import preset_classes
 from ..blender.property_definitions import annotations, effective_values
 from ..blender.source_operator import SourceOperator
@@ -15,7 +15,6 @@ from ..deform.solve_job import SolveOperator, plan_solve_job
 from ..handles import empties
 from ..handles.native_handles import native_handles
 from ..live.sessions import end_for_job
-from ..names import Op
 from ..properties.choices import orientation, result_properties, style
 from ..results.placement import destination
 from ..solver import style_settings
@@ -24,7 +23,6 @@ from ..solver import style_settings
 class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
     """Turn the surface towards the faces of a solid, as rigidly as possible"""
 
-    bl_idname = Op.STYLIZE
     bl_label = "Stylize"
     bl_options = {"UNDO"}
     title = "Stylize"
@@ -77,16 +75,14 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
 class ARAPFIELDS_OT_set_style(SourceOperator, bpy.types.Operator):
     """Choose this style for the object"""
 
-    bl_idname = Op.SET_STYLE
     bl_label = "Choose Style"
     guide = "stylize"
     bl_options = {"INTERNAL", "UNDO"}
 
     style: style()
 
-    def execute(self, context):
-        settings_of(source_of(context)).stylize.style = self.style
-        return {"FINISHED"}
+    def change(self, context, source):
+        settings_of(source).stylize.style = self.style
 
 
 CLASSES = [

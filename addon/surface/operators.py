@@ -3,11 +3,11 @@ import json
 
 import bpy
 
-from ..blender.guide import Guided
 from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..blender.presets import preset_classes
 from ..blender.property_definitions import annotations, flag
+from ..blender.source_operator import ReportingOperator
 from ..blender.user_preferences import fit_cache
 from ..core.runtime.jobs import Item
 from ..core.settings.parameters import FIT
@@ -50,7 +50,7 @@ class ARAPFIELDS_OT_fit(JobOperator, bpy.types.Operator):
         return Item(source.name, work, apply)
 
 
-class ARAPFIELDS_OT_clear_cache(Guided, bpy.types.Operator):
+class ARAPFIELDS_OT_clear_cache(ReportingOperator, bpy.types.Operator):
     """Delete every fitted surface from disk; they are fitted again when needed"""
 
     bl_label = "Clear Fits"
@@ -60,9 +60,8 @@ class ARAPFIELDS_OT_clear_cache(Guided, bpy.types.Operator):
     def obstacle(cls, context):
         return busy()
 
-    def execute(self, context):
-        self.report({"INFO"}, translated("{count} fitted surfaces deleted", count=fit_cache().clear()))
-        return {"FINISHED"}
+    def change(self, context, source):
+        return translated("{count} fitted surfaces deleted", count=fit_cache().clear())
 
 
 CLASSES = [
