@@ -111,7 +111,7 @@ def read(context, source, in_place=False):
         broken = np.flatnonzero(~np.isfinite(arrays.vertices).all(axis=1))
         raise UserError(
             "{name}: {count} vertices have no finite position, the first is {first}",
-            name=source.name,
+            source,
             count=len(broken),
             first=broken[0],
         )

@@ -160,7 +160,7 @@ def _mesh_of(context, source, kept):
     with evaluated(context, source, kept) as (item, depsgraph):
         mesh = item.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
         if mesh is None:
-            raise UserError("{name}: Blender gives no mesh for it", name=source.name)
+            raise UserError("{name}: Blender gives no mesh for it", source)
         try:
             yield mesh
         finally:

@@ -17,7 +17,7 @@ class ObjectReference:
         """The object; UserError when it is in no scene any more."""
         item = self.find()
         if not in_scene(item):
-            raise UserError("{name} was deleted while it was worked on", name=self.name)
+            raise UserError("{name} was deleted while it was worked on", self)
         return item
 
     def find(self):
@@ -96,9 +96,9 @@ def refusal(item, in_edit_mode=False):
     if item is None:
         return UserError("Select a mesh object")
     if item.type != "MESH":
-        return UserError("{name} is not a mesh object", name=item.name)
+        return UserError("{name} is not a mesh object", item)
     if item.override_library is not None:
-        return UserError("{name} is a library override; make it local first", name=item.name)
+        return UserError("{name} is a library override; make it local first", item)
     if item.mode == "EDIT" and not in_edit_mode:
-        return UserError("{name} is in Edit Mode; leave it first", name=item.name)
+        return UserError("{name} is in Edit Mode; leave it first", item)
     return None

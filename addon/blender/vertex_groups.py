@@ -16,7 +16,7 @@ BLOCK = 4000  # vertices that are read at once, some milliseconds
 def missing(source, names):
     """Why a source lacks one of these groups, as a UserError; None where it has them."""
     name = next((name for name in names if name not in source.vertex_groups), None)
-    return name and UserError("{name} has no vertex group {group}", name=source.name, group=name)
+    return name and UserError("{name} has no vertex group {group}", source, group=name)
 
 
 def read_weights(context, source, names, in_place=False):
@@ -42,7 +42,7 @@ def _read(reference, shown, names):
     for begin in range(0, count, BLOCK):
         vertices = (shown or reference.get().data).vertices
         if len(vertices) != count:
-            raise UserError("{name} changed while it was worked on; run again", name=reference.name)
+            raise UserError("{name} changed while it was worked on; run again", reference)
         for index, vertex in enumerate(vertices[begin : begin + BLOCK], begin):
             for entry in vertex.groups:
                 if entry.group in weights:
@@ -51,9 +51,7 @@ def _read(reference, shown, names):
     weights = dict(zip(names, weights.values(), strict=True))
     for name in names:
         if not weights[name].any():
-            raise UserError(
-                "The vertex group {group} of {name} holds no vertex", group=name, name=reference.name
-            )
+            raise UserError("The vertex group {group} of {name} holds no vertex", reference, group=name)
     return weights
 
 

@@ -40,7 +40,7 @@ class CarriedObject:
         item = self.reference.get()
         entry = find(source, item)
         if entry is None:
-            raise UserError("{name} is no longer carried", name=self.reference.name)
+            raise UserError("{name} is no longer carried", self.reference)
         return item, entry
 
 

@@ -22,9 +22,9 @@ class Carrier:
     def __init__(self, context, item):
         self.points = self.read(context, item)
         if not len(self.points):
-            raise UserError("{name} is empty; it is not carried", name=item.name)
+            raise UserError("{name} is empty; it is not carried", item)
         if not np.isfinite(self.points).all():
-            raise UserError("{name} has points that are not finite; it is not carried", name=item.name)
+            raise UserError("{name} has points that are not finite; it is not carried", item)
 
     @staticmethod
     def is_on(item):

@@ -21,11 +21,9 @@ class CarriedOperator(SourceOperator):
     @classmethod
     def refuses(cls, source):
         if source.library is not None:
-            return UserError(
-                "{name} is linked from another file; make it local to carry objects", name=source.name
-            )
+            return UserError("{name} is linked from another file; make it local to carry objects", source)
         if cls.needs_carried and not settings_of(source).carried:
-            return UserError("{name} carries nothing", name=source.name)
+            return UserError("{name} carries nothing", source)
         return None
 
 
@@ -60,7 +58,7 @@ def carry(source, item, way):
     refuse(refusals.of_item(source, item))
     other = settings_of(item).carried_by
     if other is not None and other != source and carried_objects.find(other, item) is not None:
-        raise UserError("{name} is carried by {other} already", name=item.name, other=other.name)
+        raise UserError("{name} is carried by {other} already", item, other=other.name)
     entry = carried_objects.find(source, item)
     if entry is None:
         entry = settings_of(source).carried.add()

@@ -58,7 +58,7 @@ def play(item, points, counts):
     mesh's object, which still rests. A bake before goes."""
     layers = layers_of(item)
     if counts != [len(layer["position"].data) for layer in layers]:
-        raise UserError("{name} changed while it was worked on; run again", name=item.name)
+        raise UserError("{name} changed while it was worked on; run again", item)
     remove(item)
     name = f"{item.name}{PLAYED_SUFFIX}"
     mesh = bpy.data.meshes.new(name)

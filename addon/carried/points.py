@@ -17,9 +17,9 @@ SURFACE_NODE = "GeometryNodeDeformCurvesOnSurface"  # of modifiers that move hai
 
 def refuse_shared(item):
     if item.library is not None or item.data.library is not None or item.data.override_library is not None:
-        raise UserError("{name} is linked from another file; make it local to carry it", name=item.name)
+        raise UserError("{name} is linked from another file; make it local to carry it", item)
     if item.data.users > 1:
-        raise UserError("{name} shares its data with other objects; make it single-user", name=item.name)
+        raise UserError("{name} shares its data with other objects; make it single-user", item)
 
 
 class AttributeCarrier(Carrier):
@@ -28,7 +28,7 @@ class AttributeCarrier(Carrier):
     def read(self, context, item):
         refuse_shared(item)
         if any(follows_surface(modifier) for modifier in item.modifiers):
-            raise UserError("{name} follows its surface by a modifier of its own", name=item.name)
+            raise UserError("{name} follows its surface by a modifier of its own", item)
         layers = layers_of(item)
         self.counts = [len(layer["position"].data) for layer in layers]
         points = [mesh_arrays.vectors(layer["position"].data) for layer in layers]
@@ -43,7 +43,7 @@ class AttributeCarrier(Carrier):
 
     def write(self, item, entry, shape):
         if modifier_stack.find(item) is None:
-            raise UserError("The modifier of {name} was removed", name=item.name)
+            raise UserError("The modifier of {name} was removed", item)
         put_offsets(item, self.counts, shape - self.points.astype(np.float32))
 
     def snapshot(self, item, entry):
@@ -81,7 +81,7 @@ def follows_surface(modifier):
 def put_offsets(item, counts, offsets):
     layers = layers_of(item)
     if counts != [len(layer["position"].data) for layer in layers]:
-        raise UserError("{name} changed while it was worked on; run again", name=item.name)
+        raise UserError("{name} changed while it was worked on; run again", item)
     motion.written.add(item.session_uid)
     for layer, part in zip(layers, np.split(offsets, np.cumsum(counts)[:-1]), strict=True):
         attribute = layer.get(OFFSETS) or layer.new(OFFSETS, "FLOAT_VECTOR", "POINT")
@@ -96,9 +96,7 @@ class KeyCarrier(Carrier):
         refuse_shared(item)
         keys = item.data.shape_keys
         if keys is not None and (not keys.use_relative or item.show_only_shape_key):
-            raise UserError(
-                "{name} shows one shape key alone, or absolute ones; it is not carried", name=item.name
-            )
+            raise UserError("{name} shows one shape key alone, or absolute ones; it is not carried", item)
         self.parts = parts_of(item)
         return own_points(item)
 
@@ -112,9 +110,9 @@ class KeyCarrier(Carrier):
     def write(self, item, entry, shape):
         key = own_key(item)
         if key is None:
-            raise UserError("The shape key of {name} was removed", name=item.name)
+            raise UserError("The shape key of {name} was removed", item)
         if len(shape) != sum(width * count for width, count in parts_of(item)):
-            raise UserError("{name} changed while it was worked on; run again", name=item.name)
+            raise UserError("{name} changed while it was worked on; run again", item)
         motion.written.add(item.session_uid)
         put_key(key, key_points(item.data.shape_keys.reference_key) + (shape - self.points))
         item.data.update_tag()

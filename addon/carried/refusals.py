@@ -14,33 +14,33 @@ def of_entry(source, entry):
     """Why an entry of a source's list is left out now, as a UserError; None where it is not."""
     item = entry.item
     if not in_scene(item):
-        return UserError("{name}, which {source} carries, was deleted", name=entry.name, source=source.name)
+        return UserError("{name}, which {source} carries, was deleted", entry, source=source.name)
     reason = of_item(source, item)
     if reason is not None:
         return reason
     if item.mode == "EDIT":
-        return UserError("{name} is in Edit Mode; leave it first", name=item.name)
+        return UserError("{name} is in Edit Mode; leave it first", item)
     if not item.visible_get():
-        return UserError("{name} is hidden; it is not carried", name=item.name)
+        return UserError("{name} is hidden; it is not carried", item)
     return None
 
 
 def of_item(source, item):
     """Why an object cannot be carried at all, as a UserError; None where it can."""
     if item == source:
-        return UserError("{name} cannot carry itself", name=item.name)
+        return UserError("{name} cannot carry itself", item)
     if item.library is not None:
-        return UserError("{name} is linked from another file; make it local to carry it", name=item.name)
+        return UserError("{name} is linked from another file; make it local to carry it", item)
     settings = settings_of(item)
     if len(settings.handles):
-        return UserError("{name} has handles of its own; it is not carried", name=item.name)
+        return UserError("{name} has handles of its own; it is not carried", item)
     if settings.handle_of == source and any(e.empty == item for e in settings_of(source).handles):
-        return UserError("{name} is a handle of {source} itself", name=item.name, source=source.name)
+        return UserError("{name} is a handle of {source} itself", item, source=source.name)
     rigs = handle_rigs(source)
     if item in rigs:
-        return UserError("The bones of {name} are handles of {source}", name=item.name, source=source.name)
+        return UserError("The bones of {name} are handles of {source}", item, source=source.name)
     if constrained_to(item, rigs):
-        return UserError("{name} follows the armature by a constraint; it is not carried", name=item.name)
+        return UserError("{name} follows the armature by a constraint; it is not carried", item)
     return moves_anyway(source, item)
 
 
@@ -66,7 +66,7 @@ def is_moved_whole(source, item):
 
 
 def moves_with(item, other):
-    return UserError("{name} moves with {other} already", name=item.name, other=other.name)
+    return UserError("{name} moves with {other} already", item, other=other.name)
 
 
 POINTWISE = {"MESH", "CURVES", "POINTCLOUD", "GREASEPENCIL", "CURVE", "SURFACE", "LATTICE", "ARMATURE"}

@@ -57,7 +57,7 @@ class TransformCarrier(PoseCarrier):
 
     def read(self, context, item):
         if item.rotation_mode == "AXIS_ANGLE":
-            raise UserError("{name} turns by Axis Angle; choose another rotation mode", name=item.name)
+            raise UserError("{name} turns by Axis Angle; choose another rotation mode", item)
         corners = array([tuple(corner) for corner in item.bound_box])
         if item.type == "EMPTY" or not np.ptp(corners, axis=0).any():
             return posing.frame_points(item.empty_display_size if item.type == "EMPTY" else 0.05)

@@ -4,10 +4,13 @@
 class UserError(Exception):
     """What the user should read: which object, what is wrong, what to do.
 
-    A template with its values, so that the template can be translated where it is shown.
+    A template with its values, so that the template can be translated where it is shown; {name} is that of
+    `named`, an object or what stands for one.
     """
 
-    def __init__(self, template, **values):
+    def __init__(self, template, named=None, **values):
+        if named is not None:
+            values["name"] = named.name
         super().__init__(template.format(**values) if values else template)
         self.template, self.values = template, values
 

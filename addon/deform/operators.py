@@ -64,9 +64,7 @@ def require_reach_supported(handles, values):
         return
     for handle in handles:
         if handle.reach > 0:
-            raise UserError(
-                "{name} has a reach; take the method Fast, without Exact Handles", name=handle.name
-            )
+            raise UserError("{name} has a reach; take the method Fast, without Exact Handles", handle)
 
 
 CLASSES = [ARAPFIELDS_OT_deform, *preset_classes("deform", "Deform", DEFORM)]

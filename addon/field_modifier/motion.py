@@ -31,9 +31,7 @@ class Motion:
 def refusal(source):
     """Why an object cannot have a field modifier, as a UserError; None where it can."""
     if source.library is not None:
-        return UserError(
-            "{name} is linked from another file; choose New Object for the result", name=source.name
-        )
+        return UserError("{name} is linked from another file; choose New Object for the result", source)
     return None
 
 
@@ -62,7 +60,7 @@ def bind(context, source):
         take_helper(source, modifier, copied)
     mesh = carrier(source, modifier)
     if len(mesh.vertices) != count:
-        raise UserError("{name} changed while it was worked on; run again", name=source.name)
+        raise UserError("{name} changed while it was worked on; run again", source)
     return modifier
 
 
@@ -141,11 +139,11 @@ def write(source, motion):
     """Moves the object's points; UserError where its modifier is gone or the points are others."""
     modifier = modifier_stack.find(source)
     if modifier is None:
-        raise UserError("The modifier of {name} was removed", name=source.name)
+        raise UserError("The modifier of {name} was removed", source)
     written.add(source.session_uid)
     mesh = carrier(source, modifier)
     if len(mesh.vertices) != len(motion.offsets):
-        raise UserError("{name} changed while it was worked on; run again", name=source.name)
+        raise UserError("{name} changed while it was worked on; run again", source)
     write_to(mesh, motion)
 
 

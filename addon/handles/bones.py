@@ -20,7 +20,7 @@ def armature_of(context, source):
     parents = [source.parent] if source.parent is not None and source.parent.type == "ARMATURE" else []
     rig = next(iter([*selected, *moved_by, *parents]), None)
     if rig is None:
-        raise UserError("{name} follows no armature; select one as well", name=source.name)
+        raise UserError("{name} follows no armature; select one as well", source)
     if rig.pose is None or not len(rig.pose.bones):
         raise UserError("The armature {rig} has no bones to pose", rig=rig.name)
     return rig

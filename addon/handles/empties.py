@@ -84,7 +84,7 @@ def solve_handles(source, space, weights=None, where=matrix_of):
         options["allow_scale"] = entry.allow_scale and entry.kind != "POINT"
         handles.append(solve_handle(name_of(entry), entry.kind, *boxes, space, **options))
     if not handles:
-        raise UserError("{name} has no handle; add one in the panel's Handles section", name=source.name)
+        raise UserError("{name} has no handle; add one in the panel's Handles section", source)
     return [*handles, far_handle()] if holds_far(source) else handles
 
 
@@ -100,9 +100,9 @@ SHAPES = {"CUBE": "CUBE", "POINT": "SPHERE", "GROUP": "ARROWS", "PIN": "SPHERE"}
 def add(source, empty, kind="CUBE"):
     """Turns an Empty into a handle of the source, at rest where it is; one it was already is only reset."""
     if empty.empty_display_type == "IMAGE":
-        raise UserError("{name} shows an image; take another kind of Empty", name=empty.name)
+        raise UserError("{name} shows an image; take another kind of Empty", empty)
     if abs(np.linalg.det(current_box(empty)[:3, :3])) == 0:
-        raise UserError("{name} is flat; give it a size and a scale other than zero", name=empty.name)
+        raise UserError("{name} is flat; give it a size and a scale other than zero", empty)
     settings = settings_of(source)
     owner = settings_of(empty).handle_of
     if owner is not None and owner != source and find(owner, empty) >= 0:  # a copy of a handle is none
@@ -173,7 +173,7 @@ def selection_box(source, size):
     chosen = np.empty(len(mesh.vertices), dtype=bool)
     mesh.vertices.foreach_get("select", chosen)
     if not chosen.any():
-        raise UserError("{name} has no selected vertices", name=source.name)
+        raise UserError("{name} has no selected vertices", source)
     points = mesh_arrays.positions(mesh)[chosen]
     low, high = points.min(axis=0), points.max(axis=0)
     world = matrix_of(source)
@@ -192,7 +192,7 @@ def mirror(context, source, entry, axis):
     world = matrix_of(source)
     group = bpy.utils.flip_name(entry.group) if entry.kind == "GROUP" else ""
     if group and group not in source.vertex_groups:
-        raise UserError("{name} has no vertex group {group}", name=source.name, group=group)
+        raise UserError("{name} has no vertex group {group}", source, group=group)
     rest = flip @ movers.rest_of(entry) @ flip
     current = flip @ inverse(world) @ matrix_of(entry.empty) @ flip
     name, size = entry.empty.name, entry.empty.empty_display_size

@@ -52,7 +52,7 @@ def chosen_entries(context, source):
     copies = [item for item in context.selected_objects if settings_of(item).handle_of == source]
     if copies:
         raise UserError(
-            "{name} is a copy of a handle and is none itself; add it as a handle first", name=copies[0].name
+            "{name} is a copy of a handle and is none itself; add it as a handle first", copies[0]
         )
     index = settings.active_handle
     return [settings.handles[index]] if 0 <= index < len(settings.handles) else []
@@ -78,15 +78,13 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
     @classmethod
     def refuses(cls, source):
         if source.library is not None:
-            return UserError(
-                "{name} is linked from another file; make it local to give it handles", name=source.name
-            )
+            return UserError("{name} is linked from another file; make it local to give it handles", source)
         return None
 
     def change(self, context, source):
         group = self.group or (source.vertex_groups.active.name if source.vertex_groups else "")
         if self.kind == "GROUP" and not group:
-            raise UserError("{name} has no vertex group", name=source.name)
+            raise UserError("{name} has no vertex group", source)
         selected = [item for item in context.selected_objects if item.type == "EMPTY"]
         is_new = not selected or self.place != "AUTO" or source.mode == "EDIT"
         if is_new:

@@ -25,16 +25,14 @@ def refusal(item):
     """Why an object cannot be pinned, as a UserError; None where it can."""
     error = object_references.refusal(item)
     if error is None and item.library is not None:
-        error = UserError(
-            "{name} is linked from another file; make it local to give it handles", name=item.name
-        )
+        error = UserError("{name} is linked from another file; make it local to give it handles", item)
     if error is None and item.mode != "OBJECT":
-        error = UserError("{name} is not in Object Mode", name=item.name)
+        error = UserError("{name} is not in Object Mode", item)
     settings = settings_of(item) if error is None else None
     if settings is not None and not placement.in_place(settings.output, settings.target):
         error = UserError(
             "Pins move {name} itself; choose Original Mesh as its output, and no New Object as its result",
-            name=item.name,
+            item,
         )
     return error
 

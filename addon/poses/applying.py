@@ -21,20 +21,20 @@ def apply(context, source, pose, strength):
     """Moves the source's points by the pose's field, so much of the way; returns warnings."""
     reason = motion.refusal(source)
     if reason is None and settings_of(source).live_kind:
-        reason = UserError("{name} is live; end live mode first", name=source.name)
+        reason = UserError("{name} is live; end live mode first", source)
     if reason is not None:
         raise reason
     with modifier_stack.evaluated_mesh(context, source, in_place=True) as mesh:
         points, has_free_normals = positions(mesh), bool(modifier_stack.free_normals(mesh))
     if not len(points) or not np.isfinite(points).all():
-        raise UserError("{name} has no points, or some that are not finite", name=source.name)
+        raise UserError("{name} has no points, or some that are not finite", source)
     rest = pose.to_solve(points)
     try:
         posed = pose.field.apply(rest)
     except native.library().InvalidInput as error:
         raise UserError(
             "{name} lies outside of the pose's field; it was saved on another shape, or elsewhere ({error})",
-            name=source.name,
+            source,
             error=error,
         ) from error
     offsets, turns = strength * (pose.to_local(posed) - points), None

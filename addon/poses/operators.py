@@ -70,7 +70,7 @@ class ARAPFIELDS_OT_save_pose(OfSource, bpy.types.Operator):
         else:
             pose = applying.solved.get(source.session_uid)
         if pose is None:
-            raise UserError("Deform {name} first, or make it live: its field is saved", name=source.name)
+            raise UserError("Deform {name} first, or make it live: its field is saved", source)
         keep(context, self.pose, poses.to_bytes(pose))
         return translated("{name} kept", name=self.pose)
 

@@ -26,9 +26,9 @@ class FieldOperator(SourceOperator):
     @classmethod
     def refuses(cls, source):
         if modifier_stack.find(source) is None:
-            return UserError("{name} has no ARAP Fields modifier", name=source.name)
+            return UserError("{name} has no ARAP Fields modifier", source)
         if settings_of(source).live_kind:
-            return UserError("{name} is live; end live mode first", name=source.name)
+            return UserError("{name} is live; end live mode first", source)
         return None
 
 

@@ -69,7 +69,7 @@ def place_result(context, source, kind, output, result, moved, before):
         source[REPORT] = json.dumps(moved.report)
         return source
     if moved.topology is None and len(source.data.vertices) != len(before):
-        raise UserError("{name} changed while it was worked on; run again", name=source.name)
+        raise UserError("{name} changed while it was worked on; run again", source)
     if moved.topology is not None:
         mesh = result_objects.surface_mesh(source, moved.vertices, moved.topology)
         old, source.data = source.data, mesh
@@ -110,13 +110,11 @@ def refusal(source, output, result):
     if keeps_mesh(output, result):
         reason = motion.refusal(source)
     elif source.library is not None or source.data.library is not None:
-        reason = UserError(
-            "{name} is linked from another file; choose New Object for the result", name=source.name
-        )
+        reason = UserError("{name} is linked from another file; choose New Object for the result", source)
     else:
         reason = None
     if reason is None and result == "REPLACE" and settings_of(source).carried:
-        reason = UserError("{name} carries other objects; choose Modifier for the result", name=source.name)
+        reason = UserError("{name} carries other objects; choose Modifier for the result", source)
     if reason is None and output != "WARP" and result == "KEY":
         reason = UserError("A shape key keeps the mesh; choose Original Mesh for the output")
     if reason is None and output == "WARP" and not keeps_mesh(output, result):
@@ -130,13 +128,11 @@ def refusal_of_stack(source):
         return None
     names = [modifier.name for modifier in modifier_stack.shown_before(source, in_place=True)]
     if not names:
-        return UserError(
-            "{name} shows one shape key alone, or absolute ones; choose Modifier", name=source.name
-        )
+        return UserError("{name} shows one shape key alone, or absolute ones; choose Modifier", source)
     return UserError(
         "{modifiers} of {name} change its vertices before; apply them, or choose Modifier for the result",
+        source,
         modifiers=", ".join(names),
-        name=source.name,
     )
 
 

@@ -137,7 +137,7 @@ def shown_mesh(context, source, count):
     applied = modifier_stack.mesh_copy(context, source)
     if len(applied.vertices) != count:
         bpy.data.meshes.remove(applied)
-        raise UserError("{name} changed while it was worked on; run again", name=source.name)
+        raise UserError("{name} changed while it was worked on; run again", source)
     return applied
 
 

@@ -23,7 +23,7 @@ class ARAPFIELDS_OT_stiffness_preset(SourceOperator, bpy.types.Operator):
 
     @classmethod
     def refuses(cls, source):
-        return None if source.vertex_groups else UserError("{name} has no vertex group", name=source.name)
+        return None if source.vertex_groups else UserError("{name} has no vertex group", source)
 
     def change(self, context, source):
         settings = settings_of(source).stiffness

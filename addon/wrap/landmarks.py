@@ -21,9 +21,9 @@ def target_of(source, name=""):
     if name and target is None:
         raise UserError("There is no object {name}", name=name)
     if not in_scene(target):
-        raise UserError("Choose the object to wrap {name} onto", name=source.name)
+        raise UserError("Choose the object to wrap {name} onto", source)
     if target.type != "MESH" or target == source:
-        raise UserError("{name} is no other mesh object to wrap onto", name=target.name)
+        raise UserError("{name} is no other mesh object to wrap onto", target)
     return target
 
 

@@ -156,11 +156,7 @@ class ARAPFIELDS_OT_reset_bones(SourceOperator, bpy.types.Operator):
 
     @classmethod
     def refuses(cls, source):
-        return (
-            None
-            if rest_bones.fitted(source)
-            else UserError("No bones were fitted to {name}", name=source.name)
-        )
+        return None if rest_bones.fitted(source) else UserError("No bones were fitted to {name}", source)
 
     def change(self, context, source):
         rest_bones.reset(context, source)
