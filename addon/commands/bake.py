@@ -10,7 +10,7 @@ from ..core.errors import UserError
 from ..core.runtime import jobs
 from ..handles import empties
 from . import files
-from .single import objects_to_solve, progress
+from .single import failure, objects_to_solve, progress
 
 EXPORTS = {".abc": "ABC", ".usdc": "USD", ".glb": "GLTF"}
 
@@ -43,13 +43,15 @@ def run_bake(options, _):
             further["part"] = options.shard or (1, 1)
             if folder:
                 further["folder"] = folder
-        done = finished(call, {**given, **further})
+        reason = failure(call, scope="SELECTED", **given, **further)
+    if reason and not jobs.messages():
+        raise UserError(reason)
     for level, text in jobs.messages():
         print(f"arapfields: {text}", file=sys.stdout if level == "INFO" else sys.stderr, flush=True)
-    if done and suffix == ".blend":
+    if not reason and suffix == ".blend":
         files.write(target, [])
     failed = any(level != "INFO" for level, _ in jobs.messages())
-    return 0 if done and not failed else 1
+    return 1 if reason or failed else 0
 
 
 def animated(options):
@@ -69,15 +71,3 @@ def choose(sources):
         item.hide_set(False)
         item.select_set(True)
     bpy.context.view_layer.objects.active = sources[0]
-
-
-def finished(call, given):
-    """Whether an operator came to its end; KeyboardInterrupt where it was interrupted."""
-    try:
-        if call("EXEC_DEFAULT", scope="SELECTED", **given) == {"CANCELLED"}:
-            raise KeyboardInterrupt
-    except (RuntimeError, TypeError) as error:
-        if not jobs.messages():
-            raise UserError(str(error).removeprefix("Error: ").strip()) from error
-        return False
-    return True

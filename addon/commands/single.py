@@ -113,20 +113,26 @@ def solve(source, options):
         settings_of(source).fit.quality = given.pop("quality")
     begin = time.perf_counter()
     outcome = {"object": source.name, "status": "failed"}
-    try:
-        bpy.context.view_layer.objects.active = source
-        if call("EXEC_DEFAULT", **given) == {"CANCELLED"}:
-            raise KeyboardInterrupt
-    except (RuntimeError, TypeError) as error:
-        text = [line.removeprefix("Error: ") for line in str(error).splitlines() if line.strip()]
-        reason = " ".join(text).removeprefix(f"{source.name}: ")
-        return {**outcome, "message": f"{source.name}: {reason}"}, None
+    bpy.context.view_layer.objects.active = source
+    reason = failure(call, **given)
+    if reason:
+        return {**outcome, "message": f"{source.name}: {reason.removeprefix(f'{source.name}: ')}"}, None
     item = settings_of(source).results[-1].item
     seconds = time.perf_counter() - begin
     figures = json.loads(item[REPORT])
     message = "; ".join(text for _, text in jobs.messages()) or source.name
     outcome |= {"status": "done", "message": message, "seconds": seconds, "figures": figures}
     return outcome, (source, item)
+
+
+def failure(call, **given):
+    """Why an operator failed, in one line, or ""; KeyboardInterrupt where it was interrupted."""
+    try:
+        if call("EXEC_DEFAULT", **given) == {"CANCELLED"}:
+            raise KeyboardInterrupt
+    except (RuntimeError, TypeError) as error:
+        return " ".join(line.removeprefix("Error: ") for line in str(error).splitlines() if line.strip())
+    return ""
 
 
 def finish_names(options, results):
