@@ -21,7 +21,11 @@ class ReportingOperator(Guided):
             return self.refuse(error)
         if line:
             self.report({"INFO"}, line)
+        self.warn(context)
         return {"FINISHED"}
+
+    def warn(self, context):
+        """Reports what should not go unseen although the work is done."""
 
     def refuse(self, error):
         self.report({"ERROR"}, translated(error))

@@ -30,15 +30,9 @@ class HandleOperator(SourceOperator):
         without = cls.needs_handle and not settings_of(source).handles
         return UserError("The object has no handle") if without else None
 
-    def execute(self, context):
-        result = super().execute(context)
-        if result == {"FINISHED"} and self.counts_points:
-            self.warn_of_empty(source_of(context))
-        return result
-
-    def warn_of_empty(self, source):
+    def warn(self, context):
         """Says which handles hold nothing; a solve would refuse them."""
-        names = empties.holding_nothing(source)
+        names = empties.holding_nothing(source_of(context)) if self.counts_points else ()
         if names:
             self.report({"WARNING"}, translated(nothing_held(names)))
 

@@ -63,7 +63,7 @@ def test_a_bake_that_no_longer_fits_is_named():
 @in_blender
 def test_an_unsaved_file_asks_for_a_place():
     animated()
-    with pytest.raises(RuntimeError, match=r"save the \.blend first"):
+    with pytest.raises(RuntimeError, match=r"Save the \.blend first"):
         bpy.ops.arapfields.bake(start=1, end=2)
     path = tempfile.mkdtemp() + "/anywhere.pc2"
     assert bpy.ops.arapfields.bake(start=1, end=2, filepath=path) == {"FINISHED"}

@@ -80,7 +80,7 @@ def reports(operator, **properties):
     """{level: texts} that an operator reports when it is executed with these properties."""
     said = {"INFO": [], "WARNING": [], "ERROR": []}
     stand_in = type("Operator", (), {**vars(operator), **properties})
-    for base in reversed(operator.__mro__[1:2]):
+    for base in reversed([base for base in operator.__mro__[1:] if base.__module__.startswith("addon")]):
         for name, value in vars(base).items():
             if not name.startswith("__") and name not in vars(operator):
                 setattr(stand_in, name, value)

@@ -85,7 +85,7 @@ def test_strength_files_and_refusals():
     patch = rider("MESH")
     scenes.activate(patch, other)
     bpy.ops.arapfields.carry()
-    with pytest.raises(RuntimeError, match="deform Other first"):
+    with pytest.raises(RuntimeError, match="Deform Other first"):
         bpy.ops.arapfields.save_pose()
     saved(source)
     rest, of_patch = np.array([v.co for v in other.data.vertices]), shown(patch)

@@ -137,7 +137,7 @@ def test_bones_are_fitted_from_their_own_rest_each_time_and_can_be_reset():
     item, rig = rigged_bar()
     item.arapfields.wrap.onto = soup_of(item)
     rest = joints(rig, posed=False)
-    with pytest.raises(RuntimeError, match="no bones were fitted"):
+    with pytest.raises(RuntimeError, match="No bones were fitted"):
         bpy.ops.arapfields.reset_bones()
     rig.pose.bones["Upper"].rotation_mode = "XYZ"
     rig.pose.bones["Upper"].rotation_euler.x = 0.4
