@@ -66,8 +66,10 @@ class ARAPFIELDS_OT_bake(BakeOperator, bpy.types.Operator):
         weight = caches.keys_weight(len(bake.reader.surface.local), bake.frames.count)
         if isinstance(bake.store, caches.ShapeKeys) and weight > caches.HEAVY:
             size = caches.size_text(weight)
-            text = "Shape keys of {size} in the .blend and in memory; a cache would take neither"
-            self.warnings.append(f"{bake.name}: {translated(text, size=size)}")
+            line = translated(
+                "Shape keys of {size} in the .blend and in memory; a cache would take neither", size=size
+            )
+            self.warnings.append(f"{bake.name}: {line}")
 
 
 class ARAPFIELDS_OT_remove_bake(SourceOperator, bpy.types.Operator):
