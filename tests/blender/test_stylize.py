@@ -122,7 +122,7 @@ def test_custom_styles_that_give_no_normals_are_named():
     rng = np.random.default_rng(0)
     cloud.from_pydata(rng.normal(size=(300, 3)).tolist(), [], np.arange(300).reshape(-1, 3).tolist())
     for chosen, message in (
-        (None, "choose the object"),
+        (None, "Choose the object"),
         (bpy.data.objects.new("Cloud", cloud), "encloses no volume, and has 100 different face normals"),
         (bpy.data.objects.new("Empty Mesh", bpy.data.meshes.new("Empty Mesh")), "the mesh is empty"),
         (scenes.cube_empty((0, 0, 0), (1, 1, 1), "Axes"), "Axes is no mesh"),
