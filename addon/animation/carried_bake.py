@@ -69,11 +69,11 @@ class CarriedBake:
             try:
                 item, entry = carried.reference.get(), find(source, carried.reference.get())
                 if entry is None:
-                    raise UserError("{name} is no longer carried", name=item.name)
+                    raise UserError("{name} is no longer carried", item)
                 if carried in self.caches:
                     self.play(carried, item)
                 elif len(self.shapes.get(carried, ())) != self.frames.count:
-                    raise UserError("{name} was not there at every frame", name=item.name)
+                    raise UserError("{name} was not there at every frame", item)
                 elif isinstance(carried.carrier, AttributeCarrier):
                     played = played_points.play(item, carried.carrier.points, carried.carrier.counts)
                     yield from self.add_frames(carried, played)

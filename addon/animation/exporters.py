@@ -157,7 +157,7 @@ class MorphingCopy:
             if len(points) != len(self.item.data.vertices):
                 raise UserError(
                     "{name} has another number of vertices at frame {frame}; glTF needs the same at all",
-                    name=self.source.name,
+                    self.source,
                     frame=plain(frame),
                 )
             moved = np.array(self.world.inverted_safe() @ world)
@@ -211,6 +211,6 @@ def select(context, items):
         item.select_set(False)
     for item in items:
         if not item.visible_get():
-            raise UserError("{name} is hidden; show it to export it", name=item.name)
+            raise UserError("{name} is hidden; show it to export it", item)
         item.select_set(True)
     context.view_layer.objects.active = items[0]

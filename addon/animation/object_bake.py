@@ -61,7 +61,7 @@ class ObjectBake:
         elif self.simulation is None:
             self.store = SharedCache(path, modifier_path, frames, fps, part)
         else:
-            raise UserError("{name}: secondary motion is not baked in parts; bake it whole", name=source.name)
+            raise UserError("{name}: secondary motion is not baked in parts; bake it whole", source)
 
     @property
     def reference(self):

@@ -82,7 +82,7 @@ class ARAPFIELDS_OT_remove_bake(SourceOperator, bpy.types.Operator):
     @classmethod
     def refuses(cls, source):
         played = modifier_stack.find_cache(source)
-        return UserError("{name} plays no bake", name=source.name) if played is None else None
+        return UserError("{name} plays no bake", source) if played is None else None
 
     def change(self, context, source):
         cache_modifier.remove(source)

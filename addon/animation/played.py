@@ -38,7 +38,7 @@ def problem(source, look_closely=False):
     if not path.is_file():
         return UserError(
             "{name}: its bake {path} is not there; choose the file in its modifier, or bake again",
-            name=source.name,
+            source,
             path=path,
         )
     if record.get("count") not in (None, len(source.data.vertices)):
@@ -57,11 +57,11 @@ def closely(source, path, record):
         with PointCacheReader(path) as cache:
             points = cache.points
     except (ValueError, OSError) as error:
-        return UserError("{name}: {error}", name=source.name, error=error)
+        return UserError("{name}: {error}", source, error=error)
     if record.get("points") not in (None, points):
         return UserError(
             "{name}: {path} holds {found} points; its bake had {count}",
-            name=source.name,
+            source,
             path=path,
             found=points,
             count=record["points"],
@@ -70,4 +70,4 @@ def closely(source, path, record):
 
 
 def changed(source):
-    return UserError("{name}: its mesh changed since the bake; bake again", name=source.name)
+    return UserError("{name}: its mesh changed since the bake; bake again", source)

@@ -30,7 +30,7 @@ class LiveModifier:
     def require(self, source):
         """UserError where the user has removed or applied it."""
         if modifier_stack.find(source) is None:
-            raise UserError("The modifier of {name} was removed", name=source.name)
+            raise UserError("The modifier of {name} was removed", source)
 
     def show(self, source, shape):
         """Moves the source's points to a session's shape; whether it could."""

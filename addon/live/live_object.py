@@ -54,7 +54,7 @@ class LiveObject:
         """Turns it into an ordinary result of that kind; returns that."""
         item = self.result.find()
         if item is None:
-            raise UserError("{name} has no live result", name=source.name)
+            raise UserError("{name} has no live result", source)
         forget(source)
         mesh = item.data
         bpy.data.objects.remove(item)

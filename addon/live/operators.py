@@ -44,9 +44,7 @@ class ARAPFIELDS_OT_live(ReportingOperator, bpy.types.Operator):
             return {"FINISHED"}
         try:
             if self.kind == "DEFORM" and not empties.used(source):
-                raise UserError(
-                    "{name} has no handle; add one in the panel's Handles section", name=source.name
-                )
+                raise UserError("{name} has no handle; add one in the panel's Handles section", source)
             context.view_layer.update()
             sessions.begin(context, source, self.kind)
         except (UserError, ValueError) as error:

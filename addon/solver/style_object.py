@@ -19,7 +19,7 @@ cache = {}  # key → ObjectStyle or (k, 3) normals
 def refusal(item):
     """The UserError of an object that can be no style, as far as it is seen without reading; else None."""
     if item.type != "MESH":
-        return UserError("{name} is no mesh; a mesh object is needed as a style", name=item.name)
+        return UserError("{name} is no mesh; a mesh object is needed as a style", item)
     return None
 
 

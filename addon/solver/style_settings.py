@@ -105,7 +105,7 @@ def region_weights(context, source, settings, of_groups, in_place):
         held = material_weights(context, source, settings.region_material, in_place)
         weights = held if weights is None else weights * held
     if weights is not None and not weights.any():
-        raise UserError("The region of {name} holds no vertex", name=source.name)
+        raise UserError("The region of {name} holds no vertex", source)
     return weights
 
 
@@ -113,9 +113,7 @@ def material_weights(context, source, material, in_place):
     """(n,) 1 at the vertices of faces with that material."""
     slots = [index for index, slot in enumerate(source.material_slots) if slot.material == material]
     if not slots:
-        raise UserError(
-            "{name} does not use the material {material}", name=source.name, material=material.name
-        )
+        raise UserError("{name} does not use the material {material}", source, material=material.name)
     with modifier_stack.evaluated_mesh(context, source, in_place) as mesh:
         numbers = np.empty(len(mesh.polygons), dtype=np.int32)
         counts, corners = np.empty_like(numbers), np.empty(len(mesh.loops), dtype=np.int32)
