@@ -5,6 +5,7 @@ ARAPFIELDS_WORKER   command that runs a Python file in another Blender instead, 
                     --factory-startup --python-use-system-env --python`; it must import arapfields and pytest
 """
 
+import inspect
 import json
 import os
 import shlex
@@ -74,3 +75,18 @@ def blender(tmp_path_factory):
 @pytest.fixture
 def user_folder(tmp_path):
     return isolated(tmp_path)
+
+
+def pytest_itemcollected(item):
+    if item.get_closest_marker("in_blender"):
+        item.fixturenames.insert(0, "blender")
+
+
+def pytest_pyfunc_call(pyfuncitem):
+    """The body of a test marked in_blender runs in the worker."""
+    if pyfuncitem.get_closest_marker("in_blender"):
+        given, names = pyfuncitem.funcargs, inspect.signature(pyfuncitem.obj).parameters
+        worker, function = given["blender"], pyfuncitem.originalname
+        worker.call(str(pyfuncitem.path), function, {name: given[name] for name in names})
+        return True
+    return None

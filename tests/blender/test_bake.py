@@ -2,7 +2,8 @@
 """Baking animated handles into shape keys, and leaving it half done."""
 
 import numpy as np
-from support.blender.inside import IN_BLENDER, in_blender
+import pytest
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -12,8 +13,9 @@ if IN_BLENDER:
     from addon.animation import caches
     from addon.core.runtime import jobs
 
+pytestmark = pytest.mark.in_blender
 
-@in_blender
+
 def test_animated_handles_are_baked_into_keys():
     bar = animated()
     bpy.context.scene.frame_set(3)
@@ -30,7 +32,6 @@ def test_animated_handles_are_baked_into_keys():
     assert np.all(np.diff(heights) > 0.1)
 
 
-@in_blender
 def test_a_cancelled_bake_leaves_nothing():
     """Stepped as a window would: cancelled while solving and while storing."""
     bar = animated()
@@ -48,7 +49,6 @@ def test_a_cancelled_bake_leaves_nothing():
         assert names() == before and not bar.hide_get(), stage
 
 
-@in_blender
 def test_many_keys_say_what_they_weigh():
     animated()
     caches.HEAVY = 1e3

@@ -2,7 +2,8 @@
 """Bakes as point caches: what plays them, where they lie, and what is left when something goes wrong."""
 
 import numpy as np
-from support.blender.inside import IN_BLENDER, in_blender
+import pytest
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -17,8 +18,9 @@ if IN_BLENDER:
     from addon.field_modifier import cache_modifier
     from addon.live import sessions
 
+pytestmark = pytest.mark.in_blender
 
-@in_blender
+
 def test_a_cache_plays_what_the_solver_says_at_every_frame():
     bar, folder = saved_animation()
     bpy.context.scene.frame_set(3)
@@ -35,7 +37,6 @@ def test_a_cache_plays_what_the_solver_says_at_every_frame():
     assert np.abs(at(bar, 9) - at(bar, 5)).max() == 0
 
 
-@in_blender
 def test_the_cache_stands_where_the_field_does_and_a_second_bake_keeps_its_modifier():
     bar, folder = saved_animation()
     bar.modifiers.new("Subdivision", "SUBSURF").levels = 1
@@ -57,7 +58,6 @@ def test_the_cache_stands_where_the_field_does_and_a_second_bake_keeps_its_modif
     assert [m.type for m in bar.modifiers] == ["NODES", "SUBSURF"] and field.show_viewport
 
 
-@in_blender
 def test_several_objects_are_baked_in_one_pass_and_one_that_fails_stops_no_other():
     first, folder = saved_animation("One")
     second, _ = saved_animation("Two", folder)
@@ -71,7 +71,6 @@ def test_several_objects_are_baked_in_one_pass_and_one_that_fails_stops_no_other
         assert np.abs(at(bar, 3) - solved(bar, 3)).max() <= EXACT
 
 
-@in_blender
 def test_what_moves_before_the_field_is_read_at_every_frame():
     bar, _ = saved_animation()
     add_modifier(bar, "ARMATURE")
@@ -92,7 +91,6 @@ def test_what_moves_before_the_field_is_read_at_every_frame():
     assert np.abs(shown[5] - shown[2]).max() > 0.2
 
 
-@in_blender
 def test_outputs_that_are_no_modifier_play_on_an_object_of_their_own():
     bar, folder = saved_animation()
     bar.arapfields.output, bar.arapfields.resolution = "SURFACE", 24
@@ -107,7 +105,6 @@ def test_outputs_that_are_no_modifier_play_on_an_object_of_their_own():
     assert np.abs(rise[right][:, 2] - 0.4).max() < 0.1 and np.abs(rise[at(item, 1)[:, 0] < -0.9]).max() < 0.1
 
 
-@in_blender
 def test_live_and_deform_put_the_field_back_and_a_bake_ends_live():
     bar, _ = saved_animation()
     bpy.ops.arapfields.bake(start=1, end=5)

@@ -6,7 +6,7 @@ import resource
 import tempfile
 
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -14,8 +14,9 @@ if IN_BLENDER:
 
     from addon.animation import played
 
+pytestmark = pytest.mark.in_blender
 
-@in_blender
+
 def test_whatever_goes_wrong_is_named_and_the_last_good_cache_stays():
     _, folder = saved_animation()
     bpy.ops.arapfields.bake(start=1, end=3)
@@ -44,7 +45,6 @@ def test_whatever_goes_wrong_is_named_and_the_last_good_cache_stays():
     fails("Nothing that moves Bar is animated", range="HANDLES")
 
 
-@in_blender
 def test_a_bake_that_no_longer_fits_is_named():
     bar, folder = saved_animation()
     assert bpy.ops.arapfields.bake(range="HANDLES") == {"FINISHED"}
@@ -60,7 +60,6 @@ def test_a_bake_that_no_longer_fits_is_named():
     assert "bytes" in str(played.problem(bar, look_closely=True))
 
 
-@in_blender
 def test_an_unsaved_file_asks_for_a_place():
     animated()
     with pytest.raises(RuntimeError, match=r"Save the \.blend first"):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -17,6 +17,8 @@ if IN_BLENDER:
     from support.blender.baking import EXACT, solved
 
     from addon.core.runtime import jobs
+
+pytestmark = pytest.mark.in_blender
 
 SIDE, FRAMES = 500, 40  # 250,000 vertices; 120 MB of frames
 MOST = 1e9  # bytes over idle that a bake may take
@@ -55,7 +57,6 @@ def memory():
 
 
 @pytest.mark.slow
-@in_blender
 def test_a_long_bake_of_a_large_mesh_takes_little_memory_and_plays_anywhere():
     item, folder = torus(), Path(tempfile.mkdtemp())
     bpy.context.scene.frame_set(1)

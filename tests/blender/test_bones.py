@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -13,12 +13,13 @@ if IN_BLENDER:
 
     from addon.live import sessions
 
+pytestmark = pytest.mark.in_blender
+
 QUICK = {"field": "radial", "samples": 2000}
 STOPPED = 5e-4  # how far apart solves end whose targets differ by rounding alone
 SAME = 1e-6  # of the size: single precision of matrices and positions
 
 
-@in_blender
 def test_posed_bones_drive_the_field_live_and_the_armature_is_not_doubled():
     bar, rig = rigged_bar()
     rest = scenes.world_points(bar)
@@ -47,7 +48,6 @@ def test_posed_bones_drive_the_field_live_and_the_armature_is_not_doubled():
     assert [m.name for m in bar.modifiers] == ["Armature"] and not bar.arapfields.silenced
 
 
-@in_blender
 def test_a_bone_equals_a_constrained_empty_with_the_same_region():
     bar, rig = rigged_bar()
     rest = scenes.world_points(bar)
@@ -92,7 +92,6 @@ def test_a_bone_equals_a_constrained_empty_with_the_same_region():
     assert np.abs(motions[0] - motions[1]).max() < STOPPED and moved.max() > 0.4
 
 
-@in_blender
 def test_frames_in_any_order_give_the_same_poses():
     bar, rig = rigged_bar()
     bone = rig.pose.bones["Second"]
@@ -113,7 +112,6 @@ def test_frames_in_any_order_give_the_same_poses():
     assert np.abs(shown[5] - shown[9]).max() > 0.5
 
 
-@in_blender
 def test_bones_without_groups_hold_what_lies_about_them():
     bar, rig = rigged_bar(with_groups=False)
     assert bpy.ops.arapfields.add_bones(bones="DEFORMING") == {"FINISHED"}
@@ -130,7 +128,6 @@ def test_bones_without_groups_hold_what_lies_about_them():
     assert np.abs(shift[rest[:, 0] < -0.9]).max() < 0.05
 
 
-@in_blender
 def test_what_is_wrong_with_bones_is_named():
     bar = scenes.bar()
     with pytest.raises(RuntimeError, match="Bar follows no armature"):
@@ -159,7 +156,6 @@ def test_what_is_wrong_with_bones_is_named():
         bpy.ops.arapfields.deform()
 
 
-@in_blender
 def test_handle_operators_work_on_bones():
     bar, rig = rigged_bar()
     bpy.ops.arapfields.add_bones()
@@ -180,7 +176,6 @@ def test_handle_operators_work_on_bones():
     assert bar.modifiers["Armature"].show_viewport
 
 
-@in_blender
 def test_a_replaced_mesh_is_not_posed_again():
     bar, rig = rigged_bar()
     bpy.ops.arapfields.add_bones()

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -14,6 +14,8 @@ if IN_BLENDER:
 
     from addon.live import sessions
 
+pytestmark = pytest.mark.in_blender
+
 CLOSE = 1e-5  # single precision of positions of size one
 
 
@@ -21,7 +23,6 @@ KINDS = ["MESH", "CURVES", "GREASEPENCIL", "CURVE", "LATTICE", "EMPTY", "ARMATUR
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@in_blender
 def test_each_kind_follows_live_and_comes_back(kind):
     bar, moving = body()
     item = rider(kind)
@@ -49,7 +50,6 @@ def test_each_kind_follows_live_and_comes_back(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@in_blender
 def test_each_kind_goes_with_a_solve_and_is_released(kind):
     bar, moving = body()
     item = rider(kind)
@@ -67,7 +67,6 @@ def test_each_kind_goes_with_a_solve_and_is_released(kind):
     assert not bar.arapfields.carried and item.arapfields.carried_by is None
 
 
-@in_blender
 def test_what_is_rigid_stays_so():
     bar, moving = body()
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, location=(0.7, 0, 0.2), segments=12, ring_count=8)
@@ -93,7 +92,6 @@ def test_what_is_rigid_stays_so():
     assert np.abs(scenes.world_points(eye) - before).max() < CLOSE and not any(eye.delta_location)
 
 
-@in_blender
 def test_an_eye_on_a_bone_does_not_move_twice():
     """A child of a bone that is a handle: it is where the field has it, not the bone's motion on top."""
     bar, rig = rigged_bar()

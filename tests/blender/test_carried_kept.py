@@ -5,7 +5,7 @@ import tempfile
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -16,11 +16,12 @@ if IN_BLENDER:
 
     from addon.live import sessions
 
+pytestmark = pytest.mark.in_blender
+
 CLOSE = 1e-5  # single precision of positions of size one
 
 
 @pytest.mark.parametrize("format", ["PC2", "KEYS"])
-@in_blender
 def test_all_are_baked_at_once(format):
     bar, moving = body()
     items = [rider(kind) for kind in ("MESH", "CURVE", "EMPTY", "ARMATURE", "CURVES", "GREASEPENCIL")]
@@ -62,7 +63,6 @@ def test_all_are_baked_at_once(format):
     assert not any(data.name.endswith("_played") for data in (*bpy.data.objects, *bpy.data.meshes))
 
 
-@in_blender
 def test_undo_and_redo_take_all_along():
     bpy.context.preferences.edit.use_global_undo = True
     bar, moving = body()
@@ -94,7 +94,6 @@ def test_undo_and_redo_take_all_along():
     assert max(np.abs(one - other).max() for one, other in zip(found, before, strict=True)) < CLOSE
 
 
-@in_blender
 def test_renders_show_all_at_the_frame_that_is_rendered():
     scene = camera(16)
     bar, moving = body()
@@ -116,7 +115,6 @@ def test_renders_show_all_at_the_frame_that_is_rendered():
 
 
 @pytest.mark.parametrize("kind", ["EMPTY", "ARMATURE"])
-@in_blender
 def test_files_of_versions_without_a_kind_of_base_come_back(kind):
     bar, moving = body()
     item = rider(kind)
@@ -141,7 +139,6 @@ def test_files_of_versions_without_a_kind_of_base_come_back(kind):
     assert np.abs(shown(item) - rest).max() < CLOSE
 
 
-@in_blender
 def test_another_way_to_be_carried_spoils_nothing_of_the_others():
     """An armature that follows, then moves as a whole; an Empty and a patch come after it in the list."""
     bar, moving = body()

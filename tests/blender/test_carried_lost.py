@@ -5,7 +5,7 @@ import tempfile
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -16,6 +16,8 @@ if IN_BLENDER:
 
     from addon.core.runtime import jobs
     from addon.live import sessions
+
+pytestmark = pytest.mark.in_blender
 
 CLOSE = 1e-5  # single precision of positions of size one
 
@@ -36,7 +38,6 @@ def from_another_file(*kinds):
     return into.objects
 
 
-@in_blender
 def test_what_is_linked_is_named_and_the_rest_goes_on():
     bar, moving = body()
     linked = from_another_file("MESH")[0]
@@ -63,7 +64,6 @@ def test_what_is_linked_is_named_and_the_rest_goes_on():
 
 
 @pytest.mark.parametrize("kind", ["MESH", "EMPTY", "CURVES", "CURVE", "ARMATURE"])
-@in_blender
 def test_library_overrides_are_carried_or_named(kind):
     """What moves as a whole, a mesh and bones need none of the linked data; other points lie there."""
     bar, moving = body()
@@ -91,7 +91,6 @@ def test_library_overrides_are_carried_or_named(kind):
     assert np.abs(shown(item) - before).max() < CLOSE
 
 
-@in_blender
 def test_one_that_is_hidden_or_deleted_while_live_is_named_and_nothing_of_the_rest_is_lost():
     bar, moving = body()
     items = [rider(kind) for kind in ("MESH", "CURVES", "EMPTY", "LATTICE")]
@@ -130,7 +129,6 @@ def test_one_that_is_hidden_or_deleted_while_live_is_named_and_nothing_of_the_re
     assert not bar.arapfields.carried and not items[0].modifiers
 
 
-@in_blender
 def test_the_influence_mask_counts_where_a_carried_object_has_weights_of_that_name():
     bar, moving = body()
     bar.vertex_groups.new(name="Face").add(list(range(len(bar.data.vertices))), 1.0, "REPLACE")

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -15,10 +15,11 @@ if IN_BLENDER:
     from addon.core.runtime import jobs
     from addon.live import sessions
 
+pytestmark = pytest.mark.in_blender
+
 CLOSE = 1e-5  # single precision of positions of size one
 
 
-@in_blender
 def test_what_moves_anyway_is_named_and_left():
     bar, _ = body()
     patch, spot, cage = rider("MESH"), rider("EMPTY"), rider("LATTICE")
@@ -36,7 +37,6 @@ def test_what_moves_anyway_is_named_and_left():
     assert len(bar.arapfields.carried) == 2
 
 
-@in_blender
 def test_bad_ones_are_named_and_the_rest_goes_on():
     bar, moving = body()
     good = rider("MESH")
@@ -79,7 +79,6 @@ def test_bad_ones_are_named_and_the_rest_goes_on():
     assert np.abs(shown(good) - before).max() < 1e-5 and len(bar.arapfields.carried) == 6
 
 
-@in_blender
 def test_a_moved_or_edited_one_follows_from_where_it_is():
     bar, moving = body()
     patch, spot = rider("MESH"), rider("EMPTY")
@@ -105,7 +104,6 @@ def test_a_moved_or_edited_one_follows_from_where_it_is():
     assert np.abs(shown(patch) - taken(session, rest)).max() < CLOSE
 
 
-@in_blender
 def test_a_shirt_of_the_same_armature_is_not_posed_twice():
     bar, rig = rigged_bar()
     shirt = bar.copy()
@@ -129,7 +127,6 @@ def test_a_shirt_of_the_same_armature_is_not_posed_twice():
     assert shirt.modifiers["Armature"].show_viewport and len(shirt.modifiers) == 1
 
 
-@in_blender
 def test_a_group_of_a_bone_that_is_missing_is_named():
     bar, _ = rigged_bar()
     bpy.ops.arapfields.add_bones()

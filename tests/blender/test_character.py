@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 import arapfields as af
 
@@ -15,11 +15,12 @@ if IN_BLENDER:
     from addon.core.runtime import jobs
     from addon.live import sessions
 
+pytestmark = pytest.mark.in_blender
+
 STEPS = 4  # of live mode, in which its solver comes to rest
 
 
 @pytest.mark.slow  # about ten seconds
-@in_blender
 def test_a_character_moves_whole():
     person = character.build()
     rest = {

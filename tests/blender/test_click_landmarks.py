@@ -4,7 +4,8 @@
 from types import SimpleNamespace
 
 import numpy as np
-from support.blender.inside import IN_BLENDER, in_blender
+import pytest
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -13,6 +14,8 @@ if IN_BLENDER:
 
     from addon.blender.object_references import ObjectReference
     from addon.wrap.clicking import ARAPFIELDS_OT_click_landmarks as Operator
+
+pytestmark = pytest.mark.in_blender
 
 
 def clicker():
@@ -62,7 +65,6 @@ def clicker():
     return item, click
 
 
-@in_blender
 def test_a_click_just_beside_the_surface_takes_its_edge():
     item, click = clicker()
     assert click(-1.08, 0.0) == ({"RUNNING_MODAL"}, [0])
@@ -72,7 +74,6 @@ def test_a_click_just_beside_the_surface_takes_its_edge():
     assert np.abs(ends[0].x + 1) < 0.05 and np.abs(ends[1].z - 0.25) < 0.05
 
 
-@in_blender
 def test_a_click_on_neither_selects_nothing_and_the_sidebar_has_its_own():
     _, click = clicker()
     assert click(1.5, 0.0) == ({"RUNNING_MODAL"}, [])  # between the two

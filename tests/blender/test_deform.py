@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -14,10 +14,11 @@ if IN_BLENDER:
 
     from addon.core.runtime import jobs
 
+pytestmark = pytest.mark.in_blender
+
 ON_SOURCE = 2e-6  # single precision of positions of size one
 
 
-@in_blender
 def test_the_moved_end_follows_and_the_held_end_stays():
     bar, _, moving = scenes.bar_with_handles()
     before = scenes.world_points(bar)
@@ -30,7 +31,6 @@ def test_the_moved_end_follows_and_the_held_end_stays():
     assert np.array_equal(scenes.world_points(bar), before)
 
 
-@in_blender
 def test_unmoved_handles_give_the_shape_itself():
     bar, *_ = scenes.bar_with_handles()
     before = scenes.world_points(bar)
@@ -38,7 +38,6 @@ def test_unmoved_handles_give_the_shape_itself():
     assert np.abs(scenes.world_points(bpy.data.objects["Bar_deformed"]) - before).max() < 5e-3
 
 
-@in_blender
 def test_everything_but_positions_is_byte_equal():
     bar, _, moving = scenes.bar_with_handles()
     scenes.decorate(bar)
@@ -50,7 +49,6 @@ def test_everything_but_positions_is_byte_equal():
     assert result.data != bar.data and scenes.everything(bar) == before
 
 
-@in_blender
 def test_shape_keys_stay_and_the_motion_is_one_more():
     bar, _, moving = scenes.bar_with_handles()
     bar.shape_key_add(name="Basis")
@@ -77,7 +75,6 @@ def test_shape_keys_stay_and_the_motion_is_one_more():
     assert np.abs(scenes.world_points(result) - shown).max() < 1e-6
 
 
-@in_blender
 def test_modifiers_are_read_and_the_result_is_what_was_shown():
     bar, _, moving = scenes.bar_with_handles()
     bar.modifiers.new("Subdivision", "SUBSURF").levels = 1
@@ -101,7 +98,6 @@ PLACES = {
 
 
 @pytest.mark.parametrize("place", PLACES)
-@in_blender
 def test_a_result_lands_on_its_source_wherever_that_is(place):
     """One handle moves as a screw of the whole bar: the result is the rigidly moved bar."""
     bar = scenes.bar()
@@ -129,7 +125,6 @@ def test_a_result_lands_on_its_source_wherever_that_is(place):
     assert np.abs(scenes.world_points(result) - expected).max() < 0.03 * size
 
 
-@in_blender
 def test_a_second_run_updates_the_same_object():
     scenes.bar_with_handles()
     for _ in range(2):
@@ -139,7 +134,6 @@ def test_a_second_run_updates_the_same_object():
     assert len([m for m in bpy.data.meshes if "deformed" in m.name]) == 1
 
 
-@in_blender
 def test_same_seed_same_result():
     bar, _, moving = scenes.bar_with_handles()
     moving.location.z += 0.4
@@ -151,7 +145,6 @@ def test_same_seed_same_result():
     assert np.array_equal(*reports)
 
 
-@in_blender
 def test_several_objects_in_one_call_and_one_that_fails():
     bars = [scenes.bar_with_handles(name)[0] for name in ("One", "Two")]
     bare = scenes.bar("Bare")

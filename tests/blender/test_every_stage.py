@@ -6,7 +6,7 @@ same object (or what is left) can be worked on again.
 """
 
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -15,6 +15,8 @@ if IN_BLENDER:
 
     from addon.core.runtime import jobs
     from addon.live import sessions
+
+pytestmark = pytest.mark.in_blender
 
 STAGES = ["idle", "job", "live", "bake"]
 ACTIONS = [
@@ -34,7 +36,6 @@ ACTIONS = [
 @pytest.mark.parametrize("which", ["source", "handle"])
 @pytest.mark.parametrize("stage", STAGES)
 @pytest.mark.parametrize("action", ACTIONS)
-@in_blender
 def test_nothing_breaks(action, stage, which):
     jobs.board.messages.clear()
     with stages.watched() as errors:
@@ -49,7 +50,6 @@ def test_nothing_breaks(action, stage, which):
 
 
 @pytest.mark.parametrize("target", ["MODIFIER", "NEW"])
-@in_blender
 def test_undone_past_live_and_back_leaves_nothing_astray(target):
     bar, _, moving = scenes.bar_with_handles()
     bar.arapfields.result = target

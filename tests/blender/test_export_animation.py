@@ -12,12 +12,14 @@ import types
 import numpy as np
 import pytest
 from pxr import UsdGeom
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
     from support.blender.baking import saved_animation
+
+pytestmark = pytest.mark.in_blender
 
 EXACT = 1e-6  # of the object's size: single precision
 READER = """
@@ -87,7 +89,6 @@ def state(item):
 
 
 @pytest.mark.parametrize("kind", ["ABC", "USD", "GLTF"])
-@in_blender
 def test_what_is_exported_is_read_back(kind):
     """By Blender itself, in a process that never heard of the extension."""
     bar, folder = scene_to_export()
@@ -116,7 +117,6 @@ def test_what_is_exported_is_read_back(kind):
         assert read["range"].tolist() == [2, 5]
 
 
-@in_blender
 def test_the_times_of_a_gltf_are_the_frames_seconds():
     _, folder = scene_to_export()
     bpy.ops.arapfields.export_animation(format="GLTF", filepath=str(folder / "a.glb"))
@@ -129,7 +129,6 @@ def test_the_times_of_a_gltf_are_the_frames_seconds():
     assert len(header["meshes"][0]["primitives"][0]["targets"]) == 4
 
 
-@in_blender
 def test_the_times_of_an_alembic_are_seconds():
     """A scene of twice the rate finds each frame at twice its number."""
     bar, folder = scene_to_export()
@@ -146,7 +145,6 @@ def test_the_times_of_an_alembic_are_seconds():
         assert np.abs(read[str(2 * frame)] - points).max() <= EXACT * np.ptp(points, axis=0).max(), frame
 
 
-@in_blender
 def test_usd_is_what_its_own_library_reads():
     usd = pytest.importorskip("pxr.Usd", reason="usd-core is not installed")
     bar, folder = scene_to_export()
@@ -165,7 +163,6 @@ def test_usd_is_what_its_own_library_reads():
 
 
 @pytest.mark.parametrize("kind", ["ABC", "USD", "GLTF"])
-@in_blender
 def test_an_export_that_fails_is_named_and_changes_nothing(kind):
     bar, folder = scene_to_export()
     bpy.ops.arapfields.bake()

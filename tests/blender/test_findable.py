@@ -5,7 +5,8 @@ import fnmatch
 from pathlib import Path
 from urllib.parse import urlparse
 
-from support.blender.inside import IN_BLENDER, in_blender
+import pytest
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -16,6 +17,8 @@ if IN_BLENDER:
     from addon import first_run, menus
     from addon.blender import guide
     from addon.names import Op
+
+pytestmark = pytest.mark.in_blender
 
 OPERATORS = (
     "PIN_TOOL",
@@ -32,7 +35,6 @@ OPERATORS = (
 )
 
 
-@in_blender
 def test_the_object_menu_has_all_that_the_panel_does():
     asked = []
 
@@ -49,7 +51,6 @@ def test_the_object_menu_has_all_that_the_panel_does():
         draw(stand_in, bpy.context)
 
 
-@in_blender
 def test_an_empty_added_as_a_handle_is_one():
     bar = scenes.bar()
     asked = {}
@@ -69,7 +70,6 @@ def test_an_empty_added_as_a_handle_is_one():
     assert len(bar.arapfields.handles) == 1
 
 
-@in_blender
 def test_every_operator_names_its_page_and_every_page_exists():
     address, patterns = guide.manual_map()
     folder = Path(urlparse(address).path)
@@ -94,7 +94,6 @@ def test_every_operator_names_its_page_and_every_page_exists():
     guide.begin(registration.CLASSES)
 
 
-@in_blender
 def test_the_first_start_says_where_the_extension_is_and_only_the_first():
     class Manager:
         shown = 0

@@ -2,7 +2,8 @@
 """What a running solve shows on the source itself: nothing of it stays, in no step of undo either."""
 
 import numpy as np
-from support.blender.inside import IN_BLENDER, in_blender
+import pytest
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -17,8 +18,9 @@ if IN_BLENDER:
     from addon.names import OFFSETS
     from addon.surface.source_surface import read_surface
 
+pytestmark = pytest.mark.in_blender
 
-@in_blender
+
 def test_what_is_shown_is_put_back_bit_for_bit():
     bar, *_ = scenes.bar_with_handles()
     for earlier in (False, True):
@@ -38,7 +40,6 @@ def test_what_is_shown_is_put_back_bit_for_bit():
         assert state(bar) == before
 
 
-@in_blender
 def test_the_field_keeps_the_place_below_the_armature_that_a_wrap_took_for_it():
     item, _ = rigged_bar()
     item.arapfields.under_rig = True
@@ -51,7 +52,6 @@ def test_the_field_keeps_the_place_below_the_armature_that_a_wrap_took_for_it():
     assert modifier_stack.place(item) == place == 0
 
 
-@in_blender
 def test_steps_that_were_pushed_meanwhile_hold_nothing_of_it():
     bpy.context.preferences.edit.use_global_undo = True
     for earlier in (False, True):
@@ -73,7 +73,6 @@ def test_steps_that_were_pushed_meanwhile_hold_nothing_of_it():
             assert state(bpy.data.objects[name]) == before
 
 
-@in_blender
 def test_a_first_result_waits_for_the_end_of_edit_mode():
     bar, *_ = scenes.bar_with_handles()
     before = state(bar)
@@ -90,7 +89,6 @@ def test_a_first_result_waits_for_the_end_of_edit_mode():
     assert state(bar) == before
 
 
-@in_blender
 def test_a_mesh_that_changed_is_left_alone():
     bar, *_ = scenes.bar_with_handles()
     first, moved = first_result(bar)
@@ -103,7 +101,6 @@ def test_a_mesh_that_changed_is_left_alone():
     first.clear()
 
 
-@in_blender
 def test_no_thread_works_on_when_the_process_ends():
     bar, *_ = scenes.bar_with_handles()
     sessions.begin(bpy.context, bar)

@@ -2,7 +2,8 @@
 """With symmetry, handles and pins have ghosts on the other side."""
 
 import numpy as np
-from support.blender.inside import IN_BLENDER, in_blender
+import pytest
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -14,8 +15,9 @@ if IN_BLENDER:
     from addon.pin_tool import drawing
     from addon.viewport.handle_boxes import CIRCLE_ENDS, box_lines, ghosts, segments
 
+pytestmark = pytest.mark.in_blender
 
-@in_blender
+
 def test_ghosts_are_where_the_other_side_is_held_and_goes():
     bar, fixed, moving = scenes.bar_with_handles()
     fixed.location, fixed.scale = (0, 0, 0), (0.1, 0.5, 0.5)
@@ -43,7 +45,6 @@ def test_ghosts_are_where_the_other_side_is_held_and_goes():
     bpy.ops.arapfields.live()
 
 
-@in_blender
 def test_pins_have_theirs_on_turned_and_scaled_objects_too():
     bar = scenes.bar()
     bar.location, bar.rotation_euler.z, bar.scale = (1, 2, 3), 0.7, (2, 2, 2)

@@ -4,7 +4,8 @@
 import time
 
 import numpy as np
-from support.blender.inside import IN_BLENDER, in_blender
+import pytest
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -15,8 +16,9 @@ if IN_BLENDER:
     from addon.core.runtime.coroutines import run_to_completion
     from addon.handles import held_counts
 
+pytestmark = pytest.mark.in_blender
 
-@in_blender
+
 def test_weights_of_groups_are_read_in_slices():
     bar = scenes.decorate(scenes.bar())
     other = bar.vertex_groups.new(name="Other")
@@ -49,7 +51,6 @@ def test_weights_of_groups_are_read_in_slices():
     assert set(bpy.data.meshes.keys()) == meshes
 
 
-@in_blender
 def test_a_window_counts_large_meshes_aside():
     bar, fixed, _ = scenes.bar_with_handles()
     scenes.decorate(bar)

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -18,6 +18,8 @@ if IN_BLENDER:
     from addon.pin_tool import drag
     from addon.pin_tool.modal import reach_steps
     from addon.viewport.handle_boxes import segments
+
+pytestmark = pytest.mark.in_blender
 
 REACH = 0.6
 
@@ -38,7 +40,6 @@ def reaching_bar(scale=(1.0, 1.0, 1.0)):
 
 
 @pytest.mark.parametrize("scale", [(2.0, 2.0, 2.0), (1.3, 0.8, 1.0)])
-@in_blender
 def test_beyond_its_reach_nothing_moves_to_the_last_bit(scale):
     bar, entry, rest, beyond = reaching_bar(scale)
     assert beyond.sum() > 100
@@ -58,7 +59,6 @@ def test_beyond_its_reach_nothing_moves_to_the_last_bit(scale):
     bpy.ops.arapfields.live()
 
 
-@in_blender
 def test_a_bake_heeds_the_reach():
     bar, entry, rest, beyond = reaching_bar()
     z = entry.empty.location.z
@@ -72,7 +72,6 @@ def test_a_bake_heeds_the_reach():
         assert np.abs(local_points(bar) - rest).max() > 0.1
 
 
-@in_blender
 def test_what_cannot_heed_a_reach_says_so_and_a_style_acts_everywhere():
     bar, _, rest, beyond = reaching_bar()
     for options in ({"field": "neural"}, {"exact_handles": True}):
@@ -85,7 +84,6 @@ def test_what_cannot_heed_a_reach_says_so_and_a_style_acts_everywhere():
     scenes.activate(bar)
 
 
-@in_blender
 def test_the_wheel_changes_the_reach_in_a_drag_and_cancel_takes_it_back():
     bar = scenes.bar()
     rest = local_points(bar)
@@ -118,7 +116,6 @@ def test_the_wheel_changes_the_reach_in_a_drag_and_cancel_takes_it_back():
     assert empty.name == "Pin 1"
 
 
-@in_blender
 def test_the_keys_are_those_of_proportional_editing():
     def event(type_, ctrl=False, value="PRESS"):
         return SimpleNamespace(type=type_, ctrl=ctrl, value=value)
@@ -129,7 +126,6 @@ def test_the_keys_are_those_of_proportional_editing():
     assert reach_steps(event("PAGE_UP", value="RELEASE")) == 0
 
 
-@in_blender
 def test_the_reach_is_drawn_about_a_selected_handle():
     bar = scenes.bar()
     bar.scale = (2, 2, 2)

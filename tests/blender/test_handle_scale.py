@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -14,6 +14,8 @@ if IN_BLENDER:
     from support.blender.stacks import local_points
 
     from addon.core.runtime import jobs
+
+pytestmark = pytest.mark.in_blender
 
 
 def enlarged(allow):
@@ -27,7 +29,6 @@ def enlarged(allow):
 
 
 @pytest.mark.parametrize("allow", [False, True])
-@in_blender
 def test_what_a_handle_holds_is_scaled_where_asked(allow):
     bar, moving = enlarged(allow)
     rest = np.array([v.co for v in bar.data.vertices])
@@ -49,7 +50,6 @@ def test_what_a_handle_holds_is_scaled_where_asked(allow):
         assert np.abs(after[rest[:, 0] < -0.8] - rest[rest[:, 0] < -0.8]).max() < 0.03
 
 
-@in_blender
 def test_a_flat_or_mirrored_scale_is_refused_by_name_and_by_axis_it_may_differ():
     bar, moving = enlarged(True)
     kept = moving.scale[2]
@@ -69,7 +69,6 @@ def test_a_flat_or_mirrored_scale_is_refused_by_name_and_by_axis_it_may_differ()
     assert all(entry.allow_scale for entry in bar.arapfields.handles[1:])
 
 
-@in_blender
 def test_a_scale_that_counts_for_nothing_is_said():
     said = "Moving is scaled, which counts only with Allow Scale"
 

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -13,8 +13,9 @@ if IN_BLENDER:
     from addon.core.geometry.spaces import space_of
     from addon.handles import empties
 
+pytestmark = pytest.mark.in_blender
 
-@in_blender
+
 def test_selected_empties_become_handles_and_anchors_at_first():
     bar, fixed, moving = scenes.bar_with_handles()
     handles = empties.solve_handles(bar, space_of(bar.matrix_world))
@@ -27,7 +28,6 @@ def test_selected_empties_become_handles_and_anchors_at_first():
     assert fixed.arapfields.handle_of == bar and fixed.empty_display_type == "CUBE"
 
 
-@in_blender
 def test_without_empties_one_is_made_at_the_cursor():
     bar = scenes.bar()
     bpy.context.scene.cursor.location = (0.5, 0, 0)
@@ -37,7 +37,6 @@ def test_without_empties_one_is_made_at_the_cursor():
     assert entry.empty.users_collection == bar.users_collection and entry.inside > 0
 
 
-@in_blender
 def test_rest_follows_the_source_and_reset_returns_to_it():
     bar, _, moving = scenes.bar_with_handles()
     before = np.array(moving.matrix_world)
@@ -50,7 +49,6 @@ def test_rest_follows_the_source_and_reset_returns_to_it():
     assert np.allclose(np.array(moving.matrix_world), before, atol=1e-5)
 
 
-@in_blender
 def test_set_rest_makes_the_present_pose_the_rest():
     bar, _, moving = scenes.bar_with_handles()
     moving.location.y += 0.1
@@ -59,7 +57,6 @@ def test_set_rest_makes_the_present_pose_the_rest():
     assert all(h.is_anchor for h in handles)
 
 
-@in_blender
 def test_remove_takes_the_selected_and_may_delete_them():
     bar, fixed, _ = scenes.bar_with_handles()
     scenes.activate(fixed, bar)
@@ -71,14 +68,12 @@ def test_remove_takes_the_selected_and_may_delete_them():
     assert not bar.arapfields.handles and "Moving" not in bpy.data.objects
 
 
-@in_blender
 def test_a_deleted_empty_is_no_handle_any_more():
     bar, _, moving = scenes.bar_with_handles()
     bpy.data.objects.remove(moving)
     assert [e.empty.name for e in empties.used(bar)] == ["Fixed"]
 
 
-@in_blender
 def test_with_a_handle_or_a_result_active_the_source_is_still_found():
     bar, fixed, _ = scenes.bar_with_handles()
     scenes.activate(fixed)
@@ -89,7 +84,6 @@ def test_with_a_handle_or_a_result_active_the_source_is_still_found():
     assert source_of(bpy.context) == bar
 
 
-@in_blender
 def test_a_vertex_group_is_a_handle():
     bar = scenes.bar()
     before = scenes.world_points(bar)
@@ -106,7 +100,6 @@ def test_a_vertex_group_is_a_handle():
     assert np.abs(shift[before[:, 0] > 0.8] - [0, 0, 0.4]).max() < 0.15
 
 
-@in_blender
 def test_a_box_around_the_selected_vertices():
     bar = scenes.bar()
     bar.rotation_euler.z, bar.scale = 0.5, (1, 2, 1)
@@ -128,7 +121,6 @@ def test_a_box_around_the_selected_vertices():
         bpy.ops.arapfields.add_handle(place="SELECTION")
 
 
-@in_blender
 def test_a_mirrored_handle_moves_as_the_mirror_image():
     bar = scenes.bar()
     bar.location, bar.rotation_euler.z = (1, 2, 3), 0.7
@@ -153,7 +145,6 @@ def test_a_mirrored_handle_moves_as_the_mirror_image():
     assert len(bar.arapfields.handles) == 3
 
 
-@in_blender
 def test_a_mirrored_group_takes_the_other_sides_group():
     bar = scenes.bar()
     for name, chosen in (("arm.L", [0, 1, 2]), ("arm.R", [5, 6, 7])):

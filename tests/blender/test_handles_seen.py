@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -14,8 +14,9 @@ if IN_BLENDER:
     from addon.handles import empties
     from addon.handles.naming import name_for
 
+pytestmark = pytest.mark.in_blender
 
-@in_blender
+
 def test_a_row_and_its_empty_are_chosen_together():
     bar, fixed, moving = scenes.bar_with_handles()
     bar.arapfields.active_handle = 0
@@ -30,7 +31,6 @@ def test_a_row_and_its_empty_are_chosen_together():
     assert bar.arapfields.active_handle == 0 and bpy.context.object == bar
 
 
-@in_blender
 def test_a_row_whose_empty_cannot_be_selected_selects_nothing():
     bar, fixed, moving = scenes.bar_with_handles()
     moving.hide_set(True)
@@ -47,7 +47,6 @@ def test_a_row_whose_empty_cannot_be_selected_selects_nothing():
     bpy.ops.object.mode_set(mode="OBJECT")
 
 
-@in_blender
 def test_handles_are_named_by_what_they_hold():
     bar = scenes.bar()
     bar.location, bar.rotation_euler.z = (1, 2, 3), 0.4
@@ -64,7 +63,6 @@ def test_handles_are_named_by_what_they_hold():
     assert bar.arapfields.handles[1].empty.name == "head"
 
 
-@in_blender
 def test_handles_without_a_group_are_numbered_and_names_of_the_users_stay():
     bar = scenes.bar()
     for name in ("Empty", "Jaw", "Empty.001"):
@@ -80,7 +78,6 @@ def test_handles_without_a_group_are_numbered_and_names_of_the_users_stay():
     assert name_for(empty_mesh, (0, 0, 0), "CUBE") == "Handle 2"  # "Handle 1" is there
 
 
-@in_blender
 def test_a_new_handle_is_selected_to_be_moved_at_once():
     bar = scenes.bar()
     bpy.ops.arapfields.add_handle(place="CURSOR")
@@ -119,7 +116,6 @@ def oklab(colour):
     return np.cbrt(linear @ cones.T) @ lab.T
 
 
-@in_blender
 def test_sixteen_handles_have_sixteen_distinct_colours():
     bar = scenes.bar()
     for _ in range(16):
@@ -139,7 +135,6 @@ def test_sixteen_handles_have_sixteen_distinct_colours():
     assert added == freed and added not in others and len(set(others)) == 15
 
 
-@in_blender
 def test_a_box_is_resized_by_a_face_and_keeps_its_motion():
     bar, _, moving = scenes.bar_with_handles()
     bar.rotation_euler.x, bar.location.y = 0.3, 1.0

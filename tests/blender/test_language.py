@@ -6,7 +6,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     from support.blender import strings
@@ -15,8 +15,9 @@ if IN_BLENDER:
     from addon.blender.translations import read_po, translations
     from addon.core.errors import UserError
 
+pytestmark = pytest.mark.in_blender
 
-@in_blender
+
 def test_every_text_is_translated():
     texts = strings.every()
     assert len(texts) > 250
@@ -35,14 +36,12 @@ def test_every_text_is_translated():
             assert translated and fields(text) == fields(translated), text
 
 
-@in_blender
 def test_messages_are_filled_in_after_translation():
     assert translated("{count} frames baked", count=3) == "3 frames baked"
     assert translated(UserError("{name} is not a mesh object", name="{x}")) == "{x} is not a mesh object"
     assert translated(ValueError("as it is")) == "as it is"
 
 
-@in_blender
 def test_wrapped_lines_and_every_form_of_a_po_file_are_read():
     path = Path(tempfile.mkdtemp()) / "de_DE.po"
     path.write_text(

@@ -6,7 +6,7 @@ import re
 import time
 
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -22,6 +22,8 @@ if IN_BLENDER:
     from addon.live.prefetch import prefetch
     from addon.pin_tool import drag, hover, tool
     from addon.viewport import previews
+
+pytestmark = pytest.mark.in_blender
 
 ROUNDS = 8  # what is left once is left each time
 STATES = ["idle", "live", "job", "counting", "drag", "prefetch"]
@@ -121,7 +123,6 @@ def enter(state):
 
 
 @pytest.mark.parametrize("state", STATES)
-@in_blender
 def test_nothing_is_left_when_the_extension_is_disabled(state):
     enabled, points_inside = None, held_counts.points_inside
     for _ in range(ROUNDS):
@@ -138,7 +139,6 @@ def test_nothing_is_left_when_the_extension_is_disabled(state):
         addon.register()
 
 
-@in_blender
 def test_in_a_window_drawing_and_timers_end_too():
     """Blender's own calls are noted, as a Blender without a window draws nothing."""
     addon.unregister()
@@ -178,7 +178,6 @@ def test_in_a_window_drawing_and_timers_end_too():
     assert host.has_window() is False
 
 
-@in_blender
 def test_what_failed_half_way_is_undone():
     addon.unregister()
     parts, lifecycle.PARTS = lifecycle.PARTS, (*lifecycle.PARTS, (lambda: 1 / 0, None))

@@ -5,7 +5,7 @@ import tempfile
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -15,8 +15,9 @@ if IN_BLENDER:
     from addon.core.runtime import jobs
     from addon.live import sessions
 
+pytestmark = pytest.mark.in_blender
 
-@in_blender
+
 def test_the_result_follows_moves_and_returns():
     bar, _, moving = scenes.bar_with_handles()
     before = scenes.world_points(bar)
@@ -36,7 +37,6 @@ def test_the_result_follows_moves_and_returns():
     assert np.abs(scenes.world_points(bar) - before).max() < 0.02
 
 
-@in_blender
 def test_off_restores_what_was_there():
     bar, _, moving = scenes.bar_with_handles()
 
@@ -57,7 +57,6 @@ def test_off_restores_what_was_there():
 
 
 @pytest.mark.parametrize("target", ["MODIFIER", "REPLACE", "KEY", "NEW"])
-@in_blender
 def test_a_live_shape_can_be_kept(target):
     bar, _, moving = scenes.bar_with_handles()
     bar.arapfields.result = target
@@ -80,7 +79,6 @@ def test_a_live_shape_can_be_kept(target):
         assert sorted(bpy.data.objects.keys()) == names
 
 
-@in_blender
 def test_several_objects_are_live_at_once():
     pairs = [scenes.bar_with_handles(name) for name in ("One", "Two")]
     for bar, _, _ in pairs:
@@ -95,7 +93,6 @@ def test_several_objects_are_live_at_once():
         assert np.abs(moved[before[:, 0] > 0.9][:, 2].mean() - 0.3 * sign) < 0.05
 
 
-@in_blender
 def test_a_new_handle_sets_the_solver_up_again():
     bar, _, _ = scenes.bar_with_handles()
     bpy.ops.arapfields.live()
@@ -110,7 +107,6 @@ def test_a_new_handle_sets_the_solver_up_again():
     assert not sessions.is_live(bar) and not bar.modifiers
 
 
-@in_blender
 def test_playback_is_followed():
     bar, _, moving = scenes.bar_with_handles()
     for frame, height in ((1, 0.0), (9, 0.4)):
@@ -127,7 +123,6 @@ def test_playback_is_followed():
 
 
 @pytest.mark.parametrize("target", ["MODIFIER", "NEW"])
-@in_blender
 def test_a_file_saved_while_live_shows_the_same_shape_as_a_result(target):
     """On the source, or on an object of its own; the panel says so, and nothing is live."""
     bar, _, moving = scenes.bar_with_handles()
@@ -159,7 +154,6 @@ def test_a_file_saved_while_live_shows_the_same_shape_as_a_result(target):
     assert not jobs.messages()
 
 
-@in_blender
 def test_what_cannot_be_live_is_named():
     scenes.bar()
     with pytest.raises(RuntimeError, match="Bar has no handle"):

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -14,6 +14,8 @@ if IN_BLENDER:
     from addon.live import sessions
     from addon.pin_tool import drag
     from addon.results.placement import placement_refusal
+
+pytestmark = pytest.mark.in_blender
 
 FINE = 0.03  # of the bar, by which a live shape and the solve of its pose may differ
 
@@ -31,7 +33,6 @@ def lifted(target="MODIFIER"):
 
 
 @pytest.mark.parametrize("target", ["MODIFIER", "NEW", "REPLACE", "KEY"])
-@in_blender
 def test_deform_takes_the_live_pose(target):
     bar, rest = lifted(target)
     assert placement_refusal(bar) is None
@@ -46,7 +47,6 @@ def test_deform_takes_the_live_pose(target):
     assert "Bar_live" not in bpy.data.objects and len(shape) == len(rest)
 
 
-@in_blender
 def test_stylize_works_on_the_rest_shape_of_what_is_live():
     bar, rest = lifted()
     bpy.ops.arapfields.stylize(style="CUBE", **scenes.QUICK)
@@ -56,7 +56,6 @@ def test_stylize_works_on_the_rest_shape_of_what_is_live():
     assert abs(lift) < 0.2  # which is the handles' alone
 
 
-@in_blender
 def test_a_job_that_is_cancelled_leaves_the_live_shape():
     bar, _ = lifted()
     live = scenes.world_points(bar)
@@ -71,7 +70,6 @@ def test_a_job_that_is_cancelled_leaves_the_live_shape():
     assert sessions.is_live(bar)
 
 
-@in_blender
 def test_pins_are_dragged_again_after_deform():
     bar = scenes.bar()
     bpy.ops.ed.undo_push(message="bar")

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -13,9 +13,10 @@ if IN_BLENDER:
 
     from addon.live import sessions
 
+pytestmark = pytest.mark.in_blender
+
 
 @pytest.mark.parametrize("which", ["source", "live object", "modifier"])
-@in_blender
 def test_live_ends_when_its_source_or_its_object_is_deleted(which):
     bar, _, moving = scenes.bar_with_handles()
     bar.arapfields.result = "NEW" if which == "live object" else "MODIFIER"
@@ -31,7 +32,6 @@ def test_live_ends_when_its_source_or_its_object_is_deleted(which):
     assert "ARAP Fields" not in bar.data.attributes
 
 
-@in_blender
 def test_edits_of_a_live_source_are_followed():
     bar, *_ = scenes.bar_with_handles()
     bpy.ops.arapfields.live()
@@ -48,7 +48,6 @@ def test_edits_of_a_live_source_are_followed():
     assert np.abs(scenes.world_points(bar) - points).max() < 0.05
 
 
-@in_blender
 def test_live_waits_while_its_source_is_in_edit_mode():
     bar, _, moving = scenes.bar_with_handles()
     bpy.ops.arapfields.live()
@@ -70,7 +69,6 @@ def test_live_waits_while_its_source_is_in_edit_mode():
     assert np.abs(shift[before[:, 0] > 0.8] - [0, 0, 0.4]).max() < 0.1
 
 
-@in_blender
 def test_a_live_object_that_undo_left_in_no_scene_goes_too():
     bar, *_ = scenes.bar_with_handles()
     bar.arapfields.result = "NEW"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -20,6 +20,8 @@ if IN_BLENDER:
 
     from addon.core.runtime import jobs
     from addon.live import sessions
+
+pytestmark = pytest.mark.in_blender
 
 
 def picture(path):
@@ -40,7 +42,6 @@ def counted(item):
 
 
 @pytest.mark.parametrize("target", ["MODIFIER", "NEW"])
-@in_blender
 def test_a_render_of_an_animation_follows_the_handles_while_live(target):
     bar = animated()
     bar.arapfields.result = target
@@ -66,7 +67,6 @@ def test_a_render_of_an_animation_follows_the_handles_while_live(target):
     assert counted(bar) == 1
 
 
-@in_blender
 def test_a_handle_hidden_in_renders_is_said():
     jobs.board.messages.clear()
     animated()
@@ -79,7 +79,6 @@ def test_a_handle_hidden_in_renders_is_said():
     assert said == ["Bar: Moving is hidden in renders, which therefore do not follow it"]
 
 
-@in_blender
 def test_a_file_looks_the_same_without_the_extension():
     """Opened by a Blender that never heard of it: the same points bit for bit, the same picture."""
     for stack in (["FIELD", "SUBSURF"], ["MIRROR", "FIELD"]):

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -15,10 +15,11 @@ if IN_BLENDER:
     from addon.field_modifier import inputs, motion
     from addon.live import recovery, sessions
 
+pytestmark = pytest.mark.in_blender
+
 BY_HAND = 1e-5  # single precision of positions of size one
 
 
-@in_blender
 def test_the_field_is_evaluated_where_the_modifiers_before_have_the_points():
     """The armature before it moves while live: the field stays, and moves the points where they are now."""
     bar, _, moving = scenes.bar_with_handles()
@@ -46,7 +47,6 @@ def test_the_field_is_evaluated_where_the_modifiers_before_have_the_points():
 
 
 @pytest.mark.parametrize("mode", ["EDIT", "SCULPT"])
-@in_blender
 def test_live_pauses_in_modes_that_change_the_mesh(mode):
     bar, _, moving = scenes.bar_with_handles()
     bpy.ops.arapfields.live()
@@ -71,7 +71,6 @@ def test_live_pauses_in_modes_that_change_the_mesh(mode):
     assert not bar.modifiers and np.array_equal(scenes.world_points(bar), rest)
 
 
-@in_blender
 def test_a_modifier_added_before_binds_the_handles_anew():
     bar, _, moving = scenes.bar_with_handles()
     bpy.ops.arapfields.live()
@@ -92,7 +91,6 @@ def test_a_modifier_added_before_binds_the_handles_anew():
     assert np.array_equal(local_points(bar)[: len(rest)], rest.astype(np.float32))
 
 
-@in_blender
 def test_what_was_there_before_live_mode_comes_back_bit_for_bit():
     bar, _, moving = scenes.bar_with_handles()
     moving.location.z += 0.3
@@ -109,7 +107,6 @@ def test_what_was_there_before_live_mode_comes_back_bit_for_bit():
     assert inputs.get(bar.modifiers[0], "Factor") > 0.69
 
 
-@in_blender
 def test_undone_steps_end_or_refresh_live_mode():
     """As after an undone step: a source that is not live in it, and one whose offsets are older."""
     bar, _, moving = scenes.bar_with_handles()

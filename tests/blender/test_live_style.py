@@ -2,7 +2,8 @@
 """Live styles, and the implicit surface that follows its handles."""
 
 import numpy as np
-from support.blender.inside import IN_BLENDER, in_blender
+import pytest
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -12,8 +13,9 @@ if IN_BLENDER:
 
     from addon.live import sessions
 
+pytestmark = pytest.mark.in_blender
 
-@in_blender
+
 def test_a_style_follows_its_sliders_without_handles():
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
     ball = bpy.context.object
@@ -35,7 +37,6 @@ def test_a_style_follows_its_sliders_without_handles():
     assert corners() < cube - 0.1
 
 
-@in_blender
 def test_handles_and_a_style_together():
     bar, _, moving = scenes.bar_with_handles()
     before = scenes.world_points(bar)
@@ -47,7 +48,6 @@ def test_handles_and_a_style_together():
     assert np.abs(shift[before[:, 0] > 0.9].mean(axis=0) - [0, 0, 0.3]).max() < 0.12
 
 
-@in_blender
 def test_the_implicit_surface_follows_too():
     bar, _, moving = scenes.bar_with_handles()
     for name, value in FIT.items():
@@ -63,7 +63,6 @@ def test_the_implicit_surface_follows_too():
     assert abs(shift[before[:, 0] > 0.9][:, 2].mean() - 0.3) < 0.05
 
 
-@in_blender
 def test_a_live_style_follows_stiffness_rigidity_and_the_fold_barrier():
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
     ball = bpy.context.object

@@ -5,7 +5,7 @@ import tempfile
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -16,8 +16,9 @@ if IN_BLENDER:
     from addon.blender.object_references import source_of
     from addon.handles import empties, operators
 
+pytestmark = pytest.mark.in_blender
 
-@in_blender
+
 def test_a_deleted_empty_is_no_handle_though_a_pointer_keeps_it():
     bar, fixed, moving = scenes.bar_with_handles()
     delete(moving)
@@ -27,7 +28,6 @@ def test_a_deleted_empty_is_no_handle_though_a_pointer_keeps_it():
         bpy.ops.arapfields.deform(**scenes.NEW)
 
 
-@in_blender
 def test_a_deleted_source_is_worked_on_no_more():
     bar, fixed, _ = scenes.bar_with_handles()
     bpy.ops.arapfields.deform(**scenes.NEW)
@@ -40,7 +40,6 @@ def test_a_deleted_source_is_worked_on_no_more():
     assert source_of(bpy.context) == result  # an object like any other
 
 
-@in_blender
 def test_a_copy_of_a_handle_takes_no_other_handle_away():
     bar, fixed, moving = scenes.bar_with_handles()
     copied = moving.copy()
@@ -57,7 +56,6 @@ def test_a_copy_of_a_handle_takes_no_other_handle_away():
     assert [entry.empty for entry in bar.arapfields.handles] == [fixed, moving]
 
 
-@in_blender
 def test_taking_a_handle_from_another_mesh_is_said():
     bar, _, moving = scenes.bar_with_handles()
     other = scenes.bar("Other")
@@ -67,7 +65,6 @@ def test_taking_a_handle_from_another_mesh_is_said():
     assert len(bar.arapfields.handles) == 1 and len(other.arapfields.handles) == 1
 
 
-@in_blender
 def test_a_handle_that_holds_nothing_is_said():
     bar = scenes.bar()
     far = scenes.cube_empty((30, 0, 0), (1, 1, 1), "Far")
@@ -89,7 +86,6 @@ def reports(operator, **properties):
     return said
 
 
-@in_blender
 def test_a_library_override_is_refused_before_pressing():
     scenes.bar_with_handles("Linked")
     path = tempfile.mktemp(suffix=".blend")
@@ -115,7 +111,6 @@ def test_a_library_override_is_refused_before_pressing():
             operator()
 
 
-@in_blender
 def test_after_a_bake_the_present_frame_is_shown():
     bar = animated()
     bpy.context.scene.frame_set(1)

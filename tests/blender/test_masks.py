@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -14,6 +14,8 @@ if IN_BLENDER:
 
     from addon.blender import modifier_stack
     from addon.field_modifier import inputs
+
+pytestmark = pytest.mark.in_blender
 
 
 def masked_bar():
@@ -27,7 +29,6 @@ def masked_bar():
     return bar, moving, rest, rest[:, 0] < 0.01
 
 
-@in_blender
 def test_where_it_is_zero_points_stay_bit_for_bit_whatever_is_solved():
     bar, _, rest, out = masked_bar()
     settings = bar.arapfields.stiffness
@@ -54,7 +55,6 @@ def test_where_it_is_zero_points_stay_bit_for_bit_whatever_is_solved():
     assert inputs.get_attribute(modifier_stack.find(bar), "Mask") == "Face"
 
 
-@in_blender
 def test_a_mask_that_is_gone_is_named():
     bar, _, rest, _ = masked_bar()
     bar.arapfields.stiffness.mask = "Face"

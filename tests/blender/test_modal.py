@@ -4,7 +4,8 @@
 import contextlib
 import time
 
-from support.blender.inside import IN_BLENDER, in_blender
+import pytest
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import addon
@@ -14,6 +15,8 @@ if IN_BLENDER:
     from addon.core.runtime.progress import JobCancelled
     from addon.jobs import display, modal
     from addon.jobs.modal import ModalRun
+
+pytestmark = pytest.mark.in_blender
 
 
 class Window:
@@ -87,7 +90,6 @@ def wait_for_cancel(tracker):
     raise JobCancelled
 
 
-@in_blender
 def test_a_job_runs_beside_events_and_leaves_nothing_in_the_window():
     with window() as context:
         running = operator(lambda tracker: (tracker.start("Working", 1.0), time.sleep(0.5)))
@@ -99,7 +101,6 @@ def test_a_job_runs_beside_events_and_leaves_nothing_in_the_window():
         assert context.texts[-1] is None and not context.timers
 
 
-@in_blender
 def test_escape_cancels():
     with window() as context:
         running = operator(wait_for_cancel)
@@ -109,7 +110,6 @@ def test_escape_cancels():
         assert context.texts[-1] is None and not context.timers
 
 
-@in_blender
 def test_the_status_bar_is_cleared_when_the_extension_is_disabled():
     with window() as context:
         running = operator(wait_for_cancel)

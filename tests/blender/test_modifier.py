@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 from support.blender.stack_list import STACKS
 
 if IN_BLENDER:
@@ -14,11 +14,12 @@ if IN_BLENDER:
     from addon.blender import modifier_stack
     from addon.field_modifier import inputs
 
+pytestmark = pytest.mark.in_blender
+
 BY_HAND = 1e-5  # single precision of positions of size one, through Blender's modifiers
 
 
 @pytest.mark.parametrize("case", STACKS)
-@in_blender
 def test_the_modifier_does_what_the_field_does_by_hand(case):
     bar, _, field = build(STACKS[case])
     own = [kind for kind in STACKS[case] if kind != "keys"]
@@ -51,7 +52,6 @@ def test_the_modifier_does_what_the_field_does_by_hand(case):
     assert len(bpy.data.scenes) == 1
 
 
-@in_blender
 def test_nothing_but_a_modifier_an_attribute_and_a_group_is_added():
     bar, _, moving = scenes.bar_with_handles()
     scenes.decorate(bar)
@@ -69,7 +69,6 @@ def test_nothing_but_a_modifier_an_attribute_and_a_group_is_added():
     assert scenes.everything(bar) == before and not bpy.data.node_groups and not bar.modifiers
 
 
-@in_blender
 def test_where_there_are_more_vertices_than_offsets_they_come_from_the_nearest_place():
     """As in a render at a higher level of subdivision than the viewport's."""
     bar, _, field = build(["SUBSURF", "FIELD"])

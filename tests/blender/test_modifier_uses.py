@@ -6,7 +6,7 @@ import tempfile
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 from support.blender.stack_list import STACKS
 
 if IN_BLENDER:
@@ -20,8 +20,9 @@ if IN_BLENDER:
     from addon.blender.object_references import source_of
     from addon.surface import staleness
 
+pytestmark = pytest.mark.in_blender
 
-@in_blender
+
 def test_objects_that_share_a_mesh_move_alone():
     bar, _, moving = scenes.bar_with_handles()
     other = bpy.data.objects.new("Other", bar.data)
@@ -46,7 +47,6 @@ def test_objects_that_share_a_mesh_move_alone():
 
 
 @pytest.mark.parametrize("case", ["alone", "mirror before", "shape keys"])
-@in_blender
 def test_the_modifier_can_be_applied(case):
     bar, *_ = build(STACKS[case])
     moved = local_points(bar)
@@ -68,7 +68,6 @@ def test_the_modifier_can_be_applied(case):
     assert np.abs(local_points(bar) - rest).max() < 1e-6
 
 
-@in_blender
 def test_replacing_or_keying_supersedes_the_modifier():
     for target in ("REPLACE", "KEY"):
         bar, _, moving = scenes.bar_with_handles(f"Bar{target}")
@@ -82,7 +81,6 @@ def test_replacing_or_keying_supersedes_the_modifier():
         assert np.abs(local_points(bar) - moved).max() < 1e-5
 
 
-@in_blender
 def test_free_normals_turn_with_the_field():
     if bpy.app.version < (4, 5, 0):
         pytest.skip("this Blender has no free normals")
@@ -109,7 +107,6 @@ def test_free_normals_turn_with_the_field():
         assert np.abs(flat.reshape(-1, 3) - given @ turn.T).max() < 0.1
 
 
-@in_blender
 def test_reading_the_shape_leaves_unkeyed_poses_alone():
     bar, *_ = build(STACKS["armature before"])
     bone = bar.modifiers["Armature"].object.pose.bones["Second"]
@@ -122,7 +119,6 @@ def test_reading_the_shape_leaves_unkeyed_poses_alone():
     assert abs(bone.rotation_euler.z - 1.1) < 1e-6 and seen > 0.6
 
 
-@in_blender
 def test_a_result_brings_no_source_along_when_it_is_appended():
     bar, *_ = scenes.bar_with_handles()
     bpy.ops.arapfields.deform(**scenes.NEW)
@@ -142,7 +138,6 @@ def test_a_result_brings_no_source_along_when_it_is_appended():
     assert source_of(bpy.context) == into.objects[0]
 
 
-@in_blender
 def test_moving_the_modifier_does_not_age_the_fit():
     bar, _, moving = scenes.bar_with_handles()
     for name, value in FIT.items():

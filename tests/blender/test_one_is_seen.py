@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Of a source, its live shape and its results, one is seen in one place, and the one that it seems to be."""
 
-from support.blender.inside import IN_BLENDER, in_blender
+import pytest
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -9,6 +10,8 @@ if IN_BLENDER:
     from support.blender.live import step
 
     from addon.core.runtime import jobs
+
+pytestmark = pytest.mark.in_blender
 
 
 def seen():
@@ -19,7 +22,6 @@ def seen():
     return shown
 
 
-@in_blender
 def test_each_result_takes_the_place_of_the_one_before():
     bar, _, moving = scenes.bar_with_handles()
     moving.location.z += 0.4
@@ -36,7 +38,6 @@ def test_each_result_takes_the_place_of_the_one_before():
     assert seen() == ["Bar"] and bar.modifiers
 
 
-@in_blender
 def test_what_the_user_has_moved_aside_or_hidden_stays_so():
     bar, *_ = scenes.bar_with_handles()
     bpy.ops.arapfields.deform(**scenes.NEW)
@@ -53,7 +54,6 @@ def test_what_the_user_has_moved_aside_or_hidden_stays_so():
     assert seen() == []
 
 
-@in_blender
 def test_live_mode_shows_its_shape_alone_and_gives_back_what_was_seen():
     bar, _, moving = scenes.bar_with_handles()
     moving.location.z += 0.4
@@ -73,7 +73,6 @@ def test_live_mode_shows_its_shape_alone_and_gives_back_what_was_seen():
     assert seen() == ["Bar"] and bar.modifiers
 
 
-@in_blender
 def test_a_render_sees_the_source_again_when_it_takes_the_result_itself():
     """A deleted result leaves its source hidden in renders, which Alt H does not undo."""
     bar, *_ = scenes.bar_with_handles()

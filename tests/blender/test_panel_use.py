@@ -4,7 +4,7 @@
 import json
 
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -15,8 +15,9 @@ if IN_BLENDER:
     from addon.handles import empties
     from addon.jobs import status_bar
 
+pytestmark = pytest.mark.in_blender
 
-@in_blender
+
 def test_everyday_sections_come_first_and_numbers_are_under_advanced():
     prepared("handles")
     jobs.add_message("INFO", "Bar: done")
@@ -51,7 +52,6 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-@in_blender
 def test_what_a_button_would_refuse_is_said_before(case):
     bar = scenes.bar()
     ours = bar.arapfields
@@ -81,7 +81,6 @@ def test_what_a_button_would_refuse_is_said_before(case):
     assert text in " ".join(drawn()[section])
 
 
-@in_blender
 def test_what_the_panel_refuses_the_operators_refuse_too():
     bar = scenes.bar()
     points = [vertex.co for vertex in bar.data.vertices]
@@ -93,7 +92,6 @@ def test_what_the_panel_refuses_the_operators_refuse_too():
         assert not getattr(bpy.ops.arapfields, operator).poll()
 
 
-@in_blender
 def test_a_menu_offers_what_the_mesh_has():
     bar = scenes.bar()
     assert not empties.can_place(None, "CUBE", "CURSOR")
@@ -107,7 +105,6 @@ def test_a_menu_offers_what_the_mesh_has():
     bpy.ops.object.mode_set(mode="OBJECT")
 
 
-@in_blender
 def test_a_fit_tells_its_errors():
     prepared("fitted")
     texts = drawn()["ARAPFIELDS_PT_surface"]
@@ -120,7 +117,6 @@ def test_a_fit_tells_its_errors():
     assert 0 < report["near_mean"] < report["near_max"]
 
 
-@in_blender
 def test_the_status_bar_shows_the_job_and_its_cancel():
     def texts():
         labels = []
@@ -138,7 +134,6 @@ def test_the_status_bar_shows_the_job_and_its_cancel():
 
 
 @pytest.mark.parametrize("field", ["auto", "radial", "neural"])
-@in_blender
 def test_the_fold_barrier_acts_on_every_field(field):
     _, _, moving = scenes.bar_with_handles()
     moving.location.x -= 1.2  # the bar is pressed together

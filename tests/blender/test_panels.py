@@ -2,7 +2,7 @@
 """Every section and menu draws in every state, naming only properties, operators and menus that exist."""
 
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -10,6 +10,8 @@ if IN_BLENDER:
 
     import addon.registration as registration
     from addon.core.runtime import jobs
+
+pytestmark = pytest.mark.in_blender
 
 STATES = [
     "nothing",
@@ -50,7 +52,6 @@ EXPECTED = {
 
 
 @pytest.mark.parametrize("state", STATES)
-@in_blender
 def test_the_panel_draws(state):
     jobs.board.messages.clear()
     undo = prepared(state)
@@ -71,7 +72,6 @@ def test_the_panel_draws(state):
         assert text in " ".join(texts_of[section]), texts_of[section]  # long texts take several labels
 
 
-@in_blender
 def test_every_grey_button_says_why():
     """Each operator's poll either holds or gives a reason, in states where it does not hold."""
     polled = [

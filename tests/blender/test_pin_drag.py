@@ -2,7 +2,8 @@
 """What is seen of a drag with the pin tool while it goes on."""
 
 import numpy as np
-from support.blender.inside import IN_BLENDER, in_blender
+import pytest
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -11,8 +12,9 @@ if IN_BLENDER:
     from addon.live import sessions
     from addon.pin_tool import drag
 
+pytestmark = pytest.mark.in_blender
 
-@in_blender
+
 def test_the_shape_moves_with_the_pin_in_the_same_picture():
     bar = scenes.bar()
     dragged = drag.of_new_pin(bpy.context, bar, np.array([0.9, -0.25, 0.0]), 0.1)

@@ -5,7 +5,7 @@ import itertools
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -19,9 +19,10 @@ if IN_BLENDER:
     from addon.handles.palette import PALETTE, free_colour
     from addon.pin_tool import pins, places, screen
 
+pytestmark = pytest.mark.in_blender
+
 
 @pytest.mark.parametrize("turn", [0.0, 0.7])
-@in_blender
 def test_a_pin_on_a_deformed_mesh_is_at_rest_where_its_place_was(turn):
     """For a mesh that has moved rigidly the place, the turn and the motion of the pin are known."""
     bar = scenes.bar()
@@ -45,7 +46,6 @@ def test_a_pin_on_a_deformed_mesh_is_at_rest_where_its_place_was(turn):
     assert np.abs(placed[:3, :3] - turned).max() < 1e-4
 
 
-@in_blender
 def test_a_known_face_decides_where_surfaces_touch():
     """Two sheets at rest apart lie on one another: the face tells which of them was hit."""
     points = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
@@ -62,7 +62,6 @@ def test_a_known_face_decides_where_surfaces_touch():
         assert np.allclose(place.rest, [0.3, 0.4, face], atol=1e-6)
 
 
-@in_blender
 def test_under_a_subdivision_the_place_is_found_by_nearness():
     bar = scenes.bar()
     bar.modifiers.new("Subdivision", "SUBSURF").levels = 1
@@ -76,7 +75,6 @@ def test_under_a_subdivision_the_place_is_found_by_nearness():
     assert entry.empty == empty and np.abs(np.array(entry.rest).reshape(4, 4)[2, 3] - 0.25) < 0.02
 
 
-@in_blender
 def test_names_by_what_is_held_and_colours_apart():
     assert len(set(PALETTE)) >= 16
     apart = [np.linalg.norm(np.subtract(a, b)) for a, b in itertools.combinations(PALETTE, 2)]
@@ -93,7 +91,6 @@ def test_names_by_what_is_held_and_colours_apart():
     assert np.allclose(free_colour(bar.arapfields.handles), colours[1])
 
 
-@in_blender
 def test_screen_places():
     wide = np.array([[0.5, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
     spots = screen.project(wide, (200, 100), [(0, 0, 0), (2, 0, 0), (0, -1, 0)])

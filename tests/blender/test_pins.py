@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -15,10 +15,11 @@ if IN_BLENDER:
     from addon.live.prefetch import prefetch
     from addon.pin_tool import drag
 
+pytestmark = pytest.mark.in_blender
+
 TOP = (0.0, 0.0, 0.25)  # on the bar
 
 
-@in_blender
 def test_the_first_drag_bends_and_what_is_far_holds():
     bar = scenes.bar()
     rest = scenes.world_points(bar)
@@ -30,7 +31,6 @@ def test_the_first_drag_bends_and_what_is_far_holds():
     assert np.abs(shift[rest[:, 0] < -0.8]).max() < 0.15  # without it everything would follow by 0.5
 
 
-@in_blender
 def test_without_anything_that_holds_the_shape_follows_as_a_whole():
     bar = scenes.bar()
     rest = scenes.world_points(bar)
@@ -41,7 +41,6 @@ def test_without_anything_that_holds_the_shape_follows_as_a_whole():
     assert np.abs(scenes.world_points(bar) - rest - [0, 0, 0.5]).max() < 0.02
 
 
-@in_blender
 def test_a_press_without_a_move_changes_no_shape():
     bar = scenes.bar()
     rest = scenes.world_points(bar)
@@ -56,7 +55,6 @@ def test_a_press_without_a_move_changes_no_shape():
 
 
 @pytest.mark.parametrize("earlier", [0, 1])
-@in_blender
 def test_a_cancelled_drag_leaves_no_trace(earlier):
     bar = scenes.bar()
     rest = scenes.world_points(bar)
@@ -85,7 +83,6 @@ def test_a_cancelled_drag_leaves_no_trace(earlier):
         assert state(bar) == before
 
 
-@in_blender
 def test_ending_live_mode_leaves_what_was_dragged():
     bar = scenes.bar()
     pin(bar, (1.0, 0.0, 0.25), target=(1.0, 0.0, 0.6))
@@ -94,7 +91,6 @@ def test_ending_live_mode_leaves_what_was_dragged():
     assert np.array_equal(scenes.world_points(bar), shown)
 
 
-@in_blender
 def test_the_last_pin_takes_the_motion_with_it():
     bar = scenes.bar()
     rest = scenes.world_points(bar)
@@ -107,7 +103,6 @@ def test_the_last_pin_takes_the_motion_with_it():
     assert bpy.context.view_layer.objects.active == bar
 
 
-@in_blender
 def test_what_cannot_be_pinned_is_named():
     bar = scenes.bar()
     bar.arapfields.result = "NEW"
@@ -117,7 +112,6 @@ def test_what_cannot_be_pinned_is_named():
     assert bpy.ops.arapfields.pin_add(location=(1, 0, 0.25), radius=0.2) == {"FINISHED"}
 
 
-@in_blender
 def test_a_solver_set_up_beforehand_gives_the_same_shape():
     shapes = []
     for is_prefetched, moved_on in ((False, False), (True, False), (True, True)):
@@ -137,7 +131,6 @@ def test_a_solver_set_up_beforehand_gives_the_same_shape():
     assert 0 < np.abs(shapes[2] - shapes[0]).max() < 0.05
 
 
-@in_blender
 def test_a_drag_keys_the_pin_where_automatic_keys_are_on():
     bar = scenes.bar()
     assert pin(bar, (-1.0, 0.0, 0.25), 0.1, target=(-1.0, 0.0, 0.4)).animation_data is None

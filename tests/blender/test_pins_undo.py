@@ -2,7 +2,8 @@
 """Undo and redo of pins: what a step holds comes back bit for bit, and no solver answers to it."""
 
 import numpy as np
-from support.blender.inside import IN_BLENDER, in_blender
+import pytest
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -13,10 +14,11 @@ if IN_BLENDER:
     from addon.live import sessions
     from addon.pin_tool import drag
 
+pytestmark = pytest.mark.in_blender
+
 ROUNDS = 8
 
 
-@in_blender
 def test_rounds_of_undo_and_redo_are_exact():
     scenes.bar()
     bpy.context.preferences.edit.use_global_undo = True
@@ -50,7 +52,6 @@ def test_rounds_of_undo_and_redo_are_exact():
             assert same(settled(), states[step]), step
 
 
-@in_blender
 def test_a_drag_after_an_undone_one_starts_from_what_is_shown():
     scenes.bar()
     bpy.context.preferences.edit.use_global_undo = True

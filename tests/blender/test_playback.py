@@ -5,7 +5,7 @@ import tempfile
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -15,6 +15,8 @@ if IN_BLENDER:
     from support.blender.stacks import local_points
 
     from addon.live import sessions
+
+pytestmark = pytest.mark.in_blender
 
 PATIENCE = 600  # seconds for a frame, on however busy a machine
 SAME = 1e-4  # of the object's size: the agreed limit; two solves of one request agree in every bit
@@ -87,7 +89,6 @@ def every_way(item, kind):
     return shapes
 
 
-@in_blender
 def test_a_frame_is_the_same_played_jumped_to_baked_and_rendered():
     bar = turning()
     shapes = every_way(bar, "DEFORM")
@@ -98,7 +99,6 @@ def test_a_frame_is_the_same_played_jumped_to_baked_and_rendered():
 
 
 @pytest.mark.slow
-@in_blender
 def test_a_frame_of_an_animated_style_is_the_same_in_every_way():
     ball = styled()
     shapes = every_way(ball, "STYLIZE")
@@ -108,7 +108,6 @@ def test_a_frame_of_an_animated_style_is_the_same_in_every_way():
 
 
 @pytest.mark.slow
-@in_blender
 def test_every_animated_setting_of_a_style_changes_what_is_solved():
     """strength, sharpness, stiffness and orientation, each alone between two frames."""
     for name, values in (("strength", (0.2, 1.0)), ("sharpness", (1.0, 9.0)), ("bending", (0.001, 5.0))):
@@ -127,7 +126,6 @@ def test_every_animated_setting_of_a_style_changes_what_is_solved():
         assert np.abs(shapes[1] - shapes[0]).max() > 1e-3, name
 
 
-@in_blender
 def test_live_playback_keeps_solved_frames_and_tells_how_many():
     bar = turning()
     first = live_at(bar, "DEFORM", [10])
@@ -148,7 +146,6 @@ def test_live_playback_keeps_solved_frames_and_tells_how_many():
     assert frames.count(1, 40) < 3
 
 
-@in_blender
 def test_a_drag_at_a_frame_goes_on_from_the_shape_at_hand():
     bar = turning()
     before = live_at(bar, "DEFORM", [20])

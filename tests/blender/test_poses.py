@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 import arapfields as af
 
@@ -16,6 +16,8 @@ if IN_BLENDER:
     from support.blender import scenes
     from support.blender.live import step
     from support.blender.riders import link, rider, shown
+
+pytestmark = pytest.mark.in_blender
 
 
 def creature(name, cuts):
@@ -52,7 +54,6 @@ def saved(source):
     return float(np.linalg.norm(scenes.world_points(source) - rest, axis=1).max())
 
 
-@in_blender
 def test_a_pose_fits_other_resolutions():
     source = creature("Body", 50)
     assert len(source.data.vertices) == 20_000
@@ -79,7 +80,6 @@ def test_a_pose_fits_other_resolutions():
         assert np.abs(after[item.name] - before[item.name]).max() > 0.3
 
 
-@in_blender
 def test_strength_files_and_refusals():
     source, other = creature("Body", 16), creature("Other", 20)
     patch = rider("MESH")
@@ -124,7 +124,6 @@ def test_strength_files_and_refusals():
         bpy.ops.arapfields.import_pose(filepath=str(path.with_name("none.arappose")))
 
 
-@in_blender
 def test_a_live_shape_is_saved():
     bar, _, moving = scenes.bar_with_handles()
     rest = scenes.world_points(bar)

@@ -4,7 +4,7 @@
 from pathlib import Path
 
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 import arapfields as af
 
@@ -15,11 +15,12 @@ if IN_BLENDER:
     import addon
     from addon.core.settings.styles import STYLES
 
+pytestmark = pytest.mark.in_blender
+
 CASES = {"fit": ("iterations", 777), "deform": ("bending", 0.25), "stylize": ("sharpness", 9.0)}
 
 
 @pytest.mark.parametrize("section", CASES)
-@in_blender
 def test_presets_are_stored_applied_and_removed(section):
     bar, fixed, _ = scenes.bar_with_handles()
     settings, (name, value) = getattr(bar.arapfields, section), CASES[section]
@@ -43,7 +44,6 @@ def test_presets_are_stored_applied_and_removed(section):
     assert not list(folder.glob("*.py"))
 
 
-@in_blender
 def test_each_style_has_its_picture():
     folder = Path(addon.__file__).parent / "icons"
     assert {path.stem for path in folder.glob("*.png")} == {name.replace(" ", "_") for name, _ in STYLES}
@@ -53,7 +53,6 @@ def test_each_style_has_its_picture():
 
 
 @pytest.mark.parametrize("section", ["deform", "stylize"])
-@in_blender
 def test_the_papers_own_settings_are_a_preset_and_the_defaults_come_back(section):
     bar = scenes.bar()
     group = getattr(bar.arapfields, section)
@@ -71,7 +70,6 @@ def test_the_papers_own_settings_are_a_preset_and_the_defaults_come_back(section
     assert group.width == options().width and group.optimizer == options().optimizer
 
 
-@in_blender
 def test_a_result_as_in_the_paper():
     bar, _, moving = scenes.bar_with_handles()
     moving.location.z += 0.3

@@ -6,7 +6,7 @@ import tempfile
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -18,8 +18,9 @@ if IN_BLENDER:
     from addon.properties.choices import RESULT_ITEMS
     from addon.results.placement import placement_refusal
 
+pytestmark = pytest.mark.in_blender
 
-@in_blender
+
 def test_replacing_moves_the_source_and_keeps_all_else():
     bar, _, moving = scenes.bar_with_handles()
     scenes.decorate(bar)
@@ -39,7 +40,6 @@ def test_replacing_moves_the_source_and_keeps_all_else():
     assert np.abs(scenes.world_points(bar) - again).max() < 0.02
 
 
-@in_blender
 def test_a_shape_key_of_the_source_carries_the_motion():
     bar, _, moving = scenes.bar_with_handles()
     before = scenes.world_points(bar)
@@ -56,7 +56,6 @@ def test_a_shape_key_of_the_source_carries_the_motion():
     assert np.abs(scenes.world_points(bar) - before).max() > 0.3
 
 
-@in_blender
 def test_the_surface_can_take_the_sources_place():
     bar, _, moving = scenes.bar_with_handles()
     for name, value in FIT.items():
@@ -68,7 +67,6 @@ def test_the_surface_can_take_the_sources_place():
     assert len(bpy.data.objects) == 3
 
 
-@in_blender
 def test_the_earlier_name_of_result_still_counts():
     """Scripts say target= and object.arapfields.result; files of all versions store it under that name."""
     bar, _, moving = scenes.bar_with_handles()
@@ -91,7 +89,6 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-@in_blender
 def test_what_the_source_cannot_take_is_refused_before_the_work(case):
     bar, *_ = scenes.bar_with_handles()
     arguments = {"result": "KEY"}
@@ -106,7 +103,6 @@ def test_what_the_source_cannot_take_is_refused_before_the_work(case):
     assert re.search(REFUSED[case], str(placement_refusal(bar)))  # which a window tells before
 
 
-@in_blender
 def test_linked_objects_give_results_but_are_never_written():
     """From another file: deforming makes a local result; writing into the linked mesh is refused."""
     scenes.bar("Linked")
@@ -130,7 +126,6 @@ def test_linked_objects_give_results_but_are_never_written():
     assert np.array_equal(scenes.world_points(linked), before)
 
 
-@in_blender
 def test_without_a_window_the_course_gives_what_blocking_gives():
     """Stepped as the window steps it, with a watched preview: the same bits as in one go."""
     bar, _, moving = scenes.bar_with_handles()

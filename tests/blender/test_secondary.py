@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -14,6 +14,8 @@ if IN_BLENDER:
     from support.blender.stacks import local_points
 
     from addon.live import sessions
+
+pytestmark = pytest.mark.in_blender
 
 
 def nodding(frames=6):
@@ -39,7 +41,6 @@ def live_shapes(bar, frames):
     return shapes
 
 
-@in_blender
 def test_playback_and_bakes_are_the_same_bits():
     bar = nodding()
     rest = local_points(bar)
@@ -66,7 +67,6 @@ def test_playback_and_bakes_are_the_same_bits():
             assert away < 1e-6, (given, frame, away)
 
 
-@in_blender
 def test_a_jump_begins_at_rest_and_is_made_again_from_the_start():
     bar = nodding()
     bpy.ops.arapfields.live(kind="DEFORM")
@@ -80,7 +80,6 @@ def test_a_jump_begins_at_rest_and_is_made_again_from_the_start():
     assert np.array_equal(live_shapes(bar, range(1, 9))[8], played[8])
 
 
-@in_blender
 def test_a_dragged_handle_lets_it_swing_and_settle():
     bar, held, moving = scenes.bar_with_handles()
     bpy.data.objects.remove(moving)
@@ -109,7 +108,6 @@ def test_a_dragged_handle_lets_it_swing_and_settle():
     assert np.isfinite(local_points(bar)).all()
 
 
-@in_blender
 def test_soft_parts_grounds_and_refusals():
     bar = nodding()
     ours = bar.arapfields.secondary

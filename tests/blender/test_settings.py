@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panel's settings are the native library's options: same names, same defaults."""
 
-from support.blender.inside import IN_BLENDER, in_blender
+import pytest
+from support.blender.inside import IN_BLENDER
 
 import arapfields as af
 
@@ -14,8 +15,9 @@ if IN_BLENDER:
     from addon.core.settings.parameters import DEFORM, FIT, TABLE
     from addon.core.settings.styles import STYLIZE
 
+pytestmark = pytest.mark.in_blender
 
-@in_blender
+
 def test_names_and_defaults_are_the_librarys():
     addons_own = {option["name"] for block in TABLE.values() for option in block["further"]}
     tables = {"DeformOptions": DEFORM, "StylizeOptions": STYLIZE, "FitOptions": FIT}
@@ -28,7 +30,6 @@ def test_names_and_defaults_are_the_librarys():
             assert getattr(options, parameter.name) == parameter.default, (name, parameter.name)
 
 
-@in_blender
 def test_values_survive_single_precision():
     item = scenes.bar()
 
@@ -40,7 +41,6 @@ def test_values_survive_single_precision():
     assert bpy.context.object == item
 
 
-@in_blender
 def test_every_property_and_operator_is_described():
     bare = []
     for module in registration.MODULES:

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -11,6 +11,8 @@ if IN_BLENDER:
     from support.blender.live import step
 
     from addon.live import sessions
+
+pytestmark = pytest.mark.in_blender
 
 
 def painted_bar(times=1.0):
@@ -37,7 +39,6 @@ def stretch(bar, before, low, high):
     return np.abs(lengths[1] / lengths[0] - 1).max()
 
 
-@in_blender
 def test_a_stiff_part_does_not_stretch_and_ones_change_nothing():
     bar, _ = painted_bar()
     before = scenes.world_points(bar) * 0 + np.array([vertex.co for vertex in bar.data.vertices])
@@ -54,7 +55,6 @@ def test_a_stiff_part_does_not_stretch_and_ones_change_nothing():
     assert soft > 0.01 and stiff < 1e-3
 
 
-@in_blender
 def test_live_follows_the_brush_and_presets():
     bar, _ = painted_bar()
     before = np.array([vertex.co for vertex in bar.data.vertices])
@@ -82,7 +82,6 @@ def test_live_follows_the_brush_and_presets():
         bpy.ops.arapfields.deform()
 
 
-@in_blender
 def test_symmetry_moves_both_sides_alike_also_live():
     bar, fixed, moving = scenes.bar_with_handles()
     scenes.activate(fixed, bar)
@@ -107,7 +106,6 @@ def test_symmetry_moves_both_sides_alike_also_live():
     assert unlike() < 1e-6
 
 
-@in_blender
 def test_what_goes_together_resists_and_is_held():
     """A rod on the bar is bent less than one that follows: it is sampled too."""
     bar, _, moving = scenes.bar_with_handles()

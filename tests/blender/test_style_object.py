@@ -2,7 +2,8 @@
 """Any mesh object as a style."""
 
 import numpy as np
-from support.blender.inside import IN_BLENDER, in_blender
+import pytest
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -12,8 +13,9 @@ if IN_BLENDER:
     from addon.solver import style_object
     from addon.stylize import ball as picture
 
+pytestmark = pytest.mark.in_blender
 
-@in_blender
+
 def test_a_ball_as_a_style_changes_nothing_and_an_open_box_is_closed():
     item = ball()
     before = scenes.world_points(item)
@@ -38,7 +40,6 @@ def test_a_ball_as_a_style_changes_nothing_and_an_open_box_is_closed():
     assert np.linalg.norm(points, axis=1).max() / np.abs(points).max() > 1.25  # of a ball 1
 
 
-@in_blender
 def test_faces_of_a_mesh_opens_as_object():
     """Files hold a style's number; that of the style which this one took in was the last."""
     style = ball().arapfields.stylize
@@ -49,7 +50,6 @@ def test_faces_of_a_mesh_opens_as_object():
     assert style.style == "OBJECT"
 
 
-@in_blender
 def test_the_picture_of_a_style_object_is_a_ball():
     bpy.ops.mesh.primitive_uv_sphere_add(segments=16, ring_count=8)
     of_ball = picture.picture(style_object.style_of(bpy.context.object)[0])

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 import arapfields
 
@@ -17,8 +17,9 @@ if IN_BLENDER:
 
     from addon.core.settings.styles import STYLES, style_identifier, style_name
 
+pytestmark = pytest.mark.in_blender
 
-@in_blender
+
 def test_a_ball_turns_towards_a_cube_and_keeps_its_mesh():
     item = ball()
     bpy.ops.arapfields.stylize(style="CUBE", **SETTINGS)
@@ -28,7 +29,6 @@ def test_a_ball_turns_towards_a_cube_and_keeps_its_mesh():
 
 
 @pytest.mark.parametrize("frame", ["UPRIGHT", "OBJECT", "WORLD", "EMPTY"])
-@in_blender
 def test_the_style_stands_along_the_chosen_axes(frame):
     """A ball, turned: the cube's axes are those along which its result is most flat."""
     item = ball()
@@ -51,7 +51,6 @@ def test_the_style_stands_along_the_chosen_axes(frame):
     assert flattest == {"UPRIGHT": 20, "OBJECT": 20, "WORLD": 0, "EMPTY": -25}[frame]
 
 
-@in_blender
 def test_imported_objects_are_styled_upright():
     """A ball, turned as an import turns objects: the flat side of a cone lies below, and there it stands."""
     item = ball()
@@ -78,7 +77,6 @@ def test_imported_objects_are_styled_upright():
     assert below < 1.5 * above
 
 
-@in_blender
 def test_a_vertex_group_bounds_the_region():
     item = ball()
     before = scenes.world_points(item)
@@ -93,13 +91,11 @@ def test_a_vertex_group_bounds_the_region():
     assert agreement[heights > 0.5].mean() > agreement[heights < -0.5].mean() + 0.03
 
 
-@in_blender
 def test_the_menu_lists_the_librarys_styles():
     assert [name for name, _ in STYLES] == list(arapfields.style_names())
     assert all(style_name(style_identifier(name)) == name for name, _ in STYLES)
 
 
-@in_blender
 def test_an_objects_axes_and_its_shape_are_styles():
     """A box turned by 30°: both kinds flatten the ball along the box's axes."""
     item = ball()
@@ -115,7 +111,6 @@ def test_an_objects_axes_and_its_shape_are_styles():
         assert reach[0] < reach[1] - 0.02, kind
 
 
-@in_blender
 def test_custom_styles_that_give_no_normals_are_named():
     item = ball()
     cloud = bpy.data.meshes.new("Cloud")
@@ -135,7 +130,6 @@ def test_custom_styles_that_give_no_normals_are_named():
             bpy.ops.arapfields.stylize(style="OBJECT", **SETTINGS)
 
 
-@in_blender
 def test_a_material_bounds_the_region():
     item = ball()
     for name in ("bottom", "top"):

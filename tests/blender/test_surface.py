@@ -4,7 +4,8 @@
 import json
 
 import numpy as np
-from support.blender.inside import IN_BLENDER, in_blender
+import pytest
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
@@ -18,10 +19,11 @@ if IN_BLENDER:
     from addon.surface import staleness
     from addon.surface.source_surface import read_surface
 
+pytestmark = pytest.mark.in_blender
+
 NEAR = 0.06  # of the bar's size: what so short a fit reaches
 
 
-@in_blender
 def test_a_fit_is_cached_and_goes_stale_with_the_mesh():
     fit_cache().clear()
     bar = scenes.bar()
@@ -48,7 +50,6 @@ def test_a_fit_is_cached_and_goes_stale_with_the_mesh():
     assert fit_cache().size() == 0
 
 
-@in_blender
 def test_a_fit_that_cannot_be_kept_is_used_and_said():
     bar = scenes.bar()
     before = user_preferences.cache_folder
@@ -65,7 +66,6 @@ def test_a_fit_that_cannot_be_kept_is_used_and_said():
     user_preferences.cache_folder = before
 
 
-@in_blender
 def test_extraction_lies_on_the_source_in_world_space():
     bar = scenes.bar()
     bar.scale, bar.location, bar.rotation_euler = (1, -1, 1), (4, 5, 6), (0.3, 0.4, 0.5)
@@ -89,7 +89,6 @@ def test_extraction_lies_on_the_source_in_world_space():
     assert not any(face.use_smooth for face in bpy.data.objects["Bar_implicit"].data.polygons)
 
 
-@in_blender
 def test_the_surface_is_deformed_like_the_mesh():
     bar, _, moving = scenes.bar_with_handles()
     for name, value in FIT.items():
@@ -107,7 +106,6 @@ def test_the_surface_is_deformed_like_the_mesh():
     assert np.mean(off) < NEAR
 
 
-@in_blender
 def test_exact_surfaces_need_no_fit():
     fit_cache().clear()
     bar, _, moving = scenes.bar_with_handles()
@@ -130,7 +128,6 @@ def test_exact_surfaces_need_no_fit():
     assert np.mean([tree.find_nearest(v.co)[3] for v in meshes["REMESH"].data.vertices]) < cell
 
 
-@in_blender
 def test_a_remeshed_surface_is_even_where_the_shape_is_stretched():
     def lengths(item):
         mesh = item.data

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bmesh
@@ -11,6 +11,8 @@ if IN_BLENDER:
     from support.blender import scenes
 
     from addon.live import sessions
+
+pytestmark = pytest.mark.in_blender
 
 BROKEN = {  # name → what the message says
     "empty": "Mesh: the mesh is empty",
@@ -26,7 +28,6 @@ BROKEN = {  # name → what the message says
 
 
 @pytest.mark.parametrize("case", BROKEN)
-@in_blender
 def test_what_cannot_be_deformed_is_named(case):
     item, _, moving = scenes.bar_with_handles("Mesh")
     mesh = item.data
@@ -61,7 +62,6 @@ def test_what_cannot_be_deformed_is_named(case):
     assert set(bpy.data.objects) == objects
 
 
-@in_blender
 def test_without_a_mesh_the_operators_say_so():
     for name in ("fit", "deform", "stylize", "extract", "add_handle"):
         with pytest.raises(RuntimeError, match="Select a mesh object"):
@@ -84,7 +84,6 @@ ODD = [
 
 
 @pytest.mark.parametrize("case", ODD)
-@in_blender
 def test_odd_meshes_deform(case):
     item, _, moving = scenes.bar_with_handles("Mesh")
     edited = bmesh.new()
@@ -138,7 +137,6 @@ def test_odd_meshes_deform(case):
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1e3])
-@in_blender
 def test_tiny_and_huge_units(scale):
     """Geometry itself of that size, and the scene's unit scale: results are the plain ones, scaled."""
     results = {}
@@ -159,7 +157,6 @@ def test_tiny_and_huge_units(scale):
     assert np.abs(results[scale] - results[1.0]).max() < 0.02
 
 
-@in_blender
 def test_half_a_million_triangles():
     """Deformed, styled and live, within the memory and patience of a test."""
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=500, y_subdivisions=500, size=2)

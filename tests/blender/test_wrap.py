@@ -5,7 +5,7 @@ import types
 
 import numpy as np
 import pytest
-from support.blender.inside import IN_BLENDER, in_blender
+from support.blender.inside import IN_BLENDER
 
 import arapfields as af
 
@@ -21,8 +21,9 @@ if IN_BLENDER:
     from addon.field_modifier import inputs
     from addon.wrap import landmarks
 
+pytestmark = pytest.mark.in_blender
 
-@in_blender
+
 def test_the_object_comes_to_lie_on_the_target_and_the_factor_goes_back():
     item, target = bar_and_target()
     rest, goal = scenes.world_points(item), scenes.world_points(target)
@@ -40,7 +41,6 @@ def test_the_object_comes_to_lie_on_the_target_and_the_factor_goes_back():
     assert np.array_equal(scenes.world_points(item), rest)
 
 
-@in_blender
 def test_landmarks_are_pairs_of_empties_that_move_with_both():
     item, target = bar_and_target()
     rest, goal = scenes.world_points(item), scenes.world_points(target)
@@ -56,7 +56,6 @@ def test_landmarks_are_pairs_of_empties_that_move_with_both():
     assert not landmarks.used(item) and not [o for o in bpy.data.objects if o.type == "EMPTY"]
 
 
-@in_blender
 def test_what_cannot_be_wrapped_onto_is_named_and_nothing_is_lost():
     item, target = bar_and_target()
     kept = scenes.everything(item)
@@ -82,7 +81,6 @@ def test_what_cannot_be_wrapped_onto_is_named_and_nothing_is_lost():
     assert scenes.everything(item) == kept and not item.modifiers
 
 
-@in_blender
 def test_a_rigged_template_goes_onto_a_soup_with_its_uvs_groups_and_keys():
     item, _ = rigged_bar()
     soup = soup_of(item)
@@ -103,7 +101,6 @@ def test_a_rigged_template_goes_onto_a_soup_with_its_uvs_groups_and_keys():
 
 
 @pytest.mark.slow  # half a minute
-@in_blender
 def test_a_rigged_character_goes_onto_a_scan_with_its_bones():
     body, rig = wraps.rigged_character()
     body.arapfields.wrap.onto, shape = wraps.scan_of(wraps.grown_parts())
@@ -132,7 +129,6 @@ def test_a_rigged_character_goes_onto_a_scan_with_its_bones():
     assert (depths()[within] > 0.005).all()
 
 
-@in_blender
 def test_bones_are_fitted_from_their_own_rest_each_time_and_can_be_reset():
     item, rig = rigged_bar()
     item.arapfields.wrap.onto = soup_of(item)
@@ -161,7 +157,6 @@ def test_bones_are_fitted_from_their_own_rest_each_time_and_can_be_reset():
     scenes.activate(item)
 
 
-@in_blender
 def test_bones_that_cannot_be_fitted_and_wraps_that_fail_leave_the_stack():
     item, rig = rigged_bar()
     item.arapfields.wrap.onto = soup_of(item)

@@ -32,7 +32,7 @@ def run(order):
         arguments = order["arguments"]
         if "tmp_path" in arguments:
             arguments["tmp_path"] = Path(arguments["tmp_path"])
-        getattr(load(order["file"]), order["function"]).inside(**arguments)
+        getattr(load(order["file"]), order["function"])(**arguments)
         return ""
     except BaseException:
         return traceback.format_exc()
