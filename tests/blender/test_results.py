@@ -10,7 +10,7 @@ from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
-    from support.blender import scenes
+    from support.blender import scenes, stages
     from support.blender.scenes import FIT
 
     import addon.deform.operators as deform
@@ -68,7 +68,7 @@ def test_the_surface_can_take_the_sources_place():
 
 
 def test_the_earlier_name_of_result_still_counts():
-    """Scripts say target= and object.arapfields.result; files of all versions store it under that name."""
+    """Scripts say target= and object.arapfields.target; files of all versions store it under that name."""
     bar, _, moving = scenes.bar_with_handles()
     settings = bar.arapfields
     for key, *_ in RESULT_ITEMS:
@@ -78,7 +78,7 @@ def test_the_earlier_name_of_result_still_counts():
         settings.result = key
         assert settings.target == key
     moving.location.z += 0.4
-    assert bpy.ops.arapfields.deform(result="NEW", **scenes.QUICK) == {"FINISHED"}
+    assert bpy.ops.arapfields.deform(target="NEW", **scenes.QUICK) == {"FINISHED"}
     assert "Bar_deformed" in bpy.data.objects and not bar.modifiers
 
 
@@ -135,20 +135,8 @@ def test_without_a_window_the_course_gives_what_blocking_gives():
     for name, value in scenes.NEW.items():
         setattr(bar.arapfields.deform, name, value)
     scenes.activate(bar)
-    cls = deform.ARAPFIELDS_OT_deform
-
-    class Operator:
-        title, in_window, scope, looks, fraction = "Deform", True, "ACTIVE", 0, 0.0
-        properties = type("P", (), {"is_property_set": staticmethod(lambda name: name == "target")})
-        target = "NEW"
-        coroutine, prepare, sources, plan = cls.coroutine, cls.prepare, cls.sources, cls.plan
-        groups_of, in_place = cls.groups_of, cls.in_place
-        conclude, apply_one = cls.conclude, cls.apply_one
-
-        def add_message(self, level, text):
-            print(level, text)
-
-    operator = Operator()
+    operator, fraction = stages.Operator(deform.ARAPFIELDS_OT_deform, result="NEW"), 0.0
+    operator.in_window = True
     coroutine = operator.coroutine(bpy.context)
     while True:
         try:
@@ -156,8 +144,7 @@ def test_without_a_window_the_course_gives_what_blocking_gives():
         except StopIteration as ended:
             assert ended.value == {"FINISHED"}
             break
-        operator.looks = max(operator.looks, jobs.running().preview_points()[1])
-        operator.fraction = max(operator.fraction, jobs.running().fraction)
+        fraction = max(fraction, jobs.running().fraction)
     jobs.stop()
     assert np.array_equal(scenes.world_points(bpy.data.objects["Bar_deformed"]), blocking)
-    assert operator.fraction > 0.9  # the share done and "iteration 40 of 40" say the same
+    assert fraction > 0.9  # the share done and "iteration 40 of 40" say the same
