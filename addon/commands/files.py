@@ -83,7 +83,7 @@ def export(path, items):
 
 
 def relative_textures(text, folder):
-    """Texture paths of a material file, told from the folder where it will lie."""
+    """Texture paths of a material file, relative to the folder where it will lie."""
 
     def relative(match):
         path = Path(match[2].strip())

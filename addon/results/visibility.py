@@ -17,8 +17,9 @@ def family(source):
 
 
 def show_alone(source, shown, for_now=False):
-    """Hides what else of the family lies in the place of `shown`, from viewport and renders, and shows that
-    again where it had been set aside itself; `for_now`: until `give_back`. Returns names of what it hides.
+    """Hides what else of the family lies in the place of `shown`, from viewport and renders.
+
+    It shows `shown` again where that was set aside. `for_now`: until `give_back`. Returns the hidden names.
     """
     names = []
     for item in family(source):
