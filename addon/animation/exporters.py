@@ -70,8 +70,8 @@ def alembic(context, path, frames):
     bpy.ops.wm.alembic_export(
         filepath=path,
         selected=True,
-        start=first_frame(frames),
-        end=last_frame(frames),
+        start=int(frames.start),
+        end=int(frames.last),
         xsamples=samples,
         gsamples=samples,
         as_background_job=False,
@@ -81,7 +81,7 @@ def alembic(context, path, frames):
 def usd(context, path, frames):
     scene = context.scene
     before = scene.frame_start, scene.frame_end
-    scene.frame_start, scene.frame_end = first_frame(frames), last_frame(frames)
+    scene.frame_start, scene.frame_end = int(frames.start), int(frames.last)
     try:
         known = bpy.ops.wm.usd_export.get_rna_type().properties
         world = {"convert_world_material": False} if "convert_world_material" in known else {}
@@ -108,17 +108,9 @@ def gltf(context, path, frames):
 CALLS = {"ABC": alembic, "USD": usd, "GLTF": gltf}
 
 
-def first_frame(frames):
-    return int(frames.start)
-
-
-def last_frame(frames):
-    return int(frames.start + (frames.count - 1) * frames.step)
-
-
 def count_of(kind, frames):
     """How many frames a file of that kind holds."""
-    return frames.count if kind == "GLTF" else last_frame(frames) - first_frame(frames) + 1
+    return frames.count if kind == "GLTF" else int(frames.last) - int(frames.start) + 1
 
 
 class MorphingCopy:

@@ -21,9 +21,13 @@ class Frames:
     def __iter__(self):
         return (self.start + i * self.step for i in range(self.count))
 
+    @property
+    def last(self):
+        return self.start + (self.count - 1) * self.step
+
     def with_those_before(self, start):
         """The frames and every whole one from `start` on that leads to them, in order."""
-        last = int(self.start + (self.count - 1) * self.step)
+        last = int(self.last)
         return sorted({*self, *map(float, range(min(start, last), last + 1))})
 
 

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a live session notices that its source, or what that carries, is edited; on the main thread."""
+"""How a live session notices that its source, its handles or what it carries is edited; main thread."""
 
 import time
 from typing import NamedTuple
 
 import bpy
 
-from ..blender import mesh_arrays
+from ..blender import mesh_arrays, modifier_stack
 from ..blender.object_references import settings_of
 from ..field_modifier import motion
-from ..solver.source_reader import SourceChanged
+from ..handles import empties, movers
+from ..solver import secondary_motion
+from ..solver.source_reader import SourceChanged, uses_handles
 from ..stiffness import painted
 
 STROKE = 0.3  # seconds without a touch of the brush after which a stroke has ended
@@ -79,3 +81,36 @@ def may_move(item, source):
     if isinstance(item, bpy.types.Object):
         return item == source or (item.type != "EMPTY" or settings_of(item).handle_of != source)
     return isinstance(item, bpy.types.Key | bpy.types.Armature | bpy.types.Lattice | bpy.types.Curve)
+
+
+def layout_of(source, kind, scene):
+    """What a solver is set up for: the handles and their rest regions, and what is shown.
+
+    Where it changes, the solver is set up anew. The energy's weights may be animated and are not part of it.
+    """
+    settings = settings_of(source)
+    held = [
+        (movers.key_of(e), e.kind, e.group, tuple(movers.user_settings(e).values()), tuple(e.rest))
+        for e in empties.used(source)
+    ]
+    style, stiffness = settings.stylize, settings.stiffness
+    further = (settings.output, settings.result, settings.surface)
+    further += (stiffness.group, stiffness.times, stiffness.bend_group, stiffness.bend_times)
+    if kind == "STYLIZE":
+        further += (style.region, style.region_material, style.use_handles)
+    further += tuple((e.item.session_uid if e.item else 0, e.way) for e in settings.carried)
+    further += (secondary_motion.layout_of(source, scene),)
+    used = uses_handles(settings, kind)
+    return (held if used else [], used and empties.holds_far(source), further, stack_of(source))
+
+
+def differ_in_handles(a, b):
+    """Whether two layouts differ in handles alone, and the solver can take those of `a` as it stands."""
+    return a[2:] == b[2:] and bool(a[0]) and not any(group for _, _, group, *_ in a[0])
+
+
+def stack_of(source):
+    """The modifiers before the field's, and where its offsets can lie."""
+    before = modifier_stack.before(source, in_place=True)
+    shown = [(modifier.name, modifier.type, modifier.show_viewport) for modifier in before]
+    return shown, source.data.users > 1

@@ -15,8 +15,7 @@ from ..results import placement, visibility
 from ..solver import secondary_motion
 from ..solver.frame_range import animation_range
 from ..solver.source_reader import SourceChanged, SourceReader
-from .edits import EditWatch
-from .layout import differ_in_handles, layout_of
+from .edits import EditWatch, differ_in_handles, layout_of
 from .live_modifier import PAUSING, LiveModifier
 from .live_object import LiveObject
 from .live_solver import PACE, LiveSolver

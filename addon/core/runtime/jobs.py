@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..errors import UserError
+from ..errors import UserError, as_user_error
 from .progress import JobCancelled, ProgressTracker
 from .threads import start_thread
 
@@ -153,10 +153,8 @@ def run_item(item, tracker):
         outcome.value = item.work(tracker)
     except JobCancelled:
         outcome.cancelled = True
-    except UserError as error:
-        outcome.error = error
-    except (ValueError, OSError) as error:
-        outcome.error = UserError("{error}", error=error)
+    except (UserError, ValueError, OSError) as error:
+        outcome.error = as_user_error(error)
     except MemoryError:
         outcome.error = UserError("Not enough memory for these settings")
     except Exception as error:
