@@ -40,7 +40,7 @@ LiveReportResult report(const RadialSolver& live) {
                "flipped_share"_a = r.distortion.flipped_share, "max_stretch"_a = r.distortion.max_stretch,
                "min_stretch"_a = r.distortion.min_stretch, "iterations"_a = r.iterations,
                "evaluations"_a = r.evaluations, "converged"_a = r.converged, "seconds"_a = r.seconds,
-               "setup_seconds"_a = r.setup_seconds, "notes"_a = py::tuple(py::cast(r.notes)),
+               "setup_seconds"_a = r.setup_seconds, "notes"_a = py::tuple(py::cast(r.warnings)),
                "preference"_a = r.preference, "kinetic"_a = r.kinetic, "speed"_a = r.speed));
 }
 

@@ -39,8 +39,9 @@ py::object solve_report(const SolveReport& report, double scale) {
                "max_stretch"_a = report.distortion.max_stretch,
                "min_stretch"_a = report.distortion.min_stretch, "iterations"_a = report.loop.iterations,
                "seconds"_a = report.loop.seconds, "stopped_by"_a = name_of(report.loop.stopped_by),
-               "scale"_a = scale, "loss"_a = py::tuple(loss), "notes"_a = py::tuple(py::cast(report.notes)),
-               "preference"_a = report.preference, "far_target"_a = report.far_target));
+               "scale"_a = scale, "loss"_a = py::tuple(loss),
+               "notes"_a = py::tuple(py::cast(report.warnings)), "preference"_a = report.preference,
+               "far_target"_a = report.far_target));
 }
 
 py::object wrap(const Solution& solution) {

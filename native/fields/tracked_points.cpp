@@ -17,7 +17,9 @@ TrackedPoints::TrackedPoints(const RadialBasis& basis, const Frame& frame, Point
   evaluator_ = RadialEvaluator<float>(basis, frame.to_cube(sorted), JetOrder::value);
 }
 
-void TrackedPoints::set_influence(const Influence* influence) {
+void TrackedPoints::set_influence(const std::shared_ptr<const Influence>& influence) {
+  if (influence == influence_) return;
+  influence_ = influence;
   shares_ = influence != nullptr ? influence->at(frame_.to_cube(rest_)) : Vector();
 }
 

@@ -14,16 +14,19 @@ class TrackedPoints {
   TrackedPoints() = default;
   TrackedPoints(const RadialBasis& basis, const Frame& frame, PointsIn mesh_points);
   /// What moves them only so far; null: nothing.
-  void set_influence(const Influence* influence);
+  void set_influence(const std::shared_ptr<const Influence>& influence);
   /// Where the field with these coefficients takes them, (n,3) in mesh coordinates.
   PointsF moved(const RowMatrix<double>& coefficients) const;
+  /// Mesh coordinates at rest.
+  const Points& rest() const { return rest_; }
   Index size() const { return evaluator_.size(); }
 
  private:
   Frame frame_;
   std::vector<std::uint32_t> order_;
   RadialEvaluator<float> evaluator_;
-  Points rest_;    // mesh coordinates
+  Points rest_;  // mesh coordinates
+  std::shared_ptr<const Influence> influence_;
   Vector shares_;  // of the motion; empty: all of it
 };
 

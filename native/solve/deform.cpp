@@ -16,7 +16,7 @@ namespace arapfields {
 namespace {
 
 std::shared_ptr<const HandleBlend> exact_blend(const BoundHandles& handles, double margin,
-                                               std::vector<std::string>& notes) {
+                                               std::vector<std::string>& warnings) {
   std::vector<RigidRegion> regions;
   std::vector<Points> members;
   for (Index i = 0; i < handles.count(); ++i) {
@@ -33,7 +33,7 @@ std::shared_ptr<const HandleBlend> exact_blend(const BoundHandles& handles, doub
     members.push_back(
         handles.sources().middleRows(handles.begin(i), handles.begin(i + 1) - handles.begin(i)));
   }
-  notes = limit_margins(regions, members);
+  warnings = limit_margins(regions, members);
   return std::make_shared<HandleBlend>(std::move(regions));
 }
 
@@ -56,8 +56,8 @@ ObjectiveTerms terms_of(const SurfaceSamples& samples, const std::vector<Handle>
 Solution exact_radial(const SurfaceSamples& samples, const std::vector<Handle>& handles,
                       const DeformOptions& options, const Progress& progress, const SolveHooks& hooks) {
   const BoundHandles bound(in_cube(handles, samples.frame), samples.points);
-  std::vector<std::string> notes;
-  ExactHandles exact{exact_blend(bound, options.margin, notes), {}};
+  std::vector<std::string> warnings;
+  ExactHandles exact{exact_blend(bound, options.margin, warnings), {}};
   exact.around = [&](std::shared_ptr<const DeformationField> inside) {
     MlpShape shape{options.network, 3};
     shape.width = shape.layers = shape.octaves = 1;
@@ -69,7 +69,7 @@ Solution exact_radial(const SurfaceSamples& samples, const std::vector<Handle>& 
     return field;
   };
   Solution solution = deform_radial(samples, handles, options, progress, hooks, &exact);
-  solution.report.notes.insert(solution.report.notes.begin(), notes.begin(), notes.end());
+  solution.report.warnings.insert(solution.report.warnings.begin(), warnings.begin(), warnings.end());
   return solution;
 }
 
@@ -96,8 +96,8 @@ Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handle
 
   const std::shared_ptr<TrainableField> field = trained_field(options);
   auto* const neural = dynamic_cast<NeuralField*>(field.get());  // other kinds have neither blend nor base
-  std::vector<std::string> notes;
-  if (options.exact_handles) neural->set_handles(exact_blend(terms.handles, options.margin, notes));
+  std::vector<std::string> warnings;
+  if (options.exact_handles) neural->set_handles(exact_blend(terms.handles, options.margin, warnings));
   const double share = options.start == StartKind::radial ? 0.1 : 0.0;
   if (options.start == StartKind::radial)
     neural->set_base(radial_start(samples, handles, options, progress.part(0.0, share)));
@@ -112,7 +112,7 @@ Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handle
                                                    resolve_device(options.machine.device));
     };
   Solution solution = solve_field(field, samples, std::move(terms), loop, progress.part(share, 1.0), wrap);
-  solution.report.notes.insert(solution.report.notes.begin(), notes.begin(), notes.end());
+  solution.report.warnings.insert(solution.report.warnings.begin(), warnings.begin(), warnings.end());
   return solution;
 }
 

@@ -11,7 +11,7 @@
 namespace arapfields {
 namespace {
 
-/// Whether a network's shape, training, precision or device is asked for.
+/// Whether an option of a network's shape, training, precision or device is not at its default.
 template <class Options>
 bool names_a_network(const Options& given) {
   const Options usual;
@@ -30,8 +30,24 @@ CouplingShape coupling_shape(NetworkOptions network, int couplings) {
   return shape;
 }
 
+}  // namespace
+
+FieldKind chosen_field(const DeformOptions& options) {
+  if (options.field != FieldKind::automatic) return options.field;
+  const DeformOptions usual;
+  const bool network = names_a_network(options) || options.start != usual.start ||
+                       options.fresh_samples != usual.fresh_samples ||
+                       options.invertibility != usual.invertibility;
+  return network ? FieldKind::neural : FieldKind::radial;
+}
+
+FieldKind chosen_field(const StylizeOptions& options) {
+  if (options.field != FieldKind::automatic) return options.field;
+  return names_a_network(options) ? FieldKind::neural : FieldKind::radial;
+}
+
 template <class Options>
-std::shared_ptr<TrainableField> made_field(const Options& options) {
+std::shared_ptr<TrainableField> trained_field(const Options& options) {
   const auto seed = static_cast<std::uint64_t>(options.training.seed);
   if (chosen_field(options) == FieldKind::invertible) {
     const std::string with = " with field='invertible'";
@@ -50,7 +66,7 @@ std::shared_ptr<TrainableField> made_field(const Options& options) {
 /// What one layer changes, all that follow carry on: steps of coupling layers have to be smaller, and more,
 /// which their narrow networks make up for.
 template <class Options>
-LoopOptions made_training(const Options& options) {
+LoopOptions training_of(const Options& options) {
   LoopOptions loop;
   loop.training = options.training;
   if (chosen_field(options) != FieldKind::invertible) return loop;
@@ -61,26 +77,9 @@ LoopOptions made_training(const Options& options) {
   return loop;
 }
 
-}  // namespace
-
-std::shared_ptr<TrainableField> trained_field(const DeformOptions& options) { return made_field(options); }
-std::shared_ptr<TrainableField> trained_field(const StylizeOptions& options) { return made_field(options); }
-
-LoopOptions training_of(const DeformOptions& options) { return made_training(options); }
-LoopOptions training_of(const StylizeOptions& options) { return made_training(options); }
-
-FieldKind chosen_field(const DeformOptions& options) {
-  if (options.field != FieldKind::automatic) return options.field;
-  const DeformOptions usual;
-  const bool network = names_a_network(options) || options.start != usual.start ||
-                       options.fresh_samples != usual.fresh_samples ||
-                       options.invertibility != usual.invertibility;
-  return network ? FieldKind::neural : FieldKind::radial;
-}
-
-FieldKind chosen_field(const StylizeOptions& options) {
-  if (options.field != FieldKind::automatic) return options.field;
-  return names_a_network(options) ? FieldKind::neural : FieldKind::radial;
-}
+template std::shared_ptr<TrainableField> trained_field(const DeformOptions&);
+template std::shared_ptr<TrainableField> trained_field(const StylizeOptions&);
+template LoopOptions training_of(const DeformOptions&);
+template LoopOptions training_of(const StylizeOptions&);
 
 }  // namespace arapfields

@@ -10,18 +10,18 @@
 
 namespace arapfields {
 
-/// What represents the motion: `field`, and where that is left to us, a network if any option that only
-/// networks have is not at its default, else radial functions.
+/// The kind of field: `options.field`. For "auto", a network if an option that only networks have is not at
+/// its default, else radial functions.
 FieldKind chosen_field(const DeformOptions& options);
 FieldKind chosen_field(const StylizeOptions& options);
 
-/// The field that training starts from, for kinds that are trained. Throws InvalidInput for options that the
-/// kind does not know.
-std::shared_ptr<TrainableField> trained_field(const DeformOptions& options);
-std::shared_ptr<TrainableField> trained_field(const StylizeOptions& options);
+/// The field that training starts from, for the trained kinds. Throws InvalidInput for options that the kind
+/// does not have.
+template <class Options>
+std::shared_ptr<TrainableField> trained_field(const Options& options);
 
-/// How the chosen kind is trained: with the options' learning rate, or its own where that is 0.
-LoopOptions training_of(const DeformOptions& options);
-LoopOptions training_of(const StylizeOptions& options);
+/// How the chosen kind is trained. A learning rate of 0 means the kind's own.
+template <class Options>
+LoopOptions training_of(const Options& options);
 
 }  // namespace arapfields

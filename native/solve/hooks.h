@@ -9,7 +9,7 @@ namespace arapfields {
 /// What a caller of deform or stylize may add to the solve.
 struct SolveHooks {
   ExternalEnergies energies;   ///< terms that join the loss
-  IterationObserver observer;  ///< told of each iteration
+  IterationObserver observer;  ///< called after each iteration
 };
 
 }  // namespace arapfields

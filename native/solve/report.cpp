@@ -74,10 +74,11 @@ SolveReport measure(const DeformationField& field, const SurfaceSamples& samples
     first = false;
     if (styled) {
       const Points rest = normals.middleRows(begin, rows);
-      const Points wanted = targets.middleRows(targets.rows() > 0 ? begin : 0, targets.rows() > 0 ? rows : 0);
+      const Points target_normals =
+          targets.middleRows(targets.rows() > 0 ? begin : 0, targets.rows() > 0 ? rows : 0);
       const auto& by = terms.style.preference;
       preference +=
-          share * preference_of(by, style_energy<double>(jets, rest, by, wanted, Vector(), 0.0, {}));
+          share * preference_of(by, style_energy<double>(jets, rest, by, target_normals, Vector(), 0.0, {}));
     }
   }
   if (styled) report.preference = preference;
@@ -100,7 +101,7 @@ Solution measured(std::shared_ptr<DeformationField> field, const SurfaceSamples&
   solution.report = measure(*solution.field, samples, terms);
   const std::optional<FarTarget> far = far_target(terms.handles, samples.points);
   if (far) solution.report.far_target = far->sizes;
-  solution.report.notes = notes_on(solution.report.distortion, far);
+  solution.report.warnings = warnings_on(solution.report.distortion, far);
   solution.report.loop = std::move(loop);
   return solution;
 }
@@ -124,11 +125,11 @@ Solution solve_field(std::shared_ptr<TrainableField> field, const SurfaceSamples
     LoopResult loop =
         minimise(*field, wrapped ? *wrapped : objective, options, progress.part(0.0, 0.95), shown);
     progress.report(0.95, "measuring the result");
-    Solution solution = measured(field, samples, objective.asked(), std::move(loop));
+    Solution solution = measured(field, samples, objective.objective_terms(), std::move(loop));
     progress.report(1.0, "done");
     return solution;
   } catch (const LoopDiverged& cause) {
-    throw SolveDiverged(cause, measured(field, samples, objective.asked(), cause.result));
+    throw SolveDiverged(cause, measured(field, samples, objective.objective_terms(), cause.result));
   }
 }
 

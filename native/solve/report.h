@@ -9,12 +9,12 @@
 
 namespace arapfields {
 
-/// Fills everything but `loop` and `notes`. Energies and distortion are means and extremes over at most
+/// Fills everything but `loop` and `warnings`. Energies and distortion are means and extremes over at most
 /// `max_samples` of the samples, evenly spread in their order.
 SolveReport measure(const DeformationField& field, const SurfaceSamples& samples, const ObjectiveTerms& terms,
                     Index max_samples = 4000);
 
-/// A report, with its notes, on a field that another solver made.
+/// A report, with its warnings, on a field that another solver made.
 Solution measured(std::shared_ptr<DeformationField> field, const SurfaceSamples& samples,
                   const ObjectiveTerms& terms, LoopResult loop);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the solvers share.
+// Checks and conversions of input that all solvers share.
 #pragma once
 
 #include "core/errors.h"
@@ -17,7 +17,7 @@ inline void require_samples(const SurfaceSamples& samples) {
   require_weights("samples.bend_weights", samples.bend_weights, samples.size());
 }
 
-/// Throws InvalidInput that names the first handle that has a reach, for what moves the whole shape.
+/// Throws InvalidInput that names the first handle with a reach: a style, say, moves the whole shape.
 inline void require_no_reach(const std::vector<Handle>& handles, const std::string& why = "a style") {
   for (std::size_t i = 0; i < handles.size(); ++i)
     require(handles[i].reach == 0.0, "handles[" + std::to_string(i) + "].reach",

@@ -14,16 +14,17 @@
 
 namespace arapfields {
 
-/// How well a solved field does what it was asked for, measured at surface samples after the solve.
+/// Energies and errors of a solved field, measured at surface samples after the solve.
 /// The stretch and the energy are pure numbers, the bend is in 1/cube units², lengths are in mesh units.
 struct SolveReport {
-  ArapValue arap;                               ///< arap.energy with the samples' own stiffness
-  std::vector<double> handle_mean, handle_max;  ///< distances ‖f(x) − C x‖ of each handle
+  ArapValue arap;                   ///< arap.energy with the samples' own stiffness
+  std::vector<double> handle_mean;  ///< distance ‖f(x) − C x‖, of each handle
+  std::vector<double> handle_max;
   std::optional<double> far_target;  ///< sizes of the shape to the farthest target, where that is far
   std::optional<double> preference;  ///< mean g of the deformed normals, or mean ñ·t of an object's style
   Distortion distortion;
   LoopResult loop;
-  std::vector<std::string> notes;  ///< sentences: folds, far targets, margins that were reduced
+  std::vector<std::string> warnings;  ///< sentences: folds, far targets, margins that were reduced
 };
 
 struct Solution {

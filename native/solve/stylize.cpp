@@ -21,8 +21,8 @@ void check_samples(const SurfaceSamples& samples, const Vector& weights) {
           "all must be 0 or larger");
 }
 
-/// The surface's lowest sample, asked to stay where it is.
-Handle hold_lowest(const SurfaceSamples& samples, const Vec3& up) {
+/// A handle that holds the lowest sample of the surface.
+Handle lowest_point(const SurfaceSamples& samples, const Vec3& up) {
   Index lowest = 0;
   (samples.points * up).minCoeff(&lowest);
   Handle handle;
@@ -31,8 +31,8 @@ Handle hold_lowest(const SurfaceSamples& samples, const Vec3& up) {
   return handle;
 }
 
-/// No other term of ours changes by a translation, so the point may be put back exactly.
-void hold(TrainableField& field, const Handle& handle) {
+/// A translation changes no other term, so that the point can be put back exactly.
+void anchor_lowest_point(TrainableField& field, const Handle& handle) {
   Points value(1, 3);
   field.evaluate(handle.rest_point.transpose(), {value.data(), 1, JetOrder::value});
   field.translate(handle.rest_point - value.row(0).transpose());
@@ -60,7 +60,7 @@ Solution stylize(const SurfaceSamples& samples, const Style& style, const Styliz
     terms.gauss = options.strength * options.gauss_weight * terms.style.factor;
   if (weights.size() > 0) terms.style.weights = terms.style.weights.cwiseProduct(weights);
   terms.external = hooks.energies;
-  const Handle lowest = hold_lowest(samples, up);
+  const Handle lowest = lowest_point(samples, up);
   terms.handles = handles.empty() ? BoundHandles({lowest}, samples.points)
                                   : BoundHandles(in_cube(handles, samples.frame), samples.points);
   terms.weights = energy_weights(samples, terms.handles);
@@ -77,7 +77,7 @@ Solution stylize(const SurfaceSamples& samples, const Style& style, const Styliz
   if (terms.gauss == 0.0 && handles.empty() && hooks.energies.empty()) loop.training.iterations = 0;
   Solution solution = solve_field(field, samples, std::move(terms), loop, progress);
   if (handles.empty()) {
-    if (hooks.energies.empty()) hold(*field, lowest);
+    if (hooks.energies.empty()) anchor_lowest_point(*field, lowest);
     solution.report.handle_mean.clear();
     solution.report.handle_max.clear();
   }

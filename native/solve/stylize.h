@@ -18,9 +18,9 @@ namespace arapfields {
 /// (The paper's text has the sign of the first term reversed and leaves the normals without unit length,
 /// which a collapsing surface would win.) Without handles the lowest sample, against the direction `up`, is
 /// held in place; with handles, there is no stance. `weights` (one u ≥ 0 a sample, or empty) blend the
-/// effect. Strength 0 is the identity, and so is a sphere's style. External energies may feel where the
-/// surface is: beside them the lowest sample is held by its spring alone. An observer is told of deform's
-/// terms, of style and of stance. Throws InvalidInput for bad options,
+/// effect. Strength 0 is the identity, and so is a sphere's style. External energies may depend on where the
+/// surface is: with them, a spring alone holds the lowest sample. An observer gets deform's terms, style and
+/// stance. Throws InvalidInput for bad options,
 /// samples without normals, weights or handles that do not fit; SolveDiverged; Cancelled.
 ARAPFIELDS_EXPORT Solution stylize(const SurfaceSamples& samples, const Style& style,
                                    const StylizeOptions& options, const Progress& progress = {},

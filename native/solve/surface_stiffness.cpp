@@ -8,10 +8,9 @@
 namespace arapfields {
 namespace {
 
-/// The radius of a bend that costs as much as the stretch at a distance of it, in thicknesses: what makes λ
-/// 0.01 at the median of the bunny's surface.
-constexpr double reach = 0.345;
-/// What is left of a sample's resistance where a handle scales it.
+/// √λ in thicknesses: with it λ is 0.01, the paper's, at the median of the bunny's surface.
+constexpr double bending_length = 0.345;
+/// Weight of a sample in a handle that may scale.
 constexpr double yielding = 0.01;
 /// λ where it is the same everywhere: the paper's.
 constexpr double uniform_bending = 0.01;
@@ -20,8 +19,9 @@ constexpr double uniform_bending = 0.01;
 
 SurfaceStiffness::SurfaceStiffness(std::shared_ptr<const LocalThickness> thickness,
                                    const SurfaceOptions& options)
-    : bending_(options.bending *
-               (options.bending_unit == BendingUnit::cube ? uniform_bending : reach * reach)) {
+    : bending_(options.bending * (options.bending_unit == BendingUnit::cube
+                                      ? uniform_bending
+                                      : bending_length * bending_length)) {
   if (bending_ > 0.0 && options.bending_unit == BendingUnit::thickness) thickness_ = std::move(thickness);
 }
 

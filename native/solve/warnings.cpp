@@ -30,15 +30,16 @@ std::optional<FarTarget> far_target(const BoundHandles& handles, PointsIn sample
   return farthest;
 }
 
-std::vector<std::string> notes_on(const Distortion& distortion, const std::optional<FarTarget>& far) {
-  std::vector<std::string> notes;
+std::vector<std::string> warnings_on(const Distortion& distortion, const std::optional<FarTarget>& far) {
+  std::vector<std::string> warnings;
   if (distortion.flipped_share > 0.0)
-    notes.push_back("the result folds: det J is not positive at " + number(100.0 * distortion.flipped_share) +
-                    " % of the samples, " + number(distortion.min_determinant) + " at the worst");
+    warnings.push_back("the result folds: det J is not positive at " +
+                       number(100.0 * distortion.flipped_share) + " % of the samples, " +
+                       number(distortion.min_determinant) + " at the worst");
   if (far)
-    notes.push_back("handles[" + std::to_string(far->handle) + "]: its target is " + number(far->sizes) +
-                    " times the shape's size away from its place at rest");
-  return notes;
+    warnings.push_back("handles[" + std::to_string(far->handle) + "]: its target is " + number(far->sizes) +
+                       " times the shape's size away from its place at rest");
+  return warnings;
 }
 
 }  // namespace arapfields

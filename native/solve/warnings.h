@@ -11,16 +11,15 @@
 
 namespace arapfields {
 
-/// A handle whose target is so far from its place at rest that the shape can only be torn after it.
+/// A handle whose target is many sizes of the shape away from its rest position.
 struct FarTarget {
   Index handle;
-  double sizes;  ///< the way in sizes of the shape: the largest extent of the samples' bounding box
+  double sizes;  ///< the distance, in sizes of the shape: the largest extent of its bounding box
 };
 /// The farthest of them, if any is far.
 std::optional<FarTarget> far_target(const BoundHandles& handles, PointsIn samples);
 
-/// Sentences on what a result should not be used without knowing: folds at the samples that it was measured
-/// at, and a far target.
-std::vector<std::string> notes_on(const Distortion& distortion, const std::optional<FarTarget>& far);
+/// Sentences that warn of folds at the measured samples and of a far target.
+std::vector<std::string> warnings_on(const Distortion& distortion, const std::optional<FarTarget>& far);
 
 }  // namespace arapfields

@@ -144,7 +144,8 @@ WrapSolution wrap(const SurfaceSamples& samples, const ImplicitFunction& functio
   report.matched_share = flow.matched_share();
   const Vector left = placement.scale * (flow.landmarks() - ends).rowwise().norm();
   report.landmarks.assign(left.data(), left.data() + left.size());
-  for (std::string& note : notes_on(report.distortion, std::nullopt)) report.notes.push_back(std::move(note));
+  for (std::string& note : warnings_on(report.distortion, std::nullopt))
+    report.notes.push_back(std::move(note));
   report.seconds = watch.seconds();
   progress.report(1.0, "done");
   return solution;

@@ -77,3 +77,18 @@ def test_a_solve_goes_on_rightly_after_one_that_was_cancelled(samples):
     field = live.solve([LEFT, turned(40) @ RIGHT], tolerance=1e-4)
     stretch, _ = af.arap_energy(field, samples.points)
     assert field.report.stretch == pytest.approx(stretch, rel=0.05)
+
+
+def test_a_solve_after_a_cancelled_step_has_no_inertia(samples):
+    live = deformer(samples)
+    live.set_secondary_motion(af.SecondaryMotionOptions())
+    live.step([LEFT, turned(10) @ RIGHT], 1 / 24)
+    state, task = live.motion_state, af.Task()
+    settled = live.solve([LEFT, RIGHT])(samples.points)
+    live.motion_state = state
+    timer = threading.Timer(0.05, task.cancel)
+    timer.start()
+    with pytest.raises(af.Cancelled):
+        live.step([LEFT, turned(40) @ RIGHT], 10.0, task=task)
+    timer.join()
+    assert np.array_equal(live.solve([LEFT, RIGHT])(samples.points), settled)

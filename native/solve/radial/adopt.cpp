@@ -1,47 +1,62 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How a live solver takes another field's shape.
+// Taking another field's shape, and adding samples where the field folds.
+#include <cmath>
+
 #include "core/parallel.h"
 #include "sampling/sample_choice.h"
+#include "solve/radial/handle_motion.h"
 #include "solve/radial/state.h"
 
 namespace arapfields {
+namespace {
 
-/// The projection in the surrogate's norm, by conjugate gradients, since the preconditioner knows a part of
-/// the samples. What single precision leaves of far coefficients grows with each round: the round of least
-/// energy is the start.
-void RadialSolver::State::adopt(const DeformationField& field) {
-  constexpr int rounds = 8;
-  const ThreadScope threads(options_.threads);
-  precondition(0.0);
-  const RadialObjective<float>& objective = *fast_.objective;
-  const Points places = rows_of(surface_, chosen_);
-  // Fields of another frame: the reflections' plane may have moved it.
-  const Frame& from = field.frame();
-  const auto there = [&](PointsIn points) {
-    return from == frame_ ? Points(points) : from.to_cube(frame_.to_mesh(points));
+double dot(const RowMatrix<double>& a, const RowMatrix<double>& b) { return a.cwiseProduct(b).sum(); }
+
+/// What an objective of single precision would measure of a field, which may have another frame: the plane of
+/// reflections may have moved it.
+VectorF measured(const RadialState& s, const DeformationField& field) {
+  const Frame &from = field.frame(), &own = s.problem.frame();
+  const auto to_field = [&](PointsIn points) {
+    return from == own ? Points(points) : from.to_cube(own.to_mesh(points));
   };
-  const auto here = [&](PointsIn points) {
-    return from == frame_ ? Points(points) : frame_.to_cube(from.to_mesh(points));
+  const auto from_field = [&](PointsIn points) {
+    return from == own ? Points(points) : own.to_cube(from.to_mesh(points));
   };
+  const Points& places = s.problem.energy_points;
   JetBlock<double> jets(places.rows(), JetOrder::second);
-  field.evaluate(there(places), jets.view());
+  field.evaluate(to_field(places), jets.view());
   Eigen::Map<Points> values(jets.view().data, places.rows(), 3);
-  values = here(values);
-  Eigen::Map<Vector>(jets.view().column(4), 18 * places.rows()) *= frame_.scale / from.scale;
-  Points ends(pairs_.sources.rows(), 3);
-  field.evaluate(there(pairs_.sources), {ends.data(), ends.rows(), JetOrder::value});
-  ends = here(ends);
-  VectorF wanted = VectorF::Zero(30 * places.rows() + 3 * ends.rows() + 3 * basis_.center_count());
-  if (blend_) RadialBlend<double>(*blend_, places).multiply(jets.view());
-  wanted.head(30 * places.rows()) =
-      Eigen::Map<const Vector>(jets.view().data, 30 * places.rows()).cast<float>();
-  wanted.segment(30 * places.rows(), 3 * ends.rows()) =
+  values = from_field(values);
+  Eigen::Map<Vector>(jets.view().column(4), 18 * places.rows()) *= own.scale / from.scale;
+  if (s.problem.blend) RadialBlend<double>(*s.problem.blend, places).multiply(jets.view());
+  const Points& sources = s.handles.pairs().sources;
+  Points ends(sources.rows(), 3);
+  field.evaluate(to_field(sources), {ends.data(), ends.rows(), JetOrder::value});
+  ends = from_field(ends);
+  VectorF u = VectorF::Zero(30 * places.rows() + 3 * ends.rows() + 3 * s.problem.basis.center_count());
+  u.head(30 * places.rows()) = Eigen::Map<const Vector>(jets.view().data, 30 * places.rows()).cast<float>();
+  u.segment(30 * places.rows(), 3 * ends.rows()) =
       Eigen::Map<const Vector>(ends.data(), 3 * ends.rows()).cast<float>();
-  const auto dot = [](const auto& a, const auto& b) { return a.cwiseProduct(b).sum(); };
+  return u;
+}
+
+}  // namespace
+
+/// The projection in the surrogate's norm, by preconditioned conjugate gradients, since the preconditioner
+/// knows a part of the samples. What single precision leaves of far coefficients grows with each round: the
+/// round of least energy is the start.
+void RadialSolver::adopt(const DeformationField& field) {
+  constexpr int rounds = 8;
+  RadialState& s = *state_;
+  const ThreadScope threads(s.problem.options.threads);
+  s.precondition(0.0);
+  const RadialObjective<float>& objective = s.objective(s.fast);
+  s.invalidate_history();
+  RowMatrix<double>& coefficients = s.shape.coefficients;
   VectorF u, du;
-  objective.measure(coefficients_, u);
+  objective.measure(coefficients, u);
   double value = objective.value(u, nullptr);
-  RowMatrix<double> residual = objective.pull_back(objective.weighted(wanted - u));
+  RowMatrix<double> residual = objective.pull_back(objective.weighted(measured(s, field) - u));
   RowMatrix<double> image = objective.precondition(residual), direction = image;
   double square = dot(residual, image);
   for (int round = 0; round < rounds && square > 0.0; ++round) {
@@ -52,15 +67,47 @@ void RadialSolver::State::adopt(const DeformationField& field) {
     const double next_value = objective.value(u, nullptr);
     if (!(next_value < value)) break;
     value = next_value;
-    coefficients_ += step * direction;
+    coefficients += step * direction;
     residual -= step * product;
     image = objective.precondition(residual);
     const double next = dot(residual, image);
     direction = image + next / square * direction;
     square = next;
   }
-  forget_past();
-  rest();
+  s.dynamics.zero_velocity(motions_of(s.handles.bound()));
+}
+
+Index RadialSolver::add_fold_samples(double barrier) {
+  RadialState& s = *state_;
+  const ThreadScope threads(s.problem.options.threads);
+  const std::vector<Index>& chosen = s.problem.energy_samples;
+  // Samples that the energy does not see, neighbours beside each other.
+  std::vector<bool> seen(static_cast<std::size_t>(s.problem.samples.size()), false);
+  for (const Index i : chosen) seen[static_cast<std::size_t>(i)] = true;
+  std::vector<Index> unseen;
+  for (const std::uint32_t i : s.problem.shape->order)
+    if (!seen[i]) unseen.push_back(i);
+  // Those that the field folds at, or nearly does.
+  const Index count = static_cast<Index>(unseen.size());
+  JetBlock<double> jets(count, JetOrder::first);
+  field()->evaluate(rows_of(s.problem.surface(), unseen), jets.view());
+  Index folded = 0;
+  std::vector<Index> added;
+  for (Index p = 0; p < count; ++p) {
+    Mat3 jacobian;
+    for (int k = 0; k < 3; ++k) jacobian.col(k) = Eigen::Map<const Vec3>(jets.view().at(first_column(k), p));
+    const double determinant = jacobian.determinant();
+    if (determinant <= 0.0) ++folded;
+    if (determinant < s.problem.options.surface.barrier_threshold)
+      added.push_back(unseen[static_cast<std::size_t>(p)]);
+  }
+  const double seen_folds = s.report.distortion.flipped_share * static_cast<double>(chosen.size());
+  folded += static_cast<Index>(std::ceil(seen_folds));
+  if (folded == 0) return 0;
+  s.problem.options.surface.barrier = barrier;
+  s.problem.add_energy_samples(added);
+  s.stiffness.add_samples(s.handles.bound());
+  return folded;
 }
 
 }  // namespace arapfields

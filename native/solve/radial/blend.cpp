@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "solve/radial/blend.h"
 
+#include "core/product_rule.h"
+
 namespace arapfields {
 namespace {
 
@@ -35,17 +37,8 @@ RadialBlend<Scalar>::RadialBlend(const HandleBlend& blend, PointsIn samples) {
 template <class Scalar>
 void RadialBlend<Scalar>::multiply(JetView<Scalar> jets) const {
   for (std::size_t r = 0; r < rows_.size(); ++r) {
-    const Scalar* a = &free_[all * r];
-    for (int i = 0; i < 3; ++i) {
-      const auto p = [&](int c) -> Scalar& { return jets.at(c, rows_[r])[i]; };
-      for (int j = 0; j < 3; ++j)
-        for (int k = j; k < 3; ++k) {
-          const int cj = first_column(j), ck = first_column(k), cjk = second_column(j, k);
-          p(cjk) = a[0] * p(cjk) + a[cj] * p(ck) + a[ck] * p(cj) + a[cjk] * p(0);
-        }
-      for (int c = 1; c < 4; ++c) p(c) = a[0] * p(c) + a[c] * p(0);
-      p(0) *= a[0];
-    }
+    const auto a = [&](int c) { return free_[all * r + static_cast<std::size_t>(c)]; };
+    for (int i = 0; i < 3; ++i) multiply_jet(a, [&](int c) -> Scalar& { return jets.at(c, rows_[r])[i]; });
   }
 }
 

@@ -9,35 +9,32 @@
 #include "core/parallel.h"
 #include "solve/radial/radial_solver.h"
 #include "solve/radial/rest_shape.h"
-#include "solve/radial/symmetry.h"
 #include "solve/setup.h"
 
 namespace arapfields {
 namespace {
 
-/// Steps between two looks at the clock.
+/// Steps between two checks of the clock and of the gain.
 constexpr int steps_at_once = 10;
-/// Of the energy, in so many steps: with less than that a deformation has arrived. Thin parts under many held
-/// samples would go on for hundreds of steps, for a ten-thousandth.
+/// A deformation has converged where these steps gain less than this share of the energy. Thin parts under
+/// many held samples would go on for hundreds of steps, for a ten-thousandth.
 constexpr double least_gain = 1e-3;
-/// From so many centers on, half of them, or so many, make a first result, in so many steps at most.
+/// A deformation with `worth_a_first` centers starts from one with half of them, `most_first` at most.
 constexpr int worth_a_first = 600, most_first = 500, first_steps = 20;
-/// What makes the first result of a style.
+/// The solve that a stylization starts from.
 constexpr int style_first_centers = 400, style_first_samples = 4000, style_first_steps = 30;
-/// A style that folds between the samples that were looked at goes on so many times, with so many more times
-/// the barrier's weight, in so many steps at most.
+/// A style that folds between the energy samples is solved on with those samples and a heavier barrier.
 constexpr int unfolding_rounds = 5, unfolding_steps = 15;
 constexpr double unfolding = 3.0;
-/// Share of the handles' weight with which exact handles still pull at the radial field inside the blend,
-/// which nothing else holds in their boxes.
+/// Exact handles pull with this share of their weight at the radial field inside the blend, which nothing
+/// else holds in their boxes.
 constexpr double share_of_exact = 0.01;
-/// Samples a center that carry it, and that the energy sees where there are as many: more centers than
-/// samples can tell apart would fit them and fold between them.
-constexpr int samples_a_center = 8, seen_a_center = 10;
-/// Samples of a handle that are held: with fewer it is chance how far to its edge they reach, and so how much
-/// room is left for the bend.
+/// Surface samples, and energy samples, for each center. A basis with more centers than samples can tell
+/// apart would fit the samples and fold between them.
+constexpr int samples_a_center = 8, energy_samples_a_center = 10;
+/// Samples of a handle that are held. With fewer, chance decides how much room is left for the bend.
 constexpr int held_samples = 1024;
-/// So many more centers for exact handles, whose margins are narrow, up to so many.
+/// Exact handles have narrow margins and need more centers.
 constexpr double more_for_exact = 4.0 / 3.0;
 constexpr int most_for_exact = 2500;
 constexpr Index least_centers = 50;
@@ -53,43 +50,42 @@ LiveOptions live_options(const Options& options) {
   return live;
 }
 
-/// So many fine centers and a fifth as many coarse ones, or what the samples carry.
+/// So many fine centers, or as many as the samples carry, and a fifth as many coarse ones.
 void set_centers(LiveOptions& live, int centers, const SurfaceSamples& samples) {
   const Index carried = std::max(least_centers, samples.size() / samples_a_center);
   live.fine_centers = static_cast<int>(std::min<Index>(centers, carried));
   live.coarse_centers = live.fine_centers / 5;
-  live.samples = std::max(live.samples, seen_a_center * live.fine_centers);
+  live.samples = std::max(live.samples, energy_samples_a_center * live.fine_centers);
 }
 
-/// The result that there is.
+/// The current result.
 using Shown = std::function<std::shared_ptr<DeformationField>()>;
 
-/// Energies, in the solver's units: what is worse is not shown to whoever watches; and the share of it that
-/// the steps between two looks must gain at least.
+/// In units of the solver's energy.
 struct Bounds {
-  double worst = std::numeric_limits<double>::infinity();
-  double least_gain = 0.0;
+  double worst = std::numeric_limits<double>::infinity();  ///< no preview of a result with more energy
+  double least_gain = 0.0;                                 ///< share that `steps_at_once` steps must gain
 };
 
-/// Solves until it converges, is out of steps or time, or the observer ends it. The solver's energy is the
-/// loss divided by `rigidity`.
+/// Solves until convergence, or until steps or time run out, or the observer ends it. The solver's energy is
+/// the loss divided by `rigidity`.
 LoopResult run(RadialSolver& live, const TrainingOptions& how, const Progress& progress,
                const SolveHooks& hooks, double rigidity, const Shown& shown, const Bounds& bounds) {
   const int iterations = how.iterations;
   const Stopwatch watch;
   LoopResult result;
-  Iteration told;
+  Iteration iteration;
   bool ended = false;
   double before = std::numeric_limits<double>::infinity();
   RadialHooks steps{hooks.energies, 1.0 / rigidity, {}};
   if (hooks.observer)
     steps.observer = [&](const std::vector<LossTerm>& terms) {
-      ++told.number;
-      told.loss = 0.0;
-      told.terms = terms;
-      for (LossTerm& term : told.terms) told.loss += term.value *= rigidity;
-      told.seconds = watch.seconds();
-      ended = !hooks.observer(told);
+      ++iteration.number;
+      iteration.loss = 0.0;
+      iteration.terms = terms;
+      for (LossTerm& term : iteration.terms) iteration.loss += term.value *= rigidity;
+      iteration.seconds = watch.seconds();
+      ended = !hooks.observer(iteration);
       return !ended;
     };
   live.set_hooks(steps);
@@ -186,7 +182,7 @@ std::shared_ptr<const DeformationField> radial_start(const SurfaceSamples& sampl
 Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const StylizeOptions& options,
                         const Progress& progress, const Vector& weights, const std::vector<Handle>& handles,
                         const Vec3& up, const SolveHooks& hooks) {
-  // The live solver's energy has weight 1: all other weights are divided by this one's.
+  // The solver's rigidity has weight 1: all other weights are divided by the options' one.
   LiveOptions live = live_options(options);
   live.samples = 8000;
   live.coarse_centers = 200;
@@ -197,7 +193,7 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
   live.surface.barrier = options.surface.barrier / options.rigidity;
   live.gauss_weight = options.gauss_weight / options.rigidity;
   live.keep_stance = options.keep_stance / options.rigidity;
-  live.interior = !handles.empty();  // a style alone acts everywhere alike: nothing is to be held apart
+  live.interior = !handles.empty();  // a style alone acts everywhere alike
   const auto shape = std::make_shared<const RestShape>(samples, live.interior,
                                                        static_cast<std::uint64_t>(options.training.seed));
   LiveOptions few = live;
@@ -217,7 +213,7 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
   solver.set_hooks({hooks.energies, 1.0 / options.rigidity, {}});
   const bool ended = loop.stopped_by == StopReason::observer || loop.stopped_by == StopReason::time_budget;
   for (int round = 0; round < unfolding_rounds && options.surface.barrier > 0.0 && !ended; ++round) {
-    if (solver.watch_folds(unfolding * live.surface.barrier) == 0) break;
+    if (solver.add_fold_samples(unfolding * live.surface.barrier) == 0) break;
     solver.solve(std::min(unfolding_steps, options.training.iterations), 0.0, progress.part(0.95, 0.98));
   }
   ObjectiveTerms terms;

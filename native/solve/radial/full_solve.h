@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// deform and stylize over a radial field: the live solver's work, brought to its end in one call.
+// deform and stylize over a radial field: a RadialSolver, run to convergence in one call.
 #pragma once
 
 #include <functional>
@@ -20,16 +20,16 @@ struct ExactHandles {
 };
 
 /// As deform (solve/deform.h) for options.field "radial". `iterations` bounds the quasi-Newton steps; options
-/// of networks do not matter. Handles are soft, or as `exact` has them.
+/// of networks have no effect. Handles are soft, unless `exact` is given.
 Solution deform_radial(const SurfaceSamples& samples, const std::vector<Handle>& handles,
                        const DeformOptions& options, const Progress& progress, const SolveHooks& hooks = {},
                        const ExactHandles* exact = nullptr);
 
-/// Options of a soft solve that leaves a blend with exact handles hardly anything to bend.
+/// Options of a solve with soft handles that are met closely, so that a blend with exact ones bends little.
 DeformOptions followed_closely(DeformOptions options);
 
-/// What a network may refine: deform_radial's field after some tens of steps, whatever options.field says and
-/// without exact handles, which the network's own blend adds.
+/// The start for a network: deform_radial's field after some tens of steps, whatever options.field is.
+/// Handles are soft; the network's own blend makes them exact.
 std::shared_ptr<const DeformationField> radial_start(const SurfaceSamples& samples,
                                                      const std::vector<Handle>& handles,
                                                      DeformOptions options, const Progress& progress);

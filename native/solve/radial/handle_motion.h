@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How handles get from one frame's targets to the next one's.
+// The motion of handles from the targets of one frame to those of the next.
 #pragma once
 
 #include <vector>
@@ -8,20 +8,21 @@
 
 namespace arapfields {
 
-/// What a rigid motion carries along: x moves with velocity + turn × x.
+/// The velocities of a rigid motion: velocity + turn × x at x.
 struct Twist {
-  Vec3 velocity = Vec3::Zero(), turn = Vec3::Zero();
+  Vec3 velocity = Vec3::Zero();
+  Vec3 turn = Vec3::Zero();
   /// The velocities of a radial field with these coefficients (centers, constant, x, y, z).
   RowMatrix<double> of(const RowMatrix<double>& coefficients, Index centers) const;
 };
 
-/// The twist that brings points (n,3) nearest to others in so many seconds, by the weights (n).
+/// The twist that brings points (n,3) nearest to others in `seconds`, by the weights (n).
 Twist twist_between(const Points& from, const Points& to, const Vector& weights, double seconds);
 
 std::vector<Mat4> motions_of(const BoundHandles& handles);
 
 /// Targets of some rows of the handles' pairs (ascending) at a share of the way from earlier motions of the
-/// handles to those at hand: rotations turn, all else goes straight.
+/// handles to the current ones: rotations by slerp, all else along lines.
 Points targets_between(const BoundHandles& handles, const std::vector<Mat4>& before, double share,
                        const std::vector<Index>& rows);
 

@@ -6,8 +6,8 @@
 
 namespace arapfields {
 
-/// What joins a live solve: energies at its samples, and who is told of the weighted terms after each step
-/// and ends the solve by false.
+/// What a caller adds to a solve: energies at its samples, and an observer. The observer gets the weighted
+/// terms after each step; it ends the solve by returning false.
 struct RadialHooks {
   ExternalEnergies energies;
   double weight = 1.0;  ///< of the energies

@@ -15,8 +15,10 @@ constexpr double coefficient_weight = 1e-10;
 }  // namespace
 
 template <class Scalar>
-RadialObjective<Scalar>::RadialObjective(const RadialBasis& basis, PointsIn samples, double handle_weight)
-    : center_count_(basis.center_count()), handle_weight_(handle_weight), samples_(basis, samples) {}
+RadialObjective<Scalar>::RadialObjective(const RadialProblem& problem)
+    : problem_(problem), samples_(problem.basis, problem.energy_points) {
+  if (problem.blend) blend_ = RadialBlend<Scalar>(*problem.blend, problem.energy_points);
+}
 
 template <class Scalar>
 void RadialObjective<Scalar>::set_stiffness(const Vector& bending, const Vector& weights) {
@@ -25,18 +27,10 @@ void RadialObjective<Scalar>::set_stiffness(const Vector& bending, const Vector&
 }
 
 template <class Scalar>
-void RadialObjective<Scalar>::set_barrier(double weight, double threshold) {
-  barrier_ = weight;
-  barrier_threshold_ = threshold;
-}
-
-template <class Scalar>
 void RadialObjective<Scalar>::set_handles(const HandleBatch<double>& pairs,
-                                          const RowMatrix<double>& values_of_basis,
-                                          const RowMatrix<double>& inverse_factor) {
+                                          const RowMatrix<double>& basis_values) {
   pairs_ = {pairs.sources.cast<Scalar>(), pairs.targets.cast<Scalar>(), pairs.weights.cast<Scalar>()};
-  handle_basis_ = TallMatrix<Scalar>(values_of_basis);
-  inverse_factor_ = TallMatrix<float>(inverse_factor, true);
+  handle_basis_ = TallMatrix<Scalar>(basis_values);
 }
 
 template <class Scalar>
@@ -47,51 +41,30 @@ void RadialObjective<Scalar>::set_targets(PointsIn targets) {
 }
 
 template <class Scalar>
-void RadialObjective<Scalar>::set_style(const std::optional<RadialStyle>& style) {
-  style_ = style;
-  if (!style) return;
-  style_normals_ = style->normals.template cast<Scalar>();
-  style_targets_ = style->style.targets.template cast<Scalar>();
-  style_weights_ = style->style.weights.template cast<Scalar>();
-}
-
-template <class Scalar>
-void RadialObjective<Scalar>::set_hooks(const RadialHooks& hooks, PointsIn rest) {
-  hooks_ = hooks;
-  rest_ = rest;
-}
-
-template <class Scalar>
 bool RadialObjective<Scalar>::accepted(const Measurements& u) const {
   if (!hooks_.observer) return true;
   const RadialTerms terms = evaluate(u, nullptr);
-  std::vector<LossTerm> told{{"stretch", terms.arap.stretch_energy}};
-  if ((bending_.array() > 0).any()) told.push_back({"bend", terms.arap.energy - terms.arap.stretch_energy});
-  if (style_) told.push_back({"style", style_->weight * terms.gauss});
-  if (stance_) told.push_back({"stance", stance_->weight * terms.stance});
-  if (barrier_ > 0.0) told.push_back({"barrier", barrier_ * terms.barrier});
-  if (body_) told.push_back({"motion", terms.body.sum()});
-  told.push_back({"handles", handle_weight_ * terms.handles});
+  std::vector<LossTerm> parts{{"stretch", terms.arap.stretch_energy}};
+  if ((bending_.array() > 0).any()) parts.push_back({"bend", terms.arap.energy - terms.arap.stretch_energy});
+  if (style_) parts.push_back({"style", style_->weight * terms.gauss});
+  if (stance_) parts.push_back({"stance", stance_->weight * terms.stance});
+  if (barrier() > 0.0) parts.push_back({"barrier", barrier() * terms.barrier});
+  if (body_) parts.push_back({"motion", terms.body.sum()});
+  parts.push_back({"handles", handle_weight() * terms.handles});
   for (std::size_t i = 0; i < terms.external.size(); ++i)
-    told.push_back({"energies[" + std::to_string(i) + "]", terms.external[i]});
-  return hooks_.observer(told);
-}
-
-template <class Scalar>
-void RadialObjective<Scalar>::set_stance(const std::optional<RadialStance>& stance) {
-  stance_ = stance;
-  if (stance) stance_rest_ = stance->rest.template cast<Scalar>();
+    parts.push_back({"energies[" + std::to_string(i) + "]", terms.external[i]});
+  return hooks_.observer(parts);
 }
 
 template <class Scalar>
 void RadialObjective<Scalar>::measure(const RowMatrix<double>& c, Measurements& u) const {
-  u.resize(center_offset() + 3 * center_count_);
+  u.resize(center_offset() + 3 * center_count());
   samples_.evaluate(c, {u.data(), samples_.size(), JetOrder::second});
   blend_.multiply({u.data(), samples_.size(), JetOrder::second});
   const PointsOf<Scalar> rounded = c.cast<Scalar>();
   Eigen::Map<PointsOf<Scalar>>(u.data() + handle_offset(), pairs_.sources.rows(), 3) =
       handle_basis_.times(rounded);
-  u.tail(3 * center_count_) = Eigen::Map<const Measurements>(rounded.data(), 3 * center_count_);
+  u.tail(3 * center_count()) = Eigen::Map<const Measurements>(rounded.data(), 3 * center_count());
 }
 
 template <class Scalar>
@@ -111,18 +84,20 @@ RadialTerms RadialObjective<Scalar>::evaluate(JetView<const Scalar> jets, const 
                                    {weights_.size() > 0 ? weights_.data() : nullptr, bending_.data()});
   const Index pairs = pairs_.sources.rows();
   terms.handles =
-      handle_energy<Scalar>({u.data() + handle_offset(), pairs, JetOrder::value}, pairs_, handle_weight_,
+      handle_energy<Scalar>({u.data() + handle_offset(), pairs, JetOrder::value}, pairs_, handle_weight(),
                             {out != nullptr ? out + handle_offset() : nullptr, pairs, JetOrder::value});
   if (style_)
-    terms.gauss = style_energy<Scalar>(jets, style_normals_, style_->style.preference, style_targets_,
-                                       style_weights_, style_->weight, jet_cotangents);
+    terms.gauss = style_energy<Scalar>(jets, style_->normals, style_->preference, style_->targets,
+                                       style_->weights, style_->weight, jet_cotangents);
   if (stance_)
     terms.stance =
-        stance_energy<Scalar>(jets, stance_rest_, stance_->stance, stance_->weight, jet_cotangents);
-  if (barrier_ > 0.0)
-    terms.barrier = fold_barrier<Scalar>(jets, barrier_threshold_, barrier_, jet_cotangents);
+        stance_energy<Scalar>(jets, stance_->rest, stance_->stance, stance_->weight, jet_cotangents);
+  if (barrier() > 0.0)
+    terms.barrier =
+        fold_barrier<Scalar>(jets, problem_.options.surface.barrier_threshold, barrier(), jet_cotangents);
   if (body_) terms.body = body_energy<Scalar>(jets, *body_, jet_cotangents);
-  terms.external = external_energies<Scalar>(hooks_.energies, rest_, jets, hooks_.weight, jet_cotangents);
+  terms.external =
+      external_energies<Scalar>(hooks_.energies, problem_.energy_points, jets, hooks_.weight, jet_cotangents);
   return terms;
 }
 
@@ -141,17 +116,18 @@ Eigen::VectorX<Scalar> RadialObjective<Scalar>::weighted(const Measurements& u) 
     if (weights_.size() > 0) to = weights_.asDiagonal() * to;
   }
   Eigen::Map<PointsOf<Scalar>>(result.data() + handle_offset(), pairs, 3) =
-      Scalar(2.0 * handle_weight_) * (pairs_.weights.asDiagonal() * handle_values(u));
+      Scalar(2.0 * handle_weight()) * (pairs_.weights.asDiagonal() * handle_values(u));
   return result;
 }
 
 template <class Scalar>
 double RadialObjective<Scalar>::value(const Measurements& u, Measurements* cotangents) const {
   const RadialTerms terms = evaluate(u, cotangents);
-  const auto centers = u.tail(3 * center_count_);
-  if (cotangents != nullptr) cotangents->tail(3 * center_count_) = Scalar(2.0 * coefficient_weight) * centers;
-  return terms.arap.energy + handle_weight_ * terms.handles + (style_ ? style_->weight * terms.gauss : 0.0) +
-         (stance_ ? stance_->weight * terms.stance : 0.0) + barrier_ * terms.barrier +
+  const auto centers = u.tail(3 * center_count());
+  if (cotangents != nullptr)
+    cotangents->tail(3 * center_count()) = Scalar(2.0 * coefficient_weight) * centers;
+  return terms.arap.energy + handle_weight() * terms.handles + (style_ ? style_->weight * terms.gauss : 0.0) +
+         (stance_ ? stance_->weight * terms.stance : 0.0) + barrier() * terms.barrier +
          (body_ ? terms.body.sum() : 0.0) +
          std::accumulate(terms.external.begin(), terms.external.end(), 0.0) +
          coefficient_weight * static_cast<double>(centers.squaredNorm());
@@ -159,7 +135,7 @@ double RadialObjective<Scalar>::value(const Measurements& u, Measurements* cotan
 
 template <class Scalar>
 RowMatrix<double> RadialObjective<Scalar>::pull_back(const Measurements& cotangents) const {
-  RowMatrix<double> gradient = RowMatrix<double>::Zero(center_count_ + 4, 3);
+  RowMatrix<double> gradient = RowMatrix<double>::Zero(center_count() + 4, 3);
   if (blend_.empty()) {
     samples_.pull_back({cotangents.data(), samples_.size(), JetOrder::second}, gradient);
   } else {
@@ -168,9 +144,9 @@ RowMatrix<double> RadialObjective<Scalar>::pull_back(const Measurements& cotange
     samples_.pull_back({own.data(), samples_.size(), JetOrder::second}, gradient);
   }
   gradient += handle_basis_.transpose_times(handle_values(cotangents)).template cast<double>();
-  Eigen::Map<Vector>(gradient.data(), 3 * center_count_) +=
-      cotangents.tail(3 * center_count_).template cast<double>();
-  if (mirror_) mirror_->symmetrise(gradient);
+  Eigen::Map<Vector>(gradient.data(), 3 * center_count()) +=
+      cotangents.tail(3 * center_count()).template cast<double>();
+  if (problem_.mirror) problem_.mirror->symmetrise(gradient);
   return gradient;
 }
 
@@ -180,8 +156,8 @@ RowMatrix<double> RadialObjective<Scalar>::precondition(const RowMatrix<double>&
   if (!(size > 0.0)) return gradient;
   const PointsF scaled = (gradient / size).cast<float>();
   RowMatrix<double> step =
-      (0.5 * size) * inverse_factor_.transpose_times(inverse_factor_.times(scaled)).cast<double>();
-  if (mirror_) mirror_->symmetrise(step);
+      (0.5 * size) * inverse_factor_->transpose_times(inverse_factor_->times(scaled)).cast<double>();
+  if (problem_.mirror) problem_.mirror->symmetrise(step);
   return step;
 }
 

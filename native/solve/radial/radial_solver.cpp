@@ -1,77 +1,216 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "solve/radial/radial_solver.h"
 
+#include <algorithm>
+
+#include "core/parallel.h"
+#include "energies/alignment.h"
+#include "sampling/sample_weights.h"
+#include "solve/radial/handle_motion.h"
 #include "solve/radial/state.h"
+#include "solve/setup.h"
 
 namespace arapfields {
+namespace {
+
+/// Single precision serves down to this tolerance; what it cannot see is an energy of about the second
+/// number; its values are good to about the third share.
+constexpr double single_tolerance = 3e-5, single_floor = 1e-10, single_error = 1e-6;
+
+/// Share of the handles' part of the energy below which a rigid motion of everything must bring it.
+constexpr double worthwhile_gain = 0.1;
+
+/// Where handles moved together, the whole shape moves along first: no energy but theirs feels it.
+void follow_rigidly(RadialState& s) {
+  const HandleBatch<double>& pairs = s.handles.pairs();
+  const VectorF& u = s.measurements(s.fast);
+  const Points values = s.fast.objective.latest()->handle_values(u).cast<double>();
+  const Alignment alignment = best_alignment(values, pairs.targets, pairs.weights);
+  if (alignment.gain > worthwhile_gain) return;
+  s.shape.coefficients *= alignment.rotation.transpose();
+  s.shape.coefficients.row(s.problem.basis.center_count()) += alignment.translation.transpose();
+  if (s.problem.mirror) s.problem.mirror->symmetrise(s.shape.coefficients);
+  s.shape.jump();
+}
+
+/// A drag goes on as it went: starts one step further along the last change where that is better. Returns
+/// where it would have started else.
+SolveHistory::Start extrapolate(RadialState& s) {
+  const SolveHistory::Start before = s.history.start.take(s.start_revisions());
+  SolveHistory::Start now{s.shape.coefficients, s.measurements(s.fast)};
+  if (before.u.size() == 0) return now;
+  const RadialObjective<float>& objective = *s.fast.objective.latest();
+  VectorF further = 2.0f * now.u - before.u;
+  const double value = objective.value(now.u, nullptr);
+  if (objective.value(further, nullptr) < (1.0 - single_error) * value) {
+    s.shape.coefficients += now.coefficients - before.coefficients;
+    s.set_measurements(s.fast, std::move(further));
+  }
+  return now;
+}
+
+/// No energy of ours feels a translation: what is left of one is taken out exactly.
+void anchor_lowest_point(RadialState& s) {
+  const Points& sources = s.handles.pairs().sources;
+  Points value(1, 3);
+  RadialEvaluator<double>(s.problem.basis, sources.topRows(1))
+      .evaluate(s.shape.coefficients, {value.data(), 1, JetOrder::value});
+  s.shape.coefficients.row(s.problem.basis.center_count()) += sources.row(0) - value.row(0);
+  if (s.problem.mirror) s.problem.mirror->symmetrise(s.shape.coefficients);
+  ++s.shape.revision;
+}
+
+}  // namespace
 
 RadialSolver::RadialSolver(const SurfaceSamples& samples, const std::vector<Handle>& handles,
                            const LiveOptions& options, const Progress& progress,
-                           std::shared_ptr<const RestShape> shape, std::shared_ptr<const HandleBlend> blend)
-    : state_(
-          std::make_unique<State>(samples, handles, options, progress, std::move(shape), std::move(blend))) {}
+                           std::shared_ptr<const RestShape> shape, std::shared_ptr<const HandleBlend> blend) {
+  options.validate();
+  const Stopwatch watch;
+  const ThreadScope threads(options.threads);
+  state_ = std::make_unique<RadialState>(samples, options, progress, std::move(shape), std::move(blend));
+  state_->handles.set(handles);
+  state_->stiffness.update(state_->handles.bound(), progress.part(0.2, 0.8));
+  state_->objective(state_->fast);
+  if (!handles.empty()) state_->precondition(0.0);
+  state_->report.setup_seconds = watch.seconds();
+}
 
 RadialSolver::~RadialSolver() = default;
 RadialSolver::RadialSolver(RadialSolver&&) noexcept = default;
 RadialSolver& RadialSolver::operator=(RadialSolver&&) noexcept = default;
 
-void RadialSolver::set_handles(const std::vector<Handle>& handles) { state_->set_handles(handles); }
+void RadialSolver::set_handles(const std::vector<Handle>& handles) {
+  RadialState& s = *state_;
+  const ThreadScope threads(s.problem.options.threads);
+  if (s.style.any()) require_no_reach(handles);
+  s.handles.set(handles);
+  s.dynamics.motions.clear();
+  s.stiffness.update(s.handles.bound());
+  if (!handles.empty()) s.precondition(s.preconditioner.inertia);
+}
 
 void RadialSolver::set_style(const Style& style, double strength, double sharpness, const Vector& weights,
                              const Vec3& up) {
-  state_->set_style(style, strength, sharpness, weights, up);
+  RadialState& s = *state_;
+  if (strength != 0.0) require_no_reach(s.handles.handles());
+  s.style.set({style, strength, sharpness, weights, up});
+  if (s.style.any()) s.handles.set_up(up);
 }
 
-void RadialSolver::clear_style() { state_->clear_style(); }
+void RadialSolver::clear_style() { state_->style.clear(); }
 
-void RadialSolver::set_hooks(const RadialHooks& hooks) { state_->set_hooks(hooks); }
+void RadialSolver::set_hooks(const RadialHooks& hooks) {
+  state_->hooks = hooks;
+  ++state_->hooks_revision;
+}
 
 void RadialSolver::set_weights(const Vector& weights, const Vector& bend_weights) {
-  state_->set_weights(weights, bend_weights);
+  RadialState& s = *state_;
+  const ThreadScope threads(s.problem.options.threads);
+  s.problem.samples = with_weights(s.problem.samples, weights, bend_weights);
+  s.stiffness.update(s.handles.bound());
+  if (s.handles.any()) s.precondition(s.preconditioner.inertia);
 }
 
 void RadialSolver::set_symmetry(SymmetryPlane symmetry, const Progress& progress) {
-  if (symmetry != state_->options().symmetry) state_ = state_->with_symmetry(symmetry, progress);
+  RadialState& s = *state_;
+  LiveOptions options = s.problem.options;
+  if (symmetry == options.symmetry) return;
+  options.symmetry = symmetry;
+  RadialSolver next(s.problem.samples, s.handles.handles(), options, progress);
+  if (const auto& request = s.style.request())
+    next.set_style(request->style, request->strength, request->sharpness, request->weights, request->up);
+  next.set_hooks(s.hooks);
+  next.set_secondary_motion(s.dynamics.motion());
+  next.adopt(*field());
+  if (s.tracked.size() > 0) next.track(s.tracked.rest());
+  next.state_->report.setup_seconds += s.report.setup_seconds;
+  *this = std::move(next);
 }
 
-void RadialSolver::set_targets(const std::vector<Handle>& moved) { state_->set_targets(moved); }
+void RadialSolver::set_targets(const std::vector<Handle>& moved) { state_->handles.set_targets(moved); }
+
+Index RadialSolver::follow(Index iterations, double tolerance, const Progress& progress) {
+  RadialState& s = *state_;
+  const ThreadScope threads(s.problem.solve_threads());
+  const Stopwatch watch;
+  if (iterations <= 0) iterations = s.problem.options.iterations;
+  if (tolerance <= 0.0) tolerance = s.problem.options.tolerance;
+  s.report.iterations = s.report.evaluations = 0;
+  s.precondition(0.0);
+  s.objective(s.fast);
+  if (s.handles.any() && !s.style.any()) follow_rigidly(s);
+  SolveHistory::Start start = extrapolate(s);
+  const QuasiNewtonOptions single{iterations, std::max(tolerance, single_tolerance), single_floor};
+  const bool ended = s.descend(s.fast, single, progress).ended;
+  const bool is_exact = tolerance < single_tolerance;
+  if (is_exact) {
+    ++s.shape.revision;  // measured afresh in double precision, and by the next solve in single
+    s.objective(s.exact);
+    if (s.report.iterations < iterations && !ended)
+      s.descend(s.exact, {iterations - s.report.iterations, tolerance}, progress);
+  }
+  s.history.start.set(s.start_revisions(), std::move(start));
+  if (!s.handles.any() && s.hooks.energies.empty()) anchor_lowest_point(s);
+  s.dynamics.zero_velocity(motions_of(s.handles.bound()));
+  s.report.kinetic = s.report.speed = 0.0;
+  s.unmeasured = is_exact ? RadialState::Unmeasured::exact : RadialState::Unmeasured::fast;
+  s.report.seconds = watch.seconds();
+  return s.report.iterations;
+}
 
 std::shared_ptr<RadialField> RadialSolver::solve(Index iterations, double tolerance,
                                                  const Progress& progress) {
-  return state_->solve(iterations, tolerance, progress);
+  const Stopwatch watch;
+  follow(iterations, tolerance, progress);
+  report();
+  state_->report.seconds = watch.seconds();
+  return field();
 }
 
-Index RadialSolver::follow(Index iterations, double tolerance, const Progress& progress) {
-  return state_->follow(iterations, tolerance, progress);
+const RadialReport& RadialSolver::report() const {
+  RadialState& s = *state_;
+  const ThreadScope threads(s.problem.solve_threads());
+  if (s.unmeasured == RadialState::Unmeasured::exact) s.measure(s.exact);
+  if (s.unmeasured == RadialState::Unmeasured::fast) s.measure(s.fast);
+  return s.report;
 }
 
-void RadialSolver::set_secondary_motion(const std::optional<SecondaryMotion>& motion) {
-  state_->set_secondary_motion(motion);
+void RadialSolver::reset() {
+  RadialState& s = *state_;
+  s.shape.coefficients = s.problem.basis.identity();
+  s.shape.jump();
+  std::vector<Handle> at_rest = handles();
+  for (Handle& handle : at_rest) {
+    handle.target = handle.rest;
+    handle.target_point = handle.rest_point;
+  }
+  set_targets(at_rest);
+  s.dynamics.zero_velocity(motions_of(s.handles.bound()));
+  const double setup = s.report.setup_seconds;
+  s.report = {};
+  s.report.setup_seconds = setup;
+  s.unmeasured = RadialState::Unmeasured::nothing;
 }
 
-std::shared_ptr<RadialField> RadialSolver::step(const std::vector<Handle>& moved, double seconds,
-                                                const Progress& progress, const Mat4& coordinates) {
-  return state_->step(moved, seconds, coordinates, progress);
+void RadialSolver::track(PointsIn points) {
+  state_->tracked = TrackedPoints(state_->problem.basis, state_->problem.frame(), points);
 }
 
-MotionState RadialSolver::motion_state() const { return state_->motion_state(); }
+PointsF RadialSolver::tracked() const {
+  state_->tracked.set_influence(state_->handles.influence());
+  return state_->tracked.moved(state_->shape.coefficients);
+}
 
-void RadialSolver::set_motion_state(const MotionState& state) { state_->set_motion_state(state); }
+std::shared_ptr<RadialField> RadialSolver::field() const {
+  const RadialState& s = *state_;
+  auto result = std::make_shared<RadialField>(s.problem.basis, s.shape.coefficients, s.handles.influence());
+  result->set_frame(s.problem.frame());
+  result->set_rest_points(s.problem.energy_points);
+  return result;
+}
 
-void RadialSolver::reset() { state_->reset(); }
-
-void RadialSolver::adopt(const DeformationField& field) { state_->adopt(field); }
-
-Index RadialSolver::watch_folds(double barrier) { return state_->watch_folds(barrier); }
-
-void RadialSolver::track(PointsIn points) { state_->track(points); }
-
-PointsF RadialSolver::tracked() const { return state_->tracked(); }
-
-std::shared_ptr<RadialField> RadialSolver::field() const { return state_->field(); }
-
-const RadialReport& RadialSolver::report() const { return state_->report(); }
-
-const std::vector<Handle>& RadialSolver::handles() const { return state_->handles(); }
+const std::vector<Handle>& RadialSolver::handles() const { return state_->handles.handles(); }
 
 }  // namespace arapfields

@@ -9,19 +9,20 @@
 
 namespace arapfields {
 
-/// What makes a live solver's surface a body that lags behind its handles, overshoots and settles.
+/// Gives a surface a mass: it lags behind its handles, overshoots and settles.
 struct SecondaryMotion {
   SecondaryMotionOptions options;
   Vector masses = {};                 ///< of the surface samples, relative, none negative; empty: all 1
   Vec3 up = Vec3::UnitZ();            ///< against the gravity
-  std::optional<double> ground = {};  ///< height along `up`, in mesh coordinates; none: nothing is in the way
+  std::optional<double> ground = {};  ///< height along `up`, in mesh coordinates; none: no ground
 };
 
 /// Where a body is and how it moves: all that the next step depends on beside its handles' targets.
 struct MotionState {
-  RowMatrix<double> coefficients, velocities;  ///< (size,3) of the radial basis, and a second
-  RowMatrix<double> accelerations;             ///< (size,3), a second²; empty: not known
-  std::vector<Mat4> motions;                   ///< of the handles, in cube coordinates; empty: not known
+  RowMatrix<double> coefficients;   ///< (size,3) of the radial basis
+  RowMatrix<double> velocities;     ///< (size,3) of these, a second
+  RowMatrix<double> accelerations;  ///< (size,3), a second²; empty: not known
+  std::vector<Mat4> motions;        ///< of the handles, in cube coordinates; empty: not known
 };
 
 }  // namespace arapfields

@@ -11,23 +11,25 @@
 
 #include "core/dense.h"
 #include "core/parallel.h"
+#include "core/product_rule.h"
 #include "fields/radial_evaluator.h"
+#include "sampling/sample_choice.h"
 
 namespace arapfields {
 namespace {
 
-/// Centers overlap so much that the matrix is singular to rounding.
+/// Centers overlap so much that the matrix is singular up to rounding.
 constexpr double ridge = 1e-9;
-/// Samples a center, and at least. A sample has nine derivatives, of which three mixtures are looked at: more
-/// places for the same products, so that no function hides between them.
+/// Samples for each center, and at least. Three mixtures stand for the nine derivatives at a sample: more
+/// samples for the same number of products, so that no basis function falls between them.
 constexpr Index samples_a_center = 4, least_samples = 1000;
 constexpr int derivatives = 9, mixtures = 3;
-/// Samples that a stance is held at.
+/// Samples of a stance.
 constexpr Index stance_samples = 1000;
-/// Parts that are summed on their own: the result does not depend on the number of threads. Between two looks
-/// at the task, a slice of each.
+/// Parts are summed on their own, so that the result does not depend on the number of threads. Progress is
+/// reported after a slice of each.
 constexpr Index parts = 4, slices = 8;
-/// Points whose products are taken together: neighbours, which feel much the same centers.
+/// Points whose products are taken together: neighbours, with nearly the same active centers.
 constexpr Index block_size = 16, blocks_at_once = 3;
 
 /// An orthogonal matrix (cosines) times √3: three of its rows stand for all nine in the mean.
@@ -41,10 +43,10 @@ RowMatrix<double> mixing_matrix() {
 }
 
 /// The products of the basis functions' derivatives, weighted, summed over points.
-class Products {
+class StiffnessAssembler {
  public:
   /// `free` (derivatives + 1, points): the jets of a factor of all functions, or empty.
-  Products(const RadialEvaluator<double>& sites, Vector roots, Vector weight_roots, Vector free)
+  StiffnessAssembler(const RadialEvaluator<double>& sites, Vector roots, Vector weight_roots, Vector free)
       : sites_(sites),
         roots_(std::move(roots)),
         weight_roots_(std::move(weight_roots)),
@@ -56,7 +58,7 @@ class Products {
   void add(Index first, Index last, RowMatrix<double>& sum);
 
  private:
-  void feel(Index first, Index last);
+  void gather_active(Index first, Index last);
   void add_rows(Index b, Index column);
   void mix(Index b);
   void multiply(Index b, double* jets) const;
@@ -71,7 +73,7 @@ class Products {
   RowMatrix<double> rows_, products_;
 };
 
-void Products::feel(Index first, Index last) {
+void StiffnessAssembler::gather_active(Index first, Index last) {
   active_.clear();
   for (Index b = first; b < last; ++b) {
     const RadialBlock<double> block = sites_.block(b);
@@ -83,7 +85,7 @@ void Products::feel(Index first, Index last) {
 }
 
 /// What each derivative at each point of a block counts in each mixture; neighbours have different mixtures.
-void Products::mix(Index b) {
+void StiffnessAssembler::mix(Index b) {
   const Index points = std::min(block_size, sites_.size() - block_size * b);
   mix_.fill(0.0);
   for (int m = 0; m < mixtures; ++m)
@@ -97,22 +99,16 @@ void Products::mix(Index b) {
 }
 
 /// The factor, where there is one, times the jets (derivatives + 1, block_size) of a function.
-void Products::multiply(Index b, double* jets) const {
+void StiffnessAssembler::multiply(Index b, double* jets) const {
   if (free_.size() == 0) return;
   const Index n = sites_.size(), points = std::min(block_size, n - block_size * b);
   for (Index i = 0; i < points; ++i) {
     const auto a = [&](int c) { return free_[c * n + block_size * b + i]; };
-    const auto p = [&](int c) -> double& { return jets[c * block_size + i]; };
-    for (int j = 0; j < 3; ++j)
-      for (int k = j; k < 3; ++k) {
-        const int cj = first_column(j), ck = first_column(k), cjk = second_column(j, k);
-        p(cjk) = a(0) * p(cjk) + a(cj) * p(ck) + a(ck) * p(cj) + a(cjk) * p(0);
-      }
-    for (int c = 1; c < 4; ++c) p(c) = a(0) * p(c) + a(c) * p(0);
+    multiply_jet(a, [&](int c) -> double& { return jets[c * block_size + i]; });
   }
 }
 
-void Products::add_rows(Index b, Index column) {
+void StiffnessAssembler::add_rows(Index b, Index column) {
   const RadialBlock<double> block = sites_.block(b);
   jets_.resize(static_cast<std::size_t>(block.active_count * (derivatives + 1) * block_size));
   ARAPFIELDS_DISPATCH(radial_rows(block, derivatives + 1, jets_.data()));
@@ -143,8 +139,8 @@ void Products::add_rows(Index b, Index column) {
   }
 }
 
-void Products::add(Index first, Index last, RowMatrix<double>& sum) {
-  feel(first, last);
+void StiffnessAssembler::add(Index first, Index last, RowMatrix<double>& sum) {
+  gather_active(first, last);
   const Index count = static_cast<Index>(active_.size()), size = count + 4, centers = sum.rows() - 4;
   rows_.setZero(size, mixtures * block_size * (last - first));
   for (Index b = first; b < last; ++b) add_rows(b, mixtures * block_size * (b - first));
@@ -164,8 +160,8 @@ void Products::add(Index first, Index last, RowMatrix<double>& sum) {
 RowMatrix<double> stiffness_matrix(const RadialBasis& basis, PointsIn samples, const Vector& bending,
                                    const Vector& weights, const Progress& progress,
                                    const HandleBlend* blend) {
-  const Index wanted = std::max(least_samples, samples_a_center * basis.center_count());
-  const Index taken = std::min<Index>(samples.rows(), wanted);
+  const Index enough = std::max(least_samples, samples_a_center * basis.center_count());
+  const Index taken = std::min<Index>(samples.rows(), enough);
   Points some(taken, 3);
   Vector roots(taken), weight_roots(weights.size() > 0 ? taken : 0);
   for (Index i = 0; i < taken; ++i) {
@@ -177,15 +173,15 @@ RowMatrix<double> stiffness_matrix(const RadialBasis& basis, PointsIn samples, c
   Vector free(blend != nullptr ? (derivatives + 1) * taken : 0);
   if (blend != nullptr) blend->free_weight(some, JetOrder::second, free.data());
   std::vector<RowMatrix<double>> sums(parts, RowMatrix<double>::Zero(basis.size(), basis.size()));
-  std::vector<Products> products(parts, Products(sites, roots, weight_roots, free));
+  std::vector<StiffnessAssembler> assemblers(parts, StiffnessAssembler(sites, roots, weight_roots, free));
   const Index groups = (sites.blocks() + blocks_at_once - 1) / blocks_at_once;
   for (Index slice = 0; slice < slices; ++slice) {
     parallel_jobs(parts, [&](Index part) {
       const Index piece = part * slices + slice, pieces = parts * slices;
       for (Index group = piece * groups / pieces; group < (piece + 1) * groups / pieces; ++group)
-        products[static_cast<std::size_t>(part)].add(group * blocks_at_once,
-                                                     std::min(sites.blocks(), (group + 1) * blocks_at_once),
-                                                     sums[static_cast<std::size_t>(part)]);
+        assemblers[static_cast<std::size_t>(part)].add(group * blocks_at_once,
+                                                       std::min(sites.blocks(), (group + 1) * blocks_at_once),
+                                                       sums[static_cast<std::size_t>(part)]);
     });
     progress.report(static_cast<double>(slice + 1) / slices, "stiffness");
   }
@@ -214,6 +210,28 @@ RowMatrix<double> inverse_factor(RowMatrix<double> stiffness, const RowMatrix<do
   lower_gram<double>(Transpose::yes, weighted, 1.0, stiffness);
   stiffness.diagonal().array() += ridge * stiffness.diagonal().mean();
   return lower_inverse<double>(cholesky<double>(stiffness));
+}
+
+void StiffnessTerms::update(const BoundHandles& handles, const Progress& progress) {
+  const Vector weights_before = weights_, bending_before = bending_;
+  add_samples(handles);
+  if (revision_ > 0 && weights_.size() == weights_before.size() && weights_ == weights_before &&
+      bending_ == bending_before)
+    return;
+  matrix_ = stiffness_matrix(problem_.basis, problem_.energy_points, bending_, weights_, progress,
+                             problem_.blend.get());
+  if (problem_.mirror) problem_.mirror->symmetrise_matrix(matrix_);
+  ++revision_;
+}
+
+void StiffnessTerms::add_samples(const BoundHandles& handles) {
+  const auto& rows = problem_.energy_samples;
+  bending_ = own_bending_.get({problem_.energy_revision},
+                              [&] { return problem_.stiffness.bending(problem_.energy_points); });
+  if (problem_.samples.bend_weights.size() > 0)
+    bending_.array() *= entries_of(problem_.samples.bend_weights, rows).array();
+  const Vector all = energy_weights(problem_.samples, handles);
+  weights_ = all.size() > 0 ? entries_of(all, rows) : Vector();
 }
 
 }  // namespace arapfields

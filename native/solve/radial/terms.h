@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What joins the energy of a live solve, at its samples.
+// Terms of a RadialObjective: what they are evaluated with, and their values.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "energies/arap.h"
@@ -11,29 +12,43 @@
 
 namespace arapfields {
 
-/// A style's preference at the samples of a live solve.
-struct RadialStyle {
-  StyleAtSamples style;
-  Points normals;       ///< (n,3) rest normals of the samples
-  double weight = 1.0;  ///< λ_Gauss
-};
-
-/// What RadialSolver::set_style was called with.
-struct StyleAsked {
+struct StyleRequest {
   Style style;
-  double strength, sharpness;
-  Vector weights;
-  Vec3 up;
+  double strength;
+  double sharpness;  ///< 0: the style's own
+  Vector weights;    ///< of all samples; empty: all 1
+  Vec3 up;           ///< where the figure's head is
 };
 
-/// What keeps a figure's stance at the samples of a live solve.
-struct RadialStance {
+template <class Scalar>
+struct StyleTerm {
+  std::optional<GaussPreference> preference;  ///< none: targets
+  PointsOf<Scalar> normals;                   ///< (n,3) at rest
+  PointsOf<Scalar> targets;                   ///< (n,3), or none
+  Eigen::VectorX<Scalar> weights;             ///< (n)
+  double weight = 1.0;                        ///< λ_Gauss
+
+  /// Whether the normals are as they should be already.
+  bool idle() const { return StyleAtSamples{preference, targets, weights}.idle(normals); }
+  template <class Other>
+  StyleTerm<Other> cast() const {
+    return {preference, normals.template cast<Other>(), targets.template cast<Other>(),
+            weights.template cast<Other>(), weight};
+  }
+};
+
+template <class Scalar>
+struct StanceTerm {
   Stance stance;
-  Points rest;  ///< (n,3) samples
+  PointsOf<Scalar> rest;  ///< (n,3) samples
   double weight = 0.0;
+
+  template <class Other>
+  StanceTerm<Other> cast() const {
+    return {stance, rest.template cast<Other>(), weight};
+  }
 };
 
-/// What the terms of the energy come to.
 struct RadialTerms {
   ArapValue arap;
   double handles = 0.0;          ///< mean squared distance to the targets

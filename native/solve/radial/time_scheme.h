@@ -7,23 +7,26 @@ namespace arapfields {
 ///   q' = q + h v + h² ((½ − β) a + β a'), v' = v + h ((1 − γ) a + γ a'),
 ///   mass ((1 − α) a' + α a) = force at q + w (q' − q).
 struct TimeScheme {
-  double alpha, w, gamma, beta;
+  double alpha;
+  double w;
+  double gamma;
+  double beta;
   bool operator==(const TimeScheme&) const = default;
 
-  /// The generalised-α method (Chung & Hulbert, J. Appl. Mech. 60, 1993) of second order. What swings much
-  /// faster than the steps can show keeps this share of itself a step.
+  /// The generalised-α method (Chung & Hulbert, J. Appl. Mech. 60, 1993) of second order. An
+  /// oscillation much faster than the steps keeps this share of its amplitude a step.
   static constexpr TimeScheme generalised_alpha(double kept) {
     const double alpha = (2.0 * kept - 1.0) / (kept + 1.0), w = 1.0 / (kept + 1.0);
     return {alpha, w, 0.5 - alpha + 1.0 - w, 0.25 * (2.0 - alpha - w) * (2.0 - alpha - w)};
   }
-  /// The midpoint rule, of second order. It asks for no acceleration at its start: a = 0.
+  /// The midpoint rule, of second order. It needs no acceleration at its start: a = 0.
   static constexpr TimeScheme midpoint() { return {0.0, 0.5, 1.0, 0.5}; }
   /// Of first order, with a = 0: a step takes energy however roughly it was solved.
   static constexpr TimeScheme backward_euler() { return {0.0, 1.0, 1.0, 1.0}; }
 
   /// What a unit of mass counts against a', with so much drag over the step's length.
   constexpr double inert(double drag) const { return 1.0 - alpha + drag * w * gamma; }
-  /// The share of h² a' in the way to where the force is asked for.
+  /// The share of h² a' in the way to the place of the force.
   constexpr double reach() const { return w * beta; }
 };
 

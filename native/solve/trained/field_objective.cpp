@@ -48,7 +48,7 @@ struct FieldObjective::Constants {
 
 struct FieldObjective::Computed {
   const char* name;
-  double here;
+  double on_host;
   at::Tensor on_device;
 };
 
@@ -219,7 +219,7 @@ void FieldObjective::add_external(const Points& points, const at::Tensor& jets, 
 std::vector<LossTerm> FieldObjective::terms() const {
   std::vector<LossTerm> result;
   for (const Computed& term : computed_)
-    result.push_back({term.name, term.on_device.defined() ? term.on_device.item<double>() : term.here});
+    result.push_back({term.name, term.on_device.defined() ? term.on_device.item<double>() : term.on_host});
   for (std::size_t i = 0; i < external_.size(); ++i)
     result.push_back({"energies[" + std::to_string(i) + "]", external_[i]});
   return result;

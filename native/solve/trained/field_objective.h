@@ -15,16 +15,17 @@
 
 namespace arapfields {
 
-/// What a deformation is asked for, as weights of the terms:
+/// The terms of a trained deformation, with their weights:
 ///   rigidity·mean w(stretch + λ·bend) + gauss·style + keep_stance·stance + barrier·fold_barrier +
 ///   handles + external.
 struct ObjectiveTerms {
   Index batch = 0;  ///< samples an iteration
-  Index fresh = 0;  ///< of the batch, samples that the surface is asked for anew; needs samples.redraw
+  Index fresh = 0;  ///< of the batch, samples that are drawn anew; needs samples.redraw
   double rigidity = 1.0;
   SurfaceStiffness stiffness;  ///< λ
   Vector weights;              ///< w, one a sample; empty: all 1
-  double barrier = 0.0, barrier_threshold = 0.1;
+  double barrier = 0.0;
+  double barrier_threshold = SurfaceOptions().barrier_threshold;
   StyleAtSamples style;  ///< its weights: one a sample, or empty: all 1
   double gauss = 0.0;    ///< weight of the style
   double keep_stance = 0.0;
@@ -44,14 +45,18 @@ class FieldObjective final : public Objective {
   ~FieldObjective() override;
   at::Tensor accumulate(TrainableField& field, Random& random) override;
   std::vector<LossTerm> terms() const override;
-  const ObjectiveTerms& asked() const { return terms_; }
+  const ObjectiveTerms& objective_terms() const { return terms_; }
 
  private:
   /// Samples of one iteration: λ and w, and normals and the style's targets and weights where the terms use
   /// them.
   struct Batch {
-    Points points, normals, targets;
-    Vector bending, weights, style_weights;
+    Points points;
+    Points normals;
+    Points targets;
+    Vector bending;
+    Vector weights;
+    Vector style_weights;
     Stance stance;
   };
   /// What the terms need on a device, beside each batch.

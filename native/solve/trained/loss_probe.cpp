@@ -11,7 +11,7 @@
 namespace arapfields {
 namespace {
 
-std::shared_ptr<const HandleBlend> blend(const BoundHandles& handles, double margin) {
+std::shared_ptr<const HandleBlend> exact_blend(const BoundHandles& handles, double margin) {
   std::vector<RigidRegion> regions;
   for (Index i = 0; i < handles.count(); ++i)
     regions.push_back({handles.handle(i).rest, handles.motion(i), margin, ""});
@@ -47,7 +47,8 @@ LossProbe::LossProbe(const SurfaceSamples& samples, const std::vector<Handle>& h
   terms.handles = BoundHandles(handles, samples.points);
   terms.pull.handle_batch = 8;
   state_ = std::make_unique<State>(samples, width, std::move(terms));
-  if (margin > 0.0) state_->field.set_handles(blend(state_->objective.asked().handles, margin));
+  if (margin > 0.0)
+    state_->field.set_handles(exact_blend(state_->objective.objective_terms().handles, margin));
 }
 
 LossProbe::~LossProbe() = default;

@@ -19,7 +19,7 @@ struct LossGradient {
 };
 
 /// Value and parameter gradient of an objective in double precision, for comparison with differences: a small
-/// network with whatever fixed parts and terms a test asks for. Handles are in cube coordinates, exact with a
+/// network with the fixed parts and terms that a test needs. Handles are in cube coordinates, exact with a
 /// margin above 0.
 class ARAPFIELDS_EXPORT_TO_TESTS LossProbe {
  public:

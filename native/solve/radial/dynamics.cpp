@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "solve/radial/dynamics.h"
+
+#include <bit>
+#include <cmath>
+#include <string>
+
+#include "core/dense.h"
+#include "core/errors.h"
+#include "fields/radial_evaluator.h"
+#include "sampling/sample_choice.h"
+
+namespace arapfields {
+namespace {
+
+/// Stiffness of the ground against the energy of the surface.
+constexpr double ground_stiffness = 1000.0;
+/// Velocities and accelerations half of which a step of 1/96 s takes, as the root of its length, by their
+/// mean ‖J‖² + λ‖D‖² against their mean square: waves shorter than a part is thick, which solves see last.
+constexpr double smoothed = 3e3, usual_step = 1.0 / 96.0;
+
+}  // namespace
+
+void SurfaceDynamics::set(const std::optional<SecondaryMotion>& motion) {
+  if (motion) {
+    motion->options.validate();
+    require(!problem_.blend, "secondary motion", "with exact handles", "it needs handles that pull");
+    const Vector& m = motion->masses;
+    const Index count = problem_.samples.size();
+    const std::string one = "one mass ≥ 0 for each of the " + std::to_string(count) + " samples";
+    require(m.size() == 0 || m.size() == count, "masses", std::to_string(m.size()) + " numbers",
+            one + ", or none, is needed");
+    require(m.allFinite() && (m.size() == 0 || m.minCoeff() >= 0.0), "masses",
+            "negative or non-finite numbers", one + ", or none, is needed");
+    require(m.size() == 0 || entries_of(m, problem_.energy_samples).maxCoeff() > 0.0, "masses",
+            "zero everywhere", "something must have a mass; strength 0 takes the secondary motion away");
+    const double length = motion->up.stableNorm();
+    require(std::isfinite(length) && length > 0.0, "up", length == 0.0 ? "zero" : "NaN or infinite",
+            "a finite direction of any positive length is allowed");
+    require(!motion->ground || std::isfinite(*motion->ground), "ground", "NaN or infinite",
+            "a finite height is needed");
+  }
+  const Vector before = motion_ ? motion_->masses : Vector();
+  motion_ = motion;
+  if (motion_) motion_->up.normalize();
+  const Vector after = motion_ ? motion_->masses : Vector();
+  ++revision_;
+  if (after.size() != before.size() || after != before) ++mass_revision_;
+}
+
+const Vector& SurfaceDynamics::masses() {
+  return masses_.get({problem_.energy_revision, mass_revision_}, [&]() -> Vector {
+    if (!motion_ || motion_->masses.size() == 0) return Vector::Ones(problem_.energy_points.rows());
+    return entries_of(motion_->masses, problem_.energy_samples);
+  });
+}
+
+double SurfaceDynamics::kinetic_energy(PointsIn velocities_at_samples) {
+  return 0.5 * mass() * masses().dot(velocities_at_samples.rowwise().squaredNorm()) /
+         static_cast<double>(velocities_at_samples.rows());
+}
+
+template <class Scalar>
+std::optional<Body<Scalar>> SurfaceDynamics::inertia_terms(double inertia, PointsOf<Scalar> goal) {
+  if (!has_mass()) return std::nullopt;
+  Body<Scalar> body{masses().cast<Scalar>(), problem_.energy_points.cast<Scalar>(), std::move(goal), inertia};
+  const Frame& frame = problem_.frame();
+  body.up = motion_->up;
+  body.gravity = -mass() * motion_->options.gravity / frame.scale * body.up;
+  if (motion_->ground) {
+    const Points on_ground = (*motion_->ground * body.up).transpose();
+    body.ground = frame.to_cube(on_ground).row(0).dot(body.up);
+    body.ground_stiffness = ground_stiffness;
+  }
+  return body;
+}
+template std::optional<Body<float>> SurfaceDynamics::inertia_terms<float>(double, PointsF);
+template std::optional<Body<double>> SurfaceDynamics::inertia_terms<double>(double, Points);
+
+/// 1 − (1 − S)² of S = (G + τK)⁻¹ G, for the mean squares of the values at the samples and of the
+/// derivatives: also without what no sample sees.
+RowMatrix<double> SurfaceDynamics::smooth(const RowMatrix<double>& x, const StiffnessTerms& stiffness,
+                                          double h) {
+  const std::array revisions{problem_.energy_revision, stiffness.revision(), std::bit_cast<Revision>(h)};
+  const Smoothing& s = smoothing_.get(revisions, [&] {
+    const RowMatrix<double> rows = radial_rows(problem_.basis, problem_.energy_points, JetOrder::value);
+    const Vector share = Vector::Constant(rows.rows(), 1.0 / static_cast<double>(rows.rows()));
+    const RowMatrix<double> weighted = share.cwiseSqrt().asDiagonal() * rows;
+    Smoothing made;
+    made.gram.resize(rows.cols(), rows.cols());
+    lower_gram<double>(Transpose::yes, weighted, 0.0, made.gram);
+    made.inverse_factor =
+        inverse_factor(std::sqrt(h / usual_step) / smoothed * stiffness.matrix(), rows, share);
+    return made;
+  });
+  const auto once = [&](const RowMatrix<double>& from) -> RowMatrix<double> {
+    const RowMatrix<double> y = s.gram.selfadjointView<Eigen::Lower>() * from;
+    const RowMatrix<double> z = s.inverse_factor.triangularView<Eigen::Lower>() * y;
+    return s.inverse_factor.transpose().triangularView<Eigen::Upper>() * z;
+  };
+  const RowMatrix<double> first = once(x);
+  return 2.0 * first - once(first);
+}
+
+void SurfaceDynamics::zero_velocity(std::vector<Mat4> handle_motions) {
+  velocities.resize(0, 3);
+  accelerations.resize(0, 3);
+  motions = std::move(handle_motions);
+}
+
+}  // namespace arapfields

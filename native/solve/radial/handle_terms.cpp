@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "solve/radial/handle_terms.h"
+
+#include "core/random.h"
+#include "fields/radial_evaluator.h"
+#include "sampling/sample_choice.h"
+#include "solve/radial/handle_motion.h"
+#include "solve/setup.h"
+
+namespace arapfields {
+namespace {
+
+/// Weight, against the surface's energy, with which a style without handles holds the lowest sample in place.
+constexpr double anchor_weight = 1.0;
+
+/// A handle without a reach that has moved less, in cube units, only holds.
+constexpr double hardly_moved = 1e-4;
+/// Spacing, in reaches, of the places of a handle that its reach is measured from, and their number at most.
+constexpr double place_spacing = 0.25;
+constexpr Index most_places = 256;
+
+}  // namespace
+
+void HandleTerms::set(const std::vector<Handle>& handles) {
+  bound_ = BoundHandles(in_cube(handles, problem_.frame()), problem_.surface());
+  handles_ = handles;
+  reaches_ = reaches();
+  update_influence();
+  choose_pairs();
+}
+
+void HandleTerms::set_targets(const std::vector<Handle>& moved) {
+  bound_.retarget(in_cube(moved, problem_.frame()));
+  for (std::size_t i = 0; i < handles_.size(); ++i) {
+    handles_[i].target = moved[i].target;
+    handles_[i].target_point = moved[i].target_point;
+  }
+  if (!any()) return;
+  if (update_influence()) return choose_pairs();
+  Points targets(own_count() + held_.rows(), 3);
+  targets << rows_of(bound_.targets(), rows_), held_;
+  pairs_.targets = with_reflections(std::move(targets));
+}
+
+void HandleTerms::set_up(const Vec3& up) {
+  const bool changed = up != up_;
+  up_ = up;
+  if (changed && !any()) choose_pairs();
+}
+
+void HandleTerms::choose_pairs() {
+  ++revision_;
+  rows_.clear();
+  held_.resize(0, 3);
+  if (!any()) return choose_anchor();
+  // Some pairs of each handle, which all handles share alike.
+  Random random(static_cast<std::uint64_t>(problem_.options.seed), 1);
+  std::vector<double> weights;
+  for (Index i = 0; i < bound_.count(); ++i) {
+    const std::vector<Index> rows =
+        random_subset(bound_.begin(i + 1) - bound_.begin(i), problem_.options.handle_samples, random);
+    const double share = 1.0 / static_cast<double>(static_cast<Index>(rows.size()) * bound_.count());
+    for (const Index row : rows) {
+      rows_.push_back(bound_.begin(i) + row);
+      weights.push_back(bound_.handle(i).weight * share);
+    }
+  }
+  // Samples beyond the influence, which stay where they are.
+  if (influence_) {
+    const Vector share = influence_->at(problem_.surface());
+    std::vector<Index> beyond;
+    for (Index i = 0; i < share.size(); ++i)
+      if (share[i] == 0.0) beyond.push_back(i);
+    std::vector<Index> some =
+        random_subset(static_cast<Index>(beyond.size()), problem_.options.handle_samples, random);
+    for (Index& row : some) row = beyond[static_cast<std::size_t>(row)];
+    held_ = rows_of(problem_.surface(), some);
+    for (std::size_t k = 0; k < some.size(); ++k)
+      weights.push_back(1.0 / static_cast<double>(held_.rows() * bound_.count()));
+  }
+  const auto count = static_cast<Index>(weights.size());
+  pairs_ = {Points(count, 3), Points(count, 3), Eigen::Map<const Vector>(weights.data(), count)};
+  pairs_.sources << rows_of(bound_.sources(), rows_), held_;
+  pairs_.targets << rows_of(bound_.targets(), rows_), held_;
+  reflect_pairs();
+}
+
+void HandleTerms::choose_anchor() {
+  Index lowest = 0;
+  (problem_.surface() * up_).minCoeff(&lowest);
+  const Points place = problem_.surface().row(lowest);
+  pairs_ = {place, place, Vector::Constant(1, anchor_weight / problem_.options.handle_weight)};
+  reflect_pairs();
+}
+
+/// What pulls at a point pulls at its reflection as well: a symmetric field feels no difference, and the
+/// preconditioner becomes symmetric.
+void HandleTerms::reflect_pairs() {
+  if (!problem_.mirror) return;
+  pairs_.sources = with_reflections(std::move(pairs_.sources));
+  pairs_.targets = with_reflections(std::move(pairs_.targets));
+  pairs_.weights = (0.5 * pairs_.weights).replicate(2, 1).eval();
+}
+
+Points HandleTerms::with_reflections(Points points) const {
+  if (!problem_.mirror) return points;
+  Points both(2 * points.rows(), 3);
+  both << points, problem_.mirror->reflected(points);
+  return both;
+}
+
+/// Where all handles that move have a reach, what is beyond all of these is held. Whether that has changed.
+bool HandleTerms::update_influence() {
+  std::shared_ptr<const Influence> next = reaches_;
+  for (Index i = 0; i < bound_.count() && next; ++i) {
+    const Index begin = bound_.begin(i), rows = bound_.begin(i + 1) - begin;
+    const Points way = bound_.targets().middleRows(begin, rows) - bound_.sources().middleRows(begin, rows);
+    if (bound_.handle(i).reach == 0.0 && way.rowwise().norm().maxCoeff() > hardly_moved) next.reset();
+  }
+  influence_.swap(next);
+  return influence_ != next;
+}
+
+std::shared_ptr<const Influence> HandleTerms::reaches() const {
+  std::vector<Vec3> places;
+  std::vector<double> distances;
+  for (Index i = 0; i < bound_.count(); ++i) {
+    const Index rows = bound_.begin(i + 1) - bound_.begin(i);
+    const auto sources = bound_.sources().middleRows(bound_.begin(i), rows);
+    const double reach = bound_.handle(i).reach;
+    if (reach == 0.0) continue;
+    FarthestPoints chosen;
+    for (Index count = 1; count <= most_places; count *= 4) {
+      chosen = farthest_points(sources, count);
+      if (chosen.fill_distance <= place_spacing * reach) break;
+    }
+    for (const Index row : chosen.indices) {
+      places.push_back(sources.row(row));
+      if (problem_.mirror) places.push_back(problem_.mirror->reflected(sources.row(row)).row(0));
+      distances.resize(places.size(), reach);
+    }
+  }
+  if (places.empty()) return nullptr;
+  const Index count = static_cast<Index>(places.size());
+  Points rows(count, 3);
+  for (Index i = 0; i < count; ++i) rows.row(i) = places[static_cast<std::size_t>(i)].transpose();
+  return std::make_shared<const Influence>(rows, Eigen::Map<const Vector>(distances.data(), count),
+                                           problem_.basis.embedding);
+}
+
+Points HandleTerms::targets_between(const std::vector<Mat4>& before, double share) const {
+  if (!any()) return pairs_.targets;
+  Points own(own_count() + held_.rows(), 3);
+  own << arapfields::targets_between(bound_, before, share, rows_), held_;
+  return with_reflections(std::move(own));
+}
+
+const RowMatrix<double>& HandleTerms::basis_values() {
+  return basis_values_.get({revision_},
+                           [&] { return radial_rows(problem_.basis, pairs_.sources, JetOrder::value); });
+}
+
+}  // namespace arapfields

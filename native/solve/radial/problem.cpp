@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "solve/radial/problem.h"
+
+#include "core/random.h"
+#include "sampling/sample_choice.h"
+#include "solve/setup.h"
+
+namespace arapfields {
+namespace {
+
+/// Samples × centers below which a step takes about a millisecond: waking other threads, which may be busy
+/// with drawing, would cost more than they do.
+constexpr Index worth_threads = 1000000;
+
+}  // namespace
+
+RadialProblem::RadialProblem(const SurfaceSamples& surface, const LiveOptions& solver_options,
+                             const Progress& progress, std::shared_ptr<const RestShape> rest_shape,
+                             std::shared_ptr<const HandleBlend> exact_handles)
+    : options(solver_options),
+      samples(surface),
+      shape(std::move(rest_shape)),
+      blend(std::move(exact_handles)) {
+  const int axis = axis_of(options.symmetry);
+  if (axis >= 0) samples = across(samples, axis);
+  require_samples(samples);
+  const auto seed = static_cast<std::uint64_t>(options.seed);
+  if (!shape) shape = std::make_shared<const RestShape>(samples, options.interior, seed, axis);
+  Random random(seed);
+  add_energy_samples(stratified(shape->order, options.samples, random));
+  std::vector<RadialScale> scales;
+  if (options.coarse_centers > 0) scales.push_back({options.coarse_centers, options.coarse_radius_factor});
+  scales.push_back({options.fine_centers, options.fine_radius_factor, true});
+  if (axis >= 0) {
+    mirror.emplace();
+    mirror->axis = axis;
+    basis = mirrored_basis({shape->sites, Points(0, 3), shape->layout}, scales, *mirror);
+  } else {
+    basis = radial_basis(shape->sites, scales, shape->layout);
+  }
+  if (options.interior) basis.set_embedding(shape->embedding);
+  progress.report(0.2, "centers placed");
+  stiffness = SurfaceStiffness(shape->thickness, options.surface);
+}
+
+void RadialProblem::add_energy_samples(const std::vector<Index>& rows) {
+  energy_samples.insert(energy_samples.end(), rows.begin(), rows.end());
+  energy_points = rows_of(surface(), energy_samples);
+  ++energy_revision;
+}
+
+int RadialProblem::solve_threads() const {
+  const Index work = energy_points.rows() * basis.center_count();
+  return options.threads == 0 && work < worth_threads ? 1 : options.threads;
+}
+
+}  // namespace arapfields
