@@ -5,7 +5,6 @@ from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..blender.property_definitions import effective_value
 from ..core.errors import UserError
-from ..core.runtime import jobs
 from ..handles import empties
 from ..jobs.job_operator import JobOperator, with_progress
 from ..solver import style_settings
@@ -24,16 +23,6 @@ class BakeOperator(JobOperator):
 
     frames_pass = None  # BakePass, where frames are solved
 
-    def coroutine(self, context):
-        """All that the main thread does; returns the operator's result."""
-        try:
-            return (yield from super().coroutine(context))
-        finally:
-            if self.frames_pass is not None:
-                self.frames_pass.feed.close()
-                jobs.stop()
-                self.frames_pass.discard()
-
     def prepare(self, context, job):
         """Coroutine: the job's items by `plan_frames(context, job)`; what cannot be planned is a failure."""
         try:
@@ -45,6 +34,13 @@ class BakeOperator(JobOperator):
     def work_beside(self, context, job):
         if self.frames_pass is not None:
             yield from self.frames_pass.play(context, job)
+
+    def clear_up(self, job):
+        if self.frames_pass is not None:
+            self.frames_pass.feed.close()
+            job.cancel()
+            job.join()
+            self.frames_pass.discard()
 
     def values(self, source):
         """The settings by name; `start` and `end` where they were given or the range is one's own."""

@@ -110,12 +110,10 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
         bake.store.play_on(player)
         return player
 
-    def coroutine(self, context):
-        try:
-            return (yield from super().coroutine(context))
-        finally:
-            if self.folder is not None:
-                shutil.rmtree(self.folder, ignore_errors=True)
+    def clear_up(self, job):
+        super().clear_up(job)
+        if self.folder is not None:
+            shutil.rmtree(self.folder, ignore_errors=True)
 
 
 CLASSES = [ARAPFIELDS_OT_export_animation]

@@ -84,16 +84,21 @@ class JobOperator(ModalRun, Guided):
         try:
             job.start((yield from self.prepare(context, job)))
             yield from self.work_beside(context, job)
+            while not job.done:
+                yield Pause.WORKER
+            return (yield from self.conclude(context, job))
         except JobCancelled:
             self.add_message("INFO", translated("{job} cancelled", job=translated(self.title)))
             return {"CANCELLED"}
-        while not job.done:
-            yield Pause.WORKER
-        return (yield from self.conclude(context, job))
+        finally:
+            self.clear_up(job)
 
     def work_beside(self, context, job):
         """Coroutine of what the main thread does while the worker is at work."""
         yield from ()
+
+    def clear_up(self, job):
+        """Removes what is not kept, however the job has ended."""
 
     def execute(self, context):
         coroutine = self.coroutine(context)
