@@ -49,6 +49,10 @@ def plain(value):
     return json.loads(json.dumps(value))
 
 
+def all_of(rule, *names):
+    return dict.fromkeys(names, rule)
+
+
 TRUE, EMPTY, FIGURE = is_(True), is_([]), Rule("a figure", lambda figures: figures is not None)
 ONCE = having(one_undo_step=TRUE, moved_by=above(0.01), shapes=above(0), first_picture_s=FIGURE)
 ALL_EXACT = Rule("exact each time", lambda figures: figures["exact"] == figures["of"] > 0)
@@ -72,22 +76,17 @@ EXPECTED = {  # of each part, every entry that it finds
     "panel": {"languages": above(0), "sections": above(10)},
     "use": {
         "face_dragged": above(1.2),
-        "face_holds_more": TRUE,
-        "face_is_one_undo_step": TRUE,
-        "searched": TRUE,
-        "cancelled_in_the_status_bar": TRUE,
+        **all_of(TRUE, "face_holds_more", "face_is_one_undo_step", "searched", "cancelled_in_the_status_bar"),
     },
     "picks": PICKS,
     "picks-in-place": PICKS,
     "jobs": {
-        "redraw_s": FIGURE,
-        "late_without_a_job": FIGURE,
+        **all_of(FIGURE, "redraw_s", "late_without_a_job"),
         "invoke": is_("{'RUNNING_MODAL'}"),
         "click_s": below(2.0),
         "late_with_a_job": FIGURE,
         "running": TRUE,
-        "progress": FIGURE,
-        "main_thread_at_once": FIGURE,
+        **all_of(FIGURE, "progress", "main_thread_at_once"),
         "previews_per_second": above(0),
         "looks_per_second": above(0),
         "cancel_s": below(10.0),
@@ -95,9 +94,7 @@ EXPECTED = {  # of each part, every entry that it finds
         "shown_on_the_mesh": above(0.3),
         "exact_after_cancel_in_place": TRUE,
         "escape_s": below(10.0),
-        "exact_after_escape": TRUE,
-        "preview_gone": TRUE,
-        "one_undo_step": TRUE,
+        **all_of(TRUE, "exact_after_escape", "preview_gone", "one_undo_step"),
         "modal_against_blocking": is_(0.0),
     },
     "stalls": {"window": FIGURE, "plain": FIGURE, "as_it_opens": FIGURE},
@@ -112,8 +109,7 @@ EXPECTED = {  # of each part, every entry that it finds
         "live_refined": is_({"converged": True}),
         "drag_moved_handle": Rule("moved", lambda figures: abs(figures) > 0.01),
         "drag_moved_shape": above(0.05),
-        "live_after_undo": TRUE,
-        "drag_is_one_undo_step": TRUE,
+        **all_of(TRUE, "live_after_undo", "drag_is_one_undo_step"),
         "shape_returns_with_undo": below(1e-3),
         "off_restores": TRUE,
     },
@@ -122,15 +118,13 @@ EXPECTED = {  # of each part, every entry that it finds
         "press_stylize": ONCE.each(),
         "cancel_deform": TRUE.each(2),
         "cancel_stylize": TRUE.each(2),
-        "step_between_holds_nothing": TRUE,
-        "step_between_shape": TRUE,
+        **all_of(TRUE, "step_between_holds_nothing", "step_between_shape"),
     },
     "pins": {
         "pins_drag_moves": above(0.2),
         "pins_escape_of_a_new_pin": TRUE,
         "pins_after_the_drag": FIGURE.each(1),
-        "pins_escape_of_a_drag": TRUE,
-        "pins_anchor": TRUE,
+        **all_of(TRUE, "pins_escape_of_a_drag", "pins_anchor"),
         "pins_ring_turns_degrees": near(45.0, 10.0),
         "pins_r_turns_degrees": Rule("turned", lambda figures: abs(figures) > 5),
         "pins_wheel_during_a_drag": having(
@@ -138,9 +132,7 @@ EXPECTED = {  # of each part, every entry that it finds
             pin_moves_pixels=Rule("30 across", lambda figures: abs(figures[0] - 30) + abs(figures[1]) <= 6),
             reach_before_and_after_ctrl=Rule("changed", lambda figures: figures[0] != figures[1]),
         ),
-        "pins_ctrl_click_deletes": TRUE,
-        "pins_x_deletes_the_last": TRUE,
-        "pins_no_stray_object": TRUE,
+        **all_of(TRUE, "pins_ctrl_click_deletes", "pins_x_deletes_the_last", "pins_no_stray_object"),
         **PINS_RATE,
     },
     "pins-rate": PINS_RATE,
@@ -157,13 +149,9 @@ EXPECTED = {  # of each part, every entry that it finds
         "wrap_escape": TRUE,
         "wrap_press_s": FIGURE,
         "wrap_moves": above(0.05).each(2),
-        "wrap_undone": TRUE,
-        "wrap_undone_bones": TRUE,
-        "wrap_redone": TRUE,
-        "wrap_redone_bones": TRUE,
+        **all_of(TRUE, "wrap_undone", "wrap_undone_bones", "wrap_redone", "wrap_redone_bones"),
         "wrap_stack": Rule("a field and an armature", lambda figures: {"NODES", "ARMATURE"} <= {*figures}),
-        "wrap_outlives_its_target": TRUE,
-        "wrap_opened_again": TRUE,
+        **all_of(TRUE, "wrap_outlives_its_target", "wrap_opened_again"),
     },
     "endings": {
         **dict.fromkeys(("ends_on_undo", "ends_on_load"), TRUE),
