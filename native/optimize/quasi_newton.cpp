@@ -10,8 +10,9 @@
 namespace arapfields {
 namespace {
 
+// Algorithms and equations: Nocedal & Wright, Numerical Optimization, 2nd edition, 2006.
 constexpr std::size_t history = 12;
-constexpr double armijo = 1e-4, wolfe = 0.9;
+constexpr double armijo = 1e-4, wolfe = 0.9;  // c1 and c2 of (3.6)
 
 double dot(const RowMatrix<double>& a, const RowMatrix<double>& b) { return a.cwiseProduct(b).sum(); }
 
@@ -22,7 +23,7 @@ struct Trial {
   Eigen::VectorX<Scalar> u, cotangents;
 };
 
-/// Minimiser of the cubic through two points' values and slopes, kept inside the middle of their interval.
+/// Minimiser (3.59) of the cubic through two points' values and slopes, kept off the ends of their interval.
 template <class Scalar>
 double cubic_minimum(const Trial<Scalar>& a, const Trial<Scalar>& b) {
   const double d1 = a.slope + b.slope - 3.0 * (a.value - b.value) / (a.t - b.t);
@@ -37,7 +38,7 @@ double cubic_minimum(const Trial<Scalar>& a, const Trial<Scalar>& b) {
   return std::clamp(t, low + margin, high - margin);
 }
 
-/// A step that lowers the value enough and leaves no steep slope; t = 0 where there is none.
+/// A step that meets the Wolfe conditions (3.6), or at least the first; t = 0 where none is found.
 template <class Scalar>
 Trial<Scalar> search_line(const MeasuredObjectiveOf<Scalar>& objective, const Trial<Scalar>& start,
                           const Eigen::VectorX<Scalar>& du, Index& evaluations) {
@@ -71,6 +72,7 @@ Trial<Scalar> search_line(const MeasuredObjectiveOf<Scalar>& objective, const Tr
 
 }  // namespace
 
+/// The two-loop recursion (algorithm 7.4), with the preconditioner as the initial inverse Hessian.
 template <class Scalar>
 RowMatrix<double> QuasiNewton::direction(const MeasuredObjectiveOf<Scalar>& objective,
                                          const RowMatrix<double>& gradient) const {
@@ -103,7 +105,7 @@ QuasiNewtonReport QuasiNewton::minimise(const MeasuredObjectiveOf<Scalar>& objec
     progress.report(static_cast<double>(report.iterations) / static_cast<double>(options.iterations));
     RowMatrix<double> step = direction(objective, gradient);
     double slope = dot(gradient, step);
-    if (!(slope < 0.0)) {  // stale pairs
+    if (!(slope < 0.0)) {  // the pairs describe another objective
       if (pairs_.empty()) break;
       forget();
       continue;

@@ -42,9 +42,9 @@ VectorF measured(const RadialState& s, const DeformationField& field) {
 
 }  // namespace
 
-/// The projection in the surrogate's norm, by preconditioned conjugate gradients, since the preconditioner
-/// knows a part of the samples. What single precision leaves of far coefficients grows with each round: the
-/// round of least energy is the start.
+/// The projection in the surrogate's norm, by preconditioned conjugate gradients (Nocedal & Wright 2006,
+/// algorithm 5.3), since the preconditioner knows a part of the samples. What single precision leaves of far
+/// coefficients grows with each round: the round of least energy is the start.
 void RadialSolver::adopt(const DeformationField& field) {
   constexpr int rounds = 8;
   RadialState& s = *state_;
