@@ -117,8 +117,7 @@ void bind_mesh(py::module_& module) {
           "mesh_indices",
           [](const SurfaceSamples& s) {
             Eigen::VectorXi result = Eigen::VectorXi::Zero(s.size());
-            for (std::size_t i = 0; i < s.mesh_indices.size(); ++i)
-              result[static_cast<Index>(i)] = s.mesh_indices[i];
+            for (std::size_t i = 0; i < s.mesh_indices.size(); ++i) result[i] = s.mesh_indices[i];
             return result;
           },
           "(n,) which of sample_meshes' meshes each sample lies on.")

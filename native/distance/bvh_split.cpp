@@ -71,7 +71,7 @@ Plane best_plane(const Bins& bins, const Binning& binning) {
 
 PrimitiveBox bounds(const std::vector<Primitive>& primitives, Index begin, Index end) {
   PrimitiveBox box;
-  for (Index i = begin; i < end; ++i) box.grow(primitives[static_cast<std::size_t>(i)].box);
+  for (Index i = begin; i < end; ++i) box.grow(primitives[i].box);
   return box;
 }
 

@@ -28,12 +28,11 @@ PrimitiveBox outer_box(const Points& vertices, TrianglesIn triangles, Index t) {
 class Builder {
  public:
   Builder(const Points& vertices, TrianglesIn triangles, const Progress& progress)
-      : primitives_(static_cast<std::size_t>(triangles.rows())), progress_(progress) {
+      : primitives_(triangles.rows()), progress_(progress) {
     parallel_for(0, triangles.rows(), grain, [&](Index begin, Index end) {
       progress.check();
       for (Index t = begin; t < end; ++t)
-        primitives_[static_cast<std::size_t>(t)] = {outer_box(vertices, triangles, t),
-                                                    static_cast<std::int32_t>(t)};
+        primitives_[t] = {outer_box(vertices, triangles, t), static_cast<std::int32_t>(t)};
     });
   }
 
@@ -44,15 +43,15 @@ class Builder {
     const std::vector<PrimitiveRange> top = wide_split(all);
     std::vector<std::vector<PrimitiveRange>> second(top.size());
     parallel_jobs(static_cast<Index>(top.size()), [&](Index i) {
-      const PrimitiveRange& range = top[static_cast<std::size_t>(i)];
-      if (range.size() > tree_width) second[static_cast<std::size_t>(i)] = wide_split(range);
+      const PrimitiveRange& range = top[i];
+      if (range.size() > tree_width) second[i] = wide_split(range);
     });
     std::vector<PrimitiveRange> jobs;
     for (const auto& ranges : second) jobs.insert(jobs.end(), ranges.begin(), ranges.end());
     std::vector<std::pair<Topology, std::int32_t>> parts(jobs.size());
     parallel_jobs(static_cast<Index>(jobs.size()), [&](Index job) {
-      auto& [part, root] = parts[static_cast<std::size_t>(job)];
-      root = add_child(jobs[static_cast<std::size_t>(job)], part);
+      auto& [part, root] = parts[job];
+      root = add_child(jobs[job], part);
     });
 
     Topology tree;
@@ -64,7 +63,7 @@ class Builder {
       return root;
     };
     add_node(top, tree, [&](const PrimitiveRange& range) {
-      const auto& ranges = second[static_cast<std::size_t>(&range - top.data())];
+      const auto& ranges = second[&range - top.data()];
       return ranges.empty() ? add_child(range, tree) : add_node(ranges, tree, next_part);
     });
     tree.triangles.resize(primitives_.size());

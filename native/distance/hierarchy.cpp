@@ -38,22 +38,20 @@ class Summarizer {
   void run(const Progress& progress) {
     parallel_jobs(static_cast<Index>(finished_.size()), [&](Index job) {
       progress.check();
-      const auto i = static_cast<std::size_t>(job);
-      finished_[i] = node(topology_.subtrees[i]);
+      finished_[job] = node(topology_.subtrees[job]);
     });
     top(0);
   }
 
  private:
   Summary leaf(std::int32_t number) {
-    const Topology::Leaf& leaf = topology_.leaves[static_cast<std::size_t>(number)];
+    const Topology::Leaf& leaf = topology_.leaves[number];
     const std::int32_t* triangles = topology_.triangles.data() + leaf.begin;
     std::array<Vec3, 3 * tree_width> corners;
     std::array<Disk, 3 * tree_width> points;
     for (int i = 0; i < 3 * leaf.count; ++i) {
-      const auto at = static_cast<std::size_t>(i);
-      corners[at] = vertices_.row(triangles_(triangles[i / 3], i % 3)).transpose();
-      points[at].center = corners[at];
+      corners[i] = vertices_.row(triangles_(triangles[i / 3], i % 3)).transpose();
+      points[i].center = corners[i];
     }
     fill(packets_[number], corners.data(), triangles, leaf.count);
     const Multipole multipole = multipole_of(corners.data(), leaf.count);
@@ -67,8 +65,8 @@ class Summarizer {
     std::array<Disk, tree_width> disks;
     for (int i = 0; i < wide.count; ++i) {
       const Summary child = summary_of(wide.child[i]);
-      multipoles[static_cast<std::size_t>(i)] = child.multipole;
-      disks[static_cast<std::size_t>(i)] = child.disk;
+      multipoles[i] = child.multipole;
+      disks[i] = child.disk;
       store(child.disk, wide, i);
       store(child.multipole, moments_[number], i);
     }
@@ -87,7 +85,7 @@ class Summarizer {
       if (child < 0) return leaf(~child);
       const auto found = std::lower_bound(topology_.subtrees.begin(), topology_.subtrees.end(), child);
       if (found == topology_.subtrees.end() || *found != child) return top(child);
-      return finished_[static_cast<std::size_t>(found - topology_.subtrees.begin())];
+      return finished_[found - topology_.subtrees.begin()];
     });
   }
 

@@ -22,7 +22,7 @@ std::vector<std::int32_t> first_at_position(PointsIn vertices) {
   const std::size_t size = std::bit_ceil(2 * count + 1);
   std::vector<std::int32_t> table(size, -1), first(count);
   for (std::size_t i = 0; i < count; ++i) {
-    const Vec3 p = vertices.row(static_cast<Index>(i)).transpose() + Vec3::Zero();  // −0 becomes 0
+    const Vec3 p = vertices.row(i).transpose() + Vec3::Zero();  // −0 becomes 0
     std::uint64_t hash = 0;
     for (int k = 0; k < 3; ++k) hash = mixed(hash ^ std::bit_cast<std::uint64_t>(p[k]));
     std::size_t slot = hash & (size - 1);
@@ -39,13 +39,13 @@ bool is_closed(PointsIn vertices, TrianglesIn triangles) {
   struct Passage {
     std::int32_t high, direction;
   };
-  std::vector<std::uint32_t> begin(static_cast<std::size_t>(vertices.rows()) + 1, 0);
+  std::vector<std::uint32_t> begin(vertices.rows() + 1, 0);
   const auto each_edge = [&](auto&& visit) {
     for (Index t = 0; t < triangles.rows(); ++t)
       for (int k = 0; k < 3; ++k) {
-        const std::int32_t a = first[static_cast<std::size_t>(triangles(t, k))];
-        const std::int32_t b = first[static_cast<std::size_t>(triangles(t, (k + 1) % 3))];
-        if (a != b) visit(static_cast<std::size_t>(std::min(a, b)), Passage{std::max(a, b), a < b ? 1 : -1});
+        const std::int32_t a = first[triangles(t, k)];
+        const std::int32_t b = first[triangles(t, (k + 1) % 3)];
+        if (a != b) visit(std::min(a, b), Passage{std::max(a, b), a < b ? 1 : -1});
       }
   };
   each_edge([&](std::size_t low, Passage) { ++begin[low + 1]; });

@@ -44,7 +44,7 @@ Vector MeshSdf::evaluate(PointsIn points, Points* gradients, const Progress& pro
       if (way.norm() > on_surface)
         gradients->row(i) = (distances[i] < 0.0 ? -1.0 : 1.0) * way.normalized();
       else
-        gradients->row(i) = normals_.row(closest.triangles[static_cast<std::size_t>(i)]);
+        gradients->row(i) = normals_.row(closest.triangles[i]);
     }
   });
   return distances;

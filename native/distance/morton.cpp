@@ -53,7 +53,7 @@ std::vector<std::uint32_t> morton_order(PointsIn points) {
       std::uint32_t key = 0;
       for (int k = 0; k < 3; ++k)
         key |= spread(static_cast<std::uint32_t>((points(i, k) - low[k]) * factor)) << k;
-      keyed[static_cast<std::size_t>(i)] = {key, static_cast<std::uint32_t>(i)};
+      keyed[i] = {key, static_cast<std::uint32_t>(i)};
     }
   });
   sort_by_digit(keyed, other, 0);

@@ -65,9 +65,9 @@ void for_blocks(PointsIn points, const Hierarchy& hierarchy, const Progress& pro
       const Index begin = job * block_size;
       block.count = static_cast<int>(std::min(block_size, count - begin));
       for (int i = 0; i < block.count; ++i) {
-        const Index row = first + order[static_cast<std::size_t>(begin + i)];
+        const Index row = first + order[begin + i];
         const Vec3 p = hierarchy.normalized(points.row(row).transpose());
-        block.rows[static_cast<std::size_t>(i)] = row;
+        block.rows[i] = row;
         std::copy_n(p.data(), 3, block.points.data() + 3 * i);
       }
       body(block);
@@ -94,11 +94,10 @@ void sides(const HierarchyView& view, const double* points, int count, bool* ins
     ARAPFIELDS_DISPATCH(winding(view, asked.data(), count, opening, numbers.data(), remainders.data()));
     int doubtful = 0;
     for (int i = 0; i < count; ++i) {
-      const auto at = static_cast<std::size_t>(i), next = static_cast<std::size_t>(doubtful);
-      inside[who[at]] = numbers[at] > 0.5;
-      if (std::abs(numbers[at] - 0.5) > doubt_of_remainder * remainders[at]) continue;
-      who[next] = who[at];
-      std::copy_n(asked.data() + 3 * at, 3, asked.data() + 3 * next);
+      inside[who[i]] = numbers[i] > 0.5;
+      if (std::abs(numbers[i] - 0.5) > doubt_of_remainder * remainders[i]) continue;
+      who[doubtful] = who[i];
+      std::copy_n(asked.data() + 3 * i, 3, asked.data() + 3 * doubtful);
       ++doubtful;
     }
     count = doubtful;
@@ -122,16 +121,16 @@ void sides_of_clusters(const HierarchyView& view, const Block& block, const Near
       if (nearest[i].squared_distance > nearest[center].squared_distance) center = i;
       members |= std::uint64_t{1} << i;
       left &= ~(std::uint64_t{1} << i);
-      fresh = (fresh | links[static_cast<std::size_t>(i)]) & left;
+      fresh = (fresh | links[i]) & left;
     }
     std::copy_n(block.points.data() + 3 * center, 3, asked.data() + 3 * clusters);
-    cluster[static_cast<std::size_t>(clusters++)] = members;
+    cluster[clusters++] = members;
   }
   std::array<bool, block_size> answers;
   sides(view, asked.data(), clusters, answers.data());
   for (int c = 0; c < clusters; ++c)
-    for (std::uint64_t rest = cluster[static_cast<std::size_t>(c)]; rest != 0; rest &= rest - 1)
-      inside[std::countr_zero(rest)] = answers[static_cast<std::size_t>(c)];
+    for (std::uint64_t rest = cluster[c]; rest != 0; rest &= rest - 1)
+      inside[std::countr_zero(rest)] = answers[c];
 }
 
 }  // namespace
@@ -165,7 +164,7 @@ void SignedDistance::evaluate(PointsIn points, Eigen::Ref<Vector> distances, con
       sides_of_clusters(view, block, nearest.data(), inside.data());
     else
       sides(view, block.points.data(), block.count, inside.data());
-    for (std::size_t i = 0; i < static_cast<std::size_t>(block.count); ++i) {
+    for (int i = 0; i < block.count; ++i) {
       const double distance = std::sqrt(nearest[i].squared_distance) / hierarchy.factor();
       distances[block.rows[i]] = inside[i] ? -distance : distance;
     }
@@ -179,7 +178,7 @@ void SignedDistance::unsigned_distance(PointsIn points, Eigen::Ref<Vector> dista
   for_blocks(points, hierarchy, progress, [&](const Block& block) {
     std::array<Nearest, block_size> nearest;
     run_nearest(hierarchy.view(), block, nearest.data());
-    for (std::size_t i = 0; i < static_cast<std::size_t>(block.count); ++i)
+    for (int i = 0; i < block.count; ++i)
       distances[block.rows[i]] = std::sqrt(nearest[i].squared_distance) / hierarchy.factor();
   });
 }
@@ -188,18 +187,18 @@ ClosestPoints SignedDistance::closest(PointsIn points, const Progress& progress)
   const Hierarchy& hierarchy = parts_->hierarchy;
   require_usable(points, hierarchy);
   ClosestPoints result{Points(points.rows(), 3), {}, Vector(points.rows())};
-  result.triangles.resize(static_cast<std::size_t>(points.rows()));
+  result.triangles.resize(points.rows());
   for_blocks(points, hierarchy, progress, [&](const Block& block) {
     const HierarchyView view = hierarchy.view();
     std::array<Nearest, block_size> nearest;
     run_nearest(view, block, nearest.data());
-    for (std::size_t i = 0; i < static_cast<std::size_t>(block.count); ++i) {
+    for (int i = 0; i < block.count; ++i) {
       const TrianglePacket& packet = view.packets[nearest[i].packet];
       const auto lane = std::find(packet.triangle, packet.triangle + tree_width, nearest[i].triangle);
       const Vec3 query = Eigen::Map<const Vec3>(block.points.data() + 3 * i);
       const Vec3 point = closest_point(packet, static_cast<int>(lane - packet.triangle), query);
       result.points.row(block.rows[i]) = hierarchy.restored(point).transpose();
-      result.triangles[static_cast<std::size_t>(block.rows[i])] = nearest[i].triangle;
+      result.triangles[block.rows[i]] = nearest[i].triangle;
       result.distances[block.rows[i]] = std::sqrt(nearest[i].squared_distance) / hierarchy.factor();
     }
   });
@@ -215,8 +214,7 @@ void SignedDistance::winding_number(PointsIn points, Eigen::Ref<Vector> numbers,
     const HierarchyView view = hierarchy.view();
     ARAPFIELDS_DISPATCH(
         winding(view, block.points.data(), block.count, opening_of_numbers, values.data(), nullptr));
-    for (std::size_t i = 0; i < static_cast<std::size_t>(block.count); ++i)
-      numbers[block.rows[i]] = values[i];
+    for (int i = 0; i < block.count; ++i) numbers[block.rows[i]] = values[i];
   });
 }
 

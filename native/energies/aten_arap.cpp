@@ -29,8 +29,8 @@ at::Tensor table(const std::array<int64_t, size>& numbers, at::IntArrayRef sizes
 std::array<double, 9 * 16> davenport_entries() {
   std::array<double, 9 * 16> entries{};
   const auto set = [&](int row, int column, int i, int k, double value) {
-    entries[static_cast<std::size_t>((3 * i + k) * 16 + 4 * row + column)] = value;
-    entries[static_cast<std::size_t>((3 * i + k) * 16 + 4 * column + row)] = value;
+    entries[(3 * i + k) * 16 + 4 * row + column] = value;
+    entries[(3 * i + k) * 16 + 4 * column + row] = value;
   };
   for (int c = 0; c < 4; ++c)
     for (int i = 0; i < 3; ++i) set(c, c, i, i, c == 0 || c == i + 1 ? 1.0 : -1.0);
@@ -49,8 +49,7 @@ constexpr std::array<int64_t, 16> turn_entries = {0, 6, 6, 2, 4, 6, 6, 0, 6, 1, 
 std::array<double, 54> pair_entries() {
   std::array<double, 54> entries{};
   for (int j = 0; j < 3; ++j)
-    for (int k = 0; k < 3; ++k)
-      entries[static_cast<std::size_t>((second_column(j, k) - 4) * 9 + 3 * k + j)] = 1.0;
+    for (int k = 0; k < 3; ++k) entries[(second_column(j, k) - 4) * 9 + 3 * k + j] = 1.0;
   return entries;
 }
 

@@ -35,12 +35,12 @@ Distortion distortion(JetView<const Scalar> jets) {
   require(jets.order != JetOrder::value, "jets", "values alone", "first derivatives are needed");
   Distortion result;
   if (jets.count == 0) return result;
-  std::vector<Distortion> parts(static_cast<std::size_t>((jets.count + range_size - 1) / range_size));
+  std::vector<Distortion> parts((jets.count + range_size - 1) / range_size);
   for_ranges(jets.count, [&](Index begin, Index end) {
     double values[4] = {INFINITY, 0.0, 0.0, INFINITY};
     ARAPFIELDS_DISPATCH(distortion_range(jets.data, jets.count, begin, end, values));
     const Distortion part{values[0], values[1], values[2], values[3]};
-    parts[static_cast<std::size_t>(begin / range_size)] = part;
+    parts[begin / range_size] = part;
   });
   result = {INFINITY, 0.0, 0.0, INFINITY};
   for (const Distortion& part : parts) {

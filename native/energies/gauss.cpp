@@ -48,15 +48,15 @@ Vector truncated_solution(const Eigen::MatrixXd& kernel,
 
 /// The curved face to which each normal belongs, by number: neighbours within 15° share one.
 std::vector<Index> faces_of(const Eigen::MatrixXd& cosines) {
-  std::vector<Index> faces(static_cast<std::size_t>(cosines.rows()), -1), open;
+  std::vector<Index> faces(cosines.rows(), -1), open;
   for (Index first = 0; first < cosines.rows(); ++first) {
-    if (faces[static_cast<std::size_t>(first)] >= 0) continue;
+    if (faces[first] >= 0) continue;
     for (open = {first}; !open.empty();) {
       const Index i = open.back();
       open.pop_back();
-      faces[static_cast<std::size_t>(i)] = first;
+      faces[i] = first;
       for (Index j = 0; j < cosines.rows(); ++j)
-        if (faces[static_cast<std::size_t>(j)] < 0 && cosines(i, j) > one_face) open.push_back(j);
+        if (faces[j] < 0 && cosines(i, j) > one_face) open.push_back(j);
     }
   }
   return faces;
@@ -103,8 +103,7 @@ double style_sharpness(PointsIn normals) {
   double nearest = -1.0;
   for (Index i = 0; i < unit.rows(); ++i)
     for (Index j = 0; j < i; ++j)
-      if (faces[static_cast<std::size_t>(i)] != faces[static_cast<std::size_t>(j)])
-        nearest = std::max(nearest, cosines(i, j));
+      if (faces[i] != faces[j]) nearest = std::max(nearest, cosines(i, j));
   const double midway = std::sqrt(0.5 + 0.5 * std::clamp(nearest, -1.0, 1.0));
   return std::clamp(cube_sharpness * (1.0 - std::sqrt(0.5)) / (1.0 - midway), cube_sharpness, most_sharpness);
 }

@@ -94,7 +94,7 @@ Mat4 Handle::motion(Index index) const {
 
 BoundHandles::BoundHandles(std::vector<Handle> handles, PointsIn samples) : handles_(std::move(handles)) {
   for (Index i = 0; i < count(); ++i) {
-    const Handle& handle = handles_[static_cast<std::size_t>(i)];
+    const Handle& handle = handles_[i];
     require(std::isfinite(handle.weight) && handle.weight > 0.0, name_of(i) + ".weight",
             std::to_string(handle.weight), "must be positive");
     require_not_negative(name_of(i) + ".reach", handle.reach);
@@ -107,11 +107,11 @@ BoundHandles::BoundHandles(std::vector<Handle> handles, PointsIn samples) : hand
     }
     begin_.push_back(static_cast<Index>(members_.size()));
   }
-  sources_.resize(static_cast<Index>(members_.size()), 3);
+  sources_.resize(members_.size(), 3);
   targets_.resize(sources_.rows(), 3);
   for (Index i = 0; i < count(); ++i) {
     for (Index p = begin(i); p < begin(i + 1); ++p) {
-      const Index member = members_[static_cast<std::size_t>(p)];
+      const Index member = members_[p];
       if (member < 0)
         sources_.row(p) = handle(i).rest_point.transpose();
       else
@@ -122,7 +122,7 @@ BoundHandles::BoundHandles(std::vector<Handle> handles, PointsIn samples) : hand
 }
 
 void BoundHandles::move(Index i) {
-  const Mat4& motion = motions_[static_cast<std::size_t>(i)];
+  const Mat4& motion = motions_[i];
   const Index rows = begin(i + 1) - begin(i);
   targets_.middleRows(begin(i), rows) =
       (sources_.middleRows(begin(i), rows) * motion.topLeftCorner<3, 3>().transpose()).rowwise() +
@@ -162,10 +162,10 @@ HandleBatch<Scalar> BoundHandles::batch(Index per_handle, Random& random) const 
   result.targets.resize(total, 3);
   result.weights.resize(total);
   for (Index p = 0; p < total; ++p) {
-    const Index row = rows[static_cast<std::size_t>(p)];
+    const Index row = rows[p];
     result.sources.row(p) = sources_.row(row).cast<Scalar>();
     result.targets.row(p) = targets_.row(row).cast<Scalar>();
-    result.weights[p] = static_cast<Scalar>(weights[static_cast<std::size_t>(p)]);
+    result.weights[p] = static_cast<Scalar>(weights[p]);
   }
   return result;
 }

@@ -52,14 +52,14 @@ class ARAPFIELDS_EXPORT BoundHandles {
   BoundHandles(std::vector<Handle> handles, PointsIn samples);
 
   Index count() const { return static_cast<Index>(handles_.size()); }
-  const Handle& handle(Index i) const { return handles_[static_cast<std::size_t>(i)]; }
+  const Handle& handle(Index i) const { return handles_[i]; }
   /// Pairs of handle i are rows begin(i) … begin(i+1)−1.
-  Index begin(Index i) const { return begin_[static_cast<std::size_t>(i)]; }
+  Index begin(Index i) const { return begin_[i]; }
   const Points& sources() const { return sources_; }
   const Points& targets() const { return targets_; }
   /// Index of each pair's sample, −1 for point handles.
   const std::vector<Index>& members() const { return members_; }
-  const Mat4& motion(Index i) const { return motions_[static_cast<std::size_t>(i)]; }
+  const Mat4& motion(Index i) const { return motions_[i]; }
 
   /// New targets for the same regions: each handle's target (or target_point) is taken from `moved`.
   void retarget(const std::vector<Handle>& moved);

@@ -38,16 +38,14 @@ Vec3 unit_or_zero(const Vec3& vector) {
 /// Computing Vertex Normals from Facet Normals").
 std::vector<Corners> corner_normals(const Points& vertices, const Triangles& triangles) {
   const Index count = triangles.rows();
-  std::vector<Vec3> flat(static_cast<std::size_t>(count));
-  std::vector<std::vector<std::int32_t>> around(static_cast<std::size_t>(vertices.rows()));
+  std::vector<Vec3> flat(count);
+  std::vector<std::vector<std::int32_t>> around(vertices.rows());
   const auto corner = [&](Index t, int k) -> Vec3 { return vertices.row(triangles(t, k % 3)).transpose(); };
   for (Index t = 0; t < count; ++t) {
-    flat[static_cast<std::size_t>(t)] =
-        unit_or_zero((corner(t, 1) - corner(t, 0)).cross(corner(t, 2) - corner(t, 0)));
-    for (int k = 0; k < 3; ++k)
-      around[static_cast<std::size_t>(triangles(t, k))].push_back(static_cast<std::int32_t>(3 * t + k));
+    flat[t] = unit_or_zero((corner(t, 1) - corner(t, 0)).cross(corner(t, 2) - corner(t, 0)));
+    for (int k = 0; k < 3; ++k) around[triangles(t, k)].push_back(static_cast<std::int32_t>(3 * t + k));
   }
-  std::vector<Corners> result(static_cast<std::size_t>(count));
+  std::vector<Corners> result(count);
   std::vector<std::int32_t> group, open;
   for (const std::vector<std::int32_t>& fan : around) {
     std::vector<bool> taken(fan.size(), false);
@@ -57,7 +55,7 @@ std::vector<Corners> corner_normals(const Points& vertices, const Triangles& tri
       group.clear();
       Vec3 sum = Vec3::Zero();
       for (open = {static_cast<std::int32_t>(first)}; !open.empty();) {
-        const std::int32_t at = fan[static_cast<std::size_t>(open.back())];
+        const std::int32_t at = fan[open.back()];
         open.pop_back();
         group.push_back(at);
         const Index t = at / 3;
@@ -70,15 +68,12 @@ std::vector<Corners> corner_normals(const Points& vertices, const Triangles& tri
           const int l = fan[other] % 3;
           const bool meet = triangles(t, (k + 1) % 3) == triangles(u, (l + 2) % 3) ||
                             triangles(t, (k + 2) % 3) == triangles(u, (l + 1) % 3);
-          if (taken[other] || !meet ||
-              flat[static_cast<std::size_t>(t)].dot(flat[static_cast<std::size_t>(u)]) < crease)
-            continue;
+          if (taken[other] || !meet || flat[t].dot(flat[u]) < crease) continue;
           taken[other] = true;
           open.push_back(static_cast<std::int32_t>(other));
         }
       }
-      for (const std::int32_t at : group)
-        result[static_cast<std::size_t>(at / 3)][static_cast<std::size_t>(at % 3)] = unit_or_zero(sum);
+      for (const std::int32_t at : group) result[at / 3][at % 3] = unit_or_zero(sum);
     }
   }
   return result;
@@ -118,7 +113,7 @@ struct ObjectStyle::Surface {
     const std::vector<std::int32_t> first = first_at_position(vertices);
     Triangles result = triangles;
     for (Index t = 0; t < result.rows(); ++t)
-      for (int k = 0; k < 3; ++k) result(t, k) = first[static_cast<std::size_t>(result(t, k))];
+      for (int k = 0; k < 3; ++k) result(t, k) = first[result(t, k)];
     return result;
   }
 
@@ -196,7 +191,7 @@ Vec3 ObjectStyle::centroid() const { return surface_->hierarchy.restored(surface
 Vec3 ObjectStyle::normal(const Vec3& direction) const {
   const Surface::Exit exit = surface_->last_exit(direction);
   if (exit.triangle < 0) return direction;
-  const Corners& corners = surface_->normals[static_cast<std::size_t>(exit.triangle)];
+  const Corners& corners = surface_->normals[exit.triangle];
   const Vec3 normal =
       unit_or_zero(exit.shares[0] * corners[0] + exit.shares[1] * corners[1] + exit.shares[2] * corners[2]);
   return normal.squaredNorm() > 0.0 ? normal : direction;

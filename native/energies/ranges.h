@@ -26,13 +26,10 @@ template <int count_of_sums, class Body>
 std::array<double, count_of_sums> sum_over_ranges(Index count, Body&& body) {
   std::vector<std::array<double, count_of_sums>> parts(
       static_cast<std::size_t>((count + range_size - 1) / range_size), std::array<double, count_of_sums>{});
-  for_ranges(count, [&](Index begin, Index end) {
-    body(begin, end, parts[static_cast<std::size_t>(begin / range_size)].data());
-  });
+  for_ranges(count, [&](Index begin, Index end) { body(begin, end, parts[begin / range_size].data()); });
   std::array<double, count_of_sums> total{};
   for (const auto& part : parts)
-    for (int i = 0; i < count_of_sums; ++i)
-      total[static_cast<std::size_t>(i)] += part[static_cast<std::size_t>(i)];
+    for (int i = 0; i < count_of_sums; ++i) total[i] += part[i];
   return total;
 }
 

@@ -58,7 +58,7 @@ Stance Stance::of(PointsIn points, const Vec3& upwards) {
 Stance Stance::at(const std::vector<Index>& rows) const {
   Stance some = *this;
   some.ground = Vector(static_cast<Index>(rows.size()));
-  for (std::size_t i = 0; i < rows.size(); ++i) some.ground[static_cast<Index>(i)] = ground[rows[i]];
+  for (std::size_t i = 0; i < rows.size(); ++i) some.ground[i] = ground[rows[i]];
   return some;
 }
 

@@ -99,7 +99,7 @@ Points preferred_normals(const std::string& name) {
     if (name == style.name) {
       const Rows rows = style.normals();
       Points result(static_cast<Index>(rows.size()), 3);
-      for (std::size_t i = 0; i < rows.size(); ++i) result.row(static_cast<Index>(i)) = rows[i].transpose();
+      for (std::size_t i = 0; i < rows.size(); ++i) result.row(i) = rows[i].transpose();
       return result;
     }
     known += (known.empty() ? "" : ", ") + std::string(style.name);

@@ -21,7 +21,7 @@ struct Edge {
 };
 
 Place moved(Place place, int axis, int by) {
-  place[static_cast<std::size_t>(axis)] += by;
+  place[axis] += by;
   return place;
 }
 
@@ -119,8 +119,7 @@ class Mesher {
         continue;
       }
       Vec3 centre = Vec3::Zero();
-      for (const int each : loop)
-        centre += vertices_[static_cast<std::size_t>(each)] / static_cast<double>(n);
+      for (const int each : loop) centre += vertices_[each] / static_cast<double>(n);
       const int own = static_cast<int>(vertices_.size());
       vertices_.push_back(centre);
       for (std::size_t i = 0; i < n; ++i) triangles_.push_back({loop[(i + 1) % n], loop[i], own});
@@ -130,10 +129,9 @@ class Mesher {
   TriangleMesh mesh() const {
     TriangleMesh result{Points(static_cast<Index>(vertices_.size()), 3),
                         Triangles(static_cast<Index>(triangles_.size()), 3)};
-    for (std::size_t i = 0; i < vertices_.size(); ++i)
-      result.vertices.row(static_cast<Index>(i)) = vertices_[i].transpose();
+    for (std::size_t i = 0; i < vertices_.size(); ++i) result.vertices.row(i) = vertices_[i].transpose();
     for (std::size_t i = 0; i < triangles_.size(); ++i)
-      result.triangles.row(static_cast<Index>(i)) << triangles_[i][0], triangles_[i][1], triangles_[i][2];
+      result.triangles.row(i) << triangles_[i][0], triangles_[i][1], triangles_[i][2];
     return result;
   }
 
@@ -149,8 +147,7 @@ class Mesher {
     unsigned inside = 0;
     for (std::size_t i = 0; i < 4; ++i) {
       for (int axis = 0; axis < 3; ++axis)
-        places[i][static_cast<std::size_t>(axis)] =
-            from[static_cast<std::size_t>(axis)] + step * CellTable::corner_at(corners[i], axis);
+        places[i][axis] = from[axis] + step * CellTable::corner_at(corners[i], axis);
       values[i] = grid_.value(places[i]);
       inside |= values[i] < 0.0f ? 1u << i : 0u;
     }
@@ -159,7 +156,7 @@ class Mesher {
     for (unsigned i = 0; i < 4; ++i) {
       const Place &a = places[i], &b = places[(i + 1) & 3u];
       int axis = 0;
-      while (a[static_cast<std::size_t>(axis)] == b[static_cast<std::size_t>(axis)]) ++axis;
+      while (a[axis] == b[axis]) ++axis;
       edges[i] = crossing({std::min(a, b), axis, step}, with_fine, blocked);
     }
     if (inside == 0 || inside == 15) return;
@@ -186,8 +183,8 @@ class Mesher {
     std::array<Place, 4> around;
     bool cut = false;
     for (int i = 0; i < 4; ++i) {
-      around[static_cast<std::size_t>(i)] = moved(moved(cell, u, -(i & 1)), v, -(i >> 1));
-      cut = cut || grid_.cut(around[static_cast<std::size_t>(i)]);
+      around[i] = moved(moved(cell, u, -(i & 1)), v, -(i >> 1));
+      cut = cut || grid_.cut(around[i]);
     }
     if (!cut) return edge;
     int passes = 0;

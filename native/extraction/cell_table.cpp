@@ -41,11 +41,8 @@ std::vector<Loop> trace(unsigned pattern, unsigned joined) {
   next.fill(-1);
   for (int face = 0; face < 6; ++face) {
     const auto corners = CellTable::face_corners(face);
-    const auto inside = [&](int i) { return (pattern >> corners[static_cast<std::size_t>(i & 3)]) & 1u; };
-    const auto edge = [&](int i) {
-      return edge_between(corners[static_cast<std::size_t>(i & 3)],
-                          corners[static_cast<std::size_t>((i + 1) & 3)]);
-    };
+    const auto inside = [&](int i) { return (pattern >> corners[i & 3]) & 1u; };
+    const auto edge = [&](int i) { return edge_between(corners[i & 3], corners[(i + 1) & 3]); };
     for (int i = 0; i < 4; ++i) {
       if (!inside(i) || inside(i + 1)) continue;  // edge i leaves the inside
       int enter = i;
@@ -56,17 +53,17 @@ std::vector<Loop> trace(unsigned pattern, unsigned joined) {
         do --enter;
         while (inside(enter & 3) || !inside(enter + 1));
       }
-      next[static_cast<std::size_t>(edge(i))] = edge(enter);
+      next[edge(i)] = edge(enter);
     }
   }
   std::vector<Loop> loops;
   for (int start = 0; start < 12; ++start) {
-    if (next[static_cast<std::size_t>(start)] < 0) continue;
+    if (next[start] < 0) continue;
     Loop loop;
-    for (int at = start; next[static_cast<std::size_t>(at)] >= 0;) {
+    for (int at = start; next[at] >= 0;) {
       loop.push_back(at);
-      const int to = next[static_cast<std::size_t>(at)];
-      next[static_cast<std::size_t>(at)] = -1;
+      const int to = next[at];
+      next[at] = -1;
       at = to;
     }
     loops.push_back(loop);
@@ -78,7 +75,7 @@ std::vector<Loop> trace(unsigned pattern, unsigned joined) {
 /// same one; for long polygons, and where there are none, a fan around the cell's own point.
 void triangulate(const Loop& loop, Triples& out) {
   const auto size = static_cast<int>(loop.size());
-  const auto at = [&](int i) { return static_cast<std::uint8_t>(loop[static_cast<std::size_t>(i)]); };
+  const auto at = [&](int i) { return static_cast<std::uint8_t>(loop[i]); };
   // cost(i, j): fewest bad diagonals in triangulations of the corners i..j (and which corner makes the last
   // one).
   std::array<std::array<int, 12>, 12> cost{}, apex{};
@@ -87,20 +84,17 @@ void triangulate(const Loop& loop, Triples& out) {
       const int j = i + width;
       int best = 1000;
       for (int k = i + 1; k < j; ++k) {
-        const auto part = [&](int a, int b) {
-          return cost[static_cast<std::size_t>(a)][static_cast<std::size_t>(b)];
-        };
+        const auto part = [&](int a, int b) { return cost[a][b]; };
         const int all = part(i, k) + part(k, j);
         if (all < best) {
           best = all;
-          apex[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] = k;
+          apex[i][j] = k;
         }
       }
       const bool whole = width == size - 1;
-      cost[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] =
-          best + (!whole && share_face(at(i), at(j)) ? 1 : 0);
+      cost[i][j] = best + (!whole && share_face(at(i), at(j)) ? 1 : 0);
     }
-  if (size >= shortest_fan || cost[0][static_cast<std::size_t>(size - 1)] > 0) {
+  if (size >= shortest_fan || cost[0][size - 1] > 0) {
     for (int i = 0; i < size; ++i) out.push_back({at((i + 1) % size), at(i), CellTable::centre});
     return;
   }
@@ -109,7 +103,7 @@ void triangulate(const Loop& loop, Triples& out) {
     const auto [i, j] = open.back();
     open.pop_back();
     if (j - i < 2) continue;
-    const int k = apex[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
+    const int k = apex[i][j];
     out.push_back({at(j), at(k), at(i)});
     open.push_back({i, k});
     open.push_back({k, j});

@@ -67,7 +67,7 @@ Points DeformedFunction::by_network(PointsIn moved) const {
 std::vector<bool> DeformedFunction::covered(PointsIn points) const {
   ClosestPoints closest = distance_.closest(points, check_);
   for (Index i = 0; i < points.rows(); ++i) {
-    const auto corners = shape_.mesh.triangles.row(closest.triangles[static_cast<std::size_t>(i)]);
+    const auto corners = shape_.mesh.triangles.row(closest.triangles[i]);
     const Vec3 a = shape_.moved.row(corners[0]), b = shape_.moved.row(corners[1]),
                c = shape_.moved.row(corners[2]);
     closest.points.row(i) += probe_in_bands * shape_.band * (b - a).cross(c - a).normalized().transpose();
@@ -90,7 +90,7 @@ void DeformedFunction::evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF
   const Points rest = shape_.inverse != nullptr ? by_network(moved) : by_newton(moved);
   std::vector<Index> found, rows, doubtful;  // rows of near, of points; of points again
   for (std::size_t k = 0; k < near.size(); ++k)
-    if (rest.row(static_cast<Index>(k)).allFinite()) {
+    if (rest.row(k).allFinite()) {
       found.push_back(static_cast<Index>(k));
       rows.push_back(near[k]);
     }
@@ -100,7 +100,7 @@ void DeformedFunction::evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF
   Vector exact = distances;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     double& value = exact[rows[k]];
-    value = static_cast<double>(phi[static_cast<Index>(k)]) * shape_.rest.frame().scale;
+    value = static_cast<double>(phi[k]) * shape_.rest.frame().scale;
     const double distance = distances[rows[k]];
     const bool beside = std::abs(distance) > probe_in_bands * shape_.band;
     if (!continuous() && beside && (value < 0.0) != (distance < 0.0))

@@ -35,7 +35,7 @@ TricubicSurrogateOptions model_options(int resolution, bool sure) {
 /// Whether there were any.
 bool drop_jumps(EvaluationCounter& function, double most, TriangleMesh& mesh) {
   const VectorF values = function.values(mesh.vertices.cast<float>());
-  std::vector<std::int32_t> number(static_cast<std::size_t>(mesh.vertices.rows()), -1);
+  std::vector<std::int32_t> number(mesh.vertices.rows(), -1);
   std::vector<Index> kept, used;
   for (Index t = 0; t < mesh.triangles.rows(); ++t) {
     bool whole = true;
@@ -43,7 +43,7 @@ bool drop_jumps(EvaluationCounter& function, double most, TriangleMesh& mesh) {
     if (!whole) continue;
     kept.push_back(t);
     for (int c = 0; c < 3; ++c) {
-      std::int32_t& own = number[static_cast<std::size_t>(mesh.triangles(t, c))];
+      std::int32_t& own = number[mesh.triangles(t, c)];
       if (own >= 0) continue;
       own = static_cast<std::int32_t>(used.size());
       used.push_back(mesh.triangles(t, c));
@@ -53,7 +53,7 @@ bool drop_jumps(EvaluationCounter& function, double most, TriangleMesh& mesh) {
   mesh.triangles = Triangles(mesh.triangles(kept, Eigen::all));
   mesh.vertices = Points(mesh.vertices(used, Eigen::all));
   for (Index t = 0; t < mesh.triangles.rows(); ++t)
-    for (int c = 0; c < 3; ++c) mesh.triangles(t, c) = number[static_cast<std::size_t>(mesh.triangles(t, c))];
+    for (int c = 0; c < 3; ++c) mesh.triangles(t, c) = number[mesh.triangles(t, c)];
   return true;
 }
 

@@ -10,7 +10,7 @@ namespace {
 constexpr float far = 1e30f;
 
 Place shifted(Place place, int axis, int by) {
-  place[static_cast<std::size_t>(axis)] += by;
+  place[axis] += by;
   return place;
 }
 
@@ -32,8 +32,7 @@ Vec3 FineGrid::position(const Place& place) const {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const int cell = place[axis] / factor_, part = place[axis] % factor_;
     const double from = coarse_.coordinate(cell);
-    result[static_cast<Index>(axis)] =
-        part == 0 ? from : from + (coarse_.coordinate(cell + 1) - from) * part / factor_;
+    result[axis] = part == 0 ? from : from + (coarse_.coordinate(cell + 1) - from) * part / factor_;
   }
   return result;
 }
@@ -51,10 +50,9 @@ std::vector<Place> FineGrid::points_in(const std::set<Place>& cells) const {
 void FineGrid::ask(const std::vector<Place>& places, EvaluationCounter& function) {
   PointsF points(static_cast<Index>(places.size()), 3);
   for (std::size_t i = 0; i < places.size(); ++i)
-    points.row(static_cast<Index>(i)) = position(places[i]).transpose().cast<float>();
+    points.row(i) = position(places[i]).transpose().cast<float>();
   const VectorF values = function.values(points);
-  for (std::size_t i = 0; i < places.size(); ++i)
-    samples_[key(places[i])] = {values[static_cast<Index>(i)], true, true};
+  for (std::size_t i = 0; i < places.size(); ++i) samples_[key(places[i])] = {values[i], true, true};
 }
 
 /// Takes the sign of a point near enough that Φ cannot change it on the way.
@@ -106,7 +104,7 @@ void FineGrid::cut(const std::set<Place>& cells, double slope, EvaluationCounter
       for (int axis = 0; axis < 3; ++axis)
         for (const int by : {-1, 1}) {
           const Place next = shifted(place, axis, by);
-          if (next[static_cast<std::size_t>(axis)] < 0) continue;
+          if (next[axis] < 0) continue;
           const auto found = samples_.find(key(next));
           change =
               change || (found != samples_.end() && (found->second.value < 0.0f) != (sample.value < 0.0f));

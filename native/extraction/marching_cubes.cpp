@@ -64,8 +64,7 @@ Numbers number(const SparseGrid& grid, const SparseGrid::Block& block) {
     for (int axis = 0; axis < 3; ++axis) {
       const float high = window.value[Window::at(i + (axis == 0), j + (axis == 1), k + (axis == 2))];
       if (std::isnan(low) || std::isnan(high) || (low < 0.0f) == (high < 0.0f)) continue;
-      numbers.slots[static_cast<std::size_t>(3 * SparseGrid::local(i, j, k) + axis)] =
-          static_cast<std::int16_t>(numbers.edges++);
+      numbers.slots[3 * SparseGrid::local(i, j, k) + axis] = static_cast<std::int16_t>(numbers.edges++);
     }
     const Cell cell = cell_at(window, i, j, k);
     if (!cell.crossed()) return;
@@ -80,21 +79,19 @@ Numbers number(const SparseGrid& grid, const SparseGrid::Block& block) {
 class Tile {
  public:
   Tile(const SparseGrid& grid, const std::vector<Numbers>& numbers, Index block)
-      : grid_(grid),
-        block_(grid.blocks()[static_cast<std::size_t>(block)]),
-        own_(numbers[static_cast<std::size_t>(block)]) {
+      : grid_(grid), block_(grid.blocks()[block]), own_(numbers[block]) {
     grid.look(block_, window_);
     for (int n = 0; n < 8; ++n) {
       const Index found =
           grid.find(block_.place[0] + (n >> 2), block_.place[1] + ((n >> 1) & 1), block_.place[2] + (n & 1));
-      around_[n] = found < 0 ? nullptr : &numbers[static_cast<std::size_t>(found)];
+      around_[n] = found < 0 ? nullptr : &numbers[found];
     }
   }
 
   void edge_vertices(Points& vertices) const {
     for_each_point([&](int i, int j, int k) {
       for (int axis = 0; axis < 3; ++axis) {
-        const int slot = own_.slots[static_cast<std::size_t>(3 * SparseGrid::local(i, j, k) + axis)];
+        const int slot = own_.slots[3 * SparseGrid::local(i, j, k) + axis];
         if (slot < 0) continue;
         const int next[3] = {i + (axis == 0), j + (axis == 1), k + (axis == 2)};
         const double low = std::abs(window_.value[Window::at(i, j, k)]);
@@ -152,7 +149,7 @@ class Tile {
               z = k + CellTable::corner_at(corner, 2);
     const Numbers& owner = *around_[4 * (x / side) + 2 * (y / side) + z / side];
     const int slot = 3 * SparseGrid::local(x % side, y % side, z % side) + CellTable::edge_axis(edge);
-    return owner.first + owner.slots[static_cast<std::size_t>(slot)];
+    return owner.first + owner.slots[slot];
   }
 
   const SparseGrid& grid_;
@@ -174,9 +171,7 @@ TriangleMesh marching_cubes(const SparseGrid& grid, const Progress& progress) {
   };
   // Vertices are numbered block by block in the order of the grid, in which later blocks need not be stored.
   std::vector<Numbers> numbers(grid.blocks().size());
-  for_each_block([&](Index b) {
-    numbers[static_cast<std::size_t>(b)] = number(grid, grid.blocks()[static_cast<std::size_t>(b)]);
-  });
+  for_each_block([&](Index b) { numbers[b] = number(grid, grid.blocks()[b]); });
   Index total = 0;
   for (Numbers& each : numbers) {
     each.first = total;
@@ -188,13 +183,11 @@ TriangleMesh marching_cubes(const SparseGrid& grid, const Progress& progress) {
   TriangleMesh mesh;
   mesh.vertices.resize(total, 3);
   for_each_block([&](Index b) {
-    if (!numbers[static_cast<std::size_t>(b)].slots.empty())
-      Tile(grid, numbers, b).edge_vertices(mesh.vertices);
+    if (!numbers[b].slots.empty()) Tile(grid, numbers, b).edge_vertices(mesh.vertices);
   });
   std::vector<std::vector<std::array<std::int32_t, 3>>> parts(numbers.size());
   for_each_block([&](Index b) {
-    const auto at = static_cast<std::size_t>(b);
-    if (!numbers[at].slots.empty()) Tile(grid, numbers, b).triangles(mesh.vertices, parts[at]);
+    if (!numbers[b].slots.empty()) Tile(grid, numbers, b).triangles(mesh.vertices, parts[b]);
   });
   Index triangles = 0;
   for (const auto& part : parts) triangles += static_cast<Index>(part.size());

@@ -43,38 +43,37 @@ SparseGrid::SparseGrid(int resolution, const TricubicSurrogate* model)
       }
       for (int i = low[0]; i <= high[0]; ++i)
         for (int j = low[1]; j <= high[1]; ++j)
-          for (int k = low[2]; k <= high[2]; ++k) marked[static_cast<std::size_t>(entry(i, j, k))] = 1;
+          for (int k = low[2]; k <= high[2]; ++k) marked[entry(i, j, k)] = 1;
     }
     for (int i = 0; i < width_; ++i)
       for (int j = 0; j < width_; ++j)
         for (int k = 0; k < width_; ++k) {
           const auto position = [&](int block) { return model->position(coordinate(block * side)); };
           if (model->side(model->cell(position(i), position(j), position(k))) < 0)
-            table_[static_cast<std::size_t>(entry(i, j, k))] = -2;
+            table_[entry(i, j, k)] = -2;
         }
   }
   Index count = 0;
   for (const auto each : marked) count += each;
-  blocks_.reserve(static_cast<std::size_t>(count));
+  blocks_.reserve(count);
   for (std::size_t i = 0; i < marked.size(); ++i)
     if (marked[i]) keep(static_cast<Index>(i));
 }
 
 Index SparseGrid::find(int i, int j, int k) const {
   if (i < 0 || j < 0 || k < 0 || i >= width_ || j >= width_ || k >= width_) return -1;
-  return std::max(-1, table_[static_cast<std::size_t>(entry(i, j, k))]);
+  return std::max(-1, table_[entry(i, j, k)]);
 }
 
 float SparseGrid::value(int i, int j, int k) const {
-  const std::int32_t found = table_[static_cast<std::size_t>(entry(i / side, j / side, k / side))];
+  const std::int32_t found = table_[entry(i / side, j / side, k / side)];
   if (found < 0) return found == -2 ? -far : far;
-  return blocks_[static_cast<std::size_t>(found)].value[local(i % side, j % side, k % side)];
+  return blocks_[found].value[local(i % side, j % side, k % side)];
 }
 
 bool SparseGrid::exact(int i, int j, int k) const {
   const Index found = find(i / side, j / side, k / side);
-  return found >= 0 &&
-         blocks_[static_cast<std::size_t>(found)].exact[local(i % side, j % side, k % side)] != 0;
+  return found >= 0 && blocks_[found].exact[local(i % side, j % side, k % side)] != 0;
 }
 
 void SparseGrid::keep(Index entry) {
@@ -83,7 +82,7 @@ void SparseGrid::keep(Index entry) {
   block.place[0] = static_cast<int>(entry / (static_cast<Index>(width_) * width_));
   block.place[1] = static_cast<int>(entry / width_ % width_);
   block.place[2] = static_cast<int>(entry % width_);
-  table_[static_cast<std::size_t>(entry)] = static_cast<std::int32_t>(blocks_.size()) - 1;
+  table_[entry] = static_cast<std::int32_t>(blocks_.size()) - 1;
   std::fill_n(block.exact, points, std::uint8_t{0});
   std::fill_n(block.error, points, blind_ ? 2.0f * far : 0.0f);
   for (int i = 0; i < side; ++i)
@@ -171,8 +170,8 @@ void SparseGrid::look(const Block& block, Window& window) const {
           inside = inside && place >= 0 && place < width_;
         }
         const int i0 = block.place[0] + di, j0 = block.place[1] + dj, k0 = block.place[2] + dk;
-        const std::int32_t found = inside ? table_[static_cast<std::size_t>(entry(i0, j0, k0))] : -1;
-        const Block* source = found >= 0 ? &blocks_[static_cast<std::size_t>(found)] : nullptr;
+        const std::int32_t found = inside ? table_[entry(i0, j0, k0)] : -1;
+        const Block* source = found >= 0 ? &blocks_[found] : nullptr;
         for (int i = from[0]; i < to[0]; ++i)
           for (int j = from[1]; j < to[1]; ++j)
             for (int k = from[2]; k < to[2]; ++k) {
@@ -216,7 +215,7 @@ int SparseGrid::settled_sign(const Window& window, int i, int j, int k, double s
 /// every other one of each axis first. A doubt is settled without an evaluation where |Φ| at a point beside
 /// it is more than the way between them allows Φ to change.
 void SparseGrid::wish(std::int32_t index, Round round, Wish& out) const {
-  const Block& block = blocks_[static_cast<std::size_t>(index)];
+  const Block& block = blocks_[index];
   Window window;
   look(block, window);
   const double slope = model_ == nullptr ? far : model_->lipschitz();
@@ -258,24 +257,24 @@ void SparseGrid::refine(EvaluationCounter& function) {
   for (Round round = blind_ ? Round::every_other : Round::changes;;) {
     const auto count = static_cast<Index>(blocks_.size());
     const Index chunks = (count + blocks_per_chunk - 1) / blocks_per_chunk;
-    std::vector<Wish> wishes(static_cast<std::size_t>(chunks));
+    std::vector<Wish> wishes(chunks);
     parallel_for(0, chunks, 1, [&](Index begin, Index end) {
       for (Index chunk = begin; chunk < end; ++chunk)
         for (Index b = chunk * blocks_per_chunk; b < std::min(count, (chunk + 1) * blocks_per_chunk); ++b)
-          wish(static_cast<std::int32_t>(b), round, wishes[static_cast<std::size_t>(chunk)]);
+          wish(static_cast<std::int32_t>(b), round, wishes[chunk]);
     });
     std::vector<Point> wanted;
     bool grown = false;
     for (const Wish& each : wishes) {
       wanted.insert(wanted.end(), each.points.begin(), each.points.end());
       for (const auto& [point, sign] : each.settled) {
-        Block& block = blocks_[static_cast<std::size_t>(point.block)];
+        Block& block = blocks_[point.block];
         if (blind_) block.value[point.local] = static_cast<float>(sign) * far;
         block.error[point.local] = 0.0f;
         grown = true;
       }
       for (const Index neighbour : each.neighbours)
-        if (table_[static_cast<std::size_t>(neighbour)] < 0) {
+        if (table_[neighbour] < 0) {
           keep(neighbour);
           grown = true;
         }
@@ -284,7 +283,7 @@ void SparseGrid::refine(EvaluationCounter& function) {
     round = round == Round::changes ? Round::every_other : Round::rest;
     PointsF places(static_cast<Index>(wanted.size()), 3);
     for (std::size_t row = 0; row < wanted.size(); ++row) {
-      const Block& block = blocks_[static_cast<std::size_t>(wanted[row].block)];
+      const Block& block = blocks_[wanted[row].block];
       const int at = wanted[row].local, within[3] = {at / (side * side), at / side % side, at % side};
       for (int axis = 0; axis < 3; ++axis)
         places(static_cast<Index>(row), axis) =
@@ -292,10 +291,10 @@ void SparseGrid::refine(EvaluationCounter& function) {
     }
     const VectorF values = function.values(places);
     for (std::size_t row = 0; row < wanted.size(); ++row) {
-      Block& block = blocks_[static_cast<std::size_t>(wanted[row].block)];
+      Block& block = blocks_[wanted[row].block];
       const int at = wanted[row].local;
       block.error[at] = 0.0f;
-      block.value[at] = values[static_cast<Index>(row)];
+      block.value[at] = values[row];
       block.exact[at] = 1;
     }
   }

@@ -87,12 +87,12 @@ ThinCells thin_cells(const SparseGrid& grid) {
 }
 
 Index piece_count(const TriangleMesh& mesh) {
-  std::vector<Index> parent(static_cast<std::size_t>(mesh.vertices.rows()));
+  std::vector<Index> parent(mesh.vertices.rows());
   std::iota(parent.begin(), parent.end(), 0);
   const auto root = [&](Index i) {
-    while (parent[static_cast<std::size_t>(i)] != i) {
-      Index& up = parent[static_cast<std::size_t>(i)];
-      up = parent[static_cast<std::size_t>(up)];
+    while (parent[i] != i) {
+      Index& up = parent[i];
+      up = parent[up];
       i = up;
     }
     return i;
@@ -102,7 +102,7 @@ Index piece_count(const TriangleMesh& mesh) {
     for (int c = 1; c < 3; ++c) {
       const Index a = root(mesh.triangles(t, 0)), b = root(mesh.triangles(t, c));
       if (a == b) continue;
-      parent[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
+      parent[std::max(a, b)] = std::min(a, b);
       --pieces;
     }
   return pieces;

@@ -26,13 +26,13 @@ void compose_at(const JetView<const double>& outer, const JetView<double>& inner
     std::array<Vec3, 6> second;
     for (int j = 0; j < 3; ++j)
       for (int k = j; k < 3; ++k) {
-        Vec3& sum = second[static_cast<std::size_t>(second_column(j, k) - 4)];
+        Vec3& sum = second[second_column(j, k) - 4];
         sum = after * Eigen::Map<const Vec3>(inner.at(second_column(j, k), i));
         for (int l = 0; l < 3; ++l)
           for (int m = 0; m < 3; ++m)
             sum += before(l, j) * before(m, k) * Eigen::Map<const Vec3>(outer.at(second_column(l, m), i));
       }
-    for (int c = 4; c < 10; ++c) Eigen::Map<Vec3>(inner.at(c, i)) = second[static_cast<std::size_t>(c - 4)];
+    for (int c = 4; c < 10; ++c) Eigen::Map<Vec3>(inner.at(c, i)) = second[c - 4];
   }
   for (int k = 0; k < 3; ++k) Eigen::Map<Vec3>(inner.at(first_column(k), i)) = after * before.col(k);
 }
@@ -71,7 +71,7 @@ void ComposedField::evaluate(PointsIn points, JetView<double> out) const {
   for (Index first = 0; first < all; first += points_at_once) {
     const Index count = std::min(points_at_once, all - first);
     Points here(count, 3);
-    for (Index i = 0; i < count; ++i) here.row(i) = points.row(order[static_cast<std::size_t>(first + i)]);
+    for (Index i = 0; i < count; ++i) here.row(i) = points.row(order[first + i]);
     JetBlock<double> jets = identity_jets(here, out.order);
     JetBlock<double> outer(count, out.order);
     for (const FieldStep& step : steps_)
@@ -82,8 +82,7 @@ void ComposedField::evaluate(PointsIn points, JetView<double> out) const {
         compose(std::as_const(outer).view(), jets.view());
       }
     for (int c = 0; c < columns(out.order); ++c)
-      for (Index i = 0; i < count; ++i)
-        std::copy_n(jets.view().at(c, i), 3, out.at(c, order[static_cast<std::size_t>(first + i)]));
+      for (Index i = 0; i < count; ++i) std::copy_n(jets.view().at(c, i), 3, out.at(c, order[first + i]));
   }
 }
 

@@ -45,7 +45,7 @@ HandleBlend::HandleBlend(std::vector<RigidRegion> regions) : regions_(std::move(
 }
 
 double HandleBlend::distance(Index region, const Vec3& point) const {
-  const OrientedBox& box = boxes_[static_cast<std::size_t>(region)];
+  const OrientedBox& box = boxes_[region];
   return ((box.directions * (point - box.center)).cwiseAbs() - box.half_extents).maxCoeff();
 }
 

@@ -14,8 +14,6 @@ namespace {
 /// Share of the reach within which nothing is held back.
 constexpr double core = 0.5;
 
-std::size_t slot(Index i) { return static_cast<std::size_t>(i); }
-
 /// 1 near q = 0 and 0 from q = 1, by the squared distance q in reaches, whose jet is given.
 ScalarJet fall_off_of_square(const ScalarJet& q) {
   const double s = std::sqrt(q.c[0]), slope = 1.0 / (1.0 - core);
@@ -26,11 +24,10 @@ ScalarJet fall_off_of_square(const ScalarJet& q) {
   const double by_s = first * slope, by_ss = second * slope * slope;
   const double by_q = by_s / (2.0 * s), by_qq = by_ss / (4.0 * s * s) - by_s / (4.0 * s * s * s);
   for (int j = 0; j < 3; ++j) {
-    const double qj = q.c[slot(first_column(j))];
-    result.c[slot(first_column(j))] = by_q * qj;
+    const double qj = q.c[first_column(j)];
+    result.c[first_column(j)] = by_q * qj;
     for (int k = j; k < 3; ++k)
-      result.c[slot(second_column(j, k))] =
-          by_q * q.c[slot(second_column(j, k))] + by_qq * qj * q.c[slot(first_column(k))];
+      result.c[second_column(j, k)] = by_q * q.c[second_column(j, k)] + by_qq * qj * q.c[first_column(k)];
   }
   return result;
 }
@@ -51,15 +48,15 @@ Influence::Influence(Points places, Vector reaches, std::shared_ptr<const Interi
 template <class Consume>
 void Influence::for_each_point(PointsIn points, JetOrder order, Consume&& consume) const {
   // Ways through the inside are no shorter than straight ones: most points are none of anybody's.
-  std::vector<std::int32_t> near(slot(points.rows()));
+  std::vector<std::int32_t> near(points.rows());
   parallel_for(0, points.rows(), 1024, [&](Index first, Index last) {
     for (Index p = first; p < last; ++p)
-      for (Index k = 0; k < places_.rows() && near[slot(p)] == 0; ++k)
-        near[slot(p)] = (points.row(p) - places_.row(k)).squaredNorm() < reaches_[k] * reaches_[k];
+      for (Index k = 0; k < places_.rows() && near[p] == 0; ++k)
+        near[p] = (points.row(p) - places_.row(k)).squaredNorm() < reaches_[k] * reaches_[k];
   });
   std::vector<Index> rows;
   for (Index p = 0; p < points.rows(); ++p) {
-    if (near[slot(p)] != 0)
+    if (near[p] != 0)
       rows.push_back(p);
     else
       consume(p, constant(0.0));
@@ -81,14 +78,14 @@ void Influence::for_each_point(PointsIn points, JetOrder order, Consume&& consum
           square += arm * arm;
           if (!embedding_) continue;
           ScalarJet way;
-          for (int c = 0; c < columns(order); ++c) way.c[slot(c)] = inside.view().at(c, i)[a];
+          for (int c = 0; c < columns(order); ++c) way.c[c] = inside.view().at(c, i)[a];
           way.c[0] -= embedded_(k, a);
           square += way * way;
         }
         for (double& entry : square.c) entry *= scale;
         if (square.c[0] < 1.0) rest = rest * one_minus(fall_off_of_square(square));
       }
-      consume(rows[slot(i)], one_minus(rest));
+      consume(rows[i], one_minus(rest));
     }
   });
 }
@@ -107,10 +104,10 @@ void Influence::confine(PointsIn points, JetView<double> jets) const {
       ScalarJet moved = place;
       if (!none) {
         ScalarJet shift;
-        for (int c = 0; c < columns(jets.order); ++c) shift.c[slot(c)] = jets.at(c, p)[i] - place.c[slot(c)];
+        for (int c = 0; c < columns(jets.order); ++c) shift.c[c] = jets.at(c, p)[i] - place.c[c];
         moved += m * shift;
       }
-      for (int c = 0; c < columns(jets.order); ++c) jets.at(c, p)[i] = moved.c[slot(c)];
+      for (int c = 0; c < columns(jets.order); ++c) jets.at(c, p)[i] = moved.c[c];
     }
   });
 }

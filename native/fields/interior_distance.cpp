@@ -19,11 +19,9 @@ constexpr double reach_share = 0.25;
 /// Neighbours on one sheet: at most so many spacings apart, normals with at least this cosine.
 constexpr double sheet_spacings = 2.5, sheet_cosine = 0.3;
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 }  // namespace
 
-InteriorGraph::InteriorGraph(PointsIn nodes, PointsIn normals, double spacing) : edges_(at(nodes.rows())) {
+InteriorGraph::InteriorGraph(PointsIn nodes, PointsIn normals, double spacing) : edges_(nodes.rows()) {
   const double extent = (nodes.colwise().maxCoeff() - nodes.colwise().minCoeff()).maxCoeff();
   const Vector radii = inner_radii(nodes, normals, nodes, normals, {.most = extent});
   const Points centers = nodes - radii.asDiagonal() * normals;
@@ -37,7 +35,7 @@ InteriorGraph::InteriorGraph(PointsIn nodes, PointsIn normals, double spacing) :
         const double reach = larger + reach_share * smaller;
         if ((centers.row(i) - centers.row(j)).squaredNorm() < reach * reach ||
             (square < near * near && normals.row(i).dot(normals.row(j)) > sheet_cosine))
-          edges_[at(i)].push_back({static_cast<std::int32_t>(j), static_cast<float>(std::sqrt(square))});
+          edges_[i].push_back({static_cast<std::int32_t>(j), static_cast<float>(std::sqrt(square))});
       }
   });
   join_parts(nodes);
@@ -46,38 +44,38 @@ InteriorGraph::InteriorGraph(PointsIn nodes, PointsIn normals, double spacing) :
 /// Prim's tree, in which edges that exist cost nothing: what it adds joins the parts.
 void InteriorGraph::join_parts(PointsIn nodes) {
   const Index n = size();
-  std::vector<double> cost(at(n), infinity);
-  std::vector<Index> from(at(n), 0);
-  std::vector<bool> reached(at(n), false);
+  std::vector<double> cost(n, infinity);
+  std::vector<Index> from(n, 0);
+  std::vector<bool> reached(n, false);
   std::vector<Index> whole{0};
   for (Index count = 0; count < n;) {
     while (!whole.empty()) {  // all that edges reach
       const Index i = whole.back();
       whole.pop_back();
-      if (reached[at(i)]) continue;
-      reached[at(i)] = true;
+      if (reached[i]) continue;
+      reached[i] = true;
       ++count;
       for (const Edge& edge : edges(i))
-        if (!reached[at(edge.to)]) whole.push_back(edge.to);
+        if (!reached[edge.to]) whole.push_back(edge.to);
       if (count == n) return;
-      cost[at(i)] = -1.0;  // not yet offered to the rest
+      cost[i] = -1.0;  // not yet offered to the rest
     }
     for (Index i = 0; i < n; ++i) {
-      if (!reached[at(i)] || cost[at(i)] >= 0.0) continue;
-      cost[at(i)] = 0.0;
+      if (!reached[i] || cost[i] >= 0.0) continue;
+      cost[i] = 0.0;
       for (Index j = 0; j < n; ++j) {
-        if (reached[at(j)]) continue;
+        if (reached[j]) continue;
         const double square = (nodes.row(i) - nodes.row(j)).squaredNorm();
-        if (square < cost[at(j)]) cost[at(j)] = square, from[at(j)] = i;
+        if (square < cost[j]) cost[j] = square, from[j] = i;
       }
     }
     Index best = -1;
     for (Index j = 0; j < n; ++j)
-      if (!reached[at(j)] && (best < 0 || cost[at(j)] < cost[at(best)])) best = j;
-    const Index other = from[at(best)];
-    const float length = static_cast<float>(std::sqrt(cost[at(best)]));
-    edges_[at(best)].push_back({static_cast<std::int32_t>(other), length});
-    edges_[at(other)].push_back({static_cast<std::int32_t>(best), length});
+      if (!reached[j] && (best < 0 || cost[j] < cost[best])) best = j;
+    const Index other = from[best];
+    const float length = static_cast<float>(std::sqrt(cost[best]));
+    edges_[best].push_back({static_cast<std::int32_t>(other), length});
+    edges_[other].push_back({static_cast<std::int32_t>(best), length});
     whole.push_back(best);
   }
 }
@@ -86,23 +84,23 @@ RowMatrix<double> InteriorGraph::distances(Index sources) const {
   RowMatrix<double> result(size(), sources);
   using Entry = std::pair<float, std::int32_t>;
   parallel_for(0, sources, 1, [&](Index first, Index last) {
-    std::vector<float> distance(at(size()));
+    std::vector<float> distance(size());
     for (Index s = first; s < last; ++s) {
       std::fill(distance.begin(), distance.end(), std::numeric_limits<float>::infinity());
       std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> queue;
-      distance[at(s)] = 0.0f;
+      distance[s] = 0.0f;
       queue.emplace(0.0f, static_cast<std::int32_t>(s));
       while (!queue.empty()) {
         const auto [length, node] = queue.top();
         queue.pop();
-        if (length > distance[at(node)]) continue;
+        if (length > distance[node]) continue;
         for (const Edge& edge : edges(node))
-          if (length + edge.length < distance[at(edge.to)]) {
-            distance[at(edge.to)] = length + edge.length;
-            queue.emplace(distance[at(edge.to)], edge.to);
+          if (length + edge.length < distance[edge.to]) {
+            distance[edge.to] = length + edge.length;
+            queue.emplace(distance[edge.to], edge.to);
           }
       }
-      for (Index i = 0; i < size(); ++i) result(i, s) = static_cast<double>(distance[at(i)]);
+      for (Index i = 0; i < size(); ++i) result(i, s) = static_cast<double>(distance[i]);
     }
   });
   return result;

@@ -22,7 +22,7 @@ class InteriorGraph {
   /// Nodes (n,3), their outward unit normals (n,3), and how far apart neighbours are.
   InteriorGraph(PointsIn nodes, PointsIn normals, double spacing);
   Index size() const { return static_cast<Index>(edges_.size()); }
-  const std::vector<Edge>& edges(Index node) const { return edges_[static_cast<std::size_t>(node)]; }
+  const std::vector<Edge>& edges(Index node) const { return edges_[node]; }
   /// Lengths (n, sources) of the shortest paths from the first `sources` nodes.
   RowMatrix<double> distances(Index sources) const;
 

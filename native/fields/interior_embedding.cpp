@@ -55,8 +55,7 @@ Points smoothed(const Points& values, const Neighbours& neighbours) {
   const auto apply = [&](const Points& x) {
     Points y = x;
     for (std::size_t i = 0; i < neighbours.size(); ++i)
-      for (const Index j : neighbours[i])
-        y.row(static_cast<Index>(i)) += smoothing * (x.row(static_cast<Index>(i)) - x.row(j));
+      for (const Index j : neighbours[i]) y.row(i) += smoothing * (x.row(i) - x.row(j));
     return y;
   };
   Points x = values, residual = values - apply(x), direction = residual;
@@ -78,7 +77,7 @@ RowMatrix<double> fitted_slopes(const Points& nodes, const Points& values, const
   RowMatrix<double> slopes = RowMatrix<double>::Zero(nodes.rows(), 9);
   for (Index i = 0; i < nodes.rows(); ++i) {
     Mat3 moments = Mat3::Zero(), products = Mat3::Zero();
-    for (const Index j : neighbours[static_cast<std::size_t>(i)]) {
+    for (const Index j : neighbours[i]) {
       const Vec3 arm = (nodes.row(j) - nodes.row(i)).transpose();
       moments += arm * arm.transpose();
       products += (values.row(j) - values.row(i)).transpose() * arm.transpose();
@@ -148,35 +147,32 @@ void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out) const {
   parallel_for(0, (count + block - 1) / block, 4, [&](Index first, Index last) {
     std::array<double, 3 * block> packed;
     std::array<double, 30 * block> jets;
-    std::vector<std::int32_t> near(static_cast<std::size_t>(n));
-    std::vector<double> distance(static_cast<std::size_t>(n));
+    std::vector<std::int32_t> near(n);
+    std::vector<double> distance(n);
     for (Index b = first; b < last; ++b) {
       const Index valid = std::min(block, count - b * block);
       const auto part = points.middleRows(b * block, valid);
       const Eigen::RowVector3d center = 0.5 * (part.colwise().minCoeff() + part.colwise().maxCoeff());
       const double radius = std::sqrt((part.rowwise() - center).rowwise().squaredNorm().maxCoeff());
       for (Index i = 0; i < block; ++i)
-        for (int k = 0; k < 3; ++k)
-          packed[static_cast<std::size_t>(k * block + i)] = part(std::min(i, valid - 1), k);
+        for (int k = 0; k < 3; ++k) packed[k * block + i] = part(std::min(i, valid - 1), k);
       double nearest = 1e300;
       for (Index j = 0; j < n; ++j) {
         const double a = nodes(j, 0) - center[0], c = nodes(j, 1) - center[1], d = nodes(j, 2) - center[2];
-        distance[static_cast<std::size_t>(j)] = std::sqrt(a * a + c * c + d * d);
-        nearest = std::min(nearest, distance[static_cast<std::size_t>(j)]);
+        distance[j] = std::sqrt(a * a + c * c + d * d);
+        nearest = std::min(nearest, distance[j]);
       }
       const double farthest_nearest = nearest + radius;
       const double reach =
           std::sqrt(farthest_nearest * farthest_nearest - negligible * width * width) + radius;
       Index found = 0;
       for (Index j = 0; j < n; ++j)
-        if (distance[static_cast<std::size_t>(j)] <= reach)
-          near[static_cast<std::size_t>(found++)] = static_cast<std::int32_t>(j);
+        if (distance[j] <= reach) near[found++] = static_cast<std::int32_t>(j);
       const EmbeddingBlock here{packed.data(), rows.data(), near.data(), found, scale};
       ARAPFIELDS_DISPATCH(embedding_jets(here, columns_count, jets.data()));
       for (int c = 0; c < columns_count; ++c)
         for (Index p = 0; p < valid; ++p)
-          for (int k = 0; k < 3; ++k)
-            out.at(c, b * block + p)[k] = jets[static_cast<std::size_t>((c * 3 + k) * block + p)];
+          for (int k = 0; k < 3; ++k) out.at(c, b * block + p)[k] = jets[(c * 3 + k) * block + p];
     }
   });
 }
@@ -203,11 +199,11 @@ std::shared_ptr<const InteriorEmbedding> interior_embedding(PointsIn samples, Po
       excess(i, l) =
           std::max(0.0, excess(i, l) - (embedding.nodes.row(i) - embedding.nodes.row(l)).squaredNorm());
   embedding.values = std::sqrt(emphasis) * leading_coordinates(excess);
-  Neighbours neighbours(static_cast<std::size_t>(n));
+  Neighbours neighbours(n);
   const float reach = static_cast<float>(neighbour_spacings * embedding.width);
   for (Index i = 0; i < n; ++i)
     for (const InteriorGraph::Edge& edge : graph.edges(i))
-      if (edge.length < reach) neighbours[static_cast<std::size_t>(i)].push_back(edge.to);
+      if (edge.length < reach) neighbours[i].push_back(edge.to);
   embedding.values = smoothed(embedding.values, neighbours);
   const double size =
       (embedding.nodes.colwise().maxCoeff() - embedding.nodes.colwise().minCoeff()).maxCoeff();

@@ -114,14 +114,14 @@ void walk(const DeformationField& field, std::vector<Walker>& walkers, const New
     const Index count = static_cast<Index>(active.size());
     Points trial(count, 3);
     for (Index k = 0; k < count; ++k) {
-      const Walker& w = walkers[active[static_cast<std::size_t>(k)]];
+      const Walker& w = walkers[active[k]];
       trial.row(k) = iteration == 0 ? w.best : Vec3(w.best + w.damping * w.step);
     }
     JetBlock<double> block(count, JetOrder::first);
     field.evaluate(trial, block.view());
     const JetView<const double> jets = block.view();
     for (Index k = 0; k < count; ++k) {
-      Walker& w = walkers[active[static_cast<std::size_t>(k)]];
+      Walker& w = walkers[active[k]];
       const Vec3 residual = Vec3(jets.at(0, k)) - w.target;
       const double norm = residual.norm();
       if (norm < w.residual) {
@@ -198,8 +198,8 @@ InverseResult NewtonInverse::operator()(PointsIn targets, const NewtonInverseOpt
       std::vector<Walker> walkers(left.size());
       parallel_for(0, static_cast<Index>(left.size()), 64, [&](Index from, Index to) {
         for (Index k = from; k < to; ++k) {
-          Walker& w = walkers[static_cast<std::size_t>(k)];
-          w.row = left[static_cast<std::size_t>(k)];
+          Walker& w = walkers[k];
+          w.row = left[k];
           w.target = targets.row(w.row);
           w.start = w.best = starts != nullptr ? starts->nearest(w.target) : w.target;
         }

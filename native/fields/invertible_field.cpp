@@ -52,7 +52,7 @@ void for_groups(Index ranges, const std::function<void(Index, Index)>& body) {
 void for_each_range(const std::vector<Range>& ranges, const std::function<void(const Range&)>& body) {
   parallel_jobs(static_cast<Index>(ranges.size()), [&](Index r) {
     const at::AutoDispatchBelowADInplaceOrView quick;
-    body(ranges[static_cast<std::size_t>(r)]);
+    body(ranges[r]);
   });
 }
 
@@ -174,10 +174,9 @@ at::Tensor InvertibleField::forward(const at::Tensor& points, JetOrder order) {
   State::Pass& pass = s.prepare(points.size(0), order);
   at::Tensor result = at::empty({columns(order), points.size(0), 3}, s.parameters.options());
   for_groups(static_cast<Index>(pass.ranges.size()), [&](Index r, Index) {
-    const Range& range = pass.ranges[static_cast<std::size_t>(r)];
+    const Range& range = pass.ranges[r];
     result.narrow(1, range.begin, range.count)
-        .copy_(couple(s.shape, s.views, points.narrow(0, range.begin, range.count), order,
-                      pass.kept[static_cast<std::size_t>(r)]));
+        .copy_(couple(s.shape, s.views, points.narrow(0, range.begin, range.count), order, pass.kept[r]));
   });
   s.fresh = true;
   return result;
@@ -203,13 +202,13 @@ void InvertibleField::pull_back(const at::Tensor& cotangents) {
     s.parts.push_back(s.parts.empty() ? s.gradient : at::empty_like(s.gradient));
     s.part_views.emplace_back(s.shape, s.parts.back());
   }
-  for (Index g = 1; g < groups; ++g) s.parts[static_cast<std::size_t>(g)].zero_();
+  for (Index g = 1; g < groups; ++g) s.parts[g].zero_();
   for_groups(ranges, [&](Index r, Index g) {
-    const Range& range = pass.ranges[static_cast<std::size_t>(r)];
-    couple_back(s.shape, s.views, cotangents.narrow(1, range.begin, range.count),
-                pass.kept[static_cast<std::size_t>(r)], s.part_views[static_cast<std::size_t>(g)]);
+    const Range& range = pass.ranges[r];
+    couple_back(s.shape, s.views, cotangents.narrow(1, range.begin, range.count), pass.kept[r],
+                s.part_views[g]);
   });
-  for (Index g = 1; g < groups; ++g) s.gradient.add_(s.parts[static_cast<std::size_t>(g)]);
+  for (Index g = 1; g < groups; ++g) s.gradient.add_(s.parts[g]);
 }
 
 void InvertibleField::translate(const Vec3& offset) {

@@ -14,8 +14,6 @@ constexpr double nearly_on_plane = 0.08;
 /// one percent.
 constexpr double half = 0.9;
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 }  // namespace
 
 Points Mirror::reflected(PointsIn points) const {
@@ -27,7 +25,7 @@ Points Mirror::reflected(PointsIn points) const {
 void Mirror::symmetrise(RowMatrix<double>& c) const {
   const Index count = static_cast<Index>(twins.size());
   for (Index m = 0; m < count; ++m) {
-    const Index twin = twins[at(m)];
+    const Index twin = twins[m];
     if (twin < m) continue;
     for (int k = 0; k < 3; ++k) {
       const double sign = k == axis ? -1.0 : 1.0;
@@ -43,14 +41,14 @@ void Mirror::symmetrise(RowMatrix<double>& c) const {
 
 RowMatrix<double> Mirror::reflected_rows(const RowMatrix<double>& rows) const {
   RowMatrix<double> result = rows;
-  for (std::size_t m = 0; m < twins.size(); ++m) result.col(static_cast<Index>(m)) = rows.col(twins[m]);
+  for (std::size_t m = 0; m < twins.size(); ++m) result.col(m) = rows.col(twins[m]);
   result.col(static_cast<Index>(twins.size()) + 1 + axis) *= -1.0;
   return result;
 }
 
 void Mirror::symmetrise_matrix(RowMatrix<double>& lower) const {
   const Index count = static_cast<Index>(twins.size()), size = lower.rows();
-  const auto twin = [&](Index i) { return i < count ? twins[at(i)] : i; };
+  const auto twin = [&](Index i) { return i < count ? twins[i] : i; };
   const auto sign = [&](Index i) { return i == count + 1 + axis ? -1.0 : 1.0; };
   const RowMatrix<double> before = lower;
   for (Index i = 0; i < size; ++i)

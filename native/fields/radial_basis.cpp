@@ -56,13 +56,11 @@ FarthestPoints farthest_points(PointsIn points, Index count, const Vector& sizes
   require(points.rows() > 0 && points.allFinite(), "points", "none, or NaN or infinite ones",
           "finite points are needed");
   const Index n = points.rows(), stride = (n + 15) / 16 * 16;
-  std::vector<double> columns(static_cast<std::size_t>(3 * stride)),
-      distance(static_cast<std::size_t>(stride), 1e300), weights(static_cast<std::size_t>(stride), 1.0);
+  std::vector<double> columns(3 * stride), distance(stride, 1e300), weights(stride, 1.0);
   for (Index i = 0; i < stride; ++i)
-    for (int k = 0; k < 3; ++k)
-      columns[static_cast<std::size_t>(k * stride + i)] = points(std::min(i, n - 1), k);
+    for (int k = 0; k < 3; ++k) columns[k * stride + i] = points(std::min(i, n - 1), k);
   for (Index i = 0; i < stride && sizes.size() > 0; ++i)
-    weights[static_cast<std::size_t>(i)] = 1.0 / (sizes[std::min(i, n - 1)] * sizes[std::min(i, n - 1)]);
+    weights[i] = 1.0 / (sizes[std::min(i, n - 1)] * sizes[std::min(i, n - 1)]);
   Index next = first_center(points);
   FarthestPoints result;
   while (static_cast<Index>(result.indices.size()) < count) {
@@ -100,13 +98,13 @@ RadialBasis radial_basis(PointsIn points, const std::vector<RadialScale>& scales
     const Index below =
         two_layers ? std::min<Index>(scale.count / 2, static_cast<Index>(chosen.indices.size())) : 0;
     for (Index k = 0; k < below; ++k) {
-      const Index i = chosen.indices[static_cast<std::size_t>(k)];
+      const Index i = chosen.indices[k];
       add(i, layout.inner.row(i));
     }
   }
   const Index count = static_cast<Index>(centers.size());
   RadialBasis basis{Points(count, 3), Eigen::Map<const Vector>(radii.data(), count), nullptr, {}};
-  for (Index m = 0; m < count; ++m) basis.centers.row(m) = centers[static_cast<std::size_t>(m)].transpose();
+  for (Index m = 0; m < count; ++m) basis.centers.row(m) = centers[m].transpose();
   return basis;
 }
 

@@ -15,12 +15,10 @@ namespace {
 constexpr Index block_size = 16;
 constexpr Index blocks_per_task = 4;
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 std::vector<double> center_rows(const RadialBasis& basis) {
-  std::vector<double> rows(at(center_stride * basis.center_count()), 0.0);
+  std::vector<double> rows(center_stride * basis.center_count(), 0.0);
   for (Index m = 0; m < basis.center_count(); ++m) {
-    double* row = &rows[at(center_stride * m)];
+    double* row = &rows[center_stride * m];
     for (int k = 0; k < 3; ++k) row[k] = basis.centers(m, k);
     row[3] = 1.0 / (basis.radii[m] * basis.radii[m]);
     for (int k = 0; k < 3; ++k) row[4 + k] = basis.embedding ? basis.embedded(m, k) : 0.0;
@@ -42,18 +40,18 @@ RadialEvaluator<Scalar>::RadialEvaluator(const RadialBasis& basis, PointsIn poin
     : center_count_(basis.center_count()), count_(points.rows()), most_(most) {
   const std::vector<double> exact = center_rows(basis);
   centers_.assign(exact.begin(), exact.end());
-  points_.resize(at(blocks() * 3 * block_size));
+  points_.resize(blocks() * 3 * block_size);
   JetBlock<double> jets(basis.embedding ? count_ : 0, most);
   if (basis.embedding) {
     basis.embedding->evaluate(points, jets.view());
     pack_embedding(jets);
   }
   const Eigen::Map<const Points> embedded(jets.view().data, jets.view().count, 3);
-  std::vector<std::vector<std::int32_t>> lists(at(blocks()));
+  std::vector<std::vector<std::int32_t>> lists(blocks());
   parallel_for(0, blocks(), 8, [&](Index first, Index last) {
-    std::vector<std::int32_t> list(at(center_count_ + 1));
+    std::vector<std::int32_t> list(center_count_ + 1);
     for (Index b = first; b < last; ++b) {
-      Scalar* block = &points_[at(b * 3 * block_size)];
+      Scalar* block = &points_[b * 3 * block_size];
       for (Index i = 0; i < block_size; ++i)
         for (int k = 0; k < 3; ++k)
           block[k * block_size + i] =
@@ -65,7 +63,7 @@ RadialEvaluator<Scalar>::RadialEvaluator(const RadialBasis& basis, PointsIn poin
       if (basis.embedding) ball_radius[1] = ball_of(embedded.middleRows(b * block_size, rows), &center[3]);
       const Index found = ARAPFIELDS_DISPATCH(
           radial_active(center.data(), ball_radius.data(), exact.data(), center_count_, list.data()));
-      lists[at(b)].assign(list.begin(), list.begin() + found);
+      lists[b].assign(list.begin(), list.begin() + found);
     }
   });
   start_.assign(1, 0);
@@ -78,12 +76,12 @@ RadialEvaluator<Scalar>::RadialEvaluator(const RadialBasis& basis, PointsIn poin
 template <class Scalar>
 void RadialEvaluator<Scalar>::pack_embedding(const JetBlock<double>& jets) {
   const int columns_count = columns(most_), rows = embedding_rows(columns_count);
-  embedding_.resize(at(blocks() * rows * block_size));
+  embedding_.resize(blocks() * rows * block_size);
   parallel_for(0, blocks(), 8, [&](Index first, Index last) {
     for (Index b = first; b < last; ++b)
       for (Index i = 0; i < block_size; ++i) {
         const Index p = std::min(b * block_size + i, count_ - 1);
-        Scalar* to = &embedding_[at(b * rows * block_size + i)];
+        Scalar* to = &embedding_[b * rows * block_size + i];
         for (int c = 0; c < columns_count; ++c)
           for (int k = 0; k < 3; ++k)
             to[(3 * c + k) * block_size] = static_cast<Scalar>(jets.view().at(c, p)[k]);
@@ -107,9 +105,9 @@ void RadialEvaluator<Scalar>::require_order(JetOrder order) const {
 template <class Scalar>
 RadialBlock<Scalar> RadialEvaluator<Scalar>::block(Index b) const {
   const Scalar* embedding =
-      embedding_.empty() ? nullptr : &embedding_[at(b * embedding_rows(columns(most_)) * block_size)];
-  return {&points_[at(b * 3 * block_size)], embedding, centers_.data(), active_.data() + start_[at(b)],
-          start_[at(b) + 1] - start_[at(b)]};
+      embedding_.empty() ? nullptr : &embedding_[b * embedding_rows(columns(most_)) * block_size];
+  return {&points_[b * 3 * block_size], embedding, centers_.data(), active_.data() + start_[b],
+          start_[b + 1] - start_[b]};
 }
 
 template <class Scalar>
@@ -140,7 +138,7 @@ void RadialEvaluator<Scalar>::evaluate(const RowMatrix<double>& coefficients, Je
       for (int c = 0; c < columns_count; ++c) {
         Scalar* to = out.at(c, b * block_size);
         for (int i = 0; i < 3; ++i) {
-          const Scalar* from = &jets[at((c * 3 + i) * block_size)];
+          const Scalar* from = &jets[(c * 3 + i) * block_size];
           const Scalar constant = c < 4 ? affine[3 * c + i] : Scalar(0);
           for (Index p = 0; p < valid; ++p) {
             Scalar value = from[p] + constant;
@@ -163,13 +161,13 @@ void RadialEvaluator<Scalar>::pull_back(JetView<const Scalar> cotangents, RowMat
   // A fixed number of partial sums: the result does not depend on the number of threads.
   constexpr Index tasks = 4;
   const Index per_task = (blocks() + tasks - 1) / tasks;
-  std::vector<std::vector<Scalar>> sums(at(tasks));
-  std::vector<RowMatrix<double>> affine(at(tasks), RowMatrix<double>::Zero(4, 3));
+  std::vector<std::vector<Scalar>> sums(tasks);
+  std::vector<RowMatrix<double>> affine(tasks, RowMatrix<double>::Zero(4, 3));
   parallel_for(0, tasks, 1, [&](Index first, Index last) {
     std::array<Scalar, 10 * 3 * block_size> packed;
     for (Index task = first; task < last; ++task) {
-      auto& sum = sums[at(task)];
-      sum.assign(at(center_count_ * 3 * radial_lanes), Scalar(0));
+      auto& sum = sums[task];
+      sum.assign(center_count_ * 3 * radial_lanes, Scalar(0));
       for (Index b = task * per_task; b < std::min((task + 1) * per_task, blocks()); ++b) {
         const RadialBlock<Scalar> here = block(b);
         const Index valid = std::min(block_size, count_ - b * block_size);
@@ -179,11 +177,11 @@ void RadialEvaluator<Scalar>::pull_back(JetView<const Scalar> cotangents, RowMat
           for (Index p = 0; p < valid; ++p)
             for (int i = 0; i < 3; ++i) {
               const Scalar x = from[3 * p + i];
-              packed[at((c * 3 + i) * block_size + p)] = x;
-              if (c < 4) affine[at(task)](c, i) += static_cast<double>(x);
+              packed[(c * 3 + i) * block_size + p] = x;
+              if (c < 4) affine[task](c, i) += static_cast<double>(x);
               if (c == 0)
                 for (int k = 0; k < 3; ++k)
-                  affine[at(task)](1 + k, i) += static_cast<double>(x * here.points[k * block_size + p]);
+                  affine[task](1 + k, i) += static_cast<double>(x * here.points[k * block_size + p]);
             }
         }
         ARAPFIELDS_DISPATCH(radial_backward(here, packed.data(), columns_count, sum.data()));
@@ -193,8 +191,8 @@ void RadialEvaluator<Scalar>::pull_back(JetView<const Scalar> cotangents, RowMat
   for (Index task = 0; task < tasks; ++task) {
     for (Index j = 0; j < center_count_ * 3; ++j)
       for (int lane = 0; lane < radial_lanes; ++lane)
-        gradient.data()[j] += static_cast<double>(sums[at(task)][at(j * radial_lanes + lane)]);
-    gradient.bottomRows<4>() += affine[at(task)];
+        gradient.data()[j] += static_cast<double>(sums[task][j * radial_lanes + lane]);
+    gradient.bottomRows<4>() += affine[task];
   }
 }
 
@@ -204,13 +202,13 @@ RowMatrix<double> radial_rows(const RadialBasis& basis, PointsIn points, JetOrde
   const int columns_count = columns(order);
   RowMatrix<double> result = RowMatrix<double>::Zero(columns_count * count, basis.size());
   sites.for_blocks([&](Index b, const RadialBlock<double>& here) {
-    std::vector<double> values(at(here.active_count * columns_count * block_size));
+    std::vector<double> values(here.active_count * columns_count * block_size);
     ARAPFIELDS_DISPATCH(radial_rows(here, columns_count, values.data()));
     for (Index p = 0; p < std::min(block_size, count - b * block_size); ++p) {
       for (int c = 0; c < columns_count; ++c) {
         auto row = result.row(c * count + b * block_size + p);
         for (Index a = 0; a < here.active_count; ++a)
-          row[here.active[a]] = values[at((a * columns_count + c) * block_size + p)];
+          row[here.active[a]] = values[(a * columns_count + c) * block_size + p];
         if (c < 4) row[centers + c] = 1.0;
         if (c == 0)
           for (int k = 0; k < 3; ++k) row[centers + 1 + k] = here.points[k * block_size + p];

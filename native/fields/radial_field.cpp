@@ -45,8 +45,7 @@ void RadialField::evaluate(PointsIn points, JetView<double> out) const {
   RadialEvaluator<double>(basis_, near, out.order).evaluate(coefficients_, sorted.view());
   parallel_for(0, points.rows(), 1024, [&](Index first, Index last) {
     for (int c = 0; c < columns(out.order); ++c)
-      for (Index i = first; i < last; ++i)
-        std::copy_n(sorted.view().at(c, i), 3, out.at(c, order[static_cast<std::size_t>(i)]));
+      for (Index i = first; i < last; ++i) std::copy_n(sorted.view().at(c, i), 3, out.at(c, order[i]));
   });
   if (influence_) influence_->confine(points, out);
 }

@@ -12,8 +12,7 @@ TrackedPoints::TrackedPoints(const RadialBasis& basis, const Frame& frame, Point
   if (mesh_points.rows() == 0) return;
   order_ = morton_order(mesh_points);
   Points sorted(mesh_points.rows(), 3);
-  for (Index i = 0; i < sorted.rows(); ++i)
-    sorted.row(i) = mesh_points.row(order_[static_cast<std::size_t>(i)]);
+  for (Index i = 0; i < sorted.rows(); ++i) sorted.row(i) = mesh_points.row(order_[i]);
   evaluator_ = RadialEvaluator<float>(basis, frame.to_cube(sorted), JetOrder::value);
 }
 
@@ -30,8 +29,7 @@ PointsF TrackedPoints::moved(const RowMatrix<double>& coefficients) const {
   evaluator_.evaluate(coefficients, {sorted.data(), size(), JetOrder::value});
   const Eigen::RowVector3d center = frame_.center.transpose();
   for (Index i = 0; i < size(); ++i)
-    result.row(order_[static_cast<std::size_t>(i)]) =
-        (frame_.scale * sorted.row(i).cast<double>() + center).cast<float>();
+    result.row(order_[i]) = (frame_.scale * sorted.row(i).cast<double>() + center).cast<float>();
   for (Index i = 0; i < shares_.size(); ++i)
     if (shares_[i] < 1.0)
       result.row(i) =

@@ -59,7 +59,7 @@ class FieldArrays {
     Vector &placements = doubles_.emplace_back(16 * count), &motions = doubles_.emplace_back(16 * count),
            &margins = doubles_.emplace_back(count);
     for (Index i = 0; i < count; ++i) {
-      const RigidRegion& region = blend.regions()[static_cast<std::size_t>(i)];
+      const RigidRegion& region = blend.regions()[i];
       placements.segment<16>(16 * i) = region.placement.reshaped<Eigen::RowMajor>();
       motions.segment<16>(16 * i) = region.motion.reshaped<Eigen::RowMajor>();
       margins[i] = region.margin;
@@ -131,9 +131,9 @@ std::shared_ptr<const HandleBlend> read_handles(ArchiveReader& file, const std::
   const Vector placements = file.doubles(prefix + "placements", {count, 4, 4});
   const Vector motions = file.doubles(prefix + "motions", {count, 4, 4});
   const Vector margins = file.doubles(prefix + "margins", {count});
-  std::vector<RigidRegion> regions(static_cast<std::size_t>(count));
+  std::vector<RigidRegion> regions(count);
   for (Index i = 0; i < count; ++i) {
-    RigidRegion& region = regions[static_cast<std::size_t>(i)];
+    RigidRegion& region = regions[i];
     region.placement = placements.segment<16>(16 * i).reshaped<Eigen::RowMajor>(4, 4);
     region.motion = motions.segment<16>(16 * i).reshaped<Eigen::RowMajor>(4, 4);
     region.margin = margins[i];

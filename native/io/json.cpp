@@ -76,7 +76,7 @@ Vec3 JsonObject::triple(const char* member) const {
   require(value.is_array() && value.size() == 3, name(member), "not a list of three",
           "three numbers are needed");
   Vec3 result;
-  for (int k = 0; k < 3; ++k) result[k] = number_of(value[static_cast<std::size_t>(k)], name(member));
+  for (int k = 0; k < 3; ++k) result[k] = number_of(value[k], name(member));
   return result;
 }
 

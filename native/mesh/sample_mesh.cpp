@@ -38,7 +38,7 @@ Vector at_draws(const Vector& painted, const Triangles& triangles,
   if (painted.size() == 0 || (painted.array() == 1.0).all()) return {};
   Vector result(static_cast<Index>(draws.size()));
   for (Index i = 0; i < result.size(); ++i) {
-    const AreaSampler::Draw& draw = draws[static_cast<std::size_t>(i)];
+    const AreaSampler::Draw& draw = draws[i];
     double sum = 0.0;
     for (int k = 0; k < 3; ++k) sum += draw.corners[k] * painted[triangles(draw.triangle, k)];
     result[i] = sum;
@@ -56,21 +56,20 @@ SurfaceSamples draw_from(Joined joined, Index count, std::uint64_t seed) {
   samples.normals.resize(count, 3);
   const bool several = !joined.ends.empty();
   const bool painted = joined.painted.weights.size() > 0 || joined.painted.bend_weights.size() > 0;
-  std::vector<AreaSampler::Draw> draws(static_cast<std::size_t>(several || painted ? count : 0));
+  std::vector<AreaSampler::Draw> draws(several || painted ? count : 0);
   parallel_for(0, count, grain, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       Random random(seed, static_cast<std::uint64_t>(i));
       const AreaSampler::Draw draw = sampler.draw(random);
       samples.points.row(i) = draw.point.transpose();
       samples.normals.row(i) = sampler.unit_normal(draw.triangle).transpose();
-      if (!draws.empty()) draws[static_cast<std::size_t>(i)] = draw;
+      if (!draws.empty()) draws[i] = draw;
     }
   });
   samples.weights = at_draws(joined.painted.weights, joined.triangles, draws);
   samples.bend_weights = at_draws(joined.painted.bend_weights, joined.triangles, draws);
   for (Index i = 0; i < count && several; ++i) {
-    const auto found =
-        std::upper_bound(joined.ends.begin(), joined.ends.end(), draws[static_cast<std::size_t>(i)].triangle);
+    const auto found = std::upper_bound(joined.ends.begin(), joined.ends.end(), draws[i].triangle);
     samples.mesh_indices.push_back(static_cast<std::int32_t>(found - joined.ends.begin()));
   }
   samples.redraw = [kept = std::make_shared<const Joined>(std::move(joined))](
@@ -83,13 +82,13 @@ SurfaceSamples draw_from(Joined joined, Index count, std::uint64_t seed) {
 AreaSampler::AreaSampler(PointsIn vertices, TrianglesIn triangles)
     : vertices_(vertices), triangles_(triangles) {
   validate(vertices_, triangles_);
-  cumulative_.resize(static_cast<std::size_t>(triangles_.rows()));
+  cumulative_.resize(triangles_.rows());
   double total = 0.0;
   for (Index t = 0; t < triangles_.rows(); ++t) {
     const Vec3 a = corner(vertices_, triangles_, t, 0);
     total +=
         0.5 * (corner(vertices_, triangles_, t, 1) - a).cross(corner(vertices_, triangles_, t, 2) - a).norm();
-    cumulative_[static_cast<std::size_t>(t)] = total;
+    cumulative_[t] = total;
   }
   require(std::isfinite(total) && total > 0.0, "triangles", "their total area is " + std::to_string(total),
           "points can be drawn only from a finite area above zero");

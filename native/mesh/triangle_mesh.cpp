@@ -32,13 +32,13 @@ void validate(PointsIn vertices, TrianglesIn triangles) {
 }
 
 Points used_vertices(PointsIn vertices, TrianglesIn triangles) {
-  std::vector<char> used(static_cast<std::size_t>(vertices.rows()), 0);
+  std::vector<char> used(vertices.rows(), 0);
   for (Index t = 0; t < triangles.rows(); ++t)
-    for (int k = 0; k < 3; ++k) used[static_cast<std::size_t>(triangles(t, k))] = 1;
+    for (int k = 0; k < 3; ++k) used[triangles(t, k)] = 1;
   Points result(vertices.rows(), 3);
   Index count = 0;
   for (Index i = 0; i < vertices.rows(); ++i)
-    if (used[static_cast<std::size_t>(i)]) result.row(count++) = vertices.row(i);
+    if (used[i]) result.row(count++) = vertices.row(i);
   result.conservativeResize(count, 3);
   return result;
 }

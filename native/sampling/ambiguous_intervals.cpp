@@ -45,7 +45,7 @@ Verdict judge(const TricubicSurrogate& model, const Line& line, Piece& piece, do
     const Index cell = model.cell(model.position(x[0]), model.position(x[1]), model.position(x[2]));
     known = model.side(cell) == 0;
     if (!known) break;
-    q[static_cast<std::size_t>(i)] = model(x);
+    q[i] = model(x);
     slope_error = std::max<double>(slope_error, model.slope_error(cell));
   }
   piece.split = 0.5 * (piece.low + piece.high);
@@ -53,7 +53,7 @@ Verdict judge(const TricubicSurrogate& model, const Line& line, Piece& piece, do
   const double ra = fa - q.front(), rb = fb - q.back();
   for (int i = 0; i < probes; ++i) {
     const double w = static_cast<double>(i) / (probes - 1);
-    q[static_cast<std::size_t>(i)] += (1.0 - w) * ra + w * rb;
+    q[i] += (1.0 - w) * ra + w * rb;
   }
   const double step = length / (probes - 1);
   double least = std::abs(q[0]), bend = 0.0, shallowest = std::abs(q[1] - q[0]) / step;
@@ -66,8 +66,7 @@ Verdict judge(const TricubicSurrogate& model, const Line& line, Piece& piece, do
     monotone = monotone && (q[i + 1] > q[i]) == (q[1] > q[0]);
     if ((q[i] < 0.0) != (q[i + 1] < 0.0)) pass = static_cast<int>(i);
     if (i > 0) bend = std::max(bend, std::abs(q[i + 1] - 2.0 * q[i] + q[i - 1]) / step);
-    if (i > 0 && std::abs(q[i]) < std::abs(q[static_cast<std::size_t>(nearest)]))
-      nearest = static_cast<int>(i);
+    if (i > 0 && std::abs(q[i]) < std::abs(q[nearest])) nearest = static_cast<int>(i);
   }
   // How far the residual and its slope may be from their chord: by its slope alone, or by its curvature.
   const double bow = curvature_factor * length / model.spacing();
@@ -75,7 +74,7 @@ Verdict judge(const TricubicSurrogate& model, const Line& line, Piece& piece, do
   const double slope_deviation = slope_error * std::min(2.0, 0.5 * bow);
   if (same_sign && !passes && least - 0.25 * bend * step > deviation) return Verdict::none;
   if (pass >= 0) {
-    const double a = q[static_cast<std::size_t>(pass)], b = q[static_cast<std::size_t>(pass) + 1];
+    const double a = q[pass], b = q[pass + 1];
     const double root = piece.low + step * (pass + (a == b ? 0.5 : a / (a - b)));
     if (passes) {
       bracket.guess = std::clamp(root, piece.low, piece.high);
@@ -94,8 +93,8 @@ VectorF ask(EvaluationCounter& function, const std::vector<Line>& lines, const s
             double Piece::* where) {
   PointsF points(static_cast<Index>(pieces.size()), 3);
   for (Index row = 0; row < points.rows(); ++row) {
-    const Piece& piece = pieces[static_cast<std::size_t>(row)];
-    points.row(row) = lines[static_cast<std::size_t>(piece.line)].at(piece.*where).cast<float>();
+    const Piece& piece = pieces[row];
+    points.row(row) = lines[piece.line].at(piece.*where).cast<float>();
   }
   return function.values(points);
 }
@@ -111,8 +110,8 @@ std::vector<Bracket> resolve_ambiguous(EvaluationCounter& function, const Tricub
   const VectorF low = ask(function, lines, pieces, &Piece::low);
   const VectorF high = ask(function, lines, pieces, &Piece::high);
   for (std::size_t i = 0; i < pieces.size(); ++i) {
-    pieces[i].low_value = low[static_cast<Index>(i)];
-    pieces[i].high_value = high[static_cast<Index>(i)];
+    pieces[i].low_value = low[i];
+    pieces[i].high_value = high[i];
   }
   std::vector<Bracket> found;
   while (!pieces.empty()) {
@@ -120,9 +119,8 @@ std::vector<Bracket> resolve_ambiguous(EvaluationCounter& function, const Tricub
     std::vector<Verdict> verdicts(pieces.size());
     std::vector<Bracket> brackets(pieces.size());
     parallel_for(0, count, 64, [&](Index begin, Index end) {
-      for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i)
-        verdicts[i] =
-            judge(model, lines[static_cast<std::size_t>(pieces[i].line)], pieces[i], finest, brackets[i]);
+      for (Index i = begin; i < end; ++i)
+        verdicts[i] = judge(model, lines[pieces[i].line], pieces[i], finest, brackets[i]);
     });
     std::vector<Piece> open;
     for (std::size_t i = 0; i < pieces.size(); ++i) {
@@ -133,7 +131,7 @@ std::vector<Bracket> resolve_ambiguous(EvaluationCounter& function, const Tricub
     pieces.clear();
     for (std::size_t i = 0; i < open.size(); ++i) {
       const Piece& p = open[i];
-      const double value = values[static_cast<Index>(i)];
+      const double value = values[i];
       pieces.push_back({p.line, p.low, p.split, p.low_value, value});
       pieces.push_back({p.line, p.split, p.high, value, p.high_value});
     }

@@ -31,8 +31,7 @@ std::vector<std::uint32_t> canonical_order(PointsIn points) {
 std::vector<Index> evenly(const std::vector<std::uint32_t>& list, Index count) {
   const Index n = static_cast<Index>(list.size()), taken = std::min(n, count);
   std::vector<Index> result;
-  for (Index i = 0; i < taken; ++i)
-    result.push_back(list[static_cast<std::size_t>((2 * i + 1) * n / (2 * taken))]);
+  for (Index i = 0; i < taken; ++i) result.push_back(list[(2 * i + 1) * n / (2 * taken)]);
   return result;
 }
 

@@ -76,28 +76,26 @@ Crossings find_crossings(EvaluationCounter& function, const std::vector<Line>& l
                  .slope = b.slope,
                  .old_width = b.high - b.low};
   }
-  const auto line_of = [&](const Search& s) -> const Line& {
-    return lines[static_cast<std::size_t>(brackets[static_cast<std::size_t>(s.bracket)].line)];
-  };
+  const auto line_of = [&](const Search& s) -> const Line& { return lines[brackets[s.bracket].line]; };
   for (int round = 0; round < max_rounds && !active.empty(); ++round) {
     const auto plain_end =
         std::stable_partition(active.begin(), active.end(), [](const Search& s) { return !s.final; });
     const auto plain = static_cast<Index>(plain_end - active.begin());
     PointsF batch(static_cast<Index>(active.size()), 3), slopes;
     for (Index row = 0; row < batch.rows(); ++row) {
-      const Search& s = active[static_cast<std::size_t>(row)];
+      const Search& s = active[row];
       batch.row(row) = line_of(s).at(s.t).cast<float>();
     }
     const VectorF values = function.values(batch.topRows(plain));
     const VectorF ends = function.values(batch.bottomRows(batch.rows() - plain), slopes);
     for (Index row = 0; row < batch.rows(); ++row) {
-      Search& s = active[static_cast<std::size_t>(row)];
+      Search& s = active[row];
       if (row < plain) {
         s.value_seen(values[row], tolerance);
         continue;
       }
       const double value = ends[row - plain];
-      double& least = best[static_cast<std::size_t>(s.bracket)];
+      double& least = best[s.bracket];
       if (std::abs(value) < least) {
         least = std::abs(value);
         points.row(s.bracket) = batch.row(row);
@@ -109,15 +107,15 @@ Crossings find_crossings(EvaluationCounter& function, const std::vector<Line>& l
   }
   Crossings result;
   for (Index i = 0; i < total; ++i) {
-    const double value = best[static_cast<std::size_t>(i)];
+    const double value = best[i];
     (value <= accepted ? result.bracket : result.failed).push_back(i);
     if (value <= accepted) result.largest = std::max(result.largest, value);
   }
-  result.points.resize(static_cast<Index>(result.bracket.size()), 3);
+  result.points.resize(result.bracket.size(), 3);
   result.gradients.resize(result.points.rows(), 3);
   for (Index row = 0; row < result.points.rows(); ++row) {
-    result.points.row(row) = points.row(result.bracket[static_cast<std::size_t>(row)]);
-    result.gradients.row(row) = gradients.row(result.bracket[static_cast<std::size_t>(row)]);
+    result.points.row(row) = points.row(result.bracket[row]);
+    result.gradients.row(row) = gradients.row(result.bracket[row]);
   }
   return result;
 }

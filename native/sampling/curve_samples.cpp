@@ -18,13 +18,13 @@ CurveSamples sample_curve(Points2In vertices, Index count, bool closed) {
   require_memory("count", 4.0 * sizeof(double) * static_cast<double>(count));
 
   const Index edges = closed ? vertices.rows() : vertices.rows() - 1;
-  std::vector<double> ends(static_cast<std::size_t>(edges));
+  std::vector<double> ends(edges);
   double length = 0.0, twice_area = 0.0;
   for (Index e = 0; e < edges; ++e) {
     const Vec2 a = vertices.row(e), b = vertices.row((e + 1) % vertices.rows());
     length += (b - a).norm();
     twice_area += a.x() * b.y() - a.y() * b.x();
-    ends[static_cast<std::size_t>(e)] = length;
+    ends[e] = length;
   }
   require(length > 0, "vertices", "all are the same point", "a curve has a length");
   require(std::isfinite(length), "vertices", "their distances are too large for floating point",
@@ -36,11 +36,11 @@ CurveSamples sample_curve(Points2In vertices, Index count, bool closed) {
   Index e = 0;
   for (Index s = 0; s < count; ++s) {
     const double at = length * (static_cast<double>(s) + 0.5) / static_cast<double>(count);
-    while (e + 1 < edges && ends[static_cast<std::size_t>(e)] < at) ++e;
+    while (e + 1 < edges && ends[e] < at) ++e;
     const Vec2 a = vertices.row(e), b = vertices.row((e + 1) % vertices.rows());
     const double edge = (b - a).norm();
     const Vec2 direction = (b - a) / edge;
-    samples.points.row(s) = b - (ends[static_cast<std::size_t>(e)] - at) * direction;
+    samples.points.row(s) = b - (ends[e] - at) * direction;
     samples.normals.row(s) = side * Vec2(direction.y(), -direction.x());
   }
   return samples;

@@ -70,7 +70,7 @@ LocalThickness::LocalThickness(PointsIn samples, PointsIn normals, const std::ve
   });
   std::vector<double> sorted(values_.begin(), values_.end());
   std::nth_element(sorted.begin(), sorted.begin() + n / 2, sorted.end());
-  median_ = sorted[static_cast<std::size_t>(n / 2)];
+  median_ = sorted[n / 2];
 }
 
 Vector LocalThickness::at(PointsIn points) const {

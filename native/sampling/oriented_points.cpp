@@ -18,15 +18,15 @@ constexpr std::size_t deepest = 64;
 }  // namespace
 
 OrientedPoints::OrientedPoints(PointsIn points, PointsIn normals) : points_(points), normals_(normals) {
-  rows_.resize(static_cast<std::size_t>(points.rows()));
+  rows_.resize(points.rows());
   std::iota(rows_.begin(), rows_.end(), Index{0});
   std::size_t nodes = 1;
   for (Index count = points.rows(); count > leaf; count = (count + 1) / 2) nodes = 2 * nodes + 1;
   nodes_.resize(nodes);
   build(0, 0, points.rows());
   for (std::size_t i = 0; i < rows_.size(); ++i) {
-    points_.row(static_cast<Index>(i)) = points.row(rows_[i]);
-    normals_.row(static_cast<Index>(i)) = normals.row(rows_[i]);
+    points_.row(i) = points.row(rows_[i]);
+    normals_.row(i) = normals.row(rows_[i]);
   }
 }
 
@@ -34,9 +34,9 @@ void OrientedPoints::build(std::size_t node, Index begin, Index end) {
   nodes_[node].begin = begin;
   nodes_[node].end = end;
   if (end - begin <= leaf || 2 * node + 2 >= nodes_.size()) return;
-  Vec3 low = points_.row(rows_[static_cast<std::size_t>(begin)]), high = low;
+  Vec3 low = points_.row(rows_[begin]), high = low;
   for (Index i = begin; i < end; ++i) {
-    const Vec3 p = points_.row(rows_[static_cast<std::size_t>(i)]);
+    const Vec3 p = points_.row(rows_[i]);
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
   }
@@ -47,7 +47,7 @@ void OrientedPoints::build(std::size_t node, Index begin, Index end) {
     return points_(a, axis) != points_(b, axis) ? points_(a, axis) < points_(b, axis) : a < b;
   });
   nodes_[node].axis = static_cast<int>(axis);
-  nodes_[node].split = points_(rows_[static_cast<std::size_t>(middle)], axis);
+  nodes_[node].split = points_(rows_[middle], axis);
   build(2 * node + 1, begin, middle);
   build(2 * node + 2, middle, end);
 }
@@ -77,7 +77,7 @@ void OrientedPoints::search(const Vec3& place, double& square, Visit&& visit) co
 }
 
 std::vector<Index> OrientedPoints::nearest(PointsIn others, PointsIn normals, double turn) const {
-  std::vector<Index> result(static_cast<std::size_t>(others.rows()));
+  std::vector<Index> result(others.rows());
   parallel_for(0, others.rows(), grain, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       const Vec3 place = others.row(i), normal = normals.row(i);
@@ -86,12 +86,12 @@ std::vector<Index> OrientedPoints::nearest(PointsIn others, PointsIn normals, do
       search(place, best, [&](Index k) {
         const double square = (points_.row(k).transpose() - place).squaredNorm() +
                               turn * turn * (normals_.row(k).transpose() - normal).squaredNorm();
-        if (square < best || (square == best && rows_[static_cast<std::size_t>(k)] < found)) {
+        if (square < best || (square == best && rows_[k] < found)) {
           best = square;
-          found = rows_[static_cast<std::size_t>(k)];
+          found = rows_[k];
         }
       });
-      result[static_cast<std::size_t>(i)] = found;
+      result[i] = found;
     }
   });
   return result;
@@ -101,8 +101,7 @@ std::vector<Index> OrientedPoints::within(const Vec3& place, double distance) co
   std::vector<Index> result;
   double square = distance * distance;
   search(place, square, [&](Index k) {
-    if ((points_.row(k).transpose() - place).squaredNorm() <= square)
-      result.push_back(rows_[static_cast<std::size_t>(k)]);
+    if ((points_.row(k).transpose() - place).squaredNorm() <= square) result.push_back(rows_[k]);
   });
   return result;
 }

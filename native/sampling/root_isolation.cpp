@@ -182,14 +182,13 @@ void scan(const TricubicSurrogate& model, const Line& line, Index index, Run& ru
 ScanResult scan_lines(const TricubicSurrogate& model, const std::vector<Line>& lines) {
   const auto count = static_cast<Index>(lines.size());
   const Index chunks = (count + lines_per_chunk - 1) / lines_per_chunk;
-  std::vector<ScanResult> parts(static_cast<std::size_t>(chunks));
+  std::vector<ScanResult> parts(chunks);
   parallel_for(0, chunks, 1, [&](Index begin, Index end) {
     Run run;
     std::vector<Kind> kinds;
     for (Index chunk = begin; chunk < end; ++chunk)
       for (Index i = chunk * lines_per_chunk; i < std::min(count, (chunk + 1) * lines_per_chunk); ++i)
-        scan(model, lines[static_cast<std::size_t>(i)], i, run, kinds,
-             parts[static_cast<std::size_t>(chunk)]);
+        scan(model, lines[i], i, run, kinds, parts[chunk]);
   });
   ScanResult result;
   for (const ScanResult& part : parts) {

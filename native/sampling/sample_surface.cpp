@@ -31,7 +31,7 @@ class Caster {
 
   /// Brackets of `count` further lines, appended to `brackets`.
   void cast(Index count) {
-    std::vector<Line> fresh(static_cast<std::size_t>(count));
+    std::vector<Line> fresh(count);
     for (Line& line : fresh) {
       Random random(seed_, static_cast<std::uint64_t>(cast_++));
       line = random_line(box_, random);
@@ -44,7 +44,7 @@ class Caster {
     });
     Index before = -1;
     for (Bracket each : found.brackets) {
-      if (each.line != before) lines.push_back(fresh[static_cast<std::size_t>(each.line)]);
+      if (each.line != before) lines.push_back(fresh[each.line]);
       before = each.line;
       each.line = static_cast<Index>(lines.size()) - 1;
       brackets.push_back(each);
@@ -78,8 +78,7 @@ class Caster {
 
 void shuffle(std::vector<Bracket>& items, std::size_t begin, Random& random) {
   for (std::size_t i = begin; i + 1 < items.size(); ++i)
-    std::swap(items[i],
-              items[i + static_cast<std::size_t>(random.below(static_cast<Index>(items.size() - i)))]);
+    std::swap(items[i], items[i + random.below(items.size() - i)]);
 }
 
 }  // namespace

@@ -31,8 +31,8 @@ SurfaceSamples with_weights(const SurfaceSamples& samples, const Vector& weights
     drawn.bend_weights.resize(b.size() > 0 ? count : 0);
     const std::vector<std::int32_t> places = nearest->closest(drawn.points).triangles;
     for (Index i = 0; i < count; ++i) {
-      if (w.size() > 0) drawn.weights[i] = w[places[static_cast<std::size_t>(i)]];
-      if (b.size() > 0) drawn.bend_weights[i] = b[places[static_cast<std::size_t>(i)]];
+      if (w.size() > 0) drawn.weights[i] = w[places[i]];
+      if (b.size() > 0) drawn.bend_weights[i] = b[places[i]];
     }
     return drawn;
   };

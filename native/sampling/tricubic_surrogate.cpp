@@ -100,13 +100,13 @@ float TricubicSurrogate::operator()(const Vec3& point) const {
 /// does not exclude a zero.
 void TricubicSurrogate::cull(EvaluationCounter& function, const TricubicSurrogateOptions& options) {
   resolution_ = options.coarsest;
-  side_.assign(static_cast<std::size_t>(resolution_) * resolution_ * resolution_, 0);
+  side_.assign(Index{resolution_} * resolution_ * resolution_, 0);
   active_.resize(side_.size());
   for (std::size_t i = 0; i < active_.size(); ++i) active_[i] = static_cast<Index>(i);
   for (;;) {
     PointsF centres(static_cast<Index>(active_.size()), 3);
     for (Index row = 0; row < centres.rows(); ++row) {
-      const auto place = coordinates(active_[static_cast<std::size_t>(row)]);
+      const auto place = coordinates(active_[row]);
       for (int axis = 0; axis < 3; ++axis)
         centres(row, axis) = static_cast<float>((place[axis] + 0.5) * spacing() - 1.0);
     }
@@ -115,15 +115,15 @@ void TricubicSurrogate::cull(EvaluationCounter& function, const TricubicSurrogat
     Index kept = 0;
     centre_values_.resize(values.size());
     for (Index row = 0; row < values.size(); ++row) {
-      const Index each = active_[static_cast<std::size_t>(row)];
+      const Index each = active_[row];
       if (std::abs(values[row]) > reach) {
-        side_[static_cast<std::size_t>(each)] = values[row] > 0.0f ? 1 : -1;
+        side_[each] = values[row] > 0.0f ? 1 : -1;
       } else {
         centre_values_[kept] = values[row];
-        active_[static_cast<std::size_t>(kept++)] = each;
+        active_[kept++] = each;
       }
     }
-    active_.resize(static_cast<std::size_t>(kept));
+    active_.resize(kept);
     centre_values_.conservativeResize(kept);
     if (kept == 0 || kept >= options.wanted_cells || 2 * resolution_ > options.max_resolution) return;
 
@@ -135,7 +135,7 @@ void TricubicSurrogate::cull(EvaluationCounter& function, const TricubicSurrogat
       for (int j = 0; j < fine; ++j)
         for (int k = 0; k < fine; ++k, ++child) {
           const int parent = side(cell(i / 2, j / 2, k / 2));
-          inherited[static_cast<std::size_t>(child)] = static_cast<std::int8_t>(parent);
+          inherited[child] = static_cast<std::int8_t>(parent);
           if (parent == 0) active_.push_back(child);
         }
     side_ = std::move(inherited);
@@ -147,7 +147,7 @@ void TricubicSurrogate::cull(EvaluationCounter& function, const TricubicSurrogat
 /// where two neighbouring values differ by more than it allows.
 bool TricubicSurrogate::fill(EvaluationCounter& function) {
   const Index points = resolution_ + 1;
-  const std::size_t total = static_cast<std::size_t>(points * points * points);
+  const std::size_t total = points * points * points;
   std::vector<std::uint8_t> needed(total, 0);
   for (const Index each : active_) {
     const auto place = coordinates(each);
@@ -162,19 +162,18 @@ bool TricubicSurrogate::fill(EvaluationCounter& function) {
     if (needed[i]) list.push_back(static_cast<Index>(i));
   PointsF corners(static_cast<Index>(list.size()), 3);
   for (Index row = 0; row < corners.rows(); ++row) {
-    const Index each = list[static_cast<std::size_t>(row)];
+    const Index each = list[row];
     corners.row(row) << static_cast<float>(each / (points * points) * spacing() - 1.0),
         static_cast<float>(each / points % points * spacing() - 1.0),
         static_cast<float>(each % points * spacing() - 1.0);
   }
   const VectorF values = function.values(corners);
   values_.assign(total, std::numeric_limits<float>::quiet_NaN());
-  for (std::size_t i = 0; i < list.size(); ++i)
-    values_[static_cast<std::size_t>(list[i])] = values[static_cast<Index>(i)];
+  for (std::size_t i = 0; i < list.size(); ++i) values_[list[i]] = values[i];
 
   float steepest = 0.0f;
   for (const Index each : list) {
-    const auto at = [&](Index offset) { return values_[static_cast<std::size_t>(each + offset)]; };
+    const auto at = [&](Index offset) { return values_[each + offset]; };
     // A comparison with NaN, a point that was not needed, is false and leaves `steepest` alone.
     if (each % points + 1 < points) steepest = std::max(steepest, std::abs(at(1) - at(0)));
     if (each / points % points + 1 < points) steepest = std::max(steepest, std::abs(at(points) - at(0)));
@@ -194,12 +193,12 @@ int TricubicSurrogate::settled_sign(Index cell, const Vec3& point) const {
     const bool kept = std::abs(value) > lipschitz_ * spacing() * (within - from).norm();
     return !kept ? 0 : value < 0.0f ? -1 : 1;
   };
-  int found = sign(centre_[static_cast<std::size_t>(cell)], Vec3::Constant(0.5));
+  int found = sign(centre_[cell], Vec3::Constant(0.5));
   const Index points = resolution_ + 1;
   for (int c = 0; c < 8 && found == 0; ++c) {
     const int i = c >> 2, j = (c >> 1) & 1, k = c & 1;
     const Index at = ((place[0] + i) * points + place[1] + j) * points + place[2] + k;
-    found = sign(values_[static_cast<std::size_t>(at)], Vec3(i, j, k));
+    found = sign(values_[at], Vec3(i, j, k));
   }
   return found;
 }
@@ -212,8 +211,8 @@ void TricubicSurrogate::measure_errors() {
   VectorF residual(count), rough(count);
   parallel_for(0, count, 512, [&](Index begin, Index end) {
     for (Index row = begin; row < end; ++row) {
-      const auto place = coordinates(active_[static_cast<std::size_t>(row)]);
-      const CubicBlock nodes = block(active_[static_cast<std::size_t>(row)]);
+      const auto place = coordinates(active_[row]);
+      const CubicBlock nodes = block(active_[row]);
       float u[3];
       for (int axis = 0; axis < 3; ++axis)
         u[axis] = static_cast<float>(place[axis] - block_start(place[axis])) + 0.5f;
@@ -223,17 +222,16 @@ void TricubicSurrogate::measure_errors() {
   });
   for (Index row = 0; row < count; ++row) {
     const float bound = error_safety * residual[row];
-    const auto place = coordinates(active_[static_cast<std::size_t>(row)]);
-    centre_[static_cast<std::size_t>(active_[static_cast<std::size_t>(row)])] = centre_values_[row];
+    const auto place = coordinates(active_[row]);
+    centre_[active_[row]] = centre_values_[row];
     for (int i = std::max(place[0] - 1, 0); i <= std::min(place[0] + 1, resolution_ - 1); ++i)
       for (int j = std::max(place[1] - 1, 0); j <= std::min(place[1] + 1, resolution_ - 1); ++j)
         for (int k = std::max(place[2] - 1, 0); k <= std::min(place[2] + 1, resolution_ - 1); ++k) {
-          float& each = error_[static_cast<std::size_t>(cell(i, j, k))];
+          float& each = error_[cell(i, j, k)];
           each = std::max(each, bound);
         }
   }
-  for (Index row = 0; row < count; ++row)
-    error_[static_cast<std::size_t>(active_[static_cast<std::size_t>(row)])] += rough[row];
+  for (Index row = 0; row < count; ++row) error_[active_[row]] += rough[row];
 }
 
 }  // namespace arapfields

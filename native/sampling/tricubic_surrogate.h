@@ -43,9 +43,9 @@ class TricubicSurrogate {
   /// The cell's position along an axis of a coordinate in [-1,1].
   int position(double x) const;
   /// +1 or −1 where Φ keeps that sign in all of the cell, 0 in the cells of active().
-  int side(Index cell) const { return side_[static_cast<std::size_t>(cell)]; }
+  int side(Index cell) const { return side_[cell]; }
   /// Bounds in an active cell on |Φ − p| and on |∇(Φ − p)|.
-  float error(Index cell) const { return error_[static_cast<std::size_t>(cell)]; }
+  float error(Index cell) const { return error_[cell]; }
   float slope_error(Index cell) const { return slope_error_of(error(cell)); }
   /// The latter from the former.
   float slope_error_of(float error) const;
