@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Objects whose types Python's checkers shall see where pybind11 alone would say object.
+// Argument and result types that Python's type checkers see, where pybind11 alone would say object.
 #pragma once
 
 #include <pybind11/pybind11.h>

@@ -11,11 +11,12 @@ std::string shape_text(const py::array& array) {
          py::cast<std::string>(py::str(array.dtype()));
 }
 
-/// What NumPy sees in the object: itself, memory shared by DLPack, or what it makes of it.
-py::object seen_by_numpy(py::object value) {
+/// The object as a NumPy array, by DLPack where it has that (no copy).
+py::object to_numpy(py::object value) {
   const py::module_ numpy = py::module_::import("numpy");
   if (!py::hasattr(value, "__dlpack__")) return numpy.attr("asarray")(value);
-  if (py::hasattr(value, "detach")) value = value.attr("detach")();  // tensors that want a gradient refuse
+  if (py::hasattr(value, "detach"))
+    value = value.attr("detach")();  // tensors that require a gradient refuse DLPack
   return numpy.attr("from_dlpack")(value);
 }
 
@@ -24,7 +25,7 @@ py::array as_array(const py::handle& value, const std::string& argument, const s
   py::array array;
   try {
     const auto given = py::reinterpret_borrow<py::object>(value);
-    array = py::isinstance<py::array>(value) ? py::array(given) : py::array(seen_by_numpy(given));
+    array = py::isinstance<py::array>(value) ? py::array(given) : py::array(to_numpy(given));
   } catch (const py::error_already_set& error) {
     if (!error.matches(PyExc_Exception)) throw;  // Ctrl-C
     throw InvalidInput(
@@ -32,8 +33,8 @@ py::array as_array(const py::handle& value, const std::string& argument, const s
         "got " + type_text(value) + ", of which NumPy says: " + py::cast<std::string>(py::str(error.value())),
         allowed);
   }
-  const std::string found = array.ndim() == 0 ? "got " + type_text(value) : shape_text(array);
-  require(kinds.find(array.dtype().kind()) != std::string::npos, argument, found, allowed);
+  const std::string received = array.ndim() == 0 ? "got " + type_text(value) : shape_text(array);
+  require(kinds.find(array.dtype().kind()) != std::string::npos, argument, received, allowed);
   return array;
 }
 
@@ -72,6 +73,16 @@ std::string as_text(const py::handle& value, const std::string& argument) {
 
 Points as_points(const py::handle& value, const std::string& argument) {
   return as_rows_of_three<Points, double>(value, argument, "fiu", "expected real numbers of shape (n, 3)");
+}
+
+Points as_finite_points(const py::handle& value, const std::string& argument) {
+  Points points = as_points(value, argument);
+  require(points.allFinite(), argument, "some coordinates are NaN or infinite", "all must be finite");
+  return points;
+}
+
+TriangleMesh as_mesh(const py::handle& vertices, const py::handle& triangles) {
+  return {as_points(vertices, "vertices"), as_triangles(triangles, "triangles")};
 }
 
 Triangles as_triangles(const py::handle& value, const std::string& argument) {
@@ -159,8 +170,8 @@ void for_each_item(const py::handle& value, const std::string& argument, const s
   if (PyErr_Occurred() != nullptr) throw py::error_already_set();
 }
 
-std::shared_ptr<py::object> kept_alive(py::object given) {
-  return {new py::object(std::move(given)), [](py::object* held) {
+std::shared_ptr<py::object> kept_alive(py::object object) {
+  return {new py::object(std::move(object)), [](py::object* held) {
             const py::gil_scoped_acquire acquire;
             delete held;
           }};

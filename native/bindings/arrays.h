@@ -1,21 +1,30 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Python's arrays, from wherever they come, as ours.
+// Conversion of Python's arrays and sequences.
 #pragma once
 
 #include <functional>
 #include <vector>
 
 #include "bindings/bind.h"
+#include "mesh/triangle_mesh.h"
 
 namespace arapfields::python {
 
-// NumPy arrays, what has the buffer protocol, DLPack (torch's tensors, also those that want a gradient) or
-// __array__, and nested sequences. Shapes and dtypes that do not fit raise InvalidInput naming `argument`, as
-// do arrays for which there is no memory; (real) integer and float dtypes are accepted for points, integers
-// alone for triangles and indices.
+// Accepted are NumPy arrays, objects with the buffer protocol, DLPack (torch tensors, also those that require
+// a gradient) or __array__, and nested sequences. Points take integer and float dtypes; triangles and indices
+// take integers alone. InvalidInput names `argument` for another shape or dtype, and where memory is short.
 Points as_points(const py::handle& value, const std::string& argument);
+/// The same, refusing NaN and infinity.
+Points as_finite_points(const py::handle& value, const std::string& argument);
+/// The arguments `vertices` and `triangles`, not yet validated.
+TriangleMesh as_mesh(const py::handle& vertices, const py::handle& triangles);
 Triangles as_triangles(const py::handle& value, const std::string& argument);
 Vector as_vector(const py::handle& value, const std::string& argument);
+/// The same; empty for an argument that was not given.
+template <class Argument>
+Vector as_vector(const std::optional<Argument>& value, const std::string& argument) {
+  return value ? as_vector(*value, argument) : Vector();
+}
 Mat4 as_matrix4(const py::handle& value, const std::string& argument);
 /// (3,3), orthogonal to 1e-4.
 Mat3 as_rotation(const py::handle& value, const std::string& argument);
@@ -47,7 +56,7 @@ std::vector<Item> as_items(const py::handle& value, const std::string& argument,
   return items;
 }
 
-/// `given`, kept alive for C++ that may let go of it on any thread.
-std::shared_ptr<py::object> kept_alive(py::object given);
+/// Shared ownership of a Python object; the last owner may be on any thread and takes the GIL to release it.
+std::shared_ptr<py::object> kept_alive(py::object object);
 
 }  // namespace arapfields::python

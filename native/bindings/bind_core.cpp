@@ -48,20 +48,20 @@ void bind_core(py::module_& module) {
   auto& invalid = py::register_exception<InvalidInput>(module, "InvalidInput", PyExc_ValueError);
   auto& cancelled = py::register_exception<Cancelled>(module, "Cancelled", PyExc_RuntimeError);
   auto& diverged = py::register_exception<Diverged>(module, "Diverged", PyExc_RuntimeError);
-  invalid.attr("__doc__") = "An argument that cannot be used; names it, what was found and what is allowed.";
+  invalid.attr("__doc__") = "An invalid argument: names it, the value received and the values allowed.";
   cancelled.attr("__doc__") = "Raised in the caller whose Task was cancelled.";
   diverged.attr("__doc__") =
-      "An optimization met NaN or infinity; names the stage and what to change.\n"
-      "Its attribute last_good is the field, or the fit, before that.";
+      "An optimization met NaN or infinity; names the stage and the option to change.\n"
+      "Its attribute last_good is the last field, or fit, with finite numbers.";
 
   py::register_exception_translator(&translate);
 
   py::class_<Task>(module, "Task", "Cancels a long call and reads its progress, from any thread.")
       .def(py::init<>())
-      .def("cancel", &Task::cancel, "Asks the running call to stop; its caller gets Cancelled within 0.2 s.")
+      .def("cancel", &Task::cancel, "Stops the running call, whose caller gets Cancelled within 0.2 s.")
       .def_property_readonly("cancelled", &Task::cancelled)
       .def_property_readonly("progress", &Task::progress, "Share of the work done, in [0, 1]; never falls.")
-      .def_property_readonly("message", &Task::message, "What is being done, in a few words.")
+      .def_property_readonly("message", &Task::message, "What the call is doing, in a few words.")
       .def("report", &Task::report, "fraction"_a, "message"_a = "",
            "Sets progress (kept if larger already) and message.")
       .def(
@@ -69,18 +69,18 @@ void bind_core(py::module_& module) {
           [](Task& self, const ArrayArgument& points, double seconds) {
             self.watch(as_points(points, "points"), seconds);
           },
-          "points"_a, "seconds"_a = 0.4,
-          "Before a call of deform or stylize: it then says where its field takes these points (n, 3), at "
-          "once\n"
-          "when there is a first result and then about every `seconds`, given a third of its time at most. "
-          "The\n"
-          "result of the call stays the same.")
-      .def_property_readonly("looks", &Task::looks, "How often the watched points were looked at.")
-      .def_property_readonly("watched", &Task::watched,
-                             "Where the watched points were then, (n, 3) single precision; empty at first.");
+          "points"_a, "seconds"_a = 0.4, R"(
+Requests previews of a later deform, stylize or wrap: positions of these points (n, 3) during the solve.
+
+There is one as soon as the solve has a first field, then one about every `seconds`. They take at most a
+third of the solve's time, and its result stays the same.)")
+      .def_property_readonly("previews", &Task::previews, "Number of previews so far.")
+      .def_property_readonly("looks", &Task::previews, "Older name of `previews`.")
+      .def_property_readonly("watched", &Task::watched, R"(
+Positions (n, 3) of the watched points in the latest preview, in single precision; (0, 3) before the first.)");
 
   py::class_<Frame>(module, "Frame",
-                    "Mesh coordinates and the unit cube: x_cube = (x_mesh - center) / scale.")
+                    "The map from mesh coordinates to the unit cube: x_cube = (x_mesh - center) / scale.")
       .def(py::init([](const ArrayArgument& center, double scale) {
              const Frame frame{as_vec3(center, "center"), scale};
              require(std::isfinite(scale) && scale > 0, "scale", std::to_string(scale), "must be positive");
@@ -102,9 +102,9 @@ void bind_core(py::module_& module) {
   module.def(
       "real_array",
       [](const ArrayArgument& value, const std::string& argument) { return as_doubles(value, argument); },
-      "value"_a, "argument"_a, "Real numbers of any shape, from anywhere; InvalidInput names the argument.");
+      "value"_a, "argument"_a, "Any array of real numbers as float64; InvalidInput names the argument.");
   module.def("require_memory", &require_memory, "argument"_a, "bytes"_a,
-             "InvalidInput naming the argument where the machine has less memory to spare than `bytes`.");
+             "InvalidInput naming the argument where less than `bytes` of memory is free.");
   module.def("simd_level", &simd_level_name,
              "Instruction set of the kernels: baseline, neon, avx2 or avx512.");
 }

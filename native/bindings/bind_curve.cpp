@@ -18,7 +18,6 @@ Points2 as_points2(const py::handle& value, const std::string& argument) {
   return matrix;
 }
 
-/// Python's field: the solution with its report.
 py::array_t<double> jacobian(const CurveSolution& self, const ArrayArgument& points) {
   const Points2 at = as_points2(points, "points");
   const RowMatrix<double> jets = self.field.jets(at);
@@ -61,14 +60,17 @@ void bind_curve(py::module_& module) {
         return sample_curve(as_points2(vertices, "vertices"), count, closed);
       },
       "vertices"_a, "count"_a = 400, py::kw_only(), "closed"_a = true,
-      "CurveSamples at equal distances along the polygon with these vertices (m, 2); closed: the last is "
-      "joined\n"
-      "to the first. InvalidInput for too few or non-finite vertices, a curve without length, count < 1.");
+      R"(
+CurveSamples at equal distances along the polygon with these vertices (m, 2).
 
-  py::class_<CurveHandle>(
-      module, "CurveHandle",
-      "Samples of a plane curve (indices) that a rigid motion is to move. `motion` (3, 3) maps\n"
-      "homogeneous (x, y, 1); the identity, its default, holds them in place.")
+closed: the last vertex is joined to the first. InvalidInput for too few or non-finite vertices, a curve
+without length, and count < 1.)");
+
+  py::class_<CurveHandle>(module, "CurveHandle",
+                          R"(
+Samples of a plane curve, by index, that follow a rigid motion.
+
+`motion` (3, 3) acts on homogeneous (x, y, 1). Its default, the identity, holds the samples in place.)")
       .def(py::init([](const ArrayArgument& samples, const std::optional<ArrayArgument>& motion,
                        double weight) {
              CurveHandle handle;
@@ -88,7 +90,7 @@ void bind_curve(py::module_& module) {
       .def_readonly("motion", &CurveHandle::motion)
       .def_readonly("weight", &CurveHandle::weight);
 
-  py::class_<CurveReport>(module, "CurveReport", "What deform_curve reached.")
+  py::class_<CurveReport>(module, "CurveReport", "Energies, handle errors and convergence of deform_curve.")
       .def_readonly("stretch", &CurveReport::stretch, "Mean ‖J − R‖² over the samples.")
       .def_readonly("bend", &CurveReport::bend, "Mean bend over the samples, in the curve's square.")
       .def_readonly("handle_error_mean", &CurveReport::handle_error_mean, "In the curve's units.")
@@ -120,12 +122,12 @@ void bind_curve(py::module_& module) {
       },
       "points"_a, "handles"_a, py::arg_v("options", CurveOptions(), "CurveOptions()"), py::kw_only(),
       "task"_a = py::none(),
-      "Deforms a plane curve, given by its samples (n, 2), as rigidly as possible so that the handles' "
-      "samples\n"
-      "follow their motions. The energy is that of surfaces with d = 2; the field is a sum of Gaussian "
-      "centers.\n"
-      "Lengths and weights refer to the square in which the curve's bounding box has half-extent 0.75.\n"
-      "InvalidInput for no handles, indices out of range, motions that are not rigid.");
+      R"(
+Deforms a plane curve, given by its samples (n, 2), as rigidly as possible so that handles follow their motions.
+
+The energy is that of surfaces with d = 2; the field is a sum of Gaussian centers. Lengths and weights refer
+to the square in which the curve's bounding box has half-extent 0.75. InvalidInput for no handles, indices out
+of range, and motions that are not rigid.)");
 
   py::module_ testing = module.attr("testing");
   bind_testing<double>(testing);

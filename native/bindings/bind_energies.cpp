@@ -22,76 +22,76 @@ struct CuboidHandle : Handle {};
 struct PointHandle : Handle {};
 struct RegionHandle : Handle {};
 
-double checked_reach(double reach) {
+/// A handle with what all kinds have in common.
+template <class Kind>
+Kind handle_of(Handle::Kind kind, double weight, double reach) {
   require_not_negative("reach", reach);
-  return reach;
+  Kind handle;
+  handle.kind = kind;
+  handle.weight = weight;
+  handle.reach = reach;
+  return handle;
+}
+
+/// Sets the poses of a cuboid or region handle; InvalidInput where they give no motion.
+void set_poses(Handle& handle, const ArrayArgument& rest, const ArrayArgument& target, bool allow_scale) {
+  handle.allow_scale = allow_scale;
+  handle.rest = as_matrix4(rest, "rest");
+  handle.target = as_matrix4(target, "target");
+  handle.motion();
 }
 
 void bind_handles(py::module_& module) {
-  py::class_<Handle>(
-      module, "Handle",
-      "A part of the surface asked to follow a rigid motion, or where it may scale, an affine\n"
-      "map; mesh coordinates. With a `reach`, a length, it moves only what is no farther from what it "
-      "holds,\n"
-      "measured through the inside of the shape; beyond that of all handles that have one nothing\n"
-      "moves at all. A handle without one then only holds: where it moves too, everything may.")
+  py::class_<Handle>(module, "Handle", R"(
+A part of the surface that follows a rigid motion, or an affine one where it may scale; mesh coordinates.
+
+A handle with a `reach`, a length, moves only what is within that distance of it, measured through the
+interior of the shape. Beyond the reach of all such handles nothing moves at all. A handle without a reach
+holds its part in place; if it moves too, it moves everything.)")
       .def_readonly("weight", &Handle::weight, "Factor of this handle's part of the loss.")
       .def_property_readonly(
           "motion", [](const Handle& self) { return self.motion(); },
           "(4, 4) motion rest → target: rigid, or affine with allow_scale.")
       .def_readonly("reach", &Handle::reach,
-                    "How far it moves things, through the inside of the shape, in mesh units; 0: everything.")
-      .def_readonly("allow_scale", &Handle::allow_scale,
-                    "Whether targets may be larger, smaller, longer or sheared.");
-  py::class_<CuboidHandle, Handle>(
-      module, "CuboidHandle",
-      "The surface inside a box. `rest` and `target` (4, 4) map the cube [-1, 1]³ onto the box before and\n"
-      "after; target·rest⁻¹ must be rigid, unless `allow_scale` lets it be any affine map that neither\n"
-      "flattens nor mirrors. A box that does not move holds its part in place.")
+                    "Distance through the interior within which the handle moves the shape, in mesh units; "
+                    "0: everything.")
+      .def_readonly("allow_scale", &Handle::allow_scale, "Whether the target may be scaled or sheared.");
+  py::class_<CuboidHandle, Handle>(module, "CuboidHandle", R"(
+The surface inside a box.
+
+`rest` and `target` (4, 4) map the cube [-1, 1]³ onto the box before and after. target·rest⁻¹ must be rigid;
+with `allow_scale` it may be any affine map that neither flattens nor mirrors. A box that does not move holds
+its part in place.)")
       .def(py::init([](const ArrayArgument& rest, const ArrayArgument& target, double weight,
                        bool allow_scale, double reach) {
-             CuboidHandle handle;
-             handle.allow_scale = allow_scale;
-             handle.reach = checked_reach(reach);
-             handle.rest = as_matrix4(rest, "rest");
-             handle.target = as_matrix4(target, "target");
-             handle.weight = weight;
-             handle.motion();
+             auto handle = handle_of<CuboidHandle>(Handle::Kind::cuboid, weight, reach);
+             set_poses(handle, rest, target, allow_scale);
              return handle;
            }),
            "rest"_a, "target"_a, "weight"_a = 1.0, py::kw_only(), "allow_scale"_a = false, "reach"_a = 0.0)
       .def_property_readonly("rest", [](const CuboidHandle& self) { return self.rest; })
       .def_property_readonly("target", [](const CuboidHandle& self) { return self.target; });
   py::class_<PointHandle, Handle>(module, "PointHandle",
-                                  "One material point: `rest` (3,) is to arrive at `target` (3,).")
+                                  "One material point, moved from `rest` (3,) to `target` (3,).")
       .def(py::init([](const ArrayArgument& rest, const ArrayArgument& target, double weight, double reach) {
-             PointHandle handle;
-             handle.reach = checked_reach(reach);
-             handle.kind = Handle::Kind::point;
+             auto handle = handle_of<PointHandle>(Handle::Kind::point, weight, reach);
              handle.rest_point = as_vec3(rest, "rest");
              handle.target_point = as_vec3(target, "target");
-             handle.weight = weight;
              return handle;
            }),
            "rest"_a, "target"_a, "weight"_a = 1.0, py::kw_only(), "reach"_a = 0.0)
       .def_property_readonly("rest", [](const PointHandle& self) { return self.rest_point; })
       .def_property_readonly("target", [](const PointHandle& self) { return self.target_point; });
-  py::class_<RegionHandle, Handle>(
-      module, "RegionHandle",
-      "The listed samples (indices into the surface samples), moved by target·rest⁻¹ (4, 4 each), which "
-      "must\n"
-      "be rigid unless `allow_scale` lets it be any affine map that neither flattens nor mirrors.")
+  py::class_<RegionHandle, Handle>(module, "RegionHandle", R"(
+The listed samples (indices into the surface samples), moved by target·rest⁻¹.
+
+`rest` and `target` are (4, 4). The motion must be rigid; with `allow_scale` it may be any affine map that
+neither flattens nor mirrors.)")
       .def(py::init([](const ArrayArgument& samples, const ArrayArgument& rest, const ArrayArgument& target,
                        double weight, bool allow_scale, double reach) {
-             RegionHandle handle;
-             handle.allow_scale = allow_scale;
-             handle.reach = checked_reach(reach);
-             handle.kind = Handle::Kind::region;
+             auto handle = handle_of<RegionHandle>(Handle::Kind::region, weight, reach);
              handle.samples = as_indices(samples, "samples");
-             handle.rest = as_matrix4(rest, "rest");
-             handle.target = as_matrix4(target, "target");
-             handle.weight = weight;
-             handle.motion();
+             set_poses(handle, rest, target, allow_scale);
              return handle;
            }),
            "samples"_a, "rest"_a, "target"_a, "weight"_a = 1.0, py::kw_only(), "allow_scale"_a = false,
@@ -113,41 +113,53 @@ void bind_styles(py::module_& module) {
         return gauss_preference(as_points(preferred, "preferred"), sharpness).values(directions);
       },
       "normals"_a, "preferred"_a, py::kw_only(), "sharpness"_a = StylizeOptions().sharpness,
-      "How much each unit normal (n, 3) agrees with the preferred normals (k, 3): (n,) values\n"
-      "g = sum_k w_k exp(sharpness n·n_k) with g(n_k) = 1, small far from all of them. Coinciding preferred\n"
-      "normals raise InvalidInput that names the pair. sharpness 0: style_sharpness(preferred). After\n"
-      "Kohlbrenner et al., Gauss Stylization (2021).");
+      R"(
+Agreement (n,) of unit normals (n, 3) with preferred normals (k, 3).
+
+g = Σ_k w_k exp(sharpness n·n_k), with weights such that g(n_k) = 1; g is small far from all n_k. sharpness 0
+stands for style_sharpness(preferred). Preferred normals that coincide raise InvalidInput, which names the
+pair. Source: Kohlbrenner et al. 2021, "Gauss Stylization".)");
   module.def(
       "style_sharpness",
       [](const ArrayArgument& preferred) { return style_sharpness(as_points(preferred, "preferred")); },
       "preferred"_a,
-      "The sharpness at which neighbours of the preferred normals (k, 3) overlap midway as the cube's do at "
-      "5;\n"
-      "from 5 to 25. Normals within 15 degrees of each other are one curved face.");
+      R"(
+The sharpness, 5 to 25, at which neighbouring preferred normals (k, 3) overlap as the cube's do at 5.
+
+Normals within 15 degrees of each other count as one curved face.)");
+}
+
+/// Calls energy(jets, cotangents) with zeroed cotangents: (value, …, cotangents).
+template <class Scalar, class Energy>
+py::tuple with_cotangents(JetArray<Scalar>& jets, Energy&& energy) {
+  JetArray<Scalar> cotangents = zeros_like(jets);
+  const auto value = energy(jet_view<const Scalar>(jets), jet_view<Scalar>(cotangents));
+  if constexpr (std::is_same_v<std::remove_const_t<decltype(value)>, ArapValue>)
+    return py::make_tuple(value.stretch, value.bend, cotangents);
+  else
+    return py::make_tuple(value, cotangents);
 }
 
 template <class Scalar>
 void bind_testing(py::module_& module) {
+  using Numbers = Eigen::VectorX<Scalar>;
+  using Rows = PointsOf<Scalar>;
   module.def(
       "arap_energy",
       [](JetArray<Scalar> jets, double bending, double weight, bool aten) {
-        JetArray<Scalar> cotangents = zeros_like(jets);
-        const auto energy = aten ? &probe_arap<Scalar> : &arap_energy<Scalar>;
-        const ArapValue value =
-            energy(jet_view<const Scalar>(jets), bending, weight, jet_view<Scalar>(cotangents), {});
-        return py::make_tuple(value.stretch, value.bend, cotangents);
+        return with_cotangents(jets, [&](auto view, auto out) {
+          return (aten ? &probe_arap<Scalar> : &arap_energy<Scalar>)(view, bending, weight, out, {});
+        });
       },
       "jets"_a.noconvert(), "bending"_a, "weight"_a = 1.0, "aten"_a = false);
   module.def(
       "arap_energy_by_points",
-      [](JetArray<Scalar> jets, double bending, const Eigen::VectorX<Scalar>& weights,
-         const Eigen::VectorX<Scalar>& bending_factors, bool aten) {
-        JetArray<Scalar> cotangents = zeros_like(jets);
-        const auto energy = aten ? &probe_arap<Scalar> : &arap_energy<Scalar>;
-        const ArapValue value =
-            energy(jet_view<const Scalar>(jets), bending, 1.0, jet_view<Scalar>(cotangents),
-                   {weights.data(), bending_factors.data()});
-        return py::make_tuple(value.energy, cotangents);
+      [](JetArray<Scalar> jets, double bending, const Numbers& weights, const Numbers& bending_factors,
+         bool aten) {
+        return with_cotangents(jets, [&](auto view, auto out) {
+          const auto energy = aten ? &probe_arap<Scalar> : &arap_energy<Scalar>;
+          return energy(view, bending, 1.0, out, {weights.data(), bending_factors.data()}).energy;
+        });
       },
       "jets"_a.noconvert(), "bending"_a, "weights"_a, "bending_factors"_a, "aten"_a = false);
   module.def(
@@ -160,71 +172,60 @@ void bind_testing(py::module_& module) {
       "jacobians"_a.noconvert());
   module.def(
       "gauss_energy",
-      [](JetArray<Scalar> jets, const PointsOf<Scalar>& normals, const Points& preferred, double sharpness,
-         double weight, const Eigen::VectorX<Scalar>& sample_weights, bool aten) {
-        JetArray<Scalar> cotangents = zeros_like(jets);
-        const auto energy = aten ? &probe_gauss<Scalar> : &gauss_energy<Scalar>;
-        const double value =
-            energy(jet_view<const Scalar>(jets), normals, sample_weights,
-                   gauss_preference(preferred, sharpness), weight, jet_view<Scalar>(cotangents));
-        return py::make_tuple(value, cotangents);
+      [](JetArray<Scalar> jets, const Rows& normals, const Points& preferred, double sharpness, double weight,
+         const Numbers& sample_weights, bool aten) {
+        return with_cotangents(jets, [&](auto view, auto out) {
+          return (aten ? &probe_gauss<Scalar> : &gauss_energy<Scalar>)(view, normals, sample_weights,
+                                                                       gauss_preference(preferred, sharpness),
+                                                                       weight, out);
+        });
       },
       "jets"_a.noconvert(), "normals"_a, "preferred"_a, "sharpness"_a, "weight"_a, "sample_weights"_a,
       "aten"_a = false);
   module.def(
       "target_energy",
-      [](JetArray<Scalar> jets, const PointsOf<Scalar>& normals, const PointsOf<Scalar>& targets,
-         double weight, const Eigen::VectorX<Scalar>& sample_weights, bool aten) {
-        JetArray<Scalar> cotangents = zeros_like(jets);
-        const auto energy = aten ? &probe_targets<Scalar> : &target_energy<Scalar>;
-        const double value = energy(jet_view<const Scalar>(jets), normals, targets, sample_weights, weight,
-                                    jet_view<Scalar>(cotangents));
-        return py::make_tuple(value, cotangents);
+      [](JetArray<Scalar> jets, const Rows& normals, const Rows& targets, double weight,
+         const Numbers& sample_weights, bool aten) {
+        return with_cotangents(jets, [&](auto view, auto out) {
+          return (aten ? &probe_targets<Scalar> : &target_energy<Scalar>)(view, normals, targets,
+                                                                          sample_weights, weight, out);
+        });
       },
       "jets"_a.noconvert(), "normals"_a, "targets"_a, "weight"_a, "sample_weights"_a, "aten"_a = false);
   module.def(
       "handle_energy",
       [](JetArray<Scalar> jets, const BoundHandles& handles, double weight, bool aten) {
-        JetArray<Scalar> cotangents = zeros_like(jets);
-        const auto energy = aten ? &probe_handles<Scalar> : &handle_energy<Scalar>;
-        const double value =
-            energy(jet_view<const Scalar>(jets), handles.all<Scalar>(), weight, jet_view<Scalar>(cotangents));
-        return py::make_tuple(value, cotangents);
+        return with_cotangents(jets, [&](auto view, auto out) {
+          return (aten ? &probe_handles<Scalar> : &handle_energy<Scalar>)(view, handles.all<Scalar>(), weight,
+                                                                          out);
+        });
       },
       "jets"_a.noconvert(), "handles"_a, "weight"_a = 1.0, "aten"_a = false);
   module.def(
       "stance_energy",
-      [](JetArray<Scalar> jets, const PointsOf<Scalar>& rest, const Stance& stance, double weight,
-         bool aten) {
-        JetArray<Scalar> cotangents = zeros_like(jets);
-        const auto energy = aten ? &probe_stance<Scalar> : &stance_energy<Scalar>;
-        const double value =
-            energy(jet_view<const Scalar>(jets), rest, stance, weight, jet_view<Scalar>(cotangents));
-        return py::make_tuple(value, cotangents);
+      [](JetArray<Scalar> jets, const Rows& rest, const Stance& stance, double weight, bool aten) {
+        return with_cotangents(jets, [&](auto view, auto out) {
+          return (aten ? &probe_stance<Scalar> : &stance_energy<Scalar>)(view, rest, stance, weight, out);
+        });
       },
       "jets"_a.noconvert(), "rest"_a, "stance"_a, "weight"_a = 1.0, "aten"_a = false);
   module.def(
       "body_energy",
       [](JetArray<Scalar> jets, const Points& rest, const Points& goal, const Vector& masses, double inertia,
          const Vector& gravity, const Vector& up, double ground, double ground_stiffness) {
-        JetArray<Scalar> cotangents = zeros_like(jets);
         const Body<Scalar> body{
             masses.cast<Scalar>(), rest.cast<Scalar>(), goal.cast<Scalar>(), inertia, gravity, up, ground,
             ground_stiffness};
-        const BodyEnergy energy =
-            body_energy(jet_view<const Scalar>(jets), body, jet_view<Scalar>(cotangents));
-        return py::make_tuple(energy.sum(), cotangents);
+        return with_cotangents(jets, [&](auto view, auto out) { return body_energy(view, body, out).sum(); });
       },
       "jets"_a.noconvert(), "rest"_a, "goal"_a, "masses"_a, "inertia"_a, "gravity"_a, "up"_a, "ground"_a,
       "ground_stiffness"_a);
   module.def(
       "fold_barrier",
       [](JetArray<Scalar> jets, double threshold, double weight, bool aten) {
-        JetArray<Scalar> cotangents = zeros_like(jets);
-        const auto energy = aten ? &probe_barrier<Scalar> : &fold_barrier<Scalar>;
-        const double value =
-            energy(jet_view<const Scalar>(jets), threshold, weight, jet_view<Scalar>(cotangents));
-        return py::make_tuple(value, cotangents);
+        return with_cotangents(jets, [&](auto view, auto out) {
+          return (aten ? &probe_barrier<Scalar> : &fold_barrier<Scalar>)(view, threshold, weight, out);
+        });
       },
       "jets"_a.noconvert(), "threshold"_a, "weight"_a = 1.0, "aten"_a = false);
 }
@@ -234,7 +235,9 @@ void bind_testing(py::module_& module) {
 void bind_energies(py::module_& module) {
   bind_handles(module);
   bind_styles(module);
-  py::class_<Distortion>(module, "Distortion", "How far a deformation is from a fold, over its samples.")
+  py::class_<Distortion>(
+      module, "Distortion",
+      "Determinants and stretches of a deformation over its samples: how far it is from folding.")
       .def_readonly("min_determinant", &Distortion::min_determinant, "Smallest det J.")
       .def_readonly("flipped_share", &Distortion::flipped_share, "Share of samples with det J ≤ 0.")
       .def_readonly("max_stretch", &Distortion::max_stretch, "Largest singular value of J.")
@@ -270,40 +273,44 @@ void bind_energies(py::module_& module) {
 }
 
 void bind_object_style(py::module_& module) {
-  py::class_<ObjectStyle>(
-      module, "ObjectStyle",
-      "A style read off a closed mesh: normals turn to what the object has in their direction, its normal\n"
-      "where the ray from its centroid leaves it for the last time. A sphere changes nothing. What is bent "
-      "by\n"
-      "less than 30 degrees from triangle to triangle counts as smooth; across sharper edges the map is\n"
-      "smoothed a little.")
+  py::class_<ObjectStyle>(module, "ObjectStyle",
+                          R"(
+A style derived from a closed mesh: a map from directions to the mesh's normals.
+
+A direction maps to the normal where the ray from the centroid leaves the mesh for the last time. A sphere is
+the identity. Edges of less than 30 degrees count as smooth; across sharper edges the map is smoothed a
+little.)")
       .def(py::init([](const ArrayArgument& vertices, const ArrayArgument& triangles, Task* task) {
-             const Points v = as_points(vertices, "vertices");
-             const Triangles f = as_triangles(triangles, "triangles");
-             return run_long(task, [&](const Progress& progress) { return ObjectStyle(v, f, progress); });
+             const TriangleMesh mesh = as_mesh(vertices, triangles);
+             return run_long(task, [&](const Progress& progress) {
+               return ObjectStyle(mesh.vertices, mesh.triangles, progress);
+             });
            }),
            "vertices"_a, "triangles"_a, py::kw_only(), "task"_a = py::none(),
-           "vertices (n, 3), triangles (m, 3), counter-clockwise seen from outside, or all the other way "
-           "round.\n"
-           "InvalidInput for a broken mesh, an open one, and one that is flat.")
+           R"(
+vertices (n, 3), triangles (m, 3), all counter-clockwise seen from outside, or all clockwise.
+
+InvalidInput for a broken, an open or a flat mesh.)")
       .def(
           "normals",
           [](const ObjectStyle& style, const ArrayArgument& directions, double smoothing) {
             Points d = as_points(directions, "directions");
-            return run_long(nullptr, [&](const Progress&) { return style.normals(d, smoothing); });
+            return run_long([&] { return style.normals(d, smoothing); });
           },
           "directions"_a, py::kw_only(), "smoothing"_a = ObjectStyle::usual_smoothing,
-          "What the object asks of directions (n, 3): unit normals (n, 3). `smoothing`, in radians: over "
-          "what\n"
-          "angle the map is smoothed, 0 to a right angle. Directions in which nothing is left are kept.")
+          R"(
+The preferred unit normals (n, 3) for directions (n, 3).
+
+`smoothing` is the angle, in radians from 0 to π/2, over which the map is smoothed. A direction whose ray
+leaves no surface is kept.)")
       .def(
           "turned",
           [](const ObjectStyle& style, const ArrayArgument& orientation) {
             return style.turned(as_rotation(orientation, "orientation"));
           },
-          "orientation"_a, "The same object after the rotation (3, 3) about its centroid.")
+          "orientation"_a, "The object rotated by `orientation` (3, 3) about its centroid.")
       .def_property_readonly("centroid", &ObjectStyle::centroid,
-                             "(3,) of the solid, in the mesh's coordinates.")
+                             "(3,) centroid of the solid, in mesh coordinates.")
       .def("__repr__", [](const ObjectStyle&) { return "ObjectStyle()"; });
 }
 

@@ -17,9 +17,8 @@ py::dict fields(const ExtractionReport& done) {
                   "notes"_a = py::tuple(py::cast(done.notes)));
 }
 
-py::object extraction(const TriangleMesh& mesh, const char* kind, const py::dict& fields) {
-  return py::module_::import("arapfields.reports")
-      .attr("Extraction")(mesh.vertices, mesh.triangles, make_report(kind, fields));
+py::object extraction(const TriangleMesh& mesh, const py::object& report) {
+  return py::module_::import("arapfields.reports").attr("Extraction")(mesh.vertices, mesh.triangles, report);
 }
 
 ExtractionResult extract(const ImplicitFunction& sdf, int resolution, bool refine_thin, int threads,
@@ -29,7 +28,7 @@ ExtractionResult extract(const ImplicitFunction& sdf, int resolution, bool refin
     const ThreadScope scope(threads);
     return extract_surface(sdf, {.resolution = resolution, .refine_thin = refine_thin}, progress, &done);
   });
-  return extraction(mesh, "ExtractionReport", fields(done));
+  return extraction(mesh, make_report("ExtractionReport", **fields(done)));
 }
 
 DeformedExtractionResult extract_moved(const ImplicitFunction& sdf, const DeformationField& field,
@@ -41,44 +40,42 @@ DeformedExtractionResult extract_moved(const ImplicitFunction& sdf, const Deform
     return extract_deformed(sdf, field, inverse, {.resolution = resolution, .refine_thin = refine_thin},
                             progress, &done);
   });
-  py::dict all = fields(done);
-  all.attr("update")("inverted"_a = done.inverted, "failures"_a = done.failures, "spacing"_a = done.spacing);
-  return extraction(mesh, "DeformedExtractionReport", all);
+  return extraction(mesh,
+                    make_report("DeformedExtractionReport", "inverted"_a = done.inverted,
+                                "failures"_a = done.failures, "spacing"_a = done.spacing, **fields(done)));
 }
 
 }  // namespace
 
 void bind_extraction(py::module_& module) {
-  module.def(
-      "extract_surface", &extract, "sdf"_a, "resolution"_a = ExtractionOptions().resolution, py::kw_only(),
-      "refine_thin"_a = ExtractionOptions().refine_thin, "threads"_a = 0, "task"_a = py::none(),
-      "The zero surface of a signed distance function as a mesh: V (n,3), F (m,3), in mesh coordinates.\n\n"
-      "Marching cubes on `resolution` (8 to 512) grid points a side over the frame's cube, evaluated only\n"
-      "where a measured bound on the gradient lets the surface be; the vertices are those of the whole "
-      "grid.\n"
-      "Triangles are counter-clockwise seen from outside; the mesh is a closed manifold unless the surface\n"
-      "leaves the cube. What is returned unpacks into V and F, and has a `report` beside them. Where the\n"
-      "function jumps, as the distance of an open soup does across its holes, there is no surface. Where "
-      "parts\n"
-      "are thinner than two cells, refine_thin cuts the cells there into finer ones, without cracks; the "
-      "report\n"
-      "says whether the surface came apart and which resolution holds it. InvalidInput for a bad resolution "
-      "or\n"
-      "no surface.");
-  module.def(
-      "extract_deformed", &extract_moved, "sdf"_a, "field"_a, "resolution"_a = ExtractionOptions().resolution,
-      py::kw_only(), "refine_thin"_a = ExtractionOptions().refine_thin, "inverse"_a = py::none(),
-      "threads"_a = 0, "task"_a = py::none(),
-      "The deformed surface as the zero set of sdf ∘ field⁻¹: V (n,3), F (m,3), in mesh coordinates.\n\n"
-      "Marching cubes on `resolution` (8 to 512) grid points a side over a cube around the deformed "
-      "surface;\n"
-      "triangles are evenly sized also where the field stretches, which those of extract_surface moved by "
-      "the\n"
-      "field are not. Rest positions come from Newton's method, or from `inverse`, the field that\n"
-      "train_inverse made of this one. They are asked for near the deformed surface alone; farther away\n"
-      "extract_surface's mesh, moved, decides the sides. Returns and raises as extract_surface does, and "
-      "raises\n"
-      "InvalidInput for a field that is not finite on the surface.");
+  module.def("extract_surface", &extract, "sdf"_a, "resolution"_a = ExtractionOptions().resolution,
+             py::kw_only(), "refine_thin"_a = ExtractionOptions().refine_thin, "threads"_a = 0,
+             "task"_a = py::none(),
+             R"(
+The zero surface of a signed distance function as a mesh: V (n, 3), F (m, 3), in mesh coordinates.
+
+Marching cubes on `resolution` (8 to 512) grid points a side over the frame's cube. The function is evaluated
+only where a bound on its gradient allows the surface to be; the vertices are those of the whole grid.
+Triangles are counter-clockwise seen from outside. The mesh is a closed manifold unless the surface leaves the
+cube, or the function jumps there, as the distance to an open soup does across its holes. The result unpacks
+into V and F and has a `report`.
+
+Where parts are thinner than two cells, refine_thin cuts the cells there into finer ones, without cracks; the
+report says whether the surface came apart and which resolution holds it together. InvalidInput for a bad
+resolution and for a function without a zero surface.)");
+  module.def("extract_deformed", &extract_moved, "sdf"_a, "field"_a,
+             "resolution"_a = ExtractionOptions().resolution, py::kw_only(),
+             "refine_thin"_a = ExtractionOptions().refine_thin, "inverse"_a = py::none(), "threads"_a = 0,
+             "task"_a = py::none(),
+             R"(
+The deformed surface as the zero set of sdf ∘ field⁻¹: V (n, 3), F (m, 3), in mesh coordinates.
+
+Marching cubes on `resolution` (8 to 512) grid points a side over a cube around the deformed surface. Unlike
+the vertices of extract_surface moved by the field, the triangles have the same size where the field
+stretches. Rest positions come from Newton's method, or from `inverse`, a field of train_inverse. They are
+evaluated near the deformed surface alone; farther away, the moved mesh of extract_surface decides the sign.
+Returns and raises as extract_surface does, and raises InvalidInput for a field that is not finite on the
+surface.)");
 }
 
 }  // namespace arapfields::python

@@ -18,18 +18,16 @@ using FieldArray = py::array_t<double>;
 /// Jets at points of mesh coordinates, as one block.
 JetBlock<double> evaluate(const DeformationField& field, const ArrayArgument& points, JetOrder order,
                           Index& count) {
-  const Points mesh = as_points(points, "points");
-  require(mesh.allFinite(), "points", "some coordinates are NaN or infinite", "all must be finite");
+  const Points mesh = as_finite_points(points, "points");
   count = mesh.rows();
   JetBlock<double> block(count, order);
-  run_long(nullptr, [&](const Progress&) { field.evaluate(field.frame().to_cube(mesh), block.view()); });
+  run_long([&] { field.evaluate(field.frame().to_cube(mesh), block.view()); });
   return block;
 }
 
 Points values(const DeformationField& field, const ArrayArgument& points) {
-  const Points mesh = as_points(points, "points");
-  require(mesh.allFinite(), "points", "some coordinates are NaN or infinite", "all must be finite");
-  return run_long(nullptr, [&](const Progress&) { return field.at(mesh); });
+  const Points mesh = as_finite_points(points, "points");
+  return run_long([&] { return field.at(mesh); });
 }
 
 FieldArray jacobian(const DeformationField& field, const ArrayArgument& points) {
@@ -75,8 +73,7 @@ void save(const py::object& self, const PathArgument& path) {
 FieldResult load(const PathArgument& path) {
   const std::string place = as_path(path);
   std::string measured;
-  py::object field =
-      py::cast(run_long(nullptr, [&](const Progress&) { return load_field(place, &measured); }));
+  py::object field = py::cast(run_long([&] { return load_field(place, &measured); }));
   attach_report(field, report_from(measured, place));
   return field;
 }
@@ -87,47 +84,51 @@ void bind_fields(py::module_& module) {
   py::class_<DeformationField, std::shared_ptr<DeformationField>>(
       module, "DeformationField", py::dynamic_attr(),
       "A smooth deformation of space, x ↦ f(x), with its derivatives; all in mesh coordinates.")
-      .def("__call__", &values, "points"_a, "Where the points (p, 3) go: (p, 3).")
+      .def("__call__", &values, "points"_a, "Deformed positions (p, 3) of points (p, 3).")
       .def(
           "apply",
           [](const DeformationField& field, const ArrayArgument& points, double strength) {
             const Points mesh = as_points(points, "points");
-            return run_long(nullptr, [&](const Progress&) { return apply_field(field, mesh, strength); });
+            return run_long([&] { return apply_field(field, mesh, strength); });
           },
           "points"_a, py::kw_only(), "strength"_a = 1.0,
-          "The same for another mesh of the same shape, coarser, finer or of other topology, `strength` of "
-          "the\n"
-          "way: (p, 3). InvalidInput where over a tenth of the points lie farther than 0.1 of the body's "
-          "size\n"
-          "from the surface that the field was solved on, and outside of the box around it.")
-      .def("jacobian", &jacobian, "points"_a, "(p, 3, 3): [:, i, j] is the derivative of f_i by x_j.")
-      .def("hessian", &hessian, "points"_a, "(p, 3, 3, 3): [:, i, j, k] is ∂²f_i/∂x_j∂x_k (1/length).")
+          R"(
+The field at another mesh of the same shape, of any resolution or topology: (p, 3).
+
+`strength` scales the displacement. InvalidInput where more than a tenth of the points lie outside the body's
+box and farther from its surface than 0.1 of its size.)")
+      .def("jacobian", &jacobian, "points"_a, "(p, 3, 3): [:, i, j] = ∂f_i/∂x_j.")
+      .def("hessian", &hessian, "points"_a, "(p, 3, 3, 3): [:, i, j, k] = ∂²f_i/∂x_j∂x_k (1/length).")
       .def("inverse", &inverse, "points"_a, py::kw_only(), "tolerance"_a = NewtonInverseOptions().tolerance,
            "task"_a = py::none(),
-           "Points (p, 3) that the field takes to `points`, by Newton's method with the analytic Jacobian; "
-           "rows\n"
-           "of NaN where none was found within `tolerance`, a share of frame.scale (half the side of the "
-           "cube\n"
-           "in which the field works), so that the unit of length does not matter. Where space is folded "
-           "there\n"
-           "are several, and the one nearest to the surface's rest samples is preferred.")
+           R"(
+Points (p, 3) that the field maps to `points`, by Newton's method with the analytic Jacobian.
+
+Rows are NaN where no preimage is found within `tolerance`, a share of frame.scale (half the side of the
+field's cube). Where the field folds space there are several; the one nearest to the surface's rest samples is
+preferred.)")
       .def_property_readonly(
           "frame", [](const DeformationField& self) { return self.frame(); },
-          "Mesh coordinates and the unit cube in which the field works.")
+          "The Frame of the unit cube in which the field is defined.")
       .def_property_readonly(
           "report", [](const py::object& self) { return FieldReportResult(report_of(self)); },
-          "What the solve measured: SolveReport of deform and stylize, LiveReport, InverseReport.\n"
-          "AttributeError for a field without one.")
+          R"(
+The SolveReport of deform and stylize, the LiveReport, WrapReport or InverseReport.
+
+AttributeError for a field without one.)")
       // DeformationField[SolveReport] in annotations that are evaluated; see the stub.
       .def_static("__class_getitem__", [](const py::object&) { return py::type::of<DeformationField>(); })
       .def("save", &save, "path"_a,
-           "Writes field and report as one file, whole or not at all; OSError where that fails, InvalidInput "
-           "for\n"
-           "a place that holds no regular file.")
-      .def_static(
-          "load", &load, "path"_a,
-          "What save() wrote. OSError for a file that cannot be read, InvalidInput naming the file for\n"
-          "one that is damaged, foreign, of another kind or version, or holds unusable numbers.");
+           R"(
+Writes field and report as one file, in whole or not at all.
+
+OSError where the system refuses, InvalidInput for a path that is not a regular file.)")
+      .def_static("load", &load, "path"_a,
+                  R"(
+The field of a file that save() wrote, with its report.
+
+OSError for a file that cannot be read. InvalidInput, naming the file, for one that is damaged, foreign, of
+another kind or version, or holds unusable numbers.)");
 }
 
 void bind_invertible_testing(py::module_& module) {

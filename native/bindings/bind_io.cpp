@@ -4,6 +4,13 @@
 #include "io/output_file.h"
 
 namespace arapfields::python {
+namespace {
+
+py::str from_path(const std::string& path) {
+  return py::str(py::module_::import("os").attr("fsdecode")(py::bytes(path)));
+}
+
+}  // namespace
 
 std::string as_path(const py::object& path) {
   py::object bytes;
@@ -33,32 +40,29 @@ py::object report_from(const std::string& text, const std::string& place) {
 }
 
 void bind_io(py::module_& module) {
-  py::class_<OutputFile>(
-      module, "OutputFile",
-      "A regular file that takes its place whole or not at all: write `partial` (or the file `beside` it),\n"
-      "then commit(). Symbolic links are followed, permissions stay; what a killed process left is removed "
-      "by\n"
-      "the next output of the same name. OSError where the system refuses, InvalidInput for a place that is\n"
-      "no regular file and where nothing arrived.")
+  py::class_<OutputFile>(module, "OutputFile",
+                         R"(
+A regular file that replaces its target in whole or not at all: write `partial` (or `beside`), then commit().
+
+Symbolic links are followed and permissions kept. The next output of the same name removes what a killed
+process left. OSError where the system refuses; InvalidInput for a path that is not a regular file, and where
+nothing was written.)")
       .def(py::init([](const PathArgument& path) { return std::make_unique<OutputFile>(as_path(path)); }),
            "path"_a)
       .def_property_readonly(
-          "partial",
+          "partial", [](const OutputFile& self) { return from_path(self.partial()); },
           [](const OutputFile& self) {
             return py::str(py::module_::import("os").attr("fsdecode")(py::bytes(self.partial())));
           },
-          "Where to write: a file of the same name in a temporary folder beside its place.")
+          "Path to write to: a file of the same name in a temporary folder beside the target.")
       .def_property_readonly(
-          "beside",
-          [](const OutputFile& self) {
-            return py::str(py::module_::import("os").attr("fsdecode")(py::bytes(self.beside())));
-          },
-          "The same in the place's own folder, for content with paths relative to it.")
+          "beside", [](const OutputFile& self) { return from_path(self.beside()); },
+          "The same in the target's own folder, for content with paths relative to it.")
       .def("finish", &OutputFile::finish, py::call_guard<py::gil_scoped_release>(),
-           "Brings the content to the disk and looks at it.")
+           "Flushes the content to the disk and verifies it.")
       .def("commit", &OutputFile::commit, py::call_guard<py::gil_scoped_release>(),
-           "finish(), if that has not been done, and the new name.")
-      .def("discard", &OutputFile::discard, "Removes what has not been committed.");
+           "Calls finish() if needed, then renames the file to its target.")
+      .def("discard", &OutputFile::discard, "Removes what was not committed.");
 }
 
 }  // namespace arapfields::python

@@ -15,7 +15,7 @@ namespace {
 /// More than any network that the options allow has.
 constexpr std::size_t most_layers = 1024;
 
-std::vector<py::object> listed(const py::object& arrays, const std::string& argument) {
+std::vector<py::object> as_list(const py::object& arrays, const std::string& argument) {
   std::vector<py::object> items;
   for_each_item(arrays, argument, "a list of arrays, one a layer, is needed", sizeof(py::object),
                 [&](const py::object& item, const std::string&) {
@@ -28,9 +28,9 @@ std::vector<py::object> listed(const py::object& arrays, const std::string& argu
 
 Layers as_layers(const py::object& weights, const py::object& biases) {
   Layers layers;
-  for (const py::object& weight : listed(weights, "weights"))
+  for (const py::object& weight : as_list(weights, "weights"))
     layers.weights.emplace_back(as_matrix(weight, "weights[" + std::to_string(layers.weights.size()) + "]"));
-  for (const py::object& bias : listed(biases, "biases"))
+  for (const py::object& bias : as_list(biases, "biases"))
     layers.biases.emplace_back(as_vector(bias, "biases[" + std::to_string(layers.biases.size()) + "]"));
   return layers;
 }
@@ -39,12 +39,6 @@ py::array_t<double> as_array(const Vector& flat, const std::vector<Index>& shape
   py::array_t<double> array(shape);
   Eigen::Map<Vector>(array.mutable_data(), flat.size()) = flat;
   return array;
-}
-
-Points finite_points(const ArrayArgument& points) {
-  Points p = as_points(points, "points");
-  require(p.allFinite(), "points", "some coordinates are NaN or infinite", "all must be finite");
-  return p;
 }
 
 void save(const py::object& self, const PathArgument& path) {
@@ -57,19 +51,18 @@ void save(const py::object& self, const PathArgument& path) {
 NeuralSdfResult load(const PathArgument& path) {
   const std::string place = as_path(path);
   std::string measured;
-  py::object sdf = py::cast(run_long(nullptr, [&](const Progress&) { return load_sdf(place, &measured); }));
+  py::object sdf = py::cast(run_long([&] { return load_sdf(place, &measured); }));
   attach_report(sdf, report_from(measured, place));
   return sdf;
 }
 
 void bind_sdf(py::module_& module) {
-  py::class_<NeuralSdf, ImplicitFunction, std::shared_ptr<NeuralSdf>>(
-      module, "NeuralSdf", py::dynamic_attr(),
-      "A signed distance function by a network: negative inside, in the mesh's coordinates and unit.\n\n"
-      "Positional encoding, then layers of softplus units.\n"
-      "Made by fit_sdf, from_layers or load. Outside the frame's cube, where the network has learnt "
-      "nothing:\n"
-      "its value at the cube's nearest point plus the distance to that point.")
+  py::class_<NeuralSdf, ImplicitFunction, std::shared_ptr<NeuralSdf>>(module, "NeuralSdf", py::dynamic_attr(),
+                                                                      R"(
+A signed distance function represented by a network, negative inside; mesh coordinates and unit.
+
+Positional encoding, then layers of softplus units. Made by fit_sdf, from_layers or load. Outside the frame's
+cube, where the network is not trained, it is the value at the cube's nearest point plus the distance to it.)")
       .def_static(
           "from_layers",
           [](const ArraysArgument& weights, const ArraysArgument& biases, int octaves, double frequency,
@@ -78,26 +71,26 @@ void bind_sdf(py::module_& module) {
           },
           "weights"_a, "biases"_a, "octaves"_a = NetworkOptions().octaves,
           "frequency"_a = NetworkOptions().frequency, "sharpness"_a = NetworkOptions().softplus_sharpness,
-          "A published network, in cube coordinates (its frame is the identity).\n\n"
-          "weights[l] (out, in) and biases[l] (out,) of each layer, the last with one output; the first "
-          "takes\n"
-          "6*octaves numbers: for x, y, z in turn and k < octaves, cos(2^k*frequency*c), "
-          "sin(2^k*frequency*c).\n"
-          "sharpness is softplus's beta. InvalidInput where shapes do not fit or numbers are not finite.")
+          R"(
+A published network, in cube coordinates (its frame is the identity).
+
+weights[l] (out, in) and biases[l] (out,) of each layer, the last with one output. The first layer takes
+6*octaves numbers: for x, y, z in turn and k < octaves, cos(2^k*frequency*c), sin(2^k*frequency*c). sharpness
+is softplus's beta. InvalidInput where shapes do not fit or numbers are not finite.)")
       .def(
           "__call__",
           [](const NeuralSdf& sdf, const ArrayArgument& points) {
-            const Points p = finite_points(points);
-            return run_long(nullptr, [&](const Progress&) { return sdf.distances(p); });
+            const Points p = as_finite_points(points, "points");
+            return run_long([&] { return sdf.distances(p); });
           },
           "points"_a, "Distances (p,) at points (p,3), negative inside; mesh coordinates and unit.")
       .def(
           "gradient",
           [](const NeuralSdf& sdf, const ArrayArgument& points) {
-            const Points p = finite_points(points);
-            return run_long(nullptr, [&](const Progress&) { return sdf.gradients(p); });
+            const Points p = as_finite_points(points, "points");
+            return run_long([&] { return sdf.gradients(p); });
           },
-          "points"_a, "Derivatives (p,3) of the distance by the point: about unit length, pointing outwards.")
+          "points"_a, "Gradients (p, 3) of the distance: about unit length, pointing outwards.")
       .def_property_readonly(
           "layers",
           [](const NeuralSdf& sdf) {
@@ -107,16 +100,19 @@ void bind_sdf(py::module_& module) {
                                    shape.softplus_sharpness);
           },
           "The network's numbers, as from_layers takes them: weights, biases, octaves, frequency, sharpness.")
-      .def_property_readonly("frame", &NeuralSdf::frame, "Mesh coordinates and the unit cube.")
+      .def_property_readonly("frame", &NeuralSdf::frame, "The Frame of the unit cube.")
       .def_property_readonly(
           "report", [](const py::object& self) { return FitReportResult(report_of(self)); },
-          "What the fit measured; AttributeError for a network that fit_sdf did not make.")
+          "The FitReport; AttributeError for a network that fit_sdf did not make.")
       .def("save", &save, "path"_a,
-           "Writes network, frame and report as one file, whole or not at all; OSError where that fails.")
-      .def_static(
-          "load", &load, "path"_a,
-          "What save() wrote. OSError for a file that cannot be read, InvalidInput naming the file for\n"
-          "one that is damaged, foreign, of another kind or version, or holds unusable numbers.")
+           "Writes network, frame and report as one file, in whole or not at all; OSError where the system "
+           "refuses.")
+      .def_static("load", &load, "path"_a,
+                  R"(
+The network of a file that save() wrote, with its report.
+
+OSError for a file that cannot be read. InvalidInput, naming the file, for one that is damaged, foreign, of
+another kind or version, or holds unusable numbers.)")
       .def("__repr__", [](const NeuralSdf& sdf) {
         const MlpShape& s = sdf.shape();
         return py::str("NeuralSdf({} x {}, octaves={}, frequency={:g})")
@@ -182,23 +178,22 @@ namespace {
 py::object with_report(const FitResult& result) {
   const FitReport& r = result.report;
   py::object sdf = py::cast(result.sdf);
-  attach_report(sdf, make_report("FitReport",
-                                 py::dict("near_mean"_a = r.near_mean, "near_max"_a = r.near_max,
-                                          "volume_mean"_a = r.volume_mean, "volume_max"_a = r.volume_max,
-                                          "scale"_a = r.scale, "iterations"_a = r.iterations,
-                                          "seconds"_a = r.seconds, "distance_seconds"_a = r.distance_seconds,
-                                          "stopped_by"_a = name_of(r.stopped_by), "device"_a = r.device)));
+  attach_report(sdf, make_report("FitReport", "near_mean"_a = r.near_mean, "near_max"_a = r.near_max,
+                                 "volume_mean"_a = r.volume_mean, "volume_max"_a = r.volume_max,
+                                 "scale"_a = r.scale, "iterations"_a = r.iterations, "seconds"_a = r.seconds,
+                                 "distance_seconds"_a = r.distance_seconds,
+                                 "stopped_by"_a = name_of(r.stopped_by), "device"_a = r.device));
   return sdf;
 }
 
 NeuralSdfResult fit(const ArrayArgument& vertices, const ArrayArgument& triangles, const FitOptions& options,
                     const std::optional<CallbackArgument>& callback, Task* task) {
-  const Points v = as_points(vertices, "vertices");
-  const Triangles f = as_triangles(triangles, "triangles");
+  const TriangleMesh mesh = as_mesh(vertices, triangles);
   const IterationObserver observer = as_observer(callback.value_or(py::none()));
   try {
-    return with_report(
-        run_long(task, [&](const Progress& progress) { return fit_sdf(v, f, options, progress, observer); }));
+    return with_report(run_long(task, [&](const Progress& progress) {
+      return fit_sdf(mesh.vertices, mesh.triangles, options, progress, observer);
+    }));
   } catch (const FitDiverged& error) {
     raise_diverged(error, with_report(error.last_good));
   }
@@ -207,21 +202,20 @@ NeuralSdfResult fit(const ArrayArgument& vertices, const ArrayArgument& triangle
 }  // namespace
 
 void bind_fit(py::module_& module) {
-  module.def(
-      "fit_sdf", &fit, "vertices"_a, "triangles"_a, py::arg_v("options", FitOptions(), "FitOptions()"),
-      py::kw_only(), "callback"_a = py::none(), "task"_a = py::none(),
-      "A NeuralSdf that has learnt the signed distance of a triangle soup.\n\n"
-      "vertices (n,3), triangles (m,3), counter-clockwise seen from outside; as signed_distance, it takes "
-      "open\n"
-      "and self-intersecting meshes. The frame is that of sample_mesh, larger where the mesh would leave its "
-      "cube.\n"
-      "Exact distances near the surface and in the cube are regressed with the mean absolute error; the "
-      "hidden\n"
-      "layers learn by orthogonalised momentum (Muon; Jordan et al. 2024), the rest by Adam, at a rate that\n"
-      "falls linearly to zero. `callback` gets each Iteration, whose one term is error, and ends the "
-      "fit\n"
-      "by raising StopIteration. report: a FitReport.\n"
-      "InvalidInput for a broken mesh or option; Cancelled; Diverged, whose last_good is the state before.");
+  module.def("fit_sdf", &fit, "vertices"_a, "triangles"_a, py::arg_v("options", FitOptions(), "FitOptions()"),
+             py::kw_only(), "callback"_a = py::none(), "task"_a = py::none(),
+             R"(
+A NeuralSdf fitted to the signed distance of a triangle soup.
+
+vertices (n, 3), triangles (m, 3), counter-clockwise seen from outside; open and self-intersecting meshes are
+allowed, as in signed_distance. The frame is that of sample_mesh, enlarged where the mesh would leave its
+cube. Exact distances near the surface and in the cube are regressed with the mean absolute error. The hidden
+layers are trained by orthogonalised momentum (Muon; Jordan et al. 2024), the rest by Adam, at a rate that
+falls linearly to zero.
+
+`callback` is called with each Iteration, whose one term is error, and ends the fit by raising StopIteration.
+report is a FitReport. InvalidInput for a broken mesh or option; Cancelled; Diverged, whose `last_good` is the
+last fit with finite numbers.)");
 }
 
 }  // namespace arapfields::python

@@ -20,31 +20,27 @@ namespace arapfields::python {
 namespace {
 
 py::object solve_report(const SolveReport& report, double scale) {
+  const std::size_t count = report.handle_mean.size();
   double mean = 0.0, max = 0.0;
   py::list handles, loss;
-  const py::object handle_error = py::module_::import("arapfields.reports").attr("HandleError");
-  for (std::size_t i = 0; i < report.handle_mean.size(); ++i) {
-    mean += report.handle_mean[i] / static_cast<double>(report.handle_mean.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    mean += report.handle_mean[i] / static_cast<double>(count);
     max = std::max(max, report.handle_max[i]);
-    handles.append(
-        handle_error("error_mean"_a = report.handle_mean[i], "error_max"_a = report.handle_max[i]));
+    handles.append(make_report("HandleError", "error_mean"_a = report.handle_mean[i],
+                               "error_max"_a = report.handle_max[i]));
   }
   for (const auto& [iteration, value] : report.loop.history) loss.append(py::make_tuple(iteration, value));
-  return make_report(
-      "SolveReport",
-      py::dict("stretch"_a = report.arap.stretch, "bend"_a = report.arap.bend,
-               "energy"_a = report.arap.energy, "handle_error_mean"_a = mean, "handle_error_max"_a = max,
-               "handles"_a = py::tuple(handles), "min_determinant"_a = report.distortion.min_determinant,
-               "flipped_share"_a = report.distortion.flipped_share,
-               "max_stretch"_a = report.distortion.max_stretch,
-               "min_stretch"_a = report.distortion.min_stretch, "iterations"_a = report.loop.iterations,
-               "seconds"_a = report.loop.seconds, "stopped_by"_a = name_of(report.loop.stopped_by),
-               "scale"_a = scale, "loss"_a = py::tuple(loss),
-               "notes"_a = py::tuple(py::cast(report.warnings)), "preference"_a = report.preference,
-               "far_target"_a = report.far_target));
+  return make_report("SolveReport", "energy"_a = report.arap.energy, "handle_error_mean"_a = mean,
+                     "handle_error_max"_a = max, "handles"_a = py::tuple(handles),
+                     "max_stretch"_a = report.distortion.max_stretch,
+                     "min_stretch"_a = report.distortion.min_stretch, "iterations"_a = report.loop.iterations,
+                     "seconds"_a = report.loop.seconds, "stopped_by"_a = name_of(report.loop.stopped_by),
+                     "scale"_a = scale, "loss"_a = py::tuple(loss),
+                     "notes"_a = py::tuple(py::cast(report.warnings)), "preference"_a = report.preference,
+                     "far_target"_a = report.far_target, **field_measures(report.arap, report.distortion));
 }
 
-py::object wrap(const Solution& solution) {
+py::object with_report(const Solution& solution) {
   py::object field = py::cast(solution.field);
   attach_report(field, solve_report(solution.report, solution.field->frame().scale));
   return field;
@@ -54,9 +50,9 @@ py::object wrap(const Solution& solution) {
 template <class Solve>
 FieldResult solve(Task* task, Solve&& call) {
   try {
-    return wrap(run_long(task, call));
+    return with_report(run_long(task, call));
   } catch (const SolveDiverged& error) {
-    raise_diverged(error, wrap(error.last_good));
+    raise_diverged(error, with_report(error.last_good));
   }
 }
 
@@ -83,7 +79,7 @@ FieldResult stylize_samples(const SurfaceSamples& samples, const NormalsArgument
                             const std::optional<ArrayArgument>& up, const EnergiesArgument& energies,
                             const std::optional<CallbackArgument>& callback, Task* task) {
   const Style style = turned_style(normals, orientation);
-  const Vector blend = weights ? as_vector(*weights, "weights") : Vector();
+  const Vector blend = as_vector(weights, "weights");
   const Vec3 upwards = up ? as_vec3(*up, "up") : Vec3(Vec3::UnitZ());
   const auto held = as_handles(handles);
   const SolveHooks hooks{as_energies(energies, samples.frame), as_observer(callback.value_or(py::none()))};
@@ -98,17 +94,15 @@ InverseResult inverse_of(const DeformationField& field, const SurfaceSamples& sa
       run_long(task, [&](const Progress& p) { return train_inverse(field, samples, options, p); });
   py::object result = py::cast(solution.field);
   const SolveReport& r = solution.report;
-  attach_report(result,
-                make_report("InverseReport",
-                            py::dict("error_mean"_a = r.handle_mean[0], "error_max"_a = r.handle_max[0],
-                                     "iterations"_a = r.loop.iterations, "seconds"_a = r.loop.seconds)));
+  attach_report(
+      result, make_report("InverseReport", "error_mean"_a = r.handle_mean[0], "error_max"_a = r.handle_max[0],
+                          "iterations"_a = r.loop.iterations, "seconds"_a = r.loop.seconds));
   return result;
 }
 
-/// What the field does at points of mesh coordinates.
 FieldMeasures measures(const DeformationField& field, const ArrayArgument& points) {
-  const Points where = as_points(points, "points");
-  return run_long(nullptr, [&](const Progress&) { return measure_at(field, where); });
+  const Points mesh = as_points(points, "points");
+  return run_long([&] { return measure_at(field, mesh); });
 }
 
 std::pair<double, double> energy_of(const DeformationField& field, const ArrayArgument& points) {
@@ -119,59 +113,61 @@ std::pair<double, double> energy_of(const DeformationField& field, const ArrayAr
 }  // namespace
 
 void bind_solve(py::module_& module) {
-  module.def(
-      "deform", &deform_samples, "samples"_a, "handles"_a,
-      py::arg_v("options", DeformOptions(), "DeformOptions()"), py::kw_only(), "energies"_a = py::tuple(),
-      "callback"_a = py::none(), "task"_a = py::none(),
-      "The DeformationField that moves the surface's handles (CuboidHandle, PointHandle, RegionHandle) to "
-      "their\n"
-      "targets and is as rigid as possible on the samples elsewhere: it minimises mean stretch + bending · "
-      "mean\n"
-      "bend + handle_weight · mean squared handle distance (section 4 of As-Rigid-As-Possible "
-      "Regularization\n"
-      "for Implicit Surfaces, with the stretch as printed there; the authors' package divides it by 3), and\n"
-      "each of `energies`, functions of Jets that return an EnergyValue. `callback` gets each "
-      "Iteration\n"
-      "(terms: stretch, bend, barrier, handles, invertibility, energies[i], those that there are); raising\n"
-      "StopIteration in it ends the solve with what was reached, anything else comes through.\n"
-      "field.report is a SolveReport: energies, handle errors, the smallest det J, times, the loss history.\n"
-      "Raises InvalidInput, Cancelled, and Diverged, whose attribute `last_good` is the field before that.");
-  module.def(
-      "stylize", &stylize_samples, "samples"_a, "normals"_a,
-      py::arg_v("options", StylizeOptions(), "StylizeOptions()"), py::kw_only(), "handles"_a = py::tuple(),
-      "weights"_a = py::none(), "orientation"_a = py::none(), "up"_a = py::none(), "energies"_a = py::tuple(),
-      "callback"_a = py::none(), "task"_a = py::none(),
-      "The DeformationField that turns the surface's normals to preferred ones: `normals` (k, 3), a style's\n"
-      "name, or an ObjectStyle, turned by `orientation` (3, 3). `weights` (n,) blend the effect sample by "
-      "sample. Without "
-      "handles\n"
-      "the figure keeps its stance (options.keep_stance) and the lowest sample stays in place (nearly, "
-      "beside\n"
-      "`energies`), seen along `up` (3,), else z; strength 0 is the identity. `energies` and `callback` are\n"
-      "deform's, with two more terms, style and stance. field.report is a SolveReport with the mean "
-      "preference\n"
-      "reached. Raises as deform does.");
-  module.def(
-      "train_inverse", &inverse_of, "field"_a, "samples"_a,
-      py::arg_v("options", InverseTrainingOptions(), "InverseTrainingOptions()"), py::kw_only(),
-      "task"_a = py::none(),
-      "A network that approximates field's inverse, as a DeformationField: trained so that the field takes\n"
-      "its values back, at deformed samples and in their box (the paper's cycle loss), and on the samples'\n"
-      "own pairs. report: an InverseReport. For exact inverses of single points use field.inverse.");
+  module.def("deform", &deform_samples, "samples"_a, "handles"_a,
+             py::arg_v("options", DeformOptions(), "DeformOptions()"), py::kw_only(),
+             "energies"_a = py::tuple(), "callback"_a = py::none(), "task"_a = py::none(), R"(
+The DeformationField that moves the handles to their targets and is as rigid as possible elsewhere.
+
+It minimises mean stretch + bending · mean bend + handle_weight · mean squared handle distance, over the
+samples and the `handles` (CuboidHandle, PointHandle, RegionHandle). Source: section 4 of Djuren et al. 2026,
+"As-Rigid-As-Possible Regularization for Implicit Surfaces". The stretch is the paper's; the authors' package
+divides it by 3.
+
+`energies` are functions of Jets that return an EnergyValue; each joins the loss with weight 1. `callback` is
+called with an Iteration after each iteration, whose terms are those of stretch, bend, barrier, handles,
+invertibility and energies[i] that are in use. StopIteration in it ends the solve with the field reached so
+far; any other exception propagates.
+
+field.report is a SolveReport. Raises InvalidInput, Cancelled and Diverged, whose attribute `last_good` is the
+last field with finite numbers.)");
+  module.def("stylize", &stylize_samples, "samples"_a, "normals"_a,
+             py::arg_v("options", StylizeOptions(), "StylizeOptions()"), py::kw_only(),
+             "handles"_a = py::tuple(), "weights"_a = py::none(), "orientation"_a = py::none(),
+             "up"_a = py::none(), "energies"_a = py::tuple(), "callback"_a = py::none(),
+             "task"_a = py::none(), R"(
+The DeformationField that turns the surface's normals to preferred ones, as rigidly as possible.
+
+`normals` is an array (k, 3), the name of a preset style, or an ObjectStyle; `orientation` (3, 3) rotates it.
+`weights` (n,) scale the effect at each sample. Source: Kohlbrenner et al. 2021, "Gauss Stylization".
+
+Without handles the figure keeps its stance (options.keep_stance), and its lowest sample along `up` (3,)
+stays in place. `up` is z unless given. Strength 0 is the identity. `energies` and `callback` are those of
+deform; the callback's terms add style and stance. field.report is a SolveReport, with the mean preference.
+Raises as deform does.)");
+  module.def("train_inverse", &inverse_of, "field"_a, "samples"_a,
+             py::arg_v("options", InverseTrainingOptions(), "InverseTrainingOptions()"), py::kw_only(),
+             "task"_a = py::none(), R"(
+A network that approximates the inverse of a field, as a DeformationField.
+
+It is trained so that the field maps its values back (the paper's cycle loss), at deformed samples and in
+their bounding box, and on the samples' own pairs. report is an InverseReport. For exact inverses of single
+points use field.inverse.)");
   module.def("device_report", &device_report,
-             "In words: whether device='cuda' can be asked for, and if not, why.");
-  module.def("arap_energy", &energy_of, "field"_a, "points"_a,
-             "(stretch, bend), means over the points (p, 3) of the rest surface, in the field's unit cube:\n"
-             "stretch ‖J − R‖² with R the rotation closest to J, bend the squared speed at which R turns.");
+             "A sentence that says whether device='cuda' is available, and if not, why.");
+  module.def("arap_energy", &energy_of, "field"_a, "points"_a, R"(
+Mean (stretch, bend) over points (p, 3) of the rest surface, in the field's unit cube.
+
+The stretch is ‖J − R‖² with R the rotation closest to J; the bend is the squared speed at which R turns.)");
   module.def(
       "distortion",
       [](const DeformationField& field, const ArrayArgument& points) {
         return measures(field, points).distortion;
       },
-      "field"_a, "points"_a,
-      "The Distortion at points (p, 3) of the rest surface, for instance the vertices of extract_surface:\n"
-      "the smallest det J, the share of points where it is not positive (the field folds there), and the\n"
-      "largest and smallest stretch.");
+      "field"_a, "points"_a, R"(
+The Distortion at points (p, 3) of the rest surface, such as the vertices of extract_surface.
+
+It holds the smallest det J, the share of points where det J ≤ 0 (the field folds there), and the largest and
+the smallest stretch.)");
 }
 
 void bind_solve_testing(py::module_& module) {
@@ -202,8 +198,8 @@ void bind_solve_testing(py::module_& module) {
       .def(
           "__call__",
           [](LossProbe& self, const Vector& parameters, std::uint64_t seed) {
-            const LossGradient found = self(parameters, seed);
-            return py::make_tuple(found.loss, found.gradient);
+            const LossGradient result = self(parameters, seed);
+            return py::make_tuple(result.loss, result.gradient);
           },
           "parameters"_a, "seed"_a = 0)
       .def_property_readonly("size", &LossProbe::size);

@@ -9,11 +9,11 @@
 namespace arapfields::python {
 namespace {
 
-std::vector<Landmark> as_landmarks(const LandmarksArgument& given) {
+std::vector<Landmark> as_landmarks(const LandmarksArgument& argument) {
   const std::string allowed = "pairs (rest, on_target) of places (3,) are needed";
   std::vector<Landmark> landmarks;
   for_each_item(
-      given, "landmarks", allowed, sizeof(Landmark), [&](const py::object& pair, const std::string& name) {
+      argument, "landmarks", allowed, sizeof(Landmark), [&](const py::object& pair, const std::string& name) {
         Landmark landmark;
         int k = 0;
         for_each_item(pair, name, allowed, 0.0, [&](const py::object& place, const std::string& which) {
@@ -35,32 +35,29 @@ WrapResult wrap_samples(const SurfaceSamples& samples, const FunctionArgument& t
   py::object field = py::cast(solution.field);
   const WrapReport& r = solution.report;
   attach_report(
-      field,
-      make_report(
-          "WrapReport",
-          py::dict("to_target_mean"_a = r.to_target_mean, "to_target_95"_a = r.to_target_95,
-                   "from_target_mean"_a = r.from_target_mean, "from_target_95"_a = r.from_target_95,
-                   "matched_share"_a = r.matched_share, "landmarks"_a = py::tuple(py::cast(r.landmarks)),
-                   "diagonal"_a = r.diagonal, "scale"_a = r.scale, "stretch"_a = r.arap.stretch,
-                   "bend"_a = r.arap.bend, "min_determinant"_a = r.distortion.min_determinant,
-                   "flipped_share"_a = r.distortion.flipped_share, "iterations"_a = r.iterations,
-                   "seconds"_a = r.seconds, "notes"_a = py::tuple(py::cast(r.notes)))));
+      field, make_report("WrapReport", "to_target_mean"_a = r.to_target_mean,
+                         "to_target_95"_a = r.to_target_95, "from_target_mean"_a = r.from_target_mean,
+                         "from_target_95"_a = r.from_target_95, "matched_share"_a = r.matched_share,
+                         "landmarks"_a = py::tuple(py::cast(r.landmarks)), "diagonal"_a = r.diagonal,
+                         "scale"_a = r.scale, "iterations"_a = r.iterations, "seconds"_a = r.seconds,
+                         "notes"_a = py::tuple(py::cast(r.notes)), **field_measures(r.arap, r.distortion)));
   return field;
 }
 
 }  // namespace
 
 void bind_wrap(py::module_& module) {
-  module.def(
-      "wrap", &wrap_samples, "samples"_a, "target"_a, "landmarks"_a = py::tuple(),
-      py::arg_v("options", WrapOptions(), "WrapOptions()"), py::kw_only(), "task"_a = py::none(),
-      "The DeformationField that lays the surface onto the zero surface of `target`, an ImplicitFunction\n"
-      "(MeshSdf, which may be open and broken; NeuralSdf; one of your own), as rigidly as possible: moved,\n"
-      "turned and scaled as a whole first, then bent in stages that resist less and less. `landmarks` are\n"
-      "pairs (rest, on_target) of places (3,) that belong together; without them the best of many turns\n"
-      "serves, which suits shapes that are alike. What an open target lacks is carried along. The samples'\n"
-      "weights say what resists more. field.report is a WrapReport: distances both ways, the landmarks'\n"
-      "errors, det J, notes. Raises InvalidInput and Cancelled.");
+  module.def("wrap", &wrap_samples, "samples"_a, "target"_a, "landmarks"_a = py::tuple(),
+             py::arg_v("options", WrapOptions(), "WrapOptions()"), py::kw_only(), "task"_a = py::none(), R"(
+The DeformationField that lays a surface onto the zero surface of `target`, as rigidly as possible.
+
+`target` is an ImplicitFunction: a MeshSdf, which may be open and broken, a NeuralSdf, or a subclass of your
+own. The surface is first moved, rotated and scaled as a whole, then deformed in stages of falling stiffness.
+`landmarks` are pairs (rest, on_target) of corresponding points (3,). Without them the best of many rotations
+is taken, which suits shapes that are alike.
+
+Parts without a counterpart on an open target follow their neighbours. The samples' weights set where the
+surface is stiffer. field.report is a WrapReport. Raises InvalidInput and Cancelled.)");
 }
 
 }  // namespace arapfields::python

@@ -23,11 +23,11 @@ class PythonEnergy final : public ExternalEnergy {
                   const JetView<double>& cotangents) override {
     const py::gil_scoped_acquire acquire;
     const py::object type = py::module_::import("arapfields.energies").attr("Jets");
-    const py::object found =
+    const py::object returned =
         (*call_)(type(frame_.to_mesh(points), values(jets), jacobians(jets), hessians(jets)));
     const std::string allowed = "an EnergyValue is needed, or a tuple like it";
-    require(py::isinstance<py::tuple>(found), name_, "it returned " + type_text(found), allowed);
-    const auto parts = py::reinterpret_borrow<py::tuple>(found);
+    require(py::isinstance<py::tuple>(returned), name_, "it returned " + type_text(returned), allowed);
+    const auto parts = py::reinterpret_borrow<py::tuple>(returned);
     require(parts.size() >= 1 && parts.size() <= 4, name_,
             "it returned a tuple of " + std::to_string(parts.size()), allowed);
     add_values(parts, jets.count, cotangents);
@@ -71,10 +71,10 @@ class PythonEnergy final : public ExternalEnergy {
     Array given = as_doubles(parts[place], argument);
     bool fits = given.ndim() == static_cast<py::ssize_t>(place + 1) && given.shape(0) == count;
     for (py::ssize_t axis = 1; fits && axis < given.ndim(); ++axis) fits = given.shape(axis) == 3;
-    std::string wanted = "(" + std::to_string(count);
-    for (std::size_t axis = 0; axis < place; ++axis) wanted += ", 3";
+    std::string expected_shape = "(" + std::to_string(count);
+    for (std::size_t axis = 0; axis < place; ++axis) expected_shape += ", 3";
     require(fits, argument, "shape " + py::cast<std::string>(py::str(given.attr("shape"))),
-            "derivatives of shape " + wanted + ") are needed");
+            "derivatives of shape " + expected_shape + ") are needed");
     return given;
   }
 

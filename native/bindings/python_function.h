@@ -11,9 +11,8 @@
 
 namespace arapfields::python {
 
-/// The native half of a Python subclass of ImplicitFunction, whose __call__ takes points (n,3) of mesh
-/// coordinates to distances (n), and whose gradient(), where it has one, takes them to derivatives (n,3).
-/// One thread at a time is let in.
+/// The native half of a Python subclass of ImplicitFunction. Its __call__ maps points (n,3) of mesh
+/// coordinates to distances (n), its gradient() to gradients (n,3). Thread-safe: one thread enters at a time.
 class PythonFunction final : public ImplicitFunction {
  public:
   explicit PythonFunction(const Frame& frame) : frame_(frame) {}
@@ -25,15 +24,19 @@ class PythonFunction final : public ImplicitFunction {
   Frame frame() const override { return frame_; }
 
  private:
+  /// call(the Python object), with the GIL, from one thread at a time.
+  template <class Call>
+  auto locked(Call&& call) const;
+
   Frame frame_;
-  mutable std::recursive_mutex one_at_a_time_;
+  mutable std::recursive_mutex mutex_;
 };
 
-/// The function that a Python object is; with it, C++ keeps the whole object. InvalidInput where it is none.
-std::shared_ptr<const ImplicitFunction> as_function(const py::object& given, const std::string& argument);
+/// The ImplicitFunction that a Python object is, keeping the object alive. InvalidInput for other objects.
+std::shared_ptr<const ImplicitFunction> as_function(const py::object& object, const std::string& argument);
 
-/// Python's energies as those of a solve over samples with this frame. Each is any callable of
-/// arapfields.Jets; InvalidInput names what is not, and what returns something else than an EnergyValue.
+/// Python callables of arapfields.Jets as energies of a solve over samples with this frame. InvalidInput
+/// names an item that is not callable, or that returns anything but an EnergyValue.
 ExternalEnergies as_energies(const py::object& energies, const Frame& frame);
 
 }  // namespace arapfields::python

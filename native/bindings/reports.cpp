@@ -5,8 +5,10 @@
 
 namespace arapfields::python {
 
-py::object make_report(const char* kind, const py::dict& fields) {
-  return py::module_::import("arapfields.reports").attr(kind)(**fields);
+py::dict field_measures(const ArapValue& arap, const Distortion& distortion) {
+  return py::dict("stretch"_a = arap.stretch, "bend"_a = arap.bend,
+                  "min_determinant"_a = distortion.min_determinant,
+                  "flipped_share"_a = distortion.flipped_share);
 }
 
 const char* name_of(StopReason reason) {
@@ -47,8 +49,8 @@ IterationObserver as_observer(const py::object& callback) {
     py::dict terms;
     for (const LossTerm& term : iteration.terms) terms[py::str(term.name)] = term.value;
     try {
-      (*held)(make_report("Iteration", py::dict("iteration"_a = iteration.number, "loss"_a = iteration.loss,
-                                                "terms"_a = terms, "seconds"_a = iteration.seconds)));
+      (*held)(make_report("Iteration", "iteration"_a = iteration.number, "loss"_a = iteration.loss,
+                          "terms"_a = terms, "seconds"_a = iteration.seconds));
     } catch (const py::error_already_set& raised) {
       if (!raised.matches(PyExc_StopIteration)) throw;
       return false;

@@ -3,14 +3,22 @@
 #pragma once
 
 #include "bindings/bind.h"
+#include "energies/arap.h"
+#include "energies/distortion.h"
 #include "optimize/iteration.h"
 #include "optimize/loop_result.h"
 
 namespace arapfields::python {
 
-/// An object of the class `kind` with these fields.
-py::object make_report(const char* kind, const py::dict& fields);
-/// As Python names it.
+/// A report of the class arapfields.reports.`kind` with keyword fields: make_report("FitReport", "scale"_a
+/// = 1.0).
+template <class... Fields>
+py::object make_report(const char* kind, Fields&&... fields) {
+  return py::module_::import("arapfields.reports").attr(kind)(std::forward<Fields>(fields)...);
+}
+/// The fields that all reports on a field share, for `**` in make_report.
+py::dict field_measures(const ArapValue& arap, const Distortion& distortion);
+/// What a report's `stopped_by` says.
 const char* name_of(StopReason reason);
 
 /// Keeps a report on a field, a signed distance or samples.
@@ -19,8 +27,8 @@ void attach_report(const py::object& self, const py::object& report);
 py::object report_or_none(const py::object& self);
 py::object report_of(const py::object& self);
 
-/// Tells a Python function of each iteration, with an arapfields.Iteration: StopIteration ends the loop,
-/// anything else that it raises comes through. None: no observer.
+/// Calls a Python function with an arapfields.Iteration after each iteration. StopIteration ends the loop;
+/// any other exception propagates. None: no observer.
 IterationObserver as_observer(const py::object& callback);
 
 }  // namespace arapfields::python

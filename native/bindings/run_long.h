@@ -15,8 +15,8 @@ namespace arapfields::python {
 
 namespace py = pybind11;
 
-/// Ctrl-C during a native call: where Python's main thread makes the call, its signal handlers run now and
-/// then while it lasts, and the exception that one of them raises ends it.
+/// Ctrl-C during a native call. Where Python's main thread makes the call, signal handlers run about every
+/// 50 ms. The exception that a handler raises ends the call.
 class SignalWatch {
  public:
   SignalWatch();  ///< with the GIL
@@ -61,6 +61,12 @@ auto run_long(Task* task, Call&& call) {
     signals.rethrow();
     throw;
   }
+}
+
+/// The same for a call that reports no progress: call().
+template <class Call>
+auto run_long(Call&& call) {
+  return run_long(nullptr, [&](const Progress&) { return call(); });
 }
 
 }  // namespace arapfields::python

@@ -14,8 +14,7 @@ void* refuse_memory(std::size_t) {
 }  // namespace
 
 void refuse_uninitialised(const py::module_& module) {
-  // pybind11 asks for memory where an object without a value is to be used, and would then read what it
-  // finds.
+  // pybind11 allocates a value where an object without one is used, and would then read uninitialised memory.
   for (const auto& [name, value] : py::dict(module.attr("__dict__")))
     if (PyType_Check(value.ptr()) != 0) {
       if (auto* known = py::detail::get_type_info(reinterpret_cast<PyTypeObject*>(value.ptr())))

@@ -63,8 +63,9 @@ double system_memory() {
                                        &count) == KERN_SUCCESS;
   mach_port_deallocate(mach_task_self(), host);
   if (!known) return unknown;
-  const double there = static_cast<double>(pages.free_count) + pages.inactive_count + pages.purgeable_count;
-  return there * static_cast<double>(sysconf(_SC_PAGESIZE));
+  const double available =
+      static_cast<double>(pages.free_count) + pages.inactive_count + pages.purgeable_count;
+  return available * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
 #else
@@ -106,9 +107,9 @@ double available_memory() { return std::min({system_memory(), group_memory(), pr
 
 void require_memory(const std::string& argument, double bytes) {
   if (bytes < gib / 4) return;  // not worth a look
-  const double there = available_memory();
-  require(bytes <= there, argument, "this would take about " + in_gib(bytes) + " of memory",
-          in_gib(there) + " are free: use less");
+  const double available = available_memory();
+  require(bytes <= available, argument, "this would take about " + in_gib(bytes) + " of memory",
+          in_gib(available) + " are free: use less");
 }
 
 }  // namespace arapfields

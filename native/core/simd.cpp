@@ -21,9 +21,9 @@ SimdLevel detect() {
 #elif defined(__aarch64__)
   level = SimdLevel::neon;  // part of the architecture
 #endif
-  const char* wanted = std::getenv("ARAPFIELDS_SIMD");
-  if (wanted == nullptr) return level;
-  const std::string name = wanted;
+  const char* requested = std::getenv("ARAPFIELDS_SIMD");
+  if (requested == nullptr) return level;
+  const std::string name = requested;
 #ifndef __APPLE__
   if (name == "baseline") return SimdLevel::baseline;
 #endif

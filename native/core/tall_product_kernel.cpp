@@ -14,9 +14,9 @@ void rows_of(const TallBlock<Scalar>& a, std::int64_t begin, std::int64_t end, c
     const int count = end - row < 4 ? static_cast<int>(end - row) : 4;
     const Scalar* from[4];
     for (int r = 0; r < 4; ++r) from[r] = a.values + (row + (r < count ? r : 0)) * a.stride;
-    const std::int64_t reach = a.lower && row + count < a.stride ? row + count : a.stride;
+    const std::int64_t row_end = a.lower && row + count < a.stride ? row + count : a.stride;
     Pack<Scalar> sums[4][3] = {};
-    for (std::int64_t j = 0; j < reach; j += lanes<Scalar>) {
+    for (std::int64_t j = 0; j < row_end; j += lanes<Scalar>) {
       Pack<Scalar> columns[3];
       for (int k = 0; k < 3; ++k) columns[k] = load(b + k * a.stride + j);
       for (int r = 0; r < 4; ++r) {

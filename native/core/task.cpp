@@ -22,8 +22,8 @@ std::string Task::message() const {
 
 void Task::report(double fraction, const std::string& message) {
   double seen = progress_.load(std::memory_order_relaxed);
-  const double wanted = std::clamp(fraction, 0.0, 1.0);
-  while (wanted > seen && !progress_.compare_exchange_weak(seen, wanted)) {
+  const double reached = std::clamp(fraction, 0.0, 1.0);
+  while (reached > seen && !progress_.compare_exchange_weak(seen, reached)) {
   }
   if (message.empty()) return;
   std::lock_guard lock(mutex_);
@@ -33,19 +33,19 @@ void Task::report(double fraction, const std::string& message) {
 void Task::watch(PointsIn points, double pause) {
   require(points.allFinite(), "points", "some are NaN or infinite", "all must be finite");
   require(pause >= 0.0, "seconds", std::to_string(pause), "must not be negative");
-  watch_ = points;
+  watched_points_ = points;
   pause_ = pause;
-  next_look_ = Clock::now();
+  next_preview_ = Clock::now();
 }
 
-Index Task::looks() const {
+Index Task::previews() const {
   std::lock_guard lock(mutex_);
-  return looks_;
+  return previews_;
 }
 
 PointsF Task::watched() const {
   std::lock_guard lock(mutex_);
-  return watched_;
+  return preview_;
 }
 
 Progress Progress::part(double from, double to) const {
@@ -69,18 +69,18 @@ void Progress::check() const {
   if (cancelled()) throw Cancelled();
 }
 
-void Progress::look(const std::function<Points(PointsIn)>& where) const {
-  constexpr int rest_over_look = 2;
-  if (task_ == nullptr || task_->watch_.rows() == 0) return;
+void Progress::preview(const std::function<Points(PointsIn)>& evaluate) const {
+  constexpr int work_over_preview = 2;
+  if (task_ == nullptr || task_->watched_points_.rows() == 0) return;
   const auto begin = Task::Clock::now();
-  if (begin < task_->next_look_) return;
-  PointsF found = where(task_->watch_).cast<float>();
+  if (begin < task_->next_preview_) return;
+  PointsF positions = evaluate(task_->watched_points_).cast<float>();
   const auto took = Task::Clock::now() - begin;
-  const auto pause = std::max<Task::Clock::duration>(seconds(task_->pause_), rest_over_look * took + took);
-  task_->next_look_ = begin + pause;
+  const auto pause = std::max<Task::Clock::duration>(seconds(task_->pause_), work_over_preview * took + took);
+  task_->next_preview_ = begin + pause;
   std::lock_guard lock(task_->mutex_);
-  task_->watched_ = std::move(found);
-  ++task_->looks_;
+  task_->preview_ = std::move(positions);
+  ++task_->previews_;
 }
 
 }  // namespace arapfields

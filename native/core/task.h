@@ -11,7 +11,7 @@
 
 namespace arapfields {
 
-/// What a caller holds while a long call runs: it may cancel, and it may read progress, from any thread.
+/// Handle on a long call: any thread may cancel it and read its progress.
 class ARAPFIELDS_EXPORT Task {
  public:
   void cancel() { cancelled_.store(true, std::memory_order_relaxed); }
@@ -21,11 +21,12 @@ class ARAPFIELDS_EXPORT Task {
   std::string message() const;
   void report(double fraction, const std::string& message);
 
-  /// Asks the running call to say where its present field takes these points, as soon as it has one and then
-  /// about every `seconds`. Called before the call begins. Looks take a third of the call's time at most.
+  /// Requests previews of a solve: the positions of these points under the field reached so far, as soon as
+  /// there is one and then about every `seconds`. Must be called before the solve begins. Previews take at
+  /// most a third of the solve's time.
   void watch(PointsIn points, double seconds);
-  /// How often that was done, and where the points (n,3) were at the last time; (0, 3) at first.
-  Index looks() const;
+  /// Number of previews so far, and the points' positions (n,3) in the latest; (0, 3) before the first.
+  Index previews() const;
   PointsF watched() const;
 
  private:
@@ -36,22 +37,23 @@ class ARAPFIELDS_EXPORT Task {
   std::atomic<double> progress_{0.0};
   mutable std::mutex mutex_;
   std::string message_;
-  Points watch_;
-  PointsF watched_;
-  Index looks_ = 0;
+  Points watched_points_;
+  PointsF preview_;
+  Index previews_ = 0;
   double pause_ = 0.0;
-  Clock::time_point next_look_;
+  Clock::time_point next_preview_;
 };
 
-/// A stage's share of a Task's progress; what native functions take. Without a Task it does nothing.
+/// The part of a Task's progress that belongs to one stage. Native functions take it; without a Task it does
+/// nothing.
 /// Call check() at least every 50 ms of work so that a cancel takes effect within 0.2 s.
 class ARAPFIELDS_EXPORT Progress {
  public:
-  /// Asked at each look at the task, on the thread that looks: true cancels the task.
+  /// Called at each check of the task, on the checking thread: true cancels the task.
   using Interruption = std::function<bool()>;
 
   Progress() = default;
-  /// What `interruption` points to (null: nothing) must outlive all copies; it needs a task to cancel.
+  /// `interruption` (may be null) must outlive all copies. It needs a task to cancel.
   explicit Progress(Task* task, double begin = 0.0, double end = 1.0,
                     const Interruption* interruption = nullptr)
       : task_(task), begin_(begin), end_(end), interruption_(interruption) {}
@@ -62,8 +64,8 @@ class ARAPFIELDS_EXPORT Progress {
   void report(double fraction, const std::string& message = {}) const;
   /// Throws Cancelled if the task was cancelled.
   void check() const;
-  /// For whoever watches: where a look is due, asks `where` for the watched points' present places.
-  void look(const std::function<Points(PointsIn)>& where) const;
+  /// Makes a preview where one is due: `evaluate` maps the watched points to their current positions.
+  void preview(const std::function<Points(PointsIn)>& evaluate) const;
   /// For loops on worker threads, which must not throw: they leave early and the caller then check()s.
   bool cancelled() const;
 

@@ -55,8 +55,8 @@ void name_thread() {
   pthread_setname_np("arapfields");
 #elif defined(_WIN32)
   using Describe = HRESULT(WINAPI*)(HANDLE, const wchar_t*);  // of Windows 10 and later
-  const auto found = GetProcAddress(GetModuleHandleW(L"kernel32.dll"), "SetThreadDescription");
-  if (const auto describe = reinterpret_cast<Describe>(reinterpret_cast<void*>(found)))
+  const auto address = GetProcAddress(GetModuleHandleW(L"kernel32.dll"), "SetThreadDescription");
+  if (const auto describe = reinterpret_cast<Describe>(reinterpret_cast<void*>(address)))
     describe(GetCurrentThread(), L"arapfields");
 #endif
 }

@@ -9,7 +9,7 @@ namespace arapfields {
 namespace {
 
 /// How far a disk reaches along and across a unit direction.
-double reach(double height, double radius, double cosine) {
+double half_extent_along(double height, double radius, double cosine) {
   return height * std::abs(cosine) + radius * std::sqrt(std::max(0.0, 1.0 - cosine * cosine));
 }
 
@@ -27,7 +27,7 @@ Disk disk_around(const Disk* parts, int count, const Vec3& direction) {
   for (int i = 0; i < count; ++i) {
     const Vec3 center = axes * parts[i].center, cosines = axes * parts[i].normal;
     for (int k = 0; k < 3; ++k) {
-      const double extent = reach(parts[i].height, parts[i].radius, cosines[k]);
+      const double extent = half_extent_along(parts[i].height, parts[i].radius, cosines[k]);
       low[k] = std::min(low[k], center[k] - extent);
       high[k] = std::max(high[k], center[k] + extent);
     }

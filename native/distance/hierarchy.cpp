@@ -83,9 +83,9 @@ class Summarizer {
   Summary top(std::int32_t number) {
     return summarize(number, [&](std::int32_t child) {
       if (child < 0) return leaf(~child);
-      const auto found = std::lower_bound(topology_.subtrees.begin(), topology_.subtrees.end(), child);
-      if (found == topology_.subtrees.end() || *found != child) return top(child);
-      return finished_[found - topology_.subtrees.begin()];
+      const auto subtree = std::lower_bound(topology_.subtrees.begin(), topology_.subtrees.end(), child);
+      if (subtree == topology_.subtrees.end() || *subtree != child) return top(child);
+      return finished_[subtree - topology_.subtrees.begin()];
     });
   }
 

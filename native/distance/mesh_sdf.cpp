@@ -9,7 +9,7 @@
 namespace arapfields {
 namespace {
 
-// Of the frame's scale: nearer to a triangle the way to it is lost in rounding.
+// Of the frame's scale: nearer to a triangle the offset to it is lost in rounding.
 constexpr double on_surface = 1e-12;
 constexpr Index grain = 1024;
 
@@ -40,9 +40,9 @@ Vector MeshSdf::evaluate(PointsIn points, Points* gradients, const Progress& pro
   gradients->resize(points.rows(), 3);
   parallel_for(0, points.rows(), grain, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
-      const Vec3 way = (points.row(i) - closest.points.row(i)) / frame_.scale;
-      if (way.norm() > on_surface)
-        gradients->row(i) = (distances[i] < 0.0 ? -1.0 : 1.0) * way.normalized();
+      const Vec3 offset = (points.row(i) - closest.points.row(i)) / frame_.scale;
+      if (offset.norm() > on_surface)
+        gradients->row(i) = (distances[i] < 0.0 ? -1.0 : 1.0) * offset.normalized();
       else
         gradients->row(i) = normals_.row(closest.triangles[i]);
     }

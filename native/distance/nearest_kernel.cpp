@@ -209,8 +209,8 @@ void overlapping(const double* points, const Nearest* nearest, int count, std::u
     std::uint64_t mask = 0;
     for (int j = 0; j < linked_points; ++j) {
       const double dx = x[0][i] - x[0][j], dy = x[1][i] - x[1][j], dz = x[2][i] - x[2][j];
-      const double reach = radius[i] + radius[j];
-      mask |= dx * dx + dy * dy + dz * dz < reach * reach ? bit[j] : 0;
+      const double sum_of_radii = radius[i] + radius[j];
+      mask |= dx * dx + dy * dy + dz * dz < sum_of_radii * sum_of_radii ? bit[j] : 0;
     }
     links[i] = mask;
   }

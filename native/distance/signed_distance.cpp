@@ -26,11 +26,11 @@ constexpr Index sorted_points = Index{1} << 21;
 constexpr Index block_size = linked_points;
 constexpr double farthest = 1e90;
 
-/// Distances, in radii of a cluster, from which its moments stand for it. Sides are decided by the coarsest
-/// that leaves no doubt: what an evaluation misses stayed below 0.31 of the remainder that it reports in
-/// every mesh measured (near and far points; soups, scans, models), and half of it is allowed for.
+/// Distances, in radii of a cluster, beyond which its moments replace it. Sides are decided by the coarsest
+/// opening whose error bound excludes 1/2. In every mesh measured (near and far points; soups, scans, models)
+/// the error stayed below 0.31 of the remainder that the kernel reports; half of the remainder is the bound.
 constexpr std::array<double, 3> openings_of_sides = {1.2, 2.0, 4.0};
-constexpr double doubt_of_remainder = 0.5;
+constexpr double ambiguity_of_remainder = 0.5;
 constexpr double opening_of_numbers = 3.0;
 
 /// A few points that are near each other.
@@ -85,22 +85,22 @@ void run_nearest(const HierarchyView& view, const Block& block, Nearest* results
 
 /// inside[i]: the soup winds about point i more than half a time.
 void sides(const HierarchyView& view, const double* points, int count, bool* inside) {
-  std::array<double, 3 * block_size> asked;
-  std::array<int, block_size> who;
+  std::array<double, 3 * block_size> queries;
+  std::array<int, block_size> rows;
   std::array<double, block_size> numbers, remainders;
-  std::copy_n(points, 3 * count, asked.data());
-  std::iota(who.begin(), who.begin() + count, 0);
+  std::copy_n(points, 3 * count, queries.data());
+  std::iota(rows.begin(), rows.begin() + count, 0);
   for (const double opening : openings_of_sides) {
-    ARAPFIELDS_DISPATCH(winding(view, asked.data(), count, opening, numbers.data(), remainders.data()));
-    int doubtful = 0;
+    ARAPFIELDS_DISPATCH(winding(view, queries.data(), count, opening, numbers.data(), remainders.data()));
+    int ambiguous = 0;
     for (int i = 0; i < count; ++i) {
-      inside[who[i]] = numbers[i] > 0.5;
-      if (std::abs(numbers[i] - 0.5) > doubt_of_remainder * remainders[i]) continue;
-      who[doubtful] = who[i];
-      std::copy_n(asked.data() + 3 * i, 3, asked.data() + 3 * doubtful);
-      ++doubtful;
+      inside[rows[i]] = numbers[i] > 0.5;
+      if (std::abs(numbers[i] - 0.5) > ambiguity_of_remainder * remainders[i]) continue;
+      rows[ambiguous] = rows[i];
+      std::copy_n(queries.data() + 3 * i, 3, queries.data() + 3 * ambiguous);
+      ++ambiguous;
     }
-    count = doubtful;
+    count = ambiguous;
   }
 }
 
@@ -109,7 +109,7 @@ void sides(const HierarchyView& view, const double* points, int count, bool* ins
 void sides_of_clusters(const HierarchyView& view, const Block& block, const Nearest* nearest, bool* inside) {
   std::array<std::uint64_t, block_size> links;
   ARAPFIELDS_DISPATCH(overlapping(block.points.data(), nearest, block.count, links.data()));
-  std::array<double, 3 * block_size> asked;
+  std::array<double, 3 * block_size> queries;
   std::array<std::uint64_t, block_size> cluster;
   int clusters = 0;
   std::uint64_t left = block.count == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << block.count) - 1;
@@ -123,11 +123,11 @@ void sides_of_clusters(const HierarchyView& view, const Block& block, const Near
       left &= ~(std::uint64_t{1} << i);
       fresh = (fresh | links[i]) & left;
     }
-    std::copy_n(block.points.data() + 3 * center, 3, asked.data() + 3 * clusters);
+    std::copy_n(block.points.data() + 3 * center, 3, queries.data() + 3 * clusters);
     cluster[clusters++] = members;
   }
   std::array<bool, block_size> answers;
-  sides(view, asked.data(), clusters, answers.data());
+  sides(view, queries.data(), clusters, answers.data());
   for (int c = 0; c < clusters; ++c)
     for (std::uint64_t rest = cluster[c]; rest != 0; rest &= rest - 1)
       inside[std::countr_zero(rest)] = answers[c];

@@ -120,9 +120,9 @@ void winding(const HierarchyView& tree, const double* points, std::int64_t count
     const double* p = points + 3 * i;
     // So far away the mesh is a speck, and single precision would overflow.
     const bool remote = std::fabs(p[0]) > 1e9 || std::fabs(p[1]) > 1e9 || std::fabs(p[2]) > 1e9;
-    const Winding found = remote ? Winding{} : winding_at(tree, p, opening_squared);
-    numbers[i] = found.number;
-    if (remainders != nullptr) remainders[i] = found.remainder;
+    const Winding result = remote ? Winding{} : winding_at(tree, p, opening_squared);
+    numbers[i] = result.number;
+    if (remainders != nullptr) remainders[i] = result.remainder;
   }
 }
 

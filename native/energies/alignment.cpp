@@ -14,8 +14,8 @@ Alignment best_alignment(PointsIn points, PointsIn targets, const Vector& weight
   const double total = weights.sum();
   const Eigen::RowVector3d from = weights.transpose() * points / total;
   const Eigen::RowVector3d to = weights.transpose() * targets / total;
-  const Points arms = points.rowwise() - from, wanted = targets.rowwise() - to;
-  const Mat3 spread = wanted.transpose() * weights.asDiagonal() * arms;
+  const Points arms = points.rowwise() - from, target_arms = targets.rowwise() - to;
+  const Mat3 spread = target_arms.transpose() * weights.asDiagonal() * arms;
   result.rotation = closest_rotation(spread + (tie * spread.norm() + 1e-300) * Mat3::Identity());
   result.translation = to.transpose() - result.rotation * from.transpose();
   const Points moved = (points * result.rotation.transpose()).rowwise() + result.translation.transpose();
@@ -39,11 +39,12 @@ Mat4 rigid_motion(PointsIn points, PointsIn moved, const Vector& weights) {
   Points from = points.rowwise() - origin.transpose(), to = moved.rowwise() - end.transpose();
   const double unit = std::max(from.cwiseAbs().maxCoeff(), to.cwiseAbs().maxCoeff());
   if (unit > 0.0) from /= unit, to /= unit;
-  const Vector shares = weights.size() > 0 ? Vector(weights / weights.maxCoeff()) : Vector::Ones(from.rows());
-  const Alignment found = best_alignment(from, to, shares, 1e-12);
+  const Vector normalized_weights =
+      weights.size() > 0 ? Vector(weights / weights.maxCoeff()) : Vector::Ones(from.rows());
+  const Alignment alignment = best_alignment(from, to, normalized_weights, 1e-12);
   Mat4 result = Mat4::Identity();
-  result.topLeftCorner<3, 3>() = found.rotation;
-  result.topRightCorner<3, 1>() = end + unit * found.translation - found.rotation * origin;
+  result.topLeftCorner<3, 3>() = alignment.rotation;
+  result.topRightCorner<3, 1>() = end + unit * alignment.translation - alignment.rotation * origin;
   return result;
 }
 

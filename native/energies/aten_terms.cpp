@@ -36,11 +36,13 @@ at::Tensor of_normals(const at::Tensor& jets, const at::Tensor& normals, const a
   const at::Tensor length = at::sqrt(dots(image, image));
   const at::Tensor inverse = at::clamp_min(length, shortest).reciprocal();
   const at::Tensor unit = image * inverse;
-  NormalLoss made = loss_of(unit);
-  if (sample_weights.defined()) made.loss = made.loss * sample_weights.unsqueeze(1);
+  NormalLoss normal_loss = loss_of(unit);
+  if (sample_weights.defined()) normal_loss.loss = normal_loss.loss * sample_weights.unsqueeze(1);
   if (cotangents.defined()) {
-    const at::Tensor along = at::where(length > shortest, dots(unit, made.slope), at::zeros_like(length));
-    at::Tensor h = (made.slope - along * unit) * sign * inverse * (-weight * share * made.factor);
+    const at::Tensor along =
+        at::where(length > shortest, dots(unit, normal_loss.slope), at::zeros_like(length));
+    at::Tensor h =
+        (normal_loss.slope - along * unit) * sign * inverse * (-weight * share * normal_loss.factor);
     if (sample_weights.defined()) h = h * sample_weights.unsqueeze(1);
     // Of j_k: h × (n_{k+1} j_{k+2} − n_{k+2} j_{k+1}).
     const at::Tensor arms =
@@ -48,7 +50,7 @@ at::Tensor of_normals(const at::Tensor& jets, const at::Tensor& normals, const a
         at::index_select(columns, 0, tables.last - 1) * at::index_select(jets, 0, tables.next_column);
     cotangents.slice(0, 1, 4).add_(at::linalg_cross(h.unsqueeze(0).expand_as(arms), arms));
   }
-  return made.loss.sum() * share;
+  return normal_loss.loss.sum() * share;
 }
 
 }  // namespace
@@ -94,23 +96,24 @@ at::Tensor aten_handles(const at::Tensor& jets, const at::Tensor& targets, const
 at::Tensor aten_stance(const at::Tensor& jets, const at::Tensor& rest, const at::Tensor& up,
                        const at::Tensor& ground, double weight, at::Tensor cotangents) {
   const double share = 1.0 / static_cast<double>(std::max<int64_t>(jets.size(1), 1));
-  const at::Tensor ways = jets[0] - rest, touching = ground.unsqueeze(1);
-  const at::Tensor others = ways - ways.mean(0, true), rises = at::mm(ways, up.unsqueeze(1));
+  const at::Tensor displacements = jets[0] - rest, touching = ground.unsqueeze(1);
+  const at::Tensor others = displacements - displacements.mean(0, true),
+                   rises = at::mm(displacements, up.unsqueeze(1));
   const at::Tensor uneven = rises - (touching * rises).sum() / at::clamp_min(ground.sum(), 1e-30);
   const at::Tensor lifted = touching * uneven;
-  // Of the turn closest to the ways, what is not about the upward axis; in float64, as the inertia is
-  // inverted.
+  // Of the turn closest to the displacements, what is not about the upward axis; in float64, as the inertia
+  // is inverted.
   const at::Tensor arms = (rest - rest.mean(0, true)).to(at::kDouble), upward = up.to(at::kDouble);
   const at::Tensor size = at::clamp_min((arms * arms).sum(), 1e-30);
   const at::Tensor inertia =
       (1.0 + Stance::thinnest) * size * at::eye(3, arms.options()) - at::mm(arms.t(), arms);
   const at::Tensor inverse = at::linalg_inv(inertia);
-  const at::Tensor turn = at::mv(inverse, at::linalg_cross(arms, ways.to(at::kDouble)).sum(0));
+  const at::Tensor turn = at::mv(inverse, at::linalg_cross(arms, displacements.to(at::kDouble)).sum(0));
   const at::Tensor lean = turn - at::dot(turn, upward) * upward;
-  const at::Tensor pull = (Stance::lean_weight * size * at::mv(inverse, lean)).expand_as(arms);
+  const at::Tensor lean_torque = (Stance::lean_weight * size * at::mv(inverse, lean)).expand_as(arms);
   if (cotangents.defined())
     cotangents[0].add_(
-        others + lifted * up.unsqueeze(0) + at::linalg_cross(pull, arms).to(jets.scalar_type()),
+        others + lifted * up.unsqueeze(0) + at::linalg_cross(lean_torque, arms).to(jets.scalar_type()),
         2.0 * weight * share);
   const at::Tensor leaning = Stance::lean_weight * size * at::dot(lean, lean);
   return ((others * others).sum() + (lifted * uneven).sum() + leaning.to(jets.scalar_type())) * share;

@@ -25,9 +25,9 @@ BodyEnergy body_energy(JetView<const Scalar> jets, const Body<Scalar>& body, Jet
     Vec3 slope = -share * mass * body.gravity;
     energy.weight += slope.dot(place - body.rest.row(i).transpose().template cast<double>());
     if (moves) {
-      const Vec3 way = place - body.goal.row(i).transpose().template cast<double>();
-      energy.inertia += 0.5 * body.inertia * share * mass * way.squaredNorm();
-      slope += body.inertia * share * mass * way;
+      const Vec3 offset = place - body.goal.row(i).transpose().template cast<double>();
+      energy.inertia += 0.5 * body.inertia * share * mass * offset.squaredNorm();
+      slope += body.inertia * share * mass * offset;
     }
     if (body.ground_stiffness > 0.0) {
       const double depth = std::max(0.0, body.ground - body.up.dot(place));

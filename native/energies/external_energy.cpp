@@ -25,16 +25,16 @@ std::vector<double> external_energies(const ExternalEnergies& energies, PointsIn
   for (std::size_t i = 0; i < energies.size(); ++i) {
     const JetOrder order = energies[i]->order();
     JetBlock<double> own(jets.count, order);
-    const JetView<double> found = own.view();
-    const double value = energies[i]->evaluate(points, {wide.data(), jets.count, order}, found);
-    const Eigen::Map<const Vector> derivatives(found.data, found.size());
+    const JetView<double> derivatives_view = own.view();
+    const double value = energies[i]->evaluate(points, {wide.data(), jets.count, order}, derivatives_view);
+    const Eigen::Map<const Vector> derivatives(derivatives_view.data, derivatives_view.size());
     const std::string name = "energies[" + std::to_string(i) + "]";
     require(!std::isnan(value), name, "its value is NaN", "a number is needed");
     require(!std::isfinite(value) || derivatives.allFinite(), name,
             "its derivatives are NaN or infinite where its value is " + number_text(value),
             "finite ones are needed");
     if (cotangents.data != nullptr)
-      Eigen::Map<Eigen::VectorX<Scalar>>(cotangents.data, found.size()) +=
+      Eigen::Map<Eigen::VectorX<Scalar>>(cotangents.data, derivatives_view.size()) +=
           (weight * derivatives).template cast<Scalar>();
     values.push_back(weight * value);
   }

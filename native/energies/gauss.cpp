@@ -19,8 +19,8 @@ constexpr double cube_sharpness = 5.0, most_sharpness = 25.0;
 /// Directions closer than 15° are facets of one curved face.
 constexpr double one_face = 0.9659258262890683;
 
-/// Cosines of 60° and 80°: between them a style loses its hold.
-constexpr double reach_full = 0.5, reach_none = 0.17364817766693036;
+/// Cosines of 60° and 80°, between which a style's weight falls off.
+constexpr double falloff_begin = 0.5, falloff_end = 0.17364817766693036;
 
 Points different_normals(PointsIn normals) {
   const Points unit = unit_normals(normals);
@@ -120,19 +120,19 @@ Vector GaussPreference::values(PointsIn directions) const {
   return result;
 }
 
-Vector GaussPreference::reach(PointsIn directions) const {
+Vector GaussPreference::falloff(PointsIn directions) const {
   Vector result = Vector::Ones(directions.rows());
   if (!automatic) return result;
   for_ranges(directions.rows(), [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
-      result[i] = reach_at((normals * directions.row(i).transpose()).maxCoeff());
+      result[i] = falloff_at((normals * directions.row(i).transpose()).maxCoeff());
     }
   });
   return result;
 }
 
-double reach_at(double cosine) {
-  const double t = std::clamp((cosine - reach_none) / (reach_full - reach_none), 0.0, 1.0);
+double falloff_at(double cosine) {
+  const double t = std::clamp((cosine - falloff_end) / (falloff_begin - falloff_end), 0.0, 1.0);
   return t * t * (3.0 - 2.0 * t);
 }
 

@@ -12,7 +12,7 @@ struct ARAPFIELDS_EXPORT GaussPreference {
   Points normals;          ///< (k,3), unit length
   Vector weights;          ///< (k)
   double sharpness = 5.0;  ///< σ
-  /// Whether σ follows from the normals; the style's weight and reach then do, too.
+  /// Whether σ follows from the normals; the style's weight and fall-off then do, too.
   bool automatic = false;
   /// Factor of the style's weight with which styles of many faces turn as much of what there is to turn as
   /// the cube: the mean angle from a direction to the cube's nearest normal over that to this style's, where
@@ -21,13 +21,13 @@ struct ARAPFIELDS_EXPORT GaussPreference {
   double value(const Vec3& normal) const;
   /// (n) values at unit normals (n,3).
   Vector values(PointsIn directions) const;
-  /// (n) how much surfaces with these rest normals (n,3) are to follow: 1 up to 60° from a preferred normal,
-  /// 0 from 80° on, so that no wall becomes a floor and no shape paper-thin. All 1 unless automatic.
-  Vector reach(PointsIn directions) const;
+  /// (n) falloff_at() for rest normals (n,3) and the nearest preferred normal, so that no wall becomes a
+  /// floor and no shape paper-thin. All 1 unless automatic.
+  Vector falloff(PointsIn directions) const;
 };
 
-/// 1 from a cosine of 60° between a normal and where it is to turn, 0 to 80°: a style's hold.
-double reach_at(double cosine);
+/// Weight of a style for a normal at this cosine to its preferred direction: 1 up to 60°, 0 from 80° on.
+double falloff_at(double cosine);
 
 /// Rows (n,3) brought to unit length. Throws InvalidInput for none, non-finite or zero ones.
 Points unit_normals(PointsIn normals);

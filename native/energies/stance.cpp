@@ -14,14 +14,14 @@ namespace {
 constexpr double ground_height = 0.05, ground_weight = 128.0;
 
 /// lean_weight · Σ‖a‖² · ‖ω − (ω·up) up‖² of samples with arms a (n,3) about their mean, ω being the
-/// infinitesimal rotation closest to their ways (n,3); and half its cotangents are arms · slope.
+/// infinitesimal rotation closest to their displacements (n,3); and half its cotangents are arms · slope.
 struct Lean {
   double energy = 0.0;
   Mat3 slope = Mat3::Zero();
 };
 
-Lean lean_of(const Points& arms, const Points& ways, const Vec3& up) {
-  const Mat3 spread = arms.transpose() * arms, moment = arms.transpose() * ways;
+Lean lean_of(const Points& arms, const Points& displacements, const Vec3& up) {
+  const Mat3 spread = arms.transpose() * arms, moment = arms.transpose() * displacements;
   const double size = spread.trace();
   if (!(size > 0.0)) return {};
   const Mat3 inertia = (1.0 + Stance::thinnest) * size * Mat3::Identity() - spread;
@@ -29,9 +29,10 @@ Lean lean_of(const Points& arms, const Points& ways, const Vec3& up) {
   const auto solver = inertia.ldlt();
   Vec3 turn = solver.solve(torque);
   turn -= turn.dot(up) * up;
-  const Vec3 pull = Stance::lean_weight * size * solver.solve(turn);
-  Mat3 slope;  // of row vectors: a · slope = pull × a
-  slope << 0.0, pull.z(), -pull.y(), -pull.z(), 0.0, pull.x(), pull.y(), -pull.x(), 0.0;
+  const Vec3 restoring = Stance::lean_weight * size * solver.solve(turn);
+  Mat3 slope;  // of row vectors: a · slope = restoring × a
+  slope << 0.0, restoring.z(), -restoring.y(), -restoring.z(), 0.0, restoring.x(), restoring.y(),
+      -restoring.x(), 0.0;
   return {Stance::lean_weight * size * turn.squaredNorm(), slope};
 }
 
@@ -71,22 +72,23 @@ double stance_energy(JetView<const Scalar> jets, ConstPointsRef<Scalar> rest, co
   require(cotangents.data == nullptr || cotangents.count == jets.count, "cotangents", "another count",
           "as many points as the jets' are needed");
   if (jets.count == 0) return 0.0;
-  Points ways = Eigen::Map<const PointsOf<Scalar>>(jets.data, jets.count, 3).template cast<double>() -
-                rest.template cast<double>();
-  Vector rises = ways * stance.up;
-  ways.rowwise() -= ways.colwise().mean().eval();
+  Points displacements =
+      Eigen::Map<const PointsOf<Scalar>>(jets.data, jets.count, 3).template cast<double>() -
+      rest.template cast<double>();
+  Vector rises = displacements * stance.up;
+  displacements.rowwise() -= displacements.colwise().mean().eval();
   const double on_ground = stance.ground.sum();
   if (on_ground > 0.0) rises.array() -= stance.ground.dot(rises) / on_ground;
   const double share = stance.scale / static_cast<double>(jets.count);
   Points arms = rest.template cast<double>();
   arms.rowwise() -= arms.colwise().mean().eval();
-  const Lean lean = lean_of(arms, ways, stance.up);
+  const Lean lean = lean_of(arms, displacements, stance.up);
   if (cotangents.data != nullptr)
     Eigen::Map<PointsOf<Scalar>>(cotangents.data, jets.count, 3) +=
         (2.0 * weight * share *
-         (ways + stance.ground.cwiseProduct(rises) * stance.up.transpose() + arms * lean.slope))
+         (displacements + stance.ground.cwiseProduct(rises) * stance.up.transpose() + arms * lean.slope))
             .template cast<Scalar>();
-  return share * (ways.squaredNorm() + stance.ground.dot(rises.cwiseAbs2()) + lean.energy);
+  return share * (displacements.squaredNorm() + stance.ground.dot(rises.cwiseAbs2()) + lean.energy);
 }
 
 #define ARAPFIELDS_STANCE(Scalar)                                                                     \

@@ -22,7 +22,7 @@ StyleAtSamples StyleAtSamples::of(const Style& style, PointsIn normals, double s
   StyleAtSamples result;
   if (!style.object) {
     result.preference = gauss_preference(style.preferred, sharpness);
-    result.weights = result.preference->reach(normals);
+    result.weights = result.preference->falloff(normals);
     result.factor = result.preference->balance;
     return result;
   }
@@ -33,7 +33,7 @@ StyleAtSamples StyleAtSamples::of(const Style& style, PointsIn normals, double s
   result.weights = Vector::Ones(normals.rows());
   if (sharpness == 0.0)
     for (Index i = 0; i < normals.rows(); ++i)
-      result.weights[i] = reach_at(result.targets.row(i).dot(normals.row(i)));
+      result.weights[i] = falloff_at(result.targets.row(i).dot(normals.row(i)));
   result.factor = target_factor;
   return result;
 }

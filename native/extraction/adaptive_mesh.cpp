@@ -64,15 +64,15 @@ class Mesher {
   }
 
   int vertex(const Edge& edge) {
-    const auto [found, fresh] = numbers_.try_emplace(edge, static_cast<int>(vertices_.size()));
-    if (fresh) {
+    const auto [entry, inserted] = numbers_.try_emplace(edge, static_cast<int>(vertices_.size()));
+    if (inserted) {
       const Place high = moved(edge.low, edge.axis, edge.length);
       const double a = std::abs(grid_.value(edge.low)), b = std::abs(grid_.value(high));
       const double t = std::clamp(a + b > 0.0 ? a / (a + b) : 0.5, clearance, 1.0 - clearance);
       const Vec3 from = grid_.position(edge.low);
       vertices_.push_back(from + t * (grid_.position(high) - from));
     }
-    return found->second;
+    return entry->second;
   }
 
   /// A whole cell, coarse (step = factor) or fine (1), by the table.
@@ -239,12 +239,12 @@ std::size_t loop_count(Curves curves) {
 std::set<Place> cells_to_cut(const FineGrid& grid) {
   const Mesher mesher(grid);
   const int last = grid.coarse().resolution() - 2;
-  std::set<Place> found, result;
+  std::set<Place> blocked_cells, result;
   for (const Place& cell : mesher.cells_beside()) {
-    const std::size_t loops = loop_count(mesher.curves(cell, true, &found));
-    if (loops != loop_count(mesher.curves(cell, false, nullptr))) found.insert(cell);
+    const std::size_t loops = loop_count(mesher.curves(cell, true, &blocked_cells));
+    if (loops != loop_count(mesher.curves(cell, false, nullptr))) blocked_cells.insert(cell);
   }
-  for (const Place& cell : found) {
+  for (const Place& cell : blocked_cells) {
     const auto [low, high] = std::minmax({cell[0], cell[1], cell[2]});
     if (low >= 0 && high <= last && !grid.cut(cell)) result.insert(cell);
   }

@@ -13,9 +13,9 @@ namespace {
 
 constexpr double newton_tolerance = 1e-4;  // a fiftieth of it is aimed at
 constexpr Index most_starts = 50000;
-constexpr double reach_in_bands = 10.0;    // room for compressions to a fifth
-constexpr double probe_in_bands = 0.5;     // how far outside of a sheet to ask for others
-constexpr double residual_in_bands = 0.5;  // what a trained inverse may be off by
+constexpr double search_radius_in_bands = 10.0;  // room for compressions to a fifth
+constexpr double probe_in_bands = 0.5;           // how far outside of a sheet to ask for others
+constexpr double residual_in_bands = 0.5;        // what a trained inverse may be off by
 
 Points some_rows(const Points& points, Index most) {
   const Index every = std::max<Index>(1, points.rows() / most), count = points.rows() / every;
@@ -25,7 +25,7 @@ Points some_rows(const Points& points, Index most) {
 }
 
 /// 0 up to `band`, 1 from twice that on, smooth between.
-double farness(double distance, double band) {
+double distance_blend(double distance, double band) {
   const double t = std::clamp(distance / band - 1.0, 0.0, 1.0);
   return t * t * (3.0 - 2.0 * t);
 }
@@ -47,7 +47,7 @@ Points DeformedFunction::by_newton(PointsIn moved) const {
   const Frame& cube = shape_.field.frame();
   NewtonInverseOptions options;
   options.tolerance = newton_tolerance;
-  options.max_distance = reach_in_bands * shape_.band / cube.scale;
+  options.max_distance = search_radius_in_bands * shape_.band / cube.scale;
   return cube.to_mesh(newton_(cube.to_cube(moved), options, check_).points);
 }
 
@@ -88,13 +88,13 @@ void DeformedFunction::evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF
     if (std::abs(distances[i]) < 2.0 * shape_.band) near.push_back(i);
   const Points moved = mesh(near, Eigen::all);
   const Points rest = shape_.inverse != nullptr ? by_network(moved) : by_newton(moved);
-  std::vector<Index> found, rows, doubtful;  // rows of near, of points; of points again
+  std::vector<Index> inverted, rows, ambiguous;  // rows of near, of points; of points again
   for (std::size_t k = 0; k < near.size(); ++k)
     if (rest.row(k).allFinite()) {
-      found.push_back(static_cast<Index>(k));
+      inverted.push_back(static_cast<Index>(k));
       rows.push_back(near[k]);
     }
-  const PointsF at = shape_.rest.frame().to_cube(rest(found, Eigen::all)).cast<float>();
+  const PointsF at = shape_.rest.frame().to_cube(rest(inverted, Eigen::all)).cast<float>();
   VectorF phi(at.rows());
   shape_.rest.evaluate(at, phi);
   Vector exact = distances;
@@ -106,16 +106,16 @@ void DeformedFunction::evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF
     if (!continuous() && beside && (value < 0.0) != (distance < 0.0))
       value = distance;  // both jump, and need not at the same place: no zero between the two
     else if (value > 0.0 && distance < 0.0)
-      doubtful.push_back(rows[k]);
+      ambiguous.push_back(rows[k]);
   }
-  const std::vector<bool> inside = covered(mesh(doubtful, Eigen::all));
-  for (std::size_t k = 0; k < doubtful.size(); ++k)
-    if (inside[k] || distances[doubtful[k]] < -probe_in_bands * shape_.band)
-      exact[doubtful[k]] = distances[doubtful[k]];
+  const std::vector<bool> inside = covered(mesh(ambiguous, Eigen::all));
+  for (std::size_t k = 0; k < ambiguous.size(); ++k)
+    if (inside[k] || distances[ambiguous[k]] < -probe_in_bands * shape_.band)
+      exact[ambiguous[k]] = distances[ambiguous[k]];
   for (Index i = 0; i < mesh.rows(); ++i)
-    exact[i] += farness(std::abs(distances[i]), shape_.band) * (distances[i] - exact[i]);
+    exact[i] += distance_blend(std::abs(distances[i]), shape_.band) * (distances[i] - exact[i]);
   inverted_ += static_cast<Index>(near.size());
-  failures_ += static_cast<Index>(near.size() - found.size());
+  failures_ += static_cast<Index>(near.size() - inverted.size());
   values = (exact / frame_.scale).cast<float>();
 }
 

@@ -22,12 +22,12 @@ constexpr Index points_a_thin_cell = 24;   // about, that cutting its edges in t
 
 /// Cells of about the same number of grid steps at every resolution.
 TricubicSurrogateOptions model_options(int resolution, bool sure) {
-  TricubicSurrogateOptions options{.wanted_cells = std::numeric_limits<Index>::max(), .interpolate = !sure};
+  TricubicSurrogateOptions options{.target_cells = std::numeric_limits<Index>::max(), .interpolate = !sure};
   const int finest = resolution / (sure ? grid_steps_a_sure_cell : grid_steps_a_cell);
   int halvings = 0;
   while (finest >> (halvings + 1) >= fewest_coarse_cells) ++halvings;
   options.coarsest = finest >> halvings;
-  options.max_resolution = options.coarsest << halvings;
+  options.max_cells_a_side = options.coarsest << halvings;
   return options;
 }
 

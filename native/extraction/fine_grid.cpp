@@ -22,8 +22,8 @@ std::uint64_t FineGrid::key(const Place& place) {
 }
 
 float FineGrid::value(const Place& place) const {
-  const auto found = samples_.find(key(place));
-  if (found != samples_.end()) return found->second.value;
+  const auto sample_at = samples_.find(key(place));
+  if (sample_at != samples_.end()) return sample_at->second.value;
   return coarse_.value(place[0] / factor_, place[1] / factor_, place[2] / factor_);
 }
 
@@ -47,7 +47,7 @@ std::vector<Place> FineGrid::points_in(const std::set<Place>& cells) const {
   return {points.begin(), points.end()};
 }
 
-void FineGrid::ask(const std::vector<Place>& places, EvaluationCounter& function) {
+void FineGrid::evaluate(const std::vector<Place>& places, EvaluationCounter& function) {
   PointsF points(static_cast<Index>(places.size()), 3);
   for (std::size_t i = 0; i < places.size(); ++i)
     points.row(i) = position(places[i]).transpose().cast<float>();
@@ -55,18 +55,18 @@ void FineGrid::ask(const std::vector<Place>& places, EvaluationCounter& function
   for (std::size_t i = 0; i < places.size(); ++i) samples_[key(places[i])] = {values[i], true, true};
 }
 
-/// Takes the sign of a point near enough that Φ cannot change it on the way.
+/// Takes over the sign of a neighbour whose |Φ| exceeds what Φ can change by over their distance.
 bool FineGrid::settle(const Place& place, Sample& sample, double slope) const {
   const double step = (coarse_.coordinate(1) - coarse_.coordinate(0)) / factor_;
   for (int i = -2; i <= 2; ++i)
     for (int j = -2; j <= 2; ++j)
       for (int k = -2; k <= 2; ++k) {
         if (place[0] + i < 0 || place[1] + j < 0 || place[2] + k < 0) continue;
-        const auto found = samples_.find(key({place[0] + i, place[1] + j, place[2] + k}));
-        if (found == samples_.end() || !found->second.exact) continue;
-        const double reach = slope * step * std::sqrt(static_cast<double>(i * i + j * j + k * k));
-        if (std::abs(found->second.value) <= reach) continue;
-        sample = {found->second.value < 0.0f ? -far : far, false, true};
+        const auto sample_at = samples_.find(key({place[0] + i, place[1] + j, place[2] + k}));
+        if (sample_at == samples_.end() || !sample_at->second.exact) continue;
+        const double largest_change = slope * step * std::sqrt(static_cast<double>(i * i + j * j + k * k));
+        if (std::abs(sample_at->second.value) <= largest_change) continue;
+        sample = {sample_at->second.value < 0.0f ? -far : far, false, true};
         return true;
       }
   return false;
@@ -77,7 +77,7 @@ void FineGrid::cut(const std::set<Place>& cells, double slope, EvaluationCounter
   for (const Place& cell : cells)
     if (cells_.insert(cell).second) fresh.insert(cell);
   const std::vector<Place> points = points_in(fresh);
-  std::vector<Place> wanted;
+  std::vector<Place> to_evaluate;
   for (const Place& place : points) {
     Sample& sample = samples_[key(place)];
     if (sample.known) continue;
@@ -86,17 +86,17 @@ void FineGrid::cut(const std::set<Place>& cells, double slope, EvaluationCounter
     if (shared && (coarse_.exact(i, j, k) || std::abs(coarse_.value(i, j, k)) >= far))
       sample = {coarse_.value(i, j, k), coarse_.exact(i, j, k), true};
     else if (place[0] % 2 == 0 && place[1] % 2 == 0 && place[2] % 2 == 0)
-      wanted.push_back(place);
+      to_evaluate.push_back(place);
   }
-  ask(wanted, function);  // every other point of each axis first; they settle most of the others
-  wanted.clear();
+  evaluate(to_evaluate, function);  // every other point of each axis first; they settle most of the others
+  to_evaluate.clear();
   for (const Place& place : points) {
     Sample& sample = samples_[key(place)];
-    if (!sample.known && !settle(place, sample, slope)) wanted.push_back(place);
+    if (!sample.known && !settle(place, sample, slope)) to_evaluate.push_back(place);
   }
-  ask(wanted, function);
+  evaluate(to_evaluate, function);
   do {
-    wanted.clear();
+    to_evaluate.clear();
     for (const Place& place : points) {
       const Sample& sample = samples_.at(key(place));
       if (sample.exact) continue;
@@ -105,14 +105,14 @@ void FineGrid::cut(const std::set<Place>& cells, double slope, EvaluationCounter
         for (const int by : {-1, 1}) {
           const Place next = shifted(place, axis, by);
           if (next[axis] < 0) continue;
-          const auto found = samples_.find(key(next));
-          change =
-              change || (found != samples_.end() && (found->second.value < 0.0f) != (sample.value < 0.0f));
+          const auto sample_at = samples_.find(key(next));
+          change = change ||
+                   (sample_at != samples_.end() && (sample_at->second.value < 0.0f) != (sample.value < 0.0f));
         }
-      if (change) wanted.push_back(place);
+      if (change) to_evaluate.push_back(place);
     }
-    ask(wanted, function);
-  } while (!wanted.empty());
+    evaluate(to_evaluate, function);
+  } while (!to_evaluate.empty());
 }
 
 }  // namespace arapfields

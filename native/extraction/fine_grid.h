@@ -37,7 +37,7 @@ class FineGrid {
     bool exact = false, known = false;  // whether value is Φ's own; whether its sign is right
   };
   static std::uint64_t key(const Place& place);
-  void ask(const std::vector<Place>& places, EvaluationCounter& function);
+  void evaluate(const std::vector<Place>& places, EvaluationCounter& function);
   bool settle(const Place& place, Sample& sample, double slope) const;
   std::vector<Place> points_in(const std::set<Place>& cells) const;
 

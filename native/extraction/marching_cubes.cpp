@@ -56,7 +56,7 @@ bool mixed(const Window& window) {
 Numbers number(const SparseGrid& grid, const SparseGrid::Block& block) {
   Numbers numbers;
   Window window;
-  grid.look(block, window);
+  grid.load(block, window);
   if (!mixed(window)) return numbers;
   numbers.slots.assign(3 * SparseGrid::points, -1);
   for_each_point([&](int i, int j, int k) {
@@ -80,11 +80,11 @@ class Tile {
  public:
   Tile(const SparseGrid& grid, const std::vector<Numbers>& numbers, Index block)
       : grid_(grid), block_(grid.blocks()[block]), own_(numbers[block]) {
-    grid.look(block_, window_);
+    grid.load(block_, window_);
     for (int n = 0; n < 8; ++n) {
-      const Index found =
+      const Index neighbour =
           grid.find(block_.place[0] + (n >> 2), block_.place[1] + ((n >> 1) & 1), block_.place[2] + (n & 1));
-      around_[n] = found < 0 ? nullptr : &numbers[found];
+      around_[n] = neighbour < 0 ? nullptr : &numbers[neighbour];
     }
   }
 
@@ -97,9 +97,9 @@ class Tile {
         const double low = std::abs(window_.value[Window::at(i, j, k)]);
         const double high = std::abs(window_.value[Window::at(next[0], next[1], next[2])]);
         const double t = std::clamp(low / (low + high), clearance, 1.0 - clearance);
-        const int here[3] = {i, j, k};
+        const int local[3] = {i, j, k};
         for (int a = 0; a < 3; ++a) {
-          const int index = block_.place[a] * side + here[a];
+          const int index = block_.place[a] * side + local[a];
           const double from = grid_.coordinate(index);
           vertices(own_.first + slot, a) = a == axis ? from + t * (grid_.coordinate(index + 1) - from) : from;
         }

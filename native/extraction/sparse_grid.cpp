@@ -11,11 +11,11 @@ namespace arapfields {
 namespace {
 
 constexpr float far = 1e30f;
-constexpr float nowhere = std::numeric_limits<float>::quiet_NaN();
+constexpr float outside_grid = std::numeric_limits<float>::quiet_NaN();
 constexpr Index blocks_per_chunk = 16;
-// Signs are asked for where |p| is up to this share of the model's bound on |Φ − p|, the largest residual
-// around times three. On eight published networks at twenty resolutions no vertex is missing even so.
-constexpr float doubt_share = 0.8f;
+// Φ is evaluated where |p| is below this share of the model's bound on |Φ − p|, which is three times the
+// largest residual nearby. On eight published networks at twenty resolutions no vertex is missing even so.
+constexpr float ambiguous_share = 0.8f;
 
 constexpr int neighbours[6][3] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
 
@@ -28,13 +28,13 @@ SparseGrid::SparseGrid(int resolution, const TricubicSurrogate* model)
       width_((resolution + side - 1) / side),
       spacing_(2.0 / (resolution - 1)),
       model_(model),
-      blind_(model == nullptr || !model->interpolates()),
+      no_surrogate_(model == nullptr || !model->interpolates()),
       table_(static_cast<std::size_t>(width_) * width_ * width_, -1) {
   std::vector<std::uint8_t> marked(table_.size(), model == nullptr ? 1 : 0);
   if (model != nullptr) {
     for (const Index cell : model->active()) {
       const auto place = model->coordinates(cell);
-      int low[3], high[3];  // blocks that reach within a grid step of the cell
+      int low[3], high[3];  // the blocks within a grid step of the cell
       for (int axis = 0; axis < 3; ++axis) {
         const double from = place[axis] * model->spacing() / spacing_,
                      to = from + model->spacing() / spacing_;
@@ -66,14 +66,14 @@ Index SparseGrid::find(int i, int j, int k) const {
 }
 
 float SparseGrid::value(int i, int j, int k) const {
-  const std::int32_t found = table_[entry(i / side, j / side, k / side)];
-  if (found < 0) return found == -2 ? -far : far;
-  return blocks_[found].value[local(i % side, j % side, k % side)];
+  const std::int32_t index = table_[entry(i / side, j / side, k / side)];
+  if (index < 0) return index == -2 ? -far : far;
+  return blocks_[index].value[local(i % side, j % side, k % side)];
 }
 
 bool SparseGrid::exact(int i, int j, int k) const {
-  const Index found = find(i / side, j / side, k / side);
-  return found >= 0 && blocks_[found].exact[local(i % side, j % side, k % side)] != 0;
+  const Index index = find(i / side, j / side, k / side);
+  return index >= 0 && blocks_[index].exact[local(i % side, j % side, k % side)] != 0;
 }
 
 void SparseGrid::keep(Index entry) {
@@ -84,13 +84,13 @@ void SparseGrid::keep(Index entry) {
   block.place[2] = static_cast<int>(entry % width_);
   table_[entry] = static_cast<std::int32_t>(blocks_.size()) - 1;
   std::fill_n(block.exact, points, std::uint8_t{0});
-  std::fill_n(block.error, points, blind_ ? 2.0f * far : 0.0f);
+  std::fill_n(block.error, points, no_surrogate_ ? 2.0f * far : 0.0f);
   for (int i = 0; i < side; ++i)
     for (int j = 0; j < side; ++j)
       for (int k = 0; k < side; ++k) {
         const int last =
             std::max({block.place[0] * side + i, block.place[1] * side + j, block.place[2] * side + k});
-        block.value[local(i, j, k)] = last < resolution_ ? far : nowhere;
+        block.value[local(i, j, k)] = last < resolution_ ? far : outside_grid;
       }
   if (model_ != nullptr) predict(block);
 }
@@ -123,10 +123,10 @@ void SparseGrid::predict(Block& block) const {
         const Index cell = model_->cell(cells[0][i0], cells[1][j0], cells[2][k0]);
         const int sign = model_->side(cell);
         CubicBlock nodes;
-        if (sign == 0 && !blind_) nodes = model_->block(cell);
+        if (sign == 0 && !no_surrogate_) nodes = model_->block(cell);
         for (int i = i0; i < i1; ++i) {
           float plane[16];
-          for (int n = 0; n < 16 && sign == 0 && !blind_; ++n) {
+          for (int n = 0; n < 16 && sign == 0 && !no_surrogate_; ++n) {
             plane[n] = 0.0f;
             for (int a = 0; a < 4; ++a) plane[n] += weights[0][i][a] * nodes.node[16 * a + n];
           }
@@ -138,12 +138,12 @@ void SparseGrid::predict(Block& block) const {
                 block.error[at] = 0.0f;
                 continue;
               }
-              if (blind_) continue;
+              if (no_surrogate_) continue;
               float value = 0.0f;
               for (int b = 0; b < 4; ++b)
                 for (int c = 0; c < 4; ++c) value += weights[1][j][b] * weights[2][k][c] * plane[4 * b + c];
               block.value[at] = value;
-              block.error[at] = doubt_share * model_->error(cell);
+              block.error[at] = ambiguous_share * model_->error(cell);
               if (std::abs(value) > block.error[at]) continue;
               const int kept = model_->settled_sign(
                   cell, {coordinate(block.place[0] * side + i), coordinate(block.place[1] * side + j),
@@ -156,7 +156,7 @@ void SparseGrid::predict(Block& block) const {
   }
 }
 
-void SparseGrid::look(const Block& block, Window& window) const {
+void SparseGrid::load(const Block& block, Window& window) const {
   int from[3], to[3];
   for (int di = -1; di <= 1; ++di)
     for (int dj = -1; dj <= 1; ++dj)
@@ -170,18 +170,18 @@ void SparseGrid::look(const Block& block, Window& window) const {
           inside = inside && place >= 0 && place < width_;
         }
         const int i0 = block.place[0] + di, j0 = block.place[1] + dj, k0 = block.place[2] + dk;
-        const std::int32_t found = inside ? table_[entry(i0, j0, k0)] : -1;
-        const Block* source = found >= 0 ? &blocks_[found] : nullptr;
+        const std::int32_t index = inside ? table_[entry(i0, j0, k0)] : -1;
+        const Block* source = index >= 0 ? &blocks_[index] : nullptr;
         for (int i = from[0]; i < to[0]; ++i)
           for (int j = from[1]; j < to[1]; ++j)
             for (int k = from[2]; k < to[2]; ++k) {
-              const int at = Window::at(i, j, k), there = local(i & 7, j & 7, k & 7);
+              const int at = Window::at(i, j, k), source_at = local(i & 7, j & 7, k & 7);
               window.kept[at] = source != nullptr || !inside;
-              window.exact[at] = source != nullptr ? source->exact[there] : 0;
-              window.error[at] = source != nullptr ? source->error[there] : 0.0f;
-              window.value[at] = source != nullptr ? source->value[there]
-                                 : !inside         ? nowhere
-                                 : found == -2     ? -far
+              window.exact[at] = source != nullptr ? source->exact[source_at] : 0;
+              window.error[at] = source != nullptr ? source->error[source_at] : 0.0f;
+              window.value[at] = source != nullptr ? source->value[source_at]
+                                 : !inside         ? outside_grid
+                                 : index == -2     ? -far
                                                    : far;
             }
       }
@@ -205,23 +205,24 @@ int SparseGrid::settled_sign(const Window& window, int i, int j, int k, double s
   for (int n = 0; n < 27; ++n) {
     const int x = n / 9 - 1, y = n / 3 % 3 - 1, z = n % 3 - 1, next = Window::at(i + x, j + y, k + z);
     if (!window.exact[next]) continue;
-    const double reach = slope * spacing_ * std::sqrt(static_cast<double>(x * x + y * y + z * z)) + slack;
-    if (std::abs(window.value[next]) > reach) return window.value[next] < 0.0f ? -1 : 1;
+    const double largest_change =
+        slope * spacing_ * std::sqrt(static_cast<double>(x * x + y * y + z * z)) + slack;
+    if (std::abs(window.value[next]) > largest_change) return window.value[next] < 0.0f ? -1 : 1;
   }
   return 0;
 }
 
-/// Points of a block to evaluate: ends of edges on which the sign changes, and points whose sign is in doubt:
-/// every other one of each axis first. A doubt is settled without an evaluation where |Φ| at a point beside
-/// it is more than the way between them allows Φ to change.
-void SparseGrid::wish(std::int32_t index, Round round, Wish& out) const {
+/// Points of a block to evaluate: ends of edges on which the sign changes, and points of ambiguous sign,
+/// every other one of each axis first. The sign of a point is settled without an evaluation where |Φ| at a
+/// neighbour exceeds what Φ can change by over their distance.
+void SparseGrid::collect_evaluations(std::int32_t index, Round round, Evaluations& out) const {
   const Block& block = blocks_[index];
   Window window;
-  look(block, window);
+  load(block, window);
   const double slope = model_ == nullptr ? far : model_->lipschitz();
   // Without p nothing else tells how deep a settled point lies, and thin parts are told by whether it is a
   // step.
-  const double slack = blind_ ? spacing_ : 0.0;
+  const double slack = no_surrogate_ ? spacing_ : 0.0;
   for (int i = 0; i < side; ++i)
     for (int j = 0; j < side; ++j)
       for (int k = 0; k < side; ++k) {
@@ -230,22 +231,22 @@ void SparseGrid::wish(std::int32_t index, Round round, Wish& out) const {
         if (std::isnan(value)) continue;
         if (!window.exact[at] && std::abs(value) <= window.error[at]) {
           const int sign = settled_sign(window, i, j, k, slope, slack);
-          if (sign != 0 && (blind_ || (value < 0.0f) == (sign < 0))) {
+          if (sign != 0 && (no_surrogate_ || (value < 0.0f) == (sign < 0))) {
             out.settled.push_back({{index, local(i, j, k)}, sign});
             continue;
           }
           const bool even = ((i | j | k) & 1) == 0;
           if (round == Round::rest || (round == Round::every_other && even) ||
-              (blind_ && model_ == nullptr)) {
+              (no_surrogate_ && model_ == nullptr)) {
             out.points.push_back({index, local(i, j, k)});
             continue;
           }
-          if (blind_) continue;
+          if (no_surrogate_) continue;
         }
         bool change = false;
         for (const auto& step : neighbours) {
           const int next = Window::at(i + step[0], j + step[1], k + step[2]);
-          const bool unknown = blind_ && !window.exact[next] && window.error[next] > 0.0f;
+          const bool unknown = no_surrogate_ && !window.exact[next] && window.error[next] > 0.0f;
           change = change || (!unknown && differs(value, window.value[next]));
         }
         if (change) keep_around(block, window, i, j, k, out.neighbours);
@@ -254,22 +255,22 @@ void SparseGrid::wish(std::int32_t index, Round round, Wish& out) const {
 }
 
 void SparseGrid::refine(EvaluationCounter& function) {
-  for (Round round = blind_ ? Round::every_other : Round::changes;;) {
+  for (Round round = no_surrogate_ ? Round::every_other : Round::changes;;) {
     const auto count = static_cast<Index>(blocks_.size());
     const Index chunks = (count + blocks_per_chunk - 1) / blocks_per_chunk;
-    std::vector<Wish> wishes(chunks);
+    std::vector<Evaluations> parts(chunks);
     parallel_for(0, chunks, 1, [&](Index begin, Index end) {
       for (Index chunk = begin; chunk < end; ++chunk)
         for (Index b = chunk * blocks_per_chunk; b < std::min(count, (chunk + 1) * blocks_per_chunk); ++b)
-          wish(static_cast<std::int32_t>(b), round, wishes[chunk]);
+          collect_evaluations(static_cast<std::int32_t>(b), round, parts[chunk]);
     });
-    std::vector<Point> wanted;
+    std::vector<Point> to_evaluate;
     bool grown = false;
-    for (const Wish& each : wishes) {
-      wanted.insert(wanted.end(), each.points.begin(), each.points.end());
+    for (const Evaluations& each : parts) {
+      to_evaluate.insert(to_evaluate.end(), each.points.begin(), each.points.end());
       for (const auto& [point, sign] : each.settled) {
         Block& block = blocks_[point.block];
-        if (blind_) block.value[point.local] = static_cast<float>(sign) * far;
+        if (no_surrogate_) block.value[point.local] = static_cast<float>(sign) * far;
         block.error[point.local] = 0.0f;
         grown = true;
       }
@@ -279,20 +280,20 @@ void SparseGrid::refine(EvaluationCounter& function) {
           grown = true;
         }
     }
-    if (wanted.empty() && !grown && round == Round::rest) return;
+    if (to_evaluate.empty() && !grown && round == Round::rest) return;
     round = round == Round::changes ? Round::every_other : Round::rest;
-    PointsF places(static_cast<Index>(wanted.size()), 3);
-    for (std::size_t row = 0; row < wanted.size(); ++row) {
-      const Block& block = blocks_[wanted[row].block];
-      const int at = wanted[row].local, within[3] = {at / (side * side), at / side % side, at % side};
+    PointsF places(static_cast<Index>(to_evaluate.size()), 3);
+    for (std::size_t row = 0; row < to_evaluate.size(); ++row) {
+      const Block& block = blocks_[to_evaluate[row].block];
+      const int at = to_evaluate[row].local, within[3] = {at / (side * side), at / side % side, at % side};
       for (int axis = 0; axis < 3; ++axis)
         places(static_cast<Index>(row), axis) =
             static_cast<float>(coordinate(block.place[axis] * side + within[axis]));
     }
     const VectorF values = function.values(places);
-    for (std::size_t row = 0; row < wanted.size(); ++row) {
-      Block& block = blocks_[wanted[row].block];
-      const int at = wanted[row].local;
+    for (std::size_t row = 0; row < to_evaluate.size(); ++row) {
+      Block& block = blocks_[to_evaluate[row].block];
+      const int at = to_evaluate[row].local;
       block.error[at] = 0.0f;
       block.value[at] = values[row];
       block.exact[at] = 1;

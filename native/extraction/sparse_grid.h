@@ -21,7 +21,7 @@ class SparseGrid {
   struct Block {
     int place[3];                ///< in blocks
     float value[points];         ///< Φ, the model's p, or ±1e30 where only the sign is known
-    float error[points];         ///< Φ's sign is in doubt where |value| is not above this
+    float error[points];         ///< Φ's sign is ambiguous where |value| is not above this
     std::uint8_t exact[points];  ///< whether value is Φ's own
   };
   /// A block with one layer of points around it; NaN outside the grid.
@@ -49,17 +49,17 @@ class SparseGrid {
   Index find(int i, int j, int k) const;
   /// Point of a block in its arrays, from coordinates within it.
   static int local(int i, int j, int k) { return (i * side + j) * side + k; }
-  void look(const Block& block, Window& window) const;
+  void load(const Block& block, Window& window) const;
 
  private:
   struct Point {
     std::int32_t block, local;
   };
-  /// What is asked for: first, where p tells it, the ends of edges on which the sign changes; then doubts.
+  /// What a round evaluates: first the ends of edges on which p changes its sign, then ambiguous points.
   enum class Round { changes, every_other, rest };
-  struct Wish {
+  struct Evaluations {
     std::vector<Point> points;                   // to evaluate
-    std::vector<std::pair<Point, int>> settled;  // doubts that need no evaluation, and their signs
+    std::vector<std::pair<Point, int>> settled;  // ambiguous points that need no evaluation, and their signs
     std::vector<Index> neighbours;               // blocks to keep from now on, as indices into table_
   };
   Index entry(int i, int j, int k) const { return (static_cast<Index>(i) * width_ + j) * width_ + k; }
@@ -68,13 +68,13 @@ class SparseGrid {
   void keep_around(const Block& block, const Window& window, int i, int j, int k,
                    std::vector<Index>& missing) const;
   int settled_sign(const Window& window, int i, int j, int k, double slope, double slack) const;
-  void wish(std::int32_t block, Round round, Wish& out) const;
+  void collect_evaluations(std::int32_t block, Round round, Evaluations& out) const;
 
   int resolution_;
   int width_;  // blocks a side
   double spacing_;
   const TricubicSurrogate* model_;
-  bool blind_;  // no p: every point whose side is not known is evaluated
+  bool no_surrogate_;  // no p: every point whose side is not known is evaluated
   std::vector<std::int32_t>
       table_;  // width³: index into blocks_, −1 for the positive and −2 for the negative
   std::vector<Block> blocks_;

@@ -71,7 +71,7 @@ ThinCells thin_cells(const SparseGrid& grid) {
   ThinCells result;
   for (const SparseGrid::Block& block : grid.blocks()) {
     SparseGrid::Window window;
-    grid.look(block, window);
+    grid.load(block, window);
     for (int at = 0; at < SparseGrid::points; ++at) {
       const int i = at / (side * side), j = at / side % side, k = at % side;
       const Place place{block.place[0] * side + i, block.place[1] * side + j, block.place[2] * side + k};

@@ -17,24 +17,26 @@ namespace {
 constexpr Index points_at_once = 16384;
 
 void compose_at(const JetView<const double>& outer, const JetView<double>& inner, Index i) {
-  Mat3 before, after;  // ∂f and ∂g
+  Mat3 inner_jacobian, outer_jacobian;  // ∂f and ∂g
   for (int k = 0; k < 3; ++k) {
-    before.col(k) = Eigen::Map<const Vec3>(inner.at(first_column(k), i));
-    after.col(k) = Eigen::Map<const Vec3>(outer.at(first_column(k), i));
+    inner_jacobian.col(k) = Eigen::Map<const Vec3>(inner.at(first_column(k), i));
+    outer_jacobian.col(k) = Eigen::Map<const Vec3>(outer.at(first_column(k), i));
   }
   if (inner.order == JetOrder::second) {
     std::array<Vec3, 6> second;
     for (int j = 0; j < 3; ++j)
       for (int k = j; k < 3; ++k) {
         Vec3& sum = second[second_column(j, k) - 4];
-        sum = after * Eigen::Map<const Vec3>(inner.at(second_column(j, k), i));
+        sum = outer_jacobian * Eigen::Map<const Vec3>(inner.at(second_column(j, k), i));
         for (int l = 0; l < 3; ++l)
           for (int m = 0; m < 3; ++m)
-            sum += before(l, j) * before(m, k) * Eigen::Map<const Vec3>(outer.at(second_column(l, m), i));
+            sum += inner_jacobian(l, j) * inner_jacobian(m, k) *
+                   Eigen::Map<const Vec3>(outer.at(second_column(l, m), i));
       }
     for (int c = 4; c < 10; ++c) Eigen::Map<Vec3>(inner.at(c, i)) = second[c - 4];
   }
-  for (int k = 0; k < 3; ++k) Eigen::Map<Vec3>(inner.at(first_column(k), i)) = after * before.col(k);
+  for (int k = 0; k < 3; ++k)
+    Eigen::Map<Vec3>(inner.at(first_column(k), i)) = outer_jacobian * inner_jacobian.col(k);
 }
 
 JetBlock<double> identity_jets(PointsIn points, JetOrder order) {
@@ -70,9 +72,9 @@ void ComposedField::evaluate(PointsIn points, JetView<double> out) const {
   const Index all = points.rows();
   for (Index first = 0; first < all; first += points_at_once) {
     const Index count = std::min(points_at_once, all - first);
-    Points here(count, 3);
-    for (Index i = 0; i < count; ++i) here.row(i) = points.row(order[first + i]);
-    JetBlock<double> jets = identity_jets(here, out.order);
+    Points chunk(count, 3);
+    for (Index i = 0; i < count; ++i) chunk.row(i) = points.row(order[first + i]);
+    JetBlock<double> jets = identity_jets(chunk, out.order);
     JetBlock<double> outer(count, out.order);
     for (const FieldStep& step : steps_)
       for (int k = 0; k < step.repeats; ++k) {

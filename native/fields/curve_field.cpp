@@ -11,9 +11,9 @@
 namespace arapfields {
 namespace {
 
-/// Nodes of the grid over the points' bounding box and `margin` cells around it that are within `reach` cells
-/// of a point.
-std::vector<Vec2> grid_nodes(Points2In points, double spacing, double margin, double reach) {
+/// Nodes of the grid over the points' bounding box and `margin` cells around it that are within `most_cells`
+/// cells of a point.
+std::vector<Vec2> grid_nodes(Points2In points, double spacing, double margin, double most_cells) {
   const Vec2 low = points.colwise().minCoeff().transpose(), high = points.colwise().maxCoeff().transpose();
   const Vec2 middle = 0.5 * (low + high);
   const auto half = [&](int axis) {
@@ -24,7 +24,7 @@ std::vector<Vec2> grid_nodes(Points2In points, double spacing, double margin, do
     for (Index j = -half(1); j <= half(1); ++j) {
       const Vec2 node = middle + spacing * Vec2(static_cast<double>(i), static_cast<double>(j));
       const double nearest = (points.rowwise() - node.transpose()).rowwise().squaredNorm().minCoeff();
-      if (nearest <= reach * reach * spacing * spacing) nodes.push_back(node);
+      if (nearest <= most_cells * most_cells * spacing * spacing) nodes.push_back(node);
     }
   return nodes;
 }

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 /// Share of the smaller radius by which a center may lie outside the larger ball.
-constexpr double reach_share = 0.25;
+constexpr double overlap_share = 0.25;
 /// Neighbours on one sheet: at most so many spacings apart, normals with at least this cosine.
 constexpr double sheet_spacings = 2.5, sheet_cosine = 0.3;
 
@@ -32,8 +32,8 @@ InteriorGraph::InteriorGraph(PointsIn nodes, PointsIn normals, double spacing) :
         if (i == j) continue;
         const double square = (nodes.row(i) - nodes.row(j)).squaredNorm();
         const double larger = std::max(radii[i], radii[j]), smaller = std::min(radii[i], radii[j]);
-        const double reach = larger + reach_share * smaller;
-        if ((centers.row(i) - centers.row(j)).squaredNorm() < reach * reach ||
+        const double limit = larger + overlap_share * smaller;
+        if ((centers.row(i) - centers.row(j)).squaredNorm() < limit * limit ||
             (square < near * near && normals.row(i).dot(normals.row(j)) > sheet_cosine))
           edges_[i].push_back({static_cast<std::int32_t>(j), static_cast<float>(std::sqrt(square))});
       }
@@ -47,16 +47,16 @@ void InteriorGraph::join_parts(PointsIn nodes) {
   std::vector<double> cost(n, infinity);
   std::vector<Index> from(n, 0);
   std::vector<bool> reached(n, false);
-  std::vector<Index> whole{0};
+  std::vector<Index> open{0};
   for (Index count = 0; count < n;) {
-    while (!whole.empty()) {  // all that edges reach
-      const Index i = whole.back();
-      whole.pop_back();
+    while (!open.empty()) {  // all that edges connect
+      const Index i = open.back();
+      open.pop_back();
       if (reached[i]) continue;
       reached[i] = true;
       ++count;
       for (const Edge& edge : edges(i))
-        if (!reached[edge.to]) whole.push_back(edge.to);
+        if (!reached[edge.to]) open.push_back(edge.to);
       if (count == n) return;
       cost[i] = -1.0;  // not yet offered to the rest
     }
@@ -76,7 +76,7 @@ void InteriorGraph::join_parts(PointsIn nodes) {
     const float length = static_cast<float>(std::sqrt(cost[best]));
     edges_[best].push_back({static_cast<std::int32_t>(other), length});
     edges_[other].push_back({static_cast<std::int32_t>(best), length});
-    whole.push_back(best);
+    open.push_back(best);
   }
 }
 

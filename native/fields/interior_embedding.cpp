@@ -20,7 +20,7 @@ constexpr Index most_nodes = 1500, least_nodes = 100, landmarks = 64;
 constexpr double detour = 0.94;
 /// Exceeding lengths count so many times.
 constexpr double emphasis = 2.0;
-/// Weight of smoothing against the embedding's values, and the reach of a node's neighbours in spacings.
+/// Weight of smoothing against the embedding's values, and the cutoff of a node's neighbours in spacings.
 constexpr double smoothing = 10.0, neighbour_spacings = 3.0;
 /// Spread of ψ, as a share of the shape's size, below which straight lines serve as well.
 constexpr double worthwhile_spread = 0.04;
@@ -163,13 +163,13 @@ void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out) const {
         nearest = std::min(nearest, distance[j]);
       }
       const double farthest_nearest = nearest + radius;
-      const double reach =
+      const double cutoff =
           std::sqrt(farthest_nearest * farthest_nearest - negligible * width * width) + radius;
-      Index found = 0;
+      Index near_count = 0;
       for (Index j = 0; j < n; ++j)
-        if (distance[j] <= reach) near[found++] = static_cast<std::int32_t>(j);
-      const EmbeddingBlock here{packed.data(), rows.data(), near.data(), found, scale};
-      ARAPFIELDS_DISPATCH(embedding_jets(here, columns_count, jets.data()));
+        if (distance[j] <= cutoff) near[near_count++] = static_cast<std::int32_t>(j);
+      const EmbeddingBlock embedding_block_data{packed.data(), rows.data(), near.data(), near_count, scale};
+      ARAPFIELDS_DISPATCH(embedding_jets(embedding_block_data, columns_count, jets.data()));
       for (int c = 0; c < columns_count; ++c)
         for (Index p = 0; p < valid; ++p)
           for (int k = 0; k < 3; ++k) out.at(c, b * block + p)[k] = jets[(c * 3 + k) * block + p];
@@ -200,10 +200,10 @@ std::shared_ptr<const InteriorEmbedding> interior_embedding(PointsIn samples, Po
           std::max(0.0, excess(i, l) - (embedding.nodes.row(i) - embedding.nodes.row(l)).squaredNorm());
   embedding.values = std::sqrt(emphasis) * leading_coordinates(excess);
   Neighbours neighbours(n);
-  const float reach = static_cast<float>(neighbour_spacings * embedding.width);
+  const float cutoff = static_cast<float>(neighbour_spacings * embedding.width);
   for (Index i = 0; i < n; ++i)
     for (const InteriorGraph::Edge& edge : graph.edges(i))
-      if (edge.length < reach) neighbours[i].push_back(edge.to);
+      if (edge.length < cutoff) neighbours[i].push_back(edge.to);
   embedding.values = smoothed(embedding.values, neighbours);
   const double size =
       (embedding.nodes.colwise().maxCoeff() - embedding.nodes.colwise().minCoeff()).maxCoeff();

@@ -157,12 +157,12 @@ void InvertibleField::evaluate(PointsIn points, JetView<double> out) const {
 Points InvertibleField::preimages(PointsIn points) const {
   const ThreadScope scope;
   const State& s = *state_;
-  Points found = points;
-  const at::Tensor x = tensor_view(found);
+  Points result = points;
+  const at::Tensor x = tensor_view(result);
   for_each_range(ranges_of(points.rows(), JetOrder::value), [&](const Range& range) {
     move_points(s.shape, s.views, x.narrow(0, range.begin, range.count), true);
   });
-  return found;
+  return result;
 }
 
 at::Tensor InvertibleField::forward(const at::Tensor& points, JetOrder order) {

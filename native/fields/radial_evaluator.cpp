@@ -61,9 +61,9 @@ RadialEvaluator<Scalar>::RadialEvaluator(const RadialBasis& basis, PointsIn poin
       std::array<double, 2> ball_radius{};
       ball_radius[0] = ball_of(points.middleRows(b * block_size, rows), center.data());
       if (basis.embedding) ball_radius[1] = ball_of(embedded.middleRows(b * block_size, rows), &center[3]);
-      const Index found = ARAPFIELDS_DISPATCH(
+      const Index active_count = ARAPFIELDS_DISPATCH(
           radial_active(center.data(), ball_radius.data(), exact.data(), center_count_, list.data()));
-      lists[b].assign(list.begin(), list.begin() + found);
+      lists[b].assign(list.begin(), list.begin() + active_count);
     }
   });
   start_.assign(1, 0);
@@ -132,8 +132,8 @@ void RadialEvaluator<Scalar>::evaluate(const RowMatrix<double>& coefficients, Je
   parallel_for(0, blocks(), blocks_per_task, [&](Index first, Index last) {
     std::array<Scalar, 10 * 3 * block_size> jets;
     for (Index b = first; b < last; ++b) {
-      const RadialBlock<Scalar> here = block(b);
-      ARAPFIELDS_DISPATCH(radial_forward(here, rounded.data(), columns_count, jets.data()));
+      const RadialBlock<Scalar> data = block(b);
+      ARAPFIELDS_DISPATCH(radial_forward(data, rounded.data(), columns_count, jets.data()));
       const Index valid = std::min(block_size, count_ - b * block_size);
       for (int c = 0; c < columns_count; ++c) {
         Scalar* to = out.at(c, b * block_size);
@@ -143,7 +143,7 @@ void RadialEvaluator<Scalar>::evaluate(const RowMatrix<double>& coefficients, Je
           for (Index p = 0; p < valid; ++p) {
             Scalar value = from[p] + constant;
             if (c == 0)
-              for (int k = 0; k < 3; ++k) value += here.points[k * block_size + p] * affine[3 * (k + 1) + i];
+              for (int k = 0; k < 3; ++k) value += data.points[k * block_size + p] * affine[3 * (k + 1) + i];
             to[3 * p + i] = value;
           }
         }
@@ -169,7 +169,7 @@ void RadialEvaluator<Scalar>::pull_back(JetView<const Scalar> cotangents, RowMat
       auto& sum = sums[task];
       sum.assign(center_count_ * 3 * radial_lanes, Scalar(0));
       for (Index b = task * per_task; b < std::min((task + 1) * per_task, blocks()); ++b) {
-        const RadialBlock<Scalar> here = block(b);
+        const RadialBlock<Scalar> data = block(b);
         const Index valid = std::min(block_size, count_ - b * block_size);
         packed.fill(Scalar(0));
         for (int c = 0; c < columns_count; ++c) {
@@ -181,10 +181,10 @@ void RadialEvaluator<Scalar>::pull_back(JetView<const Scalar> cotangents, RowMat
               if (c < 4) affine[task](c, i) += static_cast<double>(x);
               if (c == 0)
                 for (int k = 0; k < 3; ++k)
-                  affine[task](1 + k, i) += static_cast<double>(x * here.points[k * block_size + p]);
+                  affine[task](1 + k, i) += static_cast<double>(x * data.points[k * block_size + p]);
             }
         }
-        ARAPFIELDS_DISPATCH(radial_backward(here, packed.data(), columns_count, sum.data()));
+        ARAPFIELDS_DISPATCH(radial_backward(data, packed.data(), columns_count, sum.data()));
       }
     }
   });
@@ -201,17 +201,17 @@ RowMatrix<double> radial_rows(const RadialBasis& basis, PointsIn points, JetOrde
   const Index count = points.rows(), centers = basis.center_count();
   const int columns_count = columns(order);
   RowMatrix<double> result = RowMatrix<double>::Zero(columns_count * count, basis.size());
-  sites.for_blocks([&](Index b, const RadialBlock<double>& here) {
-    std::vector<double> values(here.active_count * columns_count * block_size);
-    ARAPFIELDS_DISPATCH(radial_rows(here, columns_count, values.data()));
+  sites.for_blocks([&](Index b, const RadialBlock<double>& data) {
+    std::vector<double> values(data.active_count * columns_count * block_size);
+    ARAPFIELDS_DISPATCH(radial_rows(data, columns_count, values.data()));
     for (Index p = 0; p < std::min(block_size, count - b * block_size); ++p) {
       for (int c = 0; c < columns_count; ++c) {
         auto row = result.row(c * count + b * block_size + p);
-        for (Index a = 0; a < here.active_count; ++a)
-          row[here.active[a]] = values[(a * columns_count + c) * block_size + p];
+        for (Index a = 0; a < data.active_count; ++a)
+          row[data.active[a]] = values[(a * columns_count + c) * block_size + p];
         if (c < 4) row[centers + c] = 1.0;
         if (c == 0)
-          for (int k = 0; k < 3; ++k) row[centers + 1 + k] = here.points[k * block_size + p];
+          for (int k = 0; k < 3; ++k) row[centers + 1 + k] = data.points[k * block_size + p];
       }
     }
   });

@@ -53,9 +53,9 @@ void RadialField::evaluate(PointsIn points, JetView<double> out) const {
 Points RadialField::at(PointsIn mesh_points) const {
   Points result = DeformationField::at(mesh_points);
   if (!influence_) return result;
-  const Vector share = influence_->at(frame().to_cube(mesh_points));
+  const Vector influence = influence_->at(frame().to_cube(mesh_points));
   for (Index i = 0; i < result.rows(); ++i)  // the way to the cube and back rounds
-    if (share[i] == 0.0) result.row(i) = mesh_points.row(i);
+    if (influence[i] == 0.0) result.row(i) = mesh_points.row(i);
   return result;
 }
 

@@ -169,7 +169,7 @@ void radial_rows(const RadialBlock<double>& block, int columns, double* rows) {
 
 std::int64_t radial_active(const double* center, const double* ball_radius, const double* centers,
                            std::int64_t count, std::int32_t* active) {
-  std::int64_t found = 0;
+  std::int64_t active_count = 0;
   for (std::int64_t m = 0; m < count; ++m) {
     const double* b = centers + center_stride * m;
     double square = 0;
@@ -179,10 +179,10 @@ std::int64_t radial_active(const double* center, const double* ball_radius, cons
       const double gap = std::sqrt(x * x + y * y + z * z) - ball_radius[part];
       square += gap > 0 ? gap * gap : 0;
     }
-    active[found] = static_cast<std::int32_t>(m);
-    found += square * b[3] < radial_power ? 1 : 0;
+    active[active_count] = static_cast<std::int32_t>(m);
+    active_count += square * b[3] < radial_power ? 1 : 0;
   }
-  return found;
+  return active_count;
 }
 
 double farthest_update(const double* points, const double* weights, std::int64_t count, const double* from,

@@ -146,17 +146,19 @@ void ArchiveReader::require_no_gaps(std::size_t begin) const {
 }
 
 const std::string& ArchiveReader::text(const std::string& name) {
-  const auto found = texts_.find(name);
-  require(found != texts_.end(), texts_key, "'" + name + "' is missing", "a file that save wrote is needed");
+  const auto entry_of_name = texts_.find(name);
+  require(entry_of_name != texts_.end(), texts_key, "'" + name + "' is missing",
+          "a file that save wrote is needed");
   used_.insert(texts_key + name);
-  return found->second;
+  return entry_of_name->second;
 }
 
 template <class Result>
 Result ArchiveReader::array(const std::string& name, const std::vector<Index>& shape, const char* dtype) {
-  const auto found = entries_.find(name);
-  require(found != entries_.end(), array_name(name), "is missing", "a file that save wrote is needed");
-  const Entry& entry = found->second;
+  const auto entry_of_name = entries_.find(name);
+  require(entry_of_name != entries_.end(), array_name(name), "is missing",
+          "a file that save wrote is needed");
+  const Entry& entry = entry_of_name->second;
   require(entry.dtype == dtype, array_name(name), "dtype " + entry.dtype, std::string(dtype) + " is needed");
   require(entry.shape == shape, array_name(name), "shape " + shape_text(entry.shape),
           "what is declared needs " + shape_text(shape));

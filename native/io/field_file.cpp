@@ -24,7 +24,7 @@ std::string step_prefix(const std::string& prefix, std::size_t step) {
   return prefix + "steps[" + std::to_string(step) + "].";
 }
 
-/// Adds a field's arrays to a file and keeps those that have to be made for it.
+/// Adds a field's arrays to a file and owns those that are copies.
 class FieldArrays {
  public:
   void add(const DeformationField& field, const std::string& prefix) {
@@ -179,13 +179,13 @@ std::shared_ptr<RadialField> read_radial(ArchiveReader& file, const JsonObject& 
   if (object.has("embedding")) {
     const JsonObject embedding(object.at("embedding"), object.name("embedding"), {"nodes", "width"});
     const Index nodes = embedding.integer("nodes", 1, most_rows);
-    InteriorEmbedding made;
-    made.width = embedding.number("width");
-    made.nodes = file.points(prefix + "embedding.nodes", nodes);
-    made.values = file.points(prefix + "embedding.values", nodes);
+    InteriorEmbedding restored;
+    restored.width = embedding.number("width");
+    restored.nodes = file.points(prefix + "embedding.nodes", nodes);
+    restored.values = file.points(prefix + "embedding.values", nodes);
     const Vector slopes = file.doubles(prefix + "embedding.slopes", {nodes, 9});
-    made.slopes = Eigen::Map<const RowMatrix<double>>(slopes.data(), nodes, 9);
-    basis.set_embedding(std::make_shared<const InteriorEmbedding>(std::move(made)));
+    restored.slopes = Eigen::Map<const RowMatrix<double>>(slopes.data(), nodes, 9);
+    basis.set_embedding(std::make_shared<const InteriorEmbedding>(std::move(restored)));
   }
   std::shared_ptr<const Influence> influence;
   if (object.has("influence")) {

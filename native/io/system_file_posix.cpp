@@ -13,9 +13,9 @@ namespace arapfields::system_file {
 
 int open_to_read(const std::filesystem::path& path) {
   const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  struct stat found{};
+  struct stat status{};
   if (file < 0) return -1;
-  const int problem = fstat(file, &found) != 0 ? errno : S_ISDIR(found.st_mode) ? EISDIR : 0;
+  const int problem = fstat(file, &status) != 0 ? errno : S_ISDIR(status.st_mode) ? EISDIR : 0;
   if (problem == 0) return file;
   close(file);
   errno = problem;
@@ -33,13 +33,13 @@ int open_written(const std::filesystem::path& path) {
 void close_file(int file) noexcept { close(file); }
 
 bool is_regular(int file) {
-  struct stat found{};
-  return fstat(file, &found) == 0 && S_ISREG(found.st_mode);
+  struct stat status{};
+  return fstat(file, &status) == 0 && S_ISREG(status.st_mode);
 }
 
 std::uint64_t size(int file) {
-  struct stat found{};
-  return fstat(file, &found) == 0 ? static_cast<std::uint64_t>(found.st_size) : 0;
+  struct stat status{};
+  return fstat(file, &status) == 0 ? static_cast<std::uint64_t>(status.st_size) : 0;
 }
 
 std::ptrdiff_t read_at(int file, void* to, std::size_t bytes, std::uint64_t offset) {
@@ -59,13 +59,14 @@ std::ptrdiff_t append(int file, const void* from, std::size_t bytes) {
 bool to_disk(int file) { return fsync(file) == 0; }
 
 bool take_permissions(int file, const std::filesystem::path& path) {
-  struct stat ours{}, there{};
-  if (fstat(file, &ours) != 0) return false;
-  if (stat(path.c_str(), &there) != 0) return true;
-  const bool done = fchmod(file, there.st_mode & 07777) == 0;
+  struct stat own{}, previous{};
+  if (fstat(file, &own) != 0) return false;
+  if (stat(path.c_str(), &previous) != 0) return true;
+  const bool done = fchmod(file, previous.st_mode & 07777) == 0;
   const int problem = errno;
-  if (there.st_uid != ours.st_uid || there.st_gid != ours.st_gid)
-    if (fchown(file, there.st_uid, there.st_gid) != 0) errno = 0;  // another's file becomes ours
+  if (previous.st_uid != own.st_uid || previous.st_gid != own.st_gid)
+    if (fchown(file, previous.st_uid, previous.st_gid) != 0)
+      errno = 0;  // a file of another user becomes our own
   if (!done) errno = problem;
   return done;
 }
@@ -81,10 +82,10 @@ bool make_folder(const std::filesystem::path& folder) { return mkdir(folder.c_st
 int lock_folder(const std::filesystem::path& folder) {
   const int descriptor = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
   if (descriptor < 0) return -1;
-  struct stat found{};
+  struct stat status{};
   const bool locked = flock(descriptor, LOCK_EX | LOCK_NB) == 0;
   const int problem = locked ? EWOULDBLOCK : errno;
-  if (locked && fstat(descriptor, &found) == 0 && found.st_nlink > 0 && found.st_uid == geteuid())
+  if (locked && fstat(descriptor, &status) == 0 && status.st_nlink > 0 && status.st_uid == geteuid())
     return descriptor;
   close(descriptor);
   errno = problem;

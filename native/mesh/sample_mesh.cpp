@@ -69,8 +69,8 @@ SurfaceSamples draw_from(Joined joined, Index count, std::uint64_t seed) {
   samples.weights = at_draws(joined.painted.weights, joined.triangles, draws);
   samples.bend_weights = at_draws(joined.painted.bend_weights, joined.triangles, draws);
   for (Index i = 0; i < count && several; ++i) {
-    const auto found = std::upper_bound(joined.ends.begin(), joined.ends.end(), draws[i].triangle);
-    samples.mesh_indices.push_back(static_cast<std::int32_t>(found - joined.ends.begin()));
+    const auto mesh_end = std::upper_bound(joined.ends.begin(), joined.ends.end(), draws[i].triangle);
+    samples.mesh_indices.push_back(static_cast<std::int32_t>(mesh_end - joined.ends.begin()));
   }
   samples.redraw = [kept = std::make_shared<const Joined>(std::move(joined))](
                        Index again, std::uint64_t other) { return draw_from(*kept, again, other); };
@@ -96,9 +96,9 @@ AreaSampler::AreaSampler(PointsIn vertices, TrianglesIn triangles)
 
 AreaSampler::Draw AreaSampler::draw(Random& random) const {
   const double target = random.uniform() * cumulative_.back();
-  auto found = std::upper_bound(cumulative_.begin(), cumulative_.end(), target);
-  if (found == cumulative_.end()) --found;
-  const Index t = found - cumulative_.begin();
+  auto triangle = std::upper_bound(cumulative_.begin(), cumulative_.end(), target);
+  if (triangle == cumulative_.end()) --triangle;
+  const Index t = triangle - cumulative_.begin();
   // Uniform in the triangle: the square root makes the distance to corner 0 grow with the area.
   const double root = std::sqrt(random.uniform()), split = random.uniform();
   return {(1.0 - root) * corner(vertices_, triangles_, t, 0) +

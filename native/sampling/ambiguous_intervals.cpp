@@ -12,36 +12,36 @@ namespace {
 // Curvature of Φ − p along a line, over the model's slope error per spacing. On four published networks 90 %
 // of the points are below half of this; the 99 % point is 0.5 to 1.4 times it.
 constexpr double curvature_factor = 5.0;
-constexpr int probes = 5;  // parameters at which p is looked at in a piece, ends included
+constexpr int nodes = 5;  // parameters of a piece at which p is evaluated, both ends included
 
 /// A piece of a line with Φ known at both ends.
 struct Piece {
   Index line;
   double low, high;
   double low_value, high_value;
-  double split = 0.0;  // where to ask next
+  double split = 0.0;  // parameter of the next evaluation
 };
 
-enum class Verdict { none, one, unknown };
+enum class Roots { none, one, unknown };
 
-/// What p and Φ at the piece's ends say about the zeros between; sets `split` and, for one zero, guess and
-/// slope.
-Verdict judge(const TricubicSurrogate& model, const Line& line, Piece& piece, double finest,
-              Bracket& bracket) {
+/// How many zeros Φ has in the piece, as far as p and Φ at both ends bound it. Sets `split` and, for one
+/// zero, the bracket's guess and slope.
+Roots classify_interval(const TricubicSurrogate& model, const Line& line, Piece& piece, double finest,
+                        Bracket& bracket) {
   const double length = piece.high - piece.low, fa = piece.low_value, fb = piece.high_value;
   const bool passes = (fa < 0.0) != (fb < 0.0);
-  if (!passes && std::abs(fa) + std::abs(fb) > model.lipschitz() * length) return Verdict::none;
+  if (!passes && std::abs(fa) + std::abs(fb) > model.lipschitz() * length) return Roots::none;
   const double chord = fa == fb ? 0.5 : fa / (fa - fb);
   bracket = {piece.line, piece.low, piece.high, piece.low + std::clamp(chord, 0.0, 1.0) * length,
              (fb - fa) / length};
-  if (length <= finest) return passes ? Verdict::one : Verdict::none;
+  if (length <= finest) return passes ? Roots::one : Roots::none;
 
   // q = p + the residual Φ − p interpolated between the ends.
-  std::array<double, probes> q{};
+  std::array<double, nodes> q{};
   double slope_error = 0.0;
   bool known = true;
-  for (int i = 0; i < probes && known; ++i) {
-    const Vec3 x = line.at(piece.low + length * i / (probes - 1));
+  for (int i = 0; i < nodes && known; ++i) {
+    const Vec3 x = line.at(piece.low + length * i / (nodes - 1));
     const Index cell = model.cell(model.position(x[0]), model.position(x[1]), model.position(x[2]));
     known = model.side(cell) == 0;
     if (!known) break;
@@ -49,17 +49,17 @@ Verdict judge(const TricubicSurrogate& model, const Line& line, Piece& piece, do
     slope_error = std::max<double>(slope_error, model.slope_error(cell));
   }
   piece.split = 0.5 * (piece.low + piece.high);
-  if (!known) return Verdict::unknown;
+  if (!known) return Roots::unknown;
   const double ra = fa - q.front(), rb = fb - q.back();
-  for (int i = 0; i < probes; ++i) {
-    const double w = static_cast<double>(i) / (probes - 1);
+  for (int i = 0; i < nodes; ++i) {
+    const double w = static_cast<double>(i) / (nodes - 1);
     q[i] += (1.0 - w) * ra + w * rb;
   }
-  const double step = length / (probes - 1);
+  const double step = length / (nodes - 1);
   double least = std::abs(q[0]), bend = 0.0, shallowest = std::abs(q[1] - q[0]) / step;
   bool same_sign = true, monotone = true;
   int nearest = 1, pass = -1;
-  for (std::size_t i = 0; i + 1 < probes; ++i) {
+  for (std::size_t i = 0; i + 1 < nodes; ++i) {
     least = std::min(least, std::abs(q[i + 1]));
     shallowest = std::min(shallowest, std::abs(q[i + 1] - q[i]) / step);
     same_sign = same_sign && (q[i] < 0.0) == (q[i + 1] < 0.0);
@@ -72,7 +72,7 @@ Verdict judge(const TricubicSurrogate& model, const Line& line, Piece& piece, do
   const double bow = curvature_factor * length / model.spacing();
   const double deviation = slope_error * length * std::min(0.5, 0.125 * bow);
   const double slope_deviation = slope_error * std::min(2.0, 0.5 * bow);
-  if (same_sign && !passes && least - 0.25 * bend * step > deviation) return Verdict::none;
+  if (same_sign && !passes && least - 0.25 * bend * step > deviation) return Roots::none;
   if (pass >= 0) {
     const double a = q[pass], b = q[pass + 1];
     const double root = piece.low + step * (pass + (a == b ? 0.5 : a / (a - b)));
@@ -80,21 +80,21 @@ Verdict judge(const TricubicSurrogate& model, const Line& line, Piece& piece, do
       bracket.guess = std::clamp(root, piece.low, piece.high);
       bracket.slope = (b - a) / step;
       const bool agrees = (bracket.slope > 0.0) == (fb > fa);
-      if (monotone && agrees && shallowest - bend > slope_deviation) return Verdict::one;
+      if (monotone && agrees && shallowest - bend > slope_deviation) return Roots::one;
     }
     piece.split = std::clamp(root, piece.low + 0.1 * length, piece.high - 0.1 * length);
   } else {
     piece.split = piece.low + step * nearest;
   }
-  return Verdict::unknown;
+  return Roots::unknown;
 }
 
-VectorF ask(EvaluationCounter& function, const std::vector<Line>& lines, const std::vector<Piece>& pieces,
-            double Piece::* where) {
+VectorF evaluate_at(EvaluationCounter& function, const std::vector<Line>& lines,
+                    const std::vector<Piece>& pieces, double Piece::* parameter) {
   PointsF points(static_cast<Index>(pieces.size()), 3);
   for (Index row = 0; row < points.rows(); ++row) {
     const Piece& piece = pieces[row];
-    points.row(row) = lines[piece.line].at(piece.*where).cast<float>();
+    points.row(row) = lines[piece.line].at(piece.*parameter).cast<float>();
   }
   return function.values(points);
 }
@@ -105,29 +105,29 @@ std::vector<Bracket> resolve_ambiguous(EvaluationCounter& function, const Tricub
                                        const std::vector<Line>& lines,
                                        const std::vector<AmbiguousInterval>& ambiguous, double finest) {
   std::vector<Piece> pieces;
-  for (const AmbiguousInterval& doubt : ambiguous)
-    pieces.push_back({doubt.line, doubt.low, doubt.high, 0.0, 0.0});
-  const VectorF low = ask(function, lines, pieces, &Piece::low);
-  const VectorF high = ask(function, lines, pieces, &Piece::high);
+  for (const AmbiguousInterval& interval : ambiguous)
+    pieces.push_back({interval.line, interval.low, interval.high, 0.0, 0.0});
+  const VectorF low = evaluate_at(function, lines, pieces, &Piece::low);
+  const VectorF high = evaluate_at(function, lines, pieces, &Piece::high);
   for (std::size_t i = 0; i < pieces.size(); ++i) {
     pieces[i].low_value = low[i];
     pieces[i].high_value = high[i];
   }
-  std::vector<Bracket> found;
+  std::vector<Bracket> result;
   while (!pieces.empty()) {
     const auto count = static_cast<Index>(pieces.size());
-    std::vector<Verdict> verdicts(pieces.size());
+    std::vector<Roots> roots(pieces.size());
     std::vector<Bracket> brackets(pieces.size());
     parallel_for(0, count, 64, [&](Index begin, Index end) {
       for (Index i = begin; i < end; ++i)
-        verdicts[i] = judge(model, lines[pieces[i].line], pieces[i], finest, brackets[i]);
+        roots[i] = classify_interval(model, lines[pieces[i].line], pieces[i], finest, brackets[i]);
     });
     std::vector<Piece> open;
     for (std::size_t i = 0; i < pieces.size(); ++i) {
-      if (verdicts[i] == Verdict::one) found.push_back(brackets[i]);
-      if (verdicts[i] == Verdict::unknown) open.push_back(pieces[i]);
+      if (roots[i] == Roots::one) result.push_back(brackets[i]);
+      if (roots[i] == Roots::unknown) open.push_back(pieces[i]);
     }
-    const VectorF values = ask(function, lines, open, &Piece::split);
+    const VectorF values = evaluate_at(function, lines, open, &Piece::split);
     pieces.clear();
     for (std::size_t i = 0; i < open.size(); ++i) {
       const Piece& p = open[i];
@@ -136,10 +136,10 @@ std::vector<Bracket> resolve_ambiguous(EvaluationCounter& function, const Tricub
       pieces.push_back({p.line, p.split, p.high, value, p.high_value});
     }
   }
-  std::sort(found.begin(), found.end(), [](const Bracket& a, const Bracket& b) {
+  std::sort(result.begin(), result.end(), [](const Bracket& a, const Bracket& b) {
     return a.line != b.line ? a.line < b.line : a.low < b.low;
   });
-  return found;
+  return result;
 }
 
 }  // namespace arapfields

@@ -7,9 +7,9 @@
 
 namespace arapfields {
 
-/// Asks Φ in the doubtful parts of lines until every crossing there has its bracket. A part is bisected, all
-/// parts at once, until Φ − p, known at its ends and bounded in slope, excludes a second zero or any, or
-/// until it is shorter than `finest`. Excursions of Φ over zero and back within that length may be missed.
+/// Evaluates Φ in the ambiguous intervals until every crossing there has its bracket. All intervals are
+/// bisected at once. An interval is done when Φ − p, known at its ends and bounded in slope, excludes a
+/// second zero or any, or when it is shorter than `finest`. Two zeros of Φ within that length may be missed.
 std::vector<Bracket> resolve_ambiguous(EvaluationCounter& function, const TricubicSurrogate& model,
                                        const std::vector<Line>& lines,
                                        const std::vector<AmbiguousInterval>& ambiguous, double finest = 2e-4);

@@ -16,7 +16,7 @@ constexpr Index most_nodes = 1500, most_witnesses = 6000;
 /// Of the radius of gyration.
 constexpr double most_share = 0.6, least_share = 0.02;
 /// Share of a ball's radius by which a point may lie outside it.
-constexpr double reach_share = 0.25;
+constexpr double overlap_share = 0.25;
 /// Inner balls: how flat a witness may be, and within how many spacings of witnesses sides face each other.
 constexpr double least_cosine = 0.2, facing_spacings = 3.0;
 /// Values are averaged within so many thicknesses, and blended between nodes within so many spacings.
@@ -37,33 +37,33 @@ LocalThickness::LocalThickness(PointsIn samples, PointsIn normals, const std::ve
   // A sphere's area by its radius of gyration: spacings need no more than its order of magnitude.
   const double side = 3.5 * gyration;
   spacing_ = side / std::sqrt(static_cast<double>(nodes_.rows()));
-  const double apart = side / std::sqrt(static_cast<double>(witnesses.rows()));
+  const double witness_spacing = side / std::sqrt(static_cast<double>(witnesses.rows()));
   const Vector radii =
       inner_radii(nodes_, node_normals, witnesses, witness_normals,
-                  {.most = most_, .least_cosine = least_cosine, .near = facing_spacings * apart});
+                  {.most = most_, .least_cosine = least_cosine, .near = facing_spacings * witness_spacing});
   const Points centers = nodes_ - radii.asDiagonal() * node_normals;
   const Index n = nodes_.rows();
-  Vector held(n);
+  Vector thickness(n);
   const double least = least_share * gyration;
   parallel_for(0, n, 32, [&](Index first, Index last) {
     for (Index i = first; i < last; ++i) {
       double largest = std::max(least, radii[i]);
       for (Index j = 0; j < n; ++j) {
-        const double reach = (1.0 + reach_share) * radii[j];
-        if (radii[j] > largest && (centers.row(j) - nodes_.row(i)).squaredNorm() <= reach * reach)
+        const double limit = (1.0 + overlap_share) * radii[j];
+        if (radii[j] > largest && (centers.row(j) - nodes_.row(i)).squaredNorm() <= limit * limit)
           largest = radii[j];
       }
-      held[i] = largest;
+      thickness[i] = largest;
     }
   });
   values_.resize(n);
   parallel_for(0, n, 32, [&](Index first, Index last) {
     for (Index i = first; i < last; ++i) {
-      const double width = std::max(smooth_share * held[i], spacing_);
+      const double width = std::max(smooth_share * thickness[i], spacing_);
       double sum = 0.0, total = 0.0;
       for (Index j = 0; j < n; ++j) {
-        const double share = 1.0 - (nodes_.row(j) - nodes_.row(i)).squaredNorm() / (width * width);
-        if (share > 0.0) sum += share * held[j], total += share;
+        const double weight = 1.0 - (nodes_.row(j) - nodes_.row(i)).squaredNorm() / (width * width);
+        if (weight > 0.0) sum += weight * thickness[j], total += weight;
       }
       values_[i] = sum / total;
     }
@@ -88,8 +88,8 @@ Vector LocalThickness::at(PointsIn points) const {
       double sum = 0.0, total = 0.0;
       for (Index j = 0; j < n; ++j)
         if (squares[j] < farthest) {
-          const double share = 1.0 - (squares[j] - nearest) / (width * width);
-          sum += share * values_[j], total += share;
+          const double weight = 1.0 - (squares[j] - nearest) / (width * width);
+          sum += weight * values_[j], total += weight;
         }
       result[i] = sum / total;
     }

@@ -12,8 +12,8 @@ namespace arapfields {
 namespace {
 
 constexpr Index leaf = 12, grain = 256;
-/// Subtrees that a search has yet to look at: one a level, and a level halves the points.
-constexpr std::size_t deepest = 64;
+/// Subtrees that a search has still to visit: one a level, and each level halves the points.
+constexpr std::size_t most_levels = 64;
 
 }  // namespace
 
@@ -55,22 +55,22 @@ void OrientedPoints::build(std::size_t node, Index begin, Index end) {
 /// Calls visit(row of the tree) for all points that may lie within √square, which it may lower.
 template <class Visit>
 void OrientedPoints::search(const Vec3& place, double& square, Visit&& visit) const {
-  struct Waiting {
+  struct Pending {
     std::size_t node;
-    double square;  // of the way to its half space
+    double square;  // of the offset to its half space
   };
-  std::array<Waiting, deepest> stack;
-  std::size_t waiting = 0;
-  stack[waiting++] = {0, 0.0};
-  while (waiting > 0) {
-    Waiting next = stack[--waiting];
+  std::array<Pending, most_levels> stack;
+  std::size_t pending = 0;
+  stack[pending++] = {0, 0.0};
+  while (pending > 0) {
+    Pending next = stack[--pending];
     if (next.square > square) continue;
     while (nodes_[next.node].axis >= 0) {
       const Node& node = nodes_[next.node];
-      const double way = place[node.axis] - node.split;
+      const double offset = place[node.axis] - node.split;
       const std::size_t below = 2 * next.node + 1, above = below + 1;
-      stack[waiting++] = {way < 0.0 ? above : below, std::max(next.square, way * way)};
-      next.node = way < 0.0 ? below : above;
+      stack[pending++] = {offset < 0.0 ? above : below, std::max(next.square, offset * offset)};
+      next.node = offset < 0.0 ? below : above;
     }
     for (Index i = nodes_[next.node].begin; i < nodes_[next.node].end; ++i) visit(i);
   }
@@ -82,16 +82,16 @@ std::vector<Index> OrientedPoints::nearest(PointsIn others, PointsIn normals, do
     for (Index i = begin; i < end; ++i) {
       const Vec3 place = others.row(i), normal = normals.row(i);
       double best = std::numeric_limits<double>::infinity();
-      Index found = 0;
+      Index nearest_row = 0;
       search(place, best, [&](Index k) {
         const double square = (points_.row(k).transpose() - place).squaredNorm() +
                               turn * turn * (normals_.row(k).transpose() - normal).squaredNorm();
-        if (square < best || (square == best && rows_[k] < found)) {
+        if (square < best || (square == best && rows_[k] < nearest_row)) {
           best = square;
-          found = rows_[k];
+          nearest_row = rows_[k];
         }
       });
-      result[i] = found;
+      result[i] = nearest_row;
     }
   });
   return result;

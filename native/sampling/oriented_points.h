@@ -8,8 +8,8 @@
 
 namespace arapfields {
 
-/// Points with unit normals that are asked for the one that is nearest in place and direction: a k-d tree of
-/// the places. Built once, asked from any number of threads at a time.
+/// A k-d tree over points with unit normals, for the nearest neighbour in position and direction together.
+/// Built once; queries may come from any number of threads.
 class ARAPFIELDS_EXPORT_TO_TESTS OrientedPoints {
  public:
   OrientedPoints() = default;
@@ -33,7 +33,7 @@ class ARAPFIELDS_EXPORT_TO_TESTS OrientedPoints {
   void search(const Vec3& place, double& square, Visit&& visit) const;
 
   Points points_, normals_;  // in the tree's order
-  std::vector<Index> rows_;  // whose they are
+  std::vector<Index> rows_;  // original row of each
   std::vector<Node> nodes_;  // children of node i: 2 i + 1, 2 i + 2
 };
 

@@ -32,7 +32,7 @@ int sign_of(double x) { return x < 0.0 ? -1 : 1; }
 /// Walks a line through the grid's cells (Amanatides, Woo 1987).
 class CellWalk {
  public:
-  CellWalk(const TricubicSurrogate& model, const Line& line) : line_(line), cells_(model.resolution()) {
+  CellWalk(const TricubicSurrogate& model, const Line& line) : line_(line), cells_(model.cells_a_side()) {
     const double h = model.spacing();
     const Vec3 start = line.at(std::min(1e-9, line.length));
     for (int axis = 0; axis < 3; ++axis) {

@@ -15,7 +15,7 @@ struct Bracket {
   double slope = 0.0;            ///< expected dΦ/dt there; its sign is that of Φ at `high`
 };
 
-/// A part of a line in which the model alone cannot count the zeros: Φ itself must be asked.
+/// A part of a line in which the model alone cannot count the zeros: Φ itself must be evaluated.
 struct AmbiguousInterval {
   Index line = 0;
   double low = 0.0, high = 0.0;

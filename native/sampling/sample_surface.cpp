@@ -20,7 +20,7 @@ constexpr std::uint64_t shuffle_stream = ~std::uint64_t{0};
 
 /// The model pays off while it has fewer cells than a quarter of the points wanted.
 TricubicSurrogateOptions model_options(Index count) {
-  return {.wanted_cells = std::clamp<Index>(count / 4, 200, 50'000), .max_resolution = 128};
+  return {.target_cells = std::clamp<Index>(count / 4, 200, 50'000), .max_cells_a_side = 128};
 }
 
 /// Casts lines and keeps those that cross, with a bracket for every crossing.
@@ -36,14 +36,14 @@ class Caster {
       Random random(seed_, static_cast<std::uint64_t>(cast_++));
       line = random_line(box_, random);
     }
-    ScanResult found = scan_lines(model_, fresh);
-    const std::vector<Bracket> more = resolve_ambiguous(function_, model_, fresh, found.ambiguous);
-    found.brackets.insert(found.brackets.end(), more.begin(), more.end());
-    std::sort(found.brackets.begin(), found.brackets.end(), [](const Bracket& a, const Bracket& b) {
+    ScanResult scan = scan_lines(model_, fresh);
+    const std::vector<Bracket> more = resolve_ambiguous(function_, model_, fresh, scan.ambiguous);
+    scan.brackets.insert(scan.brackets.end(), more.begin(), more.end());
+    std::sort(scan.brackets.begin(), scan.brackets.end(), [](const Bracket& a, const Bracket& b) {
       return a.line != b.line ? a.line < b.line : a.low < b.low;
     });
     Index before = -1;
-    for (Bracket each : found.brackets) {
+    for (Bracket each : scan.brackets) {
       if (each.line != before) lines.push_back(fresh[each.line]);
       before = each.line;
       each.line = static_cast<Index>(lines.size()) - 1;
@@ -72,8 +72,8 @@ class Caster {
   Index cast_ = 0;
 };
 
-[[noreturn]] void throw_empty(const std::string& found) {
-  throw InvalidInput("sdf", found, "a function with a zero surface inside the cube [-1, 1]^3 is needed");
+[[noreturn]] void throw_empty(const std::string& observed) {
+  throw InvalidInput("sdf", observed, "a function with a zero surface inside the cube [-1, 1]^3 is needed");
 }
 
 void shuffle(std::vector<Bracket>& items, std::size_t begin, Random& random) {
@@ -120,12 +120,12 @@ SurfaceSamples sample_surface(const ImplicitFunction& implicit, const SampleOpti
     const std::vector<Bracket> chosen(begin, begin + missing);
     used += chosen.size();
     progress.report(0.7, "finding the crossings");
-    const Crossings found = find_crossings(function, caster.lines, chosen, options.tolerance);
-    const Index fresh = found.points.rows();
-    samples.points.middleRows(done, fresh) = found.points.cast<double>();
-    samples.normals.middleRows(done, fresh) = found.gradients.cast<double>().rowwise().normalized();
+    const Crossings crossings = find_crossings(function, caster.lines, chosen, options.tolerance);
+    const Index fresh = crossings.points.rows();
+    samples.points.middleRows(done, fresh) = crossings.points.cast<double>();
+    samples.normals.middleRows(done, fresh) = crossings.gradients.cast<double>().rowwise().normalized();
     done += fresh;
-    largest = std::max(largest, found.largest);
+    largest = std::max(largest, crossings.largest);
   }
   if (report != nullptr)
     *report = {.lines = caster.lines_cast(),

@@ -48,16 +48,16 @@ TricubicSurrogate::TricubicSurrogate(EvaluationCounter& function, const Tricubic
 }
 
 std::array<int, 3> TricubicSurrogate::coordinates(Index cell) const {
-  return {static_cast<int>(cell / (static_cast<Index>(resolution_) * resolution_)),
-          static_cast<int>(cell / resolution_ % resolution_), static_cast<int>(cell % resolution_)};
+  return {static_cast<int>(cell / (static_cast<Index>(cells_a_side_) * cells_a_side_)),
+          static_cast<int>(cell / cells_a_side_ % cells_a_side_), static_cast<int>(cell % cells_a_side_)};
 }
 
 int TricubicSurrogate::position(double x) const {
-  return std::clamp(static_cast<int>(std::floor((x + 1.0) / spacing())), 0, resolution_ - 1);
+  return std::clamp(static_cast<int>(std::floor((x + 1.0) / spacing())), 0, cells_a_side_ - 1);
 }
 
 int TricubicSurrogate::block_start(int position) const {
-  return std::clamp(position - 1, 0, resolution_ - 3);
+  return std::clamp(position - 1, 0, cells_a_side_ - 3);
 }
 
 float TricubicSurrogate::slope_error_of(float error) const {
@@ -78,7 +78,7 @@ Box TricubicSurrogate::bounds() const {
 
 CubicBlock TricubicSurrogate::block(Index cell) const {
   const auto place = coordinates(cell);
-  const Index points = resolution_ + 1, k = block_start(place[2]);
+  const Index points = cells_a_side_ + 1, k = block_start(place[2]);
   CubicBlock result;
   for (int a = 0; a < 4; ++a)
     for (int b = 0; b < 4; ++b) {
@@ -99,8 +99,8 @@ float TricubicSurrogate::operator()(const Vec3& point) const {
 /// From coarse to fine: evaluates Φ at the centres of the cells that are left and keeps those whose value
 /// does not exclude a zero.
 void TricubicSurrogate::cull(EvaluationCounter& function, const TricubicSurrogateOptions& options) {
-  resolution_ = options.coarsest;
-  side_.assign(Index{resolution_} * resolution_ * resolution_, 0);
+  cells_a_side_ = options.coarsest;
+  side_.assign(Index{cells_a_side_} * cells_a_side_ * cells_a_side_, 0);
   active_.resize(side_.size());
   for (std::size_t i = 0; i < active_.size(); ++i) active_[i] = static_cast<Index>(i);
   for (;;) {
@@ -111,12 +111,12 @@ void TricubicSurrogate::cull(EvaluationCounter& function, const TricubicSurrogat
         centres(row, axis) = static_cast<float>((place[axis] + 0.5) * spacing() - 1.0);
     }
     const VectorF values = function.values(centres);
-    const auto reach = static_cast<float>(lipschitz_ * half_diagonal * spacing());
+    const auto farthest_zero = static_cast<float>(lipschitz_ * half_diagonal * spacing());
     Index kept = 0;
     centre_values_.resize(values.size());
     for (Index row = 0; row < values.size(); ++row) {
       const Index each = active_[row];
-      if (std::abs(values[row]) > reach) {
+      if (std::abs(values[row]) > farthest_zero) {
         side_[each] = values[row] > 0.0f ? 1 : -1;
       } else {
         centre_values_[kept] = values[row];
@@ -125,9 +125,9 @@ void TricubicSurrogate::cull(EvaluationCounter& function, const TricubicSurrogat
     }
     active_.resize(kept);
     centre_values_.conservativeResize(kept);
-    if (kept == 0 || kept >= options.wanted_cells || 2 * resolution_ > options.max_resolution) return;
+    if (kept == 0 || kept >= options.target_cells || 2 * cells_a_side_ > options.max_cells_a_side) return;
 
-    const int fine = 2 * resolution_;
+    const int fine = 2 * cells_a_side_;
     std::vector<std::int8_t> inherited(8 * side_.size());
     active_.clear();
     Index child = 0;
@@ -139,14 +139,14 @@ void TricubicSurrogate::cull(EvaluationCounter& function, const TricubicSurrogat
           if (parent == 0) active_.push_back(child);
         }
     side_ = std::move(inherited);
-    resolution_ = fine;
+    cells_a_side_ = fine;
   }
 }
 
 /// Evaluates Φ on the grid points that the active cells' blocks need. False, with the bound on |∇Φ| raised,
 /// where two neighbouring values differ by more than it allows.
 bool TricubicSurrogate::fill(EvaluationCounter& function) {
-  const Index points = resolution_ + 1;
+  const Index points = cells_a_side_ + 1;
   const std::size_t total = points * points * points;
   std::vector<std::uint8_t> needed(total, 0);
   for (const Index each : active_) {
@@ -171,18 +171,20 @@ bool TricubicSurrogate::fill(EvaluationCounter& function) {
   values_.assign(total, std::numeric_limits<float>::quiet_NaN());
   for (std::size_t i = 0; i < list.size(); ++i) values_[list[i]] = values[i];
 
-  float steepest = 0.0f;
+  float largest_difference = 0.0f;
   for (const Index each : list) {
     const auto at = [&](Index offset) { return values_[each + offset]; };
-    // A comparison with NaN, a point that was not needed, is false and leaves `steepest` alone.
-    if (each % points + 1 < points) steepest = std::max(steepest, std::abs(at(1) - at(0)));
-    if (each / points % points + 1 < points) steepest = std::max(steepest, std::abs(at(points) - at(0)));
+    // A comparison with NaN, a point that was not needed, is false and leaves `largest_difference` alone.
+    if (each % points + 1 < points)
+      largest_difference = std::max(largest_difference, std::abs(at(1) - at(0)));
+    if (each / points % points + 1 < points)
+      largest_difference = std::max(largest_difference, std::abs(at(points) - at(0)));
     if (each / (points * points) + 1 < points)
-      steepest = std::max(steepest, std::abs(at(points * points) - at(0)));
+      largest_difference = std::max(largest_difference, std::abs(at(points * points) - at(0)));
   }
-  const double seen = steepest / spacing();
-  if (seen <= lipschitz_ * (1.0 + 1e-4) || function.gradient_bound() || !function.continuous()) return true;
-  lipschitz_ = 1.25 * seen;
+  const double slope = largest_difference / spacing();
+  if (slope <= lipschitz_ * (1.0 + 1e-4) || function.gradient_bound() || !function.continuous()) return true;
+  lipschitz_ = 1.25 * slope;
   return false;
 }
 
@@ -193,14 +195,14 @@ int TricubicSurrogate::settled_sign(Index cell, const Vec3& point) const {
     const bool kept = std::abs(value) > lipschitz_ * spacing() * (within - from).norm();
     return !kept ? 0 : value < 0.0f ? -1 : 1;
   };
-  int found = sign(centre_[cell], Vec3::Constant(0.5));
-  const Index points = resolution_ + 1;
-  for (int c = 0; c < 8 && found == 0; ++c) {
+  int result = sign(centre_[cell], Vec3::Constant(0.5));
+  const Index points = cells_a_side_ + 1;
+  for (int c = 0; c < 8 && result == 0; ++c) {
     const int i = c >> 2, j = (c >> 1) & 1, k = c & 1;
     const Index at = ((place[0] + i) * points + place[1] + j) * points + place[2] + k;
-    found = sign(values_[at], Vec3(i, j, k));
+    result = sign(values_[at], Vec3(i, j, k));
   }
-  return found;
+  return result;
 }
 
 /// Each active cell gets the largest residual of its own and its 26 neighbours' centres, times the safety.
@@ -224,9 +226,9 @@ void TricubicSurrogate::measure_errors() {
     const float bound = error_safety * residual[row];
     const auto place = coordinates(active_[row]);
     centre_[active_[row]] = centre_values_[row];
-    for (int i = std::max(place[0] - 1, 0); i <= std::min(place[0] + 1, resolution_ - 1); ++i)
-      for (int j = std::max(place[1] - 1, 0); j <= std::min(place[1] + 1, resolution_ - 1); ++j)
-        for (int k = std::max(place[2] - 1, 0); k <= std::min(place[2] + 1, resolution_ - 1); ++k) {
+    for (int i = std::max(place[0] - 1, 0); i <= std::min(place[0] + 1, cells_a_side_ - 1); ++i)
+      for (int j = std::max(place[1] - 1, 0); j <= std::min(place[1] + 1, cells_a_side_ - 1); ++j)
+        for (int k = std::max(place[2] - 1, 0); k <= std::min(place[2] + 1, cells_a_side_ - 1); ++k) {
           float& each = error_[cell(i, j, k)];
           each = std::max(each, bound);
         }

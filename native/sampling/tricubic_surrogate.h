@@ -11,10 +11,10 @@
 namespace arapfields {
 
 struct TricubicSurrogateOptions {
-  Index wanted_cells = 5000;  ///< halve the cells until so many may hold the surface …
-  int max_resolution = 128;   ///< … or the cube would have more than so many of them a side
-  int coarsest = 16;          ///< cells a side to begin with
-  bool interpolate = true;    ///< else the cells' sides alone are known, and p and its errors are not
+  Index target_cells = 5000;   ///< halve the cells until so many may hold the surface …
+  int max_cells_a_side = 128;  ///< … or the cube would have more than so many of them a side
+  int coarsest = 16;           ///< cells a side to begin with
+  bool interpolate = true;     ///< else the cells' sides alone are known, and p and its errors are not
 };
 
 /// A cheap stand-in for Φ near {Φ = 0}. The cube is cut into resolution³ cells, from coarse to fine; a cell
@@ -26,8 +26,8 @@ class TricubicSurrogate {
  public:
   TricubicSurrogate(EvaluationCounter& function, const TricubicSurrogateOptions& options);
 
-  int resolution() const { return resolution_; }
-  double spacing() const { return 2.0 / resolution_; }
+  int cells_a_side() const { return cells_a_side_; }
+  double spacing() const { return 2.0 / cells_a_side_; }
   bool interpolates() const { return !values_.empty(); }
   /// Bound on |∇Φ| in use: Φ's own, else measured, and raised until no difference of grid values contradicts
   /// it.
@@ -37,7 +37,7 @@ class TricubicSurrogate {
   Box bounds() const;
 
   Index cell(int i, int j, int k) const {
-    return (static_cast<Index>(i) * resolution_ + j) * resolution_ + k;
+    return (static_cast<Index>(i) * cells_a_side_ + j) * cells_a_side_ + k;
   }
   std::array<int, 3> coordinates(Index cell) const;
   /// The cell's position along an axis of a coordinate in [-1,1].
@@ -65,7 +65,7 @@ class TricubicSurrogate {
   bool fill(EvaluationCounter& function);
   void measure_errors();
 
-  int resolution_ = 0;
+  int cells_a_side_ = 0;
   double lipschitz_ = 0.0;
   std::vector<std::int8_t> side_;
   std::vector<Index> active_;

@@ -120,7 +120,7 @@ Solution solve_field(std::shared_ptr<TrainableField> field, const SurfaceSamples
   const std::unique_ptr<Objective> wrapped = wrap ? wrap(objective) : nullptr;
   try {
     const LoopObserver shown = [&](int) {
-      progress.look([&](PointsIn points) { return field->at(points); });
+      progress.preview([&](PointsIn points) { return field->at(points); });
     };
     LoopResult loop =
         minimise(*field, wrapped ? *wrapped : objective, options, progress.part(0.0, 0.95), shown);

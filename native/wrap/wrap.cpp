@@ -133,7 +133,7 @@ WrapSolution wrap(const SurfaceSamples& samples, const ImplicitFunction& functio
       flow.step(stage_at(t, options), flowing.part(static_cast<double>(report.iterations) / all,
                                                    static_cast<double>(report.iterations + 1) / all));
       ++report.iterations;
-      progress.look([&](PointsIn points) { return placed(flow.steps(), placement, samples)->at(points); });
+      progress.preview([&](PointsIn points) { return placed(flow.steps(), placement, samples)->at(points); });
     }
   }
   progress.report(0.95, "measuring the result");

@@ -94,7 +94,7 @@ LoopResult run(RadialSolver& live, const TrainingOptions& how, const Progress& p
     const double done = static_cast<double>(result.iterations) / iterations;
     live.solve(at_once, 0.0, progress.part(done, done + static_cast<double>(at_once) / iterations));
     const double value = live.report().value;
-    if (value <= bounds.worst) progress.look([&](PointsIn points) { return shown()->at(points); });
+    if (value <= bounds.worst) progress.preview([&](PointsIn points) { return shown()->at(points); });
     result.iterations += static_cast<int>(live.report().iterations);
     result.history.emplace_back(result.iterations, value);
     result.seconds = watch.seconds();
@@ -147,7 +147,7 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
     few.tolerance = LiveOptions().tolerance;
     RadialSolver solver(samples, handles, few, progress.part(0.0, 0.1), shape);
     first = solver.solve(std::min(first_steps, options.training.iterations), 0.0, progress.part(0.1, 0.15));
-    progress.look([&](PointsIn points) { return around(first)->at(points); });
+    progress.preview([&](PointsIn points) { return around(first)->at(points); });
   }
   const double done = first ? 0.15 : 0.0;
   RadialSolver solver(samples, handles, fine, progress.part(done, 0.4), shape, blend);
@@ -204,7 +204,7 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
   quick.set_style(style, options.strength, options.sharpness, weights, up);
   const std::shared_ptr<const RadialField> first =
       quick.solve(std::min(style_first_steps, options.training.iterations), 0.0, progress.part(0.1, 0.15));
-  progress.look([&](PointsIn points) { return first->at(points); });
+  progress.preview([&](PointsIn points) { return first->at(points); });
   RadialSolver solver(samples, handles, live, progress.part(0.15, 0.3), shape);
   solver.set_style(style, options.strength, options.sharpness, weights, up);
   const Shown shown = [&] { return solver.field(); };
