@@ -51,9 +51,6 @@ nothing was written.)")
            "path"_a)
       .def_property_readonly(
           "partial", [](const OutputFile& self) { return from_path(self.partial()); },
-          [](const OutputFile& self) {
-            return py::str(py::module_::import("os").attr("fsdecode")(py::bytes(self.partial())));
-          },
           "Path to write to: a file of the same name in a temporary folder beside the target.")
       .def_property_readonly(
           "beside", [](const OutputFile& self) { return from_path(self.beside()); },
