@@ -9,12 +9,12 @@
 
 namespace arapfields {
 
-/// Points that a field carries along with a body: clothes, hair, hats, whatever its motion does not see.
-/// Near the body, within 0.03 of its size, they go where the field takes them. A field knows less and less of
-/// what is farther away: beyond 0.06 they go along with rigid frames of the surface, the nearest ones most
-/// (f(p) + R(p) (y − p) for places p of the surface, R the rotation closest to the Jacobian), between the two
-/// with a mixture. Several frames share a point, with weights that change smoothly from point to point, so
-/// that nothing tears where its nearest place jumps. All that does not depend on the field is found once.
+/// Points carried along by a body, such as clothes, hair or hats, that its samples do not contain. Within
+/// 0.03 of the body's size of its surface they move with the field. Beyond 0.06 they move with rigid frames
+/// of the surface: f(p) + R(p) (y − p) for a point p of the surface, R the rotation closest to the Jacobian.
+/// Between the two distances both are mixed. Several frames blend at each point, with weights that vary
+/// smoothly, so that nothing tears where the nearest frame changes. Everything that does not depend on the
+/// field is computed once.
 class ARAPFIELDS_EXPORT Attachment {
  public:
   /// Samples of the body at rest and points (n,3) of mesh coordinates at rest. Throws InvalidInput for no
@@ -23,9 +23,8 @@ class ARAPFIELDS_EXPORT Attachment {
   ~Attachment();
   Attachment(Attachment&&) noexcept;
 
-  /// Where the field takes the points: (n,3) in mesh coordinates. From any number of threads at a time.
-  /// Radial fields of one basis, as a live session makes them, are evaluated several times faster from the
-  /// second on.
+  /// The points (n,3) moved by the field, in mesh coordinates. Thread-safe. Radial fields of one basis, such
+  /// as those of a live session, are evaluated several times faster from the second one on.
   Points positions(const DeformationField& field) const;
   Index size() const;
   /// (n) from each point to the nearest sample, mesh units.

@@ -40,7 +40,7 @@ WrapResult wrap_samples(const SurfaceSamples& samples, const FunctionArgument& t
                          "from_target_95"_a = r.from_target_95, "matched_share"_a = r.matched_share,
                          "landmarks"_a = py::tuple(py::cast(r.landmarks)), "diagonal"_a = r.diagonal,
                          "scale"_a = r.scale, "iterations"_a = r.iterations, "seconds"_a = r.seconds,
-                         "notes"_a = py::tuple(py::cast(r.notes)), **field_measures(r.arap, r.distortion)));
+                         "notes"_a = py::tuple(py::cast(r.warnings)), **field_measures(r.arap, r.distortion)));
   return field;
 }
 

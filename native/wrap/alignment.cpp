@@ -9,31 +9,18 @@
 #include "core/errors.h"
 #include "energies/alignment.h"
 #include "sampling/nearest_sample.h"
+#include "wrap/parameters.h"
 
 namespace arapfields {
 namespace {
 
-/// Shares of a surface's diagonal: from which on a landmark is off it; below which two of them are in one
-/// place, and from which on they are not.
-constexpr double off_surface = 0.1, one_place = 0.005, two_places = 0.1;
-/// Landmarks that a turn and a scale leave so far from their targets, as a share of the diagonal, are worth a
-/// note; a mirrored set is, where it fits so many times better.
-constexpr double poor_landmarks = 0.2, poor_if_mirrored = 0.05, mirrored_gain = 2.0;
-/// Mean distance of aligned shapes, as a share of the diagonal, from which on they are not alike.
-constexpr double unlike_shapes = 0.035;
-/// Points and rounds of the first and the last look at a turn, and how many turns come to the last.
-constexpr Index few_points = 300, many_points = 1500;
-constexpr int few_rounds = 6, many_rounds = 30, finalists = 4;
-/// Share of the pairs' weight that landmarks have where they are too few to decide alone.
-constexpr double landmark_share = 0.5;
-/// As it lies is preferred to a turn that is not so much better.
-constexpr double prefer_upright = 0.9;
+using namespace wrap_parameters;
 
 double diagonal_of(PointsIn points) {
   return (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm();
 }
 
-std::string name(Index i) { return "landmarks[" + std::to_string(i) + "]"; }
+std::string name_of(Index i) { return "landmarks[" + std::to_string(i) + "]"; }
 
 std::string percent(double share) { return number_text(std::round(1000.0 * share) / 10.0) + " %"; }
 
@@ -42,27 +29,27 @@ void require_on(PointsIn surface, PointsIn places, const char* which) {
   const double size = diagonal_of(surface);
   for (Index i = 0; i < places.rows(); ++i)
     require(
-        distances[i] <= off_surface * size, name(i),
+        distances[i] <= off_surface * size, name_of(i),
         std::string(which) + " is " + percent(distances[i] / size) + " of the surface's size away from it",
         "a place on the surface is needed");
 }
 
 Similarity fit(PointsIn from, PointsIn to, const Vector& weights, double scale) {
-  const Alignment turned = best_alignment(from, to, weights);
   Similarity result;
-  result.rotation = turned.rotation;
+  result.rotation = best_alignment(from, to, weights).rotation;
   const double total = weights.sum();
   const Eigen::RowVector3d a = weights.transpose() * from / total, b = weights.transpose() * to / total;
-  const Points arms = from.rowwise() - a, wanted = to.rowwise() - b;
+  const Points arms = from.rowwise() - a, target_arms = to.rowwise() - b;
   const double square = weights.dot(arms.rowwise().squaredNorm());
-  const double along = weights.dot((arms * turned.rotation.transpose()).cwiseProduct(wanted).rowwise().sum());
+  const double along =
+      weights.dot((arms * result.rotation.transpose()).cwiseProduct(target_arms).rowwise().sum());
   result.scale = scale > 0.0 ? scale : square > 0.0 && along > 0.0 ? along / square : 1.0;
   result.translation = b.transpose() - result.scale * result.rotation * a.transpose();
   return result;
 }
 
 double residual(const WrapSource& source, const Similarity& placement) {
-  return (placement.of(source.landmarks) - source.ends).rowwise().norm().mean();
+  return (placement.of(source.landmarks) - source.landmark_targets).rowwise().norm().mean();
 }
 
 Points some_rows(PointsIn points, Index count) {
@@ -72,10 +59,11 @@ Points some_rows(PointsIn points, Index count) {
   return result;
 }
 
-/// Brings a surface closer to the target, pair by pair, from a first placement.
-class Matching {
+/// Iterative closest points (Besl, McKay 1992) with normals, in both directions.
+class IterativeClosestPoints {
  public:
-  Matching(const WrapSource& source, const WrapTarget& target, Index count, double scale, double turn)
+  IterativeClosestPoints(const WrapSource& source, const WrapTarget& target, Index count, double scale,
+                         double normal_weight)
       : points_(some_rows(source.points, count)),
         normals_(some_rows(source.normals, count)),
         target_points_(some_rows(target.points, count)),
@@ -84,39 +72,42 @@ class Matching {
         target_(target),
         tree_(points_, normals_),
         scale_(scale),
-        turn_(turn) {}
+        normal_weight_(normal_weight) {}
 
-  /// The mean distance of pairs, normals counted as well, and the placement after so many rounds.
+  /// The mean distance of pairs, including normals, and the placement after `rounds` rounds from `at`.
   std::pair<double, Similarity> improve(Similarity at, int rounds) const {
     double mean = 0.0;
     for (int round = 0; round <= rounds; ++round) {
-      // Both ways: what of the target is nearest here, and what of this is nearest there.
-      const Points here = at.of(points_), here_normals = normals_ * at.rotation.transpose();
-      const std::vector<Index> there = target_.tree.nearest(here, here_normals, turn_ * at.scale);
+      // Closest points in both directions.
+      const Points moved = at.of(points_), moved_normals = normals_ * at.rotation.transpose();
+      const std::vector<Index> target_of =
+          target_.tree.nearest(moved, moved_normals, normal_weight_ * at.scale);
       const Points back_points = at.inverse_of(target_points_), back_normals = target_normals_ * at.rotation;
-      const std::vector<Index> back = tree_.nearest(back_points, back_normals, turn_);
-      const Index n = here.rows(), m = target_points_.rows(), k = source_.landmarks.rows();
+      const std::vector<Index> source_of = tree_.nearest(back_points, back_normals, normal_weight_);
+
+      // Pairs, and landmarks among them.
+      const Index n = moved.rows(), m = target_points_.rows(), k = source_.landmarks.rows();
       Points from(n + m + k, 3), to(n + m + k, 3);
       Vector weights = Vector::Ones(n + m + k);
       double sum = 0.0;
       for (Index i = 0; i < n; ++i) {
-        const Index row = there[static_cast<std::size_t>(i)];
+        const Index row = target_of[i];
         from.row(i) = points_.row(i);
         to.row(i) = target_.points.row(row);
-        weights[i] = target_.whole[row];
-        sum +=
-            weights[i] * apart(here.row(i) - to.row(i), here_normals.row(i) - target_.normals.row(row), at);
+        weights[i] = target_.interior[row];
+        sum += weights[i] *
+               distance(moved.row(i) - to.row(i), moved_normals.row(i) - target_.normals.row(row), at);
       }
       for (Index i = 0; i < m; ++i) {
-        const Index row = back[static_cast<std::size_t>(i)];
+        const Index row = source_of[i];
         from.row(n + i) = points_.row(row);
         to.row(n + i) = target_points_.row(i);
-        sum += apart(to.row(n + i) - here.row(row), target_normals_.row(i) - here_normals.row(row), at);
+        sum += distance(to.row(n + i) - moved.row(row), target_normals_.row(i) - moved_normals.row(row), at);
       }
       mean = sum / std::max(weights.head(n + m).sum(), 1.0);
       if (k > 0) {
         from.bottomRows(k) = source_.landmarks;
-        to.bottomRows(k) = source_.ends;
+        to.bottomRows(k) = source_.landmark_targets;
         weights.tail(k).setConstant(landmark_share * weights.head(n + m).sum() / static_cast<double>(k));
         mean += residual(source_, at);
       }
@@ -126,16 +117,17 @@ class Matching {
   }
 
  private:
-  template <class Way, class Turn>
-  double apart(const Way& way, const Turn& turn, const Similarity& at) const {
-    return std::sqrt(way.squaredNorm() + turn_ * turn_ * at.scale * at.scale * turn.squaredNorm());
+  template <class Offset, class Difference>
+  double distance(const Offset& offset, const Difference& normals, const Similarity& at) const {
+    const double weight = normal_weight_ * normal_weight_ * at.scale * at.scale;
+    return std::sqrt(offset.squaredNorm() + weight * normals.squaredNorm());
   }
 
   Points points_, normals_, target_points_, target_normals_;
   const WrapSource& source_;
   const WrapTarget& target_;
   OrientedPoints tree_;
-  double scale_, turn_;
+  double scale_, normal_weight_;
 };
 
 /// Columns: principal axes, right-handed.
@@ -146,8 +138,8 @@ Mat3 principal_axes(PointsIn points) {
   return axes;
 }
 
-/// The identity and the 24 turns that take one shape's principal axes to the other's.
-std::vector<Mat3> turns_between(PointsIn from, PointsIn to) {
+/// The identity and the 24 rotations that align the principal axes.
+std::vector<Mat3> candidate_rotations(PointsIn from, PointsIn to) {
   const Mat3 a = principal_axes(from), b = principal_axes(to);
   std::vector<Mat3> result{Mat3::Identity()};
   for (int x = 0; x < 3; ++x)
@@ -166,49 +158,53 @@ double gyration(PointsIn points) {
   return std::sqrt((points.rowwise() - points.colwise().mean()).rowwise().squaredNorm().mean());
 }
 
-Similarity by_shape(const WrapSource& source, const WrapTarget& target, double scale, double turn,
-                    std::vector<std::string>& notes, const Progress& progress) {
-  const Matching few(source, target, few_points, scale, turn), many(source, target, many_points, scale, turn);
-  std::vector<std::pair<double, Similarity>> tried;
+Similarity by_shape(const WrapSource& source, const WrapTarget& target, double scale, double normal_weight,
+                    std::vector<std::string>& warnings, const Progress& progress) {
+  const IterativeClosestPoints coarse(source, target, coarse_samples, scale, normal_weight),
+      fine(source, target, fine_samples, scale, normal_weight);
+  std::vector<std::pair<double, Similarity>> candidates;
   const double growth = scale > 0.0 ? scale : gyration(target.points) / gyration(source.points);
-  for (const Mat3& rotation : turns_between(source.points, target.points)) {
+  for (const Mat3& rotation : candidate_rotations(source.points, target.points)) {
     Similarity at{growth, rotation, Vec3::Zero()};
     at.translation = target.points.colwise().mean().transpose() -
                      growth * rotation * source.points.colwise().mean().transpose();
-    tried.push_back(few.improve(at, few_rounds));
+    candidates.push_back(coarse.improve(at, coarse_rounds));
     progress.check();
   }
-  tried[0].first *= prefer_upright;
-  std::sort(tried.begin(), tried.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  candidates[0].first *= upright_preference;
+  std::sort(candidates.begin(), candidates.end(),
+            [](const auto& a, const auto& b) { return a.first < b.first; });
   std::pair<double, Similarity> best{std::numeric_limits<double>::infinity(), {}};
-  for (std::size_t i = 0; i < std::min<std::size_t>(finalists, tried.size()); ++i) {
-    const auto found = many.improve(tried[i].second, many_rounds);
-    if (found.first < best.first) best = found;
+  for (std::size_t i = 0; i < std::min<std::size_t>(finalists, candidates.size()); ++i) {
+    const auto refined = fine.improve(candidates[i].second, fine_rounds);
+    if (refined.first < best.first) best = refined;
     progress.check();
   }
   const double share = best.first / target.diagonal;
   if (share > unlike_shapes)
-    notes.push_back("the shapes are not alike: the best turn leaves them " + percent(share) +
-                    " of the target's size apart, normals counted; pairs of landmarks would say what belongs "
-                    "to what");
+    warnings.push_back(
+        "the shapes are not alike: the best turn leaves them " + percent(share) +
+        " of the target's size apart, normals counted; pairs of landmarks would say what belongs "
+        "to what");
   return best.second;
 }
 
-void note_landmarks(const WrapSource& source, const WrapTarget& target, const Similarity& placement,
-                    std::vector<std::string>& notes) {
-  const Vector left = (placement.of(source.landmarks) - source.ends).rowwise().norm();
-  const double share = left.mean() / target.diagonal;
+void check_fit(const WrapSource& source, const WrapTarget& target, const Similarity& placement,
+               std::vector<std::string>& warnings) {
+  const Vector distances = (placement.of(source.landmarks) - source.landmark_targets).rowwise().norm();
+  const double share = distances.mean() / target.diagonal;
   if (share <= poor_if_mirrored) return;
   Index worst = 0;
-  left.maxCoeff(&worst);
+  distances.maxCoeff(&worst);
   WrapSource mirrored = source;
   mirrored.landmarks.col(0) *= -1.0;
-  const Similarity other = fit(mirrored.landmarks, mirrored.ends, Vector::Ones(left.size()), 0.0);
-  if (mirrored_gain * residual(mirrored, other) < left.mean())
-    notes.emplace_back("the landmarks ask for a mirror image: left and right may be exchanged in them");
+  const Similarity reflected =
+      fit(mirrored.landmarks, mirrored.landmark_targets, Vector::Ones(distances.size()), 0.0);
+  if (mirrored_gain * residual(mirrored, reflected) < distances.mean())
+    warnings.emplace_back("the landmarks ask for a mirror image: left and right may be exchanged in them");
   else if (share > poor_landmarks)
-    notes.push_back("the landmarks fit no turn of the whole: they stay " + percent(share) +
-                    " of the target's size from where they belong, " + name(worst) + " the farthest");
+    warnings.push_back("the landmarks fit no turn of the whole: they stay " + percent(share) +
+                       " of the target's size from where they belong, " + name_of(worst) + " the farthest");
 }
 
 }  // namespace
@@ -216,32 +212,34 @@ void note_landmarks(const WrapSource& source, const WrapTarget& target, const Si
 void check_landmarks(const WrapSource& source, const WrapTarget& target) {
   const Index count = source.landmarks.rows();
   for (Index i = 0; i < count; ++i)
-    require(source.landmarks.row(i).allFinite() && source.ends.row(i).allFinite(), name(i),
+    require(source.landmarks.row(i).allFinite() && source.landmark_targets.row(i).allFinite(), name_of(i),
             "a coordinate is NaN or infinite", "all must be finite");
   if (count == 0) return;
   require_on(source.points, source.landmarks, "its place at rest");
-  require_on(target.points, source.ends, "its place on the target");
+  require_on(target.points, source.landmark_targets, "its place on the target");
   const double size = diagonal_of(source.points);
   for (Index i = 0; i < count; ++i)
     for (Index j = 0; j < i; ++j) {
-      const double here = (source.landmarks.row(i) - source.landmarks.row(j)).norm() / size;
-      const double there = (source.ends.row(i) - source.ends.row(j)).norm() / target.diagonal;
-      const bool torn = here < one_place && there > two_places,
-                 merged = there < one_place && here > two_places;
-      require(!torn && !merged, name(j) + " and " + name(i),
+      const double source_distance = (source.landmarks.row(i) - source.landmarks.row(j)).norm() / size;
+      const double target_distance =
+          (source.landmark_targets.row(i) - source.landmark_targets.row(j)).norm() / target.diagonal;
+      const bool torn = source_distance < same_point && target_distance > different_points,
+                 merged = target_distance < same_point && source_distance > different_points;
+      require(!torn && !merged, name_of(j) + " and " + name_of(i),
               torn ? "one place at rest belongs to two on the target" : "two places at rest belong to one",
               "they contradict each other");
     }
 }
 
-Similarity wrap_alignment(const WrapSource& source, const WrapTarget& target, AlignmentKind kind, double turn,
-                          std::vector<std::string>& notes, const Progress& progress) {
+Similarity wrap_alignment(const WrapSource& source, const WrapTarget& target, AlignmentKind kind,
+                          double normal_weight, std::vector<std::string>& warnings,
+                          const Progress& progress) {
   const double scale = kind == AlignmentKind::similar ? 0.0 : source.frame.scale;
   if (kind == AlignmentKind::none) return {scale, Mat3::Identity(), source.frame.center};
-  if (source.landmarks.rows() < 3) return by_shape(source, target, scale, turn, notes, progress);
+  if (source.landmarks.rows() < 3) return by_shape(source, target, scale, normal_weight, warnings, progress);
   const Similarity placement =
-      fit(source.landmarks, source.ends, Vector::Ones(source.landmarks.rows()), scale);
-  note_landmarks(source, target, placement, notes);
+      fit(source.landmarks, source.landmark_targets, Vector::Ones(source.landmarks.rows()), scale);
+  check_fit(source, target, placement, warnings);
   return placement;
 }
 

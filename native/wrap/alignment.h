@@ -9,22 +9,23 @@
 
 namespace arapfields {
 
-/// What is to be aligned: points (n,3) of a surface in their cube with normals (n,3), and landmarks on it.
+/// The surface to align: points (n,3) in its cube with normals (n,3), and landmarks on it.
 struct WrapSource {
   Points points, normals;
-  Points landmarks;  ///< (k,3)
-  Points ends;       ///< (k,3) where these belong on the target
+  Points landmarks;         ///< (k,3)
+  Points landmark_targets;  ///< (k,3) the corresponding points of the target
   Frame frame;
 };
 
-/// Throws InvalidInput that names a landmark which is not finite or far off its surface, and two of which one
-/// surface has in one place and the other has not.
+/// Throws InvalidInput that names a landmark which is not finite or far off its surface, and two landmarks
+/// that coincide on one surface alone.
 void check_landmarks(const WrapSource& source, const WrapTarget& target);
 
-/// The motion of the whole, cube → the target's coordinates, with which a wrap begins: by three landmarks or
-/// more, else by the best of many turns about the principal axes, each brought closer point by point (Besl
-/// and McKay 1992). Adds notes on what looks wrong.
-Similarity wrap_alignment(const WrapSource& source, const WrapTarget& target, AlignmentKind kind, double turn,
-                          std::vector<std::string>& notes, const Progress& progress);
+/// The similarity, cube → the target's coordinates, with which a wrap begins. With three landmarks or more it
+/// is their least-squares fit; else it is the best result of iterative closest points (Besl, McKay 1992) from
+/// the rotations that align the principal axes. `normal_weight` weights normals beside distances. Appends to
+/// `warnings`.
+Similarity wrap_alignment(const WrapSource& source, const WrapTarget& target, AlignmentKind kind,
+                          double normal_weight, std::vector<std::string>& warnings, const Progress& progress);
 
 }  // namespace arapfields

@@ -11,16 +11,12 @@
 #include "distance/mesh_sdf.h"
 #include "mesh/sample_mesh.h"
 #include "sampling/sample_surface.h"
+#include "wrap/parameters.h"
 
 namespace arapfields {
 namespace {
 
-/// Neighbours that a point is compared with lie within so many spacings: some twenty of them.
-constexpr double neighbourhood = 2.5;
-/// A gap between their directions from which on the surface ends there.
-constexpr double widest_gap = 2.4;
-/// Points at which the spacing is looked at.
-constexpr Index spacing_points = 200;
+using namespace wrap_parameters;
 
 SurfaceSamples samples_of(const ImplicitFunction& function, Index count, std::uint64_t seed,
                           const Progress& progress) {
@@ -34,21 +30,21 @@ SurfaceSamples samples_of(const ImplicitFunction& function, Index count, std::ui
   }
 }
 
-/// 0 where the directions of the neighbours leave a wide gap: beside a border.
-double wholeness(const WrapTarget& target, Index i) {
-  const Vec3 place = target.points.row(i), normal = target.normals.row(i);
+/// Whether the directions to a point's neighbours leave no wide gap in its tangent plane.
+bool is_interior(const WrapTarget& target, Index i) {
+  const Vec3 point = target.points.row(i), normal = target.normals.row(i);
   const Vec3 u = normal.unitOrthogonal(), v = normal.cross(u);
   std::vector<double> angles;
-  for (const Index k : target.tree.within(place, neighbourhood * target.spacing)) {
-    const Vec3 way = target.points.row(k).transpose() - place;
+  for (const Index k : target.tree.within(point, neighbourhood_spacings * target.spacing)) {
+    const Vec3 offset = target.points.row(k).transpose() - point;
     if (k == i || target.normals.row(k).dot(normal) < 0.0) continue;
-    angles.push_back(std::atan2(way.dot(v), way.dot(u)));
+    angles.push_back(std::atan2(offset.dot(v), offset.dot(u)));
   }
-  if (angles.empty()) return 0.0;
+  if (angles.empty()) return false;
   std::sort(angles.begin(), angles.end());
   double gap = angles.front() + 2.0 * std::numbers::pi - angles.back();
   for (std::size_t k = 1; k < angles.size(); ++k) gap = std::max(gap, angles[k] - angles[k - 1]);
-  return gap > widest_gap ? 0.0 : 1.0;
+  return gap <= border_gap;
 }
 
 }  // namespace
@@ -61,11 +57,11 @@ Points Similarity::inverse_of(PointsIn points) const {
   return (points.rowwise() - translation.transpose()) * (rotation / scale);
 }
 
-WrapTarget WrapTarget::seen_from(const Similarity& placement) const {
+WrapTarget WrapTarget::transformed_back(const Similarity& placement) const {
   WrapTarget result;
   result.points = placement.inverse_of(points);
   result.normals = normals * placement.rotation;
-  result.whole = whole;
+  result.interior = interior;
   result.closed = closed;
   result.spacing = spacing / placement.scale;
   result.diagonal = diagonal / placement.scale;
@@ -73,24 +69,19 @@ WrapTarget WrapTarget::seen_from(const Similarity& placement) const {
   return result;
 }
 
-WrapTarget WrapTarget::thinned(Index count) const {
+WrapTarget WrapTarget::subsample(Index count) const {
   const Index all = points.rows(), taken = std::min(count, all);
   WrapTarget result = *this;
-  result.points.resize(taken, 3);
-  result.normals.resize(taken, 3);
-  result.whole.resize(taken);
-  for (Index i = 0; i < taken; ++i) {  // they are in random order
-    result.points.row(i) = points.row(i);
-    result.normals.row(i) = normals.row(i);
-    result.whole[i] = whole[i];
-  }
+  result.points = points.topRows(taken);
+  result.normals = normals.topRows(taken);
+  result.interior = interior.head(taken);
   result.spacing = spacing * std::sqrt(static_cast<double>(all) / static_cast<double>(taken));
   result.tree = OrientedPoints(result.points, result.normals);
   return result;
 }
 
 double mean_spacing(PointsIn points) {
-  const Index n = points.rows(), taken = std::min(n, spacing_points);
+  const Index n = points.rows(), taken = std::min(n, spacing_samples);
   if (n < 2) return 0.0;
   double sum = 0.0;
   for (Index k = 0; k < taken; ++k) {
@@ -113,10 +104,10 @@ WrapTarget wrap_target(const ImplicitFunction& function, Index count, std::uint6
   target.diagonal = (target.points.colwise().maxCoeff() - target.points.colwise().minCoeff()).norm();
   target.spacing = mean_spacing(target.points);
   target.tree = OrientedPoints(target.points, target.normals);
-  target.whole = Vector::Ones(target.points.rows());
+  target.interior = Vector::Ones(target.points.rows());
   if (function.continuous()) return target;
   parallel_for(0, target.points.rows(), 256, [&](Index begin, Index end) {
-    for (Index i = begin; i < end; ++i) target.whole[i] = wholeness(target, i);
+    for (Index i = begin; i < end; ++i) target.interior[i] = is_interior(target, i) ? 1.0 : 0.0;
   });
   target.closed = false;
   progress.check();
@@ -124,29 +115,29 @@ WrapTarget wrap_target(const ImplicitFunction& function, Index count, std::uint6
 }
 
 SurfaceDistances surface_distances(const OrientedPoints& tree, PointsIn points, PointsIn normals,
-                                   double spacing, PointsIn others, PointsIn other_normals,
-                                   const Vector& areas, const Vector& whole) {
-  const std::vector<Index> nearest = tree.nearest(others, other_normals, 0.0);
-  std::vector<std::pair<double, double>> told;  // distances with areas
+                                   double spacing, PointsIn queries, PointsIn query_normals,
+                                   const Vector& areas, const Vector& interior) {
+  const std::vector<Index> nearest = tree.nearest(queries, query_normals, 0.0);
+  std::vector<std::pair<double, double>> distances;  // each with its area
   double area = 0.0, sum = 0.0;
-  for (Index i = 0; i < others.rows(); ++i) {
-    const Index k = nearest[static_cast<std::size_t>(i)];
-    if (whole.size() > 0 && whole[k] == 0.0) continue;
-    const Vec3 way = others.row(i) - points.row(k), normal = normals.row(k);
-    const double across = way.dot(normal);
-    const double along = std::max(0.0, (way - across * normal).norm() - spacing);
-    told.emplace_back(std::hypot(across, along), areas.size() > 0 ? areas[i] : 1.0);
-    area += told.back().second;
-    sum += told.back().first * told.back().second;
+  for (Index i = 0; i < queries.rows(); ++i) {
+    const Index k = nearest[i];
+    if (interior.size() > 0 && interior[k] == 0.0) continue;
+    const Vec3 offset = queries.row(i) - points.row(k), normal = normals.row(k);
+    const double across = offset.dot(normal);
+    const double along = std::max(0.0, (offset - across * normal).norm() - spacing);
+    distances.emplace_back(std::hypot(across, along), areas.size() > 0 ? areas[i] : 1.0);
+    area += distances.back().second;
+    sum += distances.back().first * distances.back().second;
   }
   SurfaceDistances result;
   if (!(area > 0.0)) return result;
   result.mean = sum / area;
-  std::sort(told.begin(), told.end());
+  std::sort(distances.begin(), distances.end());
   double covered = 0.0;
-  for (const auto& [distance, share] : told) {
-    result.most_95 = distance;
-    if ((covered += share) >= 0.95 * area) break;
+  for (const auto& [distance, part] : distances) {
+    result.quantile_95 = distance;
+    if ((covered += part) >= 0.95 * area) break;
   }
   return result;
 }

@@ -14,44 +14,47 @@ struct Similarity {
   double scale = 1.0;
   Mat3 rotation = Mat3::Identity();
   Vec3 translation = Vec3::Zero();
+
   Points of(PointsIn points) const;
   Points inverse_of(PointsIn points) const;
 };
 
-/// The surface that another is wrapped onto, as points (m,3) spread evenly over it with unit normals.
+/// The surface that another is wrapped onto: points (m,3) spread evenly over it, in random order, with unit
+/// normals.
 struct WrapTarget {
   Points points, normals;
-  Vector whole;           ///< (m) 1 inside the surface, 0 beside a border where it ends
-  bool closed = true;     ///< whether it ends nowhere
-  double spacing = 0.0;   ///< about the distance of neighbouring points
-  double diagonal = 0.0;  ///< of its bounding box
+  Vector interior;        ///< (m) mask: 1 in the interior of the surface, 0 beside its border
+  bool closed = true;     ///< whether there is no border
+  double spacing = 0.0;   ///< mean distance of neighbouring points
+  double diagonal = 0.0;  ///< of the bounding box
   OrientedPoints tree;
 
-  /// The same where the similarity takes it from.
-  WrapTarget seen_from(const Similarity& placement) const;
-  /// So many of the points, or all where there are no more.
-  WrapTarget thinned(Index count) const;
+  /// The target in the coordinates that the similarity maps to the target's own.
+  WrapTarget transformed_back(const Similarity& placement) const;
+  /// The first `count` points, or all where there are no more.
+  WrapTarget subsample(Index count) const;
 };
 
-/// In mesh coordinates. A mesh's own triangles are sampled, so that it may be open and broken; other
-/// functions where they are 0. Throws InvalidInput that names `target` where there is no surface.
+/// In mesh coordinates. Of a MeshSdf the mesh's own triangles are sampled, so that it may be open and broken;
+/// of other functions the zero set. Throws InvalidInput that names `target` where there is no surface.
 WrapTarget wrap_target(const ImplicitFunction& function, Index count, std::uint64_t seed,
                        const Progress& progress);
 
-/// About the distance of neighbours among points that are spread evenly over a surface.
+/// Mean distance of neighbours among points spread evenly over a surface.
 double mean_spacing(PointsIn points);
 
-/// Distances between surfaces: the mean, and what 95 % of an area keep; 0 where none was told.
+/// Distances of samples to a surface, weighted by area: the mean and the 95 % quantile; 0 where there are
+/// none.
 struct SurfaceDistances {
-  double mean = 0.0, most_95 = 0.0;
+  double mean = 0.0, quantile_95 = 0.0;
 };
 
-/// How far others (n,3) are from a surface of which there are points and normals: the way across it, and the
-/// way along it beyond the spacing of its points. Each other stands for its area (a number each, or empty:
-/// all for the same). Where `whole` (a number a point, or empty) is 0 nothing is told: what would be compared
-/// with a border has no counterpart.
+/// Distances of queries (n,3) to a surface of which points and normals are known: the normal part, and the
+/// tangential part beyond the points' spacing. `areas` (n; empty: all 1) are the queries' weights. Queries
+/// whose nearest point has `interior` 0 (a number a point; empty: all 1) do not count: beside a border they
+/// have no counterpart.
 SurfaceDistances surface_distances(const OrientedPoints& tree, PointsIn points, PointsIn normals,
-                                   double spacing, PointsIn others, PointsIn other_normals,
-                                   const Vector& areas, const Vector& whole);
+                                   double spacing, PointsIn queries, PointsIn query_normals,
+                                   const Vector& areas, const Vector& interior);
 
 }  // namespace arapfields

@@ -13,59 +13,56 @@
 #include "solve/warnings.h"
 #include "wrap/alignment.h"
 #include "wrap/flow.h"
+#include "wrap/parameters.h"
 
 namespace arapfields {
 namespace {
 
-constexpr Index target_points = 12000, drawing_points = 6000, kept_rest_points = 4000,
-                measured_points = 20000, energy_points = 4000;
-/// From the first stage to the last: weights of the pull, of what resists and of distances whatever the
-/// normals, share of ways along the target, and the radius and number of centers.
-constexpr double first_pull = 10.0, last_pull = 2000.0, first_rigid = 1.0, last_rigid = 0.1,
-                 last_nearest = 1.0, first_slack = 0.3, last_slack = 0.1, first_reach = 0.5,
-                 last_reach = 0.067;
-constexpr double first_centers = 60.0, landmark_pull = 30.0, viscosity = 1.5, coverage = 5.75;
-
-double between(double first, double last, double t) { return first * std::pow(last / first, t); }
+using namespace wrap_parameters;
 
 WrapStage stage_at(double t, const WrapOptions& options) {
+  const auto most_centers = static_cast<double>(options.centers);
+  const Schedule closeness{correspondence_weight.first, correspondence_weight.last * options.closeness},
+      centers{std::min(first_centers, most_centers), most_centers};
   WrapStage stage;
-  stage.pull = {between(first_pull, last_pull * options.closeness, t), coverage * options.coverage,
-                options.normal_weight, between(first_slack, last_slack, t), last_nearest * t * t};
-  stage.landmarks = landmark_pull * options.landmark_weight;
-  stage.rigid = between(first_rigid, last_rigid, t);
-  stage.viscous = viscosity * options.bending;
-  stage.reach = between(first_reach, last_reach, t);
-  const auto most = static_cast<double>(options.centers);
-  stage.centers = static_cast<Index>(std::round(between(std::min(first_centers, most), most, t)));
+  stage.correspondences = {.weight = closeness.at(t),
+                           .coverage = coverage * options.coverage,
+                           .normals = options.normal_weight,
+                           .tangential = tangential_weight.at(t),
+                           .unoriented = unoriented_weight * t * t};
+  stage.landmarks = landmark_weight * options.landmark_weight;
+  stage.rigidity = rigidity.at(t);
+  stage.viscosity = viscosity * options.bending;
+  stage.center_radius = center_radius.at(t);
+  stage.centers = static_cast<Index>(std::round(centers.at(t)));
   return stage;
 }
 
-/// The steps in the aligned cube as a field of the samples' own, which takes them onto the target.
-std::shared_ptr<ComposedField> placed(std::vector<FieldStep> steps, const Similarity& placement,
-                                      const SurfaceSamples& samples) {
+/// The flow's steps and the alignment as one field of the samples' own cube.
+std::shared_ptr<ComposedField> field_of(std::vector<FieldStep> steps, const Similarity& placement,
+                                        const SurfaceSamples& samples) {
   const Frame& frame = samples.frame;
-  const RadialBasis none{Points(0, 3), Vector(0)};
-  RowMatrix<double> there =
-      none.identity() * (placement.scale / frame.scale * placement.rotation.transpose());
-  there.row(0) += (placement.translation - frame.center).transpose() / frame.scale;
-  steps.push_back({std::make_shared<RadialField>(none, std::move(there)), 1});
+  const RadialBasis affine{Points(0, 3), Vector(0)};
+  RowMatrix<double> coefficients =
+      affine.identity() * (placement.scale / frame.scale * placement.rotation.transpose());
+  coefficients.row(0) += (placement.translation - frame.center).transpose() / frame.scale;
+  steps.push_back({std::make_shared<RadialField>(affine, std::move(coefficients)), 1});
   auto field = std::make_shared<ComposedField>(std::move(steps));
   field->set_frame(frame);
   field->set_rest_points(samples.points.topRows(std::min(samples.size(), kept_rest_points)));
   return field;
 }
 
-/// Beside the scale of the alignment: `field` is of the aligned cube.
+/// Measures the flow without the alignment: `field` maps the aligned cube to itself.
 void measure(const ComposedField& field, const SurfaceSamples& samples, const WrapTarget& target,
              WrapReport& report) {
   Random random(0);
-  const std::vector<Index> rows = stratified(morton_order(samples.points), measured_points, random);
+  const std::vector<Index> rows = stratified(morton_order(samples.points), measured_samples, random);
   const Points points = rows_of(samples.points, rows);
   JetBlock<double> jets(points.rows(), JetOrder::first);
   field.evaluate(points, jets.view());
   report.distortion = distortion<double>(std::as_const(jets).view());
-  const Points places = Eigen::Map<const Points>(jets.view().data, points.rows(), 3);
+  const Points moved = Eigen::Map<const Points>(jets.view().data, points.rows(), 3);
   RowMatrix<double> jacobians(points.rows(), 9);
   for (Index i = 0; i < points.rows(); ++i)
     for (int k = 0; k < 3; ++k)
@@ -73,15 +70,15 @@ void measure(const ComposedField& field, const SurfaceSamples& samples, const Wr
   Vector growth;
   const Points normals = moved_normals(jacobians, rows_of(samples.normals, rows), growth);
   const SurfaceDistances to = surface_distances(target.tree, target.points, target.normals, target.spacing,
-                                                places, normals, growth, target.whole);
-  const OrientedPoints tree(places, normals);
+                                                moved, normals, growth, target.interior);
+  const OrientedPoints tree(moved, normals);
   const SurfaceDistances from =
-      surface_distances(tree, places, normals, mean_spacing(places), target.points, target.normals, {}, {});
+      surface_distances(tree, moved, normals, mean_spacing(moved), target.points, target.normals, {}, {});
   report.to_target_mean = to.mean / target.diagonal;
-  report.to_target_95 = to.most_95 / target.diagonal;
+  report.to_target_95 = to.quantile_95 / target.diagonal;
   report.from_target_mean = from.mean / target.diagonal;
-  report.from_target_95 = from.most_95 / target.diagonal;
-  const Points some = rows_of(points, random_subset(points.rows(), energy_points, random));
+  report.from_target_95 = from.quantile_95 / target.diagonal;
+  const Points some = rows_of(points, random_subset(points.rows(), energy_samples, random));
   JetBlock<double> second(some.rows(), JetOrder::second);
   field.evaluate(some, second.view());
   report.arap = arap_energy<double>(std::as_const(second).view(), 1.0, 0.0, {});
@@ -91,10 +88,10 @@ WrapSource source_of(const SurfaceSamples& samples, const std::vector<Landmark>&
   WrapSource source{samples.points, samples.normals, {}, {}, samples.frame};
   const Index count = static_cast<Index>(landmarks.size());
   source.landmarks.resize(count, 3);
-  source.ends.resize(count, 3);
+  source.landmark_targets.resize(count, 3);
   for (Index i = 0; i < count; ++i) {
-    source.landmarks.row(i) = landmarks[static_cast<std::size_t>(i)].rest;
-    source.ends.row(i) = landmarks[static_cast<std::size_t>(i)].target;
+    source.landmarks.row(i) = landmarks[i].rest;
+    source.landmark_targets.row(i) = landmarks[i].target;
   }
   source.landmarks = samples.frame.to_cube(source.landmarks);
   return source;
@@ -115,16 +112,19 @@ WrapSolution wrap(const SurfaceSamples& samples, const ImplicitFunction& functio
   WrapSolution solution;
   WrapReport& report = solution.report;
   const WrapSource source = source_of(samples, landmarks);
-  const WrapTarget there = wrap_target(function, target_points, seed, progress.part(0.0, 0.1));
-  check_landmarks(source, there);
-  const Similarity placement = wrap_alignment(source, there, options.alignment, options.normal_weight,
-                                              report.notes, progress.part(0.1, 0.15));
-  const WrapTarget target = there.seen_from(placement);
-  const Points ends = placement.inverse_of(source.ends);
+
+  // Alignment as a whole.
+  const WrapTarget mesh_target = wrap_target(function, target_samples, seed, progress.part(0.0, 0.1));
+  check_landmarks(source, mesh_target);
+  const Similarity placement = wrap_alignment(source, mesh_target, options.alignment, options.normal_weight,
+                                              report.warnings, progress.part(0.1, 0.15));
+  const WrapTarget target = mesh_target.transformed_back(placement);
+  const Points landmark_targets = placement.inverse_of(source.landmark_targets);
   progress.report(0.2, "aligned");
 
-  const WrapTarget drawing = target.thinned(drawing_points);
-  WrapFlow flow(samples, drawing, source.landmarks, ends, seed);
+  // Stages of falling stiffness.
+  const WrapTarget flow_target = target.subsample(flow_target_samples);
+  WrapFlow flow(samples, flow_target, source.landmarks, landmark_targets, seed);
   const Progress flowing = progress.part(0.2, 0.95);
   const double all = options.stages * options.iterations;
   for (int stage = 0; stage < options.stages; ++stage) {
@@ -133,19 +133,22 @@ WrapSolution wrap(const SurfaceSamples& samples, const ImplicitFunction& functio
       flow.step(stage_at(t, options), flowing.part(static_cast<double>(report.iterations) / all,
                                                    static_cast<double>(report.iterations + 1) / all));
       ++report.iterations;
-      progress.preview([&](PointsIn points) { return placed(flow.steps(), placement, samples)->at(points); });
+      progress.preview(
+          [&](PointsIn points) { return field_of(flow.steps(), placement, samples)->at(points); });
     }
   }
+
+  // Result and report.
   progress.report(0.95, "measuring the result");
-  solution.field = placed(flow.steps(), placement, samples);
+  solution.field = field_of(flow.steps(), placement, samples);
   measure(ComposedField(flow.steps()), samples, target, report);
-  report.diagonal = there.diagonal;
+  report.diagonal = mesh_target.diagonal;
   report.scale = placement.scale / samples.frame.scale;
   report.matched_share = flow.matched_share();
-  const Vector left = placement.scale * (flow.landmarks() - ends).rowwise().norm();
-  report.landmarks.assign(left.data(), left.data() + left.size());
-  for (std::string& note : warnings_on(report.distortion, std::nullopt))
-    report.notes.push_back(std::move(note));
+  const Vector errors = placement.scale * (flow.landmarks() - landmark_targets).rowwise().norm();
+  report.landmarks.assign(errors.data(), errors.data() + errors.size());
+  for (std::string& warning : warnings_on(report.distortion, std::nullopt))
+    report.warnings.push_back(std::move(warning));
   report.seconds = watch.seconds();
   progress.report(1.0, "done");
   return solution;

@@ -16,24 +16,25 @@
 
 namespace arapfields {
 
-/// A place on the surface at rest and the place of the target that it belongs to, in mesh coordinates.
+/// A point of the surface at rest and the corresponding point of the target, in mesh coordinates.
 struct Landmark {
   Vec3 rest, target;
 };
 
-/// What a wrap reached. Distances between surfaces are shares of the diagonal of the target's bounding box.
+/// Distances, distortion and warnings of a wrap. Distances between surfaces are shares of the diagonal of the
+/// target's bounding box.
 struct WrapReport {
-  ArapValue arap;  ///< beside the alignment's scale
+  ArapValue arap;  ///< without the alignment's scale
   Distortion distortion;
   double to_target_mean = 0.0, to_target_95 = 0.0;      ///< from the wrapped surface to the target
   double from_target_mean = 0.0, from_target_95 = 0.0;  ///< from the target to the wrapped surface
-  double matched_share = 1.0;     ///< of the surface: what has a counterpart on an open target
+  double matched_share = 1.0;     ///< share of the surface that has a counterpart on an open target
   double diagonal = 0.0;          ///< in mesh units
-  double scale = 1.0;             ///< by which the surface as a whole has grown
+  double scale = 1.0;             ///< of the alignment
   std::vector<double> landmarks;  ///< each one's distance to its target, in mesh units
   Index iterations = 0;
   double seconds = 0.0;
-  std::vector<std::string> notes;
+  std::vector<std::string> warnings;
 };
 
 struct WrapSolution {
@@ -41,12 +42,12 @@ struct WrapSolution {
   WrapReport report;
 };
 
-/// Deforms a surface onto the zero set of a function, as rigidly as possible: moves, turns and scales it as a
-/// whole, then lets it flow there in stages of decreasing rigidity, drawn by the nearest places with like
-/// normals on both sides and by landmarks. It does not pass through itself: each step can be undone. What has
-/// no counterpart on an open target is only carried along. The samples need normals; their weights say what
-/// resists more. Throws InvalidInput that names bad options, samples, landmarks far off their surfaces or
-/// contradicting each other, and a target without a surface; Cancelled.
+/// Deforms a surface onto the zero set of a function, as rigidly as possible. First a similarity aligns it as
+/// a whole; then it flows onto the target in stages of decreasing stiffness, driven by correspondences in
+/// both directions and by landmarks. Each step is invertible, so that the surface does not pass through
+/// itself. Parts without a counterpart on an open target follow their neighbours. The samples need normals;
+/// their weights scale the stiffness. Throws InvalidInput that names bad options, samples, landmarks off
+/// their surfaces or contradicting each other, and a target without a surface; Cancelled.
 ARAPFIELDS_EXPORT WrapSolution wrap(const SurfaceSamples& samples, const ImplicitFunction& target,
                                     const std::vector<Landmark>& landmarks, const WrapOptions& options,
                                     const Progress& progress = {});

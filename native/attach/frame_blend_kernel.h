@@ -8,13 +8,13 @@
 
 namespace arapfields {
 
-/// Floats of one place's motion: rotation − 1 by columns, offset, shift, 0.
+/// Floats of one frame's motion: rotation − 1 by columns, offset, shift, 0.
 constexpr int frame_length = 16;
 
-// sums (count, 16) ← of each point the weighted sum of its places' rows: point i has the entries
-// start[i] … start[i+1]−1 of `places` and `weights`.
+// sums (count, 16) ← for each point the weighted sum of its frames' rows. Point i has the entries
+// start[i] … start[i+1]−1 of `frames` and `weights`.
 ARAPFIELDS_DECLARE(void blend_frames(const float* rows, const std::int64_t* start,
-                                     const std::uint16_t* places, const float* weights, std::int64_t count,
+                                     const std::uint16_t* frames, const float* weights, std::int64_t count,
                                      float* sums))
 
 }  // namespace arapfields

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "wrap/correspondence.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "wrap/parameters.h"
+
+namespace arapfields {
+namespace {
+
+using namespace wrap_parameters;
+
+/// Weight of a pair by its normals (Rusinkiewicz, Levoy 2001, section 3.4).
+double compatibility(const Vec3& a, const Vec3& b) {
+  return std::clamp((a.dot(b) - incompatible_cosine) / (compatible_cosine - incompatible_cosine), 0.0, 1.0);
+}
+
+}  // namespace
+
+void CorrespondenceTerms::add(Index point, const Vec3& displacement, const Vec3& normal, double tangential,
+                              double weight) {
+  const Mat3 form =
+      weight * ((1.0 - tangential) * normal * normal.transpose() + tangential * Mat3::Identity());
+  forms.row(point) +=
+      (Eigen::RowVectorXd(6) << form(0, 0), form(1, 1), form(2, 2), form(0, 1), form(0, 2), form(1, 2))
+          .finished();
+  right_hand_sides.row(point) += (form * displacement).transpose();
+}
+
+CorrespondenceTerms::CorrespondenceTerms(const WrapTarget& target, const SurfacePoints& surface,
+                                         const CorrespondenceWeights& weights) {
+  const Points &points = surface.points, &normals = surface.normals;
+  const Index n = points.rows(), m = target.points.rows();
+  forms.setZero(n, 6);
+  right_hand_sides.setZero(n, 3);
+  match_weights.setZero(n);
+
+  // From the surface to the target.
+  const OrientedPoints tree(points, normals);
+  const std::vector<Index> target_of = target.tree.nearest(points, normals, weights.normals);
+  const std::vector<Index> source_of = tree.nearest(target.points, target.normals, weights.normals);
+  double unmatched = 0.0;
+  for (Index i = 0; i < n; ++i) {
+    const Index k = target_of[i];
+    const Vec3 displacement = (target.points.row(k) - points.row(i)).transpose(),
+               normal = target.normals.row(k);
+    double weight = compatibility(normal, normals.row(i)) * target.interior[k];
+    if (!target.closed && weight > 0.0) {  // only if the way back ends near its start
+      const double missed = (points.row(source_of[k]) - points.row(i)).norm();
+      if (missed > return_spacings * target.spacing + return_share * displacement.norm()) weight = 0.0;
+    }
+    if (!(weight > 0.0)) {
+      unmatched += surface.area_weights[i];
+      continue;
+    }
+    match_weights[i] = weight;
+    add(i, displacement, normal, weights.tangential, weights.weight * weight * surface.area_weights[i]);
+  }
+  matched_share = 1.0 - unmatched;
+
+  // From the target to the surface.
+  for (Index k = 0; k < m && weights.coverage > 0.0; ++k) {
+    const Index i = source_of[k];
+    const Vec3 normal = target.normals.row(k);
+    const double weight = compatibility(normal, normals.row(i));
+    if (weight > 0.0)
+      add(i, (target.points.row(k) - points.row(i)).transpose(), normal, weights.tangential,
+          weights.weight * weights.coverage * weight / static_cast<double>(m));
+  }
+
+  // From the surface to the target, without regard to normals.
+  if (!(weights.unoriented > 0.0)) return;
+  const std::vector<Index> nearest = target.tree.nearest(points, normals, 0.0);
+  for (Index i = 0; i < n; ++i) {
+    const Index k = nearest[i];
+    if (!target.closed && !(match_weights[i] > 0.0)) continue;
+    add(i, (target.points.row(k) - points.row(i)).transpose(), target.normals.row(k), weights.tangential,
+        weights.unoriented * weights.weight * target.interior[k] * surface.area_weights[i]);
+  }
+}
+
+}  // namespace arapfields

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/task.h"
+#include "fields/radial_basis.h"
+#include "wrap/correspondence.h"
+
+namespace arapfields {
+
+/// The stiffness of a surface in motion: what its velocity v is measured against at n points.
+struct StiffnessTerms {
+  Points points;                ///< (n,3) current positions
+  RowMatrix<double> jacobians;  ///< (n,9), row-major: J of the motion from rest until now
+  Vector rigidity;              ///< (n) weights of ‖∇v J − (R − J)‖², R the rotation closest to J
+  Vector viscosity;             ///< (n) weights of ‖∇v‖²
+  double ridge = 0.0;           ///< weight of the squared coefficients
+};
+
+/// Landmarks (k,3), their displacements onto their targets, and the weight of the mean squared difference.
+struct LandmarkTerm {
+  Points points, displacements;
+  double weight = 0.0;
+};
+
+/// The velocity that minimises the sum of all terms: coefficients (basis.size(), 3) of a radial field. The
+/// terms are quadratic, so one Cholesky factor of the normal equations solves them (docs/method.md, section
+/// Wrap).
+RowMatrix<double> solve_velocity(const RadialBasis& basis, const StiffnessTerms& stiffness,
+                                 const CorrespondenceTerms& correspondences, const LandmarkTerm& landmarks,
+                                 const Progress& progress);
+
+}  // namespace arapfields
