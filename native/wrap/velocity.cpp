@@ -2,8 +2,10 @@
 #include "wrap/velocity.h"
 
 #include <Eigen/SVD>
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "core/dense.h"

@@ -11,10 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from distributed import Client
+from distributed import Client, as_completed
 
 import arapfields as af
-from arapfields import farm
 
 
 def stylized(job: tuple[Path, Path]) -> float:
@@ -31,20 +30,21 @@ def stylized(job: tuple[Path, Path]) -> float:
     return field.report.energy
 
 
-def tell(outcome: farm.Outcome[tuple[Path, Path], float]) -> None:
-    text = f"energy {outcome.value:.4f}" if outcome.done else f"FAILED: {outcome.error}"
-    print(f"{outcome.item[0].name}: {text}", flush=True)
-
-
 def main() -> int:
     source, target = (Path(name).resolve() for name in sys.argv[1:3])
     target.mkdir(parents=True, exist_ok=True)
     jobs = [(path, target / path.name) for path in sorted(source.glob("*.ply"))]
     jobs = [job for job in jobs if not job[1].exists()]
+    failed = 0
     # Without an address, workers on this machine, one for each processor, a thread each.
     with Client(sys.argv[3]) if len(sys.argv) > 3 else Client(threads_per_worker=1) as client:
-        outcomes = farm.map(stylized, jobs, client, on_done=tell)
-    return 0 if all(outcome.done for outcome in outcomes) else 1
+        names = {client.submit(stylized, job, pure=False): job[0].name for job in jobs}
+        for future in as_completed(list(names)):
+            error = future.exception()
+            failed += error is not None
+            text = f"FAILED: {error}" if error is not None else f"energy {future.result():.4f}"
+            print(f"{names[future]}: {text}", flush=True)
+    return 1 if failed else 0
 
 
 if __name__ == "__main__":

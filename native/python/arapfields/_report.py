@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What all kinds of report have."""
+"""The base class of reports, and what a callback receives while a solve runs."""
 
 import dataclasses
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 
 @dataclass(frozen=True, kw_only=True)
 class Report:
-    """What all reports have."""
+    """A frozen set of measurements; `report["bend"]` reads report.bend."""
 
     kinds: ClassVar[dict[str, type["Report"]]] = {}
 
@@ -34,3 +35,20 @@ class Report:
         """Plain numbers, texts, lists and dicts by name."""
         plain: dict[str, Any] = json.loads(json.dumps(dataclasses.asdict(self)))
         return plain
+
+
+@dataclass(frozen=True, kw_only=True)
+class Iteration:
+    """The argument of a callback, after each iteration."""
+
+    iteration: int
+    """Iterations done, from 1."""
+    loss: float
+    """The loss estimated in this iteration."""
+    terms: Mapping[str, float]
+    """The weighted terms of the loss, whose sum it is; see deform, stylize and fit_sdf for their names."""
+    seconds: float
+    """Since the iterations began."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "terms", MappingProxyType(dict(self.terms)))

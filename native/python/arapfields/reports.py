@@ -1,26 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What calls measure on the way: a frozen class for each kind of report.
+"""Measurements of calls: a frozen class for each kind of report.
 
 Energies are the unit cube's, lengths the mesh's. `report["bend"]` reads report.bend; to_dict() is for JSON.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any, Generic, Literal, NamedTuple, Self, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from ._report import Iteration as Iteration
 from ._report import Report as Report
-from .wrap_report import WrapReport as WrapReport
 
 StoppedBy: TypeAlias = Literal["iterations", "time_budget", "target_error", "callback", "diverged"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class FitReport(Report):
-    """What fit_sdf reached: absolute errors at points that were not learnt from, in mesh units."""
+    """Absolute errors of fit_sdf at points outside the training set, in mesh units."""
 
     near_mean: float
     """Mean error near the surface."""
@@ -35,14 +33,14 @@ class FitReport(Report):
     iterations: int
     seconds: float
     distance_seconds: float
-    """The part of the seconds that exact distances took."""
+    """The part of the seconds spent on exact distances."""
     stopped_by: StoppedBy
     device: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class HandleError(Report):
-    """How far one handle's samples are from where they are asked to be, in mesh units."""
+    """Distances between one handle's samples and their targets, in mesh units."""
 
     error_mean: float
     error_max: float
@@ -75,12 +73,12 @@ class EnergyReport(Report):
     preference: float | None = None
     """Mean agreement with the preferred normals, where there are any."""
     notes: tuple[str, ...] = ()
-    """Sentences on what should not go unseen: folds, far targets, margins that were reduced."""
+    """Warnings: folds, distant targets, margins that were reduced."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SolveReport(EnergyReport):
-    """What deform or stylize reached."""
+    """Energies, errors and loss history of deform or stylize."""
 
     scale: float
     """Mesh units a cube unit."""
@@ -90,22 +88,22 @@ class SolveReport(EnergyReport):
     loss: tuple[tuple[int, float], ...]
     """(iteration, loss), at most a few hundred of them."""
     far_target: float | None = None
-    """Sizes of the shape to the farthest handle's target, where that is far."""
+    """Distance of the farthest handle's target in sizes of the shape, where it is large."""
 
     @property
     def out_of_time(self) -> bool:
-        """Whether the time budget ended it."""
+        """Whether the time budget ended the solve."""
         return self.stopped_by == "time_budget"
 
 
 @dataclass(frozen=True, kw_only=True)
 class LiveReport(EnergyReport):
-    """What the last solve or step of a LiveDeformer reached; `speed`, in mesh units a second, is a step's."""
+    """The last solve or step of a LiveDeformer. `speed`, in mesh units per second, is that of a step."""
 
     value: float
-    """All that is minimised."""
+    """The minimised value: all terms."""
     evaluations: int
-    """Times that the energy was evaluated."""
+    """Number of evaluations of the energy."""
     converged: bool
     """Whether a further step would gain next to nothing."""
     setup_seconds: float
@@ -114,8 +112,42 @@ class LiveReport(EnergyReport):
 
 
 @dataclass(frozen=True, kw_only=True)
+class WrapReport(Report):
+    """Distances and distortion of a wrap. Distances between surfaces are shares of the target's diagonal."""
+
+    to_target_mean: float
+    """Mean distance from the wrapped surface, where it has a counterpart, to the target."""
+    to_target_95: float
+    """The 95 % quantile of that distance."""
+    from_target_mean: float
+    """Mean distance from the target to the wrapped surface."""
+    from_target_95: float
+    """The 95 % quantile of that distance."""
+    matched_share: float
+    """Share of the surface that has a counterpart; 1 where the target is closed."""
+    landmarks: tuple[float, ...]
+    """Distance of each landmark to its place on the target, in mesh units."""
+    diagonal: float
+    """Of the target's bounding box, in mesh units."""
+    scale: float
+    """Of the alignment."""
+    stretch: float
+    """Mean ‖J − R‖², without that scale."""
+    bend: float
+    """Mean squared speed at which the closest rotation R turns."""
+    min_determinant: float
+    """Smallest det J, without the scale."""
+    flipped_share: float
+    """Share of samples where det J ≤ 0."""
+    iterations: int
+    seconds: float
+    notes: tuple[str, ...] = ()
+    """Warnings: unlike shapes, landmarks that do not fit, folds."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class InverseReport(Report):
-    """What train_inverse reached: distances ‖g(f(x)) − x‖ over the samples, in mesh units."""
+    """Distances ‖g(f(x)) − x‖ of train_inverse over the samples, in mesh units."""
 
     error_mean: float
     error_max: float
@@ -125,7 +157,7 @@ class InverseReport(Report):
 
 @dataclass(frozen=True, kw_only=True)
 class SampleReport(Report):
-    """What sample_surface did."""
+    """Lines and evaluations of sample_surface."""
 
     lines: int
     """Random lines cast."""
@@ -135,7 +167,7 @@ class SampleReport(Report):
     model_evaluations: int
     """Points spent before the first line."""
     lipschitz: float
-    """The bound on the gradient that was measured."""
+    """The bound on the gradient, given or measured."""
     largest_value: float
     """Largest |sdf| of the samples, in cube units."""
     seconds: float
@@ -143,7 +175,7 @@ class SampleReport(Report):
 
 @dataclass(frozen=True, kw_only=True)
 class ExtractionReport(Report):
-    """What extract_surface did."""
+    """Evaluations and topology of extract_surface."""
 
     evaluations: int
     """Points at which the function was evaluated, those with gradients included."""
@@ -159,20 +191,20 @@ class ExtractionReport(Report):
     refinement: int
     """Steps into which an edge of these was cut; 1 where none was."""
     holding_resolution: int
-    """One that holds what came apart in fewer pieces; 0 where none was found or nothing did."""
+    """A resolution at which fewer pieces come apart; 0 where none was found or nothing came apart."""
     notes: tuple[str, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class DeformedExtractionReport(ExtractionReport):
-    """What extract_deformed did."""
+    """Evaluations, inverses and topology of extract_deformed."""
 
     inverted: int
-    """Points whose rest positions were asked for."""
+    """Points whose rest positions were computed."""
     failures: int
-    """Those without one beside the surface, where the distance to the moved rest surface stands in."""
+    """Points without one, where the distance to the moved rest surface is used."""
     spacing: float
-    """Of the grid, a length."""
+    """Spacing of the grid, in mesh units."""
 
 
 class _Mesh(NamedTuple):
@@ -191,29 +223,12 @@ class Extraction(_Mesh, Generic[ExtractionReportT]):
     def __new__(
         cls, vertices: npt.NDArray[np.float64], triangles: npt.NDArray[np.int32], report: ExtractionReportT
     ) -> Self:
-        made = super().__new__(cls, vertices, triangles)
-        object.__setattr__(made, "report", report)
-        return made
+        extraction = super().__new__(cls, vertices, triangles)
+        object.__setattr__(extraction, "report", report)
+        return extraction
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"cannot assign to {name!r} of an Extraction")
 
     def __getnewargs__(self) -> tuple[Any, ...]:
         return *self, self.report
-
-
-@dataclass(frozen=True, kw_only=True)
-class Iteration:
-    """What a callback gets after each iteration."""
-
-    iteration: int
-    """Iterations done, from 1."""
-    loss: float
-    """The estimate that this iteration lowered."""
-    terms: Mapping[str, float]
-    """The weighted terms of the loss, whose sum it is; see deform, stylize and fit_sdf for their names."""
-    seconds: float
-    """Since the iterations began."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "terms", MappingProxyType(dict(self.terms)))
