@@ -8,8 +8,11 @@ namespace {
 
 constexpr int strip_width = 64;
 
+}  // namespace
+
 template <class Scalar>
-void rows_of(const TallBlock<Scalar>& a, std::int64_t begin, std::int64_t end, const Scalar* b, Scalar* out) {
+void tall_product_rows(const TallBlock<Scalar>& a, std::int64_t begin, std::int64_t end, const Scalar* b,
+                       Scalar* out) {
   for (std::int64_t row = begin; row < end; row += 4) {
     const int count = end - row < 4 ? static_cast<int>(end - row) : 4;
     const Scalar* from[4];
@@ -28,10 +31,12 @@ void rows_of(const TallBlock<Scalar>& a, std::int64_t begin, std::int64_t end, c
       for (int k = 0; k < 3; ++k) out[3 * (row + r) + k] = sum_of_lanes<Scalar>(sums[r][k]);
   }
 }
+template void tall_product_rows(const TallBlock<float>&, std::int64_t, std::int64_t, const float*, float*);
+template void tall_product_rows(const TallBlock<double>&, std::int64_t, std::int64_t, const double*, double*);
 
 template <class Scalar>
-void strip_of(const TallBlock<Scalar>& a, std::int64_t first, std::int64_t rows, const Scalar* b,
-              Scalar* out) {
+void tall_product_strip(const TallBlock<Scalar>& a, std::int64_t first, std::int64_t rows, const Scalar* b,
+                        Scalar* out) {
   constexpr int packs = 4;
   for (int part = 0; part < strip_width; part += packs * lanes<Scalar>) {
     constexpr int used = packs * lanes<Scalar> < strip_width ? packs : strip_width / lanes<Scalar>;
@@ -49,24 +54,8 @@ void strip_of(const TallBlock<Scalar>& a, std::int64_t first, std::int64_t rows,
       for (int k = 0; k < 3; ++k) store(out + k * a.stride + column + p * lanes<Scalar>, sums[p][k]);
   }
 }
-
-}  // namespace
-
-void tall_product_rows(const TallBlock<float>& a, std::int64_t begin, std::int64_t end, const float* b,
-                       float* out) {
-  rows_of(a, begin, end, b, out);
-}
-void tall_product_rows(const TallBlock<double>& a, std::int64_t begin, std::int64_t end, const double* b,
-                       double* out) {
-  rows_of(a, begin, end, b, out);
-}
-void tall_product_strip(const TallBlock<float>& a, std::int64_t first, std::int64_t rows, const float* b,
-                        float* out) {
-  strip_of(a, first, rows, b, out);
-}
-void tall_product_strip(const TallBlock<double>& a, std::int64_t first, std::int64_t rows, const double* b,
-                        double* out) {
-  strip_of(a, first, rows, b, out);
-}
+template void tall_product_strip(const TallBlock<float>&, std::int64_t, std::int64_t, const float*, float*);
+template void tall_product_strip(const TallBlock<double>&, std::int64_t, std::int64_t, const double*,
+                                 double*);
 
 }  // namespace arapfields::SIMD_LEVEL

@@ -17,14 +17,12 @@ struct TallBlock {
 };
 
 // Rows begin … end−1 of A B into out (rows, 3), B given as three columns `stride` long.
-ARAPFIELDS_DECLARE(void tall_product_rows(const TallBlock<float>&, std::int64_t begin, std::int64_t end,
-                                          const float* b, float* out))
-ARAPFIELDS_DECLARE(void tall_product_rows(const TallBlock<double>&, std::int64_t begin, std::int64_t end,
-                                          const double* b, double* out))
+ARAPFIELDS_DECLARE(template <class Scalar> void tall_product_rows(const TallBlock<Scalar>&,
+                                                                  std::int64_t begin, std::int64_t end,
+                                                                  const Scalar* b, Scalar* out))
 // Columns first … first+63 of (Aᵀ B)ᵀ into out, three rows `stride` long, for B (rows, 3).
-ARAPFIELDS_DECLARE(void tall_product_strip(const TallBlock<float>&, std::int64_t first, std::int64_t rows,
-                                           const float* b, float* out))
-ARAPFIELDS_DECLARE(void tall_product_strip(const TallBlock<double>&, std::int64_t first, std::int64_t rows,
-                                           const double* b, double* out))
+ARAPFIELDS_DECLARE(template <class Scalar> void tall_product_strip(const TallBlock<Scalar>&,
+                                                                   std::int64_t first, std::int64_t rows,
+                                                                   const Scalar* b, Scalar* out))
 
 }  // namespace arapfields

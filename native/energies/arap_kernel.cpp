@@ -145,8 +145,10 @@ inline Pack<Scalar> load_factors(const Scalar* factors, std::int64_t point, std:
   return result;
 }
 
+}  // namespace
+
 template <class Scalar>
-void run(const ArapBlock<Scalar>& block, std::int64_t begin, std::int64_t end, double* sums) {
+void arap_range(const ArapBlock<Scalar>& block, std::int64_t begin, std::int64_t end, double* sums) {
   for (std::int64_t point = begin; point < end; point += lanes<Scalar>) {
     const std::int64_t valid = end - point;
     Pack33<Scalar> jacobian, gradient;
@@ -188,10 +190,12 @@ void run(const ArapBlock<Scalar>& block, std::int64_t begin, std::int64_t end, d
     }
   }
 }
+template void arap_range(const ArapBlock<float>&, std::int64_t, std::int64_t, double*);
+template void arap_range(const ArapBlock<double>&, std::int64_t, std::int64_t, double*);
 
 template <class Scalar>
-void rotate(const Scalar* jacobians, std::int64_t count, std::int64_t begin, std::int64_t end,
-            Scalar* rotations) {
+void rotation_range(const Scalar* jacobians, std::int64_t count, std::int64_t begin, std::int64_t end,
+                    Scalar* rotations) {
   for (std::int64_t point = begin; point < end; point += lanes<Scalar>) {
     const std::int64_t valid = end - point;
     Pack33<Scalar> jacobian;
@@ -208,22 +212,7 @@ void rotate(const Scalar* jacobians, std::int64_t count, std::int64_t begin, std
           rotations[(k * count + point + lane) * 3 + i] = polar.rotation[i][k][lane];
   }
 }
-
-}  // namespace
-
-void arap_range(const ArapBlock<float>& block, std::int64_t begin, std::int64_t end, double* sums) {
-  run(block, begin, end, sums);
-}
-void arap_range(const ArapBlock<double>& block, std::int64_t begin, std::int64_t end, double* sums) {
-  run(block, begin, end, sums);
-}
-void rotation_range(const float* jacobians, std::int64_t count, std::int64_t begin, std::int64_t end,
-                    float* rotations) {
-  rotate(jacobians, count, begin, end, rotations);
-}
-void rotation_range(const double* jacobians, std::int64_t count, std::int64_t begin, std::int64_t end,
-                    double* rotations) {
-  rotate(jacobians, count, begin, end, rotations);
-}
+template void rotation_range(const float*, std::int64_t, std::int64_t, std::int64_t, float*);
+template void rotation_range(const double*, std::int64_t, std::int64_t, std::int64_t, double*);
 
 }  // namespace arapfields::SIMD_LEVEL

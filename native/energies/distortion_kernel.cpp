@@ -4,12 +4,11 @@
 #include "energies/rotation_pack.h"
 
 namespace arapfields::SIMD_LEVEL {
-namespace {
-
 /// Signed singular values from the sums of two that the closest rotation comes with; the smallest has the
 /// determinant's sign.
 template <class Scalar>
-void run(const Scalar* jets, std::int64_t count, std::int64_t begin, std::int64_t end, double* out) {
+void distortion_range(const Scalar* jets, std::int64_t count, std::int64_t begin, std::int64_t end,
+                      double* out) {
   for (std::int64_t point = begin; point < end; point += lanes<Scalar>) {
     const std::int64_t valid = end - point;
     Pack33<Scalar> jacobian;
@@ -38,16 +37,7 @@ void run(const Scalar* jets, std::int64_t count, std::int64_t begin, std::int64_
     }
   }
 }
-
-}  // namespace
-
-void distortion_range(const float* jets, std::int64_t count, std::int64_t begin, std::int64_t end,
-                      double* out) {
-  run(jets, count, begin, end, out);
-}
-void distortion_range(const double* jets, std::int64_t count, std::int64_t begin, std::int64_t end,
-                      double* out) {
-  run(jets, count, begin, end, out);
-}
+template void distortion_range(const float*, std::int64_t, std::int64_t, std::int64_t, double*);
+template void distortion_range(const double*, std::int64_t, std::int64_t, std::int64_t, double*);
 
 }  // namespace arapfields::SIMD_LEVEL

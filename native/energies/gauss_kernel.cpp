@@ -21,10 +21,12 @@ inline Pack<Scalar> dot(const Vector3<Scalar>& a, const Vector3<Scalar>& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
+}  // namespace
+
 /// With J's columns j_k, cof(J) n = n_1 j_2×j_3 + n_2 j_3×j_1 + n_3 j_1×j_2, and J⁻ᵀn has its direction times
 /// the sign of det J. A cotangent h of cof(J) n is one of j_k: h × (n_{k+1} j_{k+2} − n_{k+2} j_{k+1}).
 template <class Scalar>
-double run(const GaussBlock<Scalar>& block, std::int64_t begin, std::int64_t end) {
+double gauss_range(const GaussBlock<Scalar>& block, std::int64_t begin, std::int64_t end) {
   using P = Pack<Scalar>;
   const P zero = {}, one = broadcast(Scalar(1)), shortest = broadcast(Scalar(1e-3));
   double sum = 0;
@@ -75,14 +77,7 @@ double run(const GaussBlock<Scalar>& block, std::int64_t begin, std::int64_t end
   }
   return sum;
 }
-
-}  // namespace
-
-double gauss_range(const GaussBlock<float>& block, std::int64_t begin, std::int64_t end) {
-  return run(block, begin, end);
-}
-double gauss_range(const GaussBlock<double>& block, std::int64_t begin, std::int64_t end) {
-  return run(block, begin, end);
-}
+template double gauss_range(const GaussBlock<float>&, std::int64_t, std::int64_t);
+template double gauss_range(const GaussBlock<double>&, std::int64_t, std::int64_t);
 
 }  // namespace arapfields::SIMD_LEVEL

@@ -38,21 +38,16 @@ struct GaussBlock {
   Scalar sharpness, weight;
 };
 
-ARAPFIELDS_DECLARE(void arap_range(const ArapBlock<float>&, std::int64_t begin, std::int64_t end,
-                                   double* sums))
-ARAPFIELDS_DECLARE(void arap_range(const ArapBlock<double>&, std::int64_t begin, std::int64_t end,
-                                   double* sums))
-ARAPFIELDS_DECLARE(double gauss_range(const GaussBlock<float>&, std::int64_t begin, std::int64_t end))
-ARAPFIELDS_DECLARE(double gauss_range(const GaussBlock<double>&, std::int64_t begin, std::int64_t end))
-ARAPFIELDS_DECLARE(void rotation_range(const float*, std::int64_t count, std::int64_t begin, std::int64_t end,
-                                       float*))
-ARAPFIELDS_DECLARE(void rotation_range(const double*, std::int64_t count, std::int64_t begin,
-                                       std::int64_t end, double*))
-
+ARAPFIELDS_DECLARE(template <class Scalar> void arap_range(const ArapBlock<Scalar>&, std::int64_t begin,
+                                                           std::int64_t end, double* sums))
+ARAPFIELDS_DECLARE(template <class Scalar>
+                   double gauss_range(const GaussBlock<Scalar>&, std::int64_t begin, std::int64_t end))
+ARAPFIELDS_DECLARE(template <class Scalar> void rotation_range(const Scalar* jacobians, std::int64_t count,
+                                                               std::int64_t begin, std::int64_t end,
+                                                               Scalar* rotations))
 // Joins (min det, share ≤ 0 as a count, max and min singular value) of the range to out[4].
-ARAPFIELDS_DECLARE(void distortion_range(const float* jets, std::int64_t count, std::int64_t begin,
-                                         std::int64_t end, double* out))
-ARAPFIELDS_DECLARE(void distortion_range(const double* jets, std::int64_t count, std::int64_t begin,
-                                         std::int64_t end, double* out))
+ARAPFIELDS_DECLARE(template <class Scalar> void distortion_range(const Scalar* jets, std::int64_t count,
+                                                                 std::int64_t begin, std::int64_t end,
+                                                                 double* out))
 
 }  // namespace arapfields

@@ -136,32 +136,7 @@ void specialise(const RadialBlock<Scalar>& block, int columns, Body&& body) {
   embedded ? body.template operator()<2, true>() : body.template operator()<2, false>();
 }
 
-template <class Scalar>
-void forward_any(const RadialBlock<Scalar>& block, const Scalar* coefficients, int columns, Scalar* jets) {
-  specialise(block, columns,
-             [&]<int order, bool embedded>() { forward<order, embedded>(block, coefficients, jets); });
-}
-
-template <class Scalar>
-void backward_any(const RadialBlock<Scalar>& block, const Scalar* cotangents, int columns, Scalar* sums) {
-  specialise(block, columns,
-             [&]<int order, bool embedded>() { backward<order, embedded>(block, cotangents, sums); });
-}
-
 }  // namespace
-
-void radial_forward(const RadialBlock<float>& block, const float* coefficients, int columns, float* jets) {
-  forward_any(block, coefficients, columns, jets);
-}
-void radial_forward(const RadialBlock<double>& block, const double* coefficients, int columns, double* jets) {
-  forward_any(block, coefficients, columns, jets);
-}
-void radial_backward(const RadialBlock<float>& block, const float* cotangents, int columns, float* sums) {
-  backward_any(block, cotangents, columns, sums);
-}
-void radial_backward(const RadialBlock<double>& block, const double* cotangents, int columns, double* sums) {
-  backward_any(block, cotangents, columns, sums);
-}
 
 void radial_rows(const RadialBlock<double>& block, int columns, double* rows) {
   specialise(block, columns, [&]<int order, bool embedded>() { rows_of<order, embedded>(block, rows); });
@@ -201,5 +176,21 @@ double farthest_update(const double* points, const double* weights, std::int64_t
   for (int i = 0; i < lanes<double>; ++i) result = worst[i] > result ? worst[i] : result;
   return result;
 }
+
+template <class Scalar>
+void radial_forward(const RadialBlock<Scalar>& block, const Scalar* coefficients, int columns, Scalar* jets) {
+  specialise(block, columns,
+             [&]<int order, bool embedded>() { forward<order, embedded>(block, coefficients, jets); });
+}
+template void radial_forward(const RadialBlock<float>&, const float*, int, float*);
+template void radial_forward(const RadialBlock<double>&, const double*, int, double*);
+
+template <class Scalar>
+void radial_backward(const RadialBlock<Scalar>& block, const Scalar* cotangents, int columns, Scalar* sums) {
+  specialise(block, columns,
+             [&]<int order, bool embedded>() { backward<order, embedded>(block, cotangents, sums); });
+}
+template void radial_backward(const RadialBlock<float>&, const float*, int, float*);
+template void radial_backward(const RadialBlock<double>&, const double*, int, double*);
 
 }  // namespace arapfields::SIMD_LEVEL

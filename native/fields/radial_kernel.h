@@ -31,15 +31,13 @@ struct RadialBlock {
 constexpr int radial_lanes = 16;
 
 // Jets (columns, 3, 16) of the centers' part.
-ARAPFIELDS_DECLARE(void radial_forward(const RadialBlock<float>&, const float* coefficients, int columns,
-                                       float* jets))
-ARAPFIELDS_DECLARE(void radial_forward(const RadialBlock<double>&, const double* coefficients, int columns,
-                                       double* jets))
-// Adds to the partial sums what cotangents (columns, 3, 16) are worth.
-ARAPFIELDS_DECLARE(void radial_backward(const RadialBlock<float>&, const float* cotangents, int columns,
-                                        float* sums))
-ARAPFIELDS_DECLARE(void radial_backward(const RadialBlock<double>&, const double* cotangents, int columns,
-                                        double* sums))
+ARAPFIELDS_DECLARE(template <class Scalar> void radial_forward(const RadialBlock<Scalar>&,
+                                                               const Scalar* coefficients, int columns,
+                                                               Scalar* jets))
+// Adds the pull-back of cotangents (columns, 3, 16) to the partial sums.
+ARAPFIELDS_DECLARE(template <class Scalar> void radial_backward(const RadialBlock<Scalar>&,
+                                                                const Scalar* cotangents, int columns,
+                                                                Scalar* sums))
 // Jets of each active bump: (active, columns, 16).
 ARAPFIELDS_DECLARE(void radial_rows(const RadialBlock<double>&, int columns, double* rows))
 // Lists the centers whose support meets the ball of radius ball_radius[0] around center[0..2], embedded into

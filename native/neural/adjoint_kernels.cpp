@@ -50,12 +50,6 @@ void adjoint_outputs(const AdjointBlock<Scalar>& b, int first, Scalar* second) {
   }
 }
 
-template <class Scalar>
-void adjoint_any(const AdjointBlock<Scalar>& b, Scalar* second) {
-  if (b.outputs == 3) return adjoint_outputs<3>(b, 0, second);
-  for (int o = 0; o < b.outputs; ++o) adjoint_outputs<1>(b, o, second);
-}
-
 /// `d`: the cotangents (6, outputs) of this point's second derivatives.
 template <class V, class Scalar>
 inline void back_units(const AdjointBlock<Scalar>& b, std::int64_t p, std::int64_t w, const Scalar* d,
@@ -87,8 +81,18 @@ inline void back_units(const AdjointBlock<Scalar>& b, std::int64_t p, std::int64
   write(partial + 3 * plane + at, V(curve * to_3));
 }
 
+}  // namespace
+
 template <class Scalar>
-void back_any(const AdjointBlock<Scalar>& b, const Scalar* second, Scalar* cotangents, Scalar* partial) {
+void adjoint(const AdjointBlock<Scalar>& b, Scalar* second) {
+  if (b.outputs == 3) return adjoint_outputs<3>(b, 0, second);
+  for (int o = 0; o < b.outputs; ++o) adjoint_outputs<1>(b, o, second);
+}
+template void adjoint(const AdjointBlock<float>&, float*);
+template void adjoint(const AdjointBlock<double>&, double*);
+
+template <class Scalar>
+void adjoint_back(const AdjointBlock<Scalar>& b, const Scalar* second, Scalar* cotangents, Scalar* partial) {
   for (std::int64_t p = 0; p < b.points; ++p) {
     const Scalar* d = second + p * 6 * b.outputs;
     std::int64_t w = 0;
@@ -97,16 +101,7 @@ void back_any(const AdjointBlock<Scalar>& b, const Scalar* second, Scalar* cotan
     for (; w < b.width; ++w) back_units<Scalar>(b, p, w, d, cotangents, partial);
   }
 }
-
-}  // namespace
-
-void adjoint(const AdjointBlock<float>& b, float* second) { adjoint_any(b, second); }
-void adjoint(const AdjointBlock<double>& b, double* second) { adjoint_any(b, second); }
-void adjoint_back(const AdjointBlock<float>& b, const float* second, float* cotangents, float* partial) {
-  back_any(b, second, cotangents, partial);
-}
-void adjoint_back(const AdjointBlock<double>& b, const double* second, double* cotangents, double* partial) {
-  back_any(b, second, cotangents, partial);
-}
+template void adjoint_back(const AdjointBlock<float>&, const float*, float*, float*);
+template void adjoint_back(const AdjointBlock<double>&, const double*, double*, double*);
 
 }  // namespace arapfields::SIMD_LEVEL

@@ -24,16 +24,12 @@ struct AdjointBlock {
   int outputs = 3;
 };
 
-#define ARAPFIELDS_ADJOINT_KERNELS(Scalar)                                                                  \
-  /* fills `below`; adds to `second` (points, 6, outputs), pairs in the order of the jets' columns */       \
-  ARAPFIELDS_DECLARE(void adjoint(const AdjointBlock<Scalar>& block, Scalar* second))                       \
-  /* cotangents (outputs, points, width) of `below` become those of q; `second` holds the cotangents of the \
-     second derivatives; `partial` (4, points, width) receives what reaches the activations; fills `below`  \
-   */                                                                                                       \
-  ARAPFIELDS_DECLARE(void adjoint_back(const AdjointBlock<Scalar>& block, const Scalar* second,             \
-                                       Scalar* cotangents, Scalar* partial))
-ARAPFIELDS_ADJOINT_KERNELS(float)
-ARAPFIELDS_ADJOINT_KERNELS(double)
-#undef ARAPFIELDS_ADJOINT_KERNELS
+// Fills `below`; adds to `second` (points, 6, outputs), pairs in the order of the jets' columns.
+ARAPFIELDS_DECLARE(template <class Scalar> void adjoint(const AdjointBlock<Scalar>& block, Scalar* second))
+// Cotangents (outputs, points, width) of `below` become those of q. `second` holds the cotangents of the
+// second derivatives; `partial` (4, points, width) receives those of the activations. Fills `below`.
+ARAPFIELDS_DECLARE(template <class Scalar> void adjoint_back(const AdjointBlock<Scalar>& block,
+                                                             const Scalar* second, Scalar* cotangents,
+                                                             Scalar* partial))
 
 }  // namespace arapfields

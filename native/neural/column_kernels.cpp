@@ -81,26 +81,22 @@ void forward_any(const ColumnBlock<Scalar>& b) {
   forward<Scalar, 6, keep>(b);
 }
 
+}  // namespace
+
 template <class Scalar>
-void back_any(const ColumnBlock<Scalar>& b, Scalar* cotangents, Scalar* bias_gradient) {
+void activate_columns_back(const ColumnBlock<Scalar>& b, Scalar* cotangents, Scalar* bias_gradient) {
   if (b.columns == 1) return back<Scalar, 1>(b, cotangents, bias_gradient);
   if (b.columns == 3) return back<Scalar, 3>(b, cotangents, bias_gradient);
   back<Scalar, 6>(b, cotangents, bias_gradient);
 }
+template void activate_columns_back(const ColumnBlock<float>&, float*, float*);
+template void activate_columns_back(const ColumnBlock<double>&, double*, double*);
 
-}  // namespace
-
-void activate_columns(const ColumnBlock<float>& b) {
-  b.slope ? forward_any<float, true>(b) : forward_any<float, false>(b);
+template <class Scalar>
+void activate_columns(const ColumnBlock<Scalar>& b) {
+  b.slope ? forward_any<Scalar, true>(b) : forward_any<Scalar, false>(b);
 }
-void activate_columns(const ColumnBlock<double>& b) {
-  b.slope ? forward_any<double, true>(b) : forward_any<double, false>(b);
-}
-void activate_columns_back(const ColumnBlock<float>& b, float* cotangents, float* bias_gradient) {
-  back_any(b, cotangents, bias_gradient);
-}
-void activate_columns_back(const ColumnBlock<double>& b, double* cotangents, double* bias_gradient) {
-  back_any(b, cotangents, bias_gradient);
-}
+template void activate_columns(const ColumnBlock<float>&);
+template void activate_columns(const ColumnBlock<double>&);
 
 }  // namespace arapfields::SIMD_LEVEL

@@ -22,13 +22,10 @@ struct ColumnBlock {
   int columns = 1;  ///< 1, 3 or 6
 };
 
-#define ARAPFIELDS_COLUMN_KERNELS(Scalar)                                                             \
-  ARAPFIELDS_DECLARE(void activate_columns(const ColumnBlock<Scalar>& block))                         \
-  /* cotangents of h (columns, points, width) become those of z; bias_gradient (width) is added to */ \
-  ARAPFIELDS_DECLARE(void activate_columns_back(const ColumnBlock<Scalar>& block, Scalar* cotangents, \
-                                                Scalar* bias_gradient))
-ARAPFIELDS_COLUMN_KERNELS(float)
-ARAPFIELDS_COLUMN_KERNELS(double)
-#undef ARAPFIELDS_COLUMN_KERNELS
+ARAPFIELDS_DECLARE(template <class Scalar> void activate_columns(const ColumnBlock<Scalar>& block))
+// Cotangents of h (columns, points, width) become those of z; bias_gradient (width) is added to.
+ARAPFIELDS_DECLARE(template <class Scalar> void activate_columns_back(const ColumnBlock<Scalar>& block,
+                                                                      Scalar* cotangents,
+                                                                      Scalar* bias_gradient))
 
 }  // namespace arapfields

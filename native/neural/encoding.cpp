@@ -6,10 +6,9 @@
 #include "neural/jet_kernels.h"
 
 namespace arapfields::SIMD_LEVEL {
-namespace {
 
 template <class Scalar>
-void encode_any(const EncodingBlock<Scalar>& b) {
+void encode(const EncodingBlock<Scalar>& b) {
   const std::int64_t row = 6 * b.octaves;
   for (std::int64_t i = 0; i < 3 * b.count; ++i) {
     const double angle = b.frequency * static_cast<double>(b.points[i]);
@@ -33,9 +32,7 @@ void encode_any(const EncodingBlock<Scalar>& b) {
   }
 }
 
-}  // namespace
-
-void encode(const EncodingBlock<float>& block) { encode_any(block); }
-void encode(const EncodingBlock<double>& block) { encode_any(block); }
+template void encode(const EncodingBlock<float>&);
+template void encode(const EncodingBlock<double>&);
 
 }  // namespace arapfields::SIMD_LEVEL

@@ -93,29 +93,23 @@ void activate_any(const ActivationBlock<Scalar>& b) {
   activate_jets<Scalar, keep>(b);
 }
 
+}  // namespace
+
 template <class Scalar>
-void back_any(const ActivationBlock<Scalar>& b, const Scalar* partial, Scalar* cotangents,
-              Scalar* bias_gradient) {
+void activate_back(const ActivationBlock<Scalar>& b, const Scalar* partial, Scalar* cotangents,
+                   Scalar* bias_gradient) {
   if (b.columns == 1) return back_values(b, cotangents, bias_gradient);
   if (partial != nullptr) return back_first<Scalar, true>(b, partial, cotangents, bias_gradient);
   back_first<Scalar, false>(b, partial, cotangents, bias_gradient);
 }
+template void activate_back(const ActivationBlock<float>&, const float*, float*, float*);
+template void activate_back(const ActivationBlock<double>&, const double*, double*, double*);
 
-}  // namespace
-
-void activate(const ActivationBlock<float>& b) {
-  b.slope ? activate_any<float, true>(b) : activate_any<float, false>(b);
+template <class Scalar>
+void activate(const ActivationBlock<Scalar>& b) {
+  b.slope ? activate_any<Scalar, true>(b) : activate_any<Scalar, false>(b);
 }
-void activate(const ActivationBlock<double>& b) {
-  b.slope ? activate_any<double, true>(b) : activate_any<double, false>(b);
-}
-void activate_back(const ActivationBlock<float>& b, const float* partial, float* cotangents,
-                   float* bias_gradient) {
-  back_any(b, partial, cotangents, bias_gradient);
-}
-void activate_back(const ActivationBlock<double>& b, const double* partial, double* cotangents,
-                   double* bias_gradient) {
-  back_any(b, partial, cotangents, bias_gradient);
-}
+template void activate(const ActivationBlock<float>&);
+template void activate(const ActivationBlock<double>&);
 
 }  // namespace arapfields::SIMD_LEVEL

@@ -35,15 +35,12 @@ struct EncodingBlock {
   int octaves = 0;
 };
 
-#define ARAPFIELDS_JET_KERNELS(Scalar)                                                                    \
-  ARAPFIELDS_DECLARE(void activate(const ActivationBlock<Scalar>& block))                                 \
-  /* cotangents (columns, points, width) of h become those of z, with `partial` (of their shape, or null) \
-     added; bias_gradient (width) is added to */                                                          \
-  ARAPFIELDS_DECLARE(void activate_back(const ActivationBlock<Scalar>& block, const Scalar* partial,      \
-                                        Scalar* cotangents, Scalar* bias_gradient))                       \
-  ARAPFIELDS_DECLARE(void encode(const EncodingBlock<Scalar>& block))
-ARAPFIELDS_JET_KERNELS(float)
-ARAPFIELDS_JET_KERNELS(double)
-#undef ARAPFIELDS_JET_KERNELS
+ARAPFIELDS_DECLARE(template <class Scalar> void activate(const ActivationBlock<Scalar>& block))
+// Cotangents (columns, points, width) of h become those of z, with `partial` (of their shape, or null) added;
+// bias_gradient (width) is added to.
+ARAPFIELDS_DECLARE(template <class Scalar> void activate_back(const ActivationBlock<Scalar>& block,
+                                                              const Scalar* partial, Scalar* cotangents,
+                                                              Scalar* bias_gradient))
+ARAPFIELDS_DECLARE(template <class Scalar> void encode(const EncodingBlock<Scalar>& block))
 
 }  // namespace arapfields

@@ -4,10 +4,8 @@
 #include <cmath>
 
 namespace arapfields::SIMD_LEVEL {
-namespace {
-
 template <class Scalar>
-void adam_any(const AdamBlock<Scalar>& b) {
+void adam(const AdamBlock<Scalar>& b) {
   const Scalar d1 = b.beta1, d2 = b.beta2, rate = b.rate, scale = b.scale, epsilon = b.epsilon;
   Scalar *x = b.parameters, *m = b.mean, *v = b.square;
   const Scalar* g = b.gradient;
@@ -20,10 +18,7 @@ void adam_any(const AdamBlock<Scalar>& b) {
     x[i] -= rate * mean / (std::sqrt(square) * scale + epsilon);
   }
 }
-
-}  // namespace
-
-void adam(const AdamBlock<float>& block) { adam_any(block); }
-void adam(const AdamBlock<double>& block) { adam_any(block); }
+template void adam(const AdamBlock<float>&);
+template void adam(const AdamBlock<double>&);
 
 }  // namespace arapfields::SIMD_LEVEL

@@ -19,7 +19,6 @@ struct AdamBlock {
   Scalar beta1 = 0, beta2 = 0, rate = 0, scale = 0, epsilon = 0;
 };
 
-ARAPFIELDS_DECLARE(void adam(const AdamBlock<float>& block))
-ARAPFIELDS_DECLARE(void adam(const AdamBlock<double>& block))
+ARAPFIELDS_DECLARE(template <class Scalar> void adam(const AdamBlock<Scalar>& block))
 
 }  // namespace arapfields
