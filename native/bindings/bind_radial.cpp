@@ -57,8 +57,8 @@ void prepare(RadialSolver& live, const std::optional<ArraysArgument>& targets, I
   if (targets) live.set_targets(moved_handles(live, *targets));
 }
 
-RadialFieldResult solve(RadialSolver& live, const std::optional<ArraysArgument>& targets, Index iterations,
-                        double tolerance, Task* task) {
+RadialFieldResult solved_field(RadialSolver& live, const std::optional<ArraysArgument>& targets,
+                               Index iterations, double tolerance, Task* task) {
   prepare(live, targets, iterations, tolerance);
   run_long(task, [&](const Progress& progress) { return live.solve(iterations, tolerance, progress); });
   return with_report(live);
@@ -134,8 +134,8 @@ caller at a time.)")
            py::kw_only(), "task"_a = py::none(), R"(
 samples: SurfaceSamples at rest. handles: CuboidHandle, PointHandle or RegionHandle in mesh coordinates; with
 none, for a style alone, the lowest sample is held. InvalidInput names the handle or option that does not fit.)")
-      .def("solve", &solve, "targets"_a = py::none(), py::kw_only(), "iterations"_a = 0, "tolerance"_a = 0.0,
-           "task"_a = py::none(), R"(
+      .def("solve", &solved_field, "targets"_a = py::none(), py::kw_only(), "iterations"_a = 0,
+           "tolerance"_a = 0.0, "task"_a = py::none(), R"(
 Moves the handles to `targets` and returns the DeformationField there.
 
 `targets` has a 4×4 matrix for each handle, (3,) for a point; None keeps the current ones. `iterations` and
