@@ -40,7 +40,7 @@ py::object solve_report(const SolveReport& report, double scale) {
                      "far_target"_a = report.far_target, **field_measures(report.arap, report.distortion));
 }
 
-py::object with_report(const Solution& solution) {
+py::object solved(const Solution& solution) {
   py::object field = py::cast(solution.field);
   attach_report(field, solve_report(solution.report, solution.field->frame().scale));
   return field;
@@ -50,9 +50,9 @@ py::object with_report(const Solution& solution) {
 template <class Solve>
 FieldResult solve(Task* task, Solve&& call) {
   try {
-    return with_report(run_long(task, call));
+    return solved(run_long(task, call));
   } catch (const SolveDiverged& error) {
-    raise_diverged(error, with_report(error.last_good));
+    raise_diverged(error, solved(error.last_good));
   }
 }
 
