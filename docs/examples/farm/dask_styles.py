@@ -8,10 +8,11 @@ python docs/examples/farm/dask_styles.py meshes cubic tcp://head:8786
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
-from distributed import Client, as_completed
+from distributed import Client
 
 import arapfields as af
 
@@ -37,13 +38,14 @@ def main() -> int:
     jobs = [job for job in jobs if not job[1].exists()]
     failed = 0
     # Without an address, workers on this machine, one for each processor, a thread each.
-    with Client(sys.argv[3]) if len(sys.argv) > 3 else Client(threads_per_worker=1) as client:
-        names = {client.submit(stylized, job, pure=False): job[0].name for job in jobs}
-        for future in as_completed(list(names)):
+    client: Any = Client(sys.argv[3]) if len(sys.argv) > 3 else Client(threads_per_worker=1)
+    with client:
+        futures = {job[0].name: client.submit(stylized, job, pure=False) for job in jobs}
+        for name, future in futures.items():
             error = future.exception()
             failed += error is not None
             text = f"FAILED: {error}" if error is not None else f"energy {future.result():.4f}"
-            print(f"{names[future]}: {text}", flush=True)
+            print(f"{name}: {text}", flush=True)
     return 1 if failed else 0
 
 
