@@ -35,12 +35,13 @@ WrapResult wrap_samples(const SurfaceSamples& samples, const FunctionArgument& t
   py::object field = py::cast(solution.field);
   const WrapReport& r = solution.report;
   attach_report(
-      field, make_report("WrapReport", "to_target_mean"_a = r.to_target_mean,
-                         "to_target_95"_a = r.to_target_95, "from_target_mean"_a = r.from_target_mean,
-                         "from_target_95"_a = r.from_target_95, "matched_share"_a = r.matched_share,
-                         "landmarks"_a = py::tuple(py::cast(r.landmarks)), "diagonal"_a = r.diagonal,
-                         "scale"_a = r.scale, "iterations"_a = r.iterations, "seconds"_a = r.seconds,
-                         "notes"_a = py::tuple(py::cast(r.warnings)), **field_measures(r.arap, r.distortion)));
+      field,
+      make_report("WrapReport", "to_target_mean"_a = r.to_target_mean, "to_target_95"_a = r.to_target_95,
+                  "from_target_mean"_a = r.from_target_mean, "from_target_95"_a = r.from_target_95,
+                  "matched_share"_a = r.matched_share, "landmarks"_a = py::tuple(py::cast(r.landmarks)),
+                  "diagonal"_a = r.diagonal, "scale"_a = r.scale, "iterations"_a = r.iterations,
+                  "seconds"_a = r.seconds, "notes"_a = py::tuple(py::cast(r.warnings)),
+                  **field_measures(r.arap, r.distortion)));
   return field;
 }
 
