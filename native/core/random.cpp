@@ -25,16 +25,20 @@ std::uint64_t Random::bits() { return mix(key_ + golden_gamma * ++counter_); }
 
 double Random::uniform() { return static_cast<double>(bits() >> 11) * 0x1.0p-53; }
 
+// The upper half of a 128-bit product (Lemire 2019, "Fast Random Integer Generation in an Interval", section
+// 4); without its rejection step the bias is at most count / 2^64.
 Index Random::below(Index count) {
   return static_cast<Index>((static_cast<unsigned __int128>(bits()) * static_cast<std::uint64_t>(count)) >>
                             64);
 }
 
+// Box and Muller 1958, "A Note on the Generation of Random Normal Deviates".
 double Random::normal() {
   const double radius = std::sqrt(-2.0 * std::log1p(-uniform()));
   return radius * std::cos(2.0 * std::numbers::pi * uniform());
 }
 
+// Archimedes: the height of a uniform point on the sphere is uniform.
 Vec3 Random::direction() {
   const double z = uniform(-1.0, 1.0), angle = 2.0 * std::numbers::pi * uniform();
   const double r = std::sqrt(1.0 - z * z);

@@ -7,8 +7,8 @@
 
 namespace arapfields {
 
-/// Counter-based random numbers: the i-th draw of a stream depends on (seed, stream, i) alone, so results
-/// depend neither on the standard library nor on how work is split over threads.
+/// Counter-based random numbers: the i-th draw of a stream depends on (seed, stream, i) alone. Results depend
+/// neither on the standard library nor on how work is split over threads.
 class ARAPFIELDS_EXPORT Random {
  public:
   explicit Random(std::uint64_t seed, std::uint64_t stream = 0);
