@@ -13,9 +13,9 @@ WARPED = (*MESH_SUFFIXES, *TEXT_SUFFIXES, *ARRAY_SUFFIXES)
 
 
 def warped(source):
-    """What `source` holds and a field can move: a function that writes it, moved, to a path.
+    """A function write(path, move) that writes the points of `source`, moved, to a path.
 
-    Meshes and OBJ curves keep all else of their file; of points alone, rows x y z are read and written.
+    Meshes and OBJ curves keep the rest of their file. Of point sets, rows x y z are read and written.
     """
     source = existing_file(source, WARPED)
     suffix = source.suffix.lower()
@@ -78,10 +78,8 @@ def _rows(path):
                 if "points" not in arrays:
                     raise InvalidInput(f"{path}: has no array 'points'")
                 rows = np.array(arrays["points"], float)
-        elif suffix == ".npy":
-            rows = np.array(np.lib.format.open_memmap(path, mode="r"), float)
         else:
-            rows = np.loadtxt(path.read_text(encoding="utf-8").replace(",", " ").splitlines(), ndmin=2)
+            rows = read_numbers(path)
     if rows.ndim != 2 or rows.shape[1] not in (3, 6):
         raise InvalidInput(
             f"{path}: holds an array of shape {rows.shape}; rows of three numbers, or of six with normals, "
@@ -104,6 +102,13 @@ def _write_points(path, points):
         header = "".join(f"property double {name}\n" for name in "xyz")
         text = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n{header}end_header\n"
         path.write_bytes(text.encode() + np.ascontiguousarray(points, "<f8").tobytes())
+
+
+def read_numbers(path):
+    """Rows of numbers of a .npy array, or of text with blanks or commas between."""
+    if path.suffix.lower() == ".npy":
+        return np.array(np.lib.format.open_memmap(path, mode="r"), float)
+    return np.loadtxt(path.read_text(encoding="utf-8").replace(",", " ").splitlines(), ndmin=2)
 
 
 def read_weights(path, vertices):

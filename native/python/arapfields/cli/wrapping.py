@@ -12,6 +12,7 @@ from . import files, verbs
 from .flags import SOURCE, report_flag, sdf_flag, stiffness_flags
 from .handles import triple
 from .options import add_option_flags, given, given_options
+from .points import read_numbers
 from .running import Outputs, with_progress
 
 SUMMARY = "lay a shape onto another, as rigidly as possible"
@@ -95,10 +96,8 @@ def read_landmarks(path):
     with files.readable(path, "pairs of places"):
         if path.suffix.lower() == ".json":
             rows = np.array(json.loads(path.read_text(encoding="utf-8")), float)
-        elif path.suffix.lower() == ".npy":
-            rows = np.array(np.lib.format.open_memmap(path, mode="r"), float)
         else:
-            rows = np.loadtxt(path.read_text(encoding="utf-8").replace(",", " ").splitlines(), ndmin=2)
+            rows = read_numbers(path)
     if rows.size == 0:
         return []
     if rows.shape[1:] not in ((2, 3), (6,)):
