@@ -76,7 +76,7 @@ void parallel_for(Index begin, Index end, Index grain, const std::function<void(
 ThreadScope::ThreadScope(int threads) : before_(scope_threads) {
   require_range("threads", threads, 0, 1024);
   if (before_ > 0 && threads == 0) return;
-  scope_threads = std::min(threads > 0 ? threads : torch_threads(), ThreadPool::most_workers + 1);
+  scope_threads = std::min(threads > 0 ? threads : library_threads(), ThreadPool::most_workers + 1);
   if (before_ == 0 && !in_loop_body) serial_.emplace();
 }
 
@@ -84,7 +84,7 @@ ThreadScope::~ThreadScope() { scope_threads = before_; }
 
 int thread_count() {
   if (in_loop_body) return 1;
-  return scope_threads > 0 ? scope_threads : std::min(torch_threads(), ThreadPool::most_workers + 1);
+  return scope_threads > 0 ? scope_threads : std::min(library_threads(), ThreadPool::most_workers + 1);
 }
 
 }  // namespace arapfields

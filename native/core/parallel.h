@@ -4,7 +4,7 @@
 #include <functional>
 #include <optional>
 
-#include "core/torch_threads.h"
+#include "core/library_threads.h"
 #include "core/types.h"
 
 namespace arapfields {
@@ -35,7 +35,7 @@ class ARAPFIELDS_EXPORT ThreadScope {
 
  private:
   int before_;
-  std::optional<SerialTorch> serial_;
+  std::optional<SerialLibrary> serial_;
 };
 
 /// The threads that a loop here would be split over: those of the innermost ThreadScope, else as many as

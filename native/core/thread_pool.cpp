@@ -16,7 +16,7 @@
 #include <pthread.h>
 #endif
 
-#include "core/torch_threads.h"
+#include "core/library_threads.h"
 
 namespace arapfields {
 namespace {
@@ -201,7 +201,7 @@ ThreadPool& thread_pool() {
   std::atomic<ThreadPool*>& mine = pools[priority()];
   ThreadPool* pool = mine.load(std::memory_order_acquire);
   if (pool != nullptr) return *pool;
-  auto* const fresh = new ThreadPool(keep_torch_serial);
+  auto* const fresh = new ThreadPool(keep_library_serial);
   if (mine.compare_exchange_strong(pool, fresh, std::memory_order_acq_rel)) return *fresh;
   return *pool;  // somebody was faster; the other one has no threads yet and is forgotten
 }

@@ -219,18 +219,18 @@ BOOST_AUTO_TEST_CASE(a_child_forked_during_another_thread_s_loop_works, *boost::
 #endif
 
 BOOST_AUTO_TEST_CASE(libtorch_s_own_number_of_threads_comes_back) {
-  const int before = torch_threads();
+  const int before = library_threads();
   {
     const ThreadScope outer(3), inner(2);
     BOOST_CHECK_EQUAL(thread_count(), 2);
-    BOOST_CHECK_EQUAL(torch_threads(), 1);
+    BOOST_CHECK_EQUAL(library_threads(), 1);
     std::atomic<bool> serial{true};
     parallel_jobs(64, [&](Index) {
-      if (torch_threads() != 1) serial = false;
+      if (library_threads() != 1) serial = false;
     });
     BOOST_CHECK(serial);
   }
-  BOOST_CHECK_EQUAL(torch_threads(), before);
+  BOOST_CHECK_EQUAL(library_threads(), before);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

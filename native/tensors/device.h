@@ -12,5 +12,9 @@ namespace arapfields {
 ARAPFIELDS_EXPORT std::string resolve_device(const std::string& device);
 /// Whether a CUDA device was found, and why not.
 ARAPFIELDS_EXPORT std::string device_report();
+/// What does the library's products: "torch" or "eigen" (ARAPFIELDS_BACKEND).
+ARAPFIELDS_EXPORT std::string backend_name();
+
+bool has_cuda();
 
 }  // namespace arapfields

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/torch_threads.h"
+#include "core/library_threads.h"
 
 #include <ATen/Parallel.h>
 
@@ -25,17 +25,17 @@ int set_mkl_threads([[maybe_unused]] int count) {
 }  // namespace
 
 // The first question about its threads that a thread asks libtorch sets them: it is asked before we do.
-int torch_threads() { return at::get_num_threads(); }
+int library_threads() { return at::get_num_threads(); }
 
-SerialTorch::SerialTorch() : openmp_(torch_threads()), mkl_(set_mkl_threads(1)) { omp_set_num_threads(1); }
+SerialLibrary::SerialLibrary() : openmp_(library_threads()), mkl_(set_mkl_threads(1)) { omp_set_num_threads(1); }
 
-SerialTorch::~SerialTorch() {
+SerialLibrary::~SerialLibrary() {
   omp_set_num_threads(openmp_);
   set_mkl_threads(mkl_);
 }
 
-void keep_torch_serial() {
-  torch_threads();
+void keep_library_serial() {
+  library_threads();
   set_mkl_threads(1);
   omp_set_num_threads(1);
 }

@@ -5,8 +5,8 @@
 
 namespace arapfields {
 
-/// Dense products and Cholesky factors of row-major matrices through libtorch's BLAS and LAPACK, which pick
-/// the processor's instruction set at run time (Eigen, compiled for the baseline, cannot).
+/// Dense products and Cholesky factors of row-major matrices, in tiles on the threads of the call, by the
+/// tensors' backend.
 enum class Transpose { no, yes };
 
 /// C = alpha op(A) op(B) + beta C.

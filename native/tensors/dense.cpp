@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/dense.h"
-
-#include <ATen/core/LegacyTypeDispatch.h>
+#include "tensors/dense.h"
 
 #include <algorithm>
 
 #include "core/errors.h"
 #include "core/parallel.h"
-#include "core/tensors.h"
+#include "tensors/views.h"
 
 namespace arapfields {
 namespace {
@@ -19,7 +17,7 @@ class Tiles {
   explicit Tiles(Index length) : length_(length), count_(std::max<Index>(1, (length + most - 1) / most)) {}
   Index count() const { return count_; }
   Index begin(Index i) const { return i * length_ / count_; }
-  at::Tensor of(const at::Tensor& whole, int dimension, Index i) const {
+  Tensor of(const Tensor& whole, int dimension, Index i) const {
     return whole.narrow(dimension, begin(i), begin(i + 1) - begin(i));
   }
 
@@ -35,16 +33,14 @@ void gemm(Transpose transpose_a, Transpose transpose_b, Scalar alpha,
           const Eigen::Ref<const RowMatrix<Scalar>>& a, const Eigen::Ref<const RowMatrix<Scalar>>& b,
           Scalar beta, Eigen::Ref<RowMatrix<Scalar>> c) {
   const ThreadScope scope;
-  at::Tensor ta = tensor_view(a), tb = tensor_view(b);
+  Tensor ta = tensor_view(a), tb = tensor_view(b);
   if (transpose_a == Transpose::yes) ta = ta.t();
   if (transpose_b == Transpose::yes) tb = tb.t();
-  const at::Tensor tc = tensor_view(c);
+  const Tensor tc = tensor_view(c);
   const Tiles rows(c.rows()), columns(c.cols());
   parallel_jobs(rows.count() * columns.count(), [&](Index job) {
-    const at::AutoDispatchBelowADInplaceOrView quick;
     const Index i = job / columns.count(), j = job % columns.count();
-    at::Tensor tile = columns.of(rows.of(tc, 0, i), 1, j);
-    at::addmm_out(tile, tile, rows.of(ta, 0, i), columns.of(tb, 1, j), beta, alpha);
+    multiply(columns.of(rows.of(tc, 0, i), 1, j), rows.of(ta, 0, i), columns.of(tb, 1, j), alpha, beta);
   });
 }
 
@@ -52,16 +48,14 @@ template <class Scalar>
 void lower_gram(Transpose transpose_a, const Eigen::Ref<const RowMatrix<Scalar>>& a, Scalar beta,
                 Eigen::Ref<RowMatrix<Scalar>> c) {
   const ThreadScope scope;
-  at::Tensor ta = tensor_view(a);
+  Tensor ta = tensor_view(a);
   if (transpose_a == Transpose::yes) ta = ta.t();
-  const at::Tensor tc = tensor_view(c);
+  const Tensor tc = tensor_view(c);
   const Tiles tiles(c.rows());
   parallel_jobs(tiles.count() * tiles.count(), [&](Index job) {
-    const at::AutoDispatchBelowADInplaceOrView quick;
     const Index i = job / tiles.count(), j = job % tiles.count();
     if (j > i) return;
-    at::Tensor tile = tiles.of(tiles.of(tc, 0, i), 1, j);
-    at::addmm_out(tile, tile, tiles.of(ta, 0, i), tiles.of(ta, 0, j).t(), beta, 1);
+    multiply(tiles.of(tiles.of(tc, 0, i), 1, j), tiles.of(ta, 0, i), tiles.of(ta, 0, j).t(), 1.0, beta);
   });
 }
 
@@ -71,26 +65,24 @@ template <class Scalar>
 RowMatrix<Scalar> cholesky(const Eigen::Ref<const RowMatrix<Scalar>>& a) {
   const ThreadScope scope;
   RowMatrix<Scalar> result = a.template triangularView<Eigen::Lower>();
-  const at::Tensor l = tensor_view(result);
+  const Tensor l = tensor_view(result);
   const Tiles tiles(result.rows());
   const auto tile = [&](Index i, Index j) { return tiles.of(tiles.of(l, 0, i), 1, j); };
   for (Index k = 0; k < tiles.count(); ++k) {
-    const auto [factor, info] = at::linalg_cholesky_ex(tile(k, k));
-    if (info.template item<int>() != 0)
+    const Tensor factor = cholesky_factor(tile(k, k));
+    if (!factor.defined())
       throw InvalidInput("matrix", "it is not positive definite",
                          "a symmetric positive definite matrix is needed");
-    tile(k, k).copy_(factor);
+    tile(k, k).assign(factor);
     const Index below = tiles.count() - k - 1;
     parallel_jobs(below, [&, upper = factor.t()](Index job) {
-      const at::Tensor panel = tile(k + 1 + job, k);
-      panel.copy_(at::linalg_solve_triangular(upper, panel, /*upper=*/true, /*left=*/false));
+      const Tensor panel = tile(k + 1 + job, k);
+      panel.assign(solve_triangular(upper, panel, /*upper=*/true, Side::right));
     });
     parallel_jobs(below * below, [&](Index job) {
       const Index i = job / below, j = job % below;
       if (j > i) return;
-      const at::AutoDispatchBelowADInplaceOrView quick;
-      at::Tensor rest = tile(k + 1 + i, k + 1 + j);
-      at::addmm_out(rest, rest, tile(k + 1 + i, k), tile(k + 1 + j, k).t(), 1, -1);
+        multiply(tile(k + 1 + i, k + 1 + j), tile(k + 1 + i, k), tile(k + 1 + j, k).t(), -1.0, 1.0);
     });
   }
   return result;
@@ -100,24 +92,23 @@ RowMatrix<Scalar> cholesky(const Eigen::Ref<const RowMatrix<Scalar>>& a) {
 template <class Scalar>
 RowMatrix<Scalar> lower_inverse(const Eigen::Ref<const RowMatrix<Scalar>>& factor) {
   const ThreadScope scope;
-  const at::Tensor l = tensor_view(factor);
+  const Tensor l = tensor_view(factor);
   RowMatrix<Scalar> result = RowMatrix<Scalar>::Zero(factor.rows(), factor.cols());
-  const at::Tensor x = tensor_view(result);
+  const Tensor x = tensor_view(result);
   const Tiles tiles(result.rows());
-  const auto tile = [&](const at::Tensor& of, Index i, Index j) {
+  const auto tile = [&](const Tensor& of, Index i, Index j) {
     return tiles.of(tiles.of(of, 0, i), 1, j);
   };
   parallel_jobs(tiles.count(), [&](Index k) {
-    const at::Tensor own = tile(l, k, k);
-    tile(x, k, k).copy_(at::linalg_solve_triangular(own, at::eye(own.size(0), own.options()), false));
+    const Tensor own = tile(l, k, k);
+    const RowMatrix<Scalar> identity = RowMatrix<Scalar>::Identity(own.size(0), own.size(0));
+    tile(x, k, k).assign(solve_triangular(own, tensor_view(identity), /*upper=*/false, Side::left));
   });
   parallel_jobs(tiles.count(), [&](Index j) {
-    const at::AutoDispatchBelowADInplaceOrView quick;
     for (Index i = j + 1; i < tiles.count(); ++i) {
       const Index first = tiles.begin(j), length = tiles.begin(i) - first;
-      at::Tensor into = tile(x, i, j);
-      const at::Tensor left = tiles.of(l, 0, i).narrow(1, first, length);
-      at::mm_out(into, tile(x, i, i), at::mm(left, tiles.of(x, 1, j).narrow(0, first, length)).neg_());
+      const Tensor left = tiles.of(l, 0, i).narrow(1, first, length);
+      multiply(tile(x, i, j), tile(x, i, i), -product(left, tiles.of(x, 1, j).narrow(0, first, length)));
     }
   });
   return result;
@@ -128,7 +119,7 @@ RowMatrix<Scalar> cholesky_solve(const Eigen::Ref<const RowMatrix<Scalar>>& fact
                                  const Eigen::Ref<const RowMatrix<Scalar>>& b) {
   const ThreadScope scope;
   RowMatrix<Scalar> result(b.rows(), b.cols());
-  tensor_view(result).copy_(at::cholesky_solve(tensor_view(b), tensor_view(factor)));
+  tensor_view(result).assign(solve_by_factor(tensor_view(factor), tensor_view(b)));
   return result;
 }
 

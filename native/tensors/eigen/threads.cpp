@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cstdlib>
+#include <thread>
+
+#include "core/library_threads.h"
+
+namespace arapfields {
+namespace {
+
+/// Eigen starts no threads: there is nothing to keep serial, but the number must be seen as libtorch's is.
+thread_local bool serial = false;
+
+int number_of_threads() {
+  const char* const set = std::getenv("OMP_NUM_THREADS");
+  const int wanted = set != nullptr ? std::atoi(set) : 0;
+  return wanted > 0 ? wanted : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+}  // namespace
+
+int library_threads() {
+  static const int threads = number_of_threads();
+  return serial ? 1 : threads;
+}
+
+SerialLibrary::SerialLibrary() : openmp_(serial), mkl_(0) { serial = true; }
+SerialLibrary::~SerialLibrary() { serial = openmp_ != 0; }
+
+void keep_library_serial() { serial = true; }
+
+}  // namespace arapfields
