@@ -13,7 +13,20 @@ PIP := $(PY) -m pip install --disable-pip-version-check
 PYTEST := $(PY) -m pytest
 # Files of tests are dealt out, long ones first, to as many processes as there are processors; each needs memory.
 ALL_TESTS := $(PYTEST) -n logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
-NATIVE_TESTS := build/wheel/tests/native_tests
+# BACKEND=eigen: the library without libtorch, as wheels and zips have it, in a folder of its own beside .venv's.
+BACKEND := torch
+ifeq ($(BACKEND),eigen)
+BUILD := build/eigen
+INSTALLED := $(BUILD)/.installed
+INTO := --target $(abspath $(BUILD)/site) --upgrade
+export PYTHONPATH := $(abspath $(BUILD)/site)
+else
+BUILD := build/wheel
+INSTALLED := $(VENV)/.installed
+INTO := --force-reinstall
+endif
+NATIVE_TESTS := $(BUILD)/tests/native_tests
+export ARAPFIELDS_NATIVE_TESTS := $(NATIVE_TESTS)
 
 .PHONY: help setup build examples demo test test-slow test-windows test-arm64 fuzz bench sanitize format lint wheel workflows extension repository blenders gallery docs clean
 
@@ -51,22 +64,22 @@ $(VENV)/.tools: tests/requirements.txt $(VENV)/.ready
 setup: $(VENV)/.tools  ## .venv with all that building and testing needs
 
 # The wheel's build folder is kept, so a rebuild compiles only what changed.
-$(VENV)/.installed: $(VENV)/.ready $(SOURCES)
+$(INSTALLED): $(VENV)/.ready $(SOURCES)
 	$(COMPILER)
 	@echo "Step 2 of 2: compiling the native library. Some minutes the first time; all output: build/build.log"
-	@mkdir -p build
-	@$(PIP) -v --no-build-isolation --no-deps --force-reinstall -C build-dir=build/wheel \
-	  -C cmake.define.ARAPFIELDS_WERROR=ON . 2>&1 | tee build/build.log | \
+	@mkdir -p $(BUILD)
+	@$(PIP) -v --no-build-isolation --no-deps $(INTO) -C build-dir=$(BUILD) \
+	  -C cmake.define.ARAPFIELDS_BACKEND=$(BACKEND) -C cmake.define.ARAPFIELDS_WERROR=ON . 2>&1 | tee build/build.log | \
 	  while read -r line; do case "$$line" in "["*/*"]"*) printf '\r  %s]' "$${line%%]*}";; esac; done \
 	  || { tail -n 60 build/build.log; exit 1; }
 	@echo
 	@touch $@
 
-build: $(VENV)/.installed  ## the Python package, installed in .venv
+build: $(INSTALLED)  ## the Python package, installed in .venv; BACKEND=eigen: without libtorch, in build/eigen/site
 
-$(NATIVE_TESTS): $(VENV)/.installed $(VENV)/.tools $(shell find tests/native -type f)
-	$(VENV)/bin/cmake -S . -B build/wheel -DARAPFIELDS_NATIVE_TESTS=ON > build/native_tests.log || { cat build/native_tests.log; exit 1; }
-	$(VENV)/bin/cmake --build build/wheel --target native_tests
+$(NATIVE_TESTS): $(INSTALLED) $(VENV)/.tools $(shell find tests/native -type f)
+	$(VENV)/bin/cmake -S . -B $(BUILD) -DARAPFIELDS_NATIVE_TESTS=ON > build/native_tests.log || { cat build/native_tests.log; exit 1; }
+	$(VENV)/bin/cmake --build $(BUILD) --target native_tests
 	@touch $@
 
 examples: build $(VENV)/.tools  ## the scenes of the workflow pages: out/examples

@@ -12,7 +12,7 @@ target_include_directories(arapfields_public SYSTEM INTERFACE "${EIGEN_INCLUDE_D
 target_compile_features(arapfields_public INTERFACE cxx_std_20)
 target_compile_definitions(arapfields_public INTERFACE EIGEN_MAX_ALIGN_BYTES=16)
 target_link_libraries(arapfields_public INTERFACE arapfields)
-if(NOT WIN32 AND NOT APPLE)  # the library finds libtorch itself; the linker need not
+if(ARAPFIELDS_BACKEND STREQUAL "torch" AND NOT WIN32 AND NOT APPLE)  # the library finds libtorch itself; the linker need not
   target_link_options(arapfields_public INTERFACE LINKER:--allow-shlib-undefined)
 endif()
 add_library(arapfields::arapfields ALIAS arapfields_public)

@@ -26,7 +26,10 @@ endfunction()
 
 arapfields_install(lib include lib/cmake/arapfields cpp)
 # The library finds libtorch, and the OpenMP of wheels that keep it in torch.libs, through these links.
-foreach(link "${LIBTORCH_DIR}/lib>libtorch" "${LIBTORCH_DIR}/../torch.libs>torch.libs")
+if(ARAPFIELDS_BACKEND STREQUAL "torch")
+  set(links "${LIBTORCH_DIR}/lib>libtorch" "${LIBTORCH_DIR}/../torch.libs>torch.libs")
+endif()
+foreach(link ${links})
   string(REPLACE ">" ";" link "${link}")
   list(GET link 0 from)
   list(GET link 1 name)
@@ -41,7 +44,7 @@ if(NOT ARAPFIELDS_PYTHON)
 endif()
 arapfields_install(arapfields arapfields/include arapfields/share/cmake/arapfields python EXCLUDE_FROM_ALL)
 install(TARGETS _native LIBRARY DESTINATION arapfields COMPONENT python EXCLUDE_FROM_ALL)
-install(FILES "${ARAPFIELDS_GENERATED}/options.json" "${ARAPFIELDS_GENERATED}/libtorch.txt"
+install(FILES "${ARAPFIELDS_GENERATED}/options.json" ${libtorch_note}
   DESTINATION arapfields COMPONENT python EXCLUDE_FROM_ALL)
 install(DIRECTORY python/arapfields/ DESTINATION arapfields COMPONENT python EXCLUDE_FROM_ALL
   PATTERN "__pycache__" EXCLUDE)

@@ -34,7 +34,7 @@ if(WIN32)  # the wheel has no import library of libiomp5md.dll
     COMMAND "${ARAPFIELDS_DLLTOOL}" -m i386:x86-64 -d "${LIBTORCH_IOMP}.def" -l "${LIBTORCH_IOMP}.lib")
   target_link_libraries(libtorch::libtorch INTERFACE "${LIBTORCH_IOMP}.lib")
 else()
-# The OpenMP library that libtorch brings along: a call tells it to keep to one thread (core/torch_threads.h).
+# The OpenMP library that libtorch brings along: a call tells it to keep to one thread (core/library_threads.h).
 file(GLOB LIBTORCH_OPENMP "${LIBTORCH_DIR}/lib/libgomp*.so*" "${LIBTORCH_DIR}/../torch.libs/libgomp*.so*"
   "${LIBTORCH_DIR}/lib/libomp.dylib")
 if(NOT LIBTORCH_OPENMP)

@@ -38,8 +38,8 @@ if(WIN32)
   target_compile_definitions(arapfields_own INTERFACE ARAPFIELDS_BUILDING)
 endif()
 
-# Four object libraries make up the one shared library: sources that need only Eigen, those that need JSON too,
-# those that need libtorch, and kernels compiled once per instruction set. Precompiled headers save more than half of the
+# Object libraries make up the one shared library: sources that need only Eigen, those that need JSON too, kernels
+# compiled once per instruction set, and the tensors' backend of libtorch, which alone sees torch's headers. Precompiled headers save more than half of the
 # compiler's time; what each source includes is complete without them (tests/packaging).
 set(ARAPFIELDS_STANDARD_HEADERS <algorithm> <array> <cmath> <cstdint> <functional> <memory> <optional> <string>
   <utility> <vector>)
@@ -49,11 +49,9 @@ target_precompile_headers(arapfields_plain PRIVATE <Eigen/Dense> ${ARAPFIELDS_ST
 target_compile_options(arapfields_plain PRIVATE -fpch-preprocess)  # lets ccache see through the header
 add_library(arapfields_io OBJECT)
 target_link_libraries(arapfields_io PRIVATE arapfields_own arapfields_json)
-if(NOT ARAPFIELDS_WITHOUT_TORCH)
+if(ARAPFIELDS_BACKEND STREQUAL "torch")
   add_library(arapfields_torch OBJECT)
   target_link_libraries(arapfields_torch PRIVATE arapfields_own libtorch::libtorch)
-  target_precompile_headers(arapfields_torch PRIVATE <ATen/ATen.h> <ATen/Parallel.h> <Eigen/Dense>)
-  target_compile_options(arapfields_torch PRIVATE -fpch-preprocess)
 endif()
 
 set(ARAPFIELDS_SIMD_baseline "")
@@ -68,14 +66,14 @@ elseif(APPLE AND CMAKE_SYSTEM_PROCESSOR STREQUAL "arm64")
 elseif(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
   list(APPEND ARAPFIELDS_SIMD_LEVELS neon)
 endif()
+set(ARAPFIELDS_SIMD_FLAGS -O3 -fno-math-errno -fno-trapping-math -ffp-contract=fast)
 foreach(level ${ARAPFIELDS_SIMD_LEVELS})
   add_library(arapfields_simd_${level} OBJECT)
   target_link_libraries(arapfields_simd_${level} PRIVATE arapfields_own)
   # Kernels live in the namespace arapfields::SIMD_LEVEL; Eigen, where one uses it, is renamed likewise,
   # so that no inline function compiled for a newer processor can be picked by the linker for all.
   target_compile_definitions(arapfields_simd_${level} PRIVATE SIMD_LEVEL=${level} Eigen=Eigen_${level})
-  target_compile_options(arapfields_simd_${level} PRIVATE ${ARAPFIELDS_SIMD_${level}}
-    -O3 -fno-math-errno -fno-trapping-math -ffp-contract=fast)
+  target_compile_options(arapfields_simd_${level} PRIVATE ${ARAPFIELDS_SIMD_${level}} ${ARAPFIELDS_SIMD_FLAGS})
 endforeach()
 
 # arapfields_sources([PLAIN a.cpp ...] [JSON d.cpp ...] [TORCH b.cpp ...] [SIMD c.cpp ...])
@@ -87,7 +85,7 @@ function(arapfields_sources)
   list(TRANSFORM arg_SIMD PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/")
   target_sources(arapfields_plain PRIVATE ${arg_PLAIN})
   target_sources(arapfields_io PRIVATE ${arg_JSON})
-  if(NOT ARAPFIELDS_WITHOUT_TORCH)
+  if(arg_TORCH)
     target_sources(arapfields_torch PRIVATE ${arg_TORCH})
   endif()
   foreach(level ${ARAPFIELDS_SIMD_LEVELS})

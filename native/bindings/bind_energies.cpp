@@ -4,8 +4,8 @@
 #include "bindings/bind.h"
 #include "bindings/jet_arrays.h"
 #include "energies/arap.h"
-#include "energies/aten_probe.h"
 #include "energies/body.h"
+#include "energies/composed_probe.h"
 #include "energies/distortion.h"
 #include "energies/gauss.h"
 #include "energies/handles.h"
@@ -146,22 +146,22 @@ void bind_testing(py::module_& module) {
   using Rows = PointsOf<Scalar>;
   module.def(
       "arap_energy",
-      [](JetArray<Scalar> jets, double bending, double weight, bool aten) {
+      [](JetArray<Scalar> jets, double bending, double weight, bool composed) {
         return with_cotangents(jets, [&](auto view, auto out) {
-          return (aten ? &probe_arap<Scalar> : &arap_energy<Scalar>)(view, bending, weight, out, {});
+          return (composed ? &probe_arap<Scalar> : &arap_energy<Scalar>)(view, bending, weight, out, {});
         });
       },
-      "jets"_a.noconvert(), "bending"_a, "weight"_a = 1.0, "aten"_a = false);
+      "jets"_a.noconvert(), "bending"_a, "weight"_a = 1.0, "composed"_a = false);
   module.def(
       "arap_energy_by_points",
       [](JetArray<Scalar> jets, double bending, const Numbers& weights, const Numbers& bending_factors,
-         bool aten) {
+         bool composed) {
         return with_cotangents(jets, [&](auto view, auto out) {
-          const auto energy = aten ? &probe_arap<Scalar> : &arap_energy<Scalar>;
+          const auto energy = composed ? &probe_arap<Scalar> : &arap_energy<Scalar>;
           return energy(view, bending, 1.0, out, {weights.data(), bending_factors.data()}).energy;
         });
       },
-      "jets"_a.noconvert(), "bending"_a, "weights"_a, "bending_factors"_a, "aten"_a = false);
+      "jets"_a.noconvert(), "bending"_a, "weights"_a, "bending_factors"_a, "composed"_a = false);
   module.def(
       "closest_rotations",
       [](JetArray<Scalar> jacobians) {
@@ -173,42 +173,42 @@ void bind_testing(py::module_& module) {
   module.def(
       "gauss_energy",
       [](JetArray<Scalar> jets, const Rows& normals, const Points& preferred, double sharpness, double weight,
-         const Numbers& sample_weights, bool aten) {
+         const Numbers& sample_weights, bool composed) {
         return with_cotangents(jets, [&](auto view, auto out) {
-          return (aten ? &probe_gauss<Scalar> : &gauss_energy<Scalar>)(view, normals, sample_weights,
-                                                                       gauss_preference(preferred, sharpness),
-                                                                       weight, out);
+          return (composed ? &probe_gauss<Scalar>
+                           : &gauss_energy<Scalar>)(view, normals, sample_weights,
+                                                    gauss_preference(preferred, sharpness), weight, out);
         });
       },
       "jets"_a.noconvert(), "normals"_a, "preferred"_a, "sharpness"_a, "weight"_a, "sample_weights"_a,
-      "aten"_a = false);
+      "composed"_a = false);
   module.def(
       "target_energy",
       [](JetArray<Scalar> jets, const Rows& normals, const Rows& targets, double weight,
-         const Numbers& sample_weights, bool aten) {
+         const Numbers& sample_weights, bool composed) {
         return with_cotangents(jets, [&](auto view, auto out) {
-          return (aten ? &probe_targets<Scalar> : &target_energy<Scalar>)(view, normals, targets,
-                                                                          sample_weights, weight, out);
+          return (composed ? &probe_targets<Scalar> : &target_energy<Scalar>)(view, normals, targets,
+                                                                              sample_weights, weight, out);
         });
       },
-      "jets"_a.noconvert(), "normals"_a, "targets"_a, "weight"_a, "sample_weights"_a, "aten"_a = false);
+      "jets"_a.noconvert(), "normals"_a, "targets"_a, "weight"_a, "sample_weights"_a, "composed"_a = false);
   module.def(
       "handle_energy",
-      [](JetArray<Scalar> jets, const BoundHandles& handles, double weight, bool aten) {
+      [](JetArray<Scalar> jets, const BoundHandles& handles, double weight, bool composed) {
         return with_cotangents(jets, [&](auto view, auto out) {
-          return (aten ? &probe_handles<Scalar> : &handle_energy<Scalar>)(view, handles.all<Scalar>(), weight,
-                                                                          out);
+          return (composed ? &probe_handles<Scalar> : &handle_energy<Scalar>)(view, handles.all<Scalar>(),
+                                                                              weight, out);
         });
       },
-      "jets"_a.noconvert(), "handles"_a, "weight"_a = 1.0, "aten"_a = false);
+      "jets"_a.noconvert(), "handles"_a, "weight"_a = 1.0, "composed"_a = false);
   module.def(
       "stance_energy",
-      [](JetArray<Scalar> jets, const Rows& rest, const Stance& stance, double weight, bool aten) {
+      [](JetArray<Scalar> jets, const Rows& rest, const Stance& stance, double weight, bool composed) {
         return with_cotangents(jets, [&](auto view, auto out) {
-          return (aten ? &probe_stance<Scalar> : &stance_energy<Scalar>)(view, rest, stance, weight, out);
+          return (composed ? &probe_stance<Scalar> : &stance_energy<Scalar>)(view, rest, stance, weight, out);
         });
       },
-      "jets"_a.noconvert(), "rest"_a, "stance"_a, "weight"_a = 1.0, "aten"_a = false);
+      "jets"_a.noconvert(), "rest"_a, "stance"_a, "weight"_a = 1.0, "composed"_a = false);
   module.def(
       "body_energy",
       [](JetArray<Scalar> jets, const Points& rest, const Points& goal, const Vector& masses, double inertia,
@@ -222,12 +222,12 @@ void bind_testing(py::module_& module) {
       "ground_stiffness"_a);
   module.def(
       "fold_barrier",
-      [](JetArray<Scalar> jets, double threshold, double weight, bool aten) {
+      [](JetArray<Scalar> jets, double threshold, double weight, bool composed) {
         return with_cotangents(jets, [&](auto view, auto out) {
-          return (aten ? &probe_barrier<Scalar> : &fold_barrier<Scalar>)(view, threshold, weight, out);
+          return (composed ? &probe_barrier<Scalar> : &fold_barrier<Scalar>)(view, threshold, weight, out);
         });
       },
-      "jets"_a.noconvert(), "threshold"_a, "weight"_a = 1.0, "aten"_a = false);
+      "jets"_a.noconvert(), "threshold"_a, "weight"_a = 1.0, "composed"_a = false);
 }
 
 }  // namespace

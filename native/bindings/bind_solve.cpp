@@ -7,14 +7,14 @@
 #include "bindings/python_function.h"
 #include "bindings/reports.h"
 #include "bindings/styles.h"
-#include "core/aten_path.h"
-#include "core/device.h"
 #include "options/deform.h"
 #include "solve/deform.h"
 #include "solve/field_measures.h"
 #include "solve/stylize.h"
 #include "solve/trained/inverse_training.h"
 #include "solve/trained/loss_probe.h"
+#include "tensors/device.h"
+#include "tensors/device_path.h"
 
 namespace arapfields::python {
 namespace {
@@ -203,8 +203,8 @@ void bind_solve_testing(py::module_& module) {
           },
           "parameters"_a, "seed"_a = 0)
       .def_property_readonly("size", &LossProbe::size);
-  py::class_<AtenPathScope, std::unique_ptr<AtenPathScope>>(
-      testing, "AtenPath", "While it lives, tensors are worked on as on a device instead of by kernels.")
+  py::class_<DevicePathScope, std::unique_ptr<DevicePathScope>>(
+      testing, "DevicePath", "While it lives, tensors are worked on as on a device instead of by kernels.")
       .def(py::init<>());
   py::class_<EnergyTrial>(testing, "EnergyTrial", "The energy and its parameter gradient, for timing.")
       .def(py::init<const SurfaceSamples&, Index, double>(), "samples"_a, "batch"_a, "bending"_a)

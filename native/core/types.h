@@ -31,7 +31,7 @@ using VectorF = Eigen::VectorXf;
 using Vec3 = Eigen::Vector3d;
 using Mat3 = Eigen::Matrix3d;
 using Mat4 = Eigen::Matrix4d;
-/// Dense row-major matrix, the layout that gemm (core/dense.h) expects.
+/// Dense row-major matrix, the layout that gemm (tensors/dense.h) expects.
 template <class Scalar>
 using RowMatrix = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 

@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/dense.h"
 #include "core/errors.h"
 #include "core/memory.h"
 #include "core/parallel.h"
 #include "energies/arap2d.h"
 #include "optimize/quasi_newton.h"
+#include "tensors/dense.h"
 
 namespace arapfields {
 namespace {

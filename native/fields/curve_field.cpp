@@ -4,9 +4,9 @@
 #include <cmath>
 #include <vector>
 
-#include "core/dense.h"
 #include "core/errors.h"
 #include "core/parallel.h"
+#include "tensors/dense.h"
 
 namespace arapfields {
 namespace {

@@ -2,11 +2,11 @@
 #include "fields/field.h"
 
 #include "core/parallel.h"
-#include "core/tensors.h"
+#include "tensors/views.h"
 
 namespace arapfields {
 
-at::Tensor DeformationField::jets(const at::Tensor& points, JetOrder order) const {
+Tensor DeformationField::jets(const Tensor& points, JetOrder order) const {
   const ThreadScope scope;
   const Points host = points_of(points);
   JetBlock<double> block(host.rows(), order);

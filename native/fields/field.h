@@ -8,11 +8,9 @@
 #include "core/types.h"
 #include "optimize/matrix_place.h"
 
-namespace at {
-class Tensor;
-}
-
 namespace arapfields {
+
+class Tensor;
 
 /// A deformation f: R³ → R³ of the unit cube's space that knows its jets: all that energies, extraction and
 /// results ask of it. The frame says where the cube lies in mesh coordinates.
@@ -23,7 +21,7 @@ class ARAPFIELDS_EXPORT DeformationField {
   virtual void evaluate(PointsIn points, JetView<double> out) const = 0;
   /// Jets (columns, n, 3) at points (n,3), in their dtype and on their device. Fields that live there compute
   /// them there; those of others come by evaluate().
-  virtual at::Tensor jets(const at::Tensor& points, JetOrder order) const;
+  virtual Tensor jets(const Tensor& points, JetOrder order) const;
 
   /// Where points (n,3) of mesh coordinates go, in mesh coordinates.
   virtual Points at(PointsIn mesh_points) const {
@@ -53,14 +51,14 @@ class ARAPFIELDS_EXPORT DeformationField {
 class ARAPFIELDS_EXPORT TrainableField : public DeformationField {
  public:
   /// Jets (columns, n, 3) at points (n,3); keeps what pull_back needs until the next call.
-  virtual at::Tensor forward(const at::Tensor& points, JetOrder order) = 0;
+  virtual Tensor forward(const Tensor& points, JetOrder order) = 0;
   /// The same at points in main memory; never waits for the field's device.
-  virtual at::Tensor forward_at(PointsIn points, JetOrder order) = 0;
+  virtual Tensor forward_at(PointsIn points, JetOrder order) = 0;
   /// Adds Jᵀ·cotangents (columns, n, 3) of the last forward call to gradient().
-  virtual void pull_back(const at::Tensor& cotangents) = 0;
+  virtual void pull_back(const Tensor& cotangents) = 0;
   /// All parameters, and their gradient, as one contiguous vector (p).
-  virtual at::Tensor& parameters() = 0;
-  virtual at::Tensor& gradient() = 0;
+  virtual Tensor& parameters() = 0;
+  virtual Tensor& gradient() = 0;
   /// The matrices among the parameters, for optimizers that treat them as such.
   virtual std::vector<MatrixPlace> matrices() const { return {}; }
   /// Adds an offset (cube coordinates) to f.

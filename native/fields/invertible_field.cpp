@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fields/invertible_field.h"
 
-#include <ATen/core/LegacyTypeDispatch.h>
-
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -14,8 +12,8 @@
 #include "core/memory.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "core/tensors.h"
 #include "neural/coupling_sweep.h"
+#include "tensors/views.h"
 
 namespace arapfields {
 namespace {
@@ -43,17 +41,13 @@ std::vector<Range> ranges_of(Index n, JetOrder order) {
 void for_groups(Index ranges, const std::function<void(Index, Index)>& body) {
   const Index groups = std::min(ranges, most_groups);
   parallel_jobs(groups, [&](Index g) {
-    const at::AutoDispatchBelowADInplaceOrView quick;
     for (Index r = g * ranges / groups; r < (g + 1) * ranges / groups; ++r) body(r, g);
   });
 }
 
 /// The same for independent ranges.
 void for_each_range(const std::vector<Range>& ranges, const std::function<void(const Range&)>& body) {
-  parallel_jobs(static_cast<Index>(ranges.size()), [&](Index r) {
-    const at::AutoDispatchBelowADInplaceOrView quick;
-    body(ranges[r]);
-  });
+  parallel_jobs(static_cast<Index>(ranges.size()), [&](Index r) { body(ranges[r]); });
 }
 
 }  // namespace
@@ -67,12 +61,12 @@ struct InvertibleField::State {
     std::vector<std::vector<CouplingMemory>> kept;
   };
   CouplingShape shape;
-  at::Tensor parameters, gradient;
+  Tensor parameters, gradient;
   CouplingViews views;
   std::deque<Pass> passes;  // the last one first; a step of a solve has two kinds of them
   bool fresh = false;
   // Gradients of the groups but the first.
-  std::vector<at::Tensor> parts;
+  std::vector<Tensor> parts;
   std::vector<CouplingViews> part_views;
 
   Pass& prepare(Index count, JetOrder order) {
@@ -85,7 +79,7 @@ struct InvertibleField::State {
     const double numbers = static_cast<double>(count) * std::min(columns(order), columns2) * shape.couplings *
                            (2.0 * shape.layers * shape.width + shape.fan_in(0));
     if (passes.size() == most_passes) passes.pop_back();
-    require_memory("batch", numbers * static_cast<double>(parameters.element_size()));
+    require_memory("batch", numbers * (parameters.is_double() ? sizeof(double) : sizeof(float)));
     Pass& pass = passes.emplace_front(Pass{count, order, ranges_of(count, order), {}});
     for (const Range& range : pass.ranges)
       pass.kept.push_back(coupling_memory(shape, parameters, range.count, columns(order), true));
@@ -99,8 +93,8 @@ InvertibleField::InvertibleField(const CouplingShape& shape, std::uint64_t seed,
   require(shape.couplings > 0, "couplings", std::to_string(shape.couplings), "at least one is needed");
   const ThreadScope scope;
   require_memory("width", static_cast<double>(shape.size()) * (sizeof(double) + 2 * sizeof(float)));
-  at::Tensor values = at::zeros({shape.size()}, at::kDouble);
-  double* next = values.data_ptr<double>();
+  Tensor values = zeros({shape.size()}, NumberType::float64);
+  double* next = values.data<double>();
   for (int i = 0; i < shape.couplings; ++i)
     for (int l = 0; l <= shape.layers; ++l) {
       const Index numbers = static_cast<Index>(shape.fan_out(l)) * (shape.fan_in(l) + 1);
@@ -110,16 +104,16 @@ InvertibleField::InvertibleField(const CouplingShape& shape, std::uint64_t seed,
     }
   State& s = *state_;
   s.shape = shape;
-  s.parameters = values.to(double_precision ? at::kDouble : at::kFloat);
-  s.gradient = at::zeros_like(s.parameters);
+  s.parameters = values.to(double_precision ? NumberType::float64 : NumberType::float32);
+  s.gradient = zeros_like(s.parameters);
   s.views = CouplingViews(shape, s.parameters);
 }
 
 InvertibleField::~InvertibleField() = default;
 
 const CouplingShape& InvertibleField::shape() const { return state_->shape; }
-at::Tensor& InvertibleField::parameters() { return state_->parameters; }
-at::Tensor& InvertibleField::gradient() { return state_->gradient; }
+Tensor& InvertibleField::parameters() { return state_->parameters; }
+Tensor& InvertibleField::gradient() { return state_->gradient; }
 
 std::vector<MatrixPlace> InvertibleField::matrices() const {
   const CouplingShape& shape = state_->shape;
@@ -138,19 +132,17 @@ void InvertibleField::evaluate(PointsIn points, JetView<double> out) const {
   const ThreadScope scope;
   require(out.count == points.rows(), "out", std::to_string(out.count) + " jets", "one a point is needed");
   const State& s = *state_;
-  at::Tensor result = tensor_view(out);
-  result[0].copy_(tensor_view(points));
-  at::Tensor values = result[0];
-  const at::Tensor x =
-      out.order == JetOrder::value ? at::Tensor() : values.to(s.parameters.scalar_type(), false, true);
+  Tensor result = tensor_view(out);
+  result[0].assign(tensor_view(points));
+  Tensor values = result[0];
+  const Tensor x = out.order == JetOrder::value ? Tensor() : values.clone().to(s.parameters.type());
   for_each_range(ranges_of(points.rows(), out.order), [&](const Range& range) {
     move_points(s.shape, s.views, values.narrow(0, range.begin, range.count), false);
     if (out.order == JetOrder::value) return;
     const int count = columns(out.order);
     std::vector<CouplingMemory> memory = coupling_memory(s.shape, s.parameters, range.count, count, false);
-    const at::Tensor jets =
-        couple(s.shape, s.views, x.narrow(0, range.begin, range.count), out.order, memory);
-    result.narrow(0, 1, count - 1).narrow(1, range.begin, range.count).copy_(jets.narrow(0, 1, count - 1));
+    const Tensor jets = couple(s.shape, s.views, x.narrow(0, range.begin, range.count), out.order, memory);
+    result.narrow(0, 1, count - 1).narrow(1, range.begin, range.count).assign(jets.narrow(0, 1, count - 1));
   });
 }
 
@@ -158,75 +150,74 @@ Points InvertibleField::preimages(PointsIn points) const {
   const ThreadScope scope;
   const State& s = *state_;
   Points result = points;
-  const at::Tensor x = tensor_view(result);
+  const Tensor x = tensor_view(result);
   for_each_range(ranges_of(points.rows(), JetOrder::value), [&](const Range& range) {
     move_points(s.shape, s.views, x.narrow(0, range.begin, range.count), true);
   });
   return result;
 }
 
-at::Tensor InvertibleField::forward(const at::Tensor& points, JetOrder order) {
+Tensor InvertibleField::forward(const Tensor& points, JetOrder order) {
   const ThreadScope scope;
   State& s = *state_;
-  require(points.dim() == 2 && points.size(1) == 3 && points.is_cpu() &&
-              points.scalar_type() == s.parameters.scalar_type(),
-          "points", "another shape, dtype or device", "expected an (n,3) tensor like the parameters");
+  require(
+      points.dims() == 2 && points.size(1) == 3 && points.on_host() && points.type() == s.parameters.type(),
+      "points", "another shape, dtype or device", "expected an (n,3) tensor like the parameters");
   State::Pass& pass = s.prepare(points.size(0), order);
-  at::Tensor result = at::empty({columns(order), points.size(0), 3}, s.parameters.options());
+  Tensor result = empty({columns(order), points.size(0), 3}, s.parameters);
   for_groups(static_cast<Index>(pass.ranges.size()), [&](Index r, Index) {
     const Range& range = pass.ranges[r];
     result.narrow(1, range.begin, range.count)
-        .copy_(couple(s.shape, s.views, points.narrow(0, range.begin, range.count), order, pass.kept[r]));
+        .assign(couple(s.shape, s.views, points.narrow(0, range.begin, range.count), order, pass.kept[r]));
   });
   s.fresh = true;
   return result;
 }
 
-at::Tensor InvertibleField::forward_at(PointsIn points, JetOrder order) {
+Tensor InvertibleField::forward_at(PointsIn points, JetOrder order) {
   const ThreadScope scope;
   return forward(tensor_like(points, state_->parameters), order);
 }
 
-void InvertibleField::pull_back(const at::Tensor& cotangents) {
+void InvertibleField::pull_back(const Tensor& cotangents) {
   const ThreadScope scope;
   State& s = *state_;
   if (!s.fresh) throw std::logic_error("InvertibleField::pull_back needs a forward call of its own");
   State::Pass& pass = s.passes.front();
-  require(cotangents.dim() == 3 && cotangents.size(0) == columns(pass.order) &&
-              cotangents.size(1) == pass.count && cotangents.scalar_type() == s.parameters.scalar_type(),
+  require(cotangents.dims() == 3 && cotangents.size(0) == columns(pass.order) &&
+              cotangents.size(1) == pass.count && cotangents.type() == s.parameters.type(),
           "cotangents", "another shape or dtype than the jets", "they must match");
   s.fresh = false;
   const auto ranges = static_cast<Index>(pass.ranges.size());
   const Index groups = std::min(ranges, most_groups);
   while (static_cast<Index>(s.parts.size()) < groups) {
-    s.parts.push_back(s.parts.empty() ? s.gradient : at::empty_like(s.gradient));
+    s.parts.push_back(s.parts.empty() ? s.gradient : empty_like(s.gradient));
     s.part_views.emplace_back(s.shape, s.parts.back());
   }
-  for (Index g = 1; g < groups; ++g) s.parts[g].zero_();
+  for (Index g = 1; g < groups; ++g) s.parts[g].set_zero();
   for_groups(ranges, [&](Index r, Index g) {
     const Range& range = pass.ranges[r];
     couple_back(s.shape, s.views, cotangents.narrow(1, range.begin, range.count), pass.kept[r],
                 s.part_views[g]);
   });
-  for (Index g = 1; g < groups; ++g) s.gradient.add_(s.parts[g]);
+  for (Index g = 1; g < groups; ++g) s.gradient.add(s.parts[g]);
 }
 
 void InvertibleField::translate(const Vec3& offset) {
-  state_->views.offset.add_(tensor_like(offset, state_->parameters));
+  state_->views.offset.add(tensor_like(offset, state_->parameters));
 }
 
 VectorF InvertibleField::weights() const {
   const ThreadScope scope;
-  const at::Tensor host = state_->parameters.to(at::kFloat).contiguous();
-  return Eigen::Map<const VectorF>(host.const_data_ptr<float>(), host.numel());
+  return floats_of(state_->parameters);
 }
 
 void InvertibleField::set_weights(const VectorF& weights) {
   const ThreadScope scope;
-  at::Tensor& own = state_->parameters;
-  require(weights.size() == own.numel(), "weights", std::to_string(weights.size()) + " numbers",
-          "this field has " + std::to_string(own.numel()));
-  own.copy_(tensor_view(weights));
+  Tensor& own = state_->parameters;
+  require(weights.size() == own.count(), "weights", std::to_string(weights.size()) + " numbers",
+          "this field has " + std::to_string(own.count()));
+  own.assign(tensor_view(weights));
 }
 
 }  // namespace arapfields

@@ -9,6 +9,8 @@
 
 namespace arapfields {
 
+class Tensor;
+
 /// f as coupling layers in turns over the axes (neural/coupling_shape.h): det J > 0 everywhere, and f⁻¹ in
 /// closed form, by construction. The identity before training. Computed in main memory; values, there and
 /// back, keep their coordinates in double precision, so that preimages() of evaluate() comes back to some
@@ -23,11 +25,11 @@ class InvertibleField final : public TrainableField {
   void evaluate(PointsIn points, JetView<double> out) const override;
   bool has_preimages() const override { return true; }
   Points preimages(PointsIn points) const override;
-  at::Tensor forward(const at::Tensor& points, JetOrder order) override;
-  at::Tensor forward_at(PointsIn points, JetOrder order) override;
-  void pull_back(const at::Tensor& cotangents) override;
-  at::Tensor& parameters() override;
-  at::Tensor& gradient() override;
+  Tensor forward(const Tensor& points, JetOrder order) override;
+  Tensor forward_at(PointsIn points, JetOrder order) override;
+  void pull_back(const Tensor& cotangents) override;
+  Tensor& parameters() override;
+  Tensor& gradient() override;
   std::vector<MatrixPlace> matrices() const override;
   void translate(const Vec3& offset) override;
 

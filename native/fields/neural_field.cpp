@@ -3,8 +3,8 @@
 
 #include "core/errors.h"
 #include "core/parallel.h"
-#include "core/tensors.h"
 #include "neural/parameters.h"
+#include "tensors/views.h"
 
 namespace arapfields {
 namespace {
@@ -16,38 +16,38 @@ void add_identity(JetView<double> jets, PointsIn points) {
     Eigen::Map<Points>(jets.column(first_column(k)), jets.count, 3).col(k).array() += 1.0;
 }
 
-void add_identity(at::Tensor& jets, const at::Tensor& points) {
-  jets[0].add_(points);
+void add_identity(Tensor& jets, const Tensor& points) {
+  jets[0] += points;
   if (jets.size(0) == 1) return;
-  for (int k = 0; k < 3; ++k) jets[first_column(k)].select(1, k).add_(1.0);
+  for (int k = 0; k < 3; ++k) jets[first_column(k)].select(1, k) += 1.0;
 }
 
 /// Jets of the product a·p, a (columns, n, 1) and p (columns, n, 3).
-at::Tensor product(const at::Tensor& a, const at::Tensor& p) {
-  at::Tensor result = a[0] * p;
+Tensor jet_product(const Tensor& a, const Tensor& p) {
+  Tensor result = a[0] * p;
   const auto columns = p.size(0);
-  for (int64_t c = 1; c < columns; ++c) result[c].addcmul_(a[c], p[0]);
+  for (int64_t c = 1; c < columns; ++c) result[c].add_product(a[c], p[0]);
   if (columns < 10) return result;
   for (int j = 0; j < 3; ++j)
     for (int k = j; k < 3; ++k) {
-      at::Tensor mixed = result[second_column(j, k)];
-      mixed.addcmul_(a[first_column(j)], p[first_column(k)]);
-      mixed.addcmul_(a[first_column(k)], p[first_column(j)]);
+      Tensor mixed = result[second_column(j, k)];
+      mixed.add_product(a[first_column(j)], p[first_column(k)]);
+      mixed.add_product(a[first_column(k)], p[first_column(j)]);
     }
   return result;
 }
 
-/// The transpose of product(a, ·).
-at::Tensor product_pull_back(const at::Tensor& a, const at::Tensor& cotangents) {
-  at::Tensor result = a[0] * cotangents;
+/// The transpose of jet_product(a, ·).
+Tensor jet_product_back(const Tensor& a, const Tensor& cotangents) {
+  Tensor result = a[0] * cotangents;
   const auto columns = cotangents.size(0);
-  for (int64_t c = 1; c < columns; ++c) result[0].addcmul_(a[c], cotangents[c]);
+  for (int64_t c = 1; c < columns; ++c) result[0].add_product(a[c], cotangents[c]);
   if (columns < 10) return result;
   for (int j = 0; j < 3; ++j)
     for (int k = j; k < 3; ++k) {
-      const at::Tensor mixed = cotangents[second_column(j, k)];
-      result[first_column(k)].addcmul_(a[first_column(j)], mixed);
-      result[first_column(j)].addcmul_(a[first_column(k)], mixed);
+      const Tensor mixed = cotangents[second_column(j, k)];
+      result[first_column(k)].add_product(a[first_column(j)], mixed);
+      result[first_column(j)].add_product(a[first_column(k)], mixed);
     }
   return result;
 }
@@ -82,16 +82,16 @@ void NeuralField::fixed_part(PointsIn points, JetView<double> b, Vector& a) cons
   handles_->free_weight(points, b.order, a.data());
   JetBlock<double> blend(n, b.order);
   handles_->evaluate(points, blend.view());
-  at::Tensor result = tensor_view(b);
-  const at::Tensor exact = tensor_view(blend.view());
+  Tensor result = tensor_view(b);
+  const Tensor exact = tensor_view(blend.view());
   if (!base_) {
-    result.copy_(exact);
+    result.assign(exact);
     return;
   }
   JetBlock<double> identity(n, b.order);
   add_identity(identity.view(), points);
-  result.sub_(tensor_view(identity.view()));
-  result.copy_(product(tensor_view(a.data(), {count, n, 1}), result) + exact);
+  result -= tensor_view(identity.view());
+  result.assign(jet_product(tensor_view(a.data(), {count, n, 1}), result) + exact);
 }
 
 void NeuralField::evaluate(PointsIn points, JetView<double> out) const {
@@ -100,58 +100,57 @@ void NeuralField::evaluate(PointsIn points, JetView<double> out) const {
   if (out.count == 0) return;
   Vector a;
   fixed_part(points, out, a);
-  const at::Tensor x = tensor_like(points, network_.parameters());
-  at::Tensor jets = network_.evaluate(x, out.order).to(at::kCPU, at::kDouble);
-  if (a.size() > 0) jets = product(tensor_view(a.data(), {columns(out.order), out.count, 1}), jets);
-  tensor_view(out).add_(jets);
+  const Tensor x = tensor_like(points, network_.parameters());
+  Tensor jets = network_.evaluate(x, out.order).to_host().to(NumberType::float64);
+  if (a.size() > 0) jets = jet_product(tensor_view(a.data(), {columns(out.order), out.count, 1}), jets);
+  tensor_view(out).add(jets);
 }
 
-at::Tensor NeuralField::jets(const at::Tensor& points, JetOrder order) const {
+Tensor NeuralField::jets(const Tensor& points, JetOrder order) const {
   const ThreadScope scope;
-  const at::Tensor& own = network_.parameters();
-  if (base_ || handles_ || points.device() != own.device() || points.scalar_type() != own.scalar_type())
-    return DeformationField::jets(points, order);
-  at::Tensor jets = network_.evaluate(points.contiguous(), order);
+  const Tensor& own = network_.parameters();
+  if (base_ || handles_ || !alike(points, own)) return DeformationField::jets(points, order);
+  Tensor jets = network_.evaluate(points.contiguous(), order);
   add_identity(jets, points);
   return jets;
 }
 
-at::Tensor NeuralField::forward(const at::Tensor& points, JetOrder order) {
+Tensor NeuralField::forward(const Tensor& points, JetOrder order) {
   const ThreadScope scope;
-  at::Tensor jets = network_.forward(points, order);
+  Tensor jets = network_.forward(points, order);
   factor_.reset();
   if (base_ || handles_) return compose(std::move(jets), points_of(points));
   add_identity(jets, points);
   return jets;
 }
 
-at::Tensor NeuralField::forward_at(PointsIn points, JetOrder order) {
+Tensor NeuralField::forward_at(PointsIn points, JetOrder order) {
   const ThreadScope scope;
-  const at::Tensor x = tensor_like(points, network_.parameters());
+  const Tensor x = tensor_like(points, network_.parameters());
   if (!base_ && !handles_) return forward(x, order);
   factor_.reset();
   return compose(network_.forward(x, order), points);
 }
 
-at::Tensor NeuralField::compose(at::Tensor jets, PointsIn points) {
+Tensor NeuralField::compose(Tensor jets, PointsIn points) {
   JetBlock<double> b(points.rows(), static_cast<JetOrder>(jets.size(0)));
   Vector a;
   fixed_part(points, b.view(), a);
-  const at::Tensor fixed = tensor_like(b.view(), jets);
-  if (a.size() == 0) return jets.add_(fixed);
+  const Tensor fixed = tensor_like(b.view(), jets);
+  if (a.size() == 0) return jets.add(fixed);
   factor_ =
-      std::make_shared<at::Tensor>(tensor_like(tensor_view(a.data(), {jets.size(0), jets.size(1), 1}), jets));
-  return product(*factor_, jets).add_(fixed);
+      std::make_shared<Tensor>(tensor_like(tensor_view(a.data(), {jets.size(0), jets.size(1), 1}), jets));
+  return jet_product(*factor_, jets).add(fixed);
 }
 
-void NeuralField::pull_back(const at::Tensor& cotangents) {
+void NeuralField::pull_back(const Tensor& cotangents) {
   const ThreadScope scope;
-  network_.pull_back(factor_ ? product_pull_back(*factor_, cotangents) : cotangents);
+  network_.pull_back(factor_ ? jet_product_back(*factor_, cotangents) : cotangents);
 }
 
 void NeuralField::translate(const Vec3& offset) {
-  at::Tensor bias = network_.bias(shape().layers);
-  bias.add_(tensor_like(offset, bias));
+  Tensor bias = network_.bias(shape().layers);
+  bias.add(tensor_like(offset, bias));
 }
 
 VectorF NeuralField::weights() const { return parameters_of(network_); }

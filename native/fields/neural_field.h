@@ -10,6 +10,8 @@
 
 namespace arapfields {
 
+class Tensor;
+
 /// f(x) = b(x) + a(x) Ψ(x) with a trained network Ψ whose last layer starts at zero. Alone, b is the identity
 /// and a is 1. Two fixed parts may be put in before training: a base field r, which training then refines,
 /// and exact handles (fields/handle_blend.h), h with its free weight a; b = h + a (r − identity).
@@ -29,12 +31,12 @@ class NeuralField final : public TrainableField {
   const MlpShape& shape() const;
 
   void evaluate(PointsIn points, JetView<double> out) const override;
-  at::Tensor jets(const at::Tensor& points, JetOrder order) const override;
-  at::Tensor forward(const at::Tensor& points, JetOrder order) override;
-  at::Tensor forward_at(PointsIn points, JetOrder order) override;
-  void pull_back(const at::Tensor& cotangents) override;
-  at::Tensor& parameters() override { return network_.parameters(); }
-  at::Tensor& gradient() override { return network_.gradient(); }
+  Tensor jets(const Tensor& points, JetOrder order) const override;
+  Tensor forward(const Tensor& points, JetOrder order) override;
+  Tensor forward_at(PointsIn points, JetOrder order) override;
+  void pull_back(const Tensor& cotangents) override;
+  Tensor& parameters() override { return network_.parameters(); }
+  Tensor& gradient() override { return network_.gradient(); }
   std::vector<MatrixPlace> matrices() const override;
   Mlp* network() { return &network_; }
 
@@ -49,12 +51,12 @@ class NeuralField final : public TrainableField {
   /// The jets (columns, n, 3) of b as (columns·n, 3) rows, and those of a (columns, n), empty where a is 1.
   void fixed_part(PointsIn points, JetView<double> b, Vector& a) const;
   /// b + a Ψ from the jets of Ψ.
-  at::Tensor compose(at::Tensor jets, PointsIn points);
+  Tensor compose(Tensor jets, PointsIn points);
 
   Mlp network_;
   std::shared_ptr<const DeformationField> base_;
   std::shared_ptr<const HandleBlend> handles_;
-  std::shared_ptr<at::Tensor> factor_;  ///< a of the last forward call, (columns, n, 1); null where a is 1
+  std::shared_ptr<Tensor> factor_;  ///< a of the last forward call, (columns, n, 1); null where a is 1
 };
 
 }  // namespace arapfields

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "neural/coupling_sweep.h"
 
-#include <ATen/ATen.h>
-
 #include <algorithm>
 #include <cmath>
 
 #include "neural/column_kernels.h"
 #include "neural/plane_algebra.h"
+#include "tensors/operations.h"
 
 namespace arapfields {
 namespace {
@@ -59,13 +58,13 @@ void each_entry(const CouplingShape& shape, Scalar x, int which, Use&& use) {
 
 template <class Scalar>
 ColumnBlock<Scalar> block_of(const CouplingShape& shape, const CouplingMemory& memory, int l,
-                             const at::Tensor& bias) {
-  const at::Tensor& slope = memory.slope[at_(l)];
+                             const Tensor& bias) {
+  const Tensor& slope = memory.slope[at_(l)];
   ColumnBlock<Scalar> block;
-  block.z = memory.pre[at_(l)].const_data_ptr<Scalar>();
-  block.h = memory.activations[at_(l)].data_ptr<Scalar>();
-  block.slope = slope.data_ptr<Scalar>();
-  block.bias = bias.const_data_ptr<Scalar>();
+  block.z = memory.pre[at_(l)].data<Scalar>();
+  block.h = memory.activations[at_(l)].data<Scalar>();
+  block.slope = slope.data<Scalar>();
+  block.bias = bias.data<Scalar>();
   block.sharpness = static_cast<Scalar>(shape.softplus_sharpness);
   block.points = slope.size(0);
   block.width = slope.size(1);
@@ -79,8 +78,8 @@ void condition(const CouplingShape& shape, const CouplingViews& views, int i, Co
   const CouplingViews::Network& network = views.networks[at_(i)];
   const Index count = memory.jets.size(1), entries = shape.fan_in(0);
   const int plane = plane_columns(static_cast<int>(memory.jets.size(0)));
-  const auto* points = memory.jets.const_data_ptr<Scalar>();
-  auto* encoding = memory.encoding.data_ptr<Scalar>();
+  const auto* points = memory.jets.data<Scalar>();
+  auto* encoding = memory.encoding.data<Scalar>();
   for (Index p = 0; p < count; ++p)
     for (int which = 0; which < 2; ++which)
       each_entry(shape, points[3 * p + (i + 1 + which) % 3], which,
@@ -93,14 +92,14 @@ void condition(const CouplingShape& shape, const CouplingViews& views, int i, Co
                    if (plane > 3) at(3 + which) = phi.second;
                  });
   for (int l = 0; l < shape.layers; ++l) {
-    const at::Tensor& below = l == 0 ? memory.encoding : memory.activations[at_(l - 1)];
+    const Tensor& below = l == 0 ? memory.encoding : memory.activations[at_(l - 1)];
     const Index rows = l == 0 ? encoded_rows(plane, count) : below.size(0);
-    at::Tensor pre = memory.pre[at_(l)].narrow(0, 0, rows);
-    at::mm_out(pre, below.narrow(0, 0, rows), network.weights[at_(l)].t());
+    Tensor pre = memory.pre[at_(l)].narrow(0, 0, rows);
+    multiply(pre, below.narrow(0, 0, rows), network.weights[at_(l)].t());
     ARAPFIELDS_DISPATCH(activate_columns(block_of<Scalar>(shape, memory, l, network.biases[at_(l)])));
   }
-  at::mm_out(memory.output, memory.activations.back(), network.weights.back().t());
-  memory.output.narrow(0, 0, count).add_(network.biases.back());
+  multiply(memory.output, memory.activations.back(), network.weights.back().t());
+  memory.output.narrow(0, 0, count).add(network.biases.back());
 }
 
 /// What coupling layer i meets at point p: the coordinate x that it moves, the other two, and the plane jets
@@ -118,22 +117,22 @@ struct Place {
 };
 
 template <class Scalar>
-at::Tensor couple_as(const CouplingShape& shape, const CouplingViews& views, const at::Tensor& points,
-                     JetOrder order, std::vector<CouplingMemory>& memory) {
+Tensor couple_as(const CouplingShape& shape, const CouplingViews& views, const Tensor& points, JetOrder order,
+                 std::vector<CouplingMemory>& memory) {
   const Index count = points.size(0);
   const int columns_here = columns(order);
-  at::Tensor jets = memory.front().jets;
-  jets.zero_();
-  jets[0].copy_(points);
-  for (int k = 0; k < 3 && columns_here > 1; ++k) jets[first_column(k)].select(1, k).fill_(1.0);
+  Tensor jets = memory.front().jets;
+  jets.set_zero();
+  jets[0].assign(points);
+  for (int k = 0; k < 3 && columns_here > 1; ++k) jets[first_column(k)].select(1, k).fill(1.0);
   for (int i = 0; i < shape.couplings; ++i) {
     CouplingMemory& here = memory[at_(i) % memory.size()];
     condition<Scalar>(shape, views, i, here);
-    at::Tensor next = i + 1 < shape.couplings && memory.size() > 1 ? memory[at_(i + 1)].jets : jets;
-    if (i + 1 == shape.couplings && memory.size() > 1) next = at::empty_like(jets);
-    if (!next.is_same(here.jets)) next.copy_(here.jets);
-    auto* moved = next.data_ptr<Scalar>();
-    const auto* output = here.output.const_data_ptr<Scalar>();
+    Tensor next = i + 1 < shape.couplings && memory.size() > 1 ? memory[at_(i + 1)].jets : jets;
+    if (i + 1 == shape.couplings && memory.size() > 1) next = empty_like(jets);
+    if (!is_same(next, here.jets)) next.assign(here.jets);
+    auto* moved = next.data<Scalar>();
+    const auto* output = here.output.data<Scalar>();
     for (Index p = 0; p < count; ++p) {
       const Place<Scalar> here_at(moved, output, count, p, i, columns_here);
       const NumberJet<Scalar> s = chain(here_at.s, here_at.u, here_at.v, columns_here);
@@ -144,31 +143,31 @@ at::Tensor couple_as(const CouplingShape& shape, const CouplingViews& views, con
     }
     jets = next;
   }
-  at::Tensor result = memory.size() > 1 && shape.couplings > 0 ? jets : jets.clone();
-  result[0].add_(views.offset);
+  Tensor result = memory.size() > 1 && shape.couplings > 0 ? jets : jets.clone();
+  result[0].add(views.offset);
   return result;
 }
 
 template <class Scalar>
-void couple_back_as(const CouplingShape& shape, const CouplingViews& views, const at::Tensor& cotangents,
+void couple_back_as(const CouplingShape& shape, const CouplingViews& views, const Tensor& cotangents,
                     std::vector<CouplingMemory>& memory, CouplingViews& gradient) {
-  at::Tensor given = cotangents.clone(at::MemoryFormat::Contiguous);
+  Tensor given = cotangents.clone();
   const Index count = given.size(1), entries = shape.fan_in(0);
   const int columns_here = static_cast<int>(given.size(0));
-  gradient.offset.add_(given[0].sum(0));
-  auto* pull = given.data_ptr<Scalar>();
+  gradient.offset += sum(given[0], {0});
+  auto* pull = given.data<Scalar>();
   const int plane = plane_columns(columns_here);
-  const at::Tensor upper = at::empty({plane * count, 2}, given.options());
-  at::Tensor wide = at::empty({plane * count, shape.width}, given.options());
-  at::Tensor spare = at::empty_like(wide);
-  at::Tensor encoded = at::empty({encoded_rows(plane, count), entries}, given.options());
+  const Tensor upper = empty({plane * count, 2}, given);
+  Tensor wide = empty({plane * count, shape.width}, given);
+  Tensor spare = empty_like(wide);
+  Tensor encoded = empty({encoded_rows(plane, count), entries}, given);
   for (int i = shape.couplings - 1; i >= 0; --i) {
     CouplingMemory& here = memory[at_(i)];
     const CouplingViews::Network& network = views.networks[at_(i)];
     CouplingViews::Network& into = gradient.networks[at_(i)];
-    const auto* jets = here.jets.const_data_ptr<Scalar>();
-    const auto* output = here.output.const_data_ptr<Scalar>();
-    auto* of_output = upper.data_ptr<Scalar>();
+    const auto* jets = here.jets.data<Scalar>();
+    const auto* output = here.output.data<Scalar>();
+    auto* of_output = upper.data<Scalar>();
     for (Index p = 0; p < count; ++p) {
       const Place<Scalar> at(jets, output, count, p, i, columns_here);
       const auto given_to = [&](int axis) {
@@ -186,21 +185,20 @@ void couple_back_as(const CouplingShape& shape, const CouplingViews& views, cons
       scatter(of_u, pull, count, 3, p, (i + 1) % 3, columns_here);
       scatter(of_v, pull, count, 3, p, (i + 2) % 3, columns_here);
     }
-    into.biases.back().add_(upper.narrow(0, 0, count).sum(0));
-    into.weights.back().addmm_(upper.t(), here.activations.back());
-    at::mm_out(wide, upper, network.weights.back());
+    into.biases.back() += sum(upper.narrow(0, 0, count), {0});
+    add_multiplied(into.weights.back(), upper.t(), here.activations.back());
+    multiply(wide, upper, network.weights.back());
     for (int l = shape.layers - 1; l >= 0; --l) {
       ARAPFIELDS_DISPATCH(activate_columns_back(block_of<Scalar>(shape, here, l, network.biases[at_(l)]),
-                                                wide.data_ptr<Scalar>(),
-                                                into.biases[at_(l)].data_ptr<Scalar>()));
-      const at::Tensor& below = l == 0 ? here.encoding : here.activations[at_(l - 1)];
+                                                wide.data<Scalar>(), into.biases[at_(l)].data<Scalar>()));
+      const Tensor& below = l == 0 ? here.encoding : here.activations[at_(l - 1)];
       const Index rows = l == 0 ? encoded.size(0) : below.size(0);
-      const at::Tensor used = wide.narrow(0, 0, rows);
-      into.weights[at_(l)].addmm_(used.t(), below.narrow(0, 0, rows));
-      at::mm_out(l == 0 ? encoded : spare, used, network.weights[at_(l)]);
+      const Tensor used = wide.narrow(0, 0, rows);
+      add_multiplied(into.weights[at_(l)], used.t(), below.narrow(0, 0, rows));
+      multiply(l == 0 ? encoded : spare, used, network.weights[at_(l)]);
       if (l > 0) std::swap(wide, spare);
     }
-    const auto* of_entries = encoded.const_data_ptr<Scalar>();
+    const auto* of_entries = encoded.data<Scalar>();
     for (Index p = 0; p < count; ++p)
       for (int which = 0; which < 2; ++which) {
         const Index coordinate = 3 * p + (i + 1 + which) % 3;
@@ -219,28 +217,28 @@ void couple_back_as(const CouplingShape& shape, const CouplingViews& views, cons
 /// Coordinates stay in double precision whatever the networks have: the way back meets the same u to
 /// rounding, and so nearly the same numbers.
 template <class Scalar>
-void move_as(const CouplingShape& shape, const CouplingViews& views, at::Tensor points, bool back) {
+void move_as(const CouplingShape& shape, const CouplingViews& views, Tensor points, bool back) {
   CouplingMemory here = coupling_memory(shape, views.offset, points.size(0), 1, false).front();
-  auto* moved = points.data_ptr<double>();
-  const at::Tensor offset = views.offset.to(at::kDouble);
-  if (back) points.sub_(offset);
+  auto* moved = points.data<double>();
+  const Tensor offset = views.offset.to(NumberType::float64);
+  if (back) points -= offset;
   for (int step = 0; step < shape.couplings; ++step) {
     const int i = back ? shape.couplings - 1 - step : step;
-    here.jets[0].copy_(points);
+    here.jets[0].assign(points);
     condition<Scalar>(shape, views, i, here);
-    const auto* output = here.output.const_data_ptr<Scalar>();
+    const auto* output = here.output.data<Scalar>();
     for (Index p = 0; p < points.size(0); ++p) {
       double& x = moved[3 * p + i % 3];
       const double e = bounded_exp(static_cast<double>(output[2 * p])).value, t = output[2 * p + 1];
       x = back ? (x - t) / e : x * e + t;
     }
   }
-  if (!back) points.add_(offset);
+  if (!back) points.add(offset);
 }
 
 }  // namespace
 
-CouplingViews::CouplingViews(const CouplingShape& shape, const at::Tensor& flat) {
+CouplingViews::CouplingViews(const CouplingShape& shape, const Tensor& flat) {
   Index begin = 0;
   for (int i = 0; i < shape.couplings; ++i) {
     Network& network = networks.emplace_back();
@@ -254,13 +252,13 @@ CouplingViews::CouplingViews(const CouplingShape& shape, const at::Tensor& flat)
   offset = flat.narrow(0, begin, 3);
 }
 
-std::vector<CouplingMemory> coupling_memory(const CouplingShape& shape, const at::Tensor& like, Index count,
+std::vector<CouplingMemory> coupling_memory(const CouplingShape& shape, const Tensor& like, Index count,
                                             int columns, bool keep) {
   std::vector<CouplingMemory> memory(keep ? static_cast<std::size_t>(shape.couplings) : 1);
   const Index rows = plane_columns(columns) * count;
-  const auto make = [&](Index height, Index width) { return at::zeros({height, width}, like.options()); };
+  const auto make = [&](Index height, Index width) { return zeros({height, width}, like); };
   for (CouplingMemory& layer : memory) {
-    layer.jets = at::empty({columns, count, 3}, like.options());
+    layer.jets = empty({columns, count, 3}, like);
     layer.encoding = make(rows, shape.fan_in(0));
     layer.output = make(rows, 2);
     for (int l = 0; l < shape.layers; ++l) {
@@ -272,22 +270,22 @@ std::vector<CouplingMemory> coupling_memory(const CouplingShape& shape, const at
   return memory;
 }
 
-at::Tensor couple(const CouplingShape& shape, const CouplingViews& views, const at::Tensor& points,
-                  JetOrder order, std::vector<CouplingMemory>& memory) {
-  return points.scalar_type() == at::kDouble ? couple_as<double>(shape, views, points, order, memory)
-                                             : couple_as<float>(shape, views, points, order, memory);
+Tensor couple(const CouplingShape& shape, const CouplingViews& views, const Tensor& points, JetOrder order,
+              std::vector<CouplingMemory>& memory) {
+  return points.is_double() ? couple_as<double>(shape, views, points, order, memory)
+                            : couple_as<float>(shape, views, points, order, memory);
 }
 
-void couple_back(const CouplingShape& shape, const CouplingViews& views, const at::Tensor& cotangents,
+void couple_back(const CouplingShape& shape, const CouplingViews& views, const Tensor& cotangents,
                  std::vector<CouplingMemory>& memory, CouplingViews& gradient) {
-  if (cotangents.scalar_type() == at::kDouble)
+  if (cotangents.is_double())
     couple_back_as<double>(shape, views, cotangents, memory, gradient);
   else
     couple_back_as<float>(shape, views, cotangents, memory, gradient);
 }
 
-void move_points(const CouplingShape& shape, const CouplingViews& views, at::Tensor points, bool back) {
-  if (views.offset.scalar_type() == at::kDouble)
+void move_points(const CouplingShape& shape, const CouplingViews& views, Tensor points, bool back) {
+  if (views.offset.is_double())
     move_as<double>(shape, views, points, back);
   else
     move_as<float>(shape, views, points, back);

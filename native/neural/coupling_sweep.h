@@ -5,12 +5,11 @@
 // two numbers a point, to all ten columns by the coordinates at rest.
 #pragma once
 
-#include <ATen/core/Tensor.h>
-
 #include <vector>
 
 #include "core/jets.h"
 #include "neural/coupling_shape.h"
+#include "tensors/tensor.h"
 
 namespace arapfields {
 
@@ -18,12 +17,12 @@ namespace arapfields {
 /// as views into one flat vector.
 struct CouplingViews {
   struct Network {
-    std::vector<at::Tensor> weights, biases;
+    std::vector<Tensor> weights, biases;
   };
   CouplingViews() = default;
-  CouplingViews(const CouplingShape& shape, const at::Tensor& flat);
+  CouplingViews(const CouplingShape& shape, const Tensor& flat);
   std::vector<Network> networks;
-  at::Tensor offset;
+  Tensor offset;
 };
 
 /// What one coupling layer computes for a block: the jets (columns, count, 3) that come in, and as plane jets
@@ -31,22 +30,22 @@ struct CouplingViews {
 /// pre-activations and activations (plane·count, width), their slopes (count, width), and the output
 /// (plane·count, 2). What no mixed derivative of the encoding reaches stays zero.
 struct CouplingMemory {
-  at::Tensor jets, encoding, output;
-  std::vector<at::Tensor> pre, activations, slope;
+  Tensor jets, encoding, output;
+  std::vector<Tensor> pre, activations, slope;
 };
 
 /// A block's memory: one a coupling layer where pull_back is to follow, one for all otherwise.
-std::vector<CouplingMemory> coupling_memory(const CouplingShape& shape, const at::Tensor& like, Index count,
+std::vector<CouplingMemory> coupling_memory(const CouplingShape& shape, const Tensor& like, Index count,
                                             int columns, bool keep);
 
 /// Jets (columns, count, 3) at points (count, 3).
-at::Tensor couple(const CouplingShape& shape, const CouplingViews& views, const at::Tensor& points,
-                  JetOrder order, std::vector<CouplingMemory>& memory);
+Tensor couple(const CouplingShape& shape, const CouplingViews& views, const Tensor& points, JetOrder order,
+              std::vector<CouplingMemory>& memory);
 /// Adds what cotangents (columns, count, 3) of couple() ask of the parameters to `gradient`.
-void couple_back(const CouplingShape& shape, const CouplingViews& views, const at::Tensor& cotangents,
+void couple_back(const CouplingShape& shape, const CouplingViews& views, const Tensor& cotangents,
                  std::vector<CouplingMemory>& memory, CouplingViews& gradient);
 /// Takes points (count, 3), double and contiguous, where couple() takes them, or `back` where they come from,
 /// in closed form: in double precision but for the networks, which have theirs.
-void move_points(const CouplingShape& shape, const CouplingViews& views, at::Tensor points, bool back);
+void move_points(const CouplingShape& shape, const CouplingViews& views, Tensor points, bool back);
 
 }  // namespace arapfields

@@ -4,17 +4,17 @@
 #include <cmath>
 #include <cstdio>
 
-#include "core/device.h"
 #include "core/memory.h"
 #include "core/parallel.h"
 #include "core/random.h"
 #include "core/stopwatch.h"
-#include "core/tensors.h"
 #include "distance/training_points.h"
 #include "mesh/sample_mesh.h"
 #include "neural/mlp.h"
 #include "neural/parameters.h"
 #include "optimize/training_loop.h"
+#include "tensors/device.h"
+#include "tensors/views.h"
 
 namespace arapfields {
 namespace {
@@ -24,13 +24,13 @@ constexpr double example_bytes = 100.0;
 
 /// Points and distances on the network's device, the near-surface ones first.
 struct Examples {
-  Examples(const TrainingPoints& given, const at::Tensor& like)
+  Examples(const TrainingPoints& given, const Tensor& like)
       : points(tensor_like(given.points, like)),
         distances(tensor_like(given.distances, like)),
         near_count(given.near_surface) {}
   Index count() const { return points.size(0); }
 
-  at::Tensor points, distances;
+  Tensor points, distances;
   Index near_count;
 };
 
@@ -41,33 +41,33 @@ class Batches {
       : examples_(examples),
         near_(std::llround(options.near_share * options.training.batch)),
         random_(options.training.seed, 0xba7c4),
-        rows_(at::empty({options.training.batch}, at::kLong)) {}
+        rows_(empty({options.training.batch}, NumberType::int64)) {}
 
   void next() {
-    Index* rows = rows_.data_ptr<Index>();
+    Index* rows = rows_.data<Index>();
     for (Index i = 0; i < rows_.size(0); ++i)
       rows[i] = i < near_ ? random_.below(examples_.near_count)
                           : examples_.near_count + random_.below(examples_.count() - examples_.near_count);
-    const at::Tensor where = upload(rows_, examples_.points);
-    points = at::index_select(examples_.points, 0, where);
-    distances = at::index_select(examples_.distances, 0, where);
+    const Tensor where = upload(rows_, examples_.points);
+    points = index_select(examples_.points, 0, where);
+    distances = index_select(examples_.distances, 0, where);
   }
-  at::Tensor points, distances;
+  Tensor points, distances;
 
  private:
   const Examples& examples_;
   Index near_;
   Random random_;
-  at::Tensor rows_;
+  Tensor rows_;
 };
 
 struct Errors {
   double mean = 0, max = 0;
 };
 
-Errors errors(const Mlp& mlp, const at::Tensor& points, const at::Tensor& distances) {
-  const at::Tensor off = (mlp.evaluate(points, JetOrder::value).view({-1}) - distances).abs();
-  return {off.mean().item<double>(), off.max().item<double>()};
+Errors errors(const Mlp& mlp, const Tensor& points, const Tensor& distances) {
+  const Tensor off = abs(mlp.evaluate(points, JetOrder::value).flat() - distances);
+  return {mean(off).number(), max(off).number()};
 }
 
 /// The mean absolute error of a batch.
@@ -76,11 +76,11 @@ class Fit final : public LoopBody {
   Fit(const FitOptions& options, Mlp& mlp, const Examples& examples, const Examples& held_out)
       : options_(options), mlp_(mlp), held_out_(held_out), batches_(examples, options) {}
 
-  at::Tensor accumulate(int) override {
+  Tensor accumulate(int) override {
     batches_.next();
-    const at::Tensor off = mlp_.forward(batches_.points, JetOrder::value).view({-1}) - batches_.distances;
-    mlp_.pull_back(at::sign(off).div_(static_cast<double>(options_.training.batch)).view({1, -1, 1}));
-    return error_ = off.abs_().mean();
+    const Tensor off = mlp_.forward(batches_.points, JetOrder::value).flat() - batches_.distances;
+    mlp_.pull_back((sign(off) / static_cast<double>(options_.training.batch)).view({1, -1, 1}));
+    return error_ = mean(abs(off));
   }
   bool is_good_enough() override {
     if (options_.target_error <= 0) return false;
@@ -88,7 +88,7 @@ class Fit final : public LoopBody {
     return errors(mlp_, held_out_.points.narrow(0, 0, some), held_out_.distances.narrow(0, 0, some)).mean <=
            options_.target_error;
   }
-  std::vector<LossTerm> terms() const override { return {{"error", error_.item<double>()}}; }
+  std::vector<LossTerm> terms() const override { return {{"error", error_.number()}}; }
   std::string message(int count, double loss, double) const override {
     char text[120];
     std::snprintf(text, sizeof text, "iteration %d of %d, mean error %.2g of the cube", count,
@@ -101,7 +101,7 @@ class Fit final : public LoopBody {
   Mlp& mlp_;
   const Examples& held_out_;
   Batches batches_;
-  at::Tensor error_;
+  Tensor error_;
 };
 
 LoopOptions loop_options(const FitOptions& options, const IterationObserver& observer) {

@@ -4,9 +4,9 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "core/tensors.h"
 #include "neural/parameters.h"
 #include "optimize/muon.h"
+#include "tensors/views.h"
 
 namespace arapfields {
 namespace {
@@ -51,8 +51,8 @@ Mlp make_mlp(const Layers& layers, const MlpShape& shape, bool double_precision,
   const ThreadScope scope;
   Mlp mlp(shape, 0, true, double_precision, device);
   for (int l = 0; l <= shape.layers; ++l) {
-    mlp.weight(l).copy_(tensor_view(layers.weights[static_cast<std::size_t>(l)]));
-    mlp.bias(l).copy_(tensor_view(layers.biases[static_cast<std::size_t>(l)]));
+    mlp.weight(l).assign(tensor_view(layers.weights[static_cast<std::size_t>(l)]));
+    mlp.bias(l).assign(tensor_view(layers.biases[static_cast<std::size_t>(l)]));
   }
   return mlp;
 }
@@ -61,9 +61,9 @@ Layers layers_of(const Mlp& mlp) {
   const ThreadScope scope;
   Layers layers;
   for (int l = 0; l <= mlp.shape().layers; ++l) {
-    const at::Tensor weight = mlp.weight(l).to(at::kCPU, at::kDouble).contiguous();
+    const Tensor weight = doubles_of(mlp.weight(l));
     layers.weights.push_back(
-        Eigen::Map<const RowMatrix<double>>(weight.data_ptr<double>(), weight.size(0), weight.size(1)));
+        Eigen::Map<const RowMatrix<double>>(weight.data<double>(), weight.size(0), weight.size(1)));
     layers.biases.push_back(vector_of(mlp.bias(l)));
   }
   return layers;
@@ -73,14 +73,14 @@ JetSweeps sweep_jets(const Layers& layers, const MlpShape& shape, bool double_pr
                      JetOrder order, const Vector& cotangents) {
   const ThreadScope scope;
   Mlp mlp = make_mlp(layers, shape, double_precision);
-  const at::Tensor jets = mlp.forward(tensor_like(points, mlp.parameters()), order);
+  const Tensor jets = mlp.forward(tensor_like(points, mlp.parameters()), order);
   JetSweeps result;
   result.jets = vector_of(jets);
   if (cotangents.size() == 0) return result;
-  require(cotangents.size() == jets.numel(), "cotangents", std::to_string(cotangents.size()) + " numbers",
-          "expected " + std::to_string(jets.numel()));
-  mlp.gradient().zero_();
-  mlp.pull_back(tensor_like(cotangents, jets).view(jets.sizes()));
+  require(cotangents.size() == jets.count(), "cotangents", std::to_string(cotangents.size()) + " numbers",
+          "expected " + std::to_string(jets.count()));
+  mlp.gradient().set_zero();
+  mlp.pull_back(tensor_like(cotangents, jets).view_like(jets));
   result.gradient = vector_of(mlp.gradient());
   return result;
 }
@@ -88,9 +88,9 @@ JetSweeps sweep_jets(const Layers& layers, const MlpShape& shape, bool double_pr
 Layers step_muon(const Layers& layers, const MlpShape& shape, const Vector& gradient, double learning_rate) {
   const ThreadScope scope;
   Mlp mlp = make_mlp(layers, shape, true);
-  require(gradient.size() == mlp.gradient().numel(), "gradient", std::to_string(gradient.size()) + " numbers",
-          "expected " + std::to_string(mlp.gradient().numel()));
-  mlp.gradient().copy_(tensor_view(gradient));
+  require(gradient.size() == mlp.gradient().count(), "gradient", std::to_string(gradient.size()) + " numbers",
+          "expected " + std::to_string(mlp.gradient().count()));
+  mlp.gradient().assign(tensor_view(gradient));
   Muon(mlp.parameters(), hidden_matrices(shape)).step(mlp.parameters(), mlp.gradient(), learning_rate);
   return layers_of(mlp);
 }
@@ -98,15 +98,15 @@ Layers step_muon(const Layers& layers, const MlpShape& shape, const Vector& grad
 struct JetTrial::State {
   Mlp mlp;
   JetOrder order;
-  at::Tensor points, cotangents;
+  Tensor points, cotangents;
 };
 
 JetTrial::JetTrial(const MlpShape& shape, Index points, JetOrder order, std::uint64_t seed) {
   Random random(seed, 0x72a1);
-  const auto draw = [&](at::IntArrayRef sizes) {
-    at::Tensor tensor = at::empty(sizes, at::kFloat);
-    float* values = tensor.data_ptr<float>();
-    for (Index i = 0; i < tensor.numel(); ++i) values[i] = static_cast<float>(random.uniform(-1.0, 1.0));
+  const auto draw = [&](SizeList sizes) {
+    Tensor tensor = empty(sizes, NumberType::float32);
+    float* values = tensor.data<float>();
+    for (Index i = 0; i < tensor.count(); ++i) values[i] = static_cast<float>(random.uniform(-1.0, 1.0));
     return tensor;
   };
   state_ = std::make_unique<State>(State{Mlp(shape, seed, false), order, draw({points, 3}),
@@ -117,7 +117,7 @@ JetTrial::~JetTrial() = default;
 void JetTrial::run() {
   const ThreadScope scope;
   state_->mlp.forward(state_->points, state_->order);
-  state_->mlp.gradient().zero_();
+  state_->mlp.gradient().set_zero();
   state_->mlp.pull_back(state_->cotangents);
 }
 

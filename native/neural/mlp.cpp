@@ -1,41 +1,38 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "neural/mlp.h"
 
-#include <ATen/ATen.h>
-#include <ATen/core/LegacyTypeDispatch.h>
-
 #include <algorithm>
 #include <cmath>
 
-#include "core/aten_path.h"
 #include "core/errors.h"
 #include "core/memory.h"
 #include "core/parallel.h"
 #include "core/random.h"
 #include "neural/mlp_sweep.h"
 #include "neural/parameters.h"
+#include "tensors/device_path.h"
+#include "tensors/operations.h"
 
 namespace arapfields {
 
 struct Mlp::State {
   MlpShape shape;
-  at::Tensor parameters, gradient;
+  Tensor parameters, gradient;
   LayerViews layers;   // into parameters
   LayerViews trained;  // what forward() and pull_back() use: the same, perhaps with rounded copies
   // Of the last forward call:
   Blocks kept;
   std::vector<GradientPart> parts;  // the first is the gradient itself
-  at::Tensor result;
+  Tensor result;
   bool fresh = false;
 
-  void prepare(const at::Tensor& points, JetOrder order);
+  void prepare(const Tensor& points, JetOrder order);
 };
 
 namespace {
 
-void check_points(const at::Tensor& points, const at::Tensor& like) {
-  require(points.dim() == 2 && points.size(1) == 3 && points.is_contiguous() &&
-              points.scalar_type() == like.scalar_type() && points.device() == like.device(),
+void check_points(const Tensor& points, const Tensor& like) {
+  require(points.dims() == 2 && points.size(1) == 3 && points.is_contiguous() && alike(points, like),
           "points", "another shape, dtype or device",
           "expected a contiguous (n,3) tensor like the parameters");
 }
@@ -53,23 +50,25 @@ const Block& largest_of(const std::vector<Block>& blocks) {
 
 }  // namespace
 
-void Mlp::State::prepare(const at::Tensor& points, JetOrder order) {
+void Mlp::State::prepare(const Tensor& points, JetOrder order) {
   const Index n = points.size(0);
   const bool same = result.defined() && result.size(0) == columns(order) && result.size(1) == n &&
                     static_cast<int>(kept.workspaces.size()) >= sweep_threads(parameters, kept.blocks.size());
   if (same) return;
   kept = {};  // frees before it allocates
-  if (parameters.is_cpu()) require_memory("batch", kept_numbers(shape, n, order) * parameters.element_size());
-  kept.blocks = split_points(n, order, !on_aten_path(parameters));
+  if (parameters.on_host())
+    require_memory("batch",
+                   kept_numbers(shape, n, order) * (parameters.is_double() ? sizeof(double) : sizeof(float)));
+  kept.blocks = split_points(n, order, !on_device_path(parameters));
   for (Block& block : kept.blocks) allocate(shape, parameters, true, block);
   for (int t = sweep_threads(parameters, kept.blocks.size()); t > 0; --t)
     kept.workspaces.push_back(make_workspace(shape, parameters, largest_of(kept.blocks)));
   parts.clear();
   for (Index g = 0; g < kept.gradient_groups(); ++g) {
-    const at::Tensor flat = g == 0 ? gradient : at::empty_like(gradient);
+    const Tensor flat = g == 0 ? gradient : empty_like(gradient);
     parts.push_back({flat, LayerViews(shape, flat)});
   }
-  result = at::empty({columns(order), n, shape.outputs}, parameters.options());
+  result = empty({columns(order), n, shape.outputs}, parameters);
 }
 
 Mlp::Mlp(const MlpShape& shape, std::uint64_t seed, bool zero_last_layer, bool double_precision,
@@ -78,8 +77,8 @@ Mlp::Mlp(const MlpShape& shape, std::uint64_t seed, bool zero_last_layer, bool d
   const ThreadScope scope;
   const Index count = parameter_count(shape);
   require_memory("width", static_cast<double>(count) * (sizeof(double) + 2 * sizeof(float)));
-  at::Tensor values = at::zeros({count}, at::kDouble);
-  double* next = values.data_ptr<double>();
+  Tensor values = zeros({count}, NumberType::float64);
+  double* next = values.data<double>();
   for (int l = 0; l < shape.layers + (zero_last_layer ? 0 : 1); ++l) {
     Random random(seed, 0x6d6c7000u + static_cast<std::uint64_t>(l));
     const double bound = 1.0 / std::sqrt(shape.fan_in(l));
@@ -89,8 +88,8 @@ Mlp::Mlp(const MlpShape& shape, std::uint64_t seed, bool zero_last_layer, bool d
   state_ = std::make_unique<State>();
   state_->shape = shape;
   state_->parameters =
-      values.to(at::TensorOptions(double_precision ? at::kDouble : at::kFloat).device(at::Device(device)));
-  state_->gradient = at::zeros_like(state_->parameters);
+      values.to(double_precision ? NumberType::float64 : NumberType::float32).to_device(device);
+  state_->gradient = zeros_like(state_->parameters);
   state_->layers = LayerViews(shape, state_->parameters);
   state_->trained = state_->layers;
 }
@@ -100,36 +99,36 @@ Mlp::Mlp(Mlp&&) noexcept = default;
 Mlp& Mlp::operator=(Mlp&&) noexcept = default;
 
 const MlpShape& Mlp::shape() const { return state_->shape; }
-at::Tensor& Mlp::parameters() { return state_->parameters; }
-const at::Tensor& Mlp::parameters() const { return state_->parameters; }
-at::Tensor& Mlp::gradient() { return state_->gradient; }
-at::Tensor Mlp::weight(int layer) const { return state_->layers.weights.at(static_cast<std::size_t>(layer)); }
-at::Tensor Mlp::bias(int layer) const { return state_->layers.biases.at(static_cast<std::size_t>(layer)); }
+Tensor& Mlp::parameters() { return state_->parameters; }
+const Tensor& Mlp::parameters() const { return state_->parameters; }
+Tensor& Mlp::gradient() { return state_->gradient; }
+Tensor Mlp::weight(int layer) const { return state_->layers.weights.at(static_cast<std::size_t>(layer)); }
+Tensor Mlp::bias(int layer) const { return state_->layers.biases.at(static_cast<std::size_t>(layer)); }
 
 void Mlp::round_products(bool rounded) {
-  std::vector<at::Tensor>& copies = state_->trained.rounded;
+  std::vector<Tensor>& copies = state_->trained.rounded;
   copies.clear();
-  if (!rounded || state_->parameters.scalar_type() != at::kFloat) return;
-  for (const at::Tensor& weight : state_->layers.weights) {
+  if (!rounded || state_->parameters.is_double()) return;
+  for (const Tensor& weight : state_->layers.weights) {
     const bool large = weight.size(0) >= 64 && weight.size(1) >= 64;
-    copies.push_back(large ? weight.to(at::kBFloat16) : at::Tensor());
+    copies.push_back(large ? weight.to(NumberType::bfloat16) : Tensor());
   }
 }
 
 void Mlp::release_buffers() {
   state_->kept = {};
   state_->parts.clear();
-  state_->result = at::Tensor();
+  state_->result = Tensor();
   state_->fresh = false;
 }
 
-at::Tensor Mlp::forward(const at::Tensor& points, JetOrder order) {
+Tensor Mlp::forward(const Tensor& points, JetOrder order) {
   const ThreadScope scope;
   State& s = *state_;
   check_points(points, s.parameters);
   s.prepare(points, order);
   for (std::size_t l = 0; l < s.trained.rounded.size(); ++l)
-    if (s.trained.rounded[l].defined()) s.trained.rounded[l].copy_(s.layers.weights[l]);
+    if (s.trained.rounded[l].defined()) s.trained.rounded[l].assign(s.layers.weights[l]);
   s.kept.for_each(s.kept.count(), [&](Block& block, Workspace& space, Index, bool) {
     sweep_forward(s.shape, s.trained, points, block, space, s.result);
   });
@@ -137,34 +136,33 @@ at::Tensor Mlp::forward(const at::Tensor& points, JetOrder order) {
   return s.result;
 }
 
-void Mlp::pull_back(const at::Tensor& cotangents) {
+void Mlp::pull_back(const Tensor& cotangents) {
   const ThreadScope scope;
   State& s = *state_;
   if (!s.fresh) throw std::logic_error("Mlp::pull_back needs a forward call of its own");
-  require(cotangents.sizes() == s.result.sizes() && cotangents.scalar_type() == s.result.scalar_type(),
-          "cotangents", "another shape or dtype than the jets", "they must match");
+  require(same_sizes(cotangents, s.result) && cotangents.type() == s.result.type(), "cotangents",
+          "another shape or dtype than the jets", "they must match");
   s.fresh = false;
   const Index groups = static_cast<Index>(s.parts.size());
   s.kept.for_each(groups, [&](Block& block, Workspace& space, Index group, bool first) {
     GradientPart& part = s.parts[static_cast<std::size_t>(group)];
-    if (first && group > 0) part.flat.zero_();
+    if (first && group > 0) part.flat.set_zero();
     sweep_back(s.shape, s.trained, cotangents, block, space, part.layers);
   });
   if (groups < 2) return;
-  parallel_for(0, s.gradient.numel(), 16384, [&](Index begin, Index end) {
-    const at::AutoDispatchBelowADInplaceOrView quick;
-    at::Tensor sum = s.gradient.slice(0, begin, end);
-    for (std::size_t g = 1; g < s.parts.size(); ++g) sum.add_(s.parts[g].flat.slice(0, begin, end));
+  parallel_for(0, s.gradient.count(), 16384, [&](Index begin, Index end) {
+    Tensor sum = s.gradient.slice(0, begin, end);
+    for (std::size_t g = 1; g < s.parts.size(); ++g) sum.add(s.parts[g].flat.slice(0, begin, end));
   });
 }
 
 namespace {
 
 /// Runs body(block, workspace) over all points with one block's memory a thread.
-void stream_blocks(const MlpShape& shape, const at::Tensor& like, Index n, JetOrder order, bool keep,
+void stream_blocks(const MlpShape& shape, const Tensor& like, Index n, JetOrder order, bool keep,
                    const std::function<void(Block&, Workspace&)>& body) {
   Blocks passing;
-  passing.blocks = split_points(n, order, !on_aten_path(like));
+  passing.blocks = split_points(n, order, !on_device_path(like));
   const int threads = sweep_threads(like, passing.blocks.size());
   std::vector<Block> memory(static_cast<std::size_t>(threads), largest_of(passing.blocks));
   for (Block& block : memory) {
@@ -181,11 +179,11 @@ void stream_blocks(const MlpShape& shape, const at::Tensor& like, Index n, JetOr
 
 }  // namespace
 
-at::Tensor Mlp::evaluate(const at::Tensor& points, JetOrder order) const {
+Tensor Mlp::evaluate(const Tensor& points, JetOrder order) const {
   const ThreadScope scope;
   const State& s = *state_;
   check_points(points, s.parameters);
-  at::Tensor result = at::empty({columns(order), points.size(0), s.shape.outputs}, s.parameters.options());
+  Tensor result = empty({columns(order), points.size(0), s.shape.outputs}, s.parameters);
   stream_blocks(s.shape, s.parameters, points.size(0), order, order == JetOrder::second,
                 [&](Block& block, Workspace& space) {
                   sweep_forward(s.shape, s.layers, points, block, space, result);
@@ -193,13 +191,13 @@ at::Tensor Mlp::evaluate(const at::Tensor& points, JetOrder order) const {
   return result;
 }
 
-void Mlp::evaluate_with_gradient(const at::Tensor& points, at::Tensor& values, at::Tensor& gradients) const {
+void Mlp::evaluate_with_gradient(const Tensor& points, Tensor& values, Tensor& gradients) const {
   const ThreadScope scope;
   const State& s = *state_;
   check_points(points, s.parameters);
   require(s.shape.outputs == 1, "network", std::to_string(s.shape.outputs) + " outputs", "expected one");
-  values = at::empty({1, points.size(0), 1}, s.parameters.options());
-  gradients = at::empty({points.size(0), 3}, s.parameters.options());
+  values = empty({1, points.size(0), 1}, s.parameters);
+  gradients = empty({points.size(0), 3}, s.parameters);
   stream_blocks(s.shape, s.parameters, points.size(0), JetOrder::value, true,
                 [&](Block& block, Workspace& space) {
                   sweep_forward(s.shape, s.layers, points, block, space, values);

@@ -8,11 +8,9 @@
 #include "core/jets.h"
 #include "neural/mlp_shape.h"
 
-namespace at {
-class Tensor;
-}
-
 namespace arapfields {
+
+class Tensor;
 
 /// The network with explicit jets. Values and first input derivatives travel through the layers as columns
 /// (core/jets.h), one matrix product a layer for all of them. Second derivatives need no columns of their
@@ -34,10 +32,10 @@ class Mlp {
 
   /// Jets at the points; keeps what pull_back needs until the next call. The result is a buffer of the
   /// network's: the next forward call overwrites it.
-  at::Tensor forward(const at::Tensor& points, JetOrder order);
+  Tensor forward(const Tensor& points, JetOrder order);
   /// Adds Σ ⟨cotangents, ∂jets/∂parameters⟩ of the last forward call to gradient(). Once for each forward
   /// call: it consumes the kept activations.
-  void pull_back(const at::Tensor& cotangents);
+  void pull_back(const Tensor& cotangents);
 
   /// Whether forward() and pull_back() round the factors and the results of the hidden layers' products to
   /// bfloat16, which processors with such instructions (AVX512-BF16, AMX) multiply twice as fast. Everything
@@ -49,18 +47,18 @@ class Mlp {
   void release_buffers();
 
   /// Jets at the points, nothing kept, in chunks: memory beyond the result does not grow with n.
-  at::Tensor evaluate(const at::Tensor& points, JetOrder order) const;
+  Tensor evaluate(const Tensor& points, JetOrder order) const;
   /// For networks with one output: values (n) and input gradients (n,3) by one backward sweep a chunk.
-  void evaluate_with_gradient(const at::Tensor& points, at::Tensor& values, at::Tensor& gradients) const;
+  void evaluate_with_gradient(const Tensor& points, Tensor& values, Tensor& gradients) const;
 
   /// All weights and biases, and their gradient, as one contiguous vector (p): weight 0, bias 0, weight 1, …
-  at::Tensor& parameters();
-  const at::Tensor& parameters() const;
-  at::Tensor& gradient();
+  Tensor& parameters();
+  const Tensor& parameters() const;
+  Tensor& gradient();
   /// Views (fan_out, fan_in) and (fan_out) into parameters(); `layer` runs from 0 to shape().layers, the
   /// output's.
-  at::Tensor weight(int layer) const;
-  at::Tensor bias(int layer) const;
+  Tensor weight(int layer) const;
+  Tensor bias(int layer) const;
 
  private:
   struct State;

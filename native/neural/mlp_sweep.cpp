@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "neural/mlp_sweep.h"
 
-#include <ATen/ATen.h>
-#include <ATen/core/LegacyTypeDispatch.h>
-
 #include <algorithm>
 
-#include "core/aten_path.h"
 #include "core/parallel.h"
 #include "neural/jet_layer.h"
+#include "tensors/device_path.h"
+#include "tensors/operations.h"
 
 namespace arapfields {
 namespace {
@@ -16,124 +14,118 @@ namespace {
 std::size_t at_(int i) { return static_cast<std::size_t>(i); }
 
 /// The first rows·cols numbers of a flat buffer as a matrix.
-at::Tensor matrix(const at::Tensor& flat, Index rows, Index cols) {
+Tensor matrix(const Tensor& flat, Index rows, Index cols) {
   return flat.narrow(0, 0, rows * cols).view({rows, cols});
 }
 
-/// c (+)= a b, into c's own memory.
-void product(at::Tensor c, const at::Tensor& a, const at::Tensor& b) { at::mm_out(c, a, b); }
-void add_product(at::Tensor c, const at::Tensor& a, const at::Tensor& b) { at::addmm_out(c, c, a, b); }
-
 /// The rounded copy of layer l's weight; undefined where its products are exact.
-at::Tensor rounded_weight(const LayerViews& layers, int l) {
-  return at_(l) < layers.rounded.size() ? layers.rounded[at_(l)] : at::Tensor();
+Tensor rounded_weight(const LayerViews& layers, int l) {
+  return at_(l) < layers.rounded.size() ? layers.rounded[at_(l)] : Tensor();
 }
 
 /// c = a Wᵀ or a W for layer l's weight W.
-void times_weight(at::Tensor c, const at::Tensor& a, const LayerViews& layers, int l, bool transposed) {
-  const at::Tensor rounded = rounded_weight(layers, l);
-  const at::Tensor& weight = rounded.defined() ? rounded : layers.weights[at_(l)];
-  const at::Tensor b = transposed ? weight.t() : weight;
+void times_weight(Tensor c, const Tensor& a, const LayerViews& layers, int l, bool transposed) {
+  const Tensor rounded = rounded_weight(layers, l);
+  const Tensor& weight = rounded.defined() ? rounded : layers.weights[at_(l)];
+  const Tensor b = transposed ? weight.t() : weight;
   if (rounded.defined())
-    c.copy_(at::mm(a.to(at::kBFloat16), b));
+    c.assign(product(a.to(NumberType::bfloat16), b));
   else
-    product(c, a, b);
+    multiply(c, a, b);
 }
 
 /// gradient += aᵀ b, the part of layer l's weight.
-void add_outer(at::Tensor gradient, const at::Tensor& a, const at::Tensor& b, const LayerViews& layers,
-               int l) {
+void add_outer(Tensor gradient, const Tensor& a, const Tensor& b, const LayerViews& layers, int l) {
   if (rounded_weight(layers, l).defined())
-    gradient.add_(at::mm(a.to(at::kBFloat16).t(), b.to(at::kBFloat16)));
+    gradient += product(a.to(NumberType::bfloat16).t(), b.to(NumberType::bfloat16));
   else
-    add_product(gradient, a.t(), b);
+    add_multiplied(gradient, a.t(), b);
 }
 
 int derivatives_of(const Block& block) { return block.columns == 4 ? 2 : 1; }
 
 /// Pre-activations of the first layer: each coordinate's derivatives meet their own part of the weight alone.
-void encode_layer(const MlpShape& shape, const at::Tensor& weight, const at::Tensor& points, Block& block) {
+void encode_layer(const MlpShape& shape, const Tensor& weight, const Tensor& points, Block& block) {
   encode_points(points.narrow(0, block.begin, block.count), shape.frequency, shape.octaves, block.encoding);
   const Index m = block.count, part = 2 * shape.octaves;
-  at::Tensor& z = block.activations[0];
-  product(z.narrow(0, 0, m), block.encoding[0], weight.t());
+  Tensor& z = block.activations[0];
+  multiply(z.narrow(0, 0, m), block.encoding[0], weight.t());
   for (int derivative = 1; derivative < derivatives_of(block); ++derivative)
     for (int i = 0; i < 3; ++i)
-      product(z.narrow(0, (3 * derivative - 2 + i) * m, m),
-              block.encoding[derivative].narrow(1, i * part, part), weight.narrow(1, i * part, part).t());
+      multiply(z.narrow(0, (3 * derivative - 2 + i) * m, m),
+               block.encoding[derivative].narrow(1, i * part, part), weight.narrow(1, i * part, part).t());
 }
 
-void encode_layer_back(const MlpShape& shape, const at::Tensor& cotangents, Block& block,
-                       at::Tensor gradient) {
+void encode_layer_back(const MlpShape& shape, const Tensor& cotangents, Block& block, Tensor gradient) {
   const Index m = block.count, part = 2 * shape.octaves;
-  add_product(gradient, cotangents.narrow(0, 0, m).t(), block.encoding[0]);
+  add_multiplied(gradient, cotangents.narrow(0, 0, m).t(), block.encoding[0]);
   for (int derivative = 1; derivative < derivatives_of(block); ++derivative)
     for (int i = 0; i < 3; ++i)
-      add_product(gradient.narrow(1, i * part, part),
-                  cotangents.narrow(0, (3 * derivative - 2 + i) * m, m).t(),
-                  block.encoding[derivative].narrow(1, i * part, part));
+      add_multiplied(gradient.narrow(1, i * part, part),
+                     cotangents.narrow(0, (3 * derivative - 2 + i) * m, m).t(),
+                     block.encoding[derivative].narrow(1, i * part, part));
 }
 
 /// The derivatives of the outputs by the activations of layer l: rows for each point, at the top for all.
-const at::Tensor& adjoints_of(const LayerViews& layers, const Block& block, int l) {
+const Tensor& adjoints_of(const LayerViews& layers, const Block& block, int l) {
   return at_(l) < block.adjoints.size() ? block.adjoints[at_(l)] : layers.weights.back();
 }
 
 /// The encoding's entries as (count, 3, 2·octaves): an entry depends on one coordinate alone, so its second
 /// derivatives are one number each.
-at::Tensor by_coordinate(const at::Tensor& entries, const MlpShape& shape) {
+Tensor by_coordinate(const Tensor& entries, const MlpShape& shape) {
   return entries.view({-1, 3, 2 * shape.octaves});
 }
 
 /// Downwards after the forward sweep: the outputs' derivatives by every layer, and with them the second
 /// derivatives into result[4:10, begin:begin+count].
 void sweep_adjoints(const MlpShape& shape, const LayerViews& layers, Block& block, Workspace& space,
-                    at::Tensor& result) {
+                    Tensor& result) {
   const Index m = block.count, rows = shape.outputs * m;
-  at::Tensor below = matrix(space.jets, rows, shape.width);
-  at::Tensor second = space.second.narrow(0, 0, m * 6 * shape.outputs).view({m, 6, shape.outputs}).zero_();
+  Tensor below = matrix(space.jets, rows, shape.width);
+  Tensor second = space.second.narrow(0, 0, m * 6 * shape.outputs).view({m, 6, shape.outputs});
+  second.set_zero();
   for (int l = shape.layers - 1; l >= 0; --l) {
     adjoint_layer(shape.softplus_sharpness, block.activations[at_(l)], block.slope[at_(l)],
                   adjoints_of(layers, block, l), below, second);
     if (l > 0) times_weight(block.adjoints[at_(l - 1)], below, layers, l, false);
   }
-  at::Tensor encoded = matrix(space.below, rows, shape.encoded());
-  product(encoded, below, layers.weights[0]);
-  const at::Tensor bent = encoded.view({shape.outputs, m, 3, 2 * shape.octaves})
-                              .mul_(by_coordinate(block.encoding[2], shape))
-                              .sum(3);
-  second.narrow(1, 0, 3).add_(bent.permute({1, 2, 0}));
-  result.narrow(0, 4, 6).narrow(1, block.begin, m).copy_(second.transpose(0, 1));
+  Tensor encoded = matrix(space.below, rows, shape.encoded());
+  multiply(encoded, below, layers.weights[0]);
+  const Tensor entries = encoded.view({shape.outputs, m, 3, 2 * shape.octaves});
+  const Tensor bent = sum(entries *= by_coordinate(block.encoding[2], shape), {3});
+  second.narrow(1, 0, 3) += bent.permute({1, 2, 0});
+  result.narrow(0, 4, 6).narrow(1, block.begin, m).assign(second.transpose(0, 1));
 }
 
 /// The way back of sweep_adjoints(), upwards: adds to `gradient`, and leaves in space.partial what the
 /// activations of each layer receive.
-void sweep_adjoints_back(const MlpShape& shape, const LayerViews& layers, const at::Tensor& cotangents,
+void sweep_adjoints_back(const MlpShape& shape, const LayerViews& layers, const Tensor& cotangents,
                          Block& block, Workspace& space, LayerViews& gradient) {
   const Index m = block.count, rows = shape.outputs * m;
-  at::Tensor second = space.second.narrow(0, 0, m * 6 * shape.outputs).view({m, 6, shape.outputs});
-  second.copy_(cotangents.narrow(0, 4, 6).narrow(1, block.begin, m).transpose(0, 1));
-  at::Tensor here = matrix(space.jets, rows, shape.width), spare = matrix(space.other, rows, shape.width);
-  at::Tensor encoded = at::empty({shape.outputs, m, 3, 2 * shape.octaves}, second.options());
-  at::mul_out(encoded, second.narrow(1, 0, 3).permute({2, 0, 1}).unsqueeze(3),
-              by_coordinate(block.encoding[2], shape));
-  at::Tensor lower = encoded.view({rows, shape.encoded()});
+  Tensor second = space.second.narrow(0, 0, m * 6 * shape.outputs).view({m, 6, shape.outputs});
+  second.assign(cotangents.narrow(0, 4, 6).narrow(1, block.begin, m).transpose(0, 1));
+  Tensor here = matrix(space.jets, rows, shape.width), spare = matrix(space.other, rows, shape.width);
+  Tensor encoded = empty({shape.outputs, m, 3, 2 * shape.octaves}, second);
+  multiply_elements(encoded, second.narrow(1, 0, 3).permute({2, 0, 1}).unsqueeze(3),
+                    by_coordinate(block.encoding[2], shape));
+  Tensor lower = encoded.view({rows, shape.encoded()});
   for (int l = 0; l < shape.layers; ++l) {
     times_weight(here, lower, layers, l, true);
-    at::Tensor below = matrix(space.below, rows, shape.width);
-    at::Tensor partial = matrix(space.partial[at_(l)], block.columns * m, shape.width);
+    Tensor below = matrix(space.below, rows, shape.width);
+    Tensor partial = matrix(space.partial[at_(l)], block.columns * m, shape.width);
     adjoint_layer_back(shape.softplus_sharpness, block.activations[at_(l)], block.slope[at_(l)],
                        adjoints_of(layers, block, l), second, here, below, partial);
     add_outer(gradient.weights[at_(l)], below, lower, layers, l);
     lower = here;
     std::swap(here, spare);
   }
-  gradient.weights.back().add_(lower.view({shape.outputs, m, shape.width}).sum(1));
+  gradient.weights.back() += sum(lower.view({shape.outputs, m, shape.width}), {1});
 }
 
 }  // namespace
 
-LayerViews::LayerViews(const MlpShape& shape, const at::Tensor& flat) {
+LayerViews::LayerViews(const MlpShape& shape, const Tensor& flat) {
   Index begin = 0;
   for (int l = 0; l <= shape.layers; ++l) {
     const Index out = shape.fan_out(l), in = shape.fan_in(l);
@@ -143,8 +135,8 @@ LayerViews::LayerViews(const MlpShape& shape, const at::Tensor& flat) {
   }
 }
 
-int sweep_threads(const at::Tensor& like, std::size_t blocks) {
-  return on_aten_path(like)
+int sweep_threads(const Tensor& like, std::size_t blocks) {
+  return on_device_path(like)
              ? 1
              : static_cast<int>(std::min<std::size_t>(blocks, static_cast<std::size_t>(thread_count())));
 }
@@ -167,19 +159,19 @@ std::vector<Block> split_points(Index n, JetOrder order, bool in_cache) {
   return blocks;
 }
 
-void allocate(const MlpShape& shape, const at::Tensor& like, bool keep, Block& block) {
+void allocate(const MlpShape& shape, const Tensor& like, bool keep, Block& block) {
   const Index m = block.count, stored = block.second ? 3 : 2;
-  block.encoding = at::empty({stored, m, shape.encoded()}, like.options());
+  block.encoding = empty({stored, m, shape.encoded()}, like);
   block.activations.clear(), block.slope.clear(), block.adjoints.clear();
   // Where nothing is kept, two buffers take turns.
   for (int l = 0; l < shape.layers; ++l) {
     const bool own = keep || l < 2;
-    block.activations.push_back(own ? at::empty({block.columns * m, shape.width}, like.options())
+    block.activations.push_back(own ? empty({block.columns * m, shape.width}, like)
                                     : block.activations[at_(l - 2)]);
-    block.slope.push_back(keep ? at::empty({m, shape.width}, like.options()) : at::Tensor());
+    block.slope.push_back(keep ? empty({m, shape.width}, like) : Tensor());
   }
   for (int l = 0; l + 1 < shape.layers && block.second; ++l)
-    block.adjoints.push_back(at::empty({shape.outputs * m, shape.width}, like.options()));
+    block.adjoints.push_back(empty({shape.outputs * m, shape.width}, like));
 }
 
 void borrow(const Block& memory, Block& block) {
@@ -188,26 +180,25 @@ void borrow(const Block& memory, Block& block) {
                        .narrow(0, 0, memory.encoding.size(0) * m * memory.encoding.size(2))
                        .view({memory.encoding.size(0), m, memory.encoding.size(2)});
   block.activations.clear(), block.slope.clear(), block.adjoints.clear();
-  for (const at::Tensor& activations : memory.activations)
+  for (const Tensor& activations : memory.activations)
     block.activations.push_back(activations.narrow(0, 0, block.columns * m));
-  for (const at::Tensor& slope : memory.slope)
+  for (const Tensor& slope : memory.slope)
     block.slope.push_back(slope.defined() ? slope.narrow(0, 0, m) : slope);
-  for (const at::Tensor& adjoints : memory.adjoints)
+  for (const Tensor& adjoints : memory.adjoints)
     block.adjoints.push_back(adjoints.narrow(0, 0, adjoints.size(0) / memory.count * m));
 }
 
-Workspace make_workspace(const MlpShape& shape, const at::Tensor& like, const Block& largest) {
+Workspace make_workspace(const MlpShape& shape, const Tensor& like, const Block& largest) {
   Workspace space;
   const Index m = largest.count, plane = m * shape.width;
   const Index wide = largest.second ? std::max(largest.columns, shape.outputs) : largest.columns;
-  space.jets = at::empty({wide * plane}, like.options());
-  space.other = at::empty({wide * plane}, like.options());
-  space.output = at::empty({largest.columns * m * shape.outputs}, like.options());
+  space.jets = empty({wide * plane}, like);
+  space.other = empty({wide * plane}, like);
+  space.output = empty({largest.columns * m * shape.outputs}, like);
   if (!largest.second) return space;
-  space.below = at::empty({shape.outputs * std::max(plane, m * shape.encoded())}, like.options());
-  space.second = at::empty({m * 6 * shape.outputs}, like.options());
-  for (int l = 0; l < shape.layers; ++l)
-    space.partial.push_back(at::empty({largest.columns * plane}, like.options()));
+  space.below = empty({shape.outputs * std::max(plane, m * shape.encoded())}, like);
+  space.second = empty({m * 6 * shape.outputs}, like);
+  for (int l = 0; l < shape.layers; ++l) space.partial.push_back(empty({largest.columns * plane}, like));
   return space;
 }
 
@@ -219,21 +210,20 @@ Index Blocks::gradient_groups() const {
 void Blocks::for_each(Index groups, const std::function<void(Block&, Workspace&, Index, bool)>& body) {
   const ThreadScope scope(std::min(thread_count(), static_cast<int>(workspaces.size())));
   parallel_jobs_in_slots(groups, [&](Index g, Index slot) {
-    const at::AutoDispatchBelowADInplaceOrView quick;  // plain kernels, no bookkeeping
     const Index begin = g * count() / groups, end = (g + 1) * count() / groups;
     for (Index b = begin; b < end; ++b)
       body(blocks[static_cast<std::size_t>(b)], workspaces[static_cast<std::size_t>(slot)], g, b == begin);
   });
 }
 
-void sweep_forward(const MlpShape& shape, const LayerViews& layers, const at::Tensor& points, Block& block,
-                   Workspace& space, at::Tensor& result) {
+void sweep_forward(const MlpShape& shape, const LayerViews& layers, const Tensor& points, Block& block,
+                   Workspace& space, Tensor& result) {
   if (block.count == 0) return;
   const Index rows = block.columns * block.count;
-  at::Tensor jets = matrix(space.jets, rows, shape.width);
+  Tensor jets = matrix(space.jets, rows, shape.width);
   for (int l = 0; l < shape.layers; ++l) {
-    at::Tensor& activations = block.activations[at_(l)];
-    const at::Tensor& below = block.columns == 1 && l > 0 ? block.activations[at_(l - 1)] : jets;
+    Tensor& activations = block.activations[at_(l)];
+    const Tensor& below = block.columns == 1 && l > 0 ? block.activations[at_(l - 1)] : jets;
     if (l == 0)
       encode_layer(shape, layers.weights[0], points, block);
     else
@@ -241,30 +231,30 @@ void sweep_forward(const MlpShape& shape, const LayerViews& layers, const at::Te
     activate_layer({shape.softplus_sharpness, block.columns}, activations, block.slope[at_(l)], jets,
                    layers.biases[at_(l)]);
   }
-  const at::Tensor& top = block.columns == 1 ? block.activations.back() : jets;
-  at::Tensor output = matrix(space.output, rows, shape.outputs);
-  product(output, top, layers.weights.back().t());
-  output.narrow(0, 0, block.count).add_(layers.biases.back());
+  const Tensor& top = block.columns == 1 ? block.activations.back() : jets;
+  Tensor output = matrix(space.output, rows, shape.outputs);
+  multiply(output, top, layers.weights.back().t());
+  output.narrow(0, 0, block.count).add(layers.biases.back());
   result.narrow(0, 0, block.columns)
       .narrow(1, block.begin, block.count)
-      .copy_(output.view({block.columns, block.count, shape.outputs}));
+      .assign(output.view({block.columns, block.count, shape.outputs}));
   if (block.second) sweep_adjoints(shape, layers, block, space, result);
 }
 
-void sweep_back(const MlpShape& shape, const LayerViews& layers, const at::Tensor& cotangents, Block& block,
+void sweep_back(const MlpShape& shape, const LayerViews& layers, const Tensor& cotangents, Block& block,
                 Workspace& space, LayerViews& gradient) {
   if (block.count == 0) return;
   const Index rows = block.columns * block.count;
-  at::Tensor upper = matrix(space.output, rows, shape.outputs);
+  Tensor upper = matrix(space.output, rows, shape.outputs);
   upper.view({block.columns, block.count, shape.outputs})
-      .copy_(cotangents.narrow(0, 0, block.columns).narrow(1, block.begin, block.count));
+      .assign(cotangents.narrow(0, 0, block.columns).narrow(1, block.begin, block.count));
   if (block.second) sweep_adjoints_back(shape, layers, cotangents, block, space, gradient);
-  gradient.biases.back().add_(upper.narrow(0, 0, block.count).sum(0));
-  at::Tensor here = matrix(space.jets, rows, shape.width), spare = matrix(space.other, rows, shape.width);
+  gradient.biases.back() += sum(upper.narrow(0, 0, block.count), {0});
+  Tensor here = matrix(space.jets, rows, shape.width), spare = matrix(space.other, rows, shape.width);
   for (int l = shape.layers - 1; l >= 0; --l) {
-    at::Tensor& activations = block.activations[at_(l)];
+    Tensor& activations = block.activations[at_(l)];
     times_weight(here, upper, layers, l + 1, false);
-    const at::Tensor partial = block.second ? matrix(space.partial[at_(l)], rows, shape.width) : at::Tensor();
+    const Tensor partial = block.second ? matrix(space.partial[at_(l)], rows, shape.width) : Tensor();
     activate_layer_back({shape.softplus_sharpness, block.columns}, activations, block.slope[at_(l)], partial,
                         here, gradient.biases[at_(l)]);
     add_outer(gradient.weights[at_(l + 1)], upper, activations, layers, l + 1);
@@ -275,18 +265,18 @@ void sweep_back(const MlpShape& shape, const LayerViews& layers, const at::Tenso
 }
 
 void sweep_to_points(const MlpShape& shape, const LayerViews& layers, Block& block, Workspace& space,
-                     at::Tensor& gradients) {
+                     Tensor& gradients) {
   if (block.count == 0) return;
   const Index m = block.count;
-  at::Tensor here = matrix(space.jets, m, shape.width), spare = matrix(space.other, m, shape.width);
-  at::mul_out(here, block.slope.back(), layers.weights.back());
+  Tensor here = matrix(space.jets, m, shape.width), spare = matrix(space.other, m, shape.width);
+  multiply_elements(here, block.slope.back(), layers.weights.back());
   for (int l = shape.layers - 2; l >= 0; --l) {
-    product(spare, here, layers.weights[at_(l + 1)]);
-    spare.mul_(block.slope[at_(l)]);
+    multiply(spare, here, layers.weights[at_(l + 1)]);
+    spare *= block.slope[at_(l)];
     std::swap(here, spare);
   }
-  const at::Tensor encoded = at::mm(here, layers.weights[0]).mul_(block.encoding[1]);
-  gradients.narrow(0, block.begin, m).copy_(encoded.view({m, 3, 2 * shape.octaves}).sum(2));
+  const Tensor encoded = product(here, layers.weights[0]) *= block.encoding[1];
+  gradients.narrow(0, block.begin, m).assign(sum(encoded.view({m, 3, 2 * shape.octaves}), {2}));
 }
 
 }  // namespace arapfields

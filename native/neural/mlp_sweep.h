@@ -2,22 +2,21 @@
 // The two sweeps through the layers, for one block of points; for libtorch sources alone.
 #pragma once
 
-#include <ATen/core/Tensor.h>
-
 #include <functional>
 #include <vector>
 
 #include "neural/mlp.h"
+#include "tensors/tensor.h"
 
 namespace arapfields {
 
 /// Each layer's weight (fan_out, fan_in) and bias (fan_out) as views into one flat vector.
 struct LayerViews {
   LayerViews() = default;
-  LayerViews(const MlpShape& shape, const at::Tensor& flat);
-  std::vector<at::Tensor> weights, biases;
+  LayerViews(const MlpShape& shape, const Tensor& flat);
+  std::vector<Tensor> weights, biases;
   /// Copies of weights in bfloat16 for the products that shall be rounded; undefined, or none, elsewhere.
-  std::vector<at::Tensor> rounded;
+  std::vector<Tensor> rounded;
 };
 
 /// A range of points and what the forward sweep computes for it. activations[l] is (columns·count, width):
@@ -30,20 +29,20 @@ struct Block {
   Index count = 0;
   int columns = 1;
   bool second = false;
-  at::Tensor encoding;
-  std::vector<at::Tensor> activations, slope, adjoints;
+  Tensor encoding;
+  std::vector<Tensor> activations, slope, adjoints;
 };
 
 /// What one thread needs besides: flat buffers for the largest block, the last three for second derivatives.
 struct Workspace {
-  at::Tensor jets, other, output;
-  at::Tensor below, second;
-  std::vector<at::Tensor> partial;
+  Tensor jets, other, output;
+  Tensor below, second;
+  std::vector<Tensor> partial;
 };
 
 /// Where a group of blocks adds up its part of the parameter gradient.
 struct GradientPart {
-  at::Tensor flat;
+  Tensor flat;
   LayerViews layers;
 };
 
@@ -66,23 +65,23 @@ struct Blocks {
 /// few; large ones where a core's cache does not matter.
 std::vector<Block> split_points(Index n, JetOrder order, bool in_cache);
 /// Threads that sweeps of so many blocks of tensors like `like` are split over.
-int sweep_threads(const at::Tensor& like, std::size_t blocks);
+int sweep_threads(const Tensor& like, std::size_t blocks);
 
 /// Gives a block its memory; for every layer where `keep` asks for the activations. With one column the
 /// encoding always has its first derivatives, for sweep_to_points().
-void allocate(const MlpShape& shape, const at::Tensor& like, bool keep, Block& block);
+void allocate(const MlpShape& shape, const Tensor& like, bool keep, Block& block);
 /// Lends the memory of a block of at least as many points and the same order.
 void borrow(const Block& memory, Block& block);
-Workspace make_workspace(const MlpShape& shape, const at::Tensor& like, const Block& largest);
+Workspace make_workspace(const MlpShape& shape, const Tensor& like, const Block& largest);
 
 /// Jets of the block's points into result[:, begin:begin+count]. Second derivatives need a kept block.
-void sweep_forward(const MlpShape& shape, const LayerViews& layers, const at::Tensor& points, Block& block,
-                   Workspace& space, at::Tensor& result);
+void sweep_forward(const MlpShape& shape, const LayerViews& layers, const Tensor& points, Block& block,
+                   Workspace& space, Tensor& result);
 /// Adds to `gradient`; consumes the block.
-void sweep_back(const MlpShape& shape, const LayerViews& layers, const at::Tensor& cotangents, Block& block,
+void sweep_back(const MlpShape& shape, const LayerViews& layers, const Tensor& cotangents, Block& block,
                 Workspace& space, LayerViews& gradient);
 /// ∂(the one output)/∂point after a kept forward sweep with one column; consumes the block.
 void sweep_to_points(const MlpShape& shape, const LayerViews& layers, Block& block, Workspace& space,
-                     at::Tensor& gradients);
+                     Tensor& gradients);
 
 }  // namespace arapfields

@@ -3,8 +3,8 @@
 
 #include "core/errors.h"
 #include "core/parallel.h"
-#include "core/tensors.h"
 #include "neural/layers.h"
+#include "tensors/views.h"
 
 namespace arapfields {
 NeuralSdf::NeuralSdf(Mlp mlp, const Frame& frame)
@@ -28,7 +28,7 @@ std::shared_ptr<NeuralSdf> NeuralSdf::from_layers(const Layers& layers, int octa
 void NeuralSdf::evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> values) const {
   const ThreadScope scope;
   if (points.rows() == 0) return;
-  tensor_view(values).copy_(
+  tensor_view(values).assign(
       mlp_->evaluate(tensor_like(points, mlp_->parameters()), JetOrder::value).view({-1}));
 }
 
@@ -36,10 +36,10 @@ void NeuralSdf::evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> value
                          Eigen::Ref<PointsF> gradients) const {
   const ThreadScope scope;
   if (points.rows() == 0) return;
-  at::Tensor value, gradient;
+  Tensor value, gradient;
   mlp_->evaluate_with_gradient(tensor_like(points, mlp_->parameters()), value, gradient);
-  tensor_view(values).copy_(value);
-  tensor_view(gradients).copy_(gradient);
+  tensor_view(values).assign(value);
+  tensor_view(gradients).assign(gradient);
 }
 
 Vector NeuralSdf::distances(PointsIn points) const {

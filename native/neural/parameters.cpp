@@ -3,7 +3,7 @@
 
 #include "core/errors.h"
 #include "core/parallel.h"
-#include "core/tensors.h"
+#include "tensors/views.h"
 
 namespace arapfields {
 
@@ -31,16 +31,15 @@ std::vector<MatrixPlace> hidden_matrices(const MlpShape& shape) {
 
 VectorF parameters_of(const Mlp& mlp) {
   const ThreadScope scope;
-  const at::Tensor host = mlp.parameters().to(at::kCPU, at::kFloat).contiguous();
-  return Eigen::Map<const VectorF>(host.const_data_ptr<float>(), host.numel());
+  return floats_of(mlp.parameters());
 }
 
 void set_parameters(Mlp& mlp, const VectorF& parameters) {
   const ThreadScope scope;
-  at::Tensor& own = mlp.parameters();
-  require(parameters.size() == own.numel(), "weights", std::to_string(parameters.size()) + " numbers",
-          "this network has " + std::to_string(own.numel()));
-  own.copy_(tensor_view(parameters));
+  Tensor& own = mlp.parameters();
+  require(parameters.size() == own.count(), "weights", std::to_string(parameters.size()) + " numbers",
+          "this network has " + std::to_string(own.count()));
+  own.assign(tensor_view(parameters));
 }
 
 }  // namespace arapfields

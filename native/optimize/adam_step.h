@@ -6,11 +6,9 @@
 
 #include "core/types.h"
 
-namespace at {
-class Tensor;
-}
-
 namespace arapfields {
+
+class Tensor;
 
 struct AdamOptions {
   double beta1 = 0.9;   ///< β1, of the gradient's running mean
@@ -23,16 +21,15 @@ struct AdamOptions {
 class AdamStep {
  public:
   /// Keeps nothing of `parameters` but its size, dtype and device.
-  explicit AdamStep(const at::Tensor& parameters, const AdamOptions& options = {});
+  explicit AdamStep(const Tensor& parameters, const AdamOptions& options = {});
   ~AdamStep();
   AdamStep(AdamStep&&) noexcept;
   AdamStep& operator=(AdamStep&&) noexcept;
 
   /// parameters −= learning_rate · (mean / √square), both corrected.
-  void step(at::Tensor& parameters, const at::Tensor& gradient, double learning_rate);
+  void step(Tensor& parameters, const Tensor& gradient, double learning_rate);
   /// The same for entries [begin, end) alone; the caller counts steps by next_step().
-  void step_range(at::Tensor& parameters, const at::Tensor& gradient, double learning_rate, Index begin,
-                  Index end);
+  void step_range(Tensor& parameters, const Tensor& gradient, double learning_rate, Index begin, Index end);
   void next_step();
 
  private:

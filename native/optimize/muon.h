@@ -9,6 +9,8 @@
 
 namespace arapfields {
 
+class Tensor;
+
 struct MuonOptions {
   double momentum = 0.95;
   int iterations = 5;       ///< of the Newton–Schulz polynomial
@@ -22,15 +24,14 @@ struct MuonOptions {
 class Muon {
  public:
   /// `matrices` in the order of the parameters (p), which are all else Adam's.
-  Muon(const at::Tensor& parameters, const std::vector<MatrixPlace>& matrices,
-       const MuonOptions& options = {});
+  Muon(const Tensor& parameters, const std::vector<MatrixPlace>& matrices, const MuonOptions& options = {});
   ~Muon();
   Muon(Muon&&) noexcept;
   Muon& operator=(Muon&&) noexcept;
 
   /// One step along the gradient. `learning_rate` is the change of a matrix's singular
   /// values, times √(rows/columns) where there are more rows.
-  void step(at::Tensor& parameters, at::Tensor& gradient, double learning_rate);
+  void step(Tensor& parameters, Tensor& gradient, double learning_rate);
 
  private:
   struct State;

@@ -7,11 +7,9 @@
 #include "optimize/matrix_place.h"
 #include "options/training.h"
 
-namespace at {
-class Tensor;
-}
-
 namespace arapfields {
+
+class Tensor;
 
 /// What no option asks for. Short memories (momentum, betas) suit the few hundred steps of a solve.
 struct OptimizerOptions {
@@ -23,8 +21,8 @@ struct OptimizerOptions {
 /// What a first-order method moves: parameters and their gradient, each one contiguous vector, and the
 /// matrices of hidden layers among them, in their order.
 struct Trainable {
-  at::Tensor& parameters;
-  at::Tensor& gradient;
+  Tensor& parameters;
+  Tensor& gradient;
   std::vector<MatrixPlace> matrices = {};
 };
 

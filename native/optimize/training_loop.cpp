@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "optimize/training_loop.h"
 
-#include <ATen/ATen.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include "core/aten_path.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
+#include "tensors/device_path.h"
+#include "tensors/operations.h"
+#include "tensors/views.h"
 
 namespace arapfields {
 namespace {
@@ -17,25 +17,25 @@ namespace {
 /// Losses stay where they were computed until a run of them is read at once: a read waits for the device.
 class Losses {
  public:
-  explicit Losses(const at::Tensor& like)
-      : every_(on_aten_path(like) ? 25 : 1), run_(at::zeros({every_}, like.options().dtype(at::kDouble))) {}
+  explicit Losses(const Tensor& like)
+      : every_(on_device_path(like) ? 25 : 1), run_(upload(zeros({every_}, NumberType::float64), like)) {}
   /// Whether as many as are read at once are there, the `iteration`-th included.
   bool due(int iteration) const { return (iteration + 1) % every_ == 0; }
-  void keep(int iteration, const at::Tensor& loss) {
-    run_.select(0, iteration % every_).copy_(loss);
+  void keep(int iteration, const Tensor& loss) {
+    run_.select(0, iteration % every_).assign(loss);
     kept_ = iteration + 1;
   }
   /// Those not read yet: consume(iteration, loss).
   template <class Consume>
   void read(Consume&& consume) {
-    const at::Tensor host = run_.to(at::kCPU);
-    const double* values = host.const_data_ptr<double>();
+    const Tensor host = run_.to_host();
+    const double* values = host.data<double>();
     for (; read_ < kept_; ++read_) consume(read_, values[read_ % every_]);
   }
 
  private:
   int every_, kept_ = 0, read_ = 0;
-  at::Tensor run_;
+  Tensor run_;
 };
 
 /// One run: what the loop carries from iteration to iteration.
@@ -61,12 +61,12 @@ class Run {
       }
       const double share = options_.schedule.share(iteration, done);
       for (int step = 1; step < options_.steps; ++step) {
-        trained_.gradient.zero_();
+        trained_.gradient.set_zero();
         body_.accumulate(iteration);
         optimizer_.step(share);
         progress_.check();
       }
-      trained_.gradient.zero_();
+      trained_.gradient.set_zero();
       losses_.keep(iteration, body_.accumulate(iteration));
       if (losses_.due(iteration) && look() && body_.is_good_enough()) {
         result_.stopped_by = StopReason::target;
@@ -82,7 +82,7 @@ class Run {
       }
     }
     read_losses();
-    if (!at::isfinite(trained_.parameters).all().item<bool>()) diverge(iteration);
+    if (!all_finite(trained_.parameters)) diverge(iteration);
     result_.seconds = watch_.seconds();
     progress_.report(1.0);
     return result_;
@@ -110,7 +110,7 @@ class Run {
     constexpr int every = 10;
     read_losses();
     if (result_.iterations - good_iteration_ < every) return false;
-    good_.copy_(trained_.parameters);
+    good_.assign(trained_.parameters);
     good_iteration_ = result_.iterations;
     return true;
   }
@@ -130,7 +130,7 @@ class Run {
   }
 
   [[noreturn]] void diverge(int iteration) {
-    trained_.parameters.copy_(good_);
+    trained_.parameters.assign(good_);
     result_.stopped_by = StopReason::divergence;
     result_.iterations = good_iteration_;
     result_.seconds = watch_.seconds();
@@ -148,7 +148,7 @@ class Run {
   const Stopwatch watch_;
   Optimizer optimizer_;
   Losses losses_;
-  at::Tensor good_;
+  Tensor good_;
   int good_iteration_ = 0;
   double last_ = 0.0, smooth_ = 0.0, reported_ = -1.0;
   LoopResult result_;

@@ -12,6 +12,8 @@
 
 namespace arapfields {
 
+class Tensor;
+
 /// The learning rate over its peak: it rises over the first iterations, is held for a part of the run, and
 /// then falls, so that the last steps average out the noise of the batches.
 struct Schedule {
@@ -39,7 +41,7 @@ class LoopBody {
   virtual ~LoopBody() = default;
   /// Adds the gradient of the estimate to the gradient, which is zero before; returns the estimate, one
   /// number wherever it was computed. Asked once a step of the iteration.
-  virtual at::Tensor accumulate(int iteration) = 0;
+  virtual Tensor accumulate(int iteration) = 0;
   /// Asked every ten iterations or so: whether the parameters as they are suffice.
   virtual bool is_good_enough() { return false; }
   /// After each iteration, of which `count` are done.

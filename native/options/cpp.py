@@ -140,7 +140,7 @@ def path(option):
 def source(table):
     lines = [f"{LICENCE}\n{NOTE}\n"]
     lines += [f'#include "options/{name}.h"\n' for name in table]
-    lines += ['#include "core/device.h"\n#include "core/errors.h"\n\nnamespace arapfields {\n']
+    lines += ['#include "tensors/device.h"\n#include "core/errors.h"\n\nnamespace arapfields {\n']
     for enum, option in enums(table).items():
         names = list(option["choices"])
         cases = "".join(f'    case {enum}::{enumerator(name)}: return "{name}";\n' for name in names)

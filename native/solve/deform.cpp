@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#include "core/device.h"
 #include "core/parallel.h"
 #include "fields/neural_field.h"
 #include "solve/field_choice.h"
@@ -11,6 +10,7 @@
 #include "solve/report.h"
 #include "solve/setup.h"
 #include "solve/trained/invertible_objective.h"
+#include "tensors/device.h"
 
 namespace arapfields {
 namespace {

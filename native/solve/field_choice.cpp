@@ -3,10 +3,10 @@
 
 #include <algorithm>
 
-#include "core/device.h"
 #include "core/errors.h"
 #include "fields/invertible_field.h"
 #include "fields/neural_field.h"
+#include "tensors/device.h"
 
 namespace arapfields {
 namespace {

@@ -82,7 +82,7 @@ RowMatrix<Scalar> cholesky(const Eigen::Ref<const RowMatrix<Scalar>>& a) {
     parallel_jobs(below * below, [&](Index job) {
       const Index i = job / below, j = job % below;
       if (j > i) return;
-        multiply(tile(k + 1 + i, k + 1 + j), tile(k + 1 + i, k), tile(k + 1 + j, k).t(), -1.0, 1.0);
+      multiply(tile(k + 1 + i, k + 1 + j), tile(k + 1 + i, k), tile(k + 1 + j, k).t(), -1.0, 1.0);
     });
   }
   return result;
@@ -96,9 +96,7 @@ RowMatrix<Scalar> lower_inverse(const Eigen::Ref<const RowMatrix<Scalar>>& facto
   RowMatrix<Scalar> result = RowMatrix<Scalar>::Zero(factor.rows(), factor.cols());
   const Tensor x = tensor_view(result);
   const Tiles tiles(result.rows());
-  const auto tile = [&](const Tensor& of, Index i, Index j) {
-    return tiles.of(tiles.of(of, 0, i), 1, j);
-  };
+  const auto tile = [&](const Tensor& of, Index i, Index j) { return tiles.of(tiles.of(of, 0, i), 1, j); };
   parallel_jobs(tiles.count(), [&](Index k) {
     const Tensor own = tile(l, k, k);
     const RowMatrix<Scalar> identity = RowMatrix<Scalar>::Identity(own.size(0), own.size(0));

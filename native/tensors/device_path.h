@@ -7,8 +7,8 @@ namespace arapfields {
 
 class Tensor;
 
-/// Whether a tensor is worked on by compositions of tensor operations rather than by our kernels: always where
-/// it is not in main memory, and everywhere while a DevicePathScope lives.
+/// Whether a tensor is worked on by compositions of tensor operations rather than by our kernels: always
+/// where it is not in main memory, and everywhere while a DevicePathScope lives.
 bool on_device_path(const Tensor& tensor);
 
 /// Forces compositions on tensors in main memory too, in the whole process: what a device would compute can

@@ -34,6 +34,7 @@ inline Tensor operator+(double a, const Tensor& b) { return b + a; }
 inline Tensor operator*(double a, const Tensor& b) { return b * a; }
 Tensor operator-(const Tensor& a);
 Tensor operator-(double a, const Tensor& b);
+inline Tensor operator-(const Tensor& a, double b) { return a + -b; }
 Tensor hypot(const Tensor& a, const Tensor& b);
 Tensor copysign(const Tensor& magnitude, const Tensor& sign);
 

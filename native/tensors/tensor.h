@@ -20,8 +20,8 @@ inline constexpr NumberType number_type<Index> = NumberType::int64;
 
 using SizeList = std::initializer_list<Index>;
 
-/// A dense array of up to six dimensions, in main memory or on a device. Copies share their numbers, and so do
-/// views: narrow, select, view and their like. Functions that change numbers are const for that reason.
+/// A dense array of up to six dimensions, in main memory or on a device. Copies share their numbers, and so
+/// do views: narrow, select, view and their like. Functions that change numbers are const for that reason.
 /// Negative dimensions count from the last one. The backend that CMake chooses (ARAPFIELDS_BACKEND) does the
 /// work: libtorch, or Eigen in main memory alone. Operations run on the calling thread.
 class Tensor {

@@ -8,10 +8,10 @@
 #include <optional>
 #include <vector>
 
-#include "core/dense.h"
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "fields/radial_evaluator.h"
+#include "tensors/dense.h"
 #include "wrap/parameters.h"
 
 namespace arapfields {

@@ -5,13 +5,13 @@
 #include <set>
 #include <stdexcept>
 
-#include "core/dense.h"
 #include "core/errors.h"
 #include "core/frame.h"
 #include "core/memory.h"
 #include "core/parallel.h"
 #include "core/random.h"
 #include "core/task.h"
+#include "tensors/dense.h"
 
 using namespace arapfields;
 

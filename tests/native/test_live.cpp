@@ -2,12 +2,12 @@
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 
-#include "core/dense.h"
 #include "core/errors.h"
 #include "core/random.h"
 #include "core/tall_product.h"
 #include "fields/radial_evaluator.h"
 #include "optimize/quasi_newton.h"
+#include "tensors/dense.h"
 
 using namespace arapfields;
 

@@ -134,8 +134,8 @@ class Everything(af.Energy):
         return af.EnergyValue(value, *[weight * np.cos(x) for weight, x in parts])
 
 
-@pytest.mark.parametrize("aten", [False, True])
-def test_the_parameter_gradient_is_that_of_differences(aten):
+@pytest.mark.parametrize("composed", [False, True])
+def test_the_parameter_gradient_is_that_of_differences(composed):
     """Every kind of derivative, through the frame's scale and the network's pull-back."""
     from arapfields._native import testing
 
@@ -143,12 +143,12 @@ def test_the_parameter_gradient_is_that_of_differences(aten):
     probe = testing.LossProbe(samples, [], energies=[Everything(20)])
     rng = np.random.default_rng(1)
     x, direction = 0.3 * rng.normal(size=(2, probe.size))
-    if aten:
-        with_path = testing.AtenPath()
+    if composed:
+        with_path = testing.DevicePath()
     loss, gradient = probe(x, 3)
     step = 1e-6
     slope = (probe(x + step * direction, 3)[0] - probe(x - step * direction, 3)[0]) / (2 * step)
-    if aten:
+    if composed:
         del with_path
     assert gradient @ direction == pytest.approx(slope, rel=1e-6)
     assert np.isfinite(loss)

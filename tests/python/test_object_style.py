@@ -110,7 +110,7 @@ def test_value_and_cotangent_equal_autograd_finite_differences_and_the_compositi
     expected, gradient = gradient_of(loss, jets)
     assert value == pytest.approx(expected, rel=FLOAT64_GRADIENT)
     assert np.abs(cotangents - 0.7 * gradient).max() < FLOAT64_GRADIENT * np.abs(gradient).max()
-    composed = testing.target_energy(jets, normals, targets, 0.7, effect, aten=True)
+    composed = testing.target_energy(jets, normals, targets, 0.7, effect, composed=True)
     assert composed[0] == pytest.approx(value, rel=COMPOSED)
     assert np.abs(composed[1] - cotangents).max() < COMPOSED * np.abs(cotangents).max()
     direction, step = rng.normal(size=jets.shape), 1e-6

@@ -66,7 +66,7 @@ def test_the_composition_equals_the_formula(dtype):
     stance = testing.Stance(rest.astype(float), [0.1, 0.2, 1])
     jets = rng.normal(size=(4, len(rest), 3)).astype(dtype)
     kernel = testing.stance_energy(jets, rest, stance, 0.6)
-    composed = testing.stance_energy(jets, rest, stance, 0.6, aten=True)
+    composed = testing.stance_energy(jets, rest, stance, 0.6, composed=True)
     tolerance = tolerances.COMPOSED if dtype is np.float64 else tolerances.FLOAT32_ENERGY
     assert composed[0] == pytest.approx(kernel[0], rel=tolerance)
     assert np.abs(composed[1] - kernel[1]).max() <= tolerance * np.abs(kernel[1]).max()

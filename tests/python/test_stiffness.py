@@ -87,14 +87,14 @@ def test_the_energy_of_reports_is_the_one_that_is_minimised():
     assert np.isclose(live.report["energy"], live.report["stretch"] + 0.03 * live.report["bend"], rtol=1e-5)
 
 
-@pytest.mark.parametrize("aten", [False, True])
-def test_factors_of_points(aten):
+@pytest.mark.parametrize("composed", [False, True])
+def test_factors_of_points(composed):
     """The energy of points with factors is the mean of theirs, and so are its cotangents."""
     rng = np.random.default_rng(0)
     jets = rng.normal(size=(10, 40, 3))
     jets[1:4] += np.eye(3)[:, None]
     weights, bending = rng.uniform(0.1, 2, size=40), rng.uniform(0, 3, size=40)
-    energy, cotangents = testing.arap_energy_by_points(jets, 0.7, weights, bending, aten=aten)
+    energy, cotangents = testing.arap_energy_by_points(jets, 0.7, weights, bending, composed=composed)
     total = 0.0
     for i in range(40):
         one = np.ascontiguousarray(jets[:, i : i + 1])

@@ -2,5 +2,5 @@
 // What there is to compute with: devices and instruction sets.
 #pragma once
 
-#include "core/device.h"
 #include "core/simd_level.h"
+#include "tensors/device.h"

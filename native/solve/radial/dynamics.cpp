@@ -5,10 +5,10 @@
 #include <cmath>
 #include <string>
 
-#include "core/dense.h"
 #include "core/errors.h"
 #include "fields/radial_evaluator.h"
 #include "sampling/sample_choice.h"
+#include "tensors/dense.h"
 
 namespace arapfields {
 namespace {

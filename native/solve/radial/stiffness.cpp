@@ -9,11 +9,11 @@
 #include <utility>
 #include <vector>
 
-#include "core/dense.h"
 #include "core/parallel.h"
 #include "core/product_rule.h"
 #include "fields/radial_evaluator.h"
 #include "sampling/sample_choice.h"
+#include "tensors/dense.h"
 
 namespace arapfields {
 namespace {

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "core/random.h"
-#include "core/tensors.h"
+#include "tensors/views.h"
 
 namespace arapfields {
 
@@ -15,8 +15,8 @@ inline Points uniform_in(const Vec3& low, const Vec3& high, Index count, Random&
 }
 
 /// Rows J_pᵀ r_p.
-inline at::Tensor transposed_times(const at::Tensor& jets, const at::Tensor& residuals) {
-  return (jets.slice(0, first_column(0), first_column(3)) * residuals).sum(2).t();
+inline Tensor transposed_times(const Tensor& jets, const Tensor& residuals) {
+  return sum(jets.slice(0, first_column(0), first_column(3)) * residuals, {2}).t();
 }
 
 }  // namespace arapfields

@@ -3,12 +3,12 @@
 
 #include <algorithm>
 
-#include "core/aten_path.h"
-#include "core/tensors.h"
 #include "distance/morton.h"
 #include "energies/arap.h"
-#include "energies/aten_energies.h"
+#include "energies/composed_energies.h"
 #include "energies/distortion.h"
+#include "tensors/device_path.h"
+#include "tensors/views.h"
 
 namespace arapfields {
 namespace {
@@ -19,15 +19,15 @@ struct HostJets {
   HostJets(TrainableField& field, const PointsOf<Scalar>& points, JetOrder order)
       : trained(field),
         jets(field.forward(tensor_view(points), order)),
-        cotangents(at::zeros_like(jets)),
+        cotangents(zeros_like(jets)),
         count(points.rows()),
         jet_order(order) {}
-  JetView<const Scalar> view() const { return {jets.const_data_ptr<Scalar>(), count, jet_order}; }
-  JetView<Scalar> cotangent_view() { return {cotangents.data_ptr<Scalar>(), count, jet_order}; }
+  JetView<const Scalar> view() const { return {jets.data<Scalar>(), count, jet_order}; }
+  JetView<Scalar> cotangent_view() { return {cotangents.data<Scalar>(), count, jet_order}; }
   void pull_back() { trained.pull_back(cotangents); }
 
   TrainableField& trained;
-  at::Tensor jets, cotangents;
+  Tensor jets, cotangents;
   Index count;
   JetOrder jet_order;
 };
@@ -35,7 +35,7 @@ struct HostJets {
 }  // namespace
 
 struct FieldObjective::Constants {
-  Constants(const ObjectiveTerms& terms, const at::Tensor& like) : tables(like) {
+  Constants(const ObjectiveTerms& terms, const Tensor& like) : tables(like) {
     const std::optional<GaussPreference>& preference = terms.style.preference;
     if (!preference) return;
     RowMatrix<double> rows(preference->normals.rows(), 4);
@@ -43,13 +43,13 @@ struct FieldObjective::Constants {
     preferred = tensor_like(rows, like);
   }
   EnergyTables tables;
-  at::Tensor preferred;
+  Tensor preferred;
 };
 
 struct FieldObjective::Computed {
   const char* name;
   double on_host;
-  at::Tensor on_device;
+  Tensor on_device;
 };
 
 FieldObjective::FieldObjective(const SurfaceSamples& samples, ObjectiveTerms terms)
@@ -104,11 +104,10 @@ FieldObjective::Batch FieldObjective::draw(Random& random) {
   return batch;
 }
 
-at::Tensor FieldObjective::accumulate(TrainableField& field, Random& random) {
-  if (on_aten_path(field.parameters())) return by_compositions(field, random);
-  const bool wide = field.parameters().scalar_type() == at::kDouble;
-  return at::scalar_tensor(wide ? by_kernels<double>(field, random) : by_kernels<float>(field, random),
-                           at::kDouble);
+Tensor FieldObjective::accumulate(TrainableField& field, Random& random) {
+  if (on_device_path(field.parameters())) return by_compositions(field, random);
+  const bool wide = field.parameters().is_double();
+  return scalar(wide ? by_kernels<double>(field, random) : by_kernels<float>(field, random));
 }
 
 template <class Scalar>
@@ -153,65 +152,65 @@ double FieldObjective::by_kernels(TrainableField& field, Random& random) {
   return value;
 }
 
-at::Tensor FieldObjective::by_compositions(TrainableField& field, Random& random) {
-  const at::Tensor& like = field.parameters();
+Tensor FieldObjective::by_compositions(TrainableField& field, Random& random) {
+  const Tensor& like = field.parameters();
   if (!constants_) constants_ = std::make_unique<Constants>(terms_, like);
   const EnergyTables& tables = constants_->tables;
   const Batch batch = draw(random);
-  const at::Tensor jets = field.forward_at(batch.points, order_of_terms());
-  const at::Tensor cotangents = at::zeros_like(jets);
-  const at::Tensor none;
-  const AtenFactors factors{batch.weights.size() > 0 ? tensor_like(batch.weights, like) : none,
-                            tensor_like(batch.bending, like)};
-  const at::Tensor arap =
-      aten_arap(jets, terms_.stiffness.bends() ? 1.0 : 0.0, terms_.rigidity, tables, cotangents, factors);
+  const Tensor jets = field.forward_at(batch.points, order_of_terms());
+  const Tensor cotangents = zeros_like(jets);
+  const Tensor none;
+  const ComposedFactors factors{batch.weights.size() > 0 ? tensor_like(batch.weights, like) : none,
+                                tensor_like(batch.bending, like)};
+  const Tensor arap =
+      composed_arap(jets, terms_.stiffness.bends() ? 1.0 : 0.0, terms_.rigidity, tables, cotangents, factors);
   computed_.clear();
-  at::Tensor value = at::zeros({}, arap.options());
-  const auto add = [&](const char* name, const at::Tensor& term) {
+  Tensor value = zeros({}, arap);
+  const auto add = [&](const char* name, const Tensor& term) {
     computed_.push_back({name, 0.0, term});
     value += term;
   };
   add("stretch", terms_.rigidity * arap[3]);
   if (terms_.stiffness.bends()) add("bend", terms_.rigidity * (arap[2] - arap[3]));
   if (styled()) {
-    const at::Tensor normals = tensor_like(batch.normals, like);
-    const at::Tensor held = batch.style_weights.size() > 0 ? tensor_like(batch.style_weights, like) : none;
+    const Tensor normals = tensor_like(batch.normals, like);
+    const Tensor held = batch.style_weights.size() > 0 ? tensor_like(batch.style_weights, like) : none;
     const auto& preference = terms_.style.preference;
     add("style",
-        terms_.gauss * (preference ? aten_gauss(jets, normals, held, constants_->preferred,
-                                                preference->sharpness, terms_.gauss, tables, cotangents)
-                                   : aten_targets(jets, normals, held, tensor_like(batch.targets, like),
-                                                  terms_.gauss, tables, cotangents)));
+        terms_.gauss * (preference ? composed_gauss(jets, normals, held, constants_->preferred,
+                                                    preference->sharpness, terms_.gauss, tables, cotangents)
+                                   : composed_targets(jets, normals, held, tensor_like(batch.targets, like),
+                                                      terms_.gauss, tables, cotangents)));
   }
   if (stands()) {
     const double weight = terms_.keep_stance * batch.stance.scale;
-    add("stance", weight * aten_stance(jets, tensor_like(batch.points, like),
-                                       tensor_like(Vector(batch.stance.up), like),
-                                       tensor_like(batch.stance.ground, like), weight, cotangents));
+    add("stance",
+        weight * composed_stance(jets, tensor_like(batch.points, like),
+                                 tensor_like(Vector(batch.stance.up), like),
+                                 tensor_like(batch.stance.ground, like), weight, tables, cotangents));
   }
   if (terms_.barrier > 0.0)
-    add("barrier",
-        terms_.barrier * aten_barrier(jets, terms_.barrier_threshold, terms_.barrier, tables, cotangents));
+    add("barrier", terms_.barrier *
+                       composed_barrier(jets, terms_.barrier_threshold, terms_.barrier, tables, cotangents));
   if (!terms_.external.empty()) add_external(batch.points, jets, cotangents, value);
   field.pull_back(cotangents);
   if (!pulled()) return value;
   const HandleBatch<double> pairs = terms_.handles.batch<double>(terms_.pull.handle_batch, random);
-  const at::Tensor ends = field.forward_at(pairs.sources, JetOrder::value);
-  const at::Tensor pull = at::zeros_like(ends);
-  add("handles", terms_.pull.handle_weight * aten_handles(ends, tensor_like(pairs.targets, like),
-                                                          tensor_like(pairs.weights, like),
-                                                          terms_.pull.handle_weight, pull));
+  const Tensor ends = field.forward_at(pairs.sources, JetOrder::value);
+  const Tensor pull = zeros_like(ends);
+  add("handles", terms_.pull.handle_weight * composed_handles(ends, tensor_like(pairs.targets, like),
+                                                              tensor_like(pairs.weights, like),
+                                                              terms_.pull.handle_weight, pull));
   field.pull_back(pull);
   return value;
 }
 
-void FieldObjective::add_external(const Points& points, const at::Tensor& jets, at::Tensor cotangents,
-                                  at::Tensor& value) {
-  const at::Tensor host = jets.to(at::kCPU, at::kDouble).contiguous(), derivatives = at::zeros_like(host);
+void FieldObjective::add_external(const Points& points, const Tensor& jets, Tensor cotangents,
+                                  Tensor& value) {
+  const Tensor host = doubles_of(jets), derivatives = zeros_like(host);
   const auto order = static_cast<JetOrder>(host.size(0));
-  external_ = external_energies<double>(terms_.external, points,
-                                        {host.const_data_ptr<double>(), points.rows(), order}, 1.0,
-                                        {derivatives.data_ptr<double>(), points.rows(), order});
+  external_ = external_energies<double>(terms_.external, points, {host.data<double>(), points.rows(), order},
+                                        1.0, {derivatives.data<double>(), points.rows(), order});
   cotangents += tensor_like(derivatives, jets);
   for (const double term : external_) value += term;
 }
@@ -219,7 +218,7 @@ void FieldObjective::add_external(const Points& points, const at::Tensor& jets, 
 std::vector<LossTerm> FieldObjective::terms() const {
   std::vector<LossTerm> result;
   for (const Computed& term : computed_)
-    result.push_back({term.name, term.on_device.defined() ? term.on_device.item<double>() : term.on_host});
+    result.push_back({term.name, term.on_device.defined() ? term.on_device.number() : term.on_host});
   for (std::size_t i = 0; i < external_.size(); ++i)
     result.push_back({"energies[" + std::to_string(i) + "]", external_[i]});
   return result;

@@ -15,6 +15,8 @@
 
 namespace arapfields {
 
+class Tensor;
+
 /// The terms of a trained deformation, with their weights:
 ///   rigidity·mean w(stretch + λ·bend) + gauss·style + keep_stance·stance + barrier·fold_barrier +
 ///   handles + external.
@@ -43,7 +45,7 @@ class FieldObjective final : public Objective {
  public:
   FieldObjective(const SurfaceSamples& samples, ObjectiveTerms terms);
   ~FieldObjective() override;
-  at::Tensor accumulate(TrainableField& field, Random& random) override;
+  Tensor accumulate(TrainableField& field, Random& random) override;
   std::vector<LossTerm> terms() const override;
   const ObjectiveTerms& objective_terms() const { return terms_; }
 
@@ -71,9 +73,9 @@ class FieldObjective final : public Objective {
   }
   template <class Scalar>
   double by_kernels(TrainableField& field, Random& random);
-  at::Tensor by_compositions(TrainableField& field, Random& random);
+  Tensor by_compositions(TrainableField& field, Random& random);
   /// The external energies of jets on a device.
-  void add_external(const Points& points, const at::Tensor& jets, at::Tensor cotangents, at::Tensor& value);
+  void add_external(const Points& points, const Tensor& jets, Tensor cotangents, Tensor& value);
 
   /// The next fresh sample; draws another pool of as many as there are samples when one is used up.
   Index next_fresh(Random& random);

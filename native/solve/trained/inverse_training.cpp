@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "solve/trained/inverse_training.h"
 
-#include "core/device.h"
 #include "core/parallel.h"
 #include "fields/neural_field.h"
 #include "solve/setup.h"
 #include "solve/trained/cycle.h"
 #include "solve/trained/objective.h"
+#include "tensors/device.h"
 
 namespace arapfields {
 namespace {
@@ -17,11 +17,10 @@ constexpr double believable = 0.02;
 
 /// (n, 1) what the cycle's gradient at each point counts: 1 near f's inverse where f keeps lengths, and less
 /// where the cycle misses by far or J would magnify what it misses by.
-at::Tensor share_of(const at::Tensor& jets, const at::Tensor& cycle) {
-  const at::Tensor missed = cycle.square().sum(1, true) / (believable * believable);
-  const at::Tensor stretch =
-      jets.slice(0, first_column(0), first_column(3)).square().sum(at::IntArrayRef{0, 2});
-  return 1.0 / ((1.0 + missed) * (stretch / 3.0).clamp_min(1.0).unsqueeze(1));
+Tensor share_of(const Tensor& jets, const Tensor& cycle) {
+  const Tensor missed = sum(square(cycle), {1}, true) / (believable * believable);
+  const Tensor stretch = sum(square(jets.slice(0, first_column(0), first_column(3))), {0, 2});
+  return 1.0 / ((1.0 + missed) * clamp_min(stretch / 3.0, 1.0).unsqueeze(1));
 }
 
 /// Trains g for a fixed f.
@@ -35,7 +34,7 @@ class CycleObjective final : public Objective {
     low_ = low - margin, high_ = high + margin;
   }
 
-  at::Tensor accumulate(TrainableField& inverse, Random& random) override {
+  Tensor accumulate(TrainableField& inverse, Random& random) override {
     const Index surface = (batch_ + 1) / 2;
     Points y(batch_, 3), x(surface, 3);
     for (Index p = 0; p < surface; ++p) {
@@ -44,16 +43,16 @@ class CycleObjective final : public Objective {
       x.row(p) = rest_.row(i);
     }
     y.bottomRows(batch_ - surface) = uniform_in(low_, high_, batch_ - surface, random);
-    const at::Tensor images = tensor_like(y, inverse.parameters());
-    const at::Tensor back = inverse.forward(images, JetOrder::value)[0];
-    const at::Tensor jets = field_.jets(back, JetOrder::first);
-    const at::Tensor cycle = jets[0] - images;
-    const at::Tensor direct = back.slice(0, 0, surface) - tensor_like(x, images);
+    const Tensor images = tensor_like(y, inverse.parameters());
+    const Tensor back = inverse.forward(images, JetOrder::value)[0];
+    const Tensor jets = field_.jets(back, JetOrder::first);
+    const Tensor cycle = jets[0] - images;
+    const Tensor direct = back.slice(0, 0, surface) - tensor_like(x, images);
     const double scale = 1.0 / static_cast<double>(batch_);
-    at::Tensor cotangents = 2.0 * scale * share_of(jets, cycle) * transposed_times(jets, cycle);
-    cotangents.slice(0, 0, surface).add_(direct, 2.0 * scale);
+    Tensor cotangents = 2.0 * scale * share_of(jets, cycle) * transposed_times(jets, cycle);
+    cotangents.slice(0, 0, surface).add(direct, 2.0 * scale);
     inverse.pull_back(cotangents.unsqueeze(0));
-    return scale * (cycle.square().sum() + direct.square().sum());
+    return scale * (sum(square(cycle)) + sum(square(direct)));
   }
 
  private:

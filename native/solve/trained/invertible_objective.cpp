@@ -18,28 +18,28 @@ InvertibleObjective::InvertibleObjective(Objective& inner, const SurfaceSamples&
       inverse_(shape, static_cast<std::uint64_t>(options.training.seed) + 1, false, device),
       optimizer_(trainable(inverse_), options.training, options.optimizer) {}
 
-at::Tensor InvertibleObjective::accumulate(TrainableField& field, Random& random) {
-  const at::Tensor inner = inner_.accumulate(field, random);
+Tensor InvertibleObjective::accumulate(TrainableField& field, Random& random) {
+  const Tensor inner = inner_.accumulate(field, random);
   Points x = uniform_in(-Vec3::Ones(), Vec3::Ones(), batch_, random);
   for (Index p = 0; p < batch_ / 2; ++p) x.row(p) = samples_.points.row(random.below(samples_.size()));
-  const at::Tensor images = field.forward_at(x, JetOrder::value)[0];
-  const at::Tensor jets = inverse_.forward(images, JetOrder::first);
-  const at::Tensor residual = jets[0] - tensor_like(x, jets);
+  const Tensor images = field.forward_at(x, JetOrder::value)[0];
+  const Tensor jets = inverse_.forward(images, JetOrder::first);
+  const Tensor residual = jets[0] - tensor_like(x, jets);
   const double scale = weight_ / static_cast<double>(batch_);
-  at::Tensor inverse_cotangents = at::zeros_like(jets);
-  inverse_cotangents[0].copy_(residual * (2.0 / static_cast<double>(batch_)));
+  Tensor inverse_cotangents = zeros_like(jets);
+  inverse_cotangents[0].assign(residual * (2.0 / static_cast<double>(batch_)));
   field.pull_back((2.0 * scale * transposed_times(jets, residual)).unsqueeze(0));
-  inverse_.gradient().zero_();
+  inverse_.gradient().set_zero();
   inverse_.pull_back(inverse_cotangents);
   const double done = static_cast<double>(done_) / std::max(1, options_.training.iterations);
   optimizer_.step(options_.schedule.share(done_++, done));
-  cycle_ = std::make_shared<at::Tensor>(scale * residual.square().sum());
+  cycle_ = std::make_shared<Tensor>(scale * sum(square(residual)));
   return inner + *cycle_;
 }
 
 std::vector<LossTerm> InvertibleObjective::terms() const {
   std::vector<LossTerm> terms = inner_.terms();
-  terms.push_back({"invertibility", cycle_->item<double>()});
+  terms.push_back({"invertibility", cycle_->number()});
   return terms;
 }
 

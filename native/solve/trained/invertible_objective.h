@@ -10,13 +10,15 @@
 
 namespace arapfields {
 
+class Tensor;
+
 /// Another objective, and weight × mean ‖g(f(x)) − x‖² with an inverse g that learns beside f, over samples
 /// and uniform points of the cube: where f folds no g exists, so folds cost.
 class InvertibleObjective final : public Objective {
  public:
   InvertibleObjective(Objective& inner, const SurfaceSamples& samples, Index batch, double weight,
                       const MlpShape& shape, const LoopOptions& options, const std::string& device);
-  at::Tensor accumulate(TrainableField& field, Random& random) override;
+  Tensor accumulate(TrainableField& field, Random& random) override;
   std::vector<LossTerm> terms() const override;
 
  private:
@@ -28,7 +30,7 @@ class InvertibleObjective final : public Objective {
   int done_ = 0;
   NeuralField inverse_;
   Optimizer optimizer_;
-  std::shared_ptr<at::Tensor> cycle_;  // the last estimate of the weighted term
+  std::shared_ptr<Tensor> cycle_;  // the last estimate of the weighted term
 };
 
 }  // namespace arapfields

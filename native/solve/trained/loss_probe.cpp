@@ -2,11 +2,11 @@
 #include "solve/trained/loss_probe.h"
 
 #include "core/parallel.h"
-#include "core/tensors.h"
 #include "fields/neural_field.h"
 #include "fields/radial_evaluator.h"
 #include "sampling/canonical_order.h"
 #include "solve/trained/field_objective.h"
+#include "tensors/views.h"
 
 namespace arapfields {
 namespace {
@@ -53,17 +53,17 @@ LossProbe::LossProbe(const SurfaceSamples& samples, const std::vector<Handle>& h
 
 LossProbe::~LossProbe() = default;
 
-Index LossProbe::size() const { return state_->field.parameters().numel(); }
+Index LossProbe::size() const { return state_->field.parameters().count(); }
 
 LossGradient LossProbe::operator()(const Vector& parameters, std::uint64_t seed) {
   const ThreadScope scope;
   NeuralField& field = state_->field;
   require(parameters.size() == size(), "parameters", std::to_string(parameters.size()) + " numbers",
           std::to_string(size()) + " are needed");
-  field.parameters().copy_(tensor_view(parameters));
-  field.gradient().zero_();
+  field.parameters().assign(tensor_view(parameters));
+  field.gradient().set_zero();
   Random random(seed);
-  const double loss = state_->objective.accumulate(field, random).item<double>();
+  const double loss = state_->objective.accumulate(field, random).number();
   return {loss, vector_of(field.gradient())};
 }
 
@@ -82,15 +82,15 @@ EnergyTrial::EnergyTrial(const SurfaceSamples& samples, Index batch, double bend
   terms.batch = batch;
   terms.stiffness = SurfaceStiffness(bending);
   state_ = std::make_unique<State>(samples, std::move(terms));
-  state_->field.network()->weight(state_->field.shape().layers).fill_(0.01);
+  state_->field.network()->weight(state_->field.shape().layers).fill(0.01);
 }
 
 EnergyTrial::~EnergyTrial() = default;
 
 double EnergyTrial::run() {
   const ThreadScope scope;
-  state_->field.gradient().zero_();
-  return state_->objective.accumulate(state_->field, state_->random).item<double>();
+  state_->field.gradient().set_zero();
+  return state_->objective.accumulate(state_->field, state_->random).number();
 }
 
 Vector probe_thickness(const SurfaceSamples& samples) {

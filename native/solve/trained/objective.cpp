@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "solve/trained/objective.h"
 
-#include <ATen/ATen.h>
-
 #include <cstdio>
+
+#include "tensors/operations.h"
 
 namespace arapfields {
 namespace {
@@ -18,7 +18,7 @@ class FieldLoop final : public LoopBody {
         observer_(observer),
         random_(static_cast<std::uint64_t>(options.training.seed), 0x5eed) {}
 
-  at::Tensor accumulate(int) override { return objective_.accumulate(field_, random_); }
+  Tensor accumulate(int) override { return objective_.accumulate(field_, random_); }
   std::vector<LossTerm> terms() const override { return objective_.terms(); }
   void iterated(int count) override {
     if (observer_) observer_(count);

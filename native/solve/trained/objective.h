@@ -9,13 +9,15 @@
 
 namespace arapfields {
 
+class Tensor;
+
 /// A loss of a trainable field, estimated anew at each iteration on a random subset.
 class Objective {
  public:
   virtual ~Objective() = default;
   /// Adds the gradient of the estimate to field.gradient(); returns the estimate, one number wherever it was
   /// computed.
-  virtual at::Tensor accumulate(TrainableField& field, Random& random) = 0;
+  virtual Tensor accumulate(TrainableField& field, Random& random) = 0;
   /// The weighted terms of the last estimate, whose sum it is.
   virtual std::vector<LossTerm> terms() const { return {}; }
 };

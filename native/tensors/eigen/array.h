@@ -85,8 +85,7 @@ void for_rows(const Tensor::Array& sizes, const std::array<Extents, operands>& s
     for (; level < depth; ++level) {
       for (std::size_t k = 0; k < operands; ++k) offsets[k] += levels[level].steps[k];
       if (++place[level] < levels[level].size) break;
-      for (std::size_t k = 0; k < operands; ++k)
-        offsets[k] -= levels[level].steps[k] * levels[level].size;
+      for (std::size_t k = 0; k < operands; ++k) offsets[k] -= levels[level].steps[k] * levels[level].size;
       place[level] = 0;
     }
     if (level == depth) return;
@@ -107,7 +106,8 @@ void apply(const Tensor::Array& out, const F& f, const Inputs&... inputs) {
       if (dense)
         for (Index i = 0; i < length; ++i) to[i] = f(data[k + 1][offsets[k + 1] + i]...);
       else
-        for (Index i = 0; i < length; ++i) to[i * steps[0]] = f(data[k + 1][offsets[k + 1] + i * steps[k + 1]]...);
+        for (Index i = 0; i < length; ++i)
+          to[i * steps[0]] = f(data[k + 1][offsets[k + 1] + i * steps[k + 1]]...);
     };
     row(std::make_index_sequence<sizeof...(Inputs)>());
   });

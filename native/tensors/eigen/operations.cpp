@@ -25,8 +25,7 @@ template <class F>
 Tensor binary(const Tensor& a, const Tensor& b, const F& f) {
   if (a.type() != b.type()) return binary(a.to(NumberType::float64), b.to(NumberType::float64), f);
   const Tensor result = make_broadcast(a, b, a.type());
-  with_type(a.type(),
-            [&](auto number) { apply<decltype(number)>(result.array(), f, a.array(), b.array()); });
+  with_type(a.type(), [&](auto number) { apply<decltype(number)>(result.array(), f, a.array(), b.array()); });
   return result;
 }
 
@@ -52,7 +51,8 @@ Tensor reduce(const Tensor& a, SizeList dimensions, bool keep, double start, con
                   double* const to = out + offsets[1];
                   if (steps[1] == 0) {
                     double value = *to;
-                    for (Index i = 0; i < length; ++i) value = f(value, static_cast<double>(row[i * steps[0]]));
+                    for (Index i = 0; i < length; ++i)
+                      value = f(value, static_cast<double>(row[i * steps[0]]));
                     *to = value;
                   } else {
                     for (Index i = 0; i < length; ++i)
@@ -141,8 +141,8 @@ Tensor operator-(double a, const Tensor& b) {
   return unary(b, [a](auto x) { return static_cast<decltype(x)>(a) - x; });
 }
 
-#define ARAPFIELDS_UNARY(name, expression) \
-  Tensor name(const Tensor& a) {           \
+#define ARAPFIELDS_UNARY(name, expression)                                        \
+  Tensor name(const Tensor& a) {                                                  \
     return unary(a, [](auto x) { return static_cast<decltype(x)>(expression); }); \
   }
 ARAPFIELDS_UNARY(abs, x < 0 ? -x : x)
@@ -161,10 +161,13 @@ Tensor hypot(const Tensor& a, const Tensor& b) {
   return binary(a, b, [](auto x, auto y) { return static_cast<decltype(x)>(std::hypot(x, y)); });
 }
 Tensor copysign(const Tensor& magnitude, const Tensor& sign) {
-  return binary(magnitude, sign, [](auto x, auto y) { return static_cast<decltype(x)>(std::copysign(x, y)); });
+  return binary(magnitude, sign,
+                [](auto x, auto y) { return static_cast<decltype(x)>(std::copysign(x, y)); });
 }
 Tensor clamp_min(const Tensor& a, double least) {
-  return unary(a, [least](auto x) { return x < static_cast<decltype(x)>(least) ? static_cast<decltype(x)>(least) : x; });
+  return unary(a, [least](auto x) {
+    return x < static_cast<decltype(x)>(least) ? static_cast<decltype(x)>(least) : x;
+  });
 }
 Tensor where_positive(const Tensor& condition, const Tensor& a, const Tensor& b) {
   const Tensor result = make_broadcast(make_broadcast(a, b, a.type()), condition, a.type());
@@ -192,7 +195,8 @@ bool all_finite(const Tensor& a) {
 Tensor argmax(const Tensor& a) {
   const Tensor rows = a.contiguous();
   const Index length = rows.size(-1);
-  const Tensor largest = make_tensor(rows.array().sizes.data(), static_cast<int>(a.dims()) - 1, NumberType::int64);
+  const Tensor largest =
+      make_tensor(rows.array().sizes.data(), static_cast<int>(a.dims()) - 1, NumberType::int64);
   with_type(a.type(), [&](auto number) {
     const auto* row = rows.data<decltype(number)>();
     for (Index i = 0; i < largest.count(); ++i, row += length)
@@ -207,8 +211,7 @@ Tensor stack(const std::vector<Tensor>& tensors, Index dimension) {
   const Index d = dimension < 0 ? dimension + first.dims() : dimension;
   sizes[at_(d)] = static_cast<Index>(tensors.size());
   const Tensor result = make_tensor(sizes.data(), static_cast<int>(first.dims()), first.type());
-  for (std::size_t i = 0; i < tensors.size(); ++i)
-    result.select(d, static_cast<Index>(i)).assign(tensors[i]);
+  for (std::size_t i = 0; i < tensors.size(); ++i) result.select(d, static_cast<Index>(i)).assign(tensors[i]);
   return result;
 }
 

@@ -1,72 +1,178 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Eigen's own buffers must be aligned for the widest vectors here. They never leave this source.
-#undef EIGEN_MAX_ALIGN_BYTES
-#define EIGEN_MAX_ALIGN_BYTES 64
 #include "tensors/eigen/product_kernel.h"
 
-#include <Eigen/Cholesky>
+#include "core/pack.h"
 
 namespace arapfields::SIMD_LEVEL {
 namespace {
 
-/// use(map) with the map of the matrix's own layout.
-template <class Scalar, class Use>
-void with_map(const Strided<Scalar>& m, const Use& use) {
-  using Plain = std::remove_const_t<Scalar>;
-  using Rows = Eigen::Matrix<Plain, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  using Columns = Eigen::Matrix<Plain, Eigen::Dynamic, Eigen::Dynamic>;
-  const auto map = [&]<class Matrix>() {
-    using Mapped = std::conditional_t<std::is_const_v<Scalar>, const Matrix, Matrix>;
-    use(Eigen::Map<Mapped, 0, Eigen::OuterStride<>>(m.data, m.rows, m.columns, Eigen::OuterStride<>(m.stride)));
-  };
-  if (m.by_rows)
-    map.template operator()<Rows>();
-  else
-    map.template operator()<Columns>();
+using std::int64_t;
+
+// A register holds the sums of one row and one pack of columns: 16 of 32 registers, or 12 of 16.
+#if defined(__AVX512F__) || defined(ARAPFIELDS_NEON)
+constexpr int rows_at_once = 8;
+#else
+constexpr int rows_at_once = 6;
+#endif
+constexpr int packs_at_once = 2;
+template <class Scalar>
+constexpr int columns_at_once = packs_at_once * lanes<Scalar>;
+
+template <class Scalar>
+using Sums = Pack<Scalar>[rows_at_once][packs_at_once];
+
+template <class Scalar>
+const Scalar* entry(const Strided<const Scalar>& m, int64_t i, int64_t j) {
+  return m.data + i * m.row + j * m.column;
+}
+
+/// Columns first … of b (inner, columns) as strips of columns_at_once, row by row; zero beyond the last.
+template <class Scalar>
+void pack_columns(const Strided<const Scalar>& b, int64_t inner, int64_t columns, Scalar* out) {
+  constexpr int width = columns_at_once<Scalar>;
+  for (int64_t first = 0; first < columns; first += width) {
+    const int64_t used = columns - first < width ? columns - first : width;
+    if (b.column == 1 && used == width) {
+      for (int64_t k = 0; k < inner; ++k, out += width)
+        for (int p = 0; p < width; p += lanes<Scalar>) store(out + p, load(entry(b, k, first) + p));
+      continue;
+    }
+    for (int64_t j = 0; j < width; ++j) {
+      const Scalar* from = entry(b, 0, first + (j < used ? j : 0));
+      for (int64_t k = 0; k < inner; ++k) out[k * width + j] = j < used ? from[k * b.row] : Scalar(0);
+    }
+    out += inner * width;
+  }
+}
+
+/// The products of some rows of a, `step` from entry to entry, with a strip of b.
+template <class Scalar>
+inline void sum_products(const Scalar* const (&rows)[rows_at_once], int64_t step, const Scalar* strip,
+                         int64_t inner, Sums<Scalar>& sums) {
+  for (auto& row : sums)
+    for (auto& sum : row) sum = Pack<Scalar>{};
+  for (int64_t k = 0; k < inner; ++k, strip += columns_at_once<Scalar>) {
+    Pack<Scalar> b[packs_at_once];
+    for (int p = 0; p < packs_at_once; ++p) b[p] = load(strip + p * lanes<Scalar>);
+    for (int r = 0; r < rows_at_once; ++r) {
+      const Scalar x = rows[r][k * step];
+      for (int p = 0; p < packs_at_once; ++p) sums[r][p] += x * b[p];
+    }
+  }
 }
 
 template <class Scalar>
-void multiply(const Strided<Scalar>& c, const Strided<const Scalar>& a, const Strided<const Scalar>& b, Scalar factor) {
-  using Rows = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  Eigen::Map<Rows, 0, Eigen::OuterStride<>> out(c.data, c.rows, c.columns, Eigen::OuterStride<>(c.stride));
-  with_map(a, [&](const auto& left) {
-    with_map(b, [&](const auto& right) { out.noalias() += factor * (left * right); });
-  });
+inline void write_sums(const Sums<Scalar>& sums, Scalar factor, bool add, Scalar* c, int64_t stride,
+                       int64_t rows, int64_t columns) {
+  for (int r = 0; r < rows_at_once; ++r) {
+    if (r >= rows) return;
+    Scalar* to = c + r * stride;
+    if (columns == columns_at_once<Scalar>) {
+      for (int p = 0; p < packs_at_once; ++p, to += lanes<Scalar>)
+        store(to, add ? load(to) + factor * sums[r][p] : factor * sums[r][p]);
+      continue;
+    }
+    Scalar numbers[columns_at_once<Scalar>];
+    for (int p = 0; p < packs_at_once; ++p) store(numbers + p * lanes<Scalar>, sums[r][p]);
+    for (int64_t j = 0; j < columns; ++j) to[j] = factor * numbers[j] + (add ? to[j] : Scalar(0));
+  }
+}
+
+/// c += or = a b for a part of b that fits the buffer. Rows of a that are not contiguous are copied.
+template <class Scalar>
+void multiply_part(const ProductBlock<Scalar>& m) {
+  constexpr int width = columns_at_once<Scalar>;
+  pack_columns(m.b, m.inner, m.columns, m.buffer);
+  Scalar copies[rows_at_once * product_inner];
+  for (int64_t i = 0; i < m.rows; i += rows_at_once) {
+    const int64_t used = m.rows - i < rows_at_once ? m.rows - i : rows_at_once;
+    const Scalar* rows[rows_at_once];
+    int64_t step = 1;
+    for (int r = 0; r < rows_at_once; ++r) rows[r] = entry(m.a, i + (r < used ? r : 0), 0);
+    if (m.a.column != 1) {
+      step = rows_at_once;
+      for (int64_t k = 0; k < m.inner; ++k)
+        for (int r = 0; r < rows_at_once; ++r) copies[k * step + r] = rows[r][k * m.a.column];
+      for (int r = 0; r < rows_at_once; ++r) rows[r] = copies + r;
+    }
+    const Scalar* strip = m.buffer;
+    for (int64_t j = 0; j < m.columns; j += width, strip += m.inner * width) {
+      Sums<Scalar> sums;
+      if (step == 1)
+        sum_products(rows, 1, strip, m.inner, sums);
+      else
+        sum_products(rows, rows_at_once, strip, m.inner, sums);
+      write_sums<Scalar>(sums, m.factor, m.add, m.c.data + i * m.c.row + j, m.c.row, used,
+                         m.columns - j < width ? m.columns - j : width);
+    }
+  }
+}
+
+/// Few columns, as dot products of the rows of a with the columns of b, all of which are contiguous.
+template <class Scalar, int columns>
+void multiply_dots(const ProductBlock<Scalar>& m) {
+  constexpr int at_once = 4;
+  const int64_t whole = m.inner / lanes<Scalar> * lanes<Scalar>;
+  for (int64_t i = 0; i < m.rows; i += at_once) {
+    const int64_t used = m.rows - i < at_once ? m.rows - i : at_once;
+    const Scalar* rows[at_once];
+    for (int r = 0; r < at_once; ++r) rows[r] = entry(m.a, i + (r < used ? r : 0), 0);
+    Pack<Scalar> sums[at_once][columns] = {};
+    for (int64_t k = 0; k < whole; k += lanes<Scalar>)
+      for (int j = 0; j < columns; ++j) {
+        const Pack<Scalar> y = load(m.b.data + j * m.b.column + k);
+        for (int r = 0; r < at_once; ++r) sums[r][j] += load(rows[r] + k) * y;
+      }
+    for (int r = 0; r < at_once && r < used; ++r)
+      for (int j = 0; j < columns; ++j) {
+        Scalar value = sum_of_lanes<Scalar>(sums[r][j]);
+        for (int64_t k = whole; k < m.inner; ++k) value += rows[r][k] * m.b.data[j * m.b.column + k];
+        Scalar& to = m.c.data[(i + r) * m.c.row + j];
+        to = m.factor * value + (m.add ? to : Scalar(0));
+      }
+  }
 }
 
 template <class Scalar>
-bool factorize(const Strided<Scalar>& a) {
-  bool definite = false;
-  with_map(a, [&](auto map) {
-    const Eigen::LLT<Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>> factor(map);
-    definite = factor.info() == Eigen::Success;
-    if (definite) map = factor.matrixL();
-  });
-  return definite;
+void multiply(const ProductBlock<Scalar>& m) {
+  if (m.columns <= 3 && m.a.column == 1 && m.b.row == 1)
+    return m.columns == 1   ? multiply_dots<Scalar, 1>(m)
+           : m.columns == 2 ? multiply_dots<Scalar, 2>(m)
+                            : multiply_dots<Scalar, 3>(m);
+  for (int64_t k = 0; k < m.inner; k += product_inner)
+    for (int64_t j = 0; j < m.columns; j += product_columns) {
+      ProductBlock<Scalar> part = m;
+      part.c.data += j;
+      part.a.data = entry(m.a, 0, k);
+      part.b.data = entry(m.b, k, j);
+      part.inner = m.inner - k < product_inner ? m.inner - k : product_inner;
+      part.columns = m.columns - j < product_columns ? m.columns - j : product_columns;
+      part.add = m.add || k > 0;
+      multiply_part(part);
+    }
 }
 
-template <int triangle, class Scalar>
-void solve(const Strided<const Scalar>& a, const Strided<Scalar>& b) {
-  with_map(a, [&](const auto& factor) {
-    with_map(b, [&](auto right) { factor.template triangularView<triangle>().solveInPlace(right); });
-  });
+template <class Scalar>
+void substitute(const SubstitutionBlock<Scalar>& m) {
+  for (int64_t place = 0; place < m.size; ++place) {
+    const int64_t i = m.upper ? m.size - 1 - place : place;
+    Scalar* const row = m.b.data + i * m.b.row;
+    for (int64_t before = 0; before < place; ++before) {
+      const int64_t j = m.upper ? m.size - 1 - before : before;
+      const Scalar x = *entry(m.a, i, j);
+      const Scalar* const other = m.b.data + j * m.b.row;
+      for (int64_t c = 0; c < m.columns; ++c) row[c] -= x * other[c];
+    }
+    const Scalar pivot = *entry(m.a, i, i);
+    for (int64_t c = 0; c < m.columns; ++c) row[c] /= pivot;
+  }
 }
 
 }  // namespace
 
-#define ARAPFIELDS_BLOCKS(Scalar)                                                                             \
-  void add_block_product(const Strided<Scalar>& c, const Strided<const Scalar>& a,                            \
-                         const Strided<const Scalar>& b, Scalar factor) {                                     \
-    multiply(c, a, b, factor);                                                                                \
-  }                                                                                                           \
-  bool factorize_block(const Strided<Scalar>& a) { return factorize(a); }                                     \
-  void solve_lower_block(const Strided<const Scalar>& lower, const Strided<Scalar>& b) {                      \
-    solve<Eigen::Lower>(lower, b);                                                                            \
-  }                                                                                                           \
-  void solve_upper_block(const Strided<const Scalar>& upper, const Strided<Scalar>& b) {                      \
-    solve<Eigen::Upper>(upper, b);                                                                            \
-  }
-ARAPFIELDS_BLOCKS(float)
-ARAPFIELDS_BLOCKS(double)
+void multiply_block(const ProductBlock<float>& block) { multiply(block); }
+void multiply_block(const ProductBlock<double>& block) { multiply(block); }
+void substitute_block(const SubstitutionBlock<float>& block) { substitute(block); }
+void substitute_block(const SubstitutionBlock<double>& block) { substitute(block); }
 
 }  // namespace arapfields::SIMD_LEVEL

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Products and factors of matrices by Eigen, compiled for each instruction set.
+// Products of matrices, and the loops within their factors, compiled for each instruction set.
 #pragma once
 
 #include <cstdint>
@@ -8,27 +8,40 @@
 
 namespace arapfields {
 
-/// A matrix whose rows, or whose columns, are contiguous and `stride` apart.
+/// Entry (i, j) lies at data[i·row + j·column].
 template <class Scalar>
 struct Strided {
   Scalar* data = nullptr;
-  std::int64_t rows = 0, columns = 0, stride = 0;
-  bool by_rows = true;
+  std::int64_t row = 0, column = 0;
 };
 
-// c += factor·a b; c by rows.
-ARAPFIELDS_DECLARE(void add_block_product(const Strided<float>& c, const Strided<const float>& a,
-                                          const Strided<const float>& b, float factor))
-ARAPFIELDS_DECLARE(void add_block_product(const Strided<double>& c, const Strided<const double>& a,
-                                          const Strided<const double>& b, double factor))
-// a becomes its lower Cholesky factor, and zero above; whether it is positive definite.
-ARAPFIELDS_DECLARE(bool factorize_block(const Strided<float>& a))
-ARAPFIELDS_DECLARE(bool factorize_block(const Strided<double>& a))
-// b becomes the solution X of L X = b for a lower triangular L.
-ARAPFIELDS_DECLARE(void solve_lower_block(const Strided<const float>& lower, const Strided<float>& b))
-ARAPFIELDS_DECLARE(void solve_lower_block(const Strided<const double>& lower, const Strided<double>& b))
-// The same of an upper triangular one.
-ARAPFIELDS_DECLARE(void solve_upper_block(const Strided<const float>& upper, const Strided<float>& b))
-ARAPFIELDS_DECLARE(void solve_upper_block(const Strided<const double>& upper, const Strided<double>& b))
+/// Parts of b in the order in which the product reads them: what the caller lends to each thread.
+constexpr std::int64_t product_inner = 256, product_columns = 512;
+constexpr std::int64_t product_buffer = product_inner * product_columns;
+
+/// c (rows, columns) = factor·a b, or this added to it. Rows of c are contiguous.
+template <class Scalar>
+struct ProductBlock {
+  Strided<Scalar> c;
+  Strided<const Scalar> a, b;
+  std::int64_t rows, inner, columns;
+  Scalar factor;
+  bool add;
+  Scalar* buffer;  // product_buffer numbers
+};
+ARAPFIELDS_DECLARE(void multiply_block(const ProductBlock<float>& block))
+ARAPFIELDS_DECLARE(void multiply_block(const ProductBlock<double>& block))
+
+/// b (size, columns) becomes X of a X = b, by substitution from the top, or from the bottom where a is upper.
+/// Rows of b are contiguous.
+template <class Scalar>
+struct SubstitutionBlock {
+  Strided<const Scalar> a;
+  Strided<Scalar> b;
+  std::int64_t size, columns;
+  bool upper;
+};
+ARAPFIELDS_DECLARE(void substitute_block(const SubstitutionBlock<float>& block))
+ARAPFIELDS_DECLARE(void substitute_block(const SubstitutionBlock<double>& block))
 
 }  // namespace arapfields

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "tensors/eigen/array.h"
@@ -7,26 +9,15 @@
 namespace arapfields {
 namespace {
 
-bool has_rows_or_columns(const Tensor& m) {
-  return m.stride(1) == 1 || m.stride(0) == 1 || m.size(1) == 1;
-}
+/// Rows that substitution and factors do without products.
+constexpr Index panel = 32;
 
-/// The tensor (rows, columns) as it lies, which must have contiguous rows or columns.
 template <class Scalar>
 Strided<Scalar> strided(const Tensor& m) {
-  Strided<Scalar> result;
-  result.data = m.data<std::remove_const_t<Scalar>>();
-  result.rows = m.size(0), result.columns = m.size(1);
-  // What has but one column is by rows with any stride; a single row or column has no next one.
-  result.by_rows = m.stride(1) == 1 || result.columns == 1;
-  result.stride = result.by_rows ? m.stride(0) : m.stride(1);
-  if (result.rows == 1 && (result.by_rows || result.columns == 1)) result.stride = result.columns;
-  return result;
+  return {m.data<std::remove_const_t<Scalar>>(), m.stride(0), m.stride(1)};
 }
 
-Tensor with_rows(const Tensor& m) { return has_rows_or_columns(m) ? m : m.contiguous(); }
-
-/// Calls use(Scalar()) for float or double.
+/// use(Scalar()) for double, or for float, which holds bfloat16 too.
 template <class Use>
 void with_real(const Tensor& tensor, Use&& use) {
   if (tensor.is_double())
@@ -35,10 +26,52 @@ void with_real(const Tensor& tensor, Use&& use) {
     use(float());
 }
 
+/// Memory of the thread's own for the kernel.
+template <class Scalar>
+Scalar* product_memory() {
+  thread_local const Tensor memory = empty({product_buffer}, number_type<Scalar>);
+  return memory.data<Scalar>();
+}
+
 void require_product(const Tensor& c, const Tensor& a, const Tensor& b) {
   if (a.dims() != 2 || b.dims() != 2 || c.size(0) != a.size(0) || a.size(1) != b.size(0) ||
       c.size(1) != b.size(1) || a.type() != b.type() || c.type() != a.type())
     throw std::invalid_argument("matrices that do not fit a product");
+}
+
+/// b becomes X of a X = b, a few rows at a time.
+void substitute(const Tensor& a, const Tensor& b, bool upper) {
+  const Index n = a.size(0);
+  for (Index done = 0; done < n; done += panel) {
+    const Index count = std::min(panel, n - done), first = upper ? n - done - count : done;
+    const Tensor rows = b.narrow(0, first, count);
+    const Index before = upper ? first + count : 0;
+    if (done > 0)
+      multiply(rows, a.narrow(0, first, count).narrow(1, before, done), b.narrow(0, before, done), -1.0, 1.0);
+    with_real(b, [&](auto number) {
+      using Scalar = decltype(number);
+      const SubstitutionBlock<Scalar> block{
+          strided<const Scalar>(a.narrow(0, first, count).narrow(1, first, count)), strided<Scalar>(rows),
+          count, b.size(1), upper};
+      ARAPFIELDS_DISPATCH(substitute_block(block));
+    });
+  }
+}
+
+/// Of a few rows, which become the factor; whether there is one.
+template <class Scalar>
+bool factorize_panel(const Tensor& a) {
+  const Strided<Scalar> m = strided<Scalar>(a);
+  const auto at = [&](Index i, Index j) -> Scalar& { return m.data[i * m.row + j * m.column]; };
+  for (Index j = 0; j < a.size(0); ++j) {
+    for (Index k = 0; k < j; ++k)
+      for (Index i = j; i < a.size(0); ++i) at(i, j) -= at(i, k) * at(j, k);
+    if (!(at(j, j) > 0)) return false;
+    const Scalar pivot = std::sqrt(at(j, j));
+    for (Index i = j; i < a.size(0); ++i) at(i, j) /= pivot;
+    for (Index i = 0; i < j; ++i) at(i, j) = 0;
+  }
+  return true;
 }
 
 }  // namespace
@@ -53,16 +86,20 @@ void multiply(const Tensor& c, const Tensor& a, const Tensor& b, double factor, 
     c.assign(rows);
     return;
   }
-  if (kept == 0.0)
-    c.set_zero();
-  else if (kept != 1.0)
-    c *= kept;
-  if (a.count() == 0) return;
-  const Tensor left = with_rows(a), right = with_rows(b);
+  if (kept != 0.0 && kept != 1.0) c *= kept;
+  if (a.count() == 0 && kept == 0.0) c.set_zero();
   with_real(c, [&](auto number) {
     using Scalar = decltype(number);
-    ARAPFIELDS_DISPATCH(add_block_product(strided<Scalar>(c), strided<const Scalar>(left),
-                                          strided<const Scalar>(right), static_cast<Scalar>(factor)));
+    const ProductBlock<Scalar> block{strided<Scalar>(c),
+                                     strided<const Scalar>(a),
+                                     strided<const Scalar>(b),
+                                     a.size(0),
+                                     a.size(1),
+                                     b.size(1),
+                                     static_cast<Scalar>(factor),
+                                     kept != 0.0,
+                                     product_memory<Scalar>()};
+    ARAPFIELDS_DISPATCH(multiply_block(block));
   });
   if (c.type() == NumberType::bfloat16) round_bfloat16(c);
 }
@@ -74,45 +111,41 @@ Tensor product(const Tensor& a, const Tensor& b) {
 }
 
 Tensor batch_product(const Tensor& a, const Tensor& b) {
-  const Tensor c = zeros({a.size(0), a.size(1), b.size(2)}, a);
-  with_real(c, [&](auto number) {
-    using Scalar = decltype(number);
-    Scalar* out = c.data<Scalar>();
-    for (Index n = 0; n < c.size(0); ++n)
-      for (Index i = 0; i < c.size(1); ++i)
-        for (Index j = 0; j < c.size(2); ++j, ++out)
-          for (Index k = 0; k < a.size(2); ++k)
-            *out += a.data<Scalar>()[n * a.stride(0) + i * a.stride(1) + k * a.stride(2)] *
-                    b.data<Scalar>()[n * b.stride(0) + k * b.stride(1) + j * b.stride(2)];
-  });
+  const Tensor c = empty({a.size(0), a.size(1), b.size(2)}, a);
+  for (Index n = 0; n < c.size(0); ++n) multiply(c[n], a[n], b[n]);
   return c;
 }
 
 Tensor cholesky_factor(const Tensor& a) {
-  const Tensor factor = a.clone();
+  Tensor factor = a.clone();
+  const Index n = a.size(0);
   bool definite = true;
-  with_real(factor, [&](auto number) {
-    definite = ARAPFIELDS_DISPATCH(factorize_block(strided<decltype(number)>(factor)));
-  });
-  return definite ? factor : Tensor();
+  for (Index k = 0; k < n && definite; k += panel) {
+    const Index count = std::min(panel, n - k), below = n - k - count;
+    const Tensor columns = factor.narrow(1, k, count), done = factor.narrow(1, 0, k),
+                 own = columns.narrow(0, k, count);
+    multiply(columns.narrow(0, k, n - k), done.narrow(0, k, n - k), done.narrow(0, k, count).t(), -1.0, 1.0);
+    with_real(factor, [&](auto number) { definite = factorize_panel<decltype(number)>(own); });
+    if (!definite) return {};
+    const Tensor rest = columns.narrow(0, k + count, below);
+    rest.assign(solve_triangular(own, rest.t(), /*upper=*/false, Side::left).t());
+    columns.narrow(0, 0, k).set_zero();
+  }
+  return factor;
 }
 
 Tensor solve_triangular(const Tensor& a, const Tensor& b, bool upper, Side side) {
   if (side == Side::right) return solve_triangular(a.t(), b.t(), !upper, Side::left).t();
-  const Tensor factor = with_rows(a), solution = b.clone();
-  with_real(solution, [&](auto number) {
-    using Scalar = decltype(number);
-    if (upper)
-      ARAPFIELDS_DISPATCH(solve_upper_block(strided<const Scalar>(factor), strided<Scalar>(solution)));
-    else
-      ARAPFIELDS_DISPATCH(solve_lower_block(strided<const Scalar>(factor), strided<Scalar>(solution)));
-  });
+  const Tensor solution = b.clone();
+  substitute(a, solution, upper);
   return solution;
 }
 
 Tensor solve_by_factor(const Tensor& lower, const Tensor& b) {
-  return solve_triangular(lower.t(), solve_triangular(lower, b, /*upper=*/false, Side::left), /*upper=*/true,
-                          Side::left);
+  const Tensor solution = b.clone();
+  substitute(lower, solution, /*upper=*/false);
+  substitute(lower.t(), solution, /*upper=*/true);
+  return solution;
 }
 
 }  // namespace arapfields

@@ -37,7 +37,8 @@ void copy_numbers(const Tensor::Array& to, const Tensor::Array& from) {
                 if (steps[0] == 1 && steps[1] == 1)
                   std::copy(source, source + length, row);
                 else
-                  for (Index i = 0; i < length; ++i) row[i * steps[0]] = static_cast<To>(source[i * steps[1]]);
+                  for (Index i = 0; i < length; ++i)
+                    row[i * steps[0]] = static_cast<To>(source[i * steps[1]]);
               });
 }
 
@@ -45,9 +46,8 @@ void copy_numbers(const Tensor::Array& to, const Tensor::Array& from) {
 template <class F>
 const Tensor& update(const Tensor& self, const Tensor& other, const F& f) {
   const Tensor same = other.to(self.type());
-  with_type(self.type(), [&](auto number) {
-    apply<decltype(number)>(self.array(), f, self.array(), same.array());
-  });
+  with_type(self.type(),
+            [&](auto number) { apply<decltype(number)>(self.array(), f, self.array(), same.array()); });
   return self;
 }
 
@@ -227,9 +227,8 @@ Tensor Tensor::to_device(const std::string&) const { return *this; }
 
 const Tensor& Tensor::assign(const Tensor& from) const {
   with_type(type(), [&](auto to) {
-    with_type(from.type(), [&](auto source) {
-      copy_numbers<decltype(to), decltype(source)>(*array_, from.array());
-    });
+    with_type(from.type(),
+              [&](auto source) { copy_numbers<decltype(to), decltype(source)>(*array_, from.array()); });
   });
   if (type() == NumberType::bfloat16) round_bfloat16(*this);
   return *this;
@@ -268,8 +267,8 @@ const Tensor& Tensor::add_quotient(const Tensor& a, const Tensor& b, double fact
 
 bool alike(const Tensor& a, const Tensor& b) { return a.type() == b.type(); }
 bool same_sizes(const Tensor& a, const Tensor& b) {
-  return a.dims() == b.dims() && std::equal(a.array().sizes.begin(), a.array().sizes.begin() + a.dims(),
-                                            b.array().sizes.begin());
+  return a.dims() == b.dims() &&
+         std::equal(a.array().sizes.begin(), a.array().sizes.begin() + a.dims(), b.array().sizes.begin());
 }
 bool is_same(const Tensor& a, const Tensor& b) {
   return a.data<char>() == b.data<char>() && same_sizes(a, b) && a.array().strides == b.array().strides;

@@ -7,10 +7,14 @@ namespace arapfields {
 
 NumberType Tensor::type() const {
   switch (aten(*this).scalar_type()) {
-    case at::kDouble: return NumberType::float64;
-    case at::kLong: return NumberType::int64;
-    case at::kBFloat16: return NumberType::bfloat16;
-    default: return NumberType::float32;
+    case at::kDouble:
+      return NumberType::float64;
+    case at::kLong:
+      return NumberType::int64;
+    case at::kBFloat16:
+      return NumberType::bfloat16;
+    default:
+      return NumberType::float32;
   }
 }
 bool Tensor::on_host() const { return aten(*this).is_cpu(); }
@@ -40,9 +44,7 @@ Tensor Tensor::to_device_of(const Tensor& other) const {
   if (other.on_host()) return *this;
   return Plain()(aten(*this).pin_memory().to(aten(other).device(), true));
 }
-Tensor Tensor::to_device(const std::string& name) const {
-  return Plain()(aten(*this).to(at::Device(name)));
-}
+Tensor Tensor::to_device(const std::string& name) const { return Plain()(aten(*this).to(at::Device(name))); }
 
 const Tensor& Tensor::assign(const Tensor& from) const {
   return Plain()(aten(*this).copy_(aten(from))), *this;

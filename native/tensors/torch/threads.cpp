@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "core/library_threads.h"
-
 #include <ATen/Parallel.h>
+
+#include "core/library_threads.h"
 
 // Of the OpenMP library that libtorch itself uses: per thread, as the standard says.
 extern "C" int omp_get_max_threads();
@@ -27,7 +27,9 @@ int set_mkl_threads([[maybe_unused]] int count) {
 // The first question about its threads that a thread asks libtorch sets them: it is asked before we do.
 int library_threads() { return at::get_num_threads(); }
 
-SerialLibrary::SerialLibrary() : openmp_(library_threads()), mkl_(set_mkl_threads(1)) { omp_set_num_threads(1); }
+SerialLibrary::SerialLibrary() : openmp_(library_threads()), mkl_(set_mkl_threads(1)) {
+  omp_set_num_threads(1);
+}
 
 SerialLibrary::~SerialLibrary() {
   omp_set_num_threads(openmp_);

@@ -28,8 +28,8 @@ STYLE = af.preferred_normals("cube")
 
 
 @contextlib.contextmanager
-def aten_path():
-    scope = testing.AtenPath()
+def device_path():
+    scope = testing.DevicePath()
     yield
     del scope
 
@@ -48,10 +48,10 @@ def jets_of(sigma, rng, count=70):
 def test_rigidity_equals_the_kernels(sigma):
     jets = jets_of(sigma, np.random.default_rng(0))
     for bending in (0.0, 0.01, 1.0):
-        energy = testing.arap_energy(jets, bending, 0.7, aten=True)
+        energy = testing.arap_energy(jets, bending, 0.7, composed=True)
         agree(energy, testing.arap_energy(jets, bending, 0.7), tolerances.COMPOSED)
     first = np.ascontiguousarray(jets[:4])
-    energy = testing.arap_energy(first, 0.0, aten=True)
+    energy = testing.arap_energy(first, 0.0, composed=True)
     agree(energy, testing.arap_energy(first, 0.0), tolerances.COMPOSED)
 
 
@@ -59,14 +59,14 @@ def test_rigidity_equals_the_kernels(sigma):
 @pytest.mark.parametrize("sigma", [[1, 1, -1], [1, 0, 0], [0, 0, 0], [3, 1e-9, -1e-9]], ids=str)
 def test_ambiguous_rotations_stay_finite(sigma, dtype):
     jets = jets_of(sigma, np.random.default_rng(1)).astype(dtype)
-    stretch, bend, cotangents = testing.arap_energy(jets, 0.01, aten=True)
+    stretch, bend, cotangents = testing.arap_energy(jets, 0.01, composed=True)
     assert stretch == pytest.approx(((np.array(sigma) - 1) ** 2).sum(), rel=1e-5)
     assert np.isfinite(bend) and np.isfinite(cotangents).all() and np.abs(cotangents).max() < 1e6
 
 
 def test_rigidity_in_single_precision():
     jets = jets_of([1.2, 1.0, 0.7], np.random.default_rng(2)).astype(np.float32)
-    energy = testing.arap_energy(jets, 0.01, aten=True)
+    energy = testing.arap_energy(jets, 0.01, composed=True)
     agree(energy, testing.arap_energy(jets, 0.01), tolerances.FLOAT32_ENERGY)
 
 
@@ -82,9 +82,9 @@ def test_gauss_and_barrier_equal_the_kernels(sigma, dtype):
         tolerance *= 100
     for weights in (np.zeros(0), rng.uniform(size=jets.shape[1])):
         arguments = jets, normals, STYLE, 5.0, 0.6, weights.astype(dtype)
-        barrier = testing.gauss_energy(*arguments, aten=True)
+        barrier = testing.gauss_energy(*arguments, composed=True)
         agree(barrier, testing.gauss_energy(*arguments), tolerance)
-    barrier = testing.fold_barrier(jets, 0.9, 0.6, aten=True)
+    barrier = testing.fold_barrier(jets, 0.9, 0.6, composed=True)
     agree(barrier, testing.fold_barrier(jets, 0.9, 0.6), tolerance)
 
 
@@ -94,7 +94,7 @@ def test_handles_equal_the_kernels(dtype):
     handles = testing.BoundHandles(cases.bar_handles(30.0), cases.bar_samples(200).points)
     jets = rng.normal(size=(1, len(handles.sources), 3)).astype(dtype)
     tolerance = tolerances.COMPOSED if dtype is np.float64 else tolerances.FLOAT32_ENERGY
-    energy = testing.handle_energy(jets, handles, 0.6, aten=True)
+    energy = testing.handle_energy(jets, handles, 0.6, composed=True)
     agree(energy, testing.handle_energy(jets, handles, 0.6), tolerance)
 
 
@@ -111,7 +111,7 @@ def test_losses_and_their_gradients_equal_the_kernels(terms):
     samples = cases.bar_samples(60)
     parameters = None
     results = []
-    for scope in (contextlib.nullcontext, aten_path):
+    for scope in (contextlib.nullcontext, device_path):
         with scope():
             probe = testing.LossProbe(samples, cases.bar_handles(30.0), **terms)
             if parameters is None:
@@ -125,7 +125,7 @@ def test_a_solve_arrives_where_the_kernels_do(optimizer):
     options = dict(iterations=60, width=48, layers=3, batch=200, optimizer=optimizer, threads=1, device="cpu")
     samples, handles = cases.bar_samples(600), cases.bar_handles(40.0)
     expected = af.deform(samples, handles, af.DeformOptions(**options)).report
-    with aten_path():
+    with device_path():
         report = af.deform(samples, handles, af.DeformOptions(**options)).report
     assert [i for i, _ in report["loss"]] == [i for i, _ in expected["loss"]]
     assert report["loss"][0][1] == pytest.approx(expected["loss"][0][1], rel=tolerances.FLOAT32_ENERGY)
@@ -142,7 +142,7 @@ def test_stylize_and_fit_arrive_where_the_kernels_do():
         iterations=60, width=48, layers=3, near_points=4000, uniform_points=1000, threads=1, device="cpu"
     )
     figures = []
-    for scope in (contextlib.nullcontext, aten_path):
+    for scope in (contextlib.nullcontext, device_path):
         with scope():
             stylized = af.stylize(samples, turned, style).report
             near_mean = af.fit_sdf(vertices, faces, fit).report.near_mean
@@ -154,7 +154,7 @@ def test_divergence_is_noticed_and_the_last_good_state_kept():
     options = af.DeformOptions(
         iterations=200, width=16, layers=2, batch=50, learning_rate=1e30, optimizer="adam", device="cpu"
     )
-    with aten_path(), pytest.raises(af.Diverged, match="was kept"):
+    with device_path(), pytest.raises(af.Diverged, match="was kept"):
         af.deform(cases.bar_samples(200), cases.bar_handles(), options)
 
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The compositions of aten_energies.h on jets in main memory, with the kernels' signatures: for comparison.
+// The compositions of composed_energies.h on jets in main memory, with the kernels' signatures: for
+// comparison.
 #pragma once
 
 #include "energies/arap.h"

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The energies of this folder as compositions of libtorch's operations, for tensors outside main memory. For
+// libtorch sources alone. Nothing is read back, so nothing waits for the
+// device. `jets` and `cotangents` are (columns, n, 3), contiguous; weight times the cotangents is added to
+// the latter unless they are undefined. Values are means as in arap.h, gauss.h, distortion.h, handles.h and
+// stance.h, as tensors.
+#pragma once
+
+#include "tensors/tensor.h"
+
+namespace arapfields {
+
+/// The constants that the compositions select and multiply by. Made once beside a tensor: each is a transfer.
+struct EnergyTables {
+  explicit EnergyTables(const Tensor& like);
+
+  Tensor davenport;  ///< (9, 16): J to Horn's 4×4 matrix
+  Tensor turn;       ///< (16): where a round of Jacobi rotations finds its matrix's entries in (c, s, −s, 0)
+  Tensor diagonal, even, odd, pair;  ///< (4), (2): places in a 4×4 matrix of its diagonal and a round's pairs
+  Tensor exchange;                   ///< (4, 4, 4): matrix i exchanges columns i and 0
+  Tensor entries;                    ///< (12): of a quaternion, see `left` and `right`
+  Tensor left, right;                ///< (3, 4): signs of these; R = (left ∘ q)(right ∘ q)ᵀ
+  Tensor axial;                      ///< (9, 3): M to axl(M); transposed, w to [w]×
+  Tensor slices;                     ///< (9): second_column(j, k) at 3j + k
+  Tensor pairs;                      ///< (6, 9): collects these
+  Tensor identity, next_column, last;  ///< (3, 3); (3): columns of J after k, and after that
+  Tensor next_axis, last_axis;         ///< (3): the same without the jets' first column
+};
+
+/// Closest rotations (n,3,3) of Jacobians (n,3,3), and K of each by eigenvectors (columns of axes) and
+/// eigenvalues (n,3): rotation_pack.h by a fixed number of Jacobi sweeps.
+struct ComposedPolar {
+  Tensor rotation, axes, sums;
+};
+ComposedPolar composed_polar(const Tensor& jacobians, const EnergyTables& tables);
+
+/// Factors (n) of single points, on their energy and on their bending; undefined: ones.
+struct ComposedFactors {
+  Tensor weights, bending;
+};
+
+/// (4): stretch, bend, energy and the stretch's part of it; the bend is 0 where the jets have no second
+/// derivatives.
+Tensor composed_arap(const Tensor& jets, double bending, double weight, const EnergyTables& tables,
+                     Tensor cotangents, const ComposedFactors& factors = {});
+/// Normals (n,3), weights (n) or undefined, the preference as rows (normal, weight) (k,4).
+Tensor composed_gauss(const Tensor& jets, const Tensor& normals, const Tensor& sample_weights,
+                      const Tensor& preferred, double sharpness, double weight, const EnergyTables& tables,
+                      Tensor cotangents);
+/// The same with unit targets (n,3) of the samples: gauss.h's target_energy.
+Tensor composed_targets(const Tensor& jets, const Tensor& normals, const Tensor& sample_weights,
+                        const Tensor& targets, double weight, const EnergyTables& tables, Tensor cotangents);
+Tensor composed_barrier(const Tensor& jets, double threshold, double weight, const EnergyTables& tables,
+                        Tensor cotangents);
+/// Targets (n,3) and weights (n) as in HandleBatch.
+Tensor composed_handles(const Tensor& jets, const Tensor& targets, const Tensor& weights, double weight,
+                        Tensor cotangents);
+/// Rest points (n,3), the stance's upward direction (3) and ground weights (n); its scale belongs to the
+/// weight.
+Tensor composed_stance(const Tensor& jets, const Tensor& rest, const Tensor& up, const Tensor& ground,
+                       double weight, const EnergyTables& tables, Tensor cotangents);
+
+}  // namespace arapfields
