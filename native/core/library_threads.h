@@ -4,8 +4,8 @@
 
 namespace arapfields {
 
-/// Threads for the calling thread's loops where nothing else is said: what torch.set_num_threads or
-/// OMP_NUM_THREADS says, else the processor's cores. Must not be called under a SerialLibrary.
+/// Threads for the calling thread's loops where nothing else is said: OMP_NUM_THREADS or what the
+/// library was told, else the processor's cores. Must not be called under a SerialLibrary.
 int library_threads();
 
 /// While one lives, the library's functions, those of its BLAS and LAPACK included, stay on the calling

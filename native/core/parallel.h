@@ -12,8 +12,8 @@ namespace arapfields {
 /// Splits [begin, end) into chunks of at least `grain` and runs body(chunk_begin, chunk_end) for each on the
 /// call's threads (ThreadScope), which take the next chunk as they come free. The chunks depend on the range
 /// and the grain alone, not on the number of threads. Loops within `body` stay on their thread, as do
-/// libtorch's functions. After an exception in `body` no chunk is begun, and the caller gets it (one, where
-/// there are more).
+/// the tensors' operations. After an exception in `body` no chunk is begun, and the caller gets it (one,
+/// where there are more).
 ARAPFIELDS_EXPORT void parallel_for(Index begin, Index end, Index grain,
                                     const std::function<void(Index, Index)>& body);
 
@@ -22,10 +22,10 @@ ARAPFIELDS_EXPORT void parallel_jobs(Index count, const std::function<void(Index
 /// body(job, slot): jobs that run at the same time have different slots, which are below thread_count().
 ARAPFIELDS_EXPORT void parallel_jobs_in_slots(Index count, const std::function<void(Index, Index)>& body);
 
-/// Gives the calling thread's loops a number of threads while it lives, and keeps libtorch's own threads out;
-/// 0 keeps the number that is in force. No other thread and no later call sees any of it. More threads than
-/// the pool may have (256), or than the system grants, are done without: results do not depend on their
-/// number.
+/// Gives the calling thread's loops a number of threads while it lives, and keeps the tensors' library
+/// serial; 0 keeps the number that is in force. No other thread and no later call sees any of it. More
+/// threads than the pool may have (256), or than the system grants, are done without: results do not depend
+/// on their number.
 class ARAPFIELDS_EXPORT ThreadScope {
  public:
   explicit ThreadScope(int threads = 0);
@@ -39,7 +39,7 @@ class ARAPFIELDS_EXPORT ThreadScope {
 };
 
 /// The threads that a loop here would be split over: those of the innermost ThreadScope, else as many as
-/// libtorch would use; 1 within a loop's body.
+/// library_threads() says; 1 within a loop's body.
 ARAPFIELDS_EXPORT int thread_count();
 
 }  // namespace arapfields

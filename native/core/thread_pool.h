@@ -40,7 +40,7 @@ class ThreadPool {
   void count_open();
 
   const std::function<void()> on_start_;
-  /// One thread starts at a time: in a forked child libtorch makes its own pool anew, unguarded.
+  /// One thread starts at a time: in a forked child a library may make its own pool anew, unguarded.
   std::mutex starting_;
   std::mutex mutex_;  // guards what follows, of which the atomic ones are read without it too
   std::condition_variable wake_;

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The energies of this folder as compositions of libtorch's operations, for tensors outside main memory. For
-// libtorch sources alone. Nothing is read back, so nothing waits for the
-// device. `jets` and `cotangents` are (columns, n, 3), contiguous; weight times the cotangents is added to
-// the latter unless they are undefined. Values are means as in arap.h, gauss.h, distortion.h, handles.h and
-// stance.h, as tensors.
+// The energies of this folder as compositions of tensor operations, for tensors outside main memory. Nothing
+// is read back, so nothing waits for the device. `jets` and `cotangents` are (columns, n, 3), contiguous;
+// weight times the cotangents is added to the latter unless they are undefined. Values are means as in
+// arap.h, gauss.h, distortion.h, handles.h and stance.h, as tensors.
 #pragma once
 
 #include "tensors/tensor.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The two sweeps through coupling layers, and the way back to where points came from, for one block of
-// points; for libtorch sources alone. A layer's network is a function of the plane: its jets by the two
+// points. A layer's network is a function of the plane: its jets by the two
 // coordinates that it sees, six columns at most, travel through it, and the chain rule lifts what comes out,
 // two numbers a point, to all ten columns by the coordinates at rest.
 #pragma once

@@ -8,7 +8,7 @@ namespace arapfields {
 class Tensor;
 
 /// The layer steps that are not matrix products, on tensors: kernels (jet_kernels.h) for those in main
-/// memory, compositions of libtorch's operations elsewhere. `activations` and `jets` are (columns·n, width);
+/// memory, compositions of tensor operations elsewhere. `activations` and `jets` are (columns·n, width);
 /// slope (n, width).
 struct LayerStep {
   double sharpness = 30.0;

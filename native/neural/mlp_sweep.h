@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The two sweeps through the layers, for one block of points; for libtorch sources alone.
+// The two sweeps through the layers, for one block of points.
 #pragma once
 
 #include <functional>
