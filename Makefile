@@ -94,10 +94,9 @@ test: build $(NATIVE_TESTS)  ## all tests but the slow ones
 test-slow: build $(NATIVE_TESTS)  ## every test
 	$(ALL_TESTS) tests
 
-# Debian: g++-mingw-w64-x86-64-posix and wine64. The torch sources are left out: only MSVC's own compiler can use that
-# torch's C++ interface.
+# Debian: g++-mingw-w64-x86-64-posix and wine64.
 WINE := $(shell command -v wine64 || ls /usr/lib/wine/wine64 2> /dev/null)
-WINDOWS_TESTS := build/windows/tests/native_tests_without_torch.exe
+WINDOWS_TESTS := build/windows/tests/native_tests.exe
 
 .PHONY: windows-tools
 windows-tools:
@@ -105,11 +104,11 @@ windows-tools:
 	  $(call lacks,A compiler for Windows is needed (Debian: g++-mingw-w64-x86-64-posix))
 	@test -n "$(WINE)" || $(call lacks,Wine is needed (Debian: wine64))
 
-test-windows: windows-tools setup  ## all but the torch sources, compiled for Windows by mingw-w64, and their native tests under Wine
-	$(VENV)/bin/cmake -S . -B build/windows -G Ninja -DCMAKE_TOOLCHAIN_FILE=cmake/mingw-w64.cmake -DARAPFIELDS_WITHOUT_TORCH=ON \
-	  -DARAPFIELDS_WERROR=ON \
+test-windows: windows-tools setup  ## the library without bindings, compiled for Windows by mingw-w64, and its native tests under Wine
+	$(VENV)/bin/cmake -S . -B build/windows -G Ninja -DCMAKE_TOOLCHAIN_FILE=cmake/mingw-w64.cmake -DARAPFIELDS_BACKEND=eigen \
+	  -DARAPFIELDS_PYTHON=OFF -DARAPFIELDS_NATIVE_TESTS=ON -DARAPFIELDS_WERROR=ON \
 	  -DCMAKE_CXX_FLAGS_RELEASE="-O1 -DNDEBUG" -DPython_EXECUTABLE=$(abspath $(PY)) -DCMAKE_MAKE_PROGRAM=$(abspath $(VENV)/bin/ninja)
-	$(VENV)/bin/cmake --build build/windows
+	$(VENV)/bin/cmake --build build/windows --target native_tests
 	WINEPREFIX=$(abspath build/wine) WINEDEBUG=-all timeout 900 $(WINE) $(WINDOWS_TESTS) --color_output=no --report_level=short
 
 # Debian: debootstrap, g++-aarch64-linux-gnu and qemu-user-static; and root, for debootstrap and chroot. ARM64 takes

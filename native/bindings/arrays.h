@@ -10,7 +10,7 @@
 
 namespace arapfields::python {
 
-// Accepted are NumPy arrays, objects with the buffer protocol, DLPack (torch tensors, also those that require
+// Accepted are NumPy arrays, objects with the buffer protocol, DLPack (other libraries' tensors, also those that require
 // a gradient) or __array__, and nested sequences. Points take integer and float dtypes; triangles and indices
 // take integers alone. InvalidInput names `argument` for another shape or dtype, and where memory is short.
 Points as_points(const py::handle& value, const std::string& argument);
