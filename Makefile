@@ -165,14 +165,20 @@ workflows: git-clone setup  ## the continuous integration's steps for Linux, run
 # PYTHONS="3.11 3.13" makes those a must; else 3.11 and whatever headers are at hand or to be had. GLIBC=2.28 takes
 # the library that `make wheel` links for systems that old; else the zip needs a C library as new as this system's.
 PLATFORM := linux-x64
+EXTENSION_BUILD = $(if $(filter macos-%,$(PLATFORM)),build,$(if $(GLIBC),wheel,eigen-build))
 BUILD_EXTENSION = $(PY) blender_scripts/build_extension.py --output dist $(if $(PYTHONS),--python $(PYTHONS)) \
-  $(if $(GLIBC),--build build/wheel-$(GLIBC))
-extension: $(if $(GLIBC),wheel,build)  ## dist/arapfields-<version>-linux-x64.zip for Blender; PLATFORM=macos-arm64 for a Mac
+  --build build/$(if $(filter macos-%,$(PLATFORM)),wheel,$(if $(GLIBC),wheel-$(GLIBC),eigen))
+
+.PHONY: eigen-build
+eigen-build:
+	@$(MAKE) --no-print-directory build BACKEND=eigen
+
+extension: $(EXTENSION_BUILD)  ## dist/arapfields-<version>-linux-x64.zip for Blender; PLATFORM=macos-arm64 for a Mac
 	@$(if $(filter macos-%,$(PLATFORM)),$(PIP) -q -r blender_scripts/extension/macos-requirements.txt)
 	$(PY) blender_scripts/python_headers.py
 	$(BUILD_EXTENSION) --platform $(PLATFORM)
 
-repository: $(if $(GLIBC),wheel,build)  ## the same, and dist/index.json: a repository of extensions to serve
+repository: $(EXTENSION_BUILD)  ## the same, and dist/index.json: a repository of extensions to serve
 	$(PY) blender_scripts/python_headers.py
 	$(BUILD_EXTENSION) --repository
 

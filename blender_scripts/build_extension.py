@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds the Blender extension: one zip with the add-on, our library, libtorch, a binding per Python and what
-the add-on takes from PyPI.
+"""Builds the Blender extension: one zip with the add-on, our library, a binding per Python and what the
+add-on takes from PyPI.
 
-python blender_scripts/build_extension.py --output dist [--build build/wheel] [--python 3.11 3.13]
+python blender_scripts/build_extension.py --output dist [--build build/eigen] [--python 3.11 3.13]
                                           [--platform macos-arm64]
 """
 
@@ -33,7 +33,7 @@ WHEEL_TAGS = {"linux-x64": "py3-none-linux_x86_64", "macos-arm64": macos.WHEEL_T
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--output", type=Path, default=ROOT / "dist")
-    parser.add_argument("--build", type=Path, default=ROOT / "build/wheel", help="CMake build folder to take")
+    parser.add_argument("--build", type=Path, default=ROOT / "build/eigen", help="CMake build folder to take")
     parser.add_argument("--platform", choices=WHEEL_TAGS, default="linux-x64", help="whom the zip is for")
     parser.add_argument("--jobs", type=int, help="compilers at a time for another platform's library")
     parser.add_argument(
@@ -72,25 +72,21 @@ def wanted_headers(options):
 
 
 def linux_files(options, headers, work):
-    """Paths of the library, of what it needs of libtorch, and of a binding for each of the Pythons."""
-    package = options.build / "python/arapfields"
-    torch = libraries.library_folder(bindings.cached(options.build, "LIBTORCH_DIR"))
-    shipped = libraries.prepare_libraries(package / "libarapfields.so", torch, work / "libraries")
-    folder = work / "bindings"
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    modules = bindings.gather_bindings(ROOT, options.build, headers, work, folder)
+    """Paths of the library and of a binding for each of the Pythons."""
+    shutil.rmtree(work / "files", ignore_errors=True)
+    (work / "files").mkdir(parents=True)
+    library = libraries.stripped(options.build / "python/arapfields/libarapfields.so", work / "files")
+    modules = bindings.gather_bindings(ROOT, options.build, headers, work, work / "files")
     for module in modules:
-        libraries.strip(module)
-        libraries.make_private(module, {})
-        missing = libraries.missing_symbols(module, shipped[0])
+        libraries.stripped(module, work / "files")
+        missing = libraries.missing_symbols(module, library)
         if missing:
             raise RuntimeError(f"{module.name} was built for another library: {missing[0]} is missing")
-    foreign = libraries.foreign_needs([*shipped, *modules], [path.name for path in shipped])
+    foreign = libraries.foreign_needs([library, *modules])
     if foreign:
         raise RuntimeError(f"the libraries need what would not be shipped: {', '.join(foreign)}")
-    print("needs glibc {}.{} or newer".format(*libraries.glibc_floor([shipped[0], *modules])))
-    return [*shipped, *modules]
+    print("needs glibc {}.{} or newer".format(*libraries.glibc_floor([library, *modules])))
+    return [library, *modules]
 
 
 def build_wheel(options, version, headers):
@@ -111,7 +107,7 @@ def build_wheel(options, version, headers):
 def build(options):
     options.output, options.build = options.output.resolve(), options.build.resolve()
     if not (options.build / "python/arapfields/libarapfields.so").exists():
-        raise RuntimeError(f"no built package in {options.build} (run make build)")
+        raise RuntimeError(f"no built package in {options.build} (run make build BACKEND=eigen)")
     addon = ROOT / "addon"
     manifest = archive.read_manifest(addon)
     version = bindings.cached(options.build, "CMAKE_PROJECT_VERSION")

@@ -10,7 +10,7 @@ from pathlib import Path
 from . import dependencies
 from .archive import OPTIONS
 
-LIMIT = 200e6
+LIMITS = {"linux-x64": 10e6, "macos-arm64": 200e6}
 PLATFORM_TAGS = {"linux-x64": r"(many)?linux.*_x86_64", "macos-arm64": r"macosx_\d+_\d+_arm64"}
 LIBRARY = re.compile(r"arapfields/libarapfields\.(so|dylib)")
 
@@ -25,9 +25,6 @@ def check_platforms(manifest, names):
 
 def check_zip(path, pythons):
     """RuntimeError unless the zip is small, whole, and serves its platforms and these (major, minor)."""
-    size = path.stat().st_size
-    if size > LIMIT:
-        raise RuntimeError(f"{path} has {size / 1e6:.0f} MB; the limit is {LIMIT / 1e6:.0f}")
     with zipfile.ZipFile(path) as archive:
         names = set(archive.namelist())
         missing = {"blender_manifest.toml", "__init__.py", "LICENSE", OPTIONS, "guide/index.html"} - names
@@ -38,6 +35,9 @@ def check_zip(path, pythons):
         if not set(wheels) <= names:
             raise RuntimeError(f"{path.name} lacks {', '.join(sorted(set(wheels) - names))}")
         check_platforms(manifest, wheels)
+        size, limit = path.stat().st_size, min(LIMITS[platform] for platform in manifest["platforms"])
+        if size > limit:
+            raise RuntimeError(f"{path} has {size / 1e6:.0f} MB; the limit is {limit / 1e6:.0f}")
         for name in dependencies.SHIPPED:
             if not any(Path(wheel).name.startswith(f"{name}-") for wheel in wheels):
                 raise RuntimeError(f"{path.name} lacks the wheel of {name}")

@@ -20,16 +20,7 @@ sys.path.insert(0, str(ROOT / "cmake" / "wheel"))
 import old_glibc  # noqa: E402
 
 WORK = ROOT / "build"
-# Beside the wheel at run time, from the torch package that it depends on.
-OF_TORCH = [
-    "libc10.so",
-    "libtorch.so",
-    "libtorch_cpu.so",
-    "libtorch_cuda.so",
-    "libc10_cuda.so",
-    "libgomp*.so*",
-]
-LIMIT = 40_000_000  # bytes; a wheel that is larger has taken torch along
+LIMIT = 10_000_000  # bytes
 
 
 def version_pair(text):
@@ -82,10 +73,9 @@ def build_wheel(glibc, folder):
 
 
 def repair(path, version, output):
-    """auditwheel checks every symbol's version and gives the wheel its tag; torch's libraries stay out."""
+    """auditwheel checks every symbol's version and gives the wheel its tag."""
     tag = f"manylinux_{version[0]}_{version[1]}_{platform.machine()}"
-    excluded = [part for name in OF_TORCH for part in ("--exclude", name)]
-    run(sys.executable, "-m", "auditwheel", "repair", "--plat", tag, *excluded, "-w", output, path)
+    run(sys.executable, "-m", "auditwheel", "repair", "--plat", tag, "-w", output, path)
     (made,) = output.glob("*.whl")
     return made
 
@@ -99,11 +89,12 @@ def check_wheel(path):
         "arapfields/_native.pyi",
         "arapfields/options.json",
     ]
-    missing = [name for name in [*wanted, "arapfields/libtorch.txt"] if name not in names]
+    missing = [name for name in wanted if name not in names]
     if missing:
         raise RuntimeError(f"{path.name} lacks {', '.join(missing)}")
-    if path.stat().st_size > LIMIT or any(".libs/" in name for name in names):
-        raise RuntimeError(f"{path.name} carries libraries that belong to torch")
+    foreign = [name for name in names if ".libs/" in name or name.endswith("libtorch.txt")]
+    if path.stat().st_size > LIMIT or foreign:
+        raise RuntimeError(f"{path.name} is too large or carries others' libraries: {', '.join(foreign)}")
 
 
 def build_sdist(output):

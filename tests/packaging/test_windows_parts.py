@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What can be checked of Windows without one: all but the torch sources by mingw-w64, their tests by Wine."""
+"""What can be checked of Windows without one: the library by mingw-w64, its tests by Wine."""
 
 import json
 import re
@@ -19,7 +19,7 @@ POSIX = re.compile(r"#include <(sys/|unistd|fcntl|pthread|dlfcn|sched|poll|diren
 @pytest.mark.skipif(
     not all(map(shutil.which, TOOLS)) or not WINE, reason="mingw-w64 or Wine is not installed"
 )
-def test_the_parts_without_torch_pass_under_wine():
+def test_native_tests_pass_under_wine():
     done = subprocess.run(["make", "test-windows"], cwd=ROOT, capture_output=True, text=True)
     said = done.stdout + done.stderr
     assert done.returncode == 0, said[-4000:]

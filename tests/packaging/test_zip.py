@@ -59,7 +59,7 @@ def test_what_is_refused(tmp_path, change, pythons, text):
 
 
 def test_a_zip_over_the_limit_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(check, "LIMIT", 100)
+    monkeypatch.setitem(check.LIMITS, "linux-x64", 100)
     with pytest.raises(RuntimeError, match="the limit is"):
         check.check_zip(make_zip(tmp_path / "a.zip"), [(3, 11)])
 
