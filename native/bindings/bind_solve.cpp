@@ -152,6 +152,8 @@ A network that approximates the inverse of a field, as a DeformationField.
 It is trained so that the field maps its values back (the paper's cycle loss), at deformed samples and in
 their bounding box, and on the samples' own pairs. report is an InverseReport. For exact inverses of single
 points use field.inverse.)");
+  module.def("backend", &backend_name,
+             "What does dense products: the ARAPFIELDS_BACKEND that the library was built with.");
   module.def("device_report", &device_report,
              "A sentence that says whether device='cuda' is available, and if not, why.");
   module.def("arap_energy", &energy_of, "field"_a, "points"_a, R"(

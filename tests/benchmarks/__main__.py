@@ -36,6 +36,7 @@ def machine():
         "cpu": cpu,
         "threads": af.thread_count(),
         "kernels": af.simd_level(),
+        "backend": af.backend(),
         "python": platform.python_version(),
         "numpy": np.__version__,
         "torch": torch.__version__,

@@ -110,4 +110,5 @@ def test_curves() -> None:
 
 
 def test_the_machine() -> None:
+    assert af.backend() in ("eigen", "torch")
     assert af.thread_count() >= 1 and af.simd_level() and af.device_report() and "cube" in af.style_names()

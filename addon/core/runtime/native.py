@@ -110,6 +110,8 @@ def report():
         return [*lines, str(problem())]
     native = library()
     lines.append(f"arapfields {native.__version__} in {Path(native.__file__).parent}")
-    lines.append(f"{native.thread_count()} threads, kernels for {native.simd_level()}")
+    lines.append(
+        f"{native.thread_count()} threads, kernels for {native.simd_level()}, products by {native.backend()}"
+    )
     lines.append(native.device_report())
     return lines
