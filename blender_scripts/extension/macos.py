@@ -13,7 +13,6 @@ import pybind11
 
 from . import macho, macho_sign, macos_tools
 from .bindings import cached
-from .libraries import private_name
 from .macos_headers import macos_headers
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -28,6 +27,11 @@ TARGETS = ["arapfields_plain", "arapfields_io", "arapfields_torch", "arapfields_
 
 def module_name(version):
     return f"_native.cpython-{version[0]}{version[1]}-darwin.so"
+
+
+def private_name(name):
+    """libtorch_cpu.dylib → libarapfields-torch_cpu.dylib"""
+    return name.replace("lib", "libarapfields-", 1)
 
 
 def in_own_folder(name):
