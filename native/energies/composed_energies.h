@@ -13,17 +13,24 @@ namespace arapfields {
 struct EnergyTables {
   explicit EnergyTables(const Tensor& like);
 
-  Tensor davenport;  ///< (9, 16): J to Horn's 4×4 matrix
-  Tensor turn;       ///< (16): where a round of Jacobi rotations finds its matrix's entries in (c, s, −s, 0)
-  Tensor diagonal, even, odd, pair;  ///< (4), (2): places in a 4×4 matrix of its diagonal and a round's pairs
-  Tensor exchange;                   ///< (4, 4, 4): matrix i exchanges columns i and 0
-  Tensor entries;                    ///< (12): of a quaternion, see `left` and `right`
-  Tensor left, right;                ///< (3, 4): signs of these; R = (left ∘ q)(right ∘ q)ᵀ
-  Tensor axial;                      ///< (9, 3): M to axl(M); transposed, w to [w]×
-  Tensor slices;                     ///< (9): second_column(j, k) at 3j + k
-  Tensor pairs;                      ///< (6, 9): collects these
-  Tensor identity, next_column, last;  ///< (3, 3); (3): columns of J after k, and after that
-  Tensor next_axis, last_axis;         ///< (3): the same without the jets' first column
+  Tensor davenport;    ///< (9, 16): J to Horn's 4×4 matrix
+  Tensor turn;         ///< (16): where a round of Jacobi rotations finds its matrix in (c, s, −s, 0)
+  Tensor diagonal;     ///< (4): places in a 4×4 matrix of its diagonal,
+  Tensor even;         ///< (2): of a round's pairs, (0,0) and (2,2),
+  Tensor odd;          ///< (2): (1,1) and (3,3),
+  Tensor pair;         ///< (2): and (0,1) and (2,3)
+  Tensor exchange;     ///< (4, 4, 4): matrix i exchanges columns i and 0
+  Tensor entries;      ///< (12): of a quaternion, see `left` and `right`
+  Tensor left;         ///< (3, 4): signs of these; R = (left ∘ q)(right ∘ q)ᵀ
+  Tensor right;        ///< (3, 4)
+  Tensor axial;        ///< (9, 3): M to axl(M); transposed, w to [w]×
+  Tensor slices;       ///< (9): second_column(j, k) at 3j + k
+  Tensor pairs;        ///< (6, 9): collects these
+  Tensor identity;     ///< (3, 3)
+  Tensor next_column;  ///< (3): the column of J after k,
+  Tensor last;         ///< (3): and after that
+  Tensor next_axis;    ///< (3): the same without the jets' first column
+  Tensor last_axis;    ///< (3)
 };
 
 /// Closest rotations (n,3,3) of Jacobians (n,3,3), and K of each by eigenvectors (columns of axes) and

@@ -19,7 +19,8 @@ struct Tensor::Array {
   char* data = nullptr;
   NumberType type = NumberType::float32;
   int dims = 0;
-  Extents sizes{}, strides{};
+  Extents sizes{};
+  Extents strides{};
 
   template <class Number>
   Number* numbers() const {

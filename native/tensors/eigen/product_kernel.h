@@ -12,7 +12,8 @@ namespace arapfields {
 template <class Scalar>
 struct Strided {
   Scalar* data = nullptr;
-  std::int64_t row = 0, column = 0;
+  std::int64_t row = 0;
+  std::int64_t column = 0;
 };
 
 /// Parts of b in the order in which the product reads them: what the caller lends to each thread.
@@ -24,7 +25,9 @@ template <class Scalar>
 struct ProductBlock {
   Strided<Scalar> c;
   Strided<const Scalar> a, b;
-  std::int64_t rows, inner, columns;
+  std::int64_t rows;
+  std::int64_t inner;
+  std::int64_t columns;
   Scalar factor;
   bool add;
   Scalar* buffer;  // product_buffer numbers
