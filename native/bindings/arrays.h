@@ -10,9 +10,10 @@
 
 namespace arapfields::python {
 
-// Accepted are NumPy arrays, objects with the buffer protocol, DLPack (other libraries' tensors, also those that require
-// a gradient) or __array__, and nested sequences. Points take integer and float dtypes; triangles and indices
-// take integers alone. InvalidInput names `argument` for another shape or dtype, and where memory is short.
+// Accepted are NumPy arrays, objects with the buffer protocol, DLPack (other libraries' tensors, also those
+// that require a gradient) or __array__, and nested sequences. Points take integer and float dtypes;
+// triangles and indices take integers alone. InvalidInput names `argument` for another shape or dtype, and
+// where memory is short.
 Points as_points(const py::handle& value, const std::string& argument);
 /// The same, refusing NaN and infinity.
 Points as_finite_points(const py::handle& value, const std::string& argument);
