@@ -36,13 +36,16 @@ struct EnergyTables {
 /// Closest rotations (n,3,3) of Jacobians (n,3,3), and K of each by eigenvectors (columns of axes) and
 /// eigenvalues (n,3): rotation_pack.h by a fixed number of Jacobi sweeps.
 struct ComposedPolar {
-  Tensor rotation, axes, sums;
+  Tensor rotation;
+  Tensor axes;
+  Tensor sums;
 };
 ComposedPolar composed_polar(const Tensor& jacobians, const EnergyTables& tables);
 
 /// Factors (n) of single points, on their energy and on their bending; undefined: ones.
 struct ComposedFactors {
-  Tensor weights, bending;
+  Tensor weights;
+  Tensor bending;
 };
 
 /// (4): stretch, bend, energy and the stretch's part of it; the bend is 0 where the jets have no second

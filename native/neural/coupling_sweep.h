@@ -17,7 +17,8 @@ namespace arapfields {
 /// as views into one flat vector.
 struct CouplingViews {
   struct Network {
-    std::vector<Tensor> weights, biases;
+    std::vector<Tensor> weights;
+    std::vector<Tensor> biases;
   };
   CouplingViews() = default;
   CouplingViews(const CouplingShape& shape, const Tensor& flat);
@@ -30,8 +31,12 @@ struct CouplingViews {
 /// pre-activations and activations (plane·count, width), their slopes (count, width), and the output
 /// (plane·count, 2). What no mixed derivative of the encoding reaches stays zero.
 struct CouplingMemory {
-  Tensor jets, encoding, output;
-  std::vector<Tensor> pre, activations, slope;
+  Tensor jets;
+  Tensor encoding;
+  Tensor output;
+  std::vector<Tensor> pre;
+  std::vector<Tensor> activations;
+  std::vector<Tensor> slope;
 };
 
 /// A block's memory: one a coupling layer where pull_back is to follow, one for all otherwise.

@@ -14,7 +14,8 @@ namespace arapfields {
 struct LayerViews {
   LayerViews() = default;
   LayerViews(const MlpShape& shape, const Tensor& flat);
-  std::vector<Tensor> weights, biases;
+  std::vector<Tensor> weights;
+  std::vector<Tensor> biases;
   /// Copies of weights in bfloat16 for the products that shall be rounded; undefined, or none, elsewhere.
   std::vector<Tensor> rounded;
 };
@@ -30,13 +31,18 @@ struct Block {
   int columns = 1;
   bool second = false;
   Tensor encoding;
-  std::vector<Tensor> activations, slope, adjoints;
+  std::vector<Tensor> activations;
+  std::vector<Tensor> slope;
+  std::vector<Tensor> adjoints;
 };
 
 /// What one thread needs besides: flat buffers for the largest block, the last three for second derivatives.
 struct Workspace {
-  Tensor jets, other, output;
-  Tensor below, second;
+  Tensor jets;
+  Tensor other;
+  Tensor output;
+  Tensor below;
+  Tensor second;
   std::vector<Tensor> partial;
 };
 

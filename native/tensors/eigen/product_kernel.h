@@ -17,14 +17,16 @@ struct Strided {
 };
 
 /// Parts of b in the order in which the product reads them: what the caller lends to each thread.
-constexpr std::int64_t product_inner = 256, product_columns = 512;
+constexpr std::int64_t product_inner = 256;
+constexpr std::int64_t product_columns = 512;
 constexpr std::int64_t product_buffer = product_inner * product_columns;
 
 /// c (rows, columns) = factor·a b, or this added to it. Rows of c are contiguous.
 template <class Scalar>
 struct ProductBlock {
   Strided<Scalar> c;
-  Strided<const Scalar> a, b;
+  Strided<const Scalar> a;
+  Strided<const Scalar> b;
   std::int64_t rows;
   std::int64_t inner;
   std::int64_t columns;
