@@ -14,7 +14,8 @@ constexpr double least_step = 4e-3, most_step = 0.128;  // in cube units; each i
 constexpr double trusted = 0.9659, settled = 0.9962;
 
 /// Rows of unit length; zeros stay.
-Points directions(const Points& rows) {
+template <class Rows>
+Points directions(const Eigen::MatrixBase<Rows>& rows) {
   Points result = rows.rowwise().normalized();
   for (Index i = 0; i < rows.rows(); ++i)
     if (rows.row(i).isZero(0.0)) result.row(i).setZero();
