@@ -18,7 +18,7 @@ SAME_PLACE = 1e-6  # of an object's size: matrices in single precision
 
 
 class Carrying:
-    """What a source carries. `warnings`: what is left out and why, each once."""
+    """What a source carries. `warnings`: what is left out and why, each told once."""
 
     def __init__(self, context, source):
         self.source, self.warnings, self.objects, self.before = ObjectReference(source), [], [], {}

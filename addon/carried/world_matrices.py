@@ -85,7 +85,7 @@ def hangs_on(item, rigs):
 
 
 def constrained_to(item, rigs):
-    """Whether constraints place the object by one of these armatures; the field would move it twice."""
+    """Whether constraints place the object by one of these armatures, which cannot be told from the field."""
     return any(c.enabled and c.type in FOLLOWING and targets(c) & set(rigs) for c in item.constraints)
 
 

@@ -13,7 +13,7 @@ from .children import Children
 from .parser import FORMATS, solve_settings
 from .record import Record, described, digest, stamp
 
-LOOK = 1.0  # seconds between two checks of what other batches work on
+LOOK = 1.0  # seconds between two looks at what other batches are at work on
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,10 @@
 """Meshes and .blend files by Blender, in the file's own coordinates; outputs appear whole."""
 
 import contextlib
+import errno
 import os
 import re
+import shutil
 from pathlib import Path
 
 import bpy
@@ -12,6 +14,7 @@ from ..core.errors import UserError
 from .export_check import is_whole
 from .parser import FORMATS
 
+ROOM = 1 << 20  # bytes; a disk with less is full
 AXES = {"forward_axis": "Y", "up_axis": "Z"}  # coordinates stay as they are in the file
 READ = {
     ".ply": lambda path: bpy.ops.wm.ply_import(filepath=path, **AXES),
@@ -26,6 +29,21 @@ def check(path):
         known = ", ".join(f".{name}" for name in FORMATS)
         raise UserError(f"{path}: unknown extension; known are {known}")
     return path
+
+
+def check_place(path):
+    """Before anything is solved: OSError or InvalidInput where no file can take this place."""
+    from arapfields._native import OutputFile
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    OutputFile(path).discard()
+
+
+def not_whole(path):
+    """What to raise where Blender, which does not tell, has written a part of a file."""
+    if shutil.disk_usage(path.parent).free < ROOM:
+        return OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+    return UserError(f"{path}: Blender could not write all of it; the disk may be full")
 
 
 def read(path):
@@ -63,7 +81,7 @@ def write(path, items):
     with whole_file(path) as partial:
         export(partial, items)
         if not partial.is_file() or not is_whole(partial, [item.data for item in items]):
-            raise UserError(f"{path}: Blender could not write all of it; the disk may be full")
+            raise not_whole(path)
         materials = partial.with_suffix(".mtl")
         if materials.exists():
             text = materials.read_text(encoding="utf-8", errors="surrogateescape")
@@ -83,7 +101,7 @@ def export(path, items):
 
 
 def relative_textures(text, folder):
-    """Texture paths of a material file, relative to the folder where it will lie."""
+    """Texture paths of a material file, told from the folder where it will lie."""
 
     def relative(match):
         path = Path(match[2].strip())
@@ -102,4 +120,6 @@ def write_blend(path):
         try:
             bpy.ops.wm.save_as_mainfile(filepath=str(partial), copy=True, relative_remap=True)
         except RuntimeError as error:
+            if shutil.disk_usage(path.parent).free < ROOM:
+                raise not_whole(path) from error
             raise UserError(f"{path}: {error}") from error

@@ -2,6 +2,7 @@
 """One command from its arguments to its exit code."""
 
 import contextlib
+import errno
 import importlib
 import signal
 import sys
@@ -30,7 +31,8 @@ def run(arguments, script=None):
         except KeyboardInterrupt:
             return fail("interrupted", 130)
         except (UserError, OSError, ValueError) as error:
-            return fail(error, 2)
+            full = isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
+            return fail(error, 1 if full else 2)
 
 
 def verb(name):

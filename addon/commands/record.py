@@ -111,7 +111,7 @@ class Record:
         return self._lock
 
     def settings(self):
-        """What the folder's results are made with; None where it is not recorded."""
+        """What the folder's results are made with; None where nothing tells."""
         settings = read(self.folder / BATCH).get("settings")
         return settings if isinstance(settings, dict) else None
 

@@ -3,6 +3,7 @@
 
 import contextlib
 import json
+import re
 import sys
 import threading
 import time
@@ -22,6 +23,10 @@ from . import files
 from .parser import solve_settings
 
 CALLS = {"deform": bpy.ops.arapfields.deform, "stylize": bpy.ops.arapfields.stylize}
+# What Blender puts before a message: the operator's name.
+OPERATOR = re.compile(
+    r"^Operator bpy\.ops\.\S+ |^Converting py args to operator properties: (:: )?|\b[A-Z]+_OT_\w+\."
+)
 UPPER = ("result", "surface", "frame", "quality")
 
 
@@ -30,6 +35,9 @@ def run_single(options, _):
     files.check(options.output)
     files.read(options.input)
     sources = objects_to_solve(options)
+    for place in (options.output, options.report):
+        if place:
+            files.check_place(place)
     if options.handles:
         for source in sources:
             add_handles(source, options.handles)
@@ -131,7 +139,8 @@ def failure(call, **given):
         if call("EXEC_DEFAULT", **given) == {"CANCELLED"}:
             raise KeyboardInterrupt
     except (RuntimeError, TypeError) as error:
-        return " ".join(line.removeprefix("Error: ") for line in str(error).splitlines() if line.strip())
+        lines = (line.removeprefix("Error: ") for line in str(error).splitlines() if line.strip())
+        return " ".join(OPERATOR.sub("", line) for line in lines)
     return ""
 
 

@@ -34,7 +34,7 @@ def put(source, group):
 
 
 def lend(source, item):
-    """Gives a carried object the source's mask, where it has weights of that name."""
+    """Has a carried object heed its own weights of the name of the source's mask, where it has such."""
     group = group_of(source)
     if group:
         put_carried(item, group)

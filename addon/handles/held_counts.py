@@ -18,7 +18,7 @@ from ..core.runtime.threads import start_thread
 from . import empties, movers
 from .native_handles import Holding
 
-COUNTED = 4000  # samples of the surface among which a handle's are counted
+COUNTED = 4000  # samples of the surface of which a handle's part is told
 LARGE = 20000  # vertices from which a window does not wait
 INTERVAL = 0.03  # seconds between looks at the worker
 pending = {}  # session_uid of the source → the coroutine that counts

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Handles that are scaled while Allow Scale is off, so that what they hold is not."""
+"""Handles that are scaled without having been asked to scale what they hold."""
 
 import numpy as np
 

@@ -12,7 +12,7 @@ from .movers import matrix_of
 def mirror_of(source):
     """(4, 4) world → world, across the plane of the source's Symmetry; None where there is none.
 
-    Nor where the source is stylized live, which ignores symmetry, or where its scale flattens it.
+    Nor where the source is being stylized live, which heeds no symmetry, or its scale flattens it.
     """
     settings = settings_of(source)
     plane = settings.deform.symmetry.lower()

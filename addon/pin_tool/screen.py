@@ -23,14 +23,14 @@ def pixel_size(perspective, size, point):
     return abs(depth) / (np.linalg.norm(perspective[0, :3]) * size[0] / 2)
 
 
-def nearest(places, pixel, limit):
-    """Index of the (n, 2) place nearest to a pixel, or -1 where none is within `limit` pixels."""
+def nearest(places, pixel, reach):
+    """Index of the (n, 2) place nearest to a pixel, or -1 where none is within `reach` pixels."""
     if not len(places):
         return -1
     away = np.linalg.norm(np.asarray(places) - pixel, axis=1)
     away = np.where(np.isnan(away), np.inf, away)
     best = int(away.argmin())
-    return best if away[best] <= limit else -1
+    return best if away[best] <= reach else -1
 
 
 def turn_between(center, before, after):

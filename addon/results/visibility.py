@@ -17,9 +17,8 @@ def family(source):
 
 
 def show_alone(source, shown, for_now=False):
-    """Hides what else of the family lies in the place of `shown`, from viewport and renders.
-
-    It shows `shown` again where that was set aside. `for_now`: until `give_back`. Returns the hidden names.
+    """Hides what else of the family lies in the place of `shown`, from viewport and renders, and shows that
+    again where it had been set aside itself; `for_now`: until `give_back`. Returns names of what it hides.
     """
     names = []
     for item in family(source):

@@ -50,7 +50,7 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
         return super().refuses(source) or (landmarks.refusal(source) if has_window() else None)
 
     def coroutine(self, context):
-        """Where the wrap fails, the field's modifier goes back to its place in the stack."""
+        """Where nothing came of it, the field's modifier stands again where it did."""
         self.below = []
         try:
             return (yield from super().coroutine(context))

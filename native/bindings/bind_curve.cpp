@@ -83,6 +83,7 @@ Samples of a plane curve, by index, that follow a rigid motion.
                handle.motion = matrix;
              }
              handle.weight = weight;
+             handle.validate();
              return handle;
            }),
            "samples"_a, "motion"_a = py::none(), "weight"_a = 1.0)
@@ -113,8 +114,7 @@ Samples of a plane curve, by index, that follow a rigid motion.
 
   module.def(
       "deform_curve",
-      [](const ArrayArgument& points, const CurveHandlesArgument& handles, const CurveOptions& options,
-         Task* task) {
+      [](const ArrayArgument& points, const CurveHandlesArgument& handles, CurveOptions options, Task* task) {
         const Points2 samples = as_points2(points, "points");
         const auto held = as_items<CurveHandle>(handles, "handles", "CurveHandles are needed");
         return run_long(

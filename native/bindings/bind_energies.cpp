@@ -25,6 +25,7 @@ struct RegionHandle : Handle {};
 /// A handle with what all kinds have in common.
 template <class Kind>
 Kind handle_of(Handle::Kind kind, double weight, double reach) {
+  require_positive("weight", weight);
   require_not_negative("reach", reach);
   Kind handle;
   handle.kind = kind;
@@ -91,6 +92,8 @@ neither flattens nor mirrors.)")
                        double weight, bool allow_scale, double reach) {
              auto handle = handle_of<RegionHandle>(Handle::Kind::region, weight, reach);
              handle.samples = as_indices(samples, "samples");
+             for (const Index i : handle.samples)
+               require(i >= 0, "samples", std::to_string(i), "indices from 0 on are allowed");
              set_poses(handle, rest, target, allow_scale);
              return handle;
            }),

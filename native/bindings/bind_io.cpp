@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bindings/arguments.h"
 #include "bindings/files.h"
+#include "core/one_at_a_time.h"
 #include "io/output_file.h"
 
 namespace arapfields::python {
@@ -8,6 +9,16 @@ namespace {
 
 py::str from_path(const std::string& path) {
   return py::str(py::module_::import("os").attr("fsdecode")(py::bytes(path)));
+}
+
+/// What Python holds: its methods may be called from any thread.
+using Output = OneAtATime<OutputFile>;
+
+template <class Method>
+auto run_alone(Output& output, Method method) {
+  return run_long(nullptr, [&](const Progress& progress) {
+    return output.run(progress, [&](OutputFile& file) { return (file.*method)(); });
+  });
 }
 
 }  // namespace
@@ -40,26 +51,30 @@ py::object report_from(const std::string& text, const std::string& place) {
 }
 
 void bind_io(py::module_& module) {
-  py::class_<OutputFile>(module, "OutputFile",
-                         R"(
+  py::class_<Output>(module, "OutputFile",
+                     R"(
 A regular file that replaces its target in whole or not at all: write `partial` (or `beside`), then commit().
 
 Symbolic links are followed and permissions kept. The next output of the same name removes what a killed
 process left. OSError where the system refuses; InvalidInput for a path that is not a regular file, and where
 nothing was written.)")
-      .def(py::init([](const PathArgument& path) { return std::make_unique<OutputFile>(as_path(path)); }),
+      .def(py::init([](const PathArgument& path) { return std::make_unique<Output>(as_path(path)); }),
            "path"_a)
       .def_property_readonly(
-          "partial", [](const OutputFile& self) { return from_path(self.partial()); },
+          "partial", [](Output& self) { return from_path(run_alone(self, &OutputFile::partial)); },
           "Path to write to: a file of the same name in a temporary folder beside the target.")
       .def_property_readonly(
-          "beside", [](const OutputFile& self) { return from_path(self.beside()); },
+          "beside", [](Output& self) { return from_path(run_alone(self, &OutputFile::beside)); },
           "The same in the target's own folder, for content with paths relative to it.")
-      .def("finish", &OutputFile::finish, py::call_guard<py::gil_scoped_release>(),
-           "Flushes the content to the disk and verifies it.")
-      .def("commit", &OutputFile::commit, py::call_guard<py::gil_scoped_release>(),
-           "Calls finish() if needed, then renames the file to its target.")
-      .def("discard", &OutputFile::discard, "Removes what was not committed.");
+      .def(
+          "finish", [](Output& self) { run_alone(self, &OutputFile::finish); },
+          "Flushes the content to the disk and verifies it.")
+      .def(
+          "commit", [](Output& self) { run_alone(self, &OutputFile::commit); },
+          "Calls finish() if needed, then renames the file to its target.")
+      .def(
+          "discard", [](Output& self) { run_alone(self, &OutputFile::discard); },
+          "Removes what was not committed.");
 }
 
 }  // namespace arapfields::python

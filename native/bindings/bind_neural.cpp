@@ -135,7 +135,7 @@ void bind_testing(py::module_& module) {
              return std::make_unique<JetTrial>(shape, points, order_of(order), 0);
            }),
            "points"_a, "order"_a, "width"_a = NetworkOptions().width, "layers"_a = NetworkOptions().layers)
-      .def("run", &JetTrial::run, py::call_guard<py::gil_scoped_release>());
+      .def("run", &JetTrial::run);
   testing.def(
       "mlp_jets",
       [](const py::object& weights, const py::object& biases, int octaves, double frequency, double sharpness,
@@ -186,7 +186,7 @@ py::object with_report(const FitResult& result) {
   return sdf;
 }
 
-NeuralSdfResult fit(const ArrayArgument& vertices, const ArrayArgument& triangles, const FitOptions& options,
+NeuralSdfResult fit(const ArrayArgument& vertices, const ArrayArgument& triangles, FitOptions options,
                     const std::optional<CallbackArgument>& callback, Task* task) {
   const TriangleMesh mesh = as_mesh(vertices, triangles);
   const IterationObserver observer = as_observer(callback.value_or(py::none()));

@@ -6,32 +6,68 @@
 #include "bindings/jet_arrays.h"
 #include "bindings/reports.h"
 #include "bindings/styles.h"
+#include "core/one_at_a_time.h"
 #include "options/stylize.h"
 #include "solve/radial/radial_solver.h"
 
 namespace arapfields::python {
 namespace {
 
-/// The solver's handles with new targets: one 4×4 matrix, or three numbers for a point, a handle.
-std::vector<Handle> moved_handles(const RadialSolver& live, const py::object& targets) {
+/// What Python holds: its methods may be called from any thread, and wait without the GIL.
+using Live = OneAtATime<RadialSolver>;
+
+/// call(solver, progress) when the solver is free.
+template <class Call>
+auto run_alone(Live& live, Task* task, Call&& call) {
+  return run_long(task, [&](const Progress& progress) {
+    return live.run(progress, [&](RadialSolver& solver) { return call(solver, progress); });
+  });
+}
+
+/// One 4×4 matrix, or three numbers for a point, a handle.
+struct Target {
+  std::string name;
+  std::optional<Vec3> point;
+  Mat4 pose = Mat4::Identity();
+};
+using Targets = std::optional<std::vector<Target>>;
+
+Targets as_targets(const std::optional<ArraysArgument>& given) {
+  if (!given) return std::nullopt;
+  std::vector<Target> targets;
+  for_each_item(*given, "targets", "one for each handle is needed: (4, 4), or (3,) for a point",
+                sizeof(Target), [&](const py::object& item, const std::string& name) {
+                  Target& target = targets.emplace_back();
+                  target.name = name;
+                  if (as_doubles(item, name).ndim() == 1)
+                    target.point = as_vec3(item, name);
+                  else
+                    target.pose = as_matrix4(item, name);
+                });
+  return targets;
+}
+
+/// The solver's handles, with new targets if there are any.
+std::vector<Handle> moved_handles(const RadialSolver& live, const Targets& targets) {
   std::vector<Handle> moved = live.handles();
+  if (!targets) return moved;
   const std::string allowed = "one for each of the " + std::to_string(moved.size()) +
                               " handles is needed: (4, 4), or (3,) for a point";
-  std::size_t i = 0;
-  for_each_item(targets, "targets", allowed, 0.0, [&](const py::object& target, const std::string& name) {
-    require(i < moved.size(), "targets", "there are more of them", allowed);
-    if (moved[i].kind == Handle::Kind::point)
-      moved[i].target_point = as_vec3(target, name);
+  require(targets->size() == moved.size(), "targets", std::to_string(targets->size()) + " of them", allowed);
+  for (std::size_t i = 0; i < moved.size(); ++i) {
+    const Target& target = (*targets)[i];
+    const bool point = moved[i].kind == Handle::Kind::point;
+    require(point == target.point.has_value(), target.name, target.point ? "three numbers" : "a matrix",
+            allowed);
+    if (point)
+      moved[i].target_point = *target.point;
     else
-      moved[i].target = as_matrix4(target, name);
-    ++i;
-  });
-  require(i == moved.size(), "targets", std::to_string(i) + " of them", allowed);
+      moved[i].target = target.pose;
+  }
   return moved;
 }
 
-LiveReportResult report(const RadialSolver& live) {
-  const RadialReport& r = live.report();
+LiveReportResult as_python(const RadialReport& r) {
   return make_report("LiveReport", "energy"_a = r.arap.energy, "value"_a = r.value,
                      "handle_error_mean"_a = r.handle_mean, "handle_error_max"_a = r.handle_max,
                      "max_stretch"_a = r.distortion.max_stretch, "min_stretch"_a = r.distortion.min_stretch,
@@ -42,62 +78,77 @@ LiveReportResult report(const RadialSolver& live) {
                      **field_measures(r.arap, r.distortion));
 }
 
-RadialFieldResult with_report(const RadialSolver& live) {
-  py::object field = py::cast(live.field());
-  attach_report(field, report(live));
+/// The field and report that call(solver, progress) leaves.
+template <class Call>
+RadialFieldResult field_after(Live& live, Task* task, Call&& call) {
+  const auto [shape, report] = run_alone(live, task, [&](RadialSolver& solver, const Progress& progress) {
+    call(solver, progress);
+    return std::pair(solver.field(), solver.report());
+  });
+  py::object field = py::cast(shape);
+  attach_report(field, as_python(report));
   return field;
 }
 
-/// Checks the limits of a solve and sets its targets.
-void prepare(RadialSolver& live, const std::optional<ArraysArgument>& targets, Index iterations,
-             double tolerance) {
+void require_limits(Index iterations, double tolerance) {
   require(iterations >= 0, "iterations", std::to_string(iterations), "0 (the options') or more is allowed");
   require(tolerance >= 0.0 && tolerance < 1.0, "tolerance", std::to_string(tolerance),
           "0 (the options') or a share below 1 is allowed");
-  if (targets) live.set_targets(moved_handles(live, *targets));
 }
 
-RadialFieldResult solved_field(RadialSolver& live, const std::optional<ArraysArgument>& targets,
-                               Index iterations, double tolerance, Task* task) {
-  prepare(live, targets, iterations, tolerance);
-  run_long(task, [&](const Progress& progress) { return live.solve(iterations, tolerance, progress); });
-  return with_report(live);
+RadialFieldResult solved_field(Live& live, const std::optional<ArraysArgument>& targets, Index iterations,
+                               double tolerance, Task* task) {
+  require_limits(iterations, tolerance);
+  const Targets there = as_targets(targets);
+  return field_after(live, task, [&](RadialSolver& solver, const Progress& progress) {
+    if (there) solver.set_targets(moved_handles(solver, there));
+    solver.solve(iterations, tolerance, progress);
+  });
 }
 
-Index follow(RadialSolver& live, const std::optional<ArraysArgument>& targets, Index iterations,
-             double tolerance, Task* task) {
-  prepare(live, targets, iterations, tolerance);
-  return run_long(task,
-                  [&](const Progress& progress) { return live.follow(iterations, tolerance, progress); });
+Index follow(Live& live, const std::optional<ArraysArgument>& targets, Index iterations, double tolerance,
+             Task* task) {
+  require_limits(iterations, tolerance);
+  const Targets there = as_targets(targets);
+  return run_alone(live, task, [&](RadialSolver& solver, const Progress& progress) {
+    if (there) solver.set_targets(moved_handles(solver, there));
+    return solver.follow(iterations, tolerance, progress);
+  });
 }
 
-RadialFieldResult step(RadialSolver& live, const std::optional<ArraysArgument>& targets, double seconds,
+RadialFieldResult step(Live& live, const std::optional<ArraysArgument>& targets, double seconds,
                        const std::optional<ArrayArgument>& coordinates, Task* task) {
   const Mat4 motion = coordinates ? as_matrix4(*coordinates, "coordinates") : Mat4(Mat4::Identity());
-  const std::vector<Handle> moved = targets ? moved_handles(live, *targets) : live.handles();
-  run_long(task, [&](const Progress& progress) { return live.step(moved, seconds, progress, motion); });
-  return with_report(live);
+  const Targets there = as_targets(targets);
+  return field_after(live, task, [&](RadialSolver& solver, const Progress& progress) {
+    solver.step(moved_handles(solver, there), seconds, progress, motion);
+  });
 }
 
-void set_secondary_motion(RadialSolver& live, const std::optional<SecondaryMotionOptions>& options,
+void set_secondary_motion(Live& live, const std::optional<SecondaryMotionOptions>& options,
                           const std::optional<ArrayArgument>& masses, const std::optional<ArrayArgument>& up,
                           const std::optional<double>& ground) {
-  if (!options) return live.set_secondary_motion(std::nullopt);
-  SecondaryMotion motion{*options};
-  motion.masses = as_vector(masses, "masses");
-  if (up) motion.up = as_vec3(*up, "up");
-  motion.ground = ground;
-  live.set_secondary_motion(motion);
+  std::optional<SecondaryMotion> motion;
+  if (options) {
+    motion = SecondaryMotion{*options};
+    if (masses) motion->masses = as_vector(*masses, "masses");
+    if (up) motion->up = as_vec3(*up, "up");
+    motion->ground = ground;
+  }
+  run_alone(live, nullptr,
+            [&](RadialSolver& solver, const Progress&) { solver.set_secondary_motion(motion); });
 }
 
-void set_style(RadialSolver& live, const std::optional<NormalsArgument>& normals, double strength,
-               double sharpness, const std::optional<ArrayArgument>& weights,
-               const std::optional<ArrayArgument>& up) {
-  if (!normals) return live.clear_style();
+void set_style(Live& live, const std::optional<NormalsArgument>& normals, double strength, double sharpness,
+               const std::optional<ArrayArgument>& weights, const std::optional<ArrayArgument>& up) {
+  if (!normals)
+    return run_alone(live, nullptr, [](RadialSolver& solver, const Progress&) { solver.clear_style(); });
   const Style style = as_style(*normals);
   const Vector blend = as_vector(weights, "weights");
   const Vec3 upwards = up ? as_vec3(*up, "up") : Vec3(Vec3::UnitZ());
-  run_long([&] { live.set_style(style, strength, sharpness, blend, upwards); });
+  run_alone(live, nullptr, [&](RadialSolver& solver, const Progress&) {
+    solver.set_style(style, strength, sharpness, blend, upwards);
+  });
 }
 
 }  // namespace
@@ -117,17 +168,17 @@ It fits any LiveDeformer with the same samples, options and number of handles.)"
       .def_readonly("velocities", &MotionState::velocities, "(n, 3) per second.")
       .def_readonly("accelerations", &MotionState::accelerations,
                     "(n, 3) per second squared; (0, 3) at rest.");
-  py::class_<RadialSolver>(module, "LiveDeformer", R"(
+  py::class_<Live>(module, "LiveDeformer", R"(
 Deforms a surface at interactive rates: when handles move, solve() continues from the last shape.
 
 The energy is that of deform (stretch, bend, handles), or with a style that of stylize, over a radial field.
-L-BFGS preconditioned with the factored stiffness of the rest surface minimises it. Not thread-safe: one
-caller at a time.)")
-      .def(py::init([](const SurfaceSamples& samples, const HandlesArgument& handles,
-                       const LiveOptions& options, Task* task) {
+L-BFGS preconditioned with the factored stiffness of the rest surface minimises it. Any thread
+may call it: one at a time works, the others wait.)")
+      .def(py::init([](const SurfaceSamples& samples, const HandlesArgument& handles, LiveOptions options,
+                       Task* task) {
              const auto held = as_handles(handles);
              return run_long(task, [&](const Progress& progress) {
-               return std::make_unique<RadialSolver>(samples, held, options, progress);
+               return std::make_unique<Live>(samples, held, options, progress);
              });
            }),
            "samples"_a, "handles"_a = py::tuple(), py::arg_v("options", LiveOptions(), "LiveOptions()"),
@@ -147,26 +198,36 @@ As solve(), for callers that need tracked() alone: it makes no field, and measur
 Returns the number of iterations, fewer than `iterations` where the solve has converged.)")
       .def(
           "track",
-          [](RadialSolver& live, const ArrayArgument& points) {
+          [](Live& live, const ArrayArgument& points) {
             const Points mesh = as_points(points, "points");
-            run_long([&] { live.track(mesh); });
+            run_alone(live, nullptr, [&](RadialSolver& solver, const Progress&) { solver.track(mesh); });
           },
           "points"_a, "Prepares rest points (n, 3), such as a mesh's vertices, for tracked().")
       .def(
-          "tracked", [](const RadialSolver& live) { return run_long([&] { return live.tracked(); }); }, R"(
+          "tracked",
+          [](Live& live) {
+            return run_alone(live, nullptr,
+                             [](RadialSolver& solver, const Progress&) { return solver.tracked(); });
+          },
+          R"(
 Current positions (n, 3) of the points given to track(), in single precision.
 
 Several times faster than evaluating the field.)")
       .def(
           "set_handles",
-          [](RadialSolver& live, const HandlesArgument& handles) { live.set_handles(as_handles(handles)); },
+          [](Live& live, const HandlesArgument& handles) {
+            const std::vector<Handle> held = as_handles(handles);
+            run_alone(live, nullptr,
+                      [&](RadialSolver& solver, const Progress&) { solver.set_handles(held); });
+          },
           "handles"_a, "Replaces the handles. The next solve starts from the current shape.")
       .def(
           "set_weights",
-          [](RadialSolver& live, const std::optional<ArrayArgument>& weights,
+          [](Live& live, const std::optional<ArrayArgument>& weights,
              const std::optional<ArrayArgument>& bend_weights) {
             const Vector w = as_vector(weights, "weights"), b = as_vector(bend_weights, "bend_weights");
-            run_long([&] { live.set_weights(w, b); });
+            run_alone(live, nullptr,
+                      [&](RadialSolver& solver, const Progress&) { solver.set_weights(w, b); });
           },
           "weights"_a = py::none(), "bend_weights"_a = py::none(), R"(
 Factors (n,) on the samples' energies and on their bending, from the next solve on.
@@ -174,10 +235,12 @@ Factors (n,) on the samples' energies and on their bending, from the next solve 
 They are those of SurfaceSamples.with_weights; None is 1 everywhere.)")
       .def(
           "set_symmetry",
-          [](RadialSolver& live, const std::string& symmetry, Task* task) {
+          [](Live& live, const std::string& symmetry, Task* task) {
             SymmetryPlane plane{};
             choose(symmetry, "symmetry", plane);
-            run_long(task, [&](const Progress& progress) { live.set_symmetry(plane, progress); });
+            run_alone(live, task, [&](RadialSolver& solver, const Progress& progress) {
+              solver.set_symmetry(plane, progress);
+            });
           },
           "symmetry"_a, py::kw_only(), "task"_a = py::none(), R"(
 Makes deformations symmetric across the plane where 'x', 'y' or 'z' is 0; 'none' ends that.
@@ -207,11 +270,34 @@ or solve; a solve ends at rest. Where the coordinate system itself has moved sin
 `coordinates` (4, 4) maps its old coordinates to the new ones, and the surface feels that motion. Without
 set_secondary_motion() this is solve(targets). The same steps from the same start give the same bits. Where
 it raises, the state is unchanged.)")
-      .def_property("motion_state", &RadialSolver::motion_state, &RadialSolver::set_motion_state,
-                    "The current MotionState; setting it continues from there.")
-      .def("reset", &RadialSolver::reset, "Back to the identity, with the handles at rest.")
-      .def_property_readonly("field", &with_report, "The current deformation, as a DeformationField.")
-      .def_property_readonly("report", &report, "The LiveReport of the last solve or step.");
+      .def_property(
+          "motion_state",
+          [](Live& live) {
+            return run_alone(live, nullptr,
+                             [](RadialSolver& solver, const Progress&) { return solver.motion_state(); });
+          },
+          [](Live& live, const MotionState& state) {
+            run_alone(live, nullptr,
+                      [&](RadialSolver& solver, const Progress&) { solver.set_motion_state(state); });
+          },
+          "The current MotionState; setting it continues from there.")
+      .def(
+          "reset",
+          [](Live& live) {
+            run_alone(live, nullptr, [](RadialSolver& solver, const Progress&) { solver.reset(); });
+          },
+          "Back to the identity, with the handles at rest.")
+      .def_property_readonly(
+          "field", [](Live& live) { return field_after(live, nullptr, [](auto&, const Progress&) {}); },
+          "The current deformation, as a DeformationField.")
+      .def_property_readonly(
+          "report",
+          [](Live& live) {
+            return as_python(run_alone(
+                live, nullptr, [](RadialSolver& solver, const Progress&) { return solver.report(); }));
+          },
+          "The LiveReport of the last solve or step.");
+
   testing_module(module).def(
       "field_jets", [](const DeformationField& field, const Points& cube_points, int count) {
         JetArray<double> jets({py::ssize_t{count}, py::ssize_t{cube_points.rows()}, py::ssize_t{3}});

@@ -57,7 +57,7 @@ FieldResult solve(Task* task, Solve&& call) {
 }
 
 FieldResult deform_samples(const SurfaceSamples& samples, const HandlesArgument& handles,
-                           const DeformOptions& options, const EnergiesArgument& energies,
+                           DeformOptions options, const EnergiesArgument& energies,
                            const std::optional<CallbackArgument>& callback, Task* task) {
   const auto held = as_handles(handles);
   const SolveHooks hooks{as_energies(energies, samples.frame), as_observer(callback.value_or(py::none()))};
@@ -73,7 +73,7 @@ Style turned_style(const NormalsArgument& normals, const std::optional<ArrayArgu
 }
 
 FieldResult stylize_samples(const SurfaceSamples& samples, const NormalsArgument& normals,
-                            const StylizeOptions& options, const HandlesArgument& handles,
+                            StylizeOptions options, const HandlesArgument& handles,
                             const std::optional<ArrayArgument>& weights,
                             const std::optional<ArrayArgument>& orientation,
                             const std::optional<ArrayArgument>& up, const EnergiesArgument& energies,
@@ -89,7 +89,7 @@ FieldResult stylize_samples(const SurfaceSamples& samples, const NormalsArgument
 }
 
 InverseResult inverse_of(const DeformationField& field, const SurfaceSamples& samples,
-                         const InverseTrainingOptions& options, Task* task) {
+                         InverseTrainingOptions options, Task* task) {
   const Solution solution =
       run_long(task, [&](const Progress& p) { return train_inverse(field, samples, options, p); });
   py::object result = py::cast(solution.field);

@@ -27,7 +27,7 @@ std::vector<Landmark> as_landmarks(const LandmarksArgument& argument) {
 }
 
 WrapResult wrap_samples(const SurfaceSamples& samples, const FunctionArgument& target,
-                        const LandmarksArgument& landmarks, const WrapOptions& options, Task* task) {
+                        const LandmarksArgument& landmarks, WrapOptions options, Task* task) {
   const std::shared_ptr<const ImplicitFunction> function = as_function(target, "target");
   const std::vector<Landmark> pairs = as_landmarks(landmarks);
   const WrapSolution solution = run_long(

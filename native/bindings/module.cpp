@@ -2,6 +2,7 @@
 #include "bindings/bind.h"
 #include "bindings/files.h"
 #include "bindings/uninitialised.h"
+#include "bindings/wrong_types.h"
 
 PYBIND11_MODULE(_native, module) {
   using namespace arapfields::python;
@@ -28,4 +29,5 @@ PYBIND11_MODULE(_native, module) {
   bind_solve_testing(module);
   bind_invertible_testing(module);
   refuse_uninitialised(module);
+  name_wrong_types(module);
 }

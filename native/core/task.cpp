@@ -33,6 +33,7 @@ void Task::report(double fraction, const std::string& message) {
 void Task::watch(PointsIn points, double pause) {
   require(points.allFinite(), "points", "some are NaN or infinite", "all must be finite");
   require(pause >= 0.0, "seconds", std::to_string(pause), "must not be negative");
+  std::lock_guard lock(mutex_);
   watched_points_ = points;
   pause_ = pause;
   next_preview_ = Clock::now();
@@ -71,14 +72,19 @@ void Progress::check() const {
 
 void Progress::preview(const std::function<Points(PointsIn)>& evaluate) const {
   constexpr int work_over_preview = 2;
-  if (task_ == nullptr || task_->watched_points_.rows() == 0) return;
+  if (task_ == nullptr) return;
   const auto begin = Task::Clock::now();
-  if (begin < task_->next_preview_) return;
-  PointsF positions = evaluate(task_->watched_points_).cast<float>();
+  Points points;
+  {
+    std::lock_guard lock(task_->mutex_);
+    if (task_->watched_points_.rows() == 0 || begin < task_->next_preview_) return;
+    points = task_->watched_points_;
+  }
+  PointsF positions = evaluate(points).cast<float>();
   const auto took = Task::Clock::now() - begin;
+  std::lock_guard lock(task_->mutex_);
   const auto pause = std::max<Task::Clock::duration>(seconds(task_->pause_), work_over_preview * took + took);
   task_->next_preview_ = begin + pause;
-  std::lock_guard lock(task_->mutex_);
   task_->preview_ = std::move(positions);
   ++task_->previews_;
 }

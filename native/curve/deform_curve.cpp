@@ -26,16 +26,9 @@ constexpr double copies = 2.0;
 
 void check(const CurveHandle& handle, std::size_t position, Index samples) {
   const std::string name = "handles[" + std::to_string(position) + "]";
-  require(!handle.samples.empty(), name, "no samples", "a handle holds one sample or more");
+  handle.validate(name + ".");
   for (const Index s : handle.samples)
-    require(s >= 0 && s < samples, name, "sample " + std::to_string(s),
-            "indices are below " + std::to_string(samples));
-  const Mat2 turn = handle.motion.topLeftCorner<2, 2>();
-  require(handle.motion.allFinite() && (turn.transpose() * turn - Mat2::Identity()).norm() < 1e-6 &&
-              turn.determinant() > 0 && (handle.motion.row(2) - Eigen::RowVector3d(0, 0, 1)).norm() < 1e-9,
-          name, "the motion scales, shears or mirrors", "a rotation and a translation (3, 3) are needed");
-  require(std::isfinite(handle.weight) && handle.weight > 0, name, "weight " + std::to_string(handle.weight),
-          "must be positive");
+    require(s < samples, name, "sample " + std::to_string(s), "indices are below " + std::to_string(samples));
 }
 
 /// The deformation of one curve. What it measures of the coefficients: the jets at the samples, then the
@@ -178,6 +171,18 @@ class CurveProblem final : public MeasuredObjective {
 };
 
 }  // namespace
+
+void CurveHandle::validate(const std::string& prefix) const {
+  require(!samples.empty(), prefix + "samples", "there are none", "a handle holds one sample or more");
+  for (const Index s : samples)
+    require(s >= 0, prefix + "samples", std::to_string(s), "indices from 0 on are allowed");
+  const Mat2 turn = motion.topLeftCorner<2, 2>();
+  require(motion.allFinite() && (turn.transpose() * turn - Mat2::Identity()).norm() < 1e-6 &&
+              turn.determinant() > 0 && (motion.row(2) - Eigen::RowVector3d(0, 0, 1)).norm() < 1e-9,
+          prefix + "motion", "it is not finite, or scales, shears or mirrors",
+          "a rotation and a translation (3, 3) are needed");
+  require_positive(prefix + "weight", weight);
+}
 
 CurveSolution deform_curve(Points2In points, const std::vector<CurveHandle>& handles,
                            const CurveOptions& options, const Progress& progress) {

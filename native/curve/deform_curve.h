@@ -14,6 +14,9 @@ struct CurveHandle {
   std::vector<Index> samples;
   Mat3 motion = Mat3::Identity();
   double weight = 1.0;
+
+  /// InvalidInput that names, after `prefix`, what no curve has or can follow.
+  ARAPFIELDS_EXPORT void validate(const std::string& prefix = "") const;
 };
 
 struct CurveReport {

@@ -109,16 +109,36 @@ BoundHandles::BoundHandles(std::vector<Handle> handles, PointsIn samples) : hand
   }
   sources_.resize(members_.size(), 3);
   targets_.resize(sources_.rows(), 3);
+  brought_.assign(handles_.size(), 0.0);
   for (Index i = 0; i < count(); ++i) {
     for (Index p = begin(i); p < begin(i + 1); ++p) {
       const Index member = members_[p];
       if (member < 0)
-        sources_.row(p) = handle(i).rest_point.transpose();
+        sources_.row(p) = place_of(i, samples).transpose();
       else
         sources_.row(p) = samples.row(member);
     }
     move(i);
   }
+}
+
+/// Where a point handle takes hold.
+Vec3 BoundHandles::place_of(Index i, PointsIn samples) {
+  const Vec3& point = handle(i).rest_point;
+  if (samples.rows() == 0) return point;
+  const Eigen::RowVector3d low = samples.colwise().minCoeff(), high = samples.colwise().maxCoeff();
+  const double size = (high - low).maxCoeff();
+  if ((point.transpose().array() >= low.array()).all() && (point.transpose().array() <= high.array()).all())
+    return point;
+  Index nearest = 0;
+  const double distance =
+      std::sqrt((samples.rowwise() - point.transpose()).rowwise().squaredNorm().minCoeff(&nearest));
+  if (!(distance > beside * size) || !(size > 0.0)) return point;
+  require(distance <= farthest * size, name_of(i),
+          "its point lies " + number_text(distance / size) + " times the shape's size away from it",
+          "within " + number_text(farthest) + " of the size it is brought onto the surface");
+  brought_[static_cast<std::size_t>(i)] = distance / size;
+  return samples.row(nearest);
 }
 
 void BoundHandles::move(Index i) {

@@ -13,7 +13,7 @@ namespace arapfields {
 struct ARAPFIELDS_EXPORT Handle {
   enum class Kind {
     cuboid,  ///< the samples inside the box that `rest` makes of [-1,1]³
-    point,   ///< one material point, no sample needed
+    point,   ///< one material point, at or near the surface; no sample needed
     region   ///< the samples listed
   };
   Kind kind = Kind::cuboid;
@@ -47,8 +47,14 @@ struct HandleBatch {
 /// The loss is the mean over the handles of weight × mean over the handle's pairs of ‖f(x) − C x‖².
 class ARAPFIELDS_EXPORT BoundHandles {
  public:
+  /// In sizes of the shape: the largest extent of the samples' box.
+  static constexpr double beside = 0.1;
+  static constexpr double farthest = 0.5;
+
   BoundHandles() = default;
-  /// Throws InvalidInput that names the handle which is invalid or holds no sample.
+  /// Throws InvalidInput that names the handle which is invalid or holds no sample, or a point farther than
+  /// `farthest` sizes of the shape from it. A point outside of the samples' box and farther than `beside`
+  /// from them stands for the nearest of them.
   BoundHandles(std::vector<Handle> handles, PointsIn samples);
 
   Index count() const { return static_cast<Index>(handles_.size()); }
@@ -60,6 +66,8 @@ class ARAPFIELDS_EXPORT BoundHandles {
   /// Index of each pair's sample, −1 for point handles.
   const std::vector<Index>& members() const { return members_; }
   const Mat4& motion(Index i) const { return motions_[i]; }
+  /// How many sizes of the shape a point was brought to reach the surface; 0 where it was not.
+  double brought(Index i) const { return brought_[static_cast<std::size_t>(i)]; }
 
   /// New targets for the same regions: each handle's target (or target_point) is taken from `moved`.
   void retarget(const std::vector<Handle>& moved);
@@ -71,12 +79,14 @@ class ARAPFIELDS_EXPORT BoundHandles {
 
  private:
   void move(Index i);
+  Vec3 place_of(Index point, PointsIn samples);
 
   std::vector<Handle> handles_;
   std::vector<Mat4> motions_;
   std::vector<Index> begin_{0};
   std::vector<Index> members_;
   Points sources_, targets_;
+  std::vector<double> brought_;
 };
 
 /// Value of the batch's loss for jets at batch.sources; adds weight times its cotangents on the value column

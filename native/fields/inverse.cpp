@@ -51,6 +51,19 @@ class Starts {
     return rest_.row(search.best);
   }
 
+  /// The one than whose image so many others are nearer, or the farthest.
+  Vec3 next_nearest(const Vec3& image, Index nearer) const {
+    Vector squares = (images_.rowwise() - image.transpose()).rowwise().squaredNorm();
+    std::vector<Index> order;
+    for (Index i = 0; i < squares.size(); ++i)
+      if (std::isfinite(squares[i])) order.push_back(i);
+    const auto wanted = order.begin() + std::min<std::ptrdiff_t>(nearer, std::ssize(order) - 1);
+    std::nth_element(order.begin(), wanted, order.end(), [&](Index a, Index b) {
+      return squares[a] != squares[b] ? squares[a] < squares[b] : a < b;
+    });
+    return rest_.row(*wanted);
+  }
+
  private:
   struct Search {
     using Scalar = double;
@@ -76,6 +89,8 @@ class Starts {
   bool empty_ = true;
 };
 
+constexpr int further_starts = 24;  // of the surface's samples, and of the grid's
+
 Points grid(int side) {
   Points points(side * side * side, 3);
   for (Index i = 0; i < points.rows(); ++i)
@@ -87,7 +102,7 @@ Points grid(int side) {
 /// One point's state: the best x so far, its residual r = f(x) − y, and the Newton step d from it.
 struct Walker {
   Index row;
-  Vec3 target, start, best, step;
+  Vec3 target, start, best, step = Vec3::Zero();
   double residual = std::numeric_limits<double>::infinity();
   double damping = 1.0;
   bool done = false;
@@ -141,6 +156,52 @@ void walk(const DeformationField& field, std::vector<Walker>& walkers, const New
   }
 }
 
+/// f at some of the walkers' starts, from which straight lines lead to their targets.
+Points values_at_starts(const DeformationField& field, const std::vector<Walker>& walkers,
+                        const Progress& progress) {
+  Points starts(static_cast<Index>(walkers.size()), 3);
+  for (std::size_t i = 0; i < walkers.size(); ++i) starts.row(static_cast<Index>(i)) = walkers[i].start;
+  return values_at(field, starts, progress);
+}
+
+/// From each start x along the line from f(x) to the target, in steps that are halved where Newton's method
+/// does not arrive: where f folds nowhere, there is one way.
+void follow_lines(const DeformationField& field, std::vector<Walker>& walkers,
+                  const NewtonInverseOptions& options, const Progress& progress) {
+  constexpr double first_step = 0.25, least_step = 1.0 / 2048.0;
+  constexpr int steps = 256;  // at most
+  const Points from = values_at_starts(field, walkers, progress);
+  std::vector<double> done(walkers.size(), 0.0), step(walkers.size(), first_step);
+  std::vector<std::size_t> active;
+  for (std::size_t i = 0; i < walkers.size(); ++i)
+    if (from.row(static_cast<Index>(i)).allFinite()) active.push_back(i);
+  for (int round = 0; round < steps && !active.empty(); ++round) {
+    std::vector<Walker> tries;
+    for (const std::size_t i : active) {
+      const Vec3 begin = from.row(static_cast<Index>(i));
+      const Vec3 at = walkers[i].start;
+      Walker& next = tries.emplace_back(walkers[i]);
+      next.target = begin + (done[i] + step[i]) * (walkers[i].target - begin);
+      next.best = at;
+    }
+    walk(field, tries, options, progress);
+    for (std::size_t k = 0; k < active.size(); ++k) {
+      const std::size_t i = active[k];
+      if (tries[k].residual <= options.tolerance) {
+        walkers[i].start = tries[k].best;
+        done[i] += step[i];
+        step[i] = std::min(2.0 * step[i], 1.0 - done[i]);
+      } else {
+        step[i] *= 0.5;
+      }
+      if (done[i] < 1.0) continue;
+      walkers[i].best = tries[k].best;
+      walkers[i].residual = tries[k].residual;
+    }
+    std::erase_if(active, [&](std::size_t i) { return done[i] >= 1.0 || step[i] < least_step; });
+  }
+}
+
 }  // namespace
 
 struct NewtonInverse::Parts {
@@ -191,9 +252,11 @@ InverseResult NewtonInverse::operator()(PointsIn targets, const NewtonInverseOpt
     std::vector<Index> left;
     for (Index i = begin; i < begin + rows; ++i)
       if (targets.row(i).allFinite()) left.push_back(i);
-    const int attempts = std::isfinite(options.max_distance) ? 1 : 3;
+    // Newton's method from three starts, then along lines from them, then from ever more of the nearest.
+    const int attempts = std::isfinite(options.max_distance) ? 1 : 6 + 2 * further_starts;
     for (int attempt = 0; attempt < attempts && !left.empty(); ++attempt) {
-      const Starts* starts = attempt == 0 ? &surface : attempt == 1 ? &space : nullptr;
+      const int turn = attempt < 6 ? attempt % 3 : attempt % 2;
+      const Starts* starts = turn == 0 ? &surface : turn == 1 ? &space : nullptr;
       if (starts != nullptr && starts->empty()) continue;
       std::vector<Walker> walkers(left.size());
       parallel_for(0, static_cast<Index>(left.size()), 64, [&](Index from, Index to) {
@@ -201,10 +264,13 @@ InverseResult NewtonInverse::operator()(PointsIn targets, const NewtonInverseOpt
           Walker& w = walkers[k];
           w.row = left[k];
           w.target = targets.row(w.row);
-          w.start = w.best = starts != nullptr ? starts->nearest(w.target) : w.target;
+          w.start = starts == nullptr ? w.target
+                    : attempt < 6     ? starts->nearest(w.target)
+                                      : starts->next_nearest(w.target, (attempt - 4) / 2);
+          w.best = w.start;
         }
       });
-      walk(field, walkers, options, progress);
+      (attempt / 3 == 1 ? follow_lines : walk)(field, walkers, options, progress);
       left.clear();
       for (const Walker& w : walkers) {
         if (w.residual <= options.tolerance && (w.best - w.start).norm() <= options.max_distance) {

@@ -20,9 +20,10 @@ ARAPFIELDS_EXPORT Points values_at(const DeformationField& field, PointsIn point
 
 /// Solves f(x) = y by Newton's method with the field's own Jacobian, its steps halved until the residual
 /// falls. It starts from that of `rest` whose image is nearest to y, and where that fails from the nearest
-/// image of a grid over [-1,1]³, then from y itself. Where f folds space there are several x: the start then
-/// decides. Where the field knows its inverse in closed form, it is asked instead, for whatever lies
-/// however far. Built once for many calls; the field must outlive it.
+/// image of a grid over [-1,1]³, then from y itself; at last along straight lines from the images of these
+/// starts to y. Where f folds space there are several x: the start then decides. Where the field knows its
+/// inverse in closed form, it is asked instead, for whatever lies however far. Built once for many calls; the
+/// field must outlive it.
 class ARAPFIELDS_EXPORT NewtonInverse {
  public:
   NewtonInverse(const DeformationField& field, Points rest, const Progress& progress = {});

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <bit>
 #include <cstdint>
+#include <cstdio>
+#include <cstring>
 
 #include "core/errors.h"
 #include "core/memory.h"
@@ -19,6 +21,37 @@ constexpr const char* texts_key = "__metadata__";
 constexpr std::size_t most_header = std::size_t{64} << 20;
 constexpr Index most_dimensions = 8;
 constexpr Index most_bytes = Index{1} << 48;  ///< of one array; products of sizes stay far from overflow
+
+constexpr std::size_t digits = 16;  ///< of a checksum
+constexpr std::size_t read_at_once = std::size_t{1} << 20;
+
+/// FNV-1a over words of 32 bits, of which all parts of a file are made: each word is taken in by a one-to-one
+/// map, so that no change of a single one goes unseen.
+class Checksum {
+ public:
+  void add(const void* data, std::size_t bytes) {
+    for (std::size_t at = 0; at < bytes; at += sizeof(std::uint32_t)) {
+      std::uint32_t word = 0;
+      std::memcpy(&word, static_cast<const char*>(data) + at, std::min(sizeof word, bytes - at));
+      state_ = (state_ ^ word) * 0x100000001b3u;
+    }
+  }
+  std::string text() const {
+    char result[digits + 1];
+    std::snprintf(result, sizeof result, "%016llx", static_cast<unsigned long long>(state_));
+    return result;
+  }
+
+ private:
+  std::uint64_t state_ = 0xcbf29ce484222325u;
+};
+
+/// Where the checksum stands in a header.
+std::size_t checksum_place(const std::string& header) {
+  const std::string before = std::string("\"") + checksum_name + "\":\"";
+  const std::size_t at = header.find(before);
+  return at == header.npos ? at : at + before.size();
+}
 
 std::string shape_text(const std::vector<Index>& shape) {
   std::string text;
@@ -52,6 +85,7 @@ void ArchiveWriter::save(const std::string& path, const std::map<std::string, st
   std::vector<Entry> ordered = entries_;  // doubles first: all arrays are aligned
   std::stable_partition(ordered.begin(), ordered.end(), [](const Entry& e) { return e.is_double; });
   Json header = {{texts_key, texts}};
+  header[texts_key][checksum_name] = std::string(digits, '0');
   std::size_t offset = 0;
   for (const Entry& entry : ordered) {
     header[entry.name] = {{"dtype", entry.is_double ? "F64" : "F32"},
@@ -64,6 +98,10 @@ void ArchiveWriter::save(const std::string& path, const std::map<std::string, st
   require(text.size() <= most_header, path, "a header of " + std::to_string(text.size()) + " bytes",
           "at most " + std::to_string(most_header) + " are allowed");
   const std::uint64_t length = text.size();
+  Checksum sum;
+  sum.add(text.data(), text.size());
+  for (const Entry& entry : ordered) sum.add(entry.data, entry.bytes);
+  text.replace(checksum_place(text), digits, sum.text());
   OutputFile file(path);
   file.write(&length, sizeof length);
   file.write(text.data(), text.size());
@@ -99,6 +137,24 @@ ArchiveReader::ArchiveReader(const std::string& path) : file_(path) {
     }
   }
   require_no_gaps(data_);
+  if (has_checksum()) compare_checksum(std::move(text));
+}
+
+void ArchiveReader::compare_checksum(std::string header) const {
+  const std::string& told = texts_.at(checksum_name);
+  const std::size_t place = checksum_place(header);
+  const bool stands = place != header.npos && header.compare(place, told.size() + 1, told + '"') == 0;
+  require(stands && told.size() == digits, checksum_name, "'" + told + "'", "sixteen digits are needed");
+  header.replace(place, digits, digits, '0');
+  Checksum sum;
+  sum.add(header.data(), header.size());
+  std::string part(read_at_once, '\0');
+  for (std::size_t at = data_; at < file_.size(); at += part.size()) {
+    part.resize(std::min(read_at_once, file_.size() - at));
+    file_.read(at, part.data(), part.size());
+    sum.add(part.data(), part.size());
+  }
+  require(sum.text() == told, "file", "its content does not fit its checksum", "it has been damaged");
 }
 
 void ArchiveReader::read_entry(const std::string& name, const JsonObject& value) {
@@ -187,8 +243,8 @@ void ArchiveReader::require_all_used() const {
   for (const auto& [name, entry] : entries_)
     require(used_.contains(name), array_name(name), "is unknown", "this release does not know it");
   for (const auto& [name, text] : texts_)
-    require(used_.contains(texts_key + name), texts_key, "unknown member '" + name + "'",
-            "this release does not know it");
+    require(name == checksum_name || used_.contains(texts_key + name), texts_key,
+            "unknown member '" + name + "'", "this release does not know it");
 }
 
 }  // namespace arapfields

@@ -13,10 +13,13 @@ namespace arapfields {
 
 class JsonObject;
 
+inline constexpr const char* checksum_name = "checksum";
+
 /// Named arrays and texts as one file in the layout of safetensors
 /// (https://github.com/huggingface/safetensors): eight bytes with the length of a header, little-endian; the
 /// header, a JSON object with dtype, shape and data_offsets of each array and the texts under "__metadata__";
-/// the arrays, row by row, nothing between them. Nothing is compressed and nothing in a file is executed.
+/// the arrays, row by row, nothing between them. Nothing is compressed and nothing in a file is executed. One
+/// of the texts is a checksum of all that follows the eight bytes, with zeros in the checksum's own place.
 class ArchiveWriter {
  public:
   void add(const std::string& name, const std::vector<Index>& shape, const double* data);
@@ -39,8 +42,10 @@ class ArchiveWriter {
 /// allocated. Every error but the system's own is an InvalidInput.
 class ArchiveReader {
  public:
-  /// Reads the header. InvalidInput where it is none, or arrays overlap, leave gaps or reach beyond the file.
+  /// Reads the header. InvalidInput where it is none, or arrays overlap, leave gaps or reach beyond the file,
+  /// and where there is a checksum that is not the content's.
   explicit ArchiveReader(const std::string& path);
+  bool has_checksum() const { return texts_.contains(checksum_name); }
 
   /// One of the texts. InvalidInput where it is missing.
   const std::string& text(const std::string& name);
@@ -58,6 +63,7 @@ class ArchiveReader {
     std::size_t begin, end;  ///< in the file
   };
   void read_entry(const std::string& name, const JsonObject& value);
+  void compare_checksum(std::string header) const;
   void require_no_gaps(std::size_t begin) const;
   template <class Result>
   Result array(const std::string& name, const std::vector<Index>& shape, const char* dtype);

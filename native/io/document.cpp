@@ -38,6 +38,8 @@ void load_document(const std::string& path, const std::string& kind, std::string
     require(file.text("format") == format_name, "format", "'" + file.text("format") + "'",
             std::string("'") + format_name + "' is needed");
     check_version(file.text("version"));
+    require(file.text("version") == "1" || file.has_checksum(), checksum_name, "it is missing",
+            "files from version 2 on have one");
     require(file.text("kind") == kind, "kind", "it holds '" + file.text("kind") + "'",
             "'" + kind + "' is needed");
     const std::string& measured = checked_report(file.text("report"));

@@ -14,7 +14,7 @@ namespace arapfields {
 
 /// The version that is written. One that changes what a file holds gets the next number, and load_document's
 /// callers keep a reader for each number before.
-inline constexpr int file_version = 1;
+inline constexpr int file_version = 2;  // 2: with a checksum
 
 /// Writes arrays and what is said of them.
 void save_document(const std::string& path, const std::string& kind, const Json& structure,

@@ -2,7 +2,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
+#include "core/errors.h"
 #include "core/parallel.h"
 #include "sampling/crossings.h"
 
@@ -12,7 +14,10 @@ namespace {
 // Curvature of Φ − p along a line, over the model's slope error per spacing. On four published networks 90 %
 // of the points are below half of this; the 99 % point is 0.5 to 1.4 times it.
 constexpr double curvature_factor = 5.0;
-constexpr int nodes = 5;  // parameters of a piece at which p is evaluated, both ends included
+constexpr int nodes = 5;             // parameters of a piece at which p is evaluated, both ends included
+constexpr double zero_piece = 0.01;  // where Φ is exactly 0 at both ends, no shorter one is looked into
+constexpr std::size_t most_pieces_a_line = 512, fewest_pieces = 4096;
+constexpr double most_pieces = 1 << 25;  // at most so many in memory, were all of them needed
 
 /// A piece of a line with Φ known at both ends.
 struct Piece {
@@ -22,7 +27,7 @@ struct Piece {
   double split = 0.0;  // parameter of the next evaluation
 };
 
-enum class Roots { none, one, unknown };
+enum class Roots { none, zero, one, unknown };
 
 /// How many zeros Φ has in the piece, as far as p and Φ at both ends bound it. Sets `split` and, for one
 /// zero, the bracket's guess and slope.
@@ -32,6 +37,7 @@ Roots classify_interval(const TricubicSurrogate& model, const Line& line, Piece&
   const bool passes = (fa < 0.0) != (fb < 0.0);
   if (!passes && std::abs(fa) + std::abs(fb) > model.lipschitz() * length) return Roots::none;
   const double chord = fa == fb ? 0.5 : fa / (fa - fb);
+  if (fa == 0.0 && fb == 0.0 && length <= zero_piece) return Roots::zero;
   bracket = {piece.line, piece.low, piece.high, piece.low + std::clamp(chord, 0.0, 1.0) * length,
              (fb - fa) / length};
   if (length <= finest) return passes ? Roots::one : Roots::none;
@@ -99,11 +105,10 @@ VectorF evaluate_at(EvaluationCounter& function, const std::vector<Line>& lines,
   return function.values(points);
 }
 
-}  // namespace
-
-std::vector<Bracket> resolve_ambiguous(EvaluationCounter& function, const TricubicSurrogate& model,
-                                       const std::vector<Line>& lines,
-                                       const std::vector<AmbiguousInterval>& ambiguous, double finest) {
+/// Some of the intervals, whose pieces fit in memory.
+void resolve(EvaluationCounter& function, const TricubicSurrogate& model, const std::vector<Line>& lines,
+             std::span<const AmbiguousInterval> ambiguous, double finest, double& zero_length,
+             std::vector<Bracket>& found) {
   std::vector<Piece> pieces;
   for (const AmbiguousInterval& interval : ambiguous)
     pieces.push_back({interval.line, interval.low, interval.high, 0.0, 0.0});
@@ -113,8 +118,12 @@ std::vector<Bracket> resolve_ambiguous(EvaluationCounter& function, const Tricub
     pieces[i].low_value = low[i];
     pieces[i].high_value = high[i];
   }
-  std::vector<Bracket> result;
+  const auto touched = static_cast<std::size_t>(ambiguous.back().line - ambiguous.front().line + 1);
   while (!pieces.empty()) {
+    require(pieces.size() <= std::max(fewest_pieces, most_pieces_a_line * touched), "sdf",
+            "its values vary like noise, or stay within rounding of 0: over " +
+                std::to_string(most_pieces_a_line) + " places on each line may be zeros",
+            "a function with a zero surface inside the cube [-1, 1]^3 is needed");
     const auto count = static_cast<Index>(pieces.size());
     std::vector<Roots> roots(pieces.size());
     std::vector<Bracket> brackets(pieces.size());
@@ -124,7 +133,8 @@ std::vector<Bracket> resolve_ambiguous(EvaluationCounter& function, const Tricub
     });
     std::vector<Piece> open;
     for (std::size_t i = 0; i < pieces.size(); ++i) {
-      if (roots[i] == Roots::one) result.push_back(brackets[i]);
+      if (roots[i] == Roots::zero) zero_length += pieces[i].high - pieces[i].low;
+      if (roots[i] == Roots::one) found.push_back(brackets[i]);
       if (roots[i] == Roots::unknown) open.push_back(pieces[i]);
     }
     const VectorF values = evaluate_at(function, lines, open, &Piece::split);
@@ -136,10 +146,27 @@ std::vector<Bracket> resolve_ambiguous(EvaluationCounter& function, const Tricub
       pieces.push_back({p.line, p.split, p.high, value, p.high_value});
     }
   }
-  std::sort(result.begin(), result.end(), [](const Bracket& a, const Bracket& b) {
+}
+
+}  // namespace
+
+std::vector<Bracket> resolve_ambiguous(EvaluationCounter& function, const TricubicSurrogate& model,
+                                       const std::vector<Line>& lines,
+                                       const std::vector<AmbiguousInterval>& ambiguous, double finest,
+                                       double* zero_length) {
+  std::vector<Bracket> found;
+  double zeros = 0.0, pieces = 0.0;
+  for (std::size_t begin = 0, end = 0; end < ambiguous.size();) {
+    pieces += (ambiguous[end].high - ambiguous[end].low) / finest;
+    if (++end < ambiguous.size() && pieces < most_pieces) continue;
+    resolve(function, model, lines, {ambiguous.data() + begin, end - begin}, finest, zeros, found);
+    begin = end, pieces = 0.0;
+  }
+  if (zero_length != nullptr) *zero_length += zeros;
+  std::sort(found.begin(), found.end(), [](const Bracket& a, const Bracket& b) {
     return a.line != b.line ? a.line < b.line : a.low < b.low;
   });
-  return result;
+  return found;
 }
 
 }  // namespace arapfields

@@ -7,12 +7,17 @@
 
 namespace arapfields {
 
+inline constexpr double finest_interval = 2e-4;
+
 /// Evaluates Φ in the ambiguous intervals until every crossing there has its bracket. All intervals are
 /// bisected at once. An interval is done when Φ − p, known at its ends and bounded in slope, excludes a
-/// second zero or any, or when it is shorter than `finest`. Two zeros of Φ within that length may be missed.
+/// second zero or any, or when it is shorter than `finest`. Two zeros of Φ within that length may be missed,
+/// and those between close places where Φ is exactly 0; the lengths of these are added to `zero_length`.
+/// Throws InvalidInput where there are more intervals than a surface has: Φ varies like noise.
 std::vector<Bracket> resolve_ambiguous(EvaluationCounter& function, const TricubicSurrogate& model,
                                        const std::vector<Line>& lines,
-                                       const std::vector<AmbiguousInterval>& ambiguous, double finest = 2e-4);
+                                       const std::vector<AmbiguousInterval>& ambiguous,
+                                       double finest = finest_interval, double* zero_length = nullptr);
 
 struct Crossings {
   std::vector<Index> bracket;  ///< which bracket each belongs to, ascending

@@ -9,6 +9,7 @@
 #include "core/memory.h"
 #include "core/random.h"
 #include "sampling/crossings.h"
+#include "sampling/surface_normals.h"
 
 namespace arapfields {
 namespace {
@@ -16,6 +17,12 @@ namespace {
 constexpr Index fewest_lines = 1024;
 constexpr Index most_lines_a_round = 1 << 18;
 constexpr Index hopeless_lines = 1 << 18;  // without a crossing: there is no surface
+// What a surface may take at most. Smooth ones take ten values a sample, noise of 0.001 a hundred.
+constexpr Index most_lines_a_sample = 1 << 15, most_values = 1 << 20, most_values_a_sample = 1 << 10;
+// Sign changes to look at before fewer than one in a hundred with a zero are too few.
+constexpr Index fewest_sign_changes = 1000, least_share = 100;
+constexpr double least_slope = 1e-5;  // a distance's is 1; points are where |Φ| is below 2e-6
+constexpr double thickest = 0.1;  // of what a line meets where the function is 0, in cube units a crossing
 constexpr std::uint64_t shuffle_stream = ~std::uint64_t{0};
 
 /// The model pays off while it has fewer cells than a quarter of the points wanted.
@@ -37,7 +44,8 @@ class Caster {
       line = random_line(box_, random);
     }
     ScanResult scan = scan_lines(model_, fresh);
-    const std::vector<Bracket> more = resolve_ambiguous(function_, model_, fresh, scan.ambiguous);
+    const std::vector<Bracket> more =
+        resolve_ambiguous(function_, model_, fresh, scan.ambiguous, finest_interval, &zero_length);
     scan.brackets.insert(scan.brackets.end(), more.begin(), more.end());
     std::sort(scan.brackets.begin(), scan.brackets.end(), [](const Bracket& a, const Bracket& b) {
       return a.line != b.line ? a.line < b.line : a.low < b.low;
@@ -63,6 +71,7 @@ class Caster {
 
   std::vector<Line> lines;
   std::vector<Bracket> brackets;
+  double zero_length = 0.0;  // of the lines, where the function is exactly 0
 
  private:
   EvaluationCounter& function_;
@@ -74,6 +83,20 @@ class Caster {
 
 [[noreturn]] void throw_empty(const std::string& observed) {
   throw InvalidInput("sdf", observed, "a function with a zero surface inside the cube [-1, 1]^3 is needed");
+}
+
+/// Throws where what was found so far is not the surface of a function, or too little of one.
+void require_surface(const Caster& caster, const EvaluationCounter& function, Index wanted) {
+  const auto crossings = static_cast<Index>(caster.brackets.size());
+  const Index cast = caster.lines_cast();
+  if (caster.zero_length > thickest * static_cast<double>(std::max(crossings, cast / least_share)))
+    throw_empty("it is 0 on an open set of the cube, not on a surface alone");
+  const std::string of_lines = std::to_string(crossings) + " crossings of " + std::to_string(cast) + " lines";
+  if (crossings == 0 ? cast > hopeless_lines : cast > hopeless_lines + most_lines_a_sample * wanted)
+    throw_empty("its zero surface has " + of_lines + " through the cube");
+  if (function.value_count() > most_values + most_values_a_sample * wanted)
+    throw_empty(std::to_string(function.value_count()) + " values found " + of_lines +
+                ": it varies like noise, or stays within rounding of 0");
 }
 
 void shuffle(std::vector<Bracket>& items, std::size_t begin, Random& random) {
@@ -92,7 +115,9 @@ SurfaceSamples sample_surface(const ImplicitFunction& implicit, const SampleOpti
   EvaluationCounter function(implicit, progress);
   const TricubicSurrogate model(function, model_options(options.count));
   const Index model_evaluations = function.value_count() + function.gradient_count();
-  if (model.active().empty()) throw_empty("its values keep one sign in the whole cube");
+  if (model.active().empty())
+    throw_empty(model.has_both_sides() ? "its values jump from one sign to the other, with no zero between"
+                                       : "its values keep one sign in the whole cube");
 
   SurfaceSamples samples;
   samples.frame = implicit.frame();
@@ -100,6 +125,10 @@ SurfaceSamples sample_surface(const ImplicitFunction& implicit, const SampleOpti
   samples.normals.resize(options.count, 3);
   const auto seed = static_cast<std::uint64_t>(options.seed);
   Caster caster(function, model, seed);
+  if (model.lipschitz() < least_slope)
+    throw_empty("it changes by less than " + number_text(4.0 * least_slope) + " over the whole cube");
+
+  SurfaceNormals normals(function);
   Random order(seed, shuffle_stream);
   Index done = 0;
   double largest = 0.0;
@@ -111,8 +140,7 @@ SurfaceSamples sample_surface(const ImplicitFunction& implicit, const SampleOpti
       progress.report(0.3 + 0.4 * static_cast<double>(done + pool()) / static_cast<double>(options.count),
                       "casting lines");
       caster.cast(caster.lines_for(missing - pool()));
-      if (caster.brackets.empty() && caster.lines_cast() > hopeless_lines)
-        throw_empty("no line of " + std::to_string(caster.lines_cast()) + " crosses its zero surface");
+      require_surface(caster, function, options.count);
     }
     // Which crossings are kept must not depend on where they are.
     shuffle(caster.brackets, used, order);
@@ -121,10 +149,14 @@ SurfaceSamples sample_surface(const ImplicitFunction& implicit, const SampleOpti
     used += chosen.size();
     progress.report(0.7, "finding the crossings");
     const Crossings crossings = find_crossings(function, caster.lines, chosen, options.tolerance);
-    const Index fresh = crossings.points.rows();
-    samples.points.middleRows(done, fresh) = crossings.points.cast<double>();
-    samples.normals.middleRows(done, fresh) = crossings.gradients.cast<double>().rowwise().normalized();
-    done += fresh;
+    const Points directions = normals(crossings.points, crossings.gradients);
+    for (Index i = 0; i < directions.rows(); ++i) {
+      if (directions.row(i).isZero(0.0)) continue;
+      samples.points.row(done) = crossings.points.row(i).cast<double>();
+      samples.normals.row(done++) = directions.row(i);
+    }
+    if (static_cast<Index>(used) > fewest_sign_changes && done < static_cast<Index>(used) / least_share)
+      throw_empty("its values jump from one sign to the other, or are too steep for single precision");
     largest = std::max(largest, crossings.largest);
   }
   if (report != nullptr)

@@ -36,15 +36,32 @@ float roughness(const CubicBlock& block) {
   return largest;
 }
 
+/// Largest difference of neighbours in a cube of `side`³ values.
+double steepest(const VectorF& values, Index side) {
+  float largest = 0.0f;
+  for (const Index offset : {Index{1}, side, side * side})
+    for (Index i = 0; i + offset < values.size(); ++i)
+      if (i / offset % side + 1 < side) largest = std::max(largest, std::abs(values[i + offset] - values[i]));
+  return largest;
+}
+
 }  // namespace
 
 TricubicSurrogate::TricubicSurrogate(EvaluationCounter& function, const TricubicSurrogateOptions& options)
     : lipschitz_(function.gradient_bound() ? *function.gradient_bound() : measure_lipschitz(function)) {
   for (int attempt = 0; attempt < max_rebuilds; ++attempt) {
     cull(function, options);
-    if (!options.interpolate || fill(function)) break;
+    // No zero between the signs: where Φ is continuous, it is steeper there than its gradients tell.
+    const bool steeper = active_.empty() && coarse_slope_ > lipschitz_ && function.continuous();
+    if (steeper) lipschitz_ = coarse_slope_;
+    if (!steeper && (!options.interpolate || fill(function))) break;
   }
   if (options.interpolate) measure_errors();
+}
+
+bool TricubicSurrogate::has_both_sides() const {
+  const auto [low, high] = std::minmax_element(side_.begin(), side_.end());
+  return *low < 0 && *high > 0;
 }
 
 std::array<int, 3> TricubicSurrogate::coordinates(Index cell) const {
@@ -111,6 +128,7 @@ void TricubicSurrogate::cull(EvaluationCounter& function, const TricubicSurrogat
         centres(row, axis) = static_cast<float>((place[axis] + 0.5) * spacing() - 1.0);
     }
     const VectorF values = function.values(centres);
+    if (cells_a_side_ == options.coarsest) coarse_slope_ = steepest(values, cells_a_side_) / spacing();
     const auto farthest_zero = static_cast<float>(lipschitz_ * half_diagonal * spacing());
     Index kept = 0;
     centre_values_.resize(values.size());

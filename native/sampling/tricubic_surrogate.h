@@ -34,6 +34,8 @@ class TricubicSurrogate {
   double lipschitz() const { return lipschitz_; }
   /// Cells that may hold the surface, ascending; their bounding box (meaningless for none).
   const std::vector<Index>& active() const { return active_; }
+  /// Whether Φ has both signs in other cells.
+  bool has_both_sides() const;
   Box bounds() const;
 
   Index cell(int i, int j, int k) const {
@@ -67,6 +69,7 @@ class TricubicSurrogate {
 
   int cells_a_side_ = 0;
   double lipschitz_ = 0.0;
+  double coarse_slope_ = 0.0;  // largest between centres of the coarsest cells
   std::vector<std::int8_t> side_;
   std::vector<Index> active_;
   VectorF centre_values_;      // of active_

@@ -27,7 +27,7 @@ std::shared_ptr<const HandleBlend> exact_blend(const BoundHandles& handles, doub
     RigidRegion region{handle.rest, handles.motion(i), margin, name};
     if (handle.kind == Handle::Kind::point) {
       region.placement = Mat4::Zero();
-      region.placement.topRightCorner<3, 1>() = handle.rest_point;
+      region.placement.topRightCorner<3, 1>() = handles.sources().row(handles.begin(i));
     }
     regions.push_back(region);
     members.push_back(

@@ -101,7 +101,7 @@ Solution measured(std::shared_ptr<DeformationField> field, const SurfaceSamples&
   solution.report = measure(*solution.field, samples, terms);
   const std::optional<FarTarget> far = far_target(terms.handles, samples.points);
   if (far) solution.report.far_target = far->sizes;
-  solution.report.warnings = warnings_on(solution.report.distortion, far);
+  solution.report.warnings = warnings_on(solution.report.distortion, far, terms.handles);
   solution.report.loop = std::move(loop);
   return solution;
 }

@@ -30,7 +30,8 @@ std::optional<FarTarget> far_target(const BoundHandles& handles, PointsIn sample
   return farthest;
 }
 
-std::vector<std::string> warnings_on(const Distortion& distortion, const std::optional<FarTarget>& far) {
+std::vector<std::string> warnings_on(const Distortion& distortion, const std::optional<FarTarget>& far,
+                                     const BoundHandles& handles) {
   std::vector<std::string> warnings;
   if (distortion.flipped_share > 0.0)
     warnings.push_back("the result folds: det J is not positive at " +
@@ -39,6 +40,10 @@ std::vector<std::string> warnings_on(const Distortion& distortion, const std::op
   if (far)
     warnings.push_back("handles[" + std::to_string(far->handle) + "]: its target is " + number(far->sizes) +
                        " times the shape's size away from its place at rest");
+  for (Index i = 0; i < handles.count(); ++i)
+    if (handles.brought(i) > 0.0)
+      warnings.push_back("handles[" + std::to_string(i) + "]: its point lies " + number(handles.brought(i)) +
+                         " times the shape's size off the surface, whose nearest place it moves instead");
   return warnings;
 }
 

@@ -147,7 +147,7 @@ WrapSolution wrap(const SurfaceSamples& samples, const ImplicitFunction& functio
   report.matched_share = flow.matched_share();
   const Vector errors = placement.scale * (flow.landmarks() - landmark_targets).rowwise().norm();
   report.landmarks.assign(errors.data(), errors.data() + errors.size());
-  for (std::string& warning : warnings_on(report.distortion, std::nullopt))
+  for (std::string& warning : warnings_on(report.distortion, std::nullopt, {}))
     report.warnings.push_back(std::move(warning));
   report.seconds = watch.seconds();
   progress.report(1.0, "done");

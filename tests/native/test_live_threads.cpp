@@ -2,9 +2,12 @@
 // The live solver and its threads; the thread sanitizer runs these.
 #include <atomic>
 #include <boost/test/unit_test.hpp>
+#include <functional>
+#include <stdexcept>
 #include <thread>
 
 #include "core/errors.h"
+#include "core/one_at_a_time.h"
 #include "core/parallel.h"
 #include "core/random.h"
 #include "solve/radial/radial_solver.h"
@@ -101,6 +104,39 @@ BOOST_AUTO_TEST_CASE(a_solve_is_watched_and_cancelled_from_another_thread) {
   BOOST_CHECK(cancelled);
   BOOST_CHECK(monotone);
   BOOST_CHECK(live.solve()->at(samples.points).allFinite());
+}
+
+BOOST_AUTO_TEST_CASE(one_solver_serves_threads_one_at_a_time) {
+  const SurfaceSamples samples = ball(600);
+  OneAtATime<RadialSolver> live(samples, pose(0.0), small_options(2));
+  live.run({}, [&](RadialSolver& solver) { solver.track(samples.points); });
+  const std::vector<std::function<void(RadialSolver&)>> calls = {
+      [](RadialSolver& solver) { solver.set_targets(pose(0.3)), solver.solve(); },
+      [](RadialSolver& solver) { solver.set_targets(pose(-0.3)), solver.follow(); },
+      [](RadialSolver& solver) { solver.step(pose(0.2), 0.04); },
+      [](RadialSolver& solver) { BOOST_CHECK(solver.tracked().allFinite()); },
+      [](RadialSolver& solver) { BOOST_CHECK(std::isfinite(solver.report().value)); },
+      [](RadialSolver& solver) { solver.set_motion_state(solver.motion_state()); },
+      [](RadialSolver& solver) { solver.set_secondary_motion(SecondaryMotion{}); },
+      [](RadialSolver& solver) { solver.set_handles(pose(0.0)); },
+      [](RadialSolver& solver) { solver.set_weights(Vector::Constant(600, 2.0)); },
+      [](RadialSolver& solver) { solver.reset(); }};
+  std::vector<std::thread> callers;
+  for (std::size_t first = 0; first < 3; ++first)
+    callers.emplace_back([&, first] {
+      for (std::size_t k = 0; k < 2 * calls.size(); ++k)
+        live.run({}, calls[(first + (2 * first + 1) * k) % calls.size()]);
+    });
+  for (std::thread& caller : callers) caller.join();
+  BOOST_CHECK_THROW(live.run({}, [&](RadialSolver&) { live.run({}, [](RadialSolver&) {}); }),
+                    std::runtime_error);
+  Task task;
+  task.cancel();
+  live.run({}, [&](RadialSolver&) {
+    std::thread waiting(
+        [&] { BOOST_CHECK_THROW(live.run(Progress(&task), [](RadialSolver&) {}), Cancelled); });
+    waiting.join();
+  });
 }
 
 BOOST_AUTO_TEST_SUITE_END()

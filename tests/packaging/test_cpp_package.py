@@ -86,8 +86,16 @@ def check_example(program, tmp_path):
     ours, same_triangles = meshes.read(moved)
     assert (same_triangles == triangles).all()
     assert np.abs(ours - bent(vertices, triangles)).max() < PRINTED
-    refused = subprocess.run([program, rest], capture_output=True, text=True)
-    assert refused.returncode == 2 and "arguments" in refused.stderr  # what the library throws is caught
+    (tmp_path / "empty.obj").write_text("v 0 0 0\n")
+    refusals = {
+        "arguments": [rest],  # what the library throws is caught
+        "cannot be read": [tmp_path / "absent.obj", moved],
+        "no faces": [tmp_path / "empty.obj", moved],
+        "cannot be written": [rest, tmp_path / "absent" / "moved.obj"],
+    }
+    for word, arguments in refusals.items():
+        refused = subprocess.run([program, *arguments], capture_output=True, text=True)
+        assert refused.returncode == 2 and word in refused.stderr
 
 
 def test_one_version_of_cmake_is_asked_for():
@@ -104,11 +112,13 @@ def test_one_version_of_cmake_is_asked_for():
 
 @pytest.mark.parametrize("place", ["prefix", "wheel"])
 def test_the_example_gives_what_python_gives(place, prefix, tmp_path):
+    """The wheel's neighbour has Eigen: no Python need be found, no environment be activated."""
     if place == "prefix":
-        found = f"-DCMAKE_PREFIX_PATH={prefix}"
+        program = build_example(tmp_path, f"-DCMAKE_PREFIX_PATH={prefix}")
     else:
         found = f"-Darapfields_DIR={run(sys.executable, '-m', 'arapfields', '--cmake-dir').strip()}"
-    check_example(build_example(tmp_path, found), tmp_path)
+        program = build_example(tmp_path, found, python=tmp_path / "absent")
+    check_example(program, tmp_path)
 
 
 @pytest.mark.slow

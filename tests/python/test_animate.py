@@ -194,7 +194,7 @@ def test_what_was_there_stays_where_the_disk_is_full(place, monkeypatch, capsys)
     before = (place / "x.pc2").read_bytes()
     full = shutil.disk_usage(place)._replace(free=1000)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: full)
-    assert animate(place, "x.pc2", "--frames", "2", "3") == 2
+    assert animate(place, "x.pc2", "--frames", "2", "3") == 1  # no bad input
     assert "No space left" in said(capsys)
     assert (place / "x.pc2").read_bytes() == before
 

@@ -100,3 +100,24 @@ def test_cancel():
     task.cancel()
     with pytest.raises(af.Cancelled):
         af.sdf_grid(Ball(), 8, task=task)
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".vdb"])
+def test_what_is_no_grid_is_not_written(tmp_path, suffix):
+    values, origin, spacing = af.sdf_grid(Ball(), 4)
+    bad = [
+        ("values", (values * np.nan, origin, spacing)),
+        ("values", (values[0], origin, spacing)),
+        ("values", (values[:0], origin, spacing)),
+        ("values", (values.astype(str), origin, spacing)),
+        ("values", (values.astype("datetime64[s]"), origin, spacing)),
+        ("origin", (values, origin[:2], spacing)),
+        ("origin", (values, [0, 0, np.inf], spacing)),
+        ("spacing", (values, origin, "wide")),
+        ("spacing", (values, origin, 0.0)),
+        ("spacing", (values, origin, [1, 2])),
+    ]
+    for name, grid in bad:
+        with pytest.raises(af.InvalidInput, match=name):
+            af.save_grid(tmp_path / f"grid{suffix}", *grid)
+    assert not list(tmp_path.iterdir())

@@ -34,7 +34,7 @@ def test_membership_and_targets(points):
     bound = testing.BoundHandles(
         [
             af.Cuboid(rest, motion @ rest),
-            af.Point([1, 2, 3], [4, 4, 4]),
+            af.Point([0.1, 0.2, 0.3], [4, 4, 4]),
             af.Region([5, 7], rest, motion @ rest),
         ],
         points,
@@ -45,7 +45,7 @@ def test_membership_and_targets(points):
     assert bound.members == [*inside, -1, 5, 7]
     cuboid = slice(0, len(inside))
     assert np.allclose(bound.targets[cuboid], points[inside] @ turn[1].T + [0.1, 0.2, 0.3])
-    assert np.allclose(bound.sources[-3], [1, 2, 3]) and np.allclose(bound.targets[-3], [4, 4, 4])
+    assert np.allclose(bound.sources[-3], [0.1, 0.2, 0.3]) and np.allclose(bound.targets[-3], [4, 4, 4])
     assert np.allclose(bound.targets[-2:], points[[5, 7]] @ turn[1].T + [0.1, 0.2, 0.3])
 
 
@@ -108,8 +108,8 @@ def test_invalid_handles_are_named(points):
         testing.BoundHandles([af.Cuboid(rest, rest), af.Cuboid(far, far)], points)
     with pytest.raises(af.InvalidInput, match=r"handles\[0\].*sample index 2000"):
         testing.BoundHandles([af.Region([2000], rest, rest)], points)
-    with pytest.raises(af.InvalidInput, match=r"handles\[0\].*weight"):
-        testing.BoundHandles([af.Cuboid(rest, rest, weight=-1)], points)
+    with pytest.raises(af.InvalidInput, match="weight"):
+        af.Cuboid(rest, rest, weight=-1)
 
 
 def test_distortion_measures_and_barrier():

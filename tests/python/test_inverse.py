@@ -157,3 +157,32 @@ def test_inverses_on_published_shapes(data_dir, name):
     trained = af.train_inverse(field, samples, af.InverseTrainingOptions(iterations=1500))
     assert gap_in_voxels(sdf, field, 128, inverse=trained)[0] <= 1.5
     assert np.quantile(np.linalg.norm(trained(images) - points, axis=1), 0.95) < 1e-3
+
+
+class Turtle(af.ImplicitFunction):
+    """A flat shell with thin flippers, a head and a tail: ellipsoids (center, radii)."""
+
+    PARTS = np.array(
+        [[[0, 0, 0], [0.7, 0.5, 0.22]]]
+        + [[[0.85, 0, 0.02], [0.2, 0.12, 0.1]], [[-0.8, 0, 0], [0.2, 0.04, 0.03]]]
+        + [[[x, y, -0.05], [0.16, abs(y) / 2, 0.035]] for x in (0.45, -0.55) for y in (0.6, -0.6)]
+    )
+
+    def __init__(self):
+        super().__init__(af.Frame([0, 0, 0], 1.3))
+
+    def __call__(self, points):
+        away = (points[:, None] - self.PARTS[:, 0]) / self.PARTS[:, 1]
+        return ((np.linalg.norm(away, axis=2) - 1) * self.PARTS[:, 1].min(axis=1)).min(axis=1)
+
+
+@pytest.mark.parametrize("style", ["octahedron", "dodecahedron"])
+def test_every_point_of_a_styled_turtle_comes_back(style):
+    """Where thin parts lie close together, the nearest image is not of the nearest part."""
+    rest, triangles = af.extract_surface(Turtle(), 72)
+    samples = af.sample_mesh(rest, triangles, 2000)
+    field = af.stylize(samples, style, af.StylizeOptions(field="radial", strength=0.3))
+    images = field(rest)
+    found = field.inverse(images)
+    assert not np.isnan(found).any()
+    assert np.abs(field(found) - images).max() < 1e-5

@@ -142,3 +142,25 @@ def test_older_names_are_the_same_classes():
 def test_what_comes_after_the_options_goes_by_name(call):
     with pytest.raises(TypeError):
         call(cases.bar_samples(50), af.Task())
+
+
+def test_what_a_wrap_tells_comes_back_equal(tmp_path):
+    vertices, triangles = sphere(1.0, 1)
+    options = af.WrapOptions(centers=20, stages=2, iterations=1, threads=1)
+    landmarks = [(vertices[i], 2 * vertices[i]) for i in (0, 3, 7)]
+    samples = af.sample_mesh(vertices, triangles, 200)
+    field = af.wrap(samples, af.MeshSdf(2 * vertices, triangles), landmarks, options)
+    field.save(tmp_path / "wrap.safetensors")
+    assert af.DeformationField.load(tmp_path / "wrap.safetensors").report == field.report
+
+
+@pytest.mark.parametrize(
+    "name, value",
+    [("iterations", 1.5), ("iterations", "3"), ("seconds", "x"), ("seconds", True), ("error_mean", [])],
+)
+def test_a_report_s_fields_are_read_with_their_types(name, value):
+    told = {"kind": "InverseReport", "error_mean": 0.5, "error_max": 1, "iterations": 3, "seconds": None}
+    read = _report_files.from_json(json.dumps(told))
+    assert type(read.error_max) is float and np.isnan(read.seconds)
+    with pytest.raises(ValueError, match=f"does not fit: {name}"):
+        _report_files.from_json(json.dumps({**told, name: value}))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Solve space: the world up to a similarity, so that a moved or uniformly scaled object keeps its fit.
 
-Rigidity is judged in world space. An object's linear part L = U S Vᵀ splits into s·Q·P. Here s is the scale,
-Q = U Vᵀ is orthogonal (a mirror included), and P = V S Vᵀ / s is the stretch that remains. Local → solve
-is P, solve → world is s·Q and the location. Without non-uniform scale P is the identity.
+Rigidity is judged in world space. An object's linear part L = U S Vᵀ splits into s·Q·P with the scale s,
+Q = U Vᵀ orthogonal (a mirror included) and P = V S Vᵀ / s the stretch that remains: local → solve is P,
+solve → world is s·Q and the location. Without non-uniform scale P is the identity.
 """
 
 from dataclasses import dataclass

@@ -16,6 +16,8 @@ from distributed import Client
 
 import arapfields as af
 
+MESHES = (".ply", ".obj", ".stl", ".off")
+
 
 def stylized(job: tuple[Path, Path]) -> float:
     """The energy reached; the result is there whole or not at all."""
@@ -33,8 +35,13 @@ def stylized(job: tuple[Path, Path]) -> float:
 
 def main() -> int:
     source, target = (Path(name).resolve() for name in sys.argv[1:3])
+    if not source.is_dir():
+        sys.exit(f"{source}: is no folder")
     target.mkdir(parents=True, exist_ok=True)
-    jobs = [(path, target / path.name) for path in sorted(source.glob("*.ply"))]
+    meshes = [path for path in sorted(source.iterdir()) if path.suffix.lower() in MESHES]
+    if not meshes:
+        sys.exit(f"{source}: holds no mesh; {', '.join(MESHES)} are read")
+    jobs = [(path, target / path.name) for path in meshes if not path.name.startswith(".")]
     jobs = [job for job in jobs if not job[1].exists()]
     failed = 0
     # Without an address, workers on this machine, one for each processor, a thread each.

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`python -m arapfields`. Exit codes: 0 done, 1 failed, 2 bad input or usage, 130 interrupted."""
 
+import errno
 import sys
 
 from ._native import Cancelled, Diverged, InvalidInput
 from .cli.parser import parse
+
+DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # nothing that another input would mend
 
 
 def main(arguments=None):
@@ -21,7 +24,7 @@ def main(arguments=None):
         return _fail(verb, "interrupted", 130)
     except OSError as error:
         where = f"{error.filename}: " if error.filename is not None else ""
-        return _fail(verb, f"{where}{error.strerror or error}", 2)
+        return _fail(verb, f"{where}{error.strerror or error}", 1 if error.errno in DISK else 2)
     except (InvalidInput, ImportError) as error:
         return _fail(verb, error, 2)
     except (Diverged, MemoryError) as error:

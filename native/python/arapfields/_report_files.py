@@ -2,11 +2,13 @@
 """Reports as files keep them."""
 
 import dataclasses
+import functools
 import json
-from typing import Any
+from types import UnionType
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from ._files import json_text
-from .reports import HandleError, Report, SolveReport
+from .reports import Report, SolveReport
 
 
 def to_json(report: Report | None) -> str:
@@ -47,13 +49,36 @@ def _kind_of(found: dict[str, Any]) -> str:
 
 def _restored(kind: type[Report], name: str, value: Any) -> Any:
     """A field's value from JSON, where NaN and infinity are null and tuples are lists."""
-    declared = {field.name: field.type for field in dataclasses.fields(kind)}.get(name)
-    if name == "handles":
-        return tuple(HandleError(**handle) for handle in value)
-    if name == "loss":
-        return tuple((int(iteration), float(loss)) for iteration, loss in value)
-    if name == "notes":
-        return tuple(str(note) for note in value)
-    if declared is float:
-        return float("nan") if value is None else float(value)
-    return value
+    declared = _declared(kind).get(name, object)
+    try:
+        return _typed(value, declared)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} is {value!r:.40}") from None
+
+
+@functools.cache
+def _declared(kind: type[Report]) -> dict[str, Any]:
+    return get_type_hints(kind)
+
+
+def _typed(value: Any, declared: Any) -> Any:
+    """The value as the annotation says, or TypeError."""
+    origin, inner = get_origin(declared), get_args(declared)
+    if origin is tuple and isinstance(value, list):
+        if inner[-1] is Ellipsis:
+            return tuple(_typed(item, inner[0]) for item in value)
+        return tuple(_typed(item, one) for item, one in zip(value, inner, strict=True))
+    if origin is Literal and value in inner:
+        return value
+    if origin in (Union, UnionType):
+        return None if value is None else _typed(value, inner[0])
+    if dataclasses.is_dataclass(declared) and isinstance(value, dict):
+        hints = get_type_hints(declared)
+        return declared(**{name: _typed(item, hints.get(name, object)) for name, item in value.items()})
+    if declared is float and value is None:
+        return float("nan")
+    if declared is float and isinstance(value, int | float) and not isinstance(value, bool):
+        return float(value)
+    if declared is object or type(value) is declared:
+        return value
+    raise TypeError

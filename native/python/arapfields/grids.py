@@ -90,8 +90,10 @@ def save_grid(path: FilePath, values: ArrayLike, origin: ArrayLike, spacing: flo
     """Writes a grid of sdf_grid as .npz (`values`, `origin`, `spacing`) or .vdb, by the path's extension.
 
     A .vdb holds one float grid, `surface`: a level set whose values are cut off BAND voxels from the surface.
-    ImportError where no openvdb module is found, InvalidInput for another extension.
+    ImportError where no openvdb module is found, InvalidInput for another extension or what is no grid
+    of finite numbers.
     """
+    values, origin, spacing = _checked_grid(values, origin, spacing)
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
         raise InvalidInput(f"{path}: unknown extension; allowed are {', '.join(SUFFIXES)}")
@@ -104,6 +106,22 @@ def save_grid(path: FilePath, values: ArrayLike, origin: ArrayLike, spacing: flo
             write_arrays(partial, values=values, origin=origin, spacing=spacing)
         else:
             _write_vdb(openvdb, partial, path, values, origin, spacing)
+
+
+def _checked_grid(values, origin, spacing):
+    """The same as arrays; `values` keep their type."""
+    numbers, corner, step = (
+        real_array(given, name)
+        for given, name in ((values, "values"), (origin, "origin"), (spacing, "spacing"))
+    )
+    if numbers.ndim != 3 or not numbers.size or not np.isfinite(numbers).all():
+        raise InvalidInput(f"values: shape {numbers.shape}; finite numbers (nx, ny, nz) are needed")
+    if corner.shape != (3,) or not np.isfinite(corner).all():
+        raise InvalidInput(f"origin: got {origin!r:.80}; three finite numbers are needed")
+    if step.shape not in ((), (1,)) or not 0 < float(step.reshape(())) < np.inf:
+        raise InvalidInput(f"spacing: got {spacing!r:.80}; a positive number is needed")
+    kept = values if isinstance(values, np.ndarray) else numbers
+    return kept, corner, float(step.reshape(()))
 
 
 def openvdb_module():

@@ -14,6 +14,7 @@ then three float32 a point as before. Memory holds one frame at a time, however 
 import errno
 import os
 import shutil
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
@@ -152,6 +153,7 @@ class PointCacheReader:
     def __init__(self, path: FilePath) -> None:
         self.path = existing_file(path, SUFFIXES)
         self._file = open(self.path, "rb", buffering=0)  # noqa: SIM115
+        self._one_at_a_time = threading.Lock()
         try:
             self._layout, self.times = self._header()
         except InvalidInput as error:
@@ -192,9 +194,10 @@ class PointCacheReader:
             raise IndexError(f"sample {index} of {len(self)}")
         index %= len(self)
         where = f"{self.path}: sample {index}"
-        self._file.seek(self._layout.begin + self._layout.sample_bytes * index)
         try:
-            content = self._exactly(self._layout.sample_bytes)
+            with self._one_at_a_time:
+                self._file.seek(self._layout.begin + self._layout.sample_bytes * index)
+                content = self._exactly(self._layout.sample_bytes)
         except InvalidInput as error:
             raise InvalidInput(f"{where}: {error}") from None
         sample = np.frombuffer(content, self._layout.type).reshape(self.points, 3)

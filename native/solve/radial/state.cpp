@@ -128,7 +128,8 @@ void RadialState::measure(RadialPrecision<Scalar>& precision) {
   if (const auto& term = style.style()) report.preference = preference_of(term->preference, terms.gauss);
   report.distortion =
       measured.with_jets(u, [](JetView<const Scalar> jets) { return distortion<Scalar>(jets); });
-  report.warnings = warnings_on(report.distortion, far_target(handles.bound(), problem.surface()));
+  report.warnings =
+      warnings_on(report.distortion, far_target(handles.bound(), problem.surface()), handles.bound());
   const Points values = measured.handle_values(u).template cast<double>();
   const HandleBatch<double>& pairs = handles.pairs();
   const Index own = handles.own_count();

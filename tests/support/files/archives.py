@@ -30,8 +30,11 @@ def read(path):
 
 
 def header_of(texts, arrays):
-    """The header's object; arrays lie in the order of the dict."""
-    texts = {k: v if isinstance(v, str) else json.dumps(v) for k, v in texts.items()}
+    """The header's object; arrays lie in the order of the dict. A file of version 2 becomes one of version 1,
+    which has no checksum."""
+    texts = {k: v if isinstance(v, str) else json.dumps(v) for k, v in texts.items() if k != "checksum"}
+    if texts.get("version") == "2":
+        texts["version"] = "1"
     header, offset = {"__metadata__": texts}, 0
     for name, array in arrays.items():
         end = offset + array.nbytes

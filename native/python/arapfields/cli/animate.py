@@ -40,8 +40,21 @@ def animate(args):
     store = FrameStore(output, len(vertices), solver.description(wanted[0]))
     places = {index: store.place(tracks.start + index, solver.key(index)) for index in wanted}
     number, shards = args.shard or (1, 1)
+    with store.only_run(f"{number}-{shards}", places.values()) as first:
+        if first:
+            text = _run(args, solver, store, tracks, places, triangles)
+        else:
+            text = f"another animate is at work on the same frames, and makes {output}"
+    if not args.quiet:
+        print(text)
+
+
+def _run(args, solver, store, tracks, places, triangles):
+    """Solves this run's frames and, where none is missing then, writes the output; says what it did."""
+    output, points, wanted = store.output, store.points, list(places)
+    number, shards = args.shard or (1, 1)
     mine = [index for index in wanted[number - 1 :: shards] if not store.has(places[index])]
-    store.require_room(len(mine), Layout(".pc2", len(vertices), len(wanted)).size)
+    store.require_room(len(mine), Layout(".pc2", points, len(wanted)).size)
     with_progress("animate", lambda task: _solve(solver, store, places, mine, task, args), args.quiet)
     text = f"{len(mine)} frames solved, {len(wanted) - len(mine)} there already or another's"
     with store.alone():
@@ -53,13 +66,12 @@ def animate(args):
         else:
             frames = (store.get(place) for place in places.values())
             start = tracks.start + wanted[0]
-            shape = len(wanted), len(vertices), triangles
+            shape = len(wanted), points, triangles
             with_progress("write", lambda task: _write(output, frames, shape, tracks.fps, start, task, args))
             store.remove(places.values() if args.frames else None)
             end = start + len(wanted) - 1
             text += f"; wrote {output}: frames {start} to {end}, {tracks.fps:g} a second"
-    if not args.quiet:
-        print(text)
+    return text
 
 
 def frames_wanted(args, tracks):

@@ -26,13 +26,13 @@ class FrameStore:
 
     def __init__(self, output, points, common):
         """`common`: bytes that stand for all that the frames have in common."""
-        output = Path(output)
+        self.output = output = Path(output)
         self.folder = output.with_name(f".{output.name}.frames")
-        self._points, self._common = points, hashlib.blake2b(common, digest_size=16).digest()
+        self.points, self._common = points, hashlib.blake2b(common, digest_size=16).digest()
 
     @property
     def frame_bytes(self):
-        return TYPE.itemsize * 3 * self._points
+        return TYPE.itemsize * 3 * self.points
 
     def place(self, number, targets):
         content = hashlib.blake2b(self._common, digest_size=12)
@@ -61,7 +61,7 @@ class FrameStore:
             frame = np.fromfile(place, TYPE)
         except FileNotFoundError:
             frame = np.empty(0)
-        if frame.size != 3 * self._points:
+        if frame.size != 3 * self.points:
             raise OSError(errno.EIO, "a solved frame has gone meanwhile; run it again", str(place))
         return frame.reshape(-1, 3)
 
@@ -72,6 +72,37 @@ class FrameStore:
         if free < needed:
             text = f"{os.strerror(errno.ENOSPC)}: {needed:,} bytes are needed for a while, {free:,} are free"
             raise OSError(errno.ENOSPC, text, str(self.folder.parent))
+
+    @contextlib.contextmanager
+    def only_run(self, part, places):
+        """Whether no other process is at work on this part of the frames; else it makes what this one would.
+
+        InvalidInput where the other solves something else. Where the file system has no locks all may work.
+        """
+        self.folder.mkdir(exist_ok=True)
+        made = "\n".join(place.name for place in places).encode()
+        with open(self.folder / f"lock-{part}", "a+b") as file:
+            try:
+                lock(file, wait=False)
+            except (PermissionError, BlockingIOError):
+                file.seek(0)
+                if file.read() != made:
+                    raise InvalidInput(
+                        f"{self.output}: another animate, of other frames or options, is at work on it; "
+                        "let it end, or choose another output"
+                    ) from None
+                yield False
+                return
+            except OSError:
+                pass
+            file.truncate(0)
+            file.write(made)
+            file.flush()
+            try:
+                yield True
+            finally:
+                if self.folder.exists():
+                    self.remove(())
 
     @contextlib.contextmanager
     def alone(self):
@@ -86,5 +117,5 @@ class FrameStore:
         """Forgets these frames; without them all, also those of other settings."""
         for place in places or ():
             place.unlink(missing_ok=True)
-        if places is None or not any(path.name != "lock" for path in self.folder.iterdir()):
+        if places is None or not any(not path.name.startswith("lock") for path in self.folder.iterdir()):
             shutil.rmtree(self.folder, ignore_errors=True)

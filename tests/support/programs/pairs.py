@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every bound class with its methods as calls, and what they answer from several threads at once."""
+
+import itertools
+import threading
+
+import numpy as np
+
+import arapfields as af
+from arapfields import _native
+
+RNG = np.random.default_rng(2)
+BALL = RNG.normal(size=(150, 3))
+BALL /= np.linalg.norm(BALL, axis=1, keepdims=True)
+SAMPLES = af.SurfaceSamples(BALL, BALL)
+POINTS = 0.9 * BALL[:20]
+TETRAHEDRON = (
+    np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]]),
+    [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]],
+)
+SMALL = af.LiveOptions(samples=60, coarse_centers=4, fine_centers=12, iterations=2, interior=False, threads=1)
+DOCUMENTED = (af.InvalidInput, af.Cancelled, OSError, AttributeError)
+
+
+def pose(x):
+    return [[0, 0, -1.0], [x, 0, 1.0]]
+
+
+def pins(x=0.0):
+    return [af.PointHandle([0, 0, -1], [0, 0, -1]), af.PointHandle([0, 0, 1], [x, 0, 1])]
+
+
+def live():
+    solver = af.LiveDeformer(SAMPLES, pins(), SMALL)
+    solver.track(POINTS)
+    return solver
+
+
+MOVED = live().solve(pose(0.2))
+STATE = live().motion_state
+
+
+class Ball(af.ImplicitFunction):
+    def __call__(self, points):
+        return np.linalg.norm(points, axis=1) - 0.5
+
+
+def network():
+    sizes = [(8, 12), (8, 8), (1, 8)]
+    rng = np.random.default_rng(4)
+    return af.NeuralSdf.from_layers(
+        [rng.normal(size=size) for size in sizes], [np.zeros(n) for n, _ in sizes], octaves=2
+    )
+
+
+def assign(name, value):
+    return lambda it: setattr(it, name, value)
+
+
+def changes_under_way(name, calls):
+    """Whether one reads what another shows while it works: a task's progress."""
+    return name == "Task" and bool({"serve", "deform"} & set(calls))
+
+
+FIELD = {
+    "__call__": lambda it: it(POINTS),
+    "apply": lambda it: it.apply(POINTS),
+    "jacobian": lambda it: it.jacobian(POINTS),
+    "hessian": lambda it: it.hessian(POINTS),
+    "inverse": lambda it: it.inverse(POINTS[:4]),
+}
+DISTANCE = {"__call__": lambda it: it(POINTS), "gradient": lambda it: it.gradient(POINTS)}
+
+# A class: how to make an object, and calls beside reading its properties.
+CLASSES = {
+    "LiveDeformer": (
+        live,
+        {
+            "solve": lambda it: it.solve(pose(0.2)),
+            "solve as it is": lambda it: it.solve(),
+            "follow": lambda it: it.follow(pose(-0.2)),
+            "step": lambda it: it.step(pose(0.1), 0.04),
+            "track": lambda it: it.track(POINTS[:5]),
+            "tracked": lambda it: it.tracked(),
+            "set_handles": lambda it: it.set_handles(pins()[:1]),
+            "set_weights": lambda it: it.set_weights(np.linspace(1, 2, len(BALL))),
+            "set_symmetry": lambda it: it.set_symmetry("x"),
+            "set_style": lambda it: it.set_style("cube", 1.0),
+            "set_secondary_motion": lambda it: it.set_secondary_motion(),
+            "set motion_state": assign("motion_state", STATE),
+            "reset": lambda it: it.reset(),
+        },
+    ),
+    "Task": (
+        af.Task,
+        {
+            "cancel": lambda it: it.cancel(),
+            "report": lambda it: it.report(0.5, "half"),
+            "watch": lambda it: it.watch(POINTS),
+            "serve": lambda it: af.winding_number(*TETRAHEDRON, POINTS, task=it),
+            "deform": lambda it: af.deform(
+                SAMPLES, pins(0.2), af.DeformOptions(field="radial", iterations=2), task=it
+            ),
+        },
+    ),
+    "NeuralSdf": (network, {**DISTANCE, "sample": lambda it: it.layers[0][0]}),
+    "MeshSdf": (lambda: af.MeshSdf(*TETRAHEDRON), DISTANCE),
+    "ImplicitFunction": (Ball, {**DISTANCE, "extract": lambda it: af.extract_surface(it, 8).vertices}),
+    "SurfaceSamples": (
+        lambda: SAMPLES.with_weights(),
+        {
+            "with_weights": lambda it: it.with_weights(np.ones(len(BALL))).weights,
+            "__len__": len,
+            "__repr__": repr,
+        },
+    ),
+    "Frame": (
+        lambda: af.Frame([0, 0, 1], 2.0),
+        {"to_cube": lambda it: it.to_cube(POINTS), "to_mesh": lambda it: it.to_mesh(POINTS)},
+    ),
+    "DeformationField": (
+        lambda: af.deform(SAMPLES, pins(0.1), af.DeformOptions(iterations=2, width=8, layers=1)),
+        FIELD,
+    ),
+    "RadialField": (lambda: live().solve(pose(0.2)), FIELD),
+    "MotionState": (lambda: live().motion_state, {}),
+    "Attachment": (
+        lambda: af.Attachment(SAMPLES, 1.3 * POINTS),
+        {"positions": lambda it: it.positions(MOVED), "__len__": len, "__repr__": repr},
+    ),
+    "ObjectStyle": (
+        lambda: af.ObjectStyle(*TETRAHEDRON),
+        {"normals": lambda it: it.normals(BALL), "turned": lambda it: it.turned(np.eye(3)).centroid},
+    ),
+    "PointHandle": (lambda: pins()[0], {}),
+    "DeformOptions": (af.DeformOptions, {"to_dict": lambda it: it.to_dict(), "set": assign("width", 32)}),
+    "CurveField": (
+        lambda: af.deform_curve(BALL[:40, :2], [af.CurveHandle([0])], af.CurveOptions(iterations=2)),
+        {"__call__": lambda it: it(POINTS[:, :2]), "jacobian": lambda it: it.jacobian(POINTS[:, :2])},
+    ),
+}
+STATIC = {"load", "from_layers", "preset", "save", "fields"}  # and what other tests do with files
+
+
+def calls_of(name):
+    """The class's calls, with those that read its properties."""
+    make, calls = CLASSES[name]
+    kind = getattr(_native, name)
+    readers = {
+        member: lambda it, member=member: getattr(it, member)
+        for member in dir(kind)
+        if not member.startswith("_") and isinstance(getattr(kind, member), property)
+    }
+    return make, {**(readers if len(readers) < 20 else {}), **calls}
+
+
+def told(answer):
+    """What can be compared: bits of arrays and of what fields do, numbers of reports but times."""
+    if isinstance(answer, np.ndarray):
+        return answer.shape, answer.tobytes()
+    if isinstance(answer, af.DeformationField):
+        return told(answer(POINTS))
+    if isinstance(answer, af.MotionState):
+        return tuple(told(getattr(answer, part)) for part in ("coefficients", "velocities", "accelerations"))
+    if isinstance(answer, _native.CurveReport):
+        return told([getattr(answer, name) for name in dir(answer) if not name.startswith("_")])
+    if isinstance(answer, af.reports.Report):
+        return tuple((key, told(answer[key])) for key in answer if "seconds" not in key)
+    if isinstance(answer, tuple | list):
+        return tuple(told(part) for part in answer)
+    return repr(answer) if not isinstance(answer, af.Frame) else told(answer.to_mesh(POINTS))
+
+
+def asked(call, it):
+    try:
+        return told(call(it))
+    except DOCUMENTED as error:
+        return type(error).__name__
+
+
+def in_order(make, calls, order):
+    """Each call's answer, in the calls' own order, when they come in this one."""
+    it = make()
+    answers = {place: asked(calls[place], it) for place in order}
+    return tuple(answers[place] for place in range(len(calls)))
+
+
+def at_once(make, calls):
+    """The same from a thread each."""
+    it, answers = make(), [None] * len(calls)
+    begin = threading.Barrier(len(calls))
+
+    def run(place):
+        begin.wait()
+        answers[place] = asked(calls[place], it)
+
+    threads = [threading.Thread(target=run, args=(place,)) for place in range(len(calls))]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60)
+        assert not thread.is_alive(), "a deadlock"
+    return tuple(answers)
+
+
+def possible(make, calls):
+    """The answers of all orders."""
+    return {in_order(make, calls, order) for order in itertools.permutations(range(len(calls)))}
