@@ -10,13 +10,13 @@
 namespace arapfields {
 
 /// Samples of the curve (indices) that a rigid motion of the plane, (3,3) homogeneous, is to move.
-struct CurveHandle {
+struct ARAPFIELDS_EXPORT CurveHandle {
   std::vector<Index> samples;
   Mat3 motion = Mat3::Identity();
   double weight = 1.0;
 
   /// InvalidInput that names, after `prefix`, what no curve has or can follow.
-  ARAPFIELDS_EXPORT void validate(const std::string& prefix = "") const;
+  void validate(const std::string& prefix = "") const;
 };
 
 struct CurveReport {

@@ -56,7 +56,7 @@ class Starts {
     Vector squares = (images_.rowwise() - image.transpose()).rowwise().squaredNorm();
     std::vector<Index> order;
     for (Index i = 0; i < squares.size(); ++i)
-      if (std::isfinite(squares[i])) order.push_back(i);
+      if (images_.row(i).allFinite()) order.push_back(i);  // a square may be infinite
     const auto wanted = order.begin() + std::min<std::ptrdiff_t>(nearer, std::ssize(order) - 1);
     std::nth_element(order.begin(), wanted, order.end(), [&](Index a, Index b) {
       return squares[a] != squares[b] ? squares[a] < squares[b] : a < b;

@@ -53,7 +53,7 @@ Points SurfaceNormals::differences(const PointsF& points, double step) {
 }
 
 void SurfaceNormals::choose_step(const PointsF& points, const Points& gradients) {
-  const Index taken = std::min(points.rows(), probes);
+  const Index taken = std::min<Index>(points.rows(), probes);
   const PointsF some = points.topRows(taken);
   Points finer = gradients.topRows(taken);
   double wanted = trusted, best = -1.0, of_finer = 0.0;

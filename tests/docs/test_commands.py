@@ -26,8 +26,9 @@ def blocks(page, language):
 
 
 def commands(page):
-    """Lines of the page's shell blocks, without comments, continued lines joined."""
+    """Lines of the page's shell blocks, without comments and variables, continued lines joined."""
     text = "\n".join(blocks(page, "sh")).replace("\\\n", " ")
+    text = re.sub(r"^[A-Z]\w*=\S+ ", "", text, flags=re.M)
     return list(filter(None, (shlex.split(line, comments=True) for line in text.splitlines())))
 
 

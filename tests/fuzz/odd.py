@@ -12,7 +12,7 @@ NORMALS = ROWS / np.linalg.norm(ROWS, axis=1, keepdims=True)
 TETRAHEDRON = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 TINY = {"width": 8, "layers": 1, "octaves": 2, "threads": 1}
-PLAIN = ("style_names", "simd_level", "thread_count", "device_report")
+PLAIN = ("style_names", "backend", "simd_level", "thread_count", "device_report")
 WRAP = {"centers": 20, "stages": 1, "iterations": 2, "samples": 50}
 CIRCLE = np.stack([np.cos(np.linspace(0, 6, 50)), np.sin(np.linspace(0, 6, 50))], axis=1)
 

@@ -132,7 +132,7 @@ BOOST_AUTO_TEST_CASE(vertices_are_those_of_the_whole_grid) {
                                   needle,
                                   shell};
   for (const auto& shape : all) {
-    for (const int n : {17, 40, 63}) {
+    for (const int n : {17, 63, 101}) {
       ExtractionReport report;
       const TriangleMesh mesh = extract(shape, n, &report);
       const auto expected = dense_crossings(shape, n);
@@ -178,7 +178,7 @@ BOOST_AUTO_TEST_CASE(a_known_bound_on_the_gradient_leaves_nothing_to_chance) {
                             shapes::torus(0.5, 0.02)};
   for (auto& shape : all) {
     shape.bound = 1.0;
-    for (const int n : {17, 40, 128}) {
+    for (const int n : {17, 40, 101, 128}) {
       ExtractionReport report;
       const auto expected = dense_crossings(shape, n);
       if (expected.empty()) continue;

@@ -35,7 +35,11 @@ def test_an_old_file_loads_and_a_new_one_needs_its_checksum(examples, tmp_path):
     points = np.random.default_rng(0).uniform(-1, 1, (20, 3))
     assert np.array_equal(archives.load(path)(points), archives.load(examples["radial"])(points))
     header = archives.header_of(texts, arrays)
-    header["__metadata__"]["version"] = "2"
-    path.write_bytes(archives.joined(header, b"".join(array.tobytes() for array in arrays.values())))
-    with pytest.raises(af.InvalidInput, match="checksum"):
-        archives.load(path)
+    for texts, message in (
+        ({"version": "2"}, "checksum: it is missing"),
+        ({"version": "2", "checksum": "12"}, "sixteen digits"),
+    ):
+        header["__metadata__"] |= texts
+        path.write_bytes(archives.joined(header, b"".join(array.tobytes() for array in arrays.values())))
+        with pytest.raises(af.InvalidInput, match=message):
+            archives.load(path)

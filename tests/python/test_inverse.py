@@ -35,6 +35,11 @@ def test_a_trained_inverse_returns(bent, samples):
     assert inverse.report.error_mean == pytest.approx(error.mean(), rel=0.2)
 
 
+def test_what_is_infinitely_far_has_no_preimage(bent):
+    """Squares of such distances overflow."""
+    assert np.isnan(bent.inverse(np.array([[1e300, 0.0, 0.0]]))).all()
+
+
 def test_a_trained_inverse_is_a_field_with_a_file(bent, samples, tmp_path):
     inverse = af.train_inverse(
         bent, samples, af.InverseTrainingOptions(width=16, layers=2, iterations=5, batch=50)
