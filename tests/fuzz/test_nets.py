@@ -18,8 +18,8 @@ COUNTS = {
     "records": 300,
     "api": 350,
 }
-# A file that shrinks while it is read, a pipe (tests/python/test_files.py), two refusals of the writer, and two
-# of checksums (tests/python/test_checksums.py): the damaged files are of version 1, which has none.
+# A file that shrinks while it is read, a pipe (tests/python/test_files.py), two refusals of the writer, and
+# two of checksums (tests/python/test_checksums.py): the damaged files are of version 1, which has none.
 ELSEWHERE = {
     "it is being written to",
     "pipes, devices and sockets cannot be read",
