@@ -11,7 +11,7 @@ def show():
     stored = preferences()
     if stored is None or stored.was_welcomed:
         return
-    stored.was_welcomed = True
+    stored.was_welcomed = bpy.context.preferences.is_dirty = True  # else Blender would not save it
 
     def draw(menu, _):
         menu.layout.label(text="Over the 3D view press N and choose the tab ARAP Fields")

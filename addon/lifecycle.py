@@ -9,6 +9,7 @@ from bpy.app.handlers import persistent
 from . import commands, first_run, install_check, menus
 from .blender import icons, library_loading, modifier_stack, timers, translations
 from .blender.host import has_window
+from .blender.language import translated
 from .core.runtime import jobs, threads
 from .deform import first_result
 from .field_modifier import motion
@@ -37,8 +38,13 @@ def before_load(*_):
 
 @persistent
 def before_undo(*_):
+    """What a job is at work on, and what the messages tell of, belong to the step that is left."""
+    job = jobs.running()
     jobs.stop()
     display.clear_previews()
+    jobs.forget_messages()
+    if job is not None:
+        jobs.add_message("INFO", translated("{job} cancelled", job=translated(job.title)))
 
 
 @persistent

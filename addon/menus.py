@@ -34,7 +34,7 @@ class ARAPFIELDS_MT_object(bpy.types.Menu):
         layout.operator(Op.CLICK_LANDMARKS, icon="PINNED")
         layout.operator(Op.LIVE_KEEP, icon="CHECKMARK")
         layout.operator(Op.BAKE, icon="REC")
-        layout.operator_menu_enum(Op.EXPORT, "format", text="Export Animation", icon="EXPORT")
+        layout.menu("ARAPFIELDS_MT_export", icon="EXPORT")
         layout.separator()
         layout.operator(Op.FIT, icon="MOD_REMESH")
         layout.operator(Op.EXTRACT, icon="OUTLINER_OB_SURFACE")

@@ -3,7 +3,7 @@ import bpy
 
 from .blender import user_preferences
 from .blender.language import translated
-from .blender.property_definitions import annotations, flag, text
+from .blender.property_definitions import annotations, flag, path_text
 from .blender.section import draw_settings
 from .blender.source_operator import ReportingOperator
 from .core.runtime import native
@@ -15,10 +15,10 @@ class ARAPFIELDS_AP_preferences(bpy.types.AddonPreferences):
     bl_idname = PACKAGE
 
     __annotations__ = annotations(MACHINE) | {
-        "cache_folder": text(
+        "cache_folder": path_text(
             "Fit Folder",
             "Where fitted surfaces are kept; empty for Blender's own folder for this extension",
-            subtype="DIR_PATH",
+            "DIR",
         ),
         "show_boxes": flag(
             "Show Boxes", "Draw the handles' boxes, at rest and now, in the viewport", default=True

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What baking and exporting share: the scene plays on the main thread while a worker solves."""
 
+import contextlib
+
+from ..blender.host import has_window
 from ..blender.language import translated
 from ..blender.object_references import settings_of
-from ..blender.property_definitions import effective_value
+from ..blender.property_definitions import effective_value, flag
 from ..core.errors import UserError
 from ..handles import empties
 from ..jobs.job_operator import JobOperator, with_progress
@@ -15,13 +18,28 @@ SETTINGS = ("format", "kind", "range", "step", "subframes")
 
 
 class BakeOperator(JobOperator):
-    """Mixin of operators that solve frames, and play the scene while a worker does."""
+    """Mixin of operators that solve frames, and play the scene while a worker does.
+
+    A subclass has `places(context)`: {path of a file that it writes: whether that is the object's own}.
+    """
+
+    overwrite: flag("Overwrite", "Replace a file without a question", options={"HIDDEN", "SKIP_SAVE"})
 
     @classmethod
     def refuses(cls, source):
         return refusal_of(source, effective_kind(source))
 
     frames_pass = None  # BakePass, where frames are solved
+
+    def invoke(self, context, event):
+        taken = []
+        if has_window() and not self.overwrite:
+            with contextlib.suppress(UserError, OSError):  # which the job tells
+                taken = [path for path, own in self.places(context).items() if path.exists() and not own]
+        if not taken:
+            return super().invoke(context, event)
+        ask(context, self, taken)
+        return {"CANCELLED"}
 
     def prepare(self, context, job):
         """Coroutine: the job's items by `plan_frames(context, job)`; what cannot be planned is a failure."""
@@ -71,6 +89,23 @@ class BakeOperator(JobOperator):
             return []
         self.frames_pass = BakePass(bakes, chosen)
         return [self.frames_pass.item(context, job, self.failures)]
+
+
+def ask(context, operator, paths):
+    """A menu whose button runs the operator again, with the same arguments, and overwrites."""
+    chosen, own = operator.properties, operator.properties.bl_rna.properties
+    own = [one.identifier for one in own if not one.is_readonly and chosen.is_property_set(one.identifier)]
+    given = {name: getattr(chosen, name) for name in own} | {"overwrite": True}
+    names = ", ".join(path.name for path in paths)
+
+    def draw(menu, _):
+        menu.layout.operator_context = "INVOKE_DEFAULT"
+        button = menu.layout.operator(operator.bl_idname, text="Overwrite", icon="ERROR")
+        for name, value in given.items():
+            setattr(button, name, value)
+
+    title = translated("{names} exists already", names=names)
+    context.window_manager.popup_menu(draw, title=title, icon="QUESTION")
 
 
 def effective_kind(source, operator=None):

@@ -9,7 +9,6 @@ import bpy
 
 from ..core.errors import UserError
 from ..field_modifier import cache_modifier
-from .properties import FOLDER
 
 SUFFIXES = {"PC2": ".pc2", "MDD": ".mdd"}
 BARRED = re.compile(r'[\x00-\x1f/\\:*?"<>|]')  # letters that a file's name cannot have
@@ -87,10 +86,10 @@ def cache_path(source, suffix, folder, filepath=""):
     path = Path(bpy.path.abspath(shown))
     if path.suffix.lower() != suffix:
         raise UserError("{path}: the format needs the extension {suffix}", path=path, suffix=suffix)
-    if not filepath and folder == FOLDER:
+    try:
         path.parent.mkdir(exist_ok=True)
-    if not path.parent.is_dir():
-        raise UserError("{folder}: no such folder", folder=path.parent)
+    except (FileNotFoundError, FileExistsError, NotADirectoryError):
+        raise UserError("{folder}: no such folder", folder=path.parent) from None
     if bpy.data.filepath:
         with contextlib.suppress(ValueError):  # on another drive
             shown = bpy.path.relpath(str(path))

@@ -8,16 +8,19 @@ import bpy
 
 from ..blender.language import translated
 from ..blender.object_references import ObjectReference, source_of
-from ..blender.property_definitions import choice, text
+from ..blender.property_definitions import choice, path_text
 from ..core.errors import UserError
 from ..core.runtime.jobs import Item
 from ..core.settings.choices import EXPORT_FORMATS
 from ..field_modifier import cache_modifier
+from ..names import Op
 from ..results import result_objects
 from . import caches, exporters, frames, played
 from .bake_operator import BakeOperator, effective_kind, refusal_of
 from .object_bake import ObjectBake
 from .properties import settings
+
+LABELS = {kind: label for kind, label, _ in EXPORT_FORMATS}
 
 
 class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
@@ -32,10 +35,10 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
     __annotations__ = {
         **{name: one for name, one in settings(options={"SKIP_SAVE"}).items() if name != "format"},
         "format": choice(EXPORT_FORMATS, "Format", "What kind of file", options={"SKIP_SAVE"}),
-        "filepath": text(
+        "filepath": path_text(
             "File",
             "Where it goes; empty for a file with the object's name beside the .blend",
-            subtype="FILE_PATH",
+            "FILE",
             options={"SKIP_SAVE"},
         ),
     }
@@ -45,9 +48,16 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
         """What plays a cache is exported as it is; what does not is solved first."""
         return None if cache_modifier.is_playing(source) else super().refuses(source)
 
+    def places(self, context):
+        suffix = exporters.SUFFIXES[self.format]
+        return {caches.cache_path(source_of(context), suffix, "//", self.filepath)[0]: False}
+
     def plan_frames(self, context, job):
+        if exporters.is_missing(self.format):
+            name = LABELS[self.format]
+            raise UserError("This Blender has no exporter for {format}, or its add-on is off", format=name)
         active, sources = source_of(context), self.sources(context)
-        path, _ = caches.cache_path(active, exporters.SUFFIXES[self.format], "//", self.filepath)
+        (path,) = self.places(context)
         kinds = [(source, effective_kind(source, self)) for source in sources]
         self.frames = frames.choose(context, kinds, self.values(active))
         self.items = [ObjectReference(source) for source in sources]
@@ -116,4 +126,17 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
             shutil.rmtree(self.folder, ignore_errors=True)
 
 
-CLASSES = [ARAPFIELDS_OT_export_animation]
+class ARAPFIELDS_MT_export(bpy.types.Menu):
+    """Write what the object does, frame by frame, to a file that other programs read"""
+
+    bl_label = "Export Animation"
+
+    def draw(self, context):
+        for kind, label in LABELS.items():
+            row, missing = self.layout.row(), exporters.is_missing(kind)
+            row.enabled = not missing
+            text = translated("{format} (not in this Blender)", format=label) if missing else label
+            row.operator(Op.EXPORT, text=text).format = kind
+
+
+CLASSES = [ARAPFIELDS_OT_export_animation, ARAPFIELDS_MT_export]

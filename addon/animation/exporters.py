@@ -16,7 +16,14 @@ from . import export_checks
 from .caches import plain, size_text
 from .frames import playing
 
+OPERATORS = {"ABC": ("wm", "alembic_export"), "USD": ("wm", "usd_export"), "GLTF": ("export_scene", "gltf")}
 SUFFIXES = {"ABC": ".abc", "USD": ".usdc", "GLTF": ".glb"}
+
+
+def is_missing(kind):
+    """Whether this Blender was built without the exporter, or its add-on is off."""
+    group, name = OPERATORS[kind]
+    return name not in dir(getattr(bpy.ops, group))
 
 
 def write(context, kind, path, items, frames):
@@ -38,7 +45,7 @@ def write(context, kind, path, items, frames):
             require_room(context, path, items, frames)
             try:
                 CALLS[kind](context, str(partial), frames)
-            except (AttributeError, RuntimeError) as error:  # the former where the exporter is switched off
+            except RuntimeError as error:
                 lines = [line for line in str(error).splitlines() if line]
                 lines = [line for line in lines if not line.startswith("Location:")]
                 reason = lines[-1].removeprefix("Error: ") if lines else ""

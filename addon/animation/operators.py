@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+from pathlib import Path
+
 import bpy
 
 from ..blender import modifier_stack
 from ..blender.language import translated
 from ..blender.object_references import settings_of, source_of
-from ..blender.property_definitions import effective_value, text
+from ..blender.property_definitions import effective_value, path_text
 from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError
 from ..field_modifier import cache_modifier
@@ -25,10 +27,10 @@ class ARAPFIELDS_OT_bake(BakeOperator, bpy.types.Operator):
     __annotations__ = {
         **settings(options={"SKIP_SAVE"}),
         "folder": folder(options={"SKIP_SAVE"}),
-        "filepath": text(
+        "filepath": path_text(
             "File",
             "Where one object's cache goes; empty for a file with its name in the folder",
-            subtype="FILE_PATH",
+            "FILE",
             options={"SKIP_SAVE"},
         ),
         "part": bpy.props.IntVectorProperty(
@@ -41,6 +43,22 @@ class ARAPFIELDS_OT_bake(BakeOperator, bpy.types.Operator):
         ),
     }
 
+    def paths(self, source, active, values):
+        """As cache_path() gives them; none for shape keys."""
+        suffix = caches.SUFFIXES.get(values["format"])
+        if suffix is None:
+            return ()
+        folder = effective_value("folder", settings_of(active).bake, self)
+        return caches.cache_path(source, suffix, folder, self.filepath)
+
+    def places(self, context):
+        active, found, self.failures = source_of(context), {}, []
+        for source in self.sources(context):
+            for path in self.paths(source, active, self.values(active))[:1]:
+                cache = modifier_stack.find_cache(source)
+                found[path] = cache is not None and Path(bpy.path.abspath(cache.filepath)) == path
+        return found
+
     def plan_frames(self, context, job):
         active = source_of(context)
         sources = [(source, effective_kind(source, self)) for source in self.sources(context)]
@@ -51,11 +69,9 @@ class ARAPFIELDS_OT_bake(BakeOperator, bpy.types.Operator):
             raise UserError(
                 "Part {i} of {n}: caches alone have parts, from 1 of N to N of N", i=part[0], n=part[1]
             )
-        suffix = caches.SUFFIXES.get(values["format"])
-        place = effective_value("folder", settings_of(active).bake, self)
 
         def make(source, kind, frames):
-            paths = caches.cache_path(source, suffix, place, self.filepath) if suffix is not None else ()
+            paths = self.paths(source, active, values)
             bake = ObjectBake(context, source, kind, frames, *paths, part=part)
             self.warn_of_weight(bake)
             return bake

@@ -34,7 +34,7 @@ class ARAPFIELDS_PT_animation(Advanced, bpy.types.Panel):
             modifier_row(layout, modifier, "MOD_MESHDEFORM", Op.REMOVE_BAKE)
             layout.prop(modifier, "filepath", text="")
             note(layout, played.problem(source))
-        layout.operator_menu_enum(Op.EXPORT, "format", icon="EXPORT")
+        layout.menu("ARAPFIELDS_MT_export", icon="EXPORT")
 
 
 def weight(context, source, bake):

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..blender.property_definitions import choice, integer, text
+from ..blender.property_definitions import choice, integer, path_text, text
 from ..core.settings.choices import BAKE_FORMATS, BAKE_KINDS, BAKE_RANGES
 
 FOLDER = "//cache"
@@ -30,13 +30,8 @@ def settings(**extra):
 
 
 def folder(**extra):
-    return text(
-        "Folder",
-        "Where the caches lie; // is the .blend's own folder",
-        subtype="DIR_PATH",
-        default=FOLDER,
-        **extra,
-    )
+    tip = "Where the caches lie; // is the .blend's own folder"
+    return path_text("Folder", tip, "DIR", default=FOLDER, **extra)
 
 
 class ARAPFIELDS_PG_bake(bpy.types.PropertyGroup):

@@ -22,6 +22,15 @@ integer, number = _kind(bpy.props.IntProperty), _kind(bpy.props.FloatProperty)
 choice = _kind(bpy.props.EnumProperty, "items")
 pointer, collection = _kind(bpy.props.PointerProperty, "type"), _kind(bpy.props.CollectionProperty, "type")
 
+# Of a path that may begin with //; before Blender 4.5 every path may.
+IS_RELATIVE = "is_path_supports_blend_relative"
+RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if IS_RELATIVE in bpy.types.Property.bl_rna.properties else set()
+
+
+def path_text(name, description, kind, options=(), **extra):
+    """A text that is the path of a FILE or a DIR."""
+    return text(name, description, subtype=f"{kind}_PATH", options={*options, *RELATIVE}, **extra)
+
 
 def annotations(parameters, **extra):
     """Property definitions for a class that shows these parameters."""

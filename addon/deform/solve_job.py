@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What deforming and stylizing share: a field is solved on the worker, then moves a mesh."""
 
+import math
+
 import bpy
 import numpy as np
 
@@ -73,8 +75,9 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
         applying.solved[owner.session_uid] = pose
         carrying.put(bpy.context, solved.carried)
         operator.warnings += [f"{owner.name}: {translated(reason)}" for reason in carrying.take_warnings()]
-        shown = item.name + visibility.hidden_note(visibility.show_alone(owner, item))
-        return describe(shown, solved.report)
+        named = "" if item == owner else item.name
+        shown = named + visibility.hidden_note(visibility.show_alone(owner, item))
+        return describe(shown.strip(), solved.report, np.ptp(surface.vertices, axis=0).max())
 
     return Item(source.name, work, apply, preview)
 
@@ -91,20 +94,20 @@ class SolveOperator(JobOperator):
         return placement.in_place(*destination(settings_of(source), self))
 
 
-def describe(shown, report):
-    figures = [shown]
-    if "energy" in report:
-        figures.append(translated("energy {value}", value=f"{report['energy']:.4g}"))
-    if report.get("handle_error_mean"):
-        figures.append(
-            translated("handles off by {value} on average", value=f"{report['handle_error_mean']:.2g}")
-        )
+def describe(shown, report, size):
+    """What a solve of an object of that size has reached, in one line; `shown` is its result, if another."""
+    figures = [shown] if shown else []
+    if report.get("handle_error_max"):
+        share = max(0.001, math.ceil(1000 * report["handle_error_max"] / size) / 1000)
+        figures.append(translated("follows its handles within {share}", share=f"{share:.1%}"))
     if "from_target_mean" in report:
         near = max(report["to_target_mean"], report["from_target_mean"])
         figures.append(translated("{share} of the target's size off on average", share=f"{near:.2%}"))
     if report.get("flipped_share"):
         share, worst = f"{report['flipped_share']:.1%}", f"{report['min_determinant']:.2g}"
         figures.append(translated("{share} folded (det J down to {worst})", share=share, worst=worst))
+    elif "flipped_share" in report:
+        figures.append(translated("nothing folded"))
     if report.get("far_target"):
         sizes = f"{report['far_target']:.0f}"
         figures.append(translated("a target is {sizes} times the object's size away", sizes=sizes))

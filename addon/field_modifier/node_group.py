@@ -71,7 +71,7 @@ class Graph:
 
     def __init__(self, name):
         self.group, self.count = bpy.data.node_groups.new(name, "GeometryNodeTree"), 0
-        self.group.is_modifier = True
+        self.group.is_modifier = False  # it would be offered under Add Modifier, and do nothing
         self.socket("Geometry", "INPUT", "NodeSocketGeometry")
 
     def socket(self, name, way, kind, description=""):

@@ -138,8 +138,7 @@ class JobOperator(ModalRun, Guided):
             text = outcome.item.apply(outcome.value)
             if isinstance(text, types.GeneratorType):
                 text = yield from text
-            took = translated("in {seconds} s", seconds=f"{outcome.seconds:.1f}")
-            self.successes.append(f"{outcome.item.label}: {text} {took}")
+            self.successes.append(f"{outcome.item.label}: {text}, {outcome.seconds:.1f} s")
         except UserError as error:
             self.failures.append(translated(error))
         except JobCancelled:

@@ -12,6 +12,7 @@ from ..core.settings.choices import LIVE_KINDS
 from ..handles import empties
 from ..jobs.job_operator import busy
 from ..results.placement import placement_refusal
+from ..solver import style_settings
 from . import sessions
 
 
@@ -45,6 +46,9 @@ class ARAPFIELDS_OT_live(ReportingOperator, bpy.types.Operator):
         try:
             if self.kind == "DEFORM" and not empties.used(source):
                 raise UserError("{name} has no handle; add one in the panel's Handles section", source)
+            reason = style_settings.refusal(source) if self.kind == "STYLIZE" else None
+            if reason is not None:
+                raise reason
             context.view_layer.update()
             sessions.begin(context, source, self.kind)
         except (UserError, ValueError) as error:

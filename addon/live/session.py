@@ -12,7 +12,7 @@ from ..core.runtime.coroutines import run_to_completion, step_for
 from ..core.runtime.latest_request_worker import REST, LatestRequestWorker
 from ..field_modifier import motion
 from ..results import placement, visibility
-from ..solver import secondary_motion
+from ..solver import secondary_motion, style_settings
 from ..solver.frame_range import animation_range
 from ..solver.source_reader import SourceChanged, SourceReader
 from .edits import EditWatch, differ_in_handles, layout_of
@@ -109,6 +109,8 @@ class Session:
             return
         if self.is_restored:
             context.view_layer.update()
+        if self.kind == "STYLIZE" and style_settings.lacks_object(settings_of(source).stylize):
+            return  # the user is about to choose it
         layout = layout_of(source, self.kind, context.scene)
         if layout != self.layout:
             if not differ_in_handles(layout, self.layout):

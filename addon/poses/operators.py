@@ -4,7 +4,7 @@ from pathlib import Path
 import bpy
 
 from ..blender.language import translated
-from ..blender.property_definitions import number, text
+from ..blender.property_definitions import number, path_text, text
 from ..blender.source_operator import ReportingOperator, SourceOperator
 from ..core import poses
 from ..core.errors import UserError
@@ -84,7 +84,7 @@ class ARAPFIELDS_OT_apply_pose(OfSource, bpy.types.Operator):
     bl_label = "Apply Pose"
 
     pose: text("Name", "Name of the pose; empty for the chosen one")
-    filepath: text("File", "A pose's file, in place of a kept pose", subtype="FILE_PATH")
+    filepath: path_text("File", "A pose's file, in place of a kept pose", "FILE")
     strength: number("Strength", "How far of the way the points go", default=1.0, soft_min=0.0, soft_max=1.0)
 
     def change(self, context, source):
@@ -124,7 +124,7 @@ class ARAPFIELDS_OT_remove_pose(OfPose, bpy.types.Operator):
 class PoseFile:
     """Mixin: a file is chosen in a window."""
 
-    filepath: text("File", "The pose's file", subtype="FILE_PATH")
+    filepath: path_text("File", "The pose's file", "FILE")
     filter_glob: text("Filter", "Files that are shown", default=f"*{SUFFIX}", options={"HIDDEN"})
 
     def invoke(self, context, event):

@@ -45,6 +45,13 @@ def refusal(source):
     return reason or vertex_groups.missing(source, group_names(source, style))
 
 
+def lacks_object(settings):
+    """Whether the object that these settings need is still to be chosen."""
+    if settings.style in CUSTOM:
+        return settings.style_object is None
+    return settings.frame == "EMPTY" and settings.frame_object is None
+
+
 def missing_object(which, frame, settings):
     """The UserError of a style, or of axes, for which no object is chosen; None where there is one."""
     if which in CUSTOM:

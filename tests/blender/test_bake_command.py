@@ -69,7 +69,7 @@ def test_an_export_and_what_cannot_be_baked(scene):
         (["-o", folder / "bar.obj"], "unknown extension"),
         (["--frames", "5-1"], "is not A-B"),
         (["--objects", "None"], "no mesh object named None"),
-        (["--folder", folder / "gone"], "no such folder"),
+        (["--folder", folder / "gone/too"], "no such folder"),
         (["-o", folder / "bar.abc", "--shard", "1/2"], "an exported file has no parts"),
     ):
         done = run(*arguments, check=False)

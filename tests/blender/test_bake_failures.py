@@ -29,7 +29,7 @@ def test_whatever_goes_wrong_is_named_and_the_last_good_cache_stays():
         assert path.read_bytes() == good and [p.name for p in path.parent.iterdir()] == ["Bar.pc2"]
 
     fails("The last frame, 3, comes before the first, 7", start=7, end=3)
-    fails("no such folder", start=1, end=2, filepath="//gone/Bar.pc2")
+    fails("no such folder", start=1, end=2, filepath="//gone/too/Bar.pc2")
     fails("needs the extension .mdd", start=1, end=2, format="MDD", filepath="//cache/Bar.pc2")
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)  # stands for a full disk
     resource.setrlimit(resource.RLIMIT_FSIZE, (9000, hard))

@@ -13,6 +13,7 @@ if IN_BLENDER:
     from support.blender import scenes
 
     from addon.core.runtime import jobs
+    from addon.deform import solve_job
 
 pytestmark = pytest.mark.in_blender
 
@@ -154,3 +155,20 @@ def test_several_objects_in_one_call_and_one_that_fails():
     assert "Bare_deformed" not in bpy.data.objects
     assert [level for level, _ in jobs.messages()] == ["INFO", "INFO", "WARNING"]
     assert "Bare has no handle" in jobs.messages()[-1][1]
+
+
+def test_the_line_about_a_result_says_what_it_has_reached_and_no_name_twice():
+    bar, _, moving = scenes.bar_with_handles()
+    moving.location.z += 0.3
+    for result, begin in (("MODIFIER", "Bar: follows"), ("NEW", "Bar: Bar_deformed")):
+        bar.arapfields.result = result
+        bpy.ops.arapfields.deform(**scenes.QUICK)
+        level, line = jobs.messages()[0]
+        assert level == "INFO" and line.startswith(begin) and line.count("Bar:") == 1, line
+        assert "follows its handles within" in line and "nothing folded" in line and "energy" not in line
+
+
+@pytest.mark.parametrize("error, share", [(1e-9, "0.1%"), (0.0014, "0.1%"), (0.003, "0.2%"), (0.1, "5.0%")])
+def test_what_is_said_of_the_handles_is_a_bound(error, share):
+    line = solve_job.describe("", {"handle_error_max": error, "flipped_share": 0.0}, 2.0)
+    assert line == f"follows its handles within {share}, nothing folded"

@@ -191,5 +191,5 @@ def test_an_export_that_fails_is_named_and_changes_nothing(kind):
     with pytest.raises(RuntimeError, match="is not there"):
         bpy.ops.arapfields.export_animation(format=kind, filepath=str(path))
     with pytest.raises(RuntimeError, match="no such folder"):
-        bpy.ops.arapfields.export_animation(format=kind, filepath=str(folder / "gone" / path.name))
+        bpy.ops.arapfields.export_animation(format=kind, filepath=str(folder / "gone/too" / path.name))
     assert path.read_bytes() == b"before"

@@ -107,12 +107,14 @@ def test_the_first_start_says_where_the_extension_is_and_only_the_first():
 
     stored = type("Preferences", (), {"was_welcomed": False})()
     kept = first_run.bpy, first_run.preferences
-    first_run.bpy = type("Bpy", (), {"context": type("C", (), {"window_manager": Manager()})})
+    saved = type("Saved", (), {"is_dirty": False})()  # Blender's own, which it saves where they have changed
+    context = type("C", (), {"window_manager": Manager(), "preferences": saved})
+    first_run.bpy = type("Bpy", (), {"context": context})
     first_run.preferences = lambda: stored
     try:
         first_run.show()
         first_run.show()
     finally:
         first_run.bpy, first_run.preferences = kept
-    assert Manager.shown == 1 and stored.was_welcomed
+    assert Manager.shown == 1 and stored.was_welcomed and saved.is_dirty
     assert bpy.app.background

@@ -189,3 +189,18 @@ def test_what_failed_half_way_is_undone():
         lifecycle.PARTS = parts
         addon.register()
     assert hasattr(bpy.types.Object, "arapfields")
+
+
+def test_what_is_said_of_a_step_goes_when_it_is_undone_and_a_job_that_ends_by_it_is_named():
+    bpy.context.preferences.edit.use_global_undo = True
+    scenes.bar()
+    bpy.ops.ed.undo_push(message="before")
+    bpy.ops.ed.undo_push(message="after")
+    jobs.add_message("INFO", "Bar: it is so")
+    bpy.ops.ed.undo()
+    assert not jobs.messages()
+    jobs.begin(jobs.Job("Wrap", [], native.library().Task), start=False)
+    jobs.add_message("WARNING", "Bar: it was so")
+    bpy.ops.ed.redo()
+    assert jobs.messages() == [("INFO", "Wrap cancelled")] and jobs.running() is None
+    jobs.forget_messages()

@@ -11,6 +11,7 @@ if IN_BLENDER:
     from support.blender.live import step
     from support.blender.scenes import FIT
 
+    from addon.core.runtime import jobs
     from addon.live import sessions
 
 pytestmark = pytest.mark.in_blender
@@ -82,3 +83,31 @@ def test_a_live_style_follows_stiffness_rigidity_and_the_fold_barrier():
     assert report()["bend"] < 0.1 * usual["bend"]
     style.bending, style.barrier = 0.1, 0.0
     assert report()["min_determinant"] < usual["min_determinant"]
+
+
+def test_live_waits_while_the_object_of_a_style_is_still_to_be_chosen():
+    """What was shown stays until it is, and then follows it."""
+    bpy.ops.mesh.primitive_cube_add(size=1, location=(5, 0, 0), rotation=(0.5, 0.3, 0))
+    cube = bpy.context.object
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
+    ball = bpy.context.object
+    bpy.ops.arapfields.live(kind="STYLIZE")
+    step(refined=True)
+    shown, style = scenes.world_points(ball), ball.arapfields.stylize
+    for choose in (
+        lambda: setattr(style, "style", "OBJECT"),
+        lambda: setattr(style, "style_object", None),
+        lambda: setattr(style, "strength", 0.5),
+    ):
+        choose()
+        step(refined=True)
+        assert sessions.is_live(ball, "STYLIZE") and not jobs.messages()
+        assert np.array_equal(scenes.world_points(ball), shown)
+    style.strength, style.style_object = 1.0, cube
+    step(refined=True)
+    assert sessions.is_live(ball) and np.abs(scenes.world_points(ball) - shown).max() > 0.05
+    bpy.ops.arapfields.live(kind="STYLIZE")
+    style.style, style.frame, style.frame_object = "CUBE", "EMPTY", None
+    with pytest.raises(RuntimeError, match="Choose the object"):  # there is nothing to go on from
+        bpy.ops.arapfields.live(kind="STYLIZE")
+    assert not sessions.is_live(ball)

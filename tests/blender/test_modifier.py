@@ -25,6 +25,7 @@ def test_the_modifier_does_what_the_field_does_by_hand(case):
     own = [kind for kind in STACKS[case] if kind != "keys"]
     assert [modifier_stack.is_field(m) for m in bar.modifiers] == [kind == "FIELD" for kind in own]
     modifier = modifier_stack.find(bar)
+    assert not modifier.node_group.is_modifier  # else Blender would offer it under Add Modifier
     modifier.show_viewport = False
     rest = local_points(bar)
     modifier.show_viewport = True

@@ -37,6 +37,7 @@ def stepped(**given):
     class Operator(BakeOperator):
         title, in_window, scope, filepath = "Bake", False, "ACTIVE", given.pop("filepath", "")
         plan_frames = bake.ARAPFIELDS_OT_bake.plan_frames
+        paths = bake.ARAPFIELDS_OT_bake.paths
         warn_of_weight = bake.ARAPFIELDS_OT_bake.warn_of_weight
         part = (0, 0)
         properties = types.SimpleNamespace(is_property_set=lambda name: name in given)
