@@ -9,7 +9,7 @@
 namespace arapfields {
 
 /// A function Φ on the unit cube [-1,1]³ whose zero set is a surface: negative inside. Sampling and
-/// extraction know no more than this; a neural SDF is one, analytic shapes in tests are others.
+/// extraction use this interface alone.
 /// Both calls are batched and parallel, and may be made from one thread at a time for each object.
 class ARAPFIELDS_EXPORT ImplicitFunction {
  public:
@@ -20,7 +20,7 @@ class ARAPFIELDS_EXPORT ImplicitFunction {
   virtual void evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> values,
                         Eigen::Ref<PointsF> gradients) const = 0;
   /// A bound on |∇Φ| in the cube that holds everywhere, where one is known: 1 for a distance. Extraction then
-  /// finds exactly what the whole grid has; else the bound is measured.
+  /// finds exactly the surface of the dense grid; else the bound is measured.
   virtual std::optional<double> gradient_bound() const { return std::nullopt; }
   /// Whether Φ is continuous. Where it is not, its sign may also change by a jump, and there is no surface
   /// there: extraction leaves the mesh open.

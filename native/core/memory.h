@@ -7,12 +7,12 @@
 
 namespace arapfields {
 
-/// Bytes that this process can still get: what the system has to spare, and what its control group allows.
-/// Infinity where the system does not say.
+/// Bytes that this process can still allocate, by the system's free memory and the limits of its control
+/// group. Infinity where the system does not report them.
 ARAPFIELDS_EXPORT double available_memory();
 
-/// Throws InvalidInput before `bytes` are asked for that the machine does not have, rather than be killed
-/// halfway. `argument` is what to make smaller.
+/// Throws InvalidInput where `bytes` exceed the free memory, so that the process is not killed halfway.
+/// `argument` names what to reduce.
 ARAPFIELDS_EXPORT void require_memory(const std::string& argument, double bytes);
 
 }  // namespace arapfields

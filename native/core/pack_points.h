@@ -7,7 +7,7 @@
 namespace arapfields::SIMD_LEVEL {
 
 #if defined(ARAPFIELDS_NEON)
-/// As many whole points as there are lanes, by the instruction that takes triples apart.
+/// As many points as there are lanes, by the instruction that deinterleaves triples.
 inline void load_interleaved(const float* from, Pack<float> (&out)[3]) {
   const float32x4x3_t split = vld3q_f32(from);
   for (int c = 0; c < 3; ++c) out[c] = (Pack<float>)split.val[c];

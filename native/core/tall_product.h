@@ -5,8 +5,8 @@
 
 namespace arapfields {
 
-/// A matrix that is multiplied again and again by three columns, which BLAS is slow at: rows padded with
-/// zeros to whole vectors. With `lower`, only the lower triangle of a square matrix is kept and used.
+/// A matrix for many products with three columns, which BLAS is slow at: rows are padded with zeros to full
+/// vectors. With `lower`, only the lower triangle of a square matrix is stored and used.
 template <class Scalar>
 class TallMatrix {
  public:

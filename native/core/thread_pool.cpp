@@ -23,7 +23,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// How long a thread that waits looks before it sleeps: about what falling asleep and waking up take.
+/// How long a waiting thread spins before it sleeps: about as long as falling asleep and waking up take.
 constexpr std::chrono::microseconds spin_time{20};
 
 void pause_processor() {
@@ -34,7 +34,7 @@ void pause_processor() {
 #endif
 }
 
-/// Looks until ready() or the time is over; returns which.
+/// Spins until ready() or until the time is over; returns ready().
 template <class Ready>
 bool spin_until(const Ready& ready) {
   const Clock::time_point end = Clock::now() + spin_time;
@@ -82,7 +82,7 @@ struct ThreadPool::Job {
     if (inside.fetch_sub(1, std::memory_order_acq_rel) > 1) return;
     {
       const std::lock_guard lock(ending);
-    }  // who has compared sleeps by now, and hears it
+    }  // a waiting thread sleeps by now, and is notified
     ended.notify_all();
   }
 };
@@ -101,7 +101,7 @@ void ThreadPool::run(int helpers, const std::function<void(int)>& work) {
     start_threads();
     wake = sleeping_ > 0 && spinning_.load(std::memory_order_relaxed) < helpers;
   }
-  if (wake) wake_.notify_one();  // who wakes up wakes the next one
+  if (wake) wake_.notify_one();  // each woken thread wakes the next one
   work(0);
   {
     const std::lock_guard lock(mutex_);
@@ -120,7 +120,7 @@ void ThreadPool::start_threads() {
       std::thread([this] { serve(); }).detach();
       ++threads_;
     } catch (const std::exception&) {
-      refused_ = true;  // those that are there share the work
+      refused_ = true;  // the existing threads share the work
     }
   }
 }
@@ -187,7 +187,7 @@ std::size_t priority() {
 }
 
 #ifndef _WIN32  // which has no fork()
-/// Of a parent's pools a child has the memory but not the threads: it leaves them alone.
+/// After fork() a child has the memory of its parent's pools but not their threads: it drops them.
 void forget_pools() {
   for (auto& pool : pools) pool.store(nullptr, std::memory_order_relaxed);
 }
@@ -203,7 +203,7 @@ ThreadPool& thread_pool() {
   if (pool != nullptr) return *pool;
   auto* const fresh = new ThreadPool(keep_library_serial);
   if (mine.compare_exchange_strong(pool, fresh, std::memory_order_acq_rel)) return *fresh;
-  return *pool;  // somebody was faster; the other one has no threads yet and is forgotten
+  return *pool;  // another thread was faster; this pool has no threads yet and is dropped
 }
 
 }  // namespace arapfields

@@ -19,14 +19,13 @@ class ThreadPool {
 
   /// Every thread runs `on_start` first.
   explicit ThreadPool(std::function<void()> on_start) : on_start_(std::move(on_start)) {}
-  ~ThreadPool() =
-      delete;  // a pool lives as long as the process, so that nobody has to wait for it at the end
+  ~ThreadPool() = delete;  // a pool lives as long as the process, so that no thread waits for it at exit
   ThreadPool(const ThreadPool&) = delete;
   ThreadPool& operator=(const ThreadPool&) = delete;
 
   /// Runs work(0) on the calling thread and, beside it, work(1) to at most work(helpers), one a thread, as
-  /// threads come; returns when each that was begun has ended. What has not begun when work(0) ends is left
-  /// out: a thread that comes late, or that the system refuses to start, holds nobody up. `work` must not
+  /// threads come; returns when each that was begun has ended. What has not begun when work(0) ends is
+  /// skipped: a thread that starts late, or that the system refuses to start, delays no call. `work` must not
   /// throw.
   void run(int helpers, const std::function<void(int)>& work);
 

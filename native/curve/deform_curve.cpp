@@ -19,7 +19,7 @@ using Rows = RowMatrix<double>;
 
 constexpr int local_global_steps = 8;
 constexpr double gain_tolerance = 1e-5;
-/// Rows that are multiplied between two looks at the task.
+/// Rows that are multiplied between two checks of the task.
 constexpr Index rows_at_once = 1024;
 /// Matrices of the problem's size that exist at once while it is set up.
 constexpr double copies = 2.0;
@@ -64,16 +64,16 @@ class CurveProblem final : public MeasuredObjective {
   void local_global_step() {
     Rows jets;
     multiply(field_.coefficients, jets);
-    Rows wanted = Rows::Zero(rows_.rows(), 2);
+    Rows targets = Rows::Zero(rows_.rows(), 2);
     for (Index p = 0; p < count_; ++p) {
       Mat2 jacobian;
       for (int k = 0; k < 2; ++k) jacobian.col(k) = jets.row((1 + k) * count_ + p).transpose();
       const Mat2 rotation = closest_rotation2(jacobian);
       for (int k = 0; k < 2; ++k)
-        wanted.row((1 + k) * count_ + p) = rotation.col(k).transpose() / static_cast<double>(count_);
+        targets.row((1 + k) * count_ + p) = rotation.col(k).transpose() / static_cast<double>(count_);
     }
-    for (const Held& h : held_) wanted.row(h.sample) += h.weight * h.target;
-    field_.coefficients = cholesky_solve<double>(factor_, multiply_transposed(wanted));
+    for (const Held& h : held_) targets.row(h.sample) += h.weight * h.target;
+    field_.coefficients = cholesky_solve<double>(factor_, multiply_transposed(targets));
   }
 
   void measure(const Rows& coefficients, Vector& u) const override {

@@ -23,8 +23,8 @@ struct alignas(64) WideNode {
 };
 
 /// Multipole moments of each child's field of solid angles, up to the octupole (Barill et al. 2018, "Fast
-/// Winding Numbers for Soups and Clouds", eq. 12), with the trace, to which the field is blind, removed and
-/// all factors multiplied in: w(q) ≈ N·e/R² + Q(e,e)/R³ + S(e,e,e)/R⁴ with r = center − q = R e.
+/// Winding Numbers for Soups and Clouds", eq. 12), with the trace, which does not affect the field, removed
+/// and all factors multiplied in: w(q) ≈ N·e/R² + Q(e,e)/R³ + S(e,e,e)/R⁴ with r = center − q = R e.
 struct alignas(64) NodeMoments {
   float center[3][tree_width];
   float radius_squared[tree_width];  ///< of a sphere about the center that holds the child

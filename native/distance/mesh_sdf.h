@@ -10,7 +10,7 @@ namespace arapfields {
 /// and extracted like a fit, without one. Negative where the winding number exceeds 1/2.
 class ARAPFIELDS_EXPORT MeshSdf final : public ImplicitFunction {
  public:
-  /// Throws InvalidInput as mesh_frame() and SignedDistance do. `progress` is only asked whether to stop.
+  /// Throws InvalidInput as mesh_frame() and SignedDistance do. `progress` only cancels.
   MeshSdf(PointsIn vertices, TrianglesIn triangles, const Progress& progress = {});
 
   void evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF> values) const override;

@@ -16,14 +16,14 @@ struct ClosestPoints {
   Vector distances;                     ///< (p) ≥ 0
 };
 
-/// Distances to a triangle soup: built once, asked often, from any number of threads at a time.
+/// Distances to a triangle soup. Built once; queries may come from any number of threads.
 /// Magnitudes are exact to rounding (float64). A point is inside, and its distance negative, where the
 /// winding number exceeds 1/2, as in Jacobson et al. 2013, "Robust Inside-Outside Segmentation using
 /// Generalized Winding Numbers"; for that the soup may be open, self-intersecting and partly degenerate.
 class ARAPFIELDS_EXPORT SignedDistance {
  public:
-  /// Builds the hierarchy; throws InvalidInput as validate(vertices, triangles) does. `progress` is only
-  /// asked whether to stop.
+  /// Builds the hierarchy; throws InvalidInput as validate(vertices, triangles) does. `progress` only
+  /// cancels.
   SignedDistance(PointsIn vertices, TrianglesIn triangles, const Progress& progress = {});
   ~SignedDistance();
   SignedDistance(SignedDistance&&) noexcept;

@@ -5,14 +5,14 @@
 
 namespace arapfields {
 
-/// The rigid motion of space after which points are nearest to their targets, and the factor by which it
-/// lowers the weighted sum of their squared distances (1: not at all).
+/// The rigid motion that maps points closest to their targets in weighted least squares, and the factor by
+/// which it lowers the sum of squares (1: not at all).
 struct Alignment {
   Mat3 rotation = Mat3::Identity();
   Vec3 translation = Vec3::Zero();
   double gain = 1.0;
 };
-/// Points on a line leave the turn about it open: `tie`, a share of the spread, keeps it small.
+/// Points on a line leave the rotation about it undetermined: `tie`, a share of the spread, keeps it small.
 Alignment best_alignment(PointsIn points, PointsIn targets, const Vector& weights, double tie = 1e-6);
 
 /// The same motion as a matrix, of points (n,3) → moved (n,3): of all rotations and translations the one with

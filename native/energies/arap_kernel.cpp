@@ -152,11 +152,7 @@ void arap_range(const ArapBlock<Scalar>& block, std::int64_t begin, std::int64_t
   for (std::int64_t point = begin; point < end; point += lanes<Scalar>) {
     const std::int64_t valid = end - point;
     Pack33<Scalar> jacobian, gradient;
-    for (int k = 0; k < 3; ++k) {
-      Pack3<Scalar> column;
-      load_points(block.jets + ((1 + k) * block.count + point) * 3, valid, column);
-      for (int i = 0; i < 3; ++i) jacobian[i][k] = column[i];
-    }
+    load_jacobians(block.jets + 3 * block.count, block.count, point, valid, jacobian);
     RotationPack<Scalar> polar;
     closest_rotation<Scalar>(jacobian, polar);
     const Pack<Scalar> factor = load_factors(block.factors, point, valid);
@@ -199,11 +195,7 @@ void rotation_range(const Scalar* jacobians, std::int64_t count, std::int64_t be
   for (std::int64_t point = begin; point < end; point += lanes<Scalar>) {
     const std::int64_t valid = end - point;
     Pack33<Scalar> jacobian;
-    for (int k = 0; k < 3; ++k) {
-      Pack3<Scalar> column;
-      load_points(jacobians + (k * count + point) * 3, valid, column);
-      for (int i = 0; i < 3; ++i) jacobian[i][k] = column[i];
-    }
+    load_jacobians(jacobians, count, point, valid, jacobian);
     RotationPack<Scalar> polar;
     closest_rotation<Scalar>(jacobian, polar);
     for (int lane = 0; lane < lanes<Scalar> && lane < valid; ++lane)

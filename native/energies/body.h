@@ -5,14 +5,14 @@
 
 namespace arapfields {
 
-/// What a body of mass m feels beside its own resistance, at samples (n): the inertia of an implicit time
-/// step, its weight, and a ground that it cannot pass.
+/// External forces on a body of mass m, at samples (n): the inertia of an implicit time step, gravity, and a
+/// penalty for passing the ground.
 template <class Scalar>
 struct Body {
   Eigen::VectorX<Scalar> masses;  ///< (n) none negative
-  PointsOf<Scalar> rest;          ///< (n,3) where the weight's potential is 0
-  PointsOf<Scalar> goal;          ///< (n,3) where the samples would go without forces
-  double inertia = 0.0;           ///< weight of the way from there; 0: none
+  PointsOf<Scalar> rest;          ///< (n,3) where the potential of gravity is 0
+  PointsOf<Scalar> goal;          ///< (n,3) positions that free motion would reach
+  double inertia = 0.0;           ///< weight of the squared distance from there; 0: none
   Vec3 gravity = Vec3::Zero();    ///< force on a unit of mass
   Vec3 up = Vec3::UnitZ();        ///< unit normal of the ground
   double ground = 0.0;            ///< the ground's height along `up`

@@ -5,7 +5,7 @@
 
 namespace arapfields {
 
-/// How far a deformation is from a fold, over the points at which its jets were taken.
+/// Determinants and stretches of a deformation over the points of its jets: how far it is from folding.
 struct Distortion {
   double min_determinant = 1.0;  ///< smallest det J
   double flipped_share = 0.0;    ///< share of points with det J ≤ 0

@@ -12,11 +12,7 @@ void distortion_range(const Scalar* jets, std::int64_t count, std::int64_t begin
   for (std::int64_t point = begin; point < end; point += lanes<Scalar>) {
     const std::int64_t valid = end - point;
     Pack33<Scalar> jacobian;
-    for (int k = 0; k < 3; ++k) {
-      Pack3<Scalar> column;
-      load_points(jets + ((1 + k) * count + point) * 3, valid, column);
-      for (int i = 0; i < 3; ++i) jacobian[i][k] = column[i];
-    }
+    load_jacobians(jets + 3 * count, count, point, valid, jacobian);
     RotationPack<Scalar> polar;
     closest_rotation<Scalar>(jacobian, polar);
     const Pack<Scalar> total = Scalar(0.5) * (polar.sums[0] + polar.sums[1] + polar.sums[2]);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Energies from outside of the library, which join a solve.
+// Energies of callers, which join a solve.
 #pragma once
 
 #include <memory>
@@ -10,11 +10,11 @@
 
 namespace arapfields {
 
-/// A term of the loss of deform or stylize that a caller brings along.
+/// A caller's term of the loss of deform or stylize.
 class ARAPFIELDS_EXPORT ExternalEnergy {
  public:
   virtual ~ExternalEnergy();
-  /// What evaluate() looks at: first or second derivatives.
+  /// The order of the jets that evaluate() needs: first or second.
   virtual JetOrder order() const { return JetOrder::first; }
   /// The value at rest points (n,3) of the unit cube at which the field has these jets, of order(); adds its
   /// derivatives by them to the cotangents, which are zero before. Called on the thread that called the
@@ -29,7 +29,7 @@ using ExternalEnergies = std::vector<std::shared_ptr<ExternalEnergy>>;
 JetOrder highest_order(const ExternalEnergies& energies, JetOrder own);
 
 /// The energies' values times `weight`, one after the other; adds their derivatives times it to cotangents of
-/// the same order as the jets (null data: they are not asked for). Throws InvalidInput that names the energy
+/// the same order as the jets (null data: values alone). Throws InvalidInput that names the energy
 /// for a value that is NaN, and for derivatives that are not finite where the value is.
 template <class Scalar>
 std::vector<double> external_energies(const ExternalEnergies& energies, PointsIn points,

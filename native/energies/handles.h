@@ -9,7 +9,7 @@
 
 namespace arapfields {
 
-/// A part of the surface that is asked to follow a rigid motion, or where it may scale, an affine map.
+/// A part of the surface that follows a rigid motion, or an affine one where it may scale.
 struct ARAPFIELDS_EXPORT Handle {
   enum class Kind {
     cuboid,  ///< the samples inside the box that `rest` makes of [-1,1]³
@@ -23,9 +23,9 @@ struct ARAPFIELDS_EXPORT Handle {
   Vec3 target_point = Vec3::Zero();
   std::vector<Index> samples;  ///< region: sample indices
   double weight = 1.0;         ///< factor of this handle's part of the loss
-  /// How far it moves things, measured through the inside of the shape, in mesh units; 0: everything.
+  /// Distance through the interior of the shape within which it moves the surface, mesh units; 0: everything.
   double reach = 0.0;
-  bool allow_scale = false;  ///< cuboid, region: targets may be larger, smaller, longer, sheared
+  bool allow_scale = false;  ///< cuboid, region: the target may be scaled or sheared
 
   /// The handle of mesh coordinates in the frame's cube.
   Handle in_cube(const Frame& frame) const;

@@ -20,6 +20,17 @@ struct RotationPack {
   Pack3<Scalar> sums;
 };
 
+/// Jacobians of `lanes` points from first derivatives (3, count, 3): column k of point p at (k·count + p)·3.
+template <class Scalar>
+inline void load_jacobians(const Scalar* from, std::int64_t count, std::int64_t point, std::int64_t valid,
+                           Pack33<Scalar>& jacobians) {
+  for (int k = 0; k < 3; ++k) {
+    Pack3<Scalar> column;
+    load_points(from + (k * count + point) * 3, valid, column);
+    for (int i = 0; i < 3; ++i) jacobians[i][k] = column[i];
+  }
+}
+
 /// Unit quaternions q: tr(R(q)ᵀJ) = qᵀNq for a symmetric 4×4 N linear in J, so the closest rotation is N's
 /// top eigenvector, whatever J's rank and determinant. The others are q·(0, v_i), v_i K's eigenvectors, and
 /// the gaps to the top are twice K's eigenvalues (Horn 1987, "Closed-form solution of absolute orientation

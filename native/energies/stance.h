@@ -10,8 +10,8 @@ struct ARAPFIELDS_EXPORT_TO_TESTS Stance {
   Vec3 up = Vec3::UnitZ();
   double scale = 1.0;  ///< one over its squared radius of gyration
   Vector ground;       ///< (n) weights of the samples on the ground, above 0 within 5 % of the height
-  static constexpr double lean_weight = 20.0;  ///< of a turn of the whole about a horizontal axis
-  /// Of a line, which has no turn about itself: added to its inertia, as a share of its size squared.
+  static constexpr double lean_weight = 20.0;  ///< of a rotation of the figure about a horizontal axis
+  /// Added to the inertia, as a share of the size squared: a line has no rotation about itself.
   static constexpr double thinnest = 1e-9;
 
   /// Of samples (n,3). Throws InvalidInput for a zero or non-finite direction.
@@ -21,10 +21,10 @@ struct ARAPFIELDS_EXPORT_TO_TESTS Stance {
 };
 
 /// scale · (mean ‖d − d̄‖² + mean ground ((d − d̂)·up)² + lean_weight · mean ‖a‖² · ‖ω − (ω·up) up‖²) with
-/// d = f(x) − x the ways of samples x (n,3), d̄ their mean, d̂ their mean over the ground, a = x − x̄ and ω the
-/// infinitesimal rotation closest to d: how far a surface moves other than by a translation, how uneven its
-/// ground becomes, and how far the whole leans. Rigidity minds none of these: it turns a leg, or the whole,
-/// for nothing. Adds weight times its cotangents on the value column (data may be null).
+/// d = f(x) − x the displacements of samples x (n,3), d̄ their mean, d̂ their mean over the ground, a = x − x̄
+/// and ω the infinitesimal rotation closest to d: how far a surface moves other than by a translation, how
+/// uneven its ground becomes, and how far the figure leans. Rigidity does not penalise these: rotating a leg,
+/// or the figure, has no energy. Adds weight times its cotangents on the value column (data may be null).
 template <class Scalar>
 ARAPFIELDS_EXPORT_TO_TESTS double stance_energy(JetView<const Scalar> jets, ConstPointsRef<Scalar> rest,
                                                 const Stance& stance, double weight,

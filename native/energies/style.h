@@ -20,7 +20,7 @@ struct Style {
 /// A style at n samples.
 struct StyleAtSamples {
   std::optional<GaussPreference> preference;  ///< none: targets
-  Points targets;                             ///< (n,3) unit normals that an object asks for; or none
+  Points targets;                             ///< (n,3) preferred unit normals of an ObjectStyle; or none
   Vector weights;                             ///< (n) how much each sample is to follow
   double factor = 1.0;                        ///< of the style's weight
 

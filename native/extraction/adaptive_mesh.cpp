@@ -11,8 +11,6 @@
 namespace arapfields {
 namespace {
 
-constexpr double clearance = 1e-6;  // of vertices from grid points, in edges, as in marching_cubes
-
 /// An edge of the fine grid, or `length` of them in a row: one of the coarse grid.
 struct Edge {
   Place low;
@@ -28,6 +26,21 @@ Place moved(Place place, int axis, int by) {
 /// What the surface does on the faces of a cell: for each edge on which it enters a face's inside, going
 /// around the face counter-clockwise, the edge at which it came in.
 using Curves = std::map<Edge, Edge>;
+
+/// The closed loops that curves form.
+std::vector<std::vector<Edge>> loops_of(Curves curves) {
+  std::vector<std::vector<Edge>> loops;
+  while (!curves.empty()) {
+    std::vector<Edge>& loop = loops.emplace_back();
+    for (auto at = curves.begin(); at != curves.end();) {
+      loop.push_back(at->first);
+      const Edge next = at->second;
+      curves.erase(at);
+      at = curves.find(next);
+    }
+  }
+  return loops;
+}
 
 class Mesher {
  public:
@@ -68,14 +81,14 @@ class Mesher {
     if (inserted) {
       const Place high = moved(edge.low, edge.axis, edge.length);
       const double a = std::abs(grid_.value(edge.low)), b = std::abs(grid_.value(high));
-      const double t = std::clamp(a + b > 0.0 ? a / (a + b) : 0.5, clearance, 1.0 - clearance);
+      const double t = std::clamp(a + b > 0.0 ? a / (a + b) : 0.5, Cell::clearance, 1.0 - Cell::clearance);
       const Vec3 from = grid_.position(edge.low);
       vertices_.push_back(from + t * (grid_.position(high) - from));
     }
     return entry->second;
   }
 
-  /// A whole cell, coarse (step = factor) or fine (1), by the table.
+  /// An uncut cell, coarse (step = factor) or fine (1), by the table.
   void add_cell(const Place& from, int step) {
     const Cell cell([&](int i, int j, int k) {
       return grid_.value({from[0] + step * i, from[1] + step * j, from[2] + step * k});
@@ -95,7 +108,11 @@ class Mesher {
         }
         if (own < 0) {
           own = static_cast<int>(vertices_.size());
-          vertices_.push_back(centre_of(cell, from, step));
+          vertices_.push_back(cell.centre([&](int corner) {
+            return grid_.position({from[0] + step * CellTable::corner_at(corner, 0),
+                                   from[1] + step * CellTable::corner_at(corner, 1),
+                                   from[2] + step * CellTable::corner_at(corner, 2)});
+          }));
         }
         triangle[c] = own;
       }
@@ -105,14 +122,9 @@ class Mesher {
 
   /// A coarse cell beside fine ones: each loop is filled.
   void add_loops(Curves curves) {
-    while (!curves.empty()) {
+    for (const std::vector<Edge>& edges : loops_of(std::move(curves))) {
       std::vector<int> loop;
-      for (auto at = curves.begin(); at != curves.end();) {
-        loop.push_back(vertex(at->first));
-        const Edge next = at->second;
-        curves.erase(at);
-        at = curves.find(next);
-      }
+      for (const Edge& edge : edges) loop.push_back(vertex(edge));
       const std::size_t n = loop.size();
       if (n == 3) {
         triangles_.push_back({loop[2], loop[1], loop[0]});
@@ -200,39 +212,12 @@ class Mesher {
     return result;
   }
 
-  Vec3 centre_of(const Cell& cell, const Place& from, int step) const {
-    double largest = 0.0, sum = 0.0;
-    for (const float value : cell.corner) largest = std::max<double>(largest, std::abs(value));
-    Vec3 mean = Vec3::Zero();
-    for (int c = 0; c < 8; ++c) {
-      const double weight = 1.0 / std::max<double>(std::abs(cell.corner[c]), clearance * largest);
-      mean += weight * grid_.position({from[0] + step * CellTable::corner_at(c, 0),
-                                       from[1] + step * CellTable::corner_at(c, 1),
-                                       from[2] + step * CellTable::corner_at(c, 2)});
-      sum += weight;
-    }
-    return mean / sum;
-  }
-
   const FineGrid& grid_;
   int factor_;
   std::map<Edge, int> numbers_;
   std::vector<Vec3> vertices_;
   std::vector<std::array<int, 3>> triangles_;
 };
-
-std::size_t loop_count(Curves curves) {
-  std::size_t count = 0;
-  while (!curves.empty()) {
-    ++count;
-    for (auto at = curves.begin(); at != curves.end();) {
-      const Edge next = at->second;
-      curves.erase(at);
-      at = curves.find(next);
-    }
-  }
-  return count;
-}
 
 }  // namespace
 
@@ -241,8 +226,8 @@ std::set<Place> cells_to_cut(const FineGrid& grid) {
   const int last = grid.coarse().resolution() - 2;
   std::set<Place> blocked_cells, result;
   for (const Place& cell : mesher.cells_beside()) {
-    const std::size_t loops = loop_count(mesher.curves(cell, true, &blocked_cells));
-    if (loops != loop_count(mesher.curves(cell, false, nullptr))) blocked_cells.insert(cell);
+    const std::size_t loops = loops_of(mesher.curves(cell, true, &blocked_cells)).size();
+    if (loops != loops_of(mesher.curves(cell, false, nullptr)).size()) blocked_cells.insert(cell);
   }
   for (const Place& cell : blocked_cells) {
     const auto [low, high] = std::minmax({cell[0], cell[1], cell[2]});

@@ -91,8 +91,8 @@ void triangulate(const Loop& loop, Triples& out) {
           apex[i][j] = k;
         }
       }
-      const bool whole = width == size - 1;
-      cost[i][j] = best + (!whole && share_face(at(i), at(j)) ? 1 : 0);
+      const bool is_side = width == size - 1;  // of the polygon
+      cost[i][j] = best + (!is_side && share_face(at(i), at(j)) ? 1 : 0);
     }
   if (size >= shortest_fan || cost[0][size - 1] > 0) {
     for (int i = 0; i < size; ++i) out.push_back({at((i + 1) % size), at(i), CellTable::centre});

@@ -6,9 +6,9 @@
 
 namespace arapfields {
 
-/// What a call of extract_deformed did.
+/// Evaluations, inverses and topology of a call of extract_deformed.
 struct DeformedReport : ExtractionReport {
-  Index inverted = 0;    ///< points at which f⁻¹ was asked for
+  Index inverted = 0;    ///< points at which f⁻¹ was evaluated
   Index failures = 0;    ///< of these, points where none was found beside the surface
   double spacing = 0.0;  ///< of the grid, in mesh coordinates
 };

@@ -16,7 +16,7 @@ constexpr int smallest_with_model = 32;  // below, the model would cost more tha
 constexpr int grid_steps_a_cell = 4;
 constexpr int grid_steps_a_sure_cell = 2;  // where Φ's own bound on |∇Φ| makes interpolation needless
 constexpr int fewest_coarse_cells = 8;     // a side
-constexpr int finest_resolution = 512;     // that can be asked for …
+constexpr int finest_resolution = 512;     // allowed …
 constexpr int finest_refined = 2048;       // … and to which thin parts are refined
 constexpr Index points_a_thin_cell = 24;   // about, that cutting its edges in three takes
 
@@ -38,9 +38,9 @@ bool drop_jumps(EvaluationCounter& function, double most, TriangleMesh& mesh) {
   std::vector<std::int32_t> number(mesh.vertices.rows(), -1);
   std::vector<Index> kept, used;
   for (Index t = 0; t < mesh.triangles.rows(); ++t) {
-    bool whole = true;
-    for (int c = 0; c < 3; ++c) whole = whole && std::abs(values[mesh.triangles(t, c)]) <= most;
-    if (!whole) continue;
+    bool on_surface = true;
+    for (int c = 0; c < 3; ++c) on_surface = on_surface && std::abs(values[mesh.triangles(t, c)]) <= most;
+    if (!on_surface) continue;
     kept.push_back(t);
     for (int c = 0; c < 3; ++c) {
       std::int32_t& own = number[mesh.triangles(t, c)];

@@ -12,7 +12,7 @@
 
 namespace arapfields {
 
-/// What a call of extract_surface did.
+/// Evaluations and topology of a call of extract_surface.
 struct ExtractionReport {
   Index evaluations = 0;        ///< points at which Φ was evaluated, those with gradients included
   Index dense_evaluations = 0;  ///< points of the grid

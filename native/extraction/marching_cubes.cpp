@@ -17,10 +17,6 @@ namespace {
 
 using Window = SparseGrid::Window;
 constexpr int side = SparseGrid::side;
-// Vertices stay so far from the grid points, in steps: where Φ is exactly zero on one, several edges meet in
-// it and the triangles between them would vanish.
-constexpr double clearance = 1e-6;
-
 /// Where a block's vertices are in the mesh. Slots are 3·local + axis for the edge from a point along an
 /// axis.
 struct Numbers {
@@ -96,7 +92,7 @@ class Tile {
         const int next[3] = {i + (axis == 0), j + (axis == 1), k + (axis == 2)};
         const double low = std::abs(window_.value[Window::at(i, j, k)]);
         const double high = std::abs(window_.value[Window::at(next[0], next[1], next[2])]);
-        const double t = std::clamp(low / (low + high), clearance, 1.0 - clearance);
+        const double t = std::clamp(low / (low + high), Cell::clearance, 1.0 - Cell::clearance);
         const int local[3] = {i, j, k};
         for (int a = 0; a < 3; ++a) {
           const int index = block_.place[a] * side + local[a];
@@ -117,7 +113,13 @@ class Tile {
       Index own_vertex = -1;
       if (centre < own_.centres.size() && own_.centres[centre] == SparseGrid::local(i, j, k)) {
         own_vertex = own_.first + own_.edges + static_cast<Index>(centre++);
-        vertices.row(own_vertex) = centre_of(cell, i, j, k);
+        vertices.row(own_vertex) = cell.centre([&](int c) {
+          const int at[3] = {i, j, k};
+          Vec3 position;
+          for (int a = 0; a < 3; ++a)
+            position[a] = grid_.coordinate(block_.place[a] * side + at[a] + CellTable::corner_at(c, a));
+          return position;
+        });
       }
       for (const auto& t : list) {
         std::array<std::int32_t, 3> triangle;
@@ -130,19 +132,6 @@ class Tile {
   }
 
  private:
-  Vec3 centre_of(const Cell& cell, int i, int j, int k) const {
-    double largest = 0.0, sum = 0.0;
-    for (const float value : cell.corner) largest = std::max<double>(largest, std::abs(value));
-    Vec3 mean = Vec3::Zero();
-    for (int c = 0; c < 8; ++c) {
-      const double weight = 1.0 / std::max<double>(std::abs(cell.corner[c]), clearance * largest);
-      const int at[3] = {i, j, k};
-      for (int a = 0; a < 3; ++a)
-        mean[a] += weight * grid_.coordinate(block_.place[a] * side + at[a] + CellTable::corner_at(c, a));
-      sum += weight;
-    }
-    return mean / sum;
-  }
   Index vertex(int i, int j, int k, int edge) const {
     const int corner = CellTable::edge_corner(edge);
     const int x = i + CellTable::corner_at(corner, 0), y = j + CellTable::corner_at(corner, 1),

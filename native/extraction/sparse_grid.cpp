@@ -220,8 +220,8 @@ void SparseGrid::collect_evaluations(std::int32_t index, Round round, Evaluation
   Window window;
   load(block, window);
   const double slope = model_ == nullptr ? far : model_->lipschitz();
-  // Without p nothing else tells how deep a settled point lies, and thin parts are told by whether it is a
-  // step.
+  // Thin parts are detected by points deeper than a step. Without p, nothing else bounds the depth of a
+  // settled point.
   const double slack = no_surrogate_ ? spacing_ : 0.0;
   for (int i = 0; i < side; ++i)
     for (int j = 0; j < side; ++j)

@@ -8,15 +8,15 @@
 
 namespace arapfields {
 
-/// One of the maps that a ComposedField takes points through, and how often in turn.
+/// One of the maps of a ComposedField, and how many times it is applied.
 struct FieldStep {
   std::shared_ptr<const RadialField> map;
   int repeats = 1;
 };
 
-/// Maps of the cube's space taken one after the other, as the flow of a velocity field is: each moves
-/// neighbours by less than they are apart, so that each can be undone, and so can the whole. Jets by the
-/// chain rule. The maps' own frames are not looked at.
+/// A composition of maps of the cube's space, as the flow of a velocity field is. Each map moves neighbours
+/// by less than their distance, so that each is invertible, and so is the composition. Jets by the chain
+/// rule. The maps' own frames are ignored.
 class ARAPFIELDS_EXPORT ComposedField final : public DeformationField {
  public:
   /// Throws InvalidInput for a step without a map and for repeats below 1.

@@ -23,7 +23,7 @@ class ARAPFIELDS_EXPORT DeformationField {
   /// them there; those of others come by evaluate().
   virtual Tensor jets(const Tensor& points, JetOrder order) const;
 
-  /// Where points (n,3) of mesh coordinates go, in mesh coordinates.
+  /// Deformed positions of points (n,3), all in mesh coordinates.
   virtual Points at(PointsIn mesh_points) const {
     Points values(mesh_points.rows(), 3);
     evaluate(frame_.to_cube(mesh_points), {values.data(), values.rows(), JetOrder::value});
@@ -32,7 +32,7 @@ class ARAPFIELDS_EXPORT DeformationField {
 
   /// Whether preimages() knows f⁻¹ in closed form.
   virtual bool has_preimages() const { return false; }
-  /// f⁻¹ at points (n,3), all in cube coordinates; asked of fields alone that know it.
+  /// f⁻¹ at points (n,3), all in cube coordinates; only where has_preimages().
   virtual Points preimages(PointsIn points) const { return Points(points.rows(), 3); }
 
   const Frame& frame() const { return frame_; }

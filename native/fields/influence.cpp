@@ -11,7 +11,7 @@
 namespace arapfields {
 namespace {
 
-/// Share of the reach within which nothing is held back.
+/// Share of the reach within which m is 1.
 constexpr double core = 0.5;
 
 /// 1 near q = 0 and 0 from q = 1, by the squared distance q in reaches, whose jet is given.
@@ -47,7 +47,7 @@ Influence::Influence(Points places, Vector reaches, std::shared_ptr<const Interi
 
 template <class Consume>
 void Influence::for_each_point(PointsIn points, JetOrder order, Consume&& consume) const {
-  // Ways through the inside are no shorter than straight ones: most points are none of anybody's.
+  // Interior distances are at least straight ones: most points are beyond every reach.
   std::vector<std::int32_t> near(points.rows());
   parallel_for(0, points.rows(), 1024, [&](Index first, Index last) {
     for (Index p = first; p < last; ++p)

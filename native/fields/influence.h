@@ -8,9 +8,9 @@
 
 namespace arapfields {
 
-/// How far motion reaches: m(x) is 1 about some places, 0 farther from all of them than their reach, and
-/// three times continuously differentiable between. Distances are those of ways through the shape's inside,
-/// where an embedding knows them. f becomes x + m(x) (f(x) − x).
+/// The influence m(x) of handles with a reach: 1 near their places, 0 beyond the reach of all of them, three
+/// times continuously differentiable between. Distances are measured through the shape's interior where there
+/// is an embedding. f becomes x + m(x) (f(x) − x).
 class Influence {
  public:
   /// Places (k,3) with their reaches (k, positive), in the cube. Throws InvalidInput for other numbers.

@@ -8,10 +8,10 @@
 
 namespace arapfields {
 
-/// Samples of a surface, joined where a path inside the shape joins them. Each node has the largest ball
-/// that touches the surface there from inside and holds no other node; two nodes are joined where one's ball
-/// nearly holds the other's center, or where they are neighbours on one sheet. Parts that nothing joins are
-/// joined by the shortest straight lines there are.
+/// A graph on samples of a surface, with edges where a path inside the shape joins them. Each node has the
+/// largest ball that touches the surface there from inside and holds no other node; two nodes are joined
+/// where one's ball nearly holds the other's center, or where they are neighbours on one sheet. Parts that
+/// nothing joins are joined by the shortest straight lines there are.
 class InteriorGraph {
  public:
   struct Edge {

@@ -8,9 +8,9 @@
 
 namespace arapfields {
 
-/// Three smooth functions ψ on R³ that tell parts apart which are near in space but not inside the shape:
-/// |x − y|² + |ψ(x) − ψ(y)|² is about the squared length of the way from x to y through the interior. ψ is
-/// known with its slope at nodes of the surface and blended between them, with Gaussian weights as wide as
+/// Three smooth functions ψ on R³ that separate parts which are near in space but far apart inside the shape:
+/// |x − y|² + |ψ(x) − ψ(y)|² is about the squared interior distance from x to y. ψ is given with its slope at
+/// nodes of the surface and blended between them, with Gaussian weights as wide as
 /// the nodes are apart and a sum of one (Franke and Little's modification of Shepard's method).
 struct ARAPFIELDS_EXPORT InteriorEmbedding {
   Points nodes;              ///< (n,3)
@@ -22,11 +22,11 @@ struct ARAPFIELDS_EXPORT InteriorEmbedding {
   void evaluate(PointsIn points, JetView<double> out) const;
 };
 
-/// ψ of a surface from samples (n,3) of it and their outward normals: the embedding that best explains by how
-/// much ways through the interior exceed straight lines (classical scaling with landmarks: de Silva and
-/// Tenenbaum). Null where they hardly do, and for less than a hundred different samples.
-/// With an axis (0, 1, 2), samples lie where that coordinate is positive, stand for their reflections too,
-/// and ψ is symmetric: the lengths of ways from x to y and from S x to S y are the same.
+/// ψ of a surface from samples (n,3) and their outward normals: the embedding that best explains by how much
+/// interior distances exceed straight ones (landmark multidimensional scaling: de Silva, Tenenbaum 2004).
+/// Null where they hardly do, and for less than a hundred different samples. With an axis (0, 1, 2), samples
+/// lie where that coordinate is positive, stand for their reflections too, and ψ is symmetric: the interior
+/// distances from x to y and from S x to S y are the same.
 ARAPFIELDS_EXPORT std::shared_ptr<const InteriorEmbedding> interior_embedding(PointsIn samples,
                                                                               PointsIn normals,
                                                                               int axis = -1);

@@ -9,20 +9,20 @@
 
 namespace arapfields {
 
-/// Points at which fields of one basis are evaluated again and again. Cheap where consecutive points are
-/// close (morton_order): blocks of 16 keep lists of the centers they feel. Float has half double's cost and
-/// errors of some 1e-6 of the jets.
+/// Evaluates fields of one basis at fixed points, many times. Efficient where consecutive points are close
+/// (morton_order): each block of 16 keeps the list of centers whose support meets it. Float has half double's
+/// cost and errors of some 1e-6 of the jets.
 template <class Scalar>
 class RadialEvaluator {
  public:
   RadialEvaluator() = default;
-  /// `most`: the highest order that will be asked for.
+  /// `most`: the highest order that will be evaluated.
   RadialEvaluator(const RadialBasis& basis, PointsIn points, JetOrder most = JetOrder::second);
   Index size() const { return count_; }
 
   /// Jets of the field with these coefficients (size, 3): overwrites `out` (count = size(), any order).
   void evaluate(const RowMatrix<double>& coefficients, JetView<Scalar> out) const;
-  /// Adds to `gradient` (size, 3) what cotangents of such jets are worth.
+  /// Adds the pull-back of cotangents of such jets to `gradient` (size, 3).
   void pull_back(JetView<const Scalar> cotangents, RowMatrix<double>& gradient) const;
 
   /// Calls body(b, block) for the blocks of 16 points, in parallel.
@@ -43,7 +43,8 @@ class RadialEvaluator {
   std::vector<Scalar> centers_;    // (m, center_stride)
   std::vector<Scalar> embedding_;  // (blocks, embedding_rows_, 16); empty without an embedding
   JetOrder most_ = JetOrder::second;
-  std::vector<std::int32_t> active_;  // centers felt by block b: active_[start_[b]] … active_[start_[b+1]−1]
+  std::vector<std::int32_t>
+      active_;  // centers that affect block b: active_[start_[b]] … active_[start_[b+1]−1]
   std::vector<Index> start_;
 };
 

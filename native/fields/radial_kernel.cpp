@@ -8,7 +8,7 @@ namespace {
 
 constexpr int block_size = 16;
 
-/// φ(s) = (1 − s/κ)₊^κ and, where asked for, twice φ' and four times φ'' by |x|² (g = 1/r²).
+/// φ(s) = (1 − s/κ)₊^κ and, from order 1 and 2, twice φ' and four times φ'' by |x|² (g = 1/r²).
 template <class Scalar>
 struct Bump {
   Pack<Scalar> value, slope, curvature;

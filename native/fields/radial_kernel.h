@@ -14,10 +14,10 @@ constexpr int radial_power = 6;
 /// Numbers of a bump: center, 1/r², embedded center, 0.
 constexpr int center_stride = 8;
 /// Rows of 16 numbers that a block's embedding has: ψ, its first derivatives, its second ones, and the
-/// products ∂_i ψ · ∂_j ψ, in the order of jets; fewer where the order of jets asks for less.
+/// products ∂_i ψ · ∂_j ψ, in the order of jets; fewer for jets of lower order.
 constexpr int embedding_rows(int columns) { return columns == 10 ? 36 : 3 * columns; }
 
-/// One block of 16 points and the centers it feels. Coefficients are rows of 3.
+/// One block of 16 points and the centers whose support meets it. Coefficients are rows of 3.
 template <class Scalar>
 struct RadialBlock {
   const Scalar* points;     // (3, 16)

@@ -24,7 +24,7 @@ class ArchiveWriter {
  public:
   void add(const std::string& name, const std::vector<Index>& shape, const double* data);
   void add(const std::string& name, const std::vector<Index>& shape, const float* data);
-  /// Writes the file whole or not at all. Throws FileError, InvalidInput as OutputFile does.
+  /// Writes the file in whole or not at all. Throws FileError, InvalidInput as OutputFile does.
   void save(const std::string& path, const std::map<std::string, std::string>& texts) const;
 
  private:
@@ -38,8 +38,8 @@ class ArchiveWriter {
   std::vector<Entry> entries_;
 };
 
-/// The same, read by someone who trusts nothing: all sizes are checked against the file's before anything is
-/// allocated. Every error but the system's own is an InvalidInput.
+/// The same, read without trust: all sizes are checked against the file's before anything is allocated. Every
+/// error but the system's own is an InvalidInput.
 class ArchiveReader {
  public:
   /// Reads the header. InvalidInput where it is none, or arrays overlap, leave gaps or reach beyond the file,
@@ -53,7 +53,7 @@ class ArchiveReader {
   Vector doubles(const std::string& name, const std::vector<Index>& shape);
   VectorF floats(const std::string& name, const std::vector<Index>& shape);
   Points points(const std::string& name, Index count);
-  /// InvalidInput for an array or a text that nothing has asked for.
+  /// InvalidInput for an array or a text that was not read.
   void require_all_used() const;
 
  private:

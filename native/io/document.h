@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What files of every kind say of themselves: format, version, kind, structure and report, as texts.
+// The metadata that files of every kind share: format, version, kind, structure and report, as texts.
 #pragma once
 
 #include <functional>
@@ -16,12 +16,12 @@ namespace arapfields {
 /// callers keep a reader for each number before.
 inline constexpr int file_version = 2;  // 2: with a checksum
 
-/// Writes arrays and what is said of them.
+/// Writes arrays with their metadata.
 void save_document(const std::string& path, const std::string& kind, const Json& structure,
                    const std::string& report, const ArchiveWriter& arrays);
 
-/// Opens a file of this kind, hands its arrays, version and structure to `read`, and sees that nothing in it
-/// was left unread. InvalidInput of whatever is wrong begins with the path.
+/// Opens a file of this kind, passes its arrays, version and structure to `read`, and checks that all of it
+/// was read. Every InvalidInput begins with the path.
 void load_document(const std::string& path, const std::string& kind, std::string* report,
                    const std::function<void(ArchiveReader&, int version, const Json&)>& read);
 

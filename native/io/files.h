@@ -13,8 +13,8 @@
 
 namespace arapfields {
 
-/// Writes a field of a kind that has a format (neural and radial ones) with a report, the JSON text of an
-/// object: what a solve measured, for whoever reads the file. Throws InvalidInput for other kinds and
+/// Writes a field of a kind that has a format (neural and radial ones) with a report, a JSON object:
+/// the measurements of its solve. Throws InvalidInput for other kinds and
 /// reports, FileError where the system refuses, and then nothing has changed.
 ARAPFIELDS_EXPORT void save_field(const std::string& path, const DeformationField& field,
                                   const std::string& report = "{}");

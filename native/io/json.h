@@ -11,8 +11,8 @@ namespace arapfields {
 
 using Json = nlohmann::json;
 
-/// JSON of a file that nobody vouches for. Throws InvalidInput naming `what` for a text that is none, objects
-/// with two members of one name, and nesting deeper than 32.
+/// Parses JSON of an untrusted file. Throws InvalidInput naming `what` for invalid JSON, objects with two
+/// members of one name, and nesting deeper than 32.
 Json parse_json(const std::string& text, const std::string& what);
 
 /// One object of such JSON. Throws InvalidInput naming the member for what is missing, of another type, out

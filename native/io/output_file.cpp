@@ -54,7 +54,7 @@ void remove_temporary(const fs::path& folder) noexcept {
   fs::remove_all(folder, ignored);
 }
 
-/// Removes what processes that live no more have left of this output.
+/// Removes what dead processes left of this output.
 void remove_stale(const fs::path& target) {
   std::error_code ignored;
   const fs::path prefix = temporary_prefix(target), last(ending);
@@ -118,7 +118,7 @@ void OutputFile::open_folder(const fs::path& target) {
     }
     folder_ = text_of(folder);
     lock_ = system_file::lock_folder(folder);
-    // Either who sweeps has taken it at once, or the file system has no locks, and then nobody sweeps.
+    // Either another process swept the folder at once, or the file system has no locks and nothing is swept.
     if (lock_ < 0 && errno != EWOULDBLOCK && errno != ENOENT) lock_ = system_file::hold_folder(folder);
     if (lock_ < 0 && tries >= most_tries) throw FileError(path_, EBUSY);
   }
@@ -162,7 +162,7 @@ void OutputFile::finish() {
 
 void OutputFile::commit() {
   if (!finished_) finish();
-  close_written();  // Windows moves no file that somebody has open
+  close_written();  // Windows cannot rename an open file
   const fs::path target = path_of(target_);
   if (!system_file::replace(path_of(partial_), target)) throw FileError(path_, errno);
   system_file::folder_to_disk(target.parent_path());

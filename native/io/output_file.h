@@ -9,16 +9,16 @@
 
 namespace arapfields {
 
-/// A regular file that takes its place whole or not at all. It is written under its own name in a temporary
-/// folder ".NAME.xxxxxxxx.tmp" beside its place (by write(), or by another library's exporter at partial()),
-/// then brought to the disk, looked at, and renamed. Symbolic links are followed: what they point to is
-/// replaced. Permissions of a file that was there stay (on Windows they are the folder's). Names are UTF-8 on
-/// Windows, elsewhere the system's bytes. What a killed process left is removed by the next
-/// output of the same name: a lock on the folder tells whether its maker still lives.
+/// A regular file that replaces its target in whole or not at all. It is written under its own name in a
+/// temporary folder ".NAME.xxxxxxxx.tmp" beside the target (by write(), or by another library's exporter at
+/// partial()), then flushed to the disk, verified and renamed. Symbolic links are followed. An existing
+/// file's permissions are kept (on Windows they are the folder's). Names are UTF-8 on Windows, elsewhere
+/// bytes. The next output of the same name removes what a killed process left; a lock on the folder shows
+/// that its process runs.
 class ARAPFIELDS_EXPORT OutputFile {
  public:
-  /// Throws InvalidInput for a place that holds something else than a regular file (a folder, a pipe, a
-  /// device) and for a name that is none, FileError where the system refuses.
+  /// Throws InvalidInput for an invalid name and for a path that is not a regular file (a pipe, a device),
+  /// FileError where the system refuses.
   explicit OutputFile(const std::string& path);
   /// Removes what has not been committed.
   ~OutputFile();
@@ -26,7 +26,7 @@ class ARAPFIELDS_EXPORT OutputFile {
   OutputFile& operator=(const OutputFile&) = delete;
 
   const std::string& path() const { return path_; }
-  /// Where the content is to be written: a file of the same name in the temporary folder.
+  /// The path to write to: a file of the same name in the temporary folder.
   const std::string& partial() const { return partial_; }
   /// The same beside the temporary folder, for content that holds paths relative to its own folder. Where
   /// this file exists, it is the one that is committed.
@@ -34,8 +34,8 @@ class ARAPFIELDS_EXPORT OutputFile {
 
   /// Appends to partial(). Throws FileError that names path().
   void write(const void* data, std::size_t bytes);
-  /// Brings the content to the disk and looks at it. Throws FileError, and InvalidInput where nothing, less
-  /// than was written, or no regular file arrived.
+  /// Flushes the content to the disk and verifies it. Throws FileError, and InvalidInput where the file is
+  /// missing, shorter than what was written, or not regular.
   void finish();
   /// finish(), if that has not been done, and renames.
   void commit();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What POSIX systems and Windows call differently about files. Descriptors are the C library's; where the
-// system refuses, the answer is −1 or false, and errno says why.
+// File operations that differ between POSIX systems and Windows. Descriptors are the C library's. Where the
+// system refuses, they return −1 or false, and errno is set.
 #pragma once
 
 #include <cstddef>
@@ -11,9 +11,9 @@ namespace arapfields::system_file {
 
 /// For reading; never waits for the other end of a pipe. A folder is refused by EISDIR.
 int open_to_read(const std::filesystem::path& path);
-/// A new file, which nobody had before.
+/// A new file; fails where one exists.
 int create(const std::filesystem::path& path);
-/// What has been written there, to be looked at and brought to the disk; no link is followed.
+/// A file just written, to verify and flush; follows no link.
 int open_written(const std::filesystem::path& path);
 void close_file(int file) noexcept;
 
@@ -29,7 +29,7 @@ bool take_permissions(int file, const std::filesystem::path& path);
 bool may_write(const std::filesystem::path& path);
 /// In one step, in place of what may be there.
 bool replace(const std::filesystem::path& from, const std::filesystem::path& to);
-/// For us alone where the system knows such folders; EEXIST where there is something of the name.
+/// Private to the user where the system supports it; EEXIST where the name is taken.
 bool make_folder(const std::filesystem::path& folder);
 /// A lock on a folder that ends with the process: to be closed. EWOULDBLOCK where another holds it, or the
 /// folder is gone or someone else's.

@@ -39,8 +39,8 @@ ARAPFIELDS_EXPORT Frame area_frame(PointsIn vertices, TrianglesIn triangles);
 /// functions that are known in the cube alone.
 ARAPFIELDS_EXPORT Frame mesh_frame(PointsIn vertices, TrianglesIn triangles);
 
-/// How stiff a mesh is about its vertices (n each; empty: all 1; ≥ 0): factors of the samples' energies, and
-/// of the bending in them. Between vertices they are linear.
+/// Stiffness at a mesh's vertices (n each, ≥ 0; empty: all 1): factors of the samples' energies, and of their
+/// bending. Between vertices they are interpolated linearly.
 struct VertexWeights {
   Vector weights = {}, bend_weights = {};
 };
@@ -51,9 +51,9 @@ struct VertexWeights {
 ARAPFIELDS_EXPORT SurfaceSamples sample_mesh(PointsIn vertices, TrianglesIn triangles, Index count,
                                              std::uint64_t seed, const VertexWeights& painted = {});
 
-/// The same of several meshes that are to deform as one: a body first, whose frame the samples have, then
-/// what is to resist with it. Each gets as many samples as its share of the area asks. `painted` has an entry
-/// for each mesh, or none. Throws InvalidInput that names the mesh.
+/// The same for several meshes that deform as one. The first is the body, whose frame the samples have. Each
+/// mesh gets samples in proportion to its area. `painted` has an entry for each mesh, or none. Throws
+/// InvalidInput that names the mesh.
 ARAPFIELDS_EXPORT SurfaceSamples sample_meshes(const std::vector<TriangleMesh>& meshes, Index count,
                                                std::uint64_t seed,
                                                const std::vector<VertexWeights>& painted = {});

@@ -16,7 +16,7 @@ struct CouplingShape : NetworkOptions {
 
   int fan_in(int layer) const { return layer == 0 ? 4 * octaves : width; }
   int fan_out(int layer) const { return layer == layers ? 2 : width; }
-  /// Numbers of one coupling layer's network, and of the whole.
+  /// Parameter counts of one coupling layer's network, and of all layers.
   Index network_size() const {
     Index size = 0;
     for (int l = 0; l <= layers; ++l) size += static_cast<Index>(fan_out(l)) * (fan_in(l) + 1);

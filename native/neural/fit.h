@@ -37,7 +37,7 @@ class ARAPFIELDS_EXPORT FitDiverged : public Diverged {
 };
 
 /// Fits a network to the signed distance of a triangle soup (vertices (n,3), triangles (m,3)), in the frame
-/// that centres it and scales it to half-extent 0.75. An observer is told of one term, error. Throws
+/// that centres it and scales it to half-extent 0.75. An observer receives one term, error. Throws
 /// InvalidInput, FitDiverged, Cancelled.
 ARAPFIELDS_EXPORT FitResult fit_sdf(PointsIn vertices, TrianglesIn triangles, const FitOptions& options = {},
                                     const Progress& progress = {}, const IterationObserver& observer = {});

@@ -27,7 +27,7 @@ struct ActivationBlock {
 template <class Scalar>
 struct EncodingBlock {
   const Scalar* points = nullptr;  ///< (points, 3)
-  Scalar* value = nullptr;  ///< (points, 6·octaves); derivatives follow in the same shape, if asked for
+  Scalar* value = nullptr;         ///< (points, 6·octaves); derivatives have the same shape, or are null
   Scalar* first = nullptr;
   Scalar* second = nullptr;
   double frequency = 0.0;

@@ -20,7 +20,7 @@ class Tensor;
 /// device. Work is split over threads by points; same seed, same thread count: same result, bit for bit.
 class Mlp {
  public:
-  /// Weights and biases uniform in ±1/√fan-in; the output layer zero where `zero_last_layer` asks for it.
+  /// Weights and biases uniform in ±1/√fan-in; the output layer zero with `zero_last_layer`.
   /// `device` is "cpu" or "cuda" (or "cuda:1", …). Throws InvalidInput for a shape out of range.
   Mlp(const MlpShape& shape, std::uint64_t seed, bool zero_last_layer, bool double_precision = false,
       const std::string& device = "cpu");
@@ -43,7 +43,7 @@ class Mlp {
   /// computes. Of no effect in double precision.
   void round_products(bool rounded);
 
-  /// Frees what forward() keeps; the next call allocates anew.
+  /// Frees what forward() keeps; the next call allocates again.
   void release_buffers();
 
   /// Jets at the points, nothing kept, in chunks: memory beyond the result does not grow with n.

@@ -73,7 +73,7 @@ std::vector<Block> split_points(Index n, JetOrder order, bool in_cache);
 /// Threads that sweeps of so many blocks of tensors like `like` are split over.
 int sweep_threads(const Tensor& like, std::size_t blocks);
 
-/// Gives a block its memory; for every layer where `keep` asks for the activations. With one column the
+/// Gives a block its memory; for every layer whose activations `keep` selects. With one column the
 /// encoding always has its first derivatives, for sweep_to_points().
 void allocate(const MlpShape& shape, const Tensor& like, bool keep, Block& block);
 /// Lends the memory of a block of at least as many points and the same order.

@@ -33,7 +33,7 @@ NumberJet<Scalar> chain(const PlaneJet<Scalar>& g, const NumberJet<Scalar>& u, c
 }
 
 /// Adds what the cotangents of g(u, v) ask to those of the derivatives of u and v, and returns what they ask
-/// of g's jet. What g's jet asks of the values of u and v is left to whoever knows g.
+/// of g's jet. The derivatives of g's jet at the values of u and v are the caller's.
 template <class Scalar>
 PlaneJet<Scalar> chain_back(const PlaneJet<Scalar>& g, const NumberJet<Scalar>& u, const NumberJet<Scalar>& v,
                             const NumberJet<Scalar>& given, NumberJet<Scalar>& back_u,

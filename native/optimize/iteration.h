@@ -13,7 +13,7 @@ struct LossTerm {
   double value = 0.0;
 };
 
-/// What an observer is told after each iteration.
+/// The argument of an observer, after each iteration.
 struct Iteration {
   int number = 0;               ///< iterations done, from 1
   double loss = 0.0;            ///< the estimate that this iteration lowered

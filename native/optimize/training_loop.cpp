@@ -115,7 +115,7 @@ class Run {
     return true;
   }
 
-  /// Tells the observer, and returns whether it wants to go on.
+  /// Calls the observer; returns whether the loop continues.
   bool observed(int iteration) {
     read_losses();
     return options_.observer({iteration + 1, last_, body_.terms(), watch_.seconds()});

@@ -35,7 +35,7 @@ struct LoopOptions {
   IterationObserver observer;  ///< none: nothing is read for it
 };
 
-/// A loss of parameters, estimated anew at each iteration on a random subset.
+/// A loss of parameters, estimated at each iteration on a new random subset.
 class LoopBody {
  public:
   virtual ~LoopBody() = default;

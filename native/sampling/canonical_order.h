@@ -8,9 +8,9 @@
 
 namespace arapfields {
 
-/// The points' numbers in the order of a Z-curve along their own principal axes, so that neighbours in the
-/// list are neighbours in space: the same order however the points are turned, moved, scaled or mirrored, and
-/// nearly the same where few more of them lie far away.
+/// Indices of the points along a Z-order curve in their principal axes, so that neighbours in the list are
+/// neighbours in space. The order does not change when the points are rotated, moved, scaled or mirrored, and
+/// hardly changes when a few outliers are added.
 std::vector<std::uint32_t> canonical_order(PointsIn points);
 
 /// `count` of the list's entries in equal steps (all of them where it has no more).

@@ -19,7 +19,7 @@ struct RootSearch {
   Index bracket = 0;
   int low_sign = 0;              // of Φ at low
   double low = 0.0, high = 0.0;  // around the zero
-  double t = 0.0;                // where Φ is asked next …
+  double t = 0.0;                // where Φ is evaluated next …
   double slope = 0.0;            // … and its slope as far as known
   double old_t = 0.0, old_value = 0.0;
   double old_width = 0.0;

@@ -6,7 +6,7 @@
 
 namespace arapfields {
 
-/// An ImplicitFunction asked in batches small enough for a prompt cancel, with the number of points counted.
+/// Evaluates an ImplicitFunction in batches small enough to cancel promptly, and counts the points.
 /// A value or gradient that is not finite throws InvalidInput("sdf", …).
 class EvaluationCounter {
  public:

@@ -5,13 +5,13 @@
 
 namespace arapfields {
 
-/// Which witnesses bound a ball.
+/// Rules for the witnesses that bound a ball.
 struct InnerBallRules {
   double most = 1.0;          ///< radius where nothing bounds a ball
-  double least_cosine = 0.0;  ///< of the angle between the inward normal and the way to a witness: those
-                              ///< flatter are taken for the surface's own roughness
-  double near = 0.0;          ///< witnesses that face the other way count as planes within this distance: the
-                              ///< opposite side of a sheet that is thinner than witnesses are apart
+  double least_cosine = 0.0;  ///< between the inward normal and the direction to a witness; flatter ones are
+                              ///< taken for the surface's own roughness
+  double near = 0.0;  ///< within this distance, witnesses that face the point count as planes: the other
+                      ///< side of a sheet thinner than the spacing of witnesses
 };
 
 /// Radii (n) of the largest balls that touch the surface at points (n,3) with outward unit normals (n,3) from

@@ -8,10 +8,11 @@
 
 namespace arapfields {
 
-/// How thick a shape is about each point of its surface: the radius of the largest ball inside the shape that
-/// holds the point, or nearly (Hildebrand and Rüegsegger's local thickness, halved), evened out over
-/// neighbours. Where no opposite side bounds a ball, as on open sheets and where normals point inwards, and
-/// at most, it is 0.6 of the radius of gyration; at least 0.02 of it. In units of the points.
+/// The local thickness of a shape at points of its surface, in units of the points: the radius of the largest
+/// ball inside the shape that (nearly) contains the point, averaged over neighbours (half of Hildebrand and
+/// Rüegsegger 1997, "A new method for the model-independent assessment of thickness"). It is clamped to
+/// between 0.02 and 0.6 of the radius of gyration. The upper limit also holds where no opposite side bounds a
+/// ball, as on open sheets and where normals point inwards.
 class LocalThickness {
  public:
   /// From samples (n,3) of a surface and their outward unit normals (n,3); without normals it is the largest

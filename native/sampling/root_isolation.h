@@ -26,9 +26,9 @@ struct ScanResult {
   std::vector<AmbiguousInterval> ambiguous;
 };
 
-/// All crossings of the lines as far as the model tells, ordered by line and parameter; no evaluation of Φ.
-/// A step along a line is clear where |p| exceeds the model's error, and holds at most one zero where
-/// |dp/dt| exceeds the model's slope error; runs of neither kind are ambiguous.
+/// All crossings of the lines that the model can isolate, ordered by line and parameter, without evaluating
+/// Φ. A step along a line has no zero where |p| exceeds the model's error, and at most one where |dp/dt|
+/// exceeds the model's slope error. Other runs of steps are ambiguous.
 ScanResult scan_lines(const TricubicSurrogate& model, const std::vector<Line>& lines);
 
 }  // namespace arapfields

@@ -10,7 +10,7 @@
 
 namespace arapfields {
 
-/// What a call of sample_surface did.
+/// Lines and evaluations of a call of sample_surface.
 struct SampleReport {
   Index lines = 0;                 ///< lines cast
   Index value_evaluations = 0;     ///< points at which Φ alone was evaluated
@@ -29,7 +29,7 @@ ARAPFIELDS_EXPORT SurfaceSamples sample_surface(const ImplicitFunction& function
                                                 const SampleOptions& options = {},
                                                 const Progress& progress = {},
                                                 SampleReport* report = nullptr);
-/// The same, of a function that the samples keep: they can then be drawn anew (SurfaceSamples::redraw).
+/// The same; the samples keep the function, so that they can be redrawn (SurfaceSamples::redraw).
 ARAPFIELDS_EXPORT SurfaceSamples sample_surface(const std::shared_ptr<const ImplicitFunction>& function,
                                                 const SampleOptions& options = {},
                                                 const Progress& progress = {},

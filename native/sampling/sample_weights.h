@@ -5,9 +5,9 @@
 
 namespace arapfields {
 
-/// The samples with factors of their own on their energies, and on the bending in them: bones, armour, a face
-/// that must not stretch. (n each, ≥ 0; empty: all 1); all 1 is the same as none. Samples that are drawn anew
-/// take those of the nearest of these. Throws InvalidInput for other numbers of them.
+/// The samples with a factor on each one's energy, and one on its bending (n each, ≥ 0; empty: all 1): bones,
+/// armour, a face that must not stretch. Redrawn samples take the factors of the nearest of these samples.
+/// Throws InvalidInput for another count, and for negative or non-finite numbers.
 ARAPFIELDS_EXPORT SurfaceSamples with_weights(const SurfaceSamples& samples, const Vector& weights,
                                               const Vector& bend_weights = {});
 

@@ -7,8 +7,8 @@
 
 namespace arapfields {
 
-/// "auto" → "cpu", as long as CUDA is experimental; throws InvalidInput for a name that is unknown or not
-/// there.
+/// "auto" → "cpu", as long as CUDA is experimental; throws InvalidInput for a name that is unknown or
+/// not available.
 ARAPFIELDS_EXPORT std::string resolve_device(const std::string& device);
 /// Whether a CUDA device was found, and why not.
 ARAPFIELDS_EXPORT std::string device_report();
