@@ -81,7 +81,7 @@ BOOST_AUTO_TEST_CASE(names_are_utf8) {
   const std::string path = folder / strange + "/" + strange + ".npz";
   save(path, "text");
   BOOST_TEST(content(path) == "text");
-  BOOST_TEST(fs::exists(folder.path / path_of(strange) / path_of(std::string(strange) + ".npz")));
+  BOOST_TEST(fs::exists(folder.path / path_of(strange) / path_of(strange).concat(".npz")));
   std::string longest;  // its temporary folder's name is cut between two letters
   while (longest.size() < 210) longest += "\xe2\x82\xac";
   save(folder / longest.c_str(), "long");
