@@ -156,6 +156,7 @@ def register():
 def unregister():
     for state in STATE:
         state.clear()
+    jobs.forget_messages()
     while _begun:
         end = _begun.pop()
         if end is not None:
