@@ -25,7 +25,7 @@ if IN_BLENDER:
 
 pytestmark = pytest.mark.in_blender
 
-ROUNDS = 8  # what is left once is left each time
+ROUNDS = 20
 STATES = ["idle", "live", "job", "counting", "drag", "prefetch"]
 
 

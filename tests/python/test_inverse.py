@@ -122,7 +122,7 @@ def test_extraction_stops_and_names_bad_input(bunny):
     task, seen = af.Task(), []
 
     def watch():
-        while task.progress < 0.1:
+        while task.progress < 0.2:
             seen.append(task.progress)
             time.sleep(0.01)
         task.cancel()
@@ -130,7 +130,7 @@ def test_extraction_stops_and_names_bad_input(bunny):
     watcher = threading.Thread(target=watch)
     watcher.start()
     with pytest.raises(af.Cancelled):
-        af.extract_deformed(sdf, field, 128, task=task)
+        af.extract_deformed(sdf, field, 256, task=task)
     watcher.join()
     assert seen == sorted(seen)
 
