@@ -24,6 +24,7 @@ from .poses import applying
 from .solver import style_object
 from .surface import staleness
 from .viewport import handle_boxes, previews
+from .wrap import drawing as landmark_drawing
 
 
 @persistent
@@ -109,7 +110,10 @@ HANDLERS = {  # of bpy.app.handlers
     "render_cancel": after_render,
     "frame_change_post": after_frame,
 }
-DRAWINGS = (previews.draw, handle_boxes.draw, pin_drawing.draw)  # over every 3D viewport
+DRAWINGS = (  # over every 3D viewport
+    *((previews.draw, "POST_VIEW"), (handle_boxes.draw, "POST_VIEW"), (pin_drawing.draw, "POST_VIEW")),
+    (landmark_drawing.draw, "POST_PIXEL"),
+)
 PARTS = (  # what begins with the extension, and how it ends
     (icons.load, icons.clear),
     (translations.load, translations.clear),
@@ -146,8 +150,8 @@ def register():
     for name, function in HANDLERS.items():
         getattr(bpy.app.handlers, name).append(function)
     if has_window():
-        for draw in DRAWINGS:
-            _drawn.append(bpy.types.SpaceView3D.draw_handler_add(draw, (), "WINDOW", "POST_VIEW"))
+        for draw, when in DRAWINGS:
+            _drawn.append(bpy.types.SpaceView3D.draw_handler_add(draw, (), "WINDOW", when))
     for begin, end in PARTS:
         begin()
         _begun.append(end)

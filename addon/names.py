@@ -7,6 +7,7 @@ PACKAGE = __package__
 TOOL = "arapfields.pin"  # in the toolbar
 CATEGORY = "ARAP Fields"  # tab of the sidebar
 RESULTS = "ARAP Fields"  # collection that holds results
+CONTEXT = "ARAP Fields"  # of our texts' translations, which Blender's own would replace otherwise
 PROPERTY = "arapfields"  # object.arapfields
 REPORT = "arapfields_report"  # custom property of results: figures as JSON
 WARP_KEY = "ARAP Fields"  # shape key that carries the motion
@@ -47,6 +48,7 @@ class Op(StrEnum):
     ADD_LANDMARK = "arapfields.add_landmark"
     CLICK_LANDMARKS = "arapfields.click_landmarks"
     RESET_BONES = "arapfields.reset_bones"
+    MIRROR_LANDMARKS = "arapfields.mirror_landmarks"
     REMOVE_LANDMARK = "arapfields.remove_landmark"
     CARRY = "arapfields.carry"
     RELEASE = "arapfields.release"

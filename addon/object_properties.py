@@ -5,7 +5,7 @@ import bpy
 
 from .animation.properties import ARAPFIELDS_PG_bake
 from .blender.object_references import owner_of, settings_of
-from .blender.property_definitions import choice, collection, flag, integer, pointer, text
+from .blender.property_definitions import choice, collection, flag, integer, number, pointer, text
 from .blender.selection import row_chosen
 from .carried.properties import ARAPFIELDS_PG_carried
 from .core.settings.choices import NORMALS
@@ -22,7 +22,7 @@ from .wrap.properties import ARAPFIELDS_PG_wrap
 class ARAPFIELDS_PG_result(bpy.types.PropertyGroup):
     item: pointer(bpy.types.Object, "Object", "The result object")
     kind: text("Kind", "DEFORM, STYLIZE or EXTRACT")
-    output: text("Output", "WARP, SURFACE or REMESH")
+    output: text("Geometry", "WARP, SURFACE or REMESH")
 
 
 def get_result(settings):
@@ -44,6 +44,16 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
         "Hold What Is Far",
         "While all handles are pins and none is an anchor, what is far from them holds its place "
         "by itself, weakly",
+    )
+    keep_rest: flag(
+        "Keep the Rest",
+        "While all handles are pins, what is far from all but the anchors holds its place",
+    )
+    keep_beyond: number(
+        "Keep Beyond",
+        "Distance from the pins, at rest, from which the rest is kept; the pin tool shows it by circles",
+        subtype="DISTANCE",
+        min=0.0,
     )
     active_handle: integer("Active Handle", "Row chosen in the list of handles", update=row_chosen)
     stiffness: pointer(ARAPFIELDS_PG_stiffness, "Stiffness", "Vertex groups that are stiffer or softer")

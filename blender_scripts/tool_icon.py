@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draws the pin tool's icon for Blender's toolbar: python blender_scripts/tool_icon.py
+"""Draws the pin tool's icon for the toolbar and the anchor of the list: python blender_scripts/tool_icon.py
 
 Blender reads coloured triangles: "VCO", a version, the size in both directions and two zeros, then two bytes
 for each corner's place (from the lower left), then four for its colour (red, green, blue, alpha).
@@ -9,6 +9,8 @@ import itertools
 import math
 import struct
 from pathlib import Path
+
+from PIL import Image, ImageDraw
 
 TARGET = Path(__file__).resolve().parents[1] / "addon/icons/pin.dat"
 WHITE, GREY, ORANGE = (238, 238, 238, 255), (160, 160, 160, 255), (250, 154, 56, 255)
@@ -35,7 +37,19 @@ def picture():
     return found + disc((127.5, 194), (44, 44), ORANGE) + disc((114, 208), (12, 12), WHITE)
 
 
+def anchor(size=64):
+    """White strokes on nothing, as Blender's own icons are."""
+    image = Image.new("RGBA", (size, size))
+    draw = ImageDraw.Draw(image)
+    draw.ellipse((24, 3, 40, 19), outline=WHITE, width=5)
+    draw.line((32, 18, 32, 58), fill=WHITE, width=6)
+    draw.line((18, 27, 46, 27), fill=WHITE, width=5)
+    draw.arc((8, 10, 56, 60), 10, 170, fill=WHITE, width=6)
+    return image
+
+
 def main():
+    anchor().save(TARGET.with_name("anchor.png"), optimize=True)
     triangles = picture()
     places = b"".join(struct.pack("BB", round(x), round(y)) for corners, _ in triangles for x, y in corners)
     colours = b"".join(struct.pack("BBBB", *colour) * 3 for _, colour in triangles)

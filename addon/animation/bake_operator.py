@@ -93,9 +93,7 @@ class BakeOperator(JobOperator):
 
 def ask(context, operator, paths):
     """A menu whose button runs the operator again, with the same arguments, and overwrites."""
-    chosen, own = operator.properties, operator.properties.bl_rna.properties
-    own = [one.identifier for one in own if not one.is_readonly and chosen.is_property_set(one.identifier)]
-    given = {name: getattr(chosen, name) for name in own} | {"overwrite": True}
+    given = arguments(operator) | {"overwrite": True}
     names = ", ".join(path.name for path in paths)
 
     def draw(menu, _):
@@ -106,6 +104,13 @@ def ask(context, operator, paths):
 
     title = translated("{names} exists already", names=names)
     context.window_manager.popup_menu(draw, title=title, icon="QUESTION")
+
+
+def arguments(operator):
+    """{name: value} of what an operator was given."""
+    chosen, own = operator.properties, operator.properties.bl_rna.properties
+    own = [one.identifier for one in own if not one.is_readonly and chosen.is_property_set(one.identifier)]
+    return {name: getattr(chosen, name) for name in own}
 
 
 def effective_kind(source, operator=None):

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import bpy
 
+from ..blender.host import has_window
 from ..blender.language import translated
 from ..blender.object_references import ObjectReference, source_of
-from ..blender.property_definitions import choice, path_text
+from ..blender.property_definitions import choice, path_text, text
 from ..core.errors import UserError
 from ..core.runtime.jobs import Item
 from ..core.settings.choices import EXPORT_FORMATS
@@ -16,7 +17,7 @@ from ..field_modifier import cache_modifier
 from ..names import Op
 from ..results import result_objects
 from . import caches, exporters, frames, played
-from .bake_operator import BakeOperator, effective_kind, refusal_of
+from .bake_operator import BakeOperator, arguments, effective_kind, refusal_of
 from .object_bake import ObjectBake
 from .properties import settings
 
@@ -41,7 +42,32 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
             "FILE",
             options={"SKIP_SAVE"},
         ),
+        "filter_glob": text("Filter", "Files that are shown", options={"HIDDEN", "SKIP_SAVE"}),
     }
+
+    asked = False  # whether a file was chosen in the dialog
+
+    def invoke(self, context, event):
+        """Asks for the file where none is named; then begins as from a script."""
+        if self.filepath or not has_window():
+            return super().invoke(context, event)
+        suffix = exporters.SUFFIXES[self.format]
+        name = caches.BARRED.sub("_", source_of(context).name)
+        self.filepath = bpy.path.abspath(f"//{name}{suffix}")
+        self.filter_glob, self.asked = f"*{suffix}", True
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context):
+        if not self.asked:
+            return super().execute(context)
+        bpy.ops.arapfields.export_animation("INVOKE_DEFAULT", **arguments(self))
+        return {"FINISHED"}
+
+    def cancel(self, context):
+        """No file was chosen, or the job's window closes."""
+        if not self.asked:
+            super().cancel(context)
 
     @classmethod
     def refuses(cls, source):

@@ -3,15 +3,16 @@ import bpy
 
 from ..blender import modifier_stack
 from ..blender.language import translated
-from ..blender.section import Advanced, job_button, modifier_row, note, wrapped
+from ..blender.section import Section, job_button, modifier_row, note, wrapped
 from ..names import Op
 from ..solver import frame_range
 from . import caches, played
 
 
-class ARAPFIELDS_PT_animation(Advanced, bpy.types.Panel):
-    bl_label = "Animation"
-    bl_order = 4
+class ARAPFIELDS_PT_animation(Section, bpy.types.Panel):
+    bl_label = "Bake and Export"
+    bl_order = 8
+    bl_options = {"DEFAULT_CLOSED"}
 
     def fill(self, context, source, settings):
         layout, bake = self.layout, settings.bake
@@ -19,12 +20,11 @@ class ARAPFIELDS_PT_animation(Advanced, bpy.types.Panel):
         layout.prop(bake, "kind")
         layout.prop(bake, "range")
         if bake.range == "CUSTOM":
-            row = layout.row(align=True)
-            row.prop(bake, "start")
-            row.prop(bake, "end")
-        row = layout.row(align=True)
-        row.prop(bake, "step")
-        row.prop(bake, "subframes")
+            column = layout.column(align=True)
+            column.prop(bake, "start")
+            column.prop(bake, "end")
+        layout.prop(bake, "step")
+        layout.prop(bake, "subframes")
         if bake.format != "KEYS":
             layout.prop(bake, "folder")
         wrapped(layout, weight(context, source, bake))

@@ -19,7 +19,7 @@ def settings(**extra):
         "end": integer("End", "Last frame", default=250, **extra),
         "step": integer("Step", "Frames from one sample to the next", default=1, min=1, max=100, **extra),
         "subframes": integer(
-            "Samples per Step",
+            "Subframes",
             "More than one for motion blur of what moves fast: samples between the frames",
             default=1,
             min=1,

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import bpy
 
+from ..names import CONTEXT
 from .language import translated
 
 ADDON = Path(__file__).resolve().parents[1]
@@ -46,6 +47,7 @@ class Guided:
     """
 
     guide = ""
+    bl_translation_context = CONTEXT
 
     def __init_subclass__(cls):
         """ARAPFIELDS_OT_fit is arapfields.fit, which names.py lists."""

@@ -4,6 +4,7 @@
 import bpy
 
 from ..core.errors import UserError
+from ..names import CONTEXT
 
 _lookup = getattr(bpy.app.translations, "pgettext_rpt", bpy.app.translations.pgettext_iface)
 
@@ -14,5 +15,5 @@ def translated(message, **values):
         message, values = message.template, message.values
     elif isinstance(message, Exception):
         return str(message)
-    text = _lookup(message)
+    text = _lookup(message, CONTEXT)
     return text.format(**values) if values else text

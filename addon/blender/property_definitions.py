@@ -3,6 +3,8 @@
 
 import bpy
 
+from ..names import CONTEXT
+
 listeners = {}  # name of a property → what is called with its group where the user changes it
 
 
@@ -11,10 +13,23 @@ def tells(name):
     return lambda group, _: listeners[name](group)
 
 
+def colour(description):
+    """One of the viewport."""
+    return bpy.props.FloatVectorProperty(
+        name="Colour",
+        description=description,
+        subtype="COLOR_GAMMA",
+        default=(0.27, 0.55, 1.0),
+        min=0.0,
+        max=1.0,
+    )
+
+
 def _kind(definition, *arguments):
     """The same definition with these arguments, its name and its description by position."""
     names = (*arguments, "name", "description")
-    return lambda *values, **extra: definition(**dict(zip(names, values, strict=True)), **extra)
+    own = {"translation_context": CONTEXT}
+    return lambda *values, **extra: definition(**dict(zip(names, values, strict=True)), **own, **extra)
 
 
 text, flag = _kind(bpy.props.StringProperty), _kind(bpy.props.BoolProperty)
@@ -37,19 +52,60 @@ def annotations(parameters, **extra):
     return {p.name: definition(p, **extra) for p in parameters}
 
 
+def group_annotations(parameters):
+    """The same for a group of settings: where 0 stands for something, also a switch and a number above 0.
+
+    What is stored, keyed and set by scripts stays the one value.
+    """
+    annotated = annotations(parameters)
+    for p in parameters:
+        if p.zero:
+            annotated |= {p.switch: switch(p), p.number: number_above_zero(p)}
+    return annotated
+
+
+def switch(p):
+    """On where the value is 0; switched off, it is the one that is offered instead."""
+    label, meaning, instead = p.zero
+
+    def put(group, is_on):
+        if is_on != (getattr(group, p.name) == 0):
+            setattr(group, p.name, 0.0 if is_on else instead)
+
+    return flag(label, f"{p.label}: {meaning}", get=lambda group: getattr(group, p.name) == 0, set=put)
+
+
+def number_above_zero(p):
+    """The value, and what is offered instead where it is 0."""
+    least = p.zero[2] / 1000
+    return number(
+        p.label,
+        p.plain,
+        get=lambda group: getattr(group, p.name) or p.zero[2],
+        set=lambda group, value: setattr(group, p.name, max(value, least)),
+        **{**limits(p), "min": least, "soft_min": least},
+    )
+
+
+def limits(p):
+    found = {"min": p.low, "max": p.high, "soft_min": p.soft_low, "soft_max": p.soft_high}
+    if isinstance(p.default, float):
+        found["precision"] = 4 if 0 < (p.default or (p.zero and p.zero[2]) or 1.0) < 0.1 else 2
+        if p.soft_low <= 0.01 and p.soft_high == 1.0:
+            found["subtype"] = "FACTOR"
+    return found
+
+
 def definition(parameter, **extra):
     """One parameter as a bpy.props definition."""
     p = parameter
-    common = {"name": p.label, "description": p.tip, **extra}
+    common = {"name": p.label, "description": p.tip, "translation_context": CONTEXT, **extra}
     if p.items:
         return bpy.props.EnumProperty(items=p.items, default=p.default, **common)
     if isinstance(p.default, bool):
         return bpy.props.BoolProperty(default=p.default, **common)
-    limits = {"min": p.low, "max": p.high, "soft_min": p.soft_low, "soft_max": p.soft_high}
-    if isinstance(p.default, int):
-        return bpy.props.IntProperty(default=p.default, **limits, **common)
-    precision = 4 if 0 < p.default < 0.1 else 2
-    return bpy.props.FloatProperty(default=p.default, precision=precision, **limits, **common)
+    kind = bpy.props.IntProperty if isinstance(p.default, int) else bpy.props.FloatProperty
+    return kind(default=p.default, **limits(p), **common)
 
 
 def effective_values(parameters, group, operator=None):

@@ -3,8 +3,9 @@
 
 import bpy
 
-from ..core.runtime import native
-from ..names import CATEGORY
+from ..core.runtime import jobs, native
+from ..core.settings.parameters import counts, method_of
+from ..names import CATEGORY, CONTEXT, Op
 from . import object_references
 from .language import translated
 
@@ -15,6 +16,7 @@ class Section:
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = CATEGORY
+    bl_translation_context = CONTEXT
     needs_source = True
 
     @classmethod
@@ -38,8 +40,26 @@ class Advanced(Section):
 
 
 def settings_column(layout, group, parameters, advanced):
-    """The everyday parameters, or the advanced ones."""
-    draw_settings(layout.column(), group, *(p.name for p in parameters if p.advanced == advanced))
+    """The everyday parameters, grey where they do nothing, or the advanced ones that do something."""
+    column, method = layout.column(), method_of(group, parameters)
+    for p in parameters:
+        if p.advanced != advanced or (advanced and not counts(p, group, method)):
+            continue
+        row = column.column()
+        row.enabled = counts(p, group, method)
+        if p.zero:
+            with_zero(row, group, p)
+        else:
+            row.prop(group, p.name)
+
+
+def with_zero(layout, group, parameter):
+    """The switch in the place of 0, and below it the number, grey while that is on."""
+    column = layout.column(align=True)
+    column.row(heading=parameter.label).prop(group, parameter.switch)
+    row = column.row()
+    row.enabled = not getattr(group, parameter.switch)
+    row.prop(group, parameter.number, text=" ")
 
 
 def draw_settings(layout, group, *names):
@@ -73,10 +93,20 @@ def note(layout, *reasons):
 
 
 def job_button(layout, operator, icon):
-    """A job's button, and beside it the choice of objects."""
-    row = layout.row(align=True)
+    """A job's button, and beside it the choice of objects; in their place how far it is while it runs."""
+    row, job = layout.row(align=True), jobs.running()
+    group, name = operator.split(".")
+    if job is not None and job.title == getattr(bpy.types, f"{group.upper()}_OT_{name}").title:
+        progress_row(row, job)
+        return
     row.operator(operator, icon=icon)
     row.operator_menu_enum(operator, "scope", text="", icon="DOWNARROW_HLT")
+
+
+def progress_row(row, job):
+    """How far the job is, and the way out."""
+    row.progress(factor=job.fraction, text=f"{translated(job.title)} {job.fraction:.0%}")
+    row.operator(Op.CANCEL, text="", icon="X")
 
 
 def presets(layout, name):

@@ -13,12 +13,15 @@ class Rows:
 rows = Rows()
 
 
-def select_alone(context, item):
-    """Makes an object the only one that is selected, and the active one; not where it cannot be seen."""
+def select_alone(context, item, extend=False):
+    """Makes an object the active one and, unless it is to `extend` what is, the only one that is selected.
+
+    Not where it cannot be seen.
+    """
     layer = context.view_layer
     if context.mode != "OBJECT" or layer.objects.get(item.name) != item or not item.visible_get():
         return
-    for other in context.selected_objects:
+    for other in () if extend else context.selected_objects:
         other.select_set(False)
     item.select_set(True)
     layer.objects.active = item

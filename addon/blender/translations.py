@@ -6,10 +6,14 @@ from pathlib import Path
 
 import bpy
 
-from ..names import PACKAGE
+from ..names import CONTEXT, PACKAGE
 
 FOLDER = Path(__file__).resolve().parents[1] / "translations"
-CONTEXTS = ("*", "Operator")  # Blender looks texts of buttons up in the second
+CONTEXTS = (
+    "*",
+    "Operator",
+    CONTEXT,
+)  # tooltips are looked up in the first, further texts of buttons in the second
 
 
 def read_po(path):

@@ -26,8 +26,11 @@ def run_bake(options, _):
     if suffix in EXPORTS and options.shard:
         raise UserError("--shard: an exported file has no parts; bake the parts first, then export")
     target = options.output.resolve() if options.output else None
-    folder = str(options.folder.resolve()) if options.folder else None
+    folder = options.folder.resolve() if options.folder else None
     files.read(options.input)
+    for place in (target, folder and folder / "cache"):
+        if place:
+            files.check_place(place)
     sources = objects_to_solve(options) if options.objects else animated(options)
     given = {"kind": options.kind.upper()} if options.kind else {}
     if options.frames:
@@ -42,7 +45,7 @@ def run_bake(options, _):
             call, further = bpy.ops.arapfields.bake, {"format": options.format.upper()}
             further["part"] = options.shard or (1, 1)
             if folder:
-                further["folder"] = folder
+                further["folder"] = str(folder)
         reason = failure(call, scope="SELECTED", **given, **further)
     if reason and not jobs.messages():
         raise UserError(reason)

@@ -32,17 +32,23 @@ def check(path):
 
 
 def check_place(path):
-    """Before anything is solved: OSError or InvalidInput where no file can take this place."""
+    """Before anything is solved: an error where no file can take this place, or no room is left."""
     from arapfields._native import OutputFile
 
     path.parent.mkdir(parents=True, exist_ok=True)
     OutputFile(path).discard()
+    if shutil.disk_usage(path.parent).free < ROOM:
+        raise full(path)
+
+
+def full(path):
+    return OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
 
 
 def not_whole(path):
     """What to raise where Blender, which does not tell, has written a part of a file."""
     if shutil.disk_usage(path.parent).free < ROOM:
-        return OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+        return full(path)
     return UserError(f"{path}: Blender could not write all of it; the disk may be full")
 
 

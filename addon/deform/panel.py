@@ -5,7 +5,7 @@ from ..blender.section import Advanced, Section, job_button, note, presets, sett
 from ..core.geometry.handles import nothing_held
 from ..core.settings.parameters import DEFORM
 from ..handles import empties
-from ..live.panel import live_buttons
+from ..live.panel import live_buttons, playback_progress
 from ..names import Op
 from ..results.placement import placement_refusal
 
@@ -22,6 +22,7 @@ class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
         live_buttons(layout, source, "DEFORM", empties.require_handles(source))
         job_button(layout, Op.DEFORM, "MOD_SIMPLEDEFORM")
         settings_column(layout, settings.deform, DEFORM, advanced=False)
+        playback_progress(layout, source, "DEFORM")
         note(layout, empties.require_handles(source), placement_refusal(source))
         if empties.holding_nothing(source):
             note(layout, nothing_held(empties.holding_nothing(source)))

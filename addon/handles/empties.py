@@ -13,7 +13,7 @@ from ..core.errors import UserError, refuse
 from ..core.geometry.handles import far_handle, solve_handle
 from ..core.geometry.spaces import inverse, transform
 from ..core.runtime.coroutines import run_to_completion
-from . import movers, naming
+from . import movers, naming, symmetry
 from .movers import box_now, current_box, has_mover, matrix_of, name_of
 from .palette import free_colour
 
@@ -85,15 +85,34 @@ def solve_handles(source, space, weights=None, where=matrix_of):
         handles.append(solve_handle(name_of(entry), entry.kind, *boxes, space, **options))
     if not handles:
         raise UserError("{name} has no handle; add one in the panel's Handles section", source)
-    return [*handles, far_handle()] if holds_far(source) else handles
+    centers, beyond = kept_rest(source)
+    if not len(centers):
+        return handles
+    centers = transform(space.world_to_solve @ where(source), np.array(centers))
+    mirror = symmetry.mirror_of(source)
+    if mirror is not None:
+        across = space.world_to_solve @ mirror @ space.solve_to_world
+        centers = np.concatenate([centers, transform(across, centers)])
+    return [*handles, far_handle(centers, from_single_precision(beyond))]
 
 
-def holds_far(source):
-    """Whether what is far from all pins holds its place by itself: pins alone, none of them an anchor."""
-    entries = used(source)
-    return settings_of(source).hold_far and all(e.kind == "PIN" and not e.anchor for e in entries)
+def kept_rest(source):
+    """(places in the source's coordinates, distance): what is farther from all of these holds its place.
+
+    Without places nothing does: there are handles other than pins, or only anchors. Distance 0 is the rule of
+    earlier files: beyond half of the way to the farthest point, while there is no anchor.
+    """
+    settings, entries = settings_of(source), used(source)
+    pins = all(entry.kind in PINS for entry in entries)
+    if settings.keep_rest and pins:
+        moving = [tuple(movers.rest_of(e)[:3, 3]) for e in entries if not e.anchor]
+        return tuple(moving), settings.keep_beyond
+    if settings.hold_far and pins and not any(e.anchor for e in entries):
+        return tuple(tuple(movers.rest_of(e)[:3, 3]) for e in entries), 0.0
+    return (), 0.0
 
 
+PINS = ("PIN", "POINT")  # which hold place and turn, and the place alone
 SHAPES = {"CUBE": "CUBE", "POINT": "SPHERE", "GROUP": "ARROWS", "PIN": "SPHERE"}
 
 

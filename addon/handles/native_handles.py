@@ -25,7 +25,8 @@ def native_handles(af, handles, rest, samples, reaches=True):
         elif handle.kind == "PIN":
             natives.append(region(af, handle, handle.pinned(samples.points), further))
         elif handle.kind == "FAR":
-            natives.append(region(af, handle, far_from(handles, samples.points), further))
+            held = far_from(handle, samples.points)
+            natives += [region(af, handle, held, further)] if len(held) else []
         else:
             counts[handle.name] = int(handle.inside(samples.points).sum())
             natives.append(af.Cuboid(handle.rest, handle.target, **further))

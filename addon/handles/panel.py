@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
+from ..blender import icons
 from ..blender.language import translated
 from ..blender.object_references import source_of
 from ..blender.section import Section, note, wrapped
@@ -8,6 +9,12 @@ from ..names import Op
 from . import empties, movers, scaling
 
 ICONS = {"CUBE": "CUBE", "POINT": "DOT", "GROUP": "GROUP_VERTEX", "PIN": "PINNED", "BONE": "BONE_DATA"}
+
+
+def anchor_icon(entry):
+    """An anchor where it is one, as keywords of a layout's call."""
+    number = icons.icon("ANCHOR") if entry.anchor else 0
+    return {"icon_value": number} if number else {"icon": "PINNED" if entry.anchor else "LAYER_USED"}
 
 
 class ARAPFIELDS_UL_handles(bpy.types.UIList):
@@ -23,6 +30,8 @@ class ARAPFIELDS_UL_handles(bpy.types.UIList):
             row.prop(item, "bone", text="", emboss=False, icon=ICONS[item.kind])
         else:
             row.prop(item.empty, "name", text="", emboss=False, icon=ICONS[item.kind])
+        if item.kind in empties.PINS:
+            row.prop(item, "anchor", text="", emboss=False, **anchor_icon(item))
         if item.inside >= 0:
             row.label(
                 text=f"{item.inside:,}" if item.inside else translated("empty"),
@@ -42,7 +51,8 @@ class ARAPFIELDS_MT_add_handle(bpy.types.Menu):
             ("CUBE", "AUTO", "From Selected Empties", "EMPTY_DATA"),
             ("CUBE", "CURSOR", "At 3D Cursor", "PIVOT_CURSOR"),
             ("CUBE", "SELECTION", "Around Selected Vertices", "VERTEXSEL"),
-            ("POINT", "CURSOR", "Point at 3D Cursor", "DOT"),
+            ("PIN", "CURSOR", "Pin at 3D Cursor", "PINNED"),
+            ("POINT", "CURSOR", "Point Pin at 3D Cursor", "DOT"),
             ("GROUP", "AUTO", "From Active Vertex Group", "GROUP_VERTEX"),
         ):
             row = layout.row()
@@ -80,9 +90,15 @@ class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
         column.separator()
         column.menu("ARAPFIELDS_MT_more_handle", icon="DOWNARROW_HLT", text="")
         if not settings.handles:
-            hint = translated("Press + to place a box around a part, then move it and press Live")
+            hint = translated("Drag the shape with the pin tool, or press + for a pin or a box")
             wrapped(layout, hint, icon="INFO")
             return
+        if all(entry.kind in empties.PINS for entry in settings.handles):
+            row = layout.row(heading="Keep the Rest")
+            row.prop(settings, "keep_rest", text="")
+            beyond = row.row()
+            beyond.enabled = settings.keep_rest
+            beyond.prop(settings, "keep_beyond", text="")
         row = layout.row(align=True)
         row.operator(Op.SET_REST, icon="PINNED")
         row.operator(Op.RESET_HANDLE, icon="LOOP_BACK")
@@ -90,13 +106,15 @@ class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
             entry = settings.handles[settings.active_handle]
             layout.prop(entry, "weight")
             layout.prop(entry, "reach")
+            if entry.kind in empties.PINS:
+                layout.prop(entry, "hold_turn")
             if entry.kind != "POINT":
                 layout.prop(entry, "allow_scale")
-            note(layout, scaling.ignored(source))
             if entry.kind in ("GROUP", "BONE"):
                 layout.prop_search(entry, "group", source, "vertex_groups")
             if entry.group:
                 layout.prop(entry, "hold_from")
+            note(layout, scaling.ignored(source))
 
 
 CLASSES = [

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..blender.property_definitions import choice, flag, integer, number, pointer, text
+from ..blender.property_definitions import choice, colour, flag, integer, listeners, number, pointer, text
 from ..core.settings.choices import HANDLE_KINDS
 
 
@@ -51,17 +51,14 @@ class ARAPFIELDS_PG_handle(bpy.types.PropertyGroup):
         "Allow Scale",
         "What the handle holds is scaled as it is; otherwise only the handle's move and turn count",
     )
-    anchor: flag(
-        "Anchor", "The pin tool does not drag it; while there is one, nothing else is held by itself"
+    anchor: flag("Anchor", "Stays where it is: the pin tool does not drag it")
+    hold_turn: flag(
+        "Hold Turn",
+        "The pin holds how the surface is turned, too; otherwise its place alone, and a lifted hoof hangs",
+        get=lambda entry: entry.kind != "POINT",
+        set=lambda entry, holds: listeners["hold_turn"](entry, holds),
     )
-    colour: bpy.props.FloatVectorProperty(
-        name="Colour",
-        description="Colour of the handle's boxes in the viewport",
-        subtype="COLOR_GAMMA",
-        default=(0.27, 0.55, 1.0),
-        min=0.0,
-        max=1.0,
-    )
+    colour: colour("Colour of the handle's boxes in the viewport")
     rest: bpy.props.FloatVectorProperty(
         size=16,
         name="Rest Box",

@@ -1,43 +1,59 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
+from ..blender import modifier_stack
 from ..blender.language import translated
-from ..blender.section import Section, wrapped
+from ..blender.object_references import settings_of, source_of
+from ..blender.section import Section, progress_row, wrapped
 from ..core.runtime import jobs
-from ..names import Op
 
 ICONS = {"INFO": "CHECKMARK", "WARNING": "ERROR", "ERROR": "CANCEL"}
 
 
 def draw_progress(layout, job):
-    """The running job, at the top of the panel where it is seen: how far, what, how long, and the way out."""
+    """The running job: how far, what, how long, and the way out."""
     box = layout.box()
-    box.progress(factor=job.fraction, text=f"{translated(job.title)} {job.fraction:.0%}")
+    progress_row(box.row(align=True), job)
     wrapped(box, job.message)
     left = job.remaining
     text = f"{job.elapsed:.0f} s"
     if left is not None:
         text += translated(", about {seconds} s left", seconds=f"{left:.0f}")
     box.label(text=text, translate=False)
-    box.operator(Op.CANCEL, icon="X")
+
+
+def remarks(source):
+    """What the user should know about how the source is read."""
+    if source is None:
+        return
+    shown = modifier_stack.shown_before(source, settings_of(source).in_place)
+    after = [m.name for m in modifier_stack.shown_before(source, False) if m not in shown]
+    if shown:
+        yield translated("Read with its modifiers applied ({count})", count=len(shown))
+    if after:
+        yield translated("Read before {names}", names=", ".join(after))
+    if source.data.shape_keys:
+        yield translated("Read with its shape keys as they are set")
 
 
 class ARAPFIELDS_PT_status(Section, bpy.types.Panel):
+    """Last: what comes and goes moves nothing above it."""
+
     bl_label = "Status"
-    bl_order = 4
+    bl_order = 10
     needs_source = False
 
     @classmethod
     def poll(cls, context):
-        return super().poll(context) and (jobs.running() is not None or bool(jobs.messages()))
+        said = jobs.running() is not None or bool(jobs.messages())
+        return super().poll(context) and (said or any(remarks(source_of(context))))
 
     def fill(self, context, source, settings):
         layout = self.layout
-        job = jobs.running()
-        if job is not None:
-            layout.label(
-                text=translated("{job} is running (see the top)", job=translated(job.title)), icon="TIME"
-            )
+        if jobs.running() is not None:
+            draw_progress(layout, jobs.running())
+        for text in remarks(source):
+            wrapped(layout, text, icon="INFO")
         for level, text in jobs.messages():
             wrapped(layout, text, icon=ICONS[level])
 

@@ -101,7 +101,7 @@ def layout_of(source, kind, scene):
     further += tuple((e.item.session_uid if e.item else 0, e.way) for e in settings.carried)
     further += (secondary_motion.layout_of(source, scene),)
     used = uses_handles(settings, kind)
-    return (held if used else [], used and empties.holds_far(source), further, stack_of(source))
+    return (held if used else [], used and empties.kept_rest(source), further, stack_of(source))
 
 
 def differ_in_handles(a, b):

@@ -5,7 +5,8 @@ import bpy
 
 from ..blender import vertex_groups
 from ..blender.language import translated
-from ..blender.section import Advanced, note, settings_column
+from ..blender.object_references import settings_of, source_of
+from ..blender.section import Section, note, settings_column
 from ..names import Op
 from ..solver import secondary_motion
 from . import sessions
@@ -19,23 +20,32 @@ def live_buttons(layout, source, kind, refusal):
     row.scale_y = 1.4
     start = row.row(align=True)
     start.enabled = on or refusal is None
-    start.operator(Op.LIVE, icon="PAUSE" if on else "PLAY", depress=on).kind = kind
+    names = {"DEFORM": translated("Live Deform"), "STYLIZE": translated("Live Stylize")}
+    start.operator(Op.LIVE, text=names[kind], icon="PAUSE" if on else "PLAY", depress=on).kind = kind
+    if on:
+        row.operator(Op.LIVE_KEEP, icon="CHECKMARK")
+
+
+def playback_progress(layout, source, kind):
+    """How many of the scene's frames are solved already."""
+    on = sessions.is_live(source, kind)
     solved = sessions.solved_frames(source, bpy.context.scene) if on else None
     if solved is not None:
         count, total = solved
         text = translated("{count} of {total} frames solved", count=count, total=total)
         layout.progress(factor=count / max(1, total), text=text)
-    if on:
-        row.operator(Op.LIVE_KEEP, icon="CHECKMARK")
 
 
-class ARAPFIELDS_PT_secondary(Advanced, bpy.types.Panel):
+class ARAPFIELDS_PT_secondary(Section, bpy.types.Panel):
     bl_label = "Secondary Motion"
-    bl_order = 3
+    bl_order = 6
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, context):
+        self.layout.prop(settings_of(source_of(context)).secondary, "use", text="")
 
     def fill(self, context, source, settings):
         group = settings.secondary
-        self.layout.prop(group, "use")
         layout = self.layout.column()
         layout.enabled = group.use
         settings_column(layout, group, SECONDARY, advanced=False)

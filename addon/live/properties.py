@@ -17,7 +17,7 @@ class ARAPFIELDS_PG_secondary(bpy.types.PropertyGroup):
         ),
         **annotations(SECONDARY),
         "group": text(
-            "Soft Part",
+            "Soft Group",
             "Vertex group that says how much of the motion each part has: 0 follows its handles "
             "at once; empty for all",
         ),

@@ -20,7 +20,7 @@ class Snapshot:
         settings, layer = settings_of(source), context.view_layer
         self.source, self.was_live = ObjectReference(source), sessions.is_live(source)
         self.motion = motion.snapshot(source)
-        self.hold_far, self.row = settings.hold_far, settings.active_handle
+        self.keep_rest, self.row = settings.keep_rest, settings.active_handle
         self.active = ObjectReference(layer.objects.active) if layer.objects.active else None
         self.selected = [ObjectReference(item) for item in context.selected_objects]
 
@@ -51,7 +51,7 @@ class Drag:
     def __init__(self, context, before, empty, is_new=False):
         self.before, self.is_new, self.has_moved = before, is_new, False
         self.empty, self.start = ObjectReference(empty), empty.matrix_world.copy()
-        self.reach = pins.entry_of(empty).reach
+        self.reach, self.kind = pins.entry_of(empty).reach, pins.entry_of(empty).kind
         self.values = {name: tuple(getattr(empty, name)) for name in TRANSFORMS}
         source = before.source.get()
         if not sessions.is_live(source, "DEFORM"):
@@ -66,6 +66,10 @@ class Drag:
 
     def turn(self, context, axis, angle):
         """Turns the Empty from where it was at the start, about an axis (3,) through it."""
+        entry = pins.entry_of(self.empty.get())
+        if not entry.hold_turn:
+            entry.hold_turn = True
+            self.start = self.empty.get().matrix_world.copy()
         middle = self.start.translation
         turn = Matrix.Translation(middle) @ Matrix.Rotation(angle, 4, Vector(axis))
         self.put(context, turn @ Matrix.Translation(-middle) @ self.start)
@@ -114,9 +118,9 @@ class Drag:
         elif empty is not None:
             for name, value in self.values.items():
                 setattr(empty, name, value)
-            pins.entry_of(empty).reach = self.reach
+            pins.entry_of(empty).reach, pins.entry_of(empty).kind = self.reach, self.kind
         settings = settings_of(source)
-        settings.hold_far, settings.active_handle = self.before.hold_far, self.before.row
+        settings.keep_rest, settings.active_handle = self.before.keep_rest, self.before.row
         self.before.restore_selection(context)
         if sessions.is_live(source):
             self.before.restore_shape(context)
@@ -154,6 +158,6 @@ def of_new_pin(context, source, location, radius, **further):
         return Drag(context, before, entry.empty, is_new=True)
     except Exception:
         pins.discard(source, entry.empty)
-        settings_of(source).hold_far = before.hold_far
+        settings_of(source).keep_rest = before.keep_rest
         before.restore_selection(context)
         raise

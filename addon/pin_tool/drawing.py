@@ -9,17 +9,30 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
-from ..handles import movers, symmetry
+from ..core.geometry.spaces import transform
+from ..handles import empties, movers, symmetry
 from ..names import TOOL
 from . import pins, screen
 from .hover import RING, hover
 
 LIGHT = (1.0, 0.85, 0.4)
 DARK = (0.05, 0.05, 0.05, 0.9)
-PIN, CORNERS = 7, 24  # radius of a pin's disc in pixels; corners of a circle
+KEPT = (0.85, 0.85, 0.85, 0.35)
+PIN, ANCHOR, CORNERS = (
+    7,
+    9,
+    24,
+)  # radius of a pin's disc in pixels, of an anchor's square; corners of a circle
 ANGLES = np.linspace(0, 2 * np.pi, CORNERS, endpoint=False)
 SQUARE = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * 0.9
 CIRCLE = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
+ARMS = np.linspace(np.pi, 2 * np.pi, 9)
+ANCHOR_STROKES = (  # of a square from -1 to 1
+    np.array([(0, 0.45), (0, -0.65)]),
+    np.array([(-0.35, 0.2), (0.35, 0.2)]),
+    np.stack([0.6 * np.cos(ARMS), 0.55 * np.sin(ARMS) - 0.1], axis=1),
+    0.17 * np.concatenate([CIRCLE, CIRCLE[:1]]) + (0, 0.6),
+)
 ENOUGH = 8  # triangles within the radius that show it; a disc does where they are fewer
 GHOST = 0.35  # how much of a disc is left on the other side
 LIFT = 1.5  # pixels by which the lit surface is drawn before the shape
@@ -61,11 +74,13 @@ class Brush:
         batch_for_shader(self.fill, "TRIS", {"pos": points.astype(np.float32).tolist()}).draw(self.fill)
 
     def loop(self, colour, corners, width):
+        self.strip(colour, np.concatenate([corners, corners[:1]]), width)
+
+    def strip(self, colour, points, width):
         self.line.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
         self.line.uniform_float("lineWidth", width * self.scale)
         self.line.uniform_float("color", colour)
-        closed = [*corners.tolist(), corners[0].tolist()]
-        batch_for_shader(self.line, "LINE_STRIP", {"pos": closed}).draw(self.line)
+        batch_for_shader(self.line, "LINE_STRIP", {"pos": points.tolist()}).draw(self.line)
 
 
 def draw():
@@ -81,6 +96,8 @@ def draw():
     handles = pins.handles_in_view(context)
     for colour, shape, location in ghosts(handles):
         brush.area((*colour, GHOST), brush.outline(location, shape, PIN))
+    for source in {source for source, _ in handles}:
+        draw_kept(brush, source)
     for _, entry in handles:
         draw_handle(brush, entry, target, entry.empty == pins.chosen(context))
     gpu.state.blend_set("NONE")
@@ -111,14 +128,31 @@ def draw_surface(brush, target):
     brush.loop((*LIGHT, 0.9), rim, 2.0)
 
 
+def draw_kept(brush, source):
+    """About each pin that is no anchor the circle beyond which the rest is kept, at rest."""
+    places, beyond = empties.kept_rest(source)
+    world = movers.matrix_of(source)
+    radius = beyond * np.cbrt(abs(np.linalg.det(world[:3, :3])))
+    for place in transform(world, np.array(places).reshape(-1, 3)) if radius else ():
+        brush.loop(KEPT, place + radius * (CIRCLE @ np.stack([brush.right, brush.up])), 1.5)
+
+
 def draw_handle(brush, entry, target, is_chosen):
-    """A disc, for an anchor a square; larger under the cursor; the chosen one has a ring to turn it by."""
+    """A disc, with a hole where it holds its place alone; for an anchor a square with one on it.
+
+    Larger under the cursor; the chosen one has a ring to turn it by.
+    """
     location = np.array(entry.empty.matrix_world.translation)
     meant = target is not None and target.empty is not None and target.empty.uid == entry.empty.session_uid
     shape = SQUARE if entry.anchor else CIRCLE
-    size = PIN * (1.35 if meant and target.kind == "HANDLE" else 1.0)
+    size = (ANCHOR if entry.anchor else PIN) * (1.35 if meant and target.kind == "HANDLE" else 1.0)
     brush.area(DARK, brush.outline(location, shape, size + 2))
     brush.area((*entry.colour, 1.0), brush.outline(location, shape, size))
+    if entry.anchor:
+        for stroke in ANCHOR_STROKES:
+            brush.strip(DARK, brush.outline(location, stroke, size), 1.5)
+    elif not entry.hold_turn:
+        brush.area(DARK, brush.outline(location, CIRCLE, size * 0.4))
     if is_chosen:
         brush.loop((1.0, 1.0, 1.0, 0.95), brush.outline(location, shape, size + 2), 2.0)
         if not entry.anchor:

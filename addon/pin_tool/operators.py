@@ -69,7 +69,8 @@ class ARAPFIELDS_OT_pin_drag(Dragging, bpy.types.Operator):
         try:
             source = source_of_target(target)
             if target.kind == "SURFACE":
-                return self.start(context, view, drag_of_new_pin(context, source, target), "MOVE")
+                kind = "PIN" if context.scene.arapfields.pin_holds_turn else "POINT"
+                return self.start(context, view, drag_of_new_pin(context, source, target, kind=kind), "MOVE")
             entry = pins.entry_of(target.empty.get())
             if entry.anchor:
                 return {"FINISHED"} if pins.select(context, entry.empty) else {"CANCELLED"}
@@ -117,6 +118,7 @@ class ARAPFIELDS_OT_pin_add(PinOperator, bpy.types.Operator):
         "Radius", "Of the region that the pin holds, in the world", subtype="DISTANCE", default=0.1, min=1e-6
     )
     anchor: flag("Anchor", "Place an anchor")
+    hold_turn: flag("Hold Turn", "Hold how the surface is turned, too", default=True)
 
     def invoke(self, context, event):
         self.location = context.scene.cursor.location
@@ -125,7 +127,8 @@ class ARAPFIELDS_OT_pin_add(PinOperator, bpy.types.Operator):
     def change(self, context, source):
         if source is None:
             raise UserError("Select a mesh object")
-        pins.place(context, source, np.array(self.location), self.radius, anchor=self.anchor)
+        kind = "PIN" if self.hold_turn else "POINT"
+        pins.place(context, source, np.array(self.location), self.radius, anchor=self.anchor, kind=kind)
 
 
 class ARAPFIELDS_OT_pin_delete(PinOperator, bpy.types.Operator):
@@ -171,6 +174,7 @@ class ARAPFIELDS_OT_pin_turn(PinOperator, bpy.types.Operator):
         except (UserError, ValueError) as error:
             return self.refuse(error)
         sessions.live[source.session_uid].keeps_shape = True
+        pins.entry_of(empty).hold_turn = True
         return bpy.ops.transform.rotate("INVOKE_DEFAULT") and {"FINISHED"}
 
 

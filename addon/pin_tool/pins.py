@@ -7,6 +7,7 @@ from mathutils import Matrix
 
 from ..blender import object_references
 from ..blender.object_references import owner_of, settings_of
+from ..blender.property_definitions import listeners
 from ..carried import carried_objects
 from ..core.errors import UserError
 from ..core.geometry.handles import box_matrix
@@ -18,6 +19,7 @@ from ..results import placement
 from . import places
 
 REACH_STEP = 1.1  # how many times as far a handle reaches by one step of the wheel
+KEPT = 0.3  # of the shape's size beyond which the rest is kept, at first
 MAJORITY = 0.5  # mean weight from which a vertex group gives a pin its name
 
 
@@ -31,7 +33,7 @@ def refusal(item):
     settings = settings_of(item) if error is None else None
     if settings is not None and not placement.in_place(settings.output, settings.target):
         error = UserError(
-            "Pins move {name} itself; choose Original Mesh as its output, and no New Object as its result",
+            "Pins move {name} itself; choose Original Mesh as its geometry, and store it as no New Object",
             item,
         )
     return error
@@ -79,7 +81,7 @@ def next_reach(source, entry, steps):
     return 0.0 if reach > size * 1.001 else max(reach, least)
 
 
-def place(context, source, location, radius, face=None, face_count=None, anchor=False):
+def place(context, source, location, radius, face=None, face_count=None, anchor=False, kind="PIN"):
     """A pin at a location on the shown surface, (3,) in world space; returns its handle.
 
     Where the surface is deformed the pin is at rest where that place was, so that nothing moves.
@@ -87,18 +89,35 @@ def place(context, source, location, radius, face=None, face_count=None, anchor=
     error = refusal(source)
     if error is not None:
         raise error
-    settings = settings_of(source)
-    if not empties.used(source):
-        settings.hold_far = True
+    settings, is_first = settings_of(source), not empties.used(source)
     place = places.find(context, source, location, radius, face, face_count)
+    if is_first:
+        settings.keep_rest, settings.keep_beyond = True, KEPT * place.size
     now, rest = np.eye(4), np.eye(4)
     now[:3, :3], now[:3, 3], rest[:3, 3] = place.turn, place.now, place.rest
     empty = empties.make_empty(context, source, Matrix(now.tolist()), radius, name(source, place.weights))
-    entry = empties.add(source, empty, "PIN")
+    entry = empties.add(source, empty, kind)
     entry.rest = (inverse(empties.matrix_of(source)) @ box_matrix(rest, radius)).ravel()
     entry.anchor = anchor
     select(context, empty)
     return entry
+
+
+def hold_turn(entry, holds):
+    """Makes a pin hold its turn as well, as the surface is turned now, or its place alone."""
+    if entry.kind not in empties.PINS or holds == (entry.kind == "PIN"):
+        return
+    source, empty = entry.id_data, entry.empty
+    if holds:
+        location = np.array(empty.matrix_world.translation)
+        place = places.find(bpy.context, source, location, empty.empty_display_size)
+        empty.matrix_world = Matrix.LocRotScale(
+            empty.matrix_world.translation, Matrix(place.turn.tolist()), empty.matrix_world.to_scale()
+        )
+    entry.kind = "PIN" if holds else "POINT"
+
+
+listeners["hold_turn"] = hold_turn
 
 
 def name(source, weights):
@@ -138,7 +157,7 @@ def remove(context, source, empty):
         if with_empties:
             select(context, with_empties[-1].empty)
         return
-    settings_of(source).hold_far = False
+    settings_of(source).hold_far = settings_of(source).keep_rest = False
     sessions.end(context, source)
     motion.remove(source)
     carried_objects.give_back_all(source)

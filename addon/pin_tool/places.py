@@ -24,6 +24,7 @@ class Place:
     rest: np.ndarray  # (3,) in world space, of the shape before the field
     now: np.ndarray  # (3,) where the field has it
     turn: np.ndarray  # (3, 3) the rotation of the surface about it from rest
+    size: float  # of the shape at rest, in the object's lengths
     weights: dict  # mean weight of the points about it in each vertex group, by name
 
 
@@ -48,7 +49,8 @@ def find(context, source, location, radius, face=None, face_count=None):
         at_rest, moved = map_back(now, rest, chosen, location)
         about = around(rest, at_rest, radius)
         weights = group_weights(source, mesh, about)
-    return Place(at_rest, moved, best_rotation(rest[about], now[about]), weights)
+    size = float(np.linalg.norm(np.ptp(rest, axis=0)) / np.cbrt(abs(np.linalg.det(world[:3, :3])) or 1.0))
+    return Place(at_rest, moved, best_rotation(rest[about], now[about]), size, weights)
 
 
 def near(points, triangles, location):

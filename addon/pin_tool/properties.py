@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..blender.property_definitions import collection, integer
+from ..blender.property_definitions import collection, flag, integer
 from ..poses.properties import ARAPFIELDS_PG_pose
 
 
@@ -18,6 +18,9 @@ class ARAPFIELDS_PG_scene(bpy.types.PropertyGroup):
         min=2,
         soft_max=200,
         max=2000,
+    )
+    pin_holds_turn: flag(
+        "Hold Turn", "New pins hold how the surface is turned, too; without it a lifted hoof hangs naturally"
     )
 
 

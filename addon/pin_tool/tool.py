@@ -6,6 +6,7 @@ from pathlib import Path
 import bpy
 
 from ..blender.host import has_window
+from ..blender.object_references import settings_of, source_of
 from ..names import TOOL, Op
 
 ICON = str(Path(__file__).resolve().parents[1] / "icons" / "pin")  # Blender adds .dat
@@ -44,7 +45,14 @@ class ARAPFIELDS_TOOL_pin(bpy.types.WorkSpaceTool):
     )
 
     def draw_settings(context, layout, tool):
+        source = source_of(context)
         layout.prop(context.scene.arapfields, "pin_radius")
+        layout.prop(context.scene.arapfields, "pin_holds_turn")
+        if source is not None:
+            settings = settings_of(source)
+            layout.prop(settings.deform, "symmetry")
+            if settings.handles:
+                layout.prop(settings, "keep_rest")
 
 
 def register():

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..blender.section import Advanced
+from ..blender.section import Section
 from ..names import Op
 
 
@@ -10,9 +10,10 @@ class ARAPFIELDS_UL_poses(bpy.types.UIList):
         layout.prop(item, "name", text="", emboss=False, icon="ARMATURE_DATA")
 
 
-class ARAPFIELDS_PT_poses(Advanced, bpy.types.Panel):
+class ARAPFIELDS_PT_poses(Section, bpy.types.Panel):
     bl_label = "Poses"
-    bl_order = 4
+    bl_order = 7
+    bl_options = {"DEFAULT_CLOSED"}
 
     def fill(self, context, source, settings):
         group, layout = context.scene.arapfields, self.layout

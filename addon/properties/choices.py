@@ -25,14 +25,14 @@ quality = partial(
 )
 style = partial(choice, STYLE_ITEMS, "Style", "The solid whose faces the surface turns towards")
 orientation = partial(choice, ORIENTATIONS, "Orientation", "Along which axes the style stands")
-output = partial(choice, OUTPUTS, "Output", "What the result is made of")
+output = partial(choice, OUTPUTS, "Geometry", "What the result is made of")
 surface = partial(
     choice,
     SURFACES,
     "Surface",
     "What the implicit surface is made of, which solves sample and new meshes show",
 )
-result = partial(choice, RESULT_ITEMS, "Result", "Where the result goes", default="MODIFIER")
+result = partial(choice, RESULT_ITEMS, "Store As", "Where the result goes", default="MODIFIER")
 
 
 def extraction(**extra):

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..blender.property_definitions import annotations, flag, pointer, text
+from ..blender.property_definitions import flag, group_annotations, pointer, text
 from ..core.settings.parameters import DEFORM, FIT, QUALITIES
 from ..core.settings.styles import STYLIZE
 from .choices import orientation, quality, style
@@ -15,7 +15,7 @@ def apply_quality(group, context):
 
 
 def group(name, parameters, **further):
-    annotated = {**further, **annotations(parameters)}
+    annotated = {**further, **group_annotations(parameters)}
     return type(name, (bpy.types.PropertyGroup,), {"__annotations__": annotated})
 
 

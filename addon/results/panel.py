@@ -9,7 +9,7 @@ from ..names import Op
 
 class ARAPFIELDS_PT_result(Advanced, bpy.types.Panel):
     bl_label = "Result"
-    bl_order = 3
+    bl_order = 5
 
     def fill(self, context, source, settings):
         layout = self.layout

@@ -116,7 +116,7 @@ def refusal(source, output, result):
     if reason is None and result == "REPLACE" and settings_of(source).carried:
         reason = UserError("{name} carries other objects; choose Modifier for the result", source)
     if reason is None and output != "WARP" and result == "KEY":
-        reason = UserError("A shape key keeps the mesh; choose Original Mesh for the output")
+        reason = UserError("A shape key keeps the mesh; choose Original Mesh as its geometry")
     if reason is None and output == "WARP" and not keeps_mesh(output, result):
         reason = refusal_of_stack(source)
     return reason

@@ -11,13 +11,13 @@ from .painted import PRESETS
 class ARAPFIELDS_OT_stiffness_preset(SourceOperator, bpy.types.Operator):
     """Make the painted part of this material: the active vertex group where none is chosen"""
 
-    bl_label = "Material"
+    bl_label = "Stiffness Preset"
     guide = "characters"
     bl_options = {"REGISTER", "UNDO"}
 
     material: choice(
         tuple((key, label, tip) for key, (label, tip, _) in PRESETS.items()),
-        "Material",
+        "Stiffness Preset",
         "How stiff the painted part is",
     )
 

@@ -8,11 +8,11 @@ from . import painted
 
 class ARAPFIELDS_PT_stiffness(Advanced, bpy.types.Panel):
     bl_label = "Painted Stiffness"
-    bl_order = 2
+    bl_order = 4
 
     def fill(self, context, source, settings):
         layout, group = self.layout, settings.stiffness
-        layout.operator_menu_enum(Op.STIFFNESS_PRESET, "material", icon="MATERIAL")
+        layout.operator_menu_enum(Op.STIFFNESS_PRESET, "material", icon="PRESET")
         group_row(layout, group, "group", source, "times")
         group_row(layout, group, "bend_group", source, "bend_times")
         group_row(layout, group, "mask", source)

@@ -14,14 +14,12 @@ def factor(name, description):
 
 class ARAPFIELDS_PG_stiffness(bpy.types.PropertyGroup):
     group: text(
-        "Stiff Part", "Vertex group that is as many times as stiff as is chosen where its weight is 1"
+        "Stiff Group", "Vertex group that is as many times as stiff as is chosen where its weight is 1"
     )
-    times: factor(
-        "Times as Stiff", "How stiff the group is against stretching and bending; below 1 it is softer"
-    )
-    bend_group: text("Bending Part", "Vertex group whose stiffness against bending alone is another")
+    times: factor("Multiplier", "How stiff the group is against stretching and bending; below 1 it is softer")
+    bend_group: text("Bend Group", "Vertex group whose stiffness against bending alone is another")
     bend_times: factor(
-        "Times against Bending", "How stiff that group is against bending; below 1 it folds more easily"
+        "Bend Multiplier", "How stiff that group is against bending; below 1 it folds more easily"
     )
 
     mask: text(

@@ -5,7 +5,7 @@ from ..blender.icons import icon
 from ..blender.object_references import settings_of, source_of
 from ..blender.section import Advanced, Section, job_button, note, presets, settings_column
 from ..core.settings.styles import CUSTOM, STYLIZE
-from ..live.panel import live_buttons
+from ..live.panel import live_buttons, playback_progress
 from ..names import Op
 from ..properties.choices import STYLE_ITEMS
 from ..results.placement import placement_refusal
@@ -55,6 +55,7 @@ class ARAPFIELDS_PT_stylize(Section, bpy.types.Panel):
         reason = style_settings.refusal(source)
         live_buttons(layout, source, "STYLIZE", reason)
         job_button(layout, Op.STYLIZE, "MOD_EDGESPLIT")
+        playback_progress(layout, source, "STYLIZE")
         note(layout, reason, placement_refusal(source))
 
 

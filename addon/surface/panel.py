@@ -3,13 +3,12 @@ import json
 
 import bpy
 
-from ..blender import mesh_arrays, modifier_stack, object_references
+from ..blender import mesh_arrays, object_references
 from ..blender.language import translated
 from ..blender.section import Advanced, Section, job_button, presets, settings_column, wrapped
 from ..blender.user_preferences import fit_cache
-from ..core.runtime import jobs, native
+from ..core.runtime import native
 from ..core.settings.parameters import FIT
-from ..jobs.panel import draw_progress
 from ..names import Op
 from . import staleness
 
@@ -28,8 +27,6 @@ class ARAPFIELDS_PT_source(Section, bpy.types.Panel):
         if native.problem():
             wrapped(layout, translated(native.problem()), icon="ERROR")
             return
-        if jobs.running() is not None:
-            draw_progress(layout, jobs.running())
         if source is None:
             layout.label(text="Select a mesh object", icon="INFO")
             return
@@ -40,26 +37,11 @@ class ARAPFIELDS_PT_source(Section, bpy.types.Panel):
         reason = object_references.refusal(source) or mesh_arrays.refusal(source)
         if reason:
             wrapped(layout, translated(reason), icon="ERROR")
-        for text in remarks(source):
-            wrapped(layout, text, icon="INFO")
-
-
-def remarks(source):
-    """What the user should know about how the source is read."""
-    in_place = object_references.settings_of(source).in_place
-    shown = modifier_stack.shown_before(source, in_place)
-    after = [m.name for m in modifier_stack.shown_before(source, False) if m not in shown]
-    if shown:
-        yield translated("Read with its modifiers applied ({count})", count=len(shown))
-    if after:
-        yield translated("Read before {names}", names=", ".join(after))
-    if source.data.shape_keys:
-        yield translated("Read with its shape keys as they are set")
 
 
 class ARAPFIELDS_PT_advanced(Section, bpy.types.Panel):
     bl_label = "Advanced"
-    bl_order = 5
+    bl_order = 9
     bl_options = {"DEFAULT_CLOSED"}
 
     def fill(self, context, source, settings):

@@ -8,8 +8,9 @@ from mathutils import Matrix
 from ..blender import mesh_arrays
 from ..blender.object_references import in_scene, settings_of
 from ..core.errors import UserError
-from ..core.geometry.spaces import transform
+from ..core.geometry.spaces import inverse, transform
 from ..handles.empties import make_empty, matrix_of
+from ..handles.palette import free_colour
 from ..pin_tool import places
 
 SIZE = 0.02  # of an Empty, as a share of the object's
@@ -72,8 +73,11 @@ def place(context, source, target, rest, on_target):
         empty_at(context, source, at_rest, f"Landmark {number}"),
         empty_at(context, target, at_target, f"Landmark {number} {target.name}"),
     ]
-    entry = settings_of(source).wrap.landmarks.add()
+    wrap = settings_of(source).wrap
+    colour = free_colour(wrap.landmarks)
+    entry = wrap.landmarks.add()
     entry.rest, entry.on_target = ends
+    entry.colour = colour
     return entry
 
 
@@ -88,6 +92,22 @@ def empty_at(context, owner, where, name):
     empty.parent = owner
     empty.matrix_world = matrix
     return empty
+
+
+def mirror(context, source):
+    """The pairs again across both objects' X; returns how many: none in the middle, nor twice."""
+    target, flip = target_of(source), np.diag([-1.0, 1.0, 1.0, 1.0])
+    worlds = [matrix_of(source), matrix_of(target)]
+    pairs = [[matrix_of(item)[:3, 3] for item in (e.rest, e.on_target)] for e in used(source)]
+    near = SIZE * np.linalg.norm(np.ptp(transform(worlds[0], np.array(source.bound_box)), axis=0))
+    made = 0
+    for pair in list(pairs):
+        others = [transform(w @ flip @ inverse(w), p[None])[0] for w, p in zip(worlds, pair, strict=True)]
+        if all(np.linalg.norm(others[0] - rest) > near for rest, _ in pairs):
+            place(context, source, target, *others)
+            pairs.append(others)
+            made += 1
+    return made
 
 
 def remove(source, index):

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..blender import mesh_arrays
 from ..blender.host import has_window
+from ..blender.language import translated
 from ..blender.native_options import options_of
 from ..blender.object_references import settings_of
 from ..blender.presets import preset_classes
@@ -147,6 +148,24 @@ class ARAPFIELDS_OT_remove_landmark(SourceOperator, bpy.types.Operator):
             landmarks.remove(source, self.index)
 
 
+class ARAPFIELDS_OT_mirror_landmarks(SourceOperator, bpy.types.Operator):
+    """Add the pairs of landmarks again on the other side of both objects, across their X axes"""
+
+    bl_label = "Mirror Landmarks"
+    bl_options = {"REGISTER", "UNDO"}
+    guide = "wrap"
+
+    @classmethod
+    def refuses(cls, source):
+        return landmarks.refusal(source) or (
+            None if landmarks.used(source) else UserError("No landmarks yet")
+        )
+
+    def change(self, context, source):
+        count = landmarks.mirror(context, source)
+        return translated("{count} pairs of landmarks added", count=count)
+
+
 class ARAPFIELDS_OT_reset_bones(SourceOperator, bpy.types.Operator):
     """Put the bones at rest back to where they were before they were fitted to the wrapped shape"""
 
@@ -167,5 +186,6 @@ CLASSES = [
     ARAPFIELDS_OT_reset_bones,
     ARAPFIELDS_OT_add_landmark,
     ARAPFIELDS_OT_remove_landmark,
+    ARAPFIELDS_OT_mirror_landmarks,
     *preset_classes("wrap", "Wrap", WRAP),
 ]

@@ -2,6 +2,7 @@
 import bpy
 
 from ..blender import modifier_stack
+from ..blender.object_references import in_scene
 from ..blender.section import Advanced, Section, job_button, note, presets, settings_column
 from ..carried import rest_bones
 from ..core.settings.parameters import WRAP
@@ -11,9 +12,22 @@ from ..results.placement import placement_refusal
 from . import landmarks
 
 
+class ARAPFIELDS_UL_landmarks(bpy.types.UIList):
+    def draw_item(self, context, layout, data, item, icon, active_data, active_propname, index):
+        row = layout.row(align=True)
+        swatch = row.row()
+        swatch.ui_units_x = 0.8
+        swatch.prop(item, "colour", text="")
+        if in_scene(item.rest) and in_scene(item.on_target):
+            row.prop(item.rest, "name", text="", emboss=False)
+        else:
+            row.label(text="(deleted)", icon="ERROR")
+        row.label(text=str(index + 1), translate=False)
+
+
 class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
     bl_label = "Wrap"
-    bl_order = 3
+    bl_order = 4
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw_header_preset(self, context):
@@ -23,12 +37,12 @@ class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
         layout, wrap = self.layout, settings.wrap
         layout.prop(wrap, "onto")
         layout.operator(Op.CLICK_LANDMARKS, icon="PINNED")
-        for index, entry in enumerate(wrap.landmarks):
-            row = layout.row(align=True)
-            row.use_property_split = False
-            row.prop(entry, "rest", text="")
-            row.prop(entry, "on_target", text="")
-            row.operator(Op.REMOVE_LANDMARK, text="", icon="X").index = index
+        row = layout.row()
+        row.template_list("ARAPFIELDS_UL_landmarks", "", wrap, "landmarks", wrap, "active_landmark", rows=3)
+        column = row.column(align=True)
+        column.operator(Op.REMOVE_LANDMARK, text="", icon="REMOVE").index = wrap.active_landmark
+        column.separator()
+        column.operator(Op.MIRROR_LANDMARKS, text="", icon="MOD_MIRROR")
         settings_column(layout, wrap, WRAP, advanced=False)
         if rest_bones.armatures_of(source):
             layout.prop(wrap, "fit_rig")
@@ -59,4 +73,4 @@ class ARAPFIELDS_PT_wrap_settings(Advanced, bpy.types.Panel):
         settings_column(self.layout, settings.wrap, WRAP, advanced=True)
 
 
-CLASSES = [ARAPFIELDS_PT_wrap, ARAPFIELDS_PT_wrap_settings]
+CLASSES = [ARAPFIELDS_UL_landmarks, ARAPFIELDS_PT_wrap, ARAPFIELDS_PT_wrap_settings]

@@ -3,12 +3,22 @@
 
 import bpy
 
-from ..blender.property_definitions import annotations, collection, flag, pointer
+from ..blender.property_definitions import annotations, collection, colour, flag, integer, pointer
+from ..blender.selection import select_alone
 from ..core.settings.parameters import WRAP
 
 
 def is_target(group, item):
     return item.type == "MESH" and item != group.id_data
+
+
+def row_chosen(wrap, context):
+    """Both Empties of the pair are selected."""
+    if wrap.active_landmark < len(wrap.landmarks):
+        pair = wrap.landmarks[wrap.active_landmark]
+        for item in (pair.on_target, pair.rest):
+            if item is not None:
+                select_alone(context, item, extend=item == pair.rest)
 
 
 def fit_rig(**extra):
@@ -23,6 +33,7 @@ def fit_rig(**extra):
 class ARAPFIELDS_PG_landmark(bpy.types.PropertyGroup):
     rest: pointer(bpy.types.Object, "Landmark", "Empty on the object at rest")
     on_target: pointer(bpy.types.Object, "On the Target", "Empty where it belongs on the target")
+    colour: colour("Colour of the landmark in the viewport")
 
 
 class ARAPFIELDS_PG_wrap(bpy.types.PropertyGroup):
@@ -34,6 +45,9 @@ class ARAPFIELDS_PG_wrap(bpy.types.PropertyGroup):
             poll=is_target,
         ),
         "landmarks": collection(ARAPFIELDS_PG_landmark, "Landmarks", "Pairs of places that belong together"),
+        "active_landmark": integer(
+            "Active Landmark", "Row chosen in the list of landmarks", update=row_chosen
+        ),
         "fit_rig": fit_rig(),
         **annotations(WRAP),
     }

@@ -12,7 +12,7 @@ BLOCK_KEYS = {
 }
 OPTION_KEYS = {
     *("type", "default", "automatic", "range", "soft", "unit", "label", "sentence"),
-    *("choices", "enum", "call", "alias"),
+    *("choices", "enum", "call", "alias", "zero", "methods", "needs"),
 }
 
 
@@ -39,7 +39,8 @@ def resolved(path=TABLE):
     A dict with `struct`, `python`, `about`, `checks`, `groups`, `options`, `panel`, `advanced`, `presets`,
     and `further`: what the panel shows beside the struct's own options. An option is a dict with `name`,
     `group` (that of the struct in which it is nested, or ""), `type`, `default`, `low`, `high`, `soft_low`,
-    `soft_high`, `unit`, `label`, `sentence`, `choices`, `enum`, `automatic`, `alias`.
+    `soft_high`, `unit`, `label`, `sentence` (with what 0 stands for; `plain` without), `zero`, `choices`,
+    `enum`, `automatic`, `alias`, `methods`, `needs`.
     """
     table = read(path)
     return {name: _resolve(table, name) for name, block in table.items() if "struct" in block}
@@ -113,8 +114,13 @@ def _option(key, declared, group):
         "soft_low": soft_low,
         "soft_high": soft_high,
     }
-    for further in ("unit", "label", "sentence", "enum", "alias"):
+    for further in ("unit", "label", "sentence", "enum", "alias", "needs"):
         option[further] = declared.get(further, "")
+    for further in ("zero", "methods"):
+        option[further] = declared.get(further, [])
+    option["plain"] = option["sentence"]
+    if option["zero"]:
+        option["sentence"] += f"; 0 for {option['zero'][1]}"
     for further in ("choices", "automatic"):
         option[further] = declared.get(further, {})
     if type(option["default"]) is not kind:

@@ -25,16 +25,48 @@ def test_everyday_sections_come_first_and_numbers_are_under_advanced():
     jobs.board.messages.clear()
     panels = {name: getattr(bpy.types, name) for name in shown_texts if "_PT_" in name}
     first = {n: cls.bl_order for n, cls in panels.items() if not hasattr(cls, "bl_parent_id")}
-    order = ["source", "handles", "deform", "stylize", "wrap", "carried", "status", "advanced"]
+    folded = ["wrap", "carried", "secondary", "poses", "animation", "advanced"]
+    order = ["source", "handles", "deform", "stylize", *folded, "status"]
     assert sorted(first, key=first.get) == [f"ARAPFIELDS_PT_{name}" for name in order]
     closed = {name for name, cls in panels.items() if "DEFAULT_CLOSED" in getattr(cls, "bl_options", ())}
-    folded = {f"ARAPFIELDS_PT_{name}" for name in ("advanced", "carried", "wrap")}
-    assert closed == {*panels} - {*first} | folded
-    jargon = {"Samples", "Iterations", "Network Width", "Handle Weight", "Output", "Resolution", "Time Limit"}
+    assert closed == {*panels} - {*first} | {f"ARAPFIELDS_PT_{name}" for name in folded}
+    jargon = {"Samples", "Iterations", "Handle Weight", "Geometry", "Resolution", "No Limit"}
     for name, texts in shown_texts.items():
         if name in first:
             assert not jargon & {*texts}, name
     assert jargon <= {text for texts in shown_texts.values() for text in texts}
+
+
+def test_advanced_shows_what_counts_for_the_method_alone():
+    deform = scenes.bar().arapfields.deform
+    for field, fall_off, shown in (("auto", False, set()), ("radial", True, {"Falloff"})):
+        deform.field, deform.exact_handles = field, fall_off
+        texts = {*drawn()["ARAPFIELDS_PT_deform_settings"]}
+        assert texts & {"Falloff", "Network Width", "Start", "Optimizer"} == shown and "Iterations" in texts
+    for field, start in (("neural", True), ("invertible", False)):
+        deform.field = field
+        texts = {*drawn()["ARAPFIELDS_PT_deform_settings"]}
+        assert {"Network Width", "Optimizer"} <= texts and ("Start" in texts) == start
+    deform.field, deform.width = "auto", 64  # which makes the method neural
+    assert "Network Width" in drawn()["ARAPFIELDS_PT_deform_settings"]
+
+
+def test_a_switch_stands_for_zero_and_numbers_go_one_way():
+    style = scenes.bar().arapfields.stylize
+    assert style.sharpness_is_zero and style.sharpness == 0.0
+    style.sharpness_is_zero = False
+    assert style.sharpness == style.sharpness_above_zero == 8.0
+    style.sharpness_above_zero = 0.0  # nearly off, and not automatic
+    assert 0 < style.sharpness < 0.01 and not style.sharpness_is_zero
+    style.sharpness = 9.0  # as scripts and files say it
+    assert style.sharpness_above_zero == 9.0 and not style.sharpness_is_zero
+    for frame, value in ((1, 2.0), (11, 4.0)):
+        style.sharpness_above_zero = value
+        style.keyframe_insert("sharpness_above_zero", frame=frame)
+    bpy.context.scene.frame_set(6)
+    assert 2.5 < style.sharpness < 3.5
+    style.sharpness_is_zero = True
+    assert style.sharpness == 0.0
 
 
 REFUSED = {

@@ -37,7 +37,7 @@ EXPECTED = {
     "nothing": ("ARAPFIELDS_PT_source", "Select a mesh object"),
     "a camera": ("ARAPFIELDS_PT_source", "Select a mesh object"),
     "a mesh": ("ARAPFIELDS_PT_surface", "Not fitted yet"),
-    "modifiers and keys": ("ARAPFIELDS_PT_source", "Read before S"),
+    "modifiers and keys": ("ARAPFIELDS_PT_status", "Read before S"),
     "edit mode": ("ARAPFIELDS_PT_source", "Bar is in Edit Mode; leave it first"),
     "a handle active": ("ARAPFIELDS_PT_source", "Bar"),
     "a deleted handle": ("ARAPFIELDS_PT_handles", "(deleted)"),
@@ -45,7 +45,7 @@ EXPECTED = {
     "fit cleared": ("ARAPFIELDS_PT_surface", "Fit was cleared"),
     "custom style": ("ARAPFIELDS_PT_stylize", "Normals Of"),
     "live": ("ARAPFIELDS_PT_deform", "Keep Shape"),
-    "running": ("ARAPFIELDS_PT_source", "Cancel"),
+    "running": ("ARAPFIELDS_PT_status", "Deform 0%"),
     "a failure": ("ARAPFIELDS_PT_status", "Bar: the mesh has no faces"),
     "library missing": ("ARAPFIELDS_PT_source", "The native library is not part of this"),
 }
@@ -65,7 +65,7 @@ def test_the_panel_draws(state):
     else:
         said = "ARAPFIELDS_PT_status" in shown
         assert len(shown) == 16 + said and said == (
-            state in ("fitted", "fit cleared", "running", "a failure")
+            state in ("modifiers and keys", "fitted", "fit cleared", "running", "a failure")
         )
     if state in EXPECTED:
         section, text = EXPECTED[state]

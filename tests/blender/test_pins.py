@@ -35,7 +35,7 @@ def test_without_anything_that_holds_the_shape_follows_as_a_whole():
     bar = scenes.bar()
     rest = scenes.world_points(bar)
     empty = pin(bar, (1.0, 0.0, 0.25))
-    bar.arapfields.hold_far = False
+    bar.arapfields.keep_rest = False
     empty.location.z += 0.5
     step(refined=True)
     assert np.abs(scenes.world_points(bar) - rest - [0, 0, 0.5]).max() < 0.02

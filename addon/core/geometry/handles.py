@@ -11,6 +11,7 @@ from .spaces import inverse, rigid_motion
 PIN_SAMPLES = 12  # of the surface that a pin holds at least: those nearest to it
 FAR_SHARE = 0.5  # of the largest distance from all pins: what is farther is far
 FAR_WEIGHT = 0.02  # with which what is far holds its place, relative to a pin
+REST_WEIGHT = 0.1  # with which the rest is kept
 BONE_GAP = 0.25  # of a bone's width by which what it holds is nearer to it than to any other bone
 BONE_LIMIT = 4.0  # widths within which a bone that holds nothing takes what is nearest
 ANCHOR_TOLERANCE = 1e-5  # motion, relative to the box, below which a handle is an anchor
@@ -31,6 +32,8 @@ class Handle:
     weight: float = 1.0  # how strictly it is followed, relative to others
     reach: float = 0.0  # how far it moves things, through the inside; 0: everything
     allow_scale: bool = False  # whether the motion may be any affine map that keeps the box's orientation
+    centers: np.ndarray | None = None  # FAR: (k, 3) from which it is far
+    beyond: float = 0.0  # FAR: how far; 0: a share of the largest distance
 
     @property
     def is_anchor(self):
@@ -129,13 +132,13 @@ def nothing_held(names):
     return UserError("No part of the surface lies in the rest region of {names}", names=", ".join(names))
 
 
-def far_handle():
-    """Stands for an anchor where there is none: what is far from all pins holds its place, weakly."""
-    return Handle("", "FAR", np.eye(4), np.eye(4), weight=FAR_WEIGHT)
+def far_handle(centers, beyond):
+    """What is far from these (k, 3) centers holds its place: an anchor for all that no pin moves."""
+    weight = REST_WEIGHT if beyond else FAR_WEIGHT
+    return Handle("", "FAR", np.eye(4), np.eye(4), weight=weight, centers=centers, beyond=beyond)
 
 
-def far_from(handles, points):
-    """Indices of the points that are far from all pins, in solve space at rest."""
-    centers = np.array([handle.rest[:3, 3] for handle in handles if handle.kind != "FAR"])
-    away = np.linalg.norm(points[:, None] - centers, axis=2).min(axis=1)
-    return np.flatnonzero(away >= FAR_SHARE * away.max())
+def far_from(handle, points):
+    """Indices of the points that are far from a FAR handle's centers, in solve space at rest."""
+    away = np.linalg.norm(points[:, None] - handle.centers, axis=2).min(axis=1)
+    return np.flatnonzero(away >= (handle.beyond or FAR_SHARE * away.max()))

@@ -3,7 +3,7 @@
 
 EMPTY_KINDS = (  # of handles that Empties move
     ("CUBE", "Region", "What lies in the box at rest follows the Empty"),
-    ("POINT", "Point", "The point of the surface nearest to the Empty at rest follows it"),
+    ("POINT", "Point Pin", "The point of the surface nearest to the Empty at rest follows it"),
     ("GROUP", "Vertex Group", "What a vertex group of the object holds follows the Empty"),
     ("PIN", "Pin", "A small round region of the surface follows the Empty"),
 )

@@ -23,6 +23,20 @@ class Parameter:
     soft_high: float | None = None
     items: tuple = ()  # (identifier, label, tip) of a choice
     advanced: bool = False
+    plain: str = ""  # the tip without what 0 stands for
+    zero: tuple = ()  # (label of a switch, what 0 stands for, value instead)
+    methods: tuple = ()  # the fields on which it acts; none: all
+    needs: str = ""  # the switch without which it does nothing
+
+    @property
+    def switch(self):
+        """Name of the switch in the place of 0."""
+        return f"{self.name}_is_zero"
+
+    @property
+    def number(self):
+        """Name of the setting as a number that is never 0."""
+        return f"{self.name}_above_zero"
 
 
 def read_table():
@@ -61,6 +75,10 @@ def parameter(option, advanced=False):
         option["soft_high"],
         tuple((name, label, tip) for name, (label, tip) in choices),
         advanced,
+        option["plain"],
+        tuple(option["zero"]),
+        tuple(option["methods"]),
+        option["needs"],
     )
 
 
@@ -74,6 +92,21 @@ def parameters(operation):
     return [parameter(options[name]) for name in plain] + [
         parameter(options[name], advanced=True) for name in block["advanced"]
     ]
+
+
+def method_of(group, parameters):
+    """The field that an operation's settings ask for; Automatic is neural where a network's option is set."""
+    field = getattr(group, "field", "neural")
+    if field != "auto":
+        return field
+    of_networks = [p for p in parameters if "neural" in p.methods]
+    return "neural" if any(getattr(group, p.name) != p.default for p in of_networks) else "radial"
+
+
+def counts(parameter, group, method):
+    """Whether a setting does anything beside the others."""
+    is_on = not parameter.needs or getattr(group, parameter.needs)
+    return is_on and (not parameter.methods or method in parameter.methods)
 
 
 def presets(operation):

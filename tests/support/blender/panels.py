@@ -79,8 +79,9 @@ def drawn():
                 continue
             texts = sections[cls.__name__] = []
             stand_in = type("Section", (), {"layout": Layout(texts), "fill": getattr(cls, "fill", None)})()
-            if hasattr(cls, "draw_header_preset"):
-                cls.draw_header_preset(stand_in, bpy.context)
+            for name in ("draw_header", "draw_header_preset"):
+                if hasattr(cls, name):
+                    getattr(cls, name)(stand_in, bpy.context)
             cls.draw(stand_in, bpy.context)
     return sections
 

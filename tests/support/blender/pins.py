@@ -28,7 +28,7 @@ def state(source):
         (o.name, o.location[:], o.rotation_euler[:], o.rotation_quaternion[:], o.scale[:])
         for o in bpy.data.objects
     ]
-    flags = settings.hold_far, settings.active_handle, settings.live_kind, layer.objects.active.name
+    flags = settings.keep_rest, settings.active_handle, settings.live_kind, layer.objects.active.name
     chosen = sorted(o.name for o in bpy.context.selected_objects)
     shape = scenes.world_points(source).tobytes()
     kinds = bpy.data.objects, bpy.data.meshes, bpy.data.node_groups, bpy.data.scenes, source.modifiers

@@ -12,7 +12,7 @@ from addon.core.runtime.native import ADVICE
 from addon.pin_tool.tool import ARAPFIELDS_TOOL_pin as tool
 
 ADDON = Path(__file__).resolve().parents[3] / "addon"
-UNTRANSLATED = {"", "X", "Y", "Z", "ARAP Fields", "{error}", "CUDA", "JSON", "Seed"}
+UNTRANSLATED = {"", " ", "X", "Y", "Z", "ARAP Fields", "{error}", "CUDA", "JSON", "Seed"}
 SAYS = {"translated", "UserError", "wrapped"}  # calls whose first argument is read by users
 MENU_ROWS = 2  # place of the text in the rows that menus are made of
 
