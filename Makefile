@@ -88,8 +88,9 @@ examples: build $(VENV)/.tools  ## the scenes of the workflow pages: out/example
 demo: build $(VENV)/.tools  ## pins, a hat carried, a style and a wrap on a dog: out/demo.png and out/demo.blend
 	$(PY) blender_scripts/demo.py --output out
 
-test: build $(NATIVE_TESTS)  ## all tests but the slow ones
-	$(ALL_TESTS) -m "not slow" tests
+TESTS := tests
+test: build $(NATIVE_TESTS)  ## all tests but the slow ones; TESTS="tests/python …" names some
+	$(ALL_TESTS) -m "not slow" $(TESTS)
 
 test-slow: build $(NATIVE_TESTS)  ## every test
 	$(ALL_TESTS) tests
