@@ -2,6 +2,7 @@
 """Where the frames of a bake go, and what they weigh."""
 
 import contextlib
+import os
 import re
 from pathlib import Path
 
@@ -92,7 +93,7 @@ def cache_path(source, suffix, folder, filepath=""):
         raise UserError("{folder}: no such folder", folder=path.parent) from None
     if bpy.data.filepath:
         with contextlib.suppress(ValueError):  # on another drive
-            shown = bpy.path.relpath(str(path))
+            shown = bpy.path.relpath(str(path)).replace(os.sep, "/")  # as other systems read it, too
     return path, shown
 
 

@@ -2,7 +2,6 @@
 """Bakes that cannot be: each is named, and the last good cache stays."""
 
 import os
-import resource
 import tempfile
 
 import pytest
@@ -18,6 +17,8 @@ pytestmark = pytest.mark.in_blender
 
 
 def test_whatever_goes_wrong_is_named_and_the_last_good_cache_stays():
+    import resource
+
     _, folder = saved_animation()
     bpy.ops.arapfields.bake(start=1, end=3)
     path = folder / "cache/Bar.pc2"

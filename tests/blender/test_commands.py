@@ -2,7 +2,6 @@
 """deform, stylize and batch as scripts of Python's bpy: real files in, real files out."""
 
 import json
-import resource
 import signal
 import subprocess
 import sys
@@ -36,12 +35,14 @@ def needs_bpy():
 @pytest.fixture
 def script(user_folder):
     def run(verb, *arguments, check=True, largest=None):
-        def limit():
-            if largest:  # bytes of a file: stands for a full disk
-                resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
+        def limit():  # bytes of a file: stands for a full disk
+            import resource
+
+            resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
 
         command = [sys.executable, str(ROOT / f"blender_scripts/{verb}.py"), *map(str, arguments)]
-        done = subprocess.run(command, env=user_folder, preexec_fn=limit, capture_output=True, text=True)
+        first = limit if largest else None
+        done = subprocess.run(command, env=user_folder, preexec_fn=first, capture_output=True, text=True)
         assert not check or done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
         return done
 

@@ -2,7 +2,6 @@
 """Alembic, USD and glTF with what the object does, read back by another Blender, by usd-core and by hand."""
 
 import json
-import resource
 import shutil
 import struct
 import subprocess
@@ -164,6 +163,8 @@ def test_usd_is_what_its_own_library_reads():
 
 @pytest.mark.parametrize("kind", ["ABC", "USD", "GLTF"])
 def test_an_export_that_fails_is_named_and_changes_nothing(kind):
+    import resource
+
     bar, folder = scene_to_export()
     bpy.ops.arapfields.bake()
     path = folder / f"Bar{dict(ABC='.abc', USD='.usdc', GLTF='.glb')[kind]}"

@@ -3,9 +3,7 @@
 
 import json
 import os
-import pty
 import subprocess
-import termios
 
 import numpy as np
 import pytest
@@ -232,6 +230,9 @@ def test_a_bar_is_drawn_on_a_terminal_alone(made, tmp_path, capsys):
 
 def on_a_terminal(command, environment):
     """What a command prints on stderr where that is a terminal of 100 columns."""
+    import pty
+    import termios
+
     try:
         terminal, side = pty.openpty()
     except OSError as error:

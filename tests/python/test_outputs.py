@@ -2,7 +2,6 @@
 """One writer for all outputs: whole or not at all, regular files alone, nothing left after a kill."""
 
 import os
-import resource
 import stat
 import subprocess
 import sys
@@ -142,6 +141,8 @@ def test_what_a_killed_process_left_is_removed_and_no_other(tmp_path):
 
 
 def small_disk():
+    import resource
+
     resource.setrlimit(resource.RLIMIT_FSIZE, (LIMIT, LIMIT))
 
 

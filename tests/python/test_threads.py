@@ -2,7 +2,6 @@
 """The library's own threads: a number for each call, the same results for all; libtorch's are left alone."""
 
 import os
-import resource
 import subprocess
 import sys
 import threading
@@ -103,6 +102,12 @@ def test_results_are_the_same_for_every_number_of_threads(name):
 def run_script(code, stack=None, **environment):
     """What a process prints; `stack` is the size of its threads' stacks, in bytes."""
     code = f"import sys; sys.path[:0] = [{TESTS!r}, {TESTS + '/python'!r}]\n{code}"
+
+    def small_stacks():
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_STACK, (stack, stack))
+
     # Of NumPy's BLAS nothing is wanted here: its threads would be taken for ours.
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", **environment}
     run = subprocess.run(
@@ -111,7 +116,7 @@ def run_script(code, stack=None, **environment):
         capture_output=True,
         text=True,
         timeout=300,
-        preexec_fn=stack and (lambda: resource.setrlimit(resource.RLIMIT_STACK, (stack, stack))),
+        preexec_fn=small_stacks if stack else None,
     )
     assert run.returncode == 0, f"{run.returncode}: {run.stdout}{run.stderr}"
     return run.stdout.strip()

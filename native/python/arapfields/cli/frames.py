@@ -79,6 +79,16 @@ class FrameStore:
 
         InvalidInput where the other solves something else. Where the file system has no locks all may work.
         """
+        first = False
+        try:
+            with self._one_run(part, places) as first:
+                yield first
+        finally:
+            if first and os.name == "nt" and self.folder.exists():  # Windows removes no open file
+                self.remove(())
+
+    @contextlib.contextmanager
+    def _one_run(self, part, places):
         self.folder.mkdir(exist_ok=True)
         made = "\n".join(place.name for place in places).encode()
         with open(self.folder / f"lock-{part}", "a+b") as file:
