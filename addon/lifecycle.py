@@ -12,8 +12,8 @@ from .blender.host import has_window
 from .blender.language import translated
 from .core.runtime import jobs, threads
 from .deform import first_result
-from .field_modifier import motion
-from .handles import held_counts, row_selection
+from .field_modifier import copies, motion
+from .handles import held_counts, left_behind, row_selection
 from .jobs.display import display
 from .live import recovery, rendering, sessions
 from .live.prefetch import prefetch
@@ -31,7 +31,7 @@ from .wrap import drawing as landmark_drawing
 def before_load(*_):
     """The file is about to go: whatever works on it ends, and nothing of it is applied."""
     passing = (jobs.board, held_counts.pending, staleness.changed, row_selection.seen, prefetch)
-    for state in (*passing, applying.solved, first_result.steps):
+    for state in (*passing, applying.solved, first_result.steps, left_behind.seen):
         state.clear()
     sessions.stop_all()
     jobs.forget_messages()
@@ -76,6 +76,10 @@ def after_update(scene, depsgraph):
         motion.written.clear()
         if not sessions.live.is_rendering:
             row_selection.follow(bpy.context)
+            left_behind.follow(bpy.context)
+            active = getattr(bpy.context, "active_object", None)
+            if active is not None and active.library is None:
+                copies.switch_off(active)
 
 
 @persistent
@@ -128,7 +132,7 @@ PARTS = (  # what begins with the extension, and how it ends
 # Timers are started by blender/timers.py, threads by core/runtime/threads.py.
 STATE = (jobs.board, display, sessions.live, held_counts.pending, staleness.changed, motion.written)
 STATE += (hover, prefetch, applying.solved, previews.shown, first_result.steps, row_selection.seen, timers)
-STATE += (style_object.cache,)
+STATE += (style_object.cache, left_behind.seen)
 
 LONGEST = 10.0  # seconds that the end of the process waits for a thread
 

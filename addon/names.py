@@ -39,6 +39,7 @@ class Op(StrEnum):
     SET_REST = "arapfields.set_rest"
     RESET_HANDLE = "arapfields.reset_handle"
     REMOVE_HANDLE = "arapfields.remove_handle"
+    DELETE_LEFT = "arapfields.delete_left"
     RESIZE_HANDLE = "arapfields.resize_handle"
     DEFORM = "arapfields.deform"
     EXTRACT = "arapfields.extract"

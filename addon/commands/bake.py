@@ -28,7 +28,7 @@ def run_bake(options, _):
     target = options.output.resolve() if options.output else None
     folder = options.folder.resolve() if options.folder else None
     files.read(options.input)
-    for place in (target, folder and folder / "cache"):
+    for place in (target, folder / "cache" if folder and folder.parent.is_dir() else None):
         if place:
             files.check_place(place)
     sources = objects_to_solve(options) if options.objects else animated(options)

@@ -26,6 +26,7 @@ PIN, ANCHOR, CORNERS = (
 ANGLES = np.linspace(0, 2 * np.pi, CORNERS, endpoint=False)
 SQUARE = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * 0.9
 CIRCLE = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
+ROUND = np.stack([np.cos(np.arange(0, 6.28, 0.08)), np.sin(np.arange(0, 6.28, 0.08))], axis=1)
 ARMS = np.linspace(np.pi, 2 * np.pi, 9)
 ANCHOR_STROKES = (  # of a square from -1 to 1
     np.array([(0, 0.45), (0, -0.65)]),
@@ -134,7 +135,7 @@ def draw_kept(brush, source):
     world = movers.matrix_of(source)
     radius = beyond * np.cbrt(abs(np.linalg.det(world[:3, :3])))
     for place in transform(world, np.array(places).reshape(-1, 3)) if radius else ():
-        brush.loop(KEPT, place + radius * (CIRCLE @ np.stack([brush.right, brush.up])), 1.5)
+        brush.loop(KEPT, place + radius * (ROUND @ np.stack([brush.right, brush.up])), 1.5)
 
 
 def draw_handle(brush, entry, target, is_chosen):

@@ -65,7 +65,7 @@ def segments(source, across=FLAT):
 def outline(kind, rest, now, thick):
     """[(width, line ends)] of a handle from its box at rest and now."""
     way = [rest[:3, 3].tolist(), now[:3, 3].tolist()]
-    if kind == "PIN":
+    if kind in empties.PINS:
         return [] if np.allclose(*way, atol=1e-6) else [(thick, way)]
     if np.allclose(rest, now, atol=1e-6):
         return [(thick, box_lines(rest))]
@@ -98,7 +98,7 @@ def ghosts(source, across=FLAT):
             continue
         rest, now = mirror @ rest, mirror @ now
         parts = outline(entry.kind, rest, now, THICK)
-        if entry.kind == "PIN":
+        if entry.kind in empties.PINS:
             rims = [(THIN, rest), (THICK, now)] if parts else [(THICK, now)]
             parts += [(width, circle_lines(box[:3, 3], radius_of(box), across)) for width, box in rims]
         lines += [(tuple(entry.colour), width, ends) for width, ends in parts]

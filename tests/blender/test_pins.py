@@ -11,6 +11,8 @@ if IN_BLENDER:
     from support.blender.live import WAIT, step
     from support.blender.pins import pin, state
 
+    from addon.core.geometry.rotations import best_rotation
+    from addon.handles import left_behind
     from addon.live import sessions
     from addon.live.prefetch import prefetch
     from addon.pin_tool import drag
@@ -101,6 +103,61 @@ def test_the_last_pin_takes_the_motion_with_it():
         assert len(bar.arapfields.handles) == left and len(bpy.data.objects) == left + 1
     assert not bar.modifiers and np.array_equal(scenes.world_points(bar), rest)
     assert bpy.context.view_layer.objects.active == bar
+
+
+def lifted(hold_turn, keeps):
+    """How far the middle of the bar went, and how its end turned (degrees): one end nailed, one lifted."""
+    bar = scenes.bar()
+    rest = scenes.world_points(bar)
+    pin(bar, (-0.95, 0.0, 0.25), anchor=True)
+    bar.arapfields.keep_rest = keeps
+    pin(bar, (0.95, 0.0, 0.25), target=(0.6, 0.0, 0.9), kind="PIN" if hold_turn else "POINT")
+    step(refined=True)
+    shift = scenes.world_points(bar) - rest
+    end = np.linalg.norm(rest - [0.95, 0.0, 0.25], axis=1) < 0.15
+    turn = best_rotation(rest[end], rest[end] + shift[end])
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    middle = np.abs(shift[np.abs(rest[:, 0] + 0.3) < 0.2]).mean()
+    return middle, np.degrees(np.arccos((np.trace(turn) - 1) / 2))
+
+
+def test_a_pin_of_place_lets_turn_and_the_rest_is_kept():
+    (loose, _), (kept, held), (_, hanging) = lifted(True, False), lifted(True, True), lifted(False, True)
+    assert kept < 0.5 * loose and held < 0.5 * hanging, (loose, kept, held, hanging)
+
+
+def test_a_pin_holds_its_turn_as_the_surface_is_turned_then():
+    bar = scenes.bar()
+    pin(bar, (-0.95, 0.0, 0.25), anchor=True)
+    pin(bar, (0.95, 0.0, 0.25), target=(0.6, 0.0, 0.9), kind="POINT")
+    step(refined=True)
+    before, entry = scenes.world_points(bar), bar.arapfields.handles[1]
+    assert entry.kind == "POINT" and not entry.hold_turn
+    entry.hold_turn = True
+    step(refined=True)
+    assert entry.kind == "PIN" and entry.empty.matrix_world.to_euler().y != 0
+    assert np.abs(scenes.world_points(bar) - before).max() < 0.1
+
+
+def test_a_second_copy_of_the_modifier_moves_nothing():
+    bar = scenes.bar()
+    pin(bar, (1.0, 0.0, 0.25), target=(1.0, 0.0, 0.6))
+    sessions.end(bpy.context, bar)
+    shown = scenes.world_points(bar)
+    scenes.activate(bar)
+    bpy.ops.object.modifier_copy(modifier=bar.modifiers[0].name)
+    bpy.context.view_layer.update()
+    assert len(bar.modifiers) == 2 and np.array_equal(scenes.world_points(bar), shown)
+
+
+def test_pins_of_a_deleted_source_can_go_along():
+    bar = scenes.bar()
+    pin(bar, (1.0, 0.0, 0.25), target=(1.0, 0.0, 0.6))
+    scenes.activate(bar)
+    bpy.ops.object.delete()
+    assert {source.name: len(items) for source, items in left_behind.of_deleted().items()} == {"Bar": 1}
+    assert bpy.ops.arapfields.delete_left(source="Bar") == {"FINISHED"}
+    assert not bpy.context.scene.objects
 
 
 def test_what_cannot_be_pinned_is_named():

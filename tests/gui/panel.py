@@ -3,6 +3,7 @@
 
 import bpy
 import stage
+import widths
 
 from addon.preferences import ARAPFIELDS_AP_preferences
 from addon.registration import CLASSES
@@ -22,6 +23,7 @@ def checks(figures, folder):
     yield 4.0  # sections slide to where they stay
     stage.picture(folder, "handles")
     yield from sections(folder, "panel")
+    figures["cut"] = widths.cut()
     figures["languages"] = len(bpy.app.translations.locales)
     if "de_DE" in bpy.app.translations.locales:
         view = bpy.context.preferences.view
@@ -29,6 +31,7 @@ def checks(figures, folder):
         yield 1.0
         yield from sections(folder, "german")
         yield from preferences(folder, "german-preferences")
+        figures["cut_in_german"] = widths.cut()
         view.language = "en_US"
         yield 1.0
     yield from preferences(folder, "preferences")

@@ -68,6 +68,12 @@ class Layout:
     column = box = grid_flow = row
 
 
+def shown():
+    """The sections that show."""
+    classes = [cls for module in registration.MODULES for cls in getattr(module, "CLASSES", [])]
+    return [cls for cls in classes if issubclass(cls, bpy.types.Panel) and cls.poll(bpy.context)]
+
+
 def drawn():
     """The texts of all sections that show, by section; menus are drawn as well."""
     sections = {}

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which labels of the panel Blender would cut off, by its own font: texts against the sidebar's width."""
+
+import blf
+import bpy
+import stage
+from support.blender import panels
+
+from addon.names import CONTEXT
+
+MARGINS, LABELS = 23, 0.4  # pixels beside what a section shows; share of it that labels before values have
+ICON, PADDING = 20, 8  # pixels at a scale of 1
+
+
+class Measured(panels.Layout):
+    """Notes (text, pixels that there are for it) of what it is asked to show."""
+
+    def __init__(self, found, width, row=None):
+        super().__init__([])
+        self.__dict__.update(found=found, width=width, buttons=row)
+
+    def note(self, text, room):
+        self.found.append((bpy.app.translations.pgettext_iface(text, CONTEXT), room))
+
+    def prop(self, data, name, **options):
+        super().prop(data, name, **options)
+        text, prop = self.texts.pop(), data.bl_rna.properties.get(name)
+        if prop is None or options.get("icon_only") or not text.strip():
+            return
+        values = (1 - LABELS) * self.width - PADDING
+        is_switch = prop.type == "BOOLEAN" and not options.get("icon")
+        self.note(text, values - ICON if is_switch else LABELS * self.width - PADDING)
+        for item in prop.enum_items if prop.type == "ENUM" and not options.get("expand") else ():
+            self.note(item.name, values - ICON)
+
+    def operator(self, name, **options):
+        given = super().operator(name, **options)
+        button = (self.texts.pop(), ICON if "icon" in options else 0)
+        if self.buttons is None:
+            self.note(button[0], self.width - button[1] - PADDING)
+        else:
+            self.buttons.append(button)
+        return given
+
+    def label(self, text="", **options):
+        if options.get("translate", True) and self.buttons is None:
+            self.note(text, self.width - ICON)
+
+    def template_list(self, *_, **__):
+        """Rows have names of the user's."""
+
+    def row(self, heading="", **_):
+        if heading:
+            self.note(heading, LABELS * self.width - PADDING)
+        return Measured(self.found, self.width, [])
+
+    def column(self, **_):
+        return self
+
+    def menu(self, name, text=None, **options):
+        super().menu(name)
+
+
+def of_rows(found, row):
+    """Buttons of a row that have words share what those without leave."""
+    words = [(text, icon) for text, icon in row.buttons if text]
+    left = row.width - ICON * (len(row.buttons) - len(words))
+    for text, icon in words:
+        row.note(text, left / len(words) - icon - PADDING)
+
+
+def cut():
+    """Texts of the sections as they show now that are wider than their place, longest excess first."""
+    region = next(r for r in stage.view()[1].regions if r.type == "UI")
+    scale = bpy.context.preferences.system.ui_scale
+    style = bpy.context.preferences.ui_styles[0].widget.points
+    blf.size(0, style * scale)
+    found, rows = [], []
+
+    class Layout(Measured):
+        def row(self, **options):
+            row = super().row(**options)
+            rows.append(row)
+            return row
+
+    with stage.override():
+        for cls in panels.shown():
+            section = type("Section", (), {"layout": Layout(found, region.width / scale - MARGINS)})()
+            section.fill = cls.fill.__get__(section)
+            cls.draw(section, bpy.context)
+    for row in rows:
+        of_rows(found, row)
+    wide = {text: blf.dimensions(0, text)[0] / scale - room for text, room in found}
+    return sorted((f"{text} by {excess:.0f}" for text, excess in wide.items() if excess > 0), key=len)
