@@ -3,7 +3,6 @@
 
 import bpy
 import stage
-import widths
 
 from addon.preferences import ARAPFIELDS_AP_preferences
 from addon.registration import CLASSES
@@ -23,7 +22,6 @@ def checks(figures, folder):
     yield 4.0  # sections slide to where they stay
     stage.picture(folder, "handles")
     yield from sections(folder, "panel")
-    figures["cut"] = widths.cut()
     figures["languages"] = len(bpy.app.translations.locales)
     if "de_DE" in bpy.app.translations.locales:
         view = bpy.context.preferences.view
@@ -31,7 +29,6 @@ def checks(figures, folder):
         yield 1.0
         yield from sections(folder, "german")
         yield from preferences(folder, "german-preferences")
-        figures["cut_in_german"] = widths.cut()
         view.language = "en_US"
         yield 1.0
     yield from preferences(folder, "preferences")

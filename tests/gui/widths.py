@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which labels of the panel Blender would cut off, by its own font: texts against the sidebar's width."""
 
+from pathlib import Path
+
 import blf
 import bpy
 import stage
@@ -10,6 +12,27 @@ from addon.names import CONTEXT
 
 MARGINS, LABELS = 23, 0.4  # pixels beside what a section shows; share of it that labels before values have
 ICON, PADDING = 20, 8  # pixels at a scale of 1
+
+
+def checks(figures, folder):
+    """At the sidebar's first width, with all methods' settings in sight, in English and in German."""
+    bar, interface = bpy.data.objects["Bar"].arapfields, bpy.context.preferences.view
+    bar.surface = "FIT"
+    bar.deform.field = bar.stylize.field = "neural"
+    bar.deform.exact_handles = True
+    for language in {"en_US", "de_DE"} & {"en_US", *bpy.app.translations.locales}:
+        interface.language = language
+        yield 0.5
+        figures[f"cut_{language}"] = cut()
+    interface.language = "en_US"
+    theme = next(Path(one) for one in bpy.utils.preset_paths("interface_theme"))
+    with stage.override():
+        light = str(theme / "Blender_Light.xml")
+        bpy.ops.script.execute_preset(filepath=light, menu_idname="USERPREF_MT_interface_theme_presets")
+    yield 1.0
+    stage.picture(folder, "light")
+    bpy.ops.preferences.reset_default_theme()
+    yield 0.5
 
 
 class Measured(panels.Layout):
@@ -71,7 +94,8 @@ def of_rows(found, row):
 
 def cut():
     """Texts of the sections as they show now that are wider than their place, longest excess first."""
-    region = next(r for r in stage.view()[1].regions if r.type == "UI")
+    window, area, _ = stage.view()
+    region = next(one for one in area.regions if one.type == "UI")
     scale = bpy.context.preferences.system.ui_scale
     style = bpy.context.preferences.ui_styles[0].widget.points
     blf.size(0, style * scale)
@@ -83,7 +107,7 @@ def cut():
             rows.append(row)
             return row
 
-    with stage.override():
+    with bpy.context.temp_override(window=window, area=area, region=region):
         for cls in panels.shown():
             section = type("Section", (), {"layout": Layout(found, region.width / scale - MARGINS)})()
             section.fill = cls.fill.__get__(section)

@@ -26,7 +26,7 @@ import addon  # noqa: E402
 
 TOGETHER = {name: (name, {}) for name in ("panel", "use", "picks", "jobs", "stalls", "live", "press", "pins")}
 TOGETHER |= {name: (name, {}) for name in ("undo", "render", "table")} | {"wrap": ("wrapping", {})}
-TOGETHER |= {"endings": ("jobs", {"ending": True})}
+TOGETHER |= {"labels": ("widths", {}), "endings": ("jobs", {"ending": True})}
 SHORTER = {
     "picks-in-place": ("picks", {"in_place": True}),
     "pins-rate": ("pins", {"rate_alone": True}),
