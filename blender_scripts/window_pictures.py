@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[1]
 STEP, INNER = 28.4, 26.0  # from one closed section to the next, and within Advanced
 LEFT, WORDS = slice(0, 258), slice(8, 120)  # a section, and where its header has words
 HEADER = 22  # height of what is compared
-STATUS = 72  # height of the section of one line above Advanced
+STATUS = 72  # height of the section of one line, the last one
 SIDEBAR = (1028, 84, 1286, 904)
 SHOWN = (1280, 800)
 TOP = ("source", "handles", "deform", "stylize")
@@ -63,8 +63,8 @@ def of_panel(folder, target):
     closed, advanced = pixels(folder / "panel-closed.png"), pixels(folder / "panel-advanced.png")
     for row, name in enumerate(TOP):
         save(section(folder, name, row, closed, STEP, 0), target / f"panel-{name}.png")
-    first = found(next_header(closed, 5, STEP, 0), advanced) - 2 + STEP  # within Advanced
-    for name, row in zip(WITHIN, (0, 6), strict=True):
+    first = found(next_header(closed, 8, STEP, 0), advanced) - 2 + STEP  # within Advanced
+    for name, row in zip(WITHIN, (0, 5), strict=True):
         save(section(folder, name, row, advanced, INNER, first), target / f"panel-{name}.png")
     Image.open(folder / "panel-styles.png").convert("RGB").crop(MENU).save(
         target / "style-menu.png", optimize=True
@@ -87,8 +87,8 @@ def main():
         shown.resize(SHOWN, Image.Resampling.LANCZOS).save(options.to / f"blender-{name}.png", optimize=True)
         if name == "cancelled":
             sidebar = np.asarray(shown.crop(SIDEBAR), dtype=np.int16)
-            end = found(next_header(closed, 5, STEP, 0), sidebar) - 2
-            save(sidebar[end - STATUS : end, LEFT], options.to / "panel-status.png")
+            start = found(next_header(closed, 9, STEP, 0), sidebar) - 2
+            save(sidebar[start : start + STATUS, LEFT], options.to / "panel-status.png")
 
 
 if __name__ == "__main__":

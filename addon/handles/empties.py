@@ -48,7 +48,7 @@ def require_handles(source):
     if lost_bone(source):
         return lost_bone(source)
     if not used(source):
-        return UserError("Add a handle first")
+        return UserError("Drag a pin or add a handle first")
     return vertex_groups.missing(source, group_names(source))
 
 

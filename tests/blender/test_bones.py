@@ -152,7 +152,7 @@ def test_what_is_wrong_with_bones_is_named():
         bpy.ops.arapfields.add_bones()
     bpy.data.objects.remove(rig)
     scenes.activate(bar)
-    with pytest.raises(RuntimeError, match="Add a handle first"):
+    with pytest.raises(RuntimeError, match="Drag a pin or add a handle first"):
         bpy.ops.arapfields.deform()
 
 

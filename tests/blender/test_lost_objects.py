@@ -24,7 +24,7 @@ def test_a_deleted_empty_is_no_handle_though_a_pointer_keeps_it():
     delete(moving)
     assert [entry.empty for entry in empties.used(bar)] == [fixed]
     delete(fixed)
-    with pytest.raises(RuntimeError, match="Add a handle first"):
+    with pytest.raises(RuntimeError, match="Drag a pin or add a handle first"):
         bpy.ops.arapfields.deform(**scenes.NEW)
 
 

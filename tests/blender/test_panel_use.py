@@ -70,13 +70,13 @@ def test_a_switch_stands_for_zero_and_numbers_go_one_way():
 
 
 REFUSED = {
-    "no handle": ("ARAPFIELDS_PT_deform", "Add a handle first"),
+    "no handle": ("ARAPFIELDS_PT_deform", "Drag a pin or add a handle first"),
     "no group": ("ARAPFIELDS_PT_deform", "Bar has no vertex group gone"),
     "holds nothing": ("ARAPFIELDS_PT_deform", "No part of the surface lies in the rest region of Far"),
     "no style object": ("ARAPFIELDS_PT_stylize", "Choose the object that gives the style its normals"),
     "no axes": ("ARAPFIELDS_PT_stylize", "Choose the object along whose axes the style stands"),
     "no region": ("ARAPFIELDS_PT_stylize", "Bar has no vertex group gone"),
-    "follows no handle": ("ARAPFIELDS_PT_stylize", "Add a handle first"),
+    "follows no handle": ("ARAPFIELDS_PT_stylize", "Drag a pin or add a handle first"),
     "no faces": ("ARAPFIELDS_PT_source", "Bar: the mesh has no faces"),
     "empty": ("ARAPFIELDS_PT_source", "Bar: the mesh is empty"),
     "a key of a surface": ("ARAPFIELDS_PT_stylize", "A shape key keeps the mesh"),

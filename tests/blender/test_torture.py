@@ -20,7 +20,7 @@ BROKEN = {  # name → what the message says
     "loose edges": "Mesh: the mesh has no faces",
     "not finite": "Mesh: 1 vertices have no finite position, the first is 5",
     "flat object": "Mesh: its scale flattens it",
-    "no handle": "Add a handle first",
+    "no handle": "Drag a pin or add a handle first",
     "handle outside": "No part of the surface lies in the rest region of Moving",
     "edit mode": "Mesh is in Edit Mode",
     "all faces degenerate": "Mesh: ",
