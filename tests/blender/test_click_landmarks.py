@@ -79,3 +79,18 @@ def test_a_click_on_neither_selects_nothing_and_the_sidebar_has_its_own():
     assert click(1.5, 0.0) == ({"RUNNING_MODAL"}, [])  # between the two
     assert click(3.8, 0.0) == ({"PASS_THROUGH"}, [])  # the sidebar lies over the target
     assert click(3.0, 4.0) == ({"PASS_THROUGH"}, [])  # the gizmos of navigation
+
+
+def test_landmarks_are_mirrored_once():
+    source, target = scenes.bar(), scenes.bar()
+    target.location.x = 4.0
+    scenes.activate(source)
+    source.arapfields.wrap.onto = target
+    bpy.context.view_layer.update()
+    for x in (0.0, 0.8):
+        bpy.ops.arapfields.add_landmark(rest=(x, 0, 0.25), on_target=(4 + x, 0, 0.25))
+    pairs = source.arapfields.wrap.landmarks
+    for _ in range(2):
+        assert bpy.ops.arapfields.mirror_landmarks() == {"FINISHED"} and len(pairs) == 3
+    ends = [round(end.matrix_world.translation.x, 3) for end in (pairs[2].rest, pairs[2].on_target)]
+    assert ends == [-0.8, 3.2] and len({tuple(pair.colour) for pair in pairs}) == 3
