@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cfenv>
 #include <chrono>
 #include <exception>
 #include <thread>
@@ -65,6 +66,7 @@ void name_thread() {
 
 struct ThreadPool::Job {
   const std::function<void(int)>* work;
+  std::fenv_t arithmetic;      // the caller's: on Windows, threads of mingw's round exp() to other digits
   int helpers;                 // under the pool's mutex
   int begun = 0;               // under the pool's mutex
   std::atomic<int> inside{0};  // helpers that have begun and not ended
@@ -91,6 +93,7 @@ void ThreadPool::run(int helpers, const std::function<void(int)>& work) {
   if (helpers <= 0) return work(0);
   const auto job = std::make_shared<Job>();
   job->work = &work;
+  std::fegetenv(&job->arithmetic);
   job->helpers = helpers;
   bool wake = false;
   {
@@ -168,6 +171,7 @@ void ThreadPool::serve() {
     std::shared_ptr<Job> job;
     int number = 0;
     take_job(job, number);
+    std::fesetenv(&job->arithmetic);
     (*job->work)(number);
     job->leave();
   }

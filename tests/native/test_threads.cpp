@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <boost/test/unit_test.hpp>
+#include <cfenv>
 #include <chrono>
 #include <mutex>
 #include <numeric>
@@ -106,6 +107,19 @@ BOOST_AUTO_TEST_CASE(chunks_do_not_depend_on_the_number_of_threads) {
   const auto alone = chunks(1);
   BOOST_CHECK_GT(alone.size(), 16u);
   BOOST_CHECK(chunks(2) == alone && chunks(7) == alone);
+}
+
+BOOST_AUTO_TEST_CASE(all_threads_round_as_the_caller_does) {
+  const ThreadScope scope(3);
+  const int before = std::fegetround();
+  std::atomic<int> different{0};
+  std::fesetround(FE_UPWARD);
+  parallel_jobs(2000, [&](Index) {
+    if (std::fegetround() != FE_UPWARD) ++different;
+    std::this_thread::sleep_for(std::chrono::microseconds(10));
+  });
+  std::fesetround(before);
+  BOOST_TEST(different == 0);
 }
 
 BOOST_AUTO_TEST_CASE(slots_are_one_thread_s_at_a_time) {
