@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <cerrno>
-
 #include "bindings/arguments.h"
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
@@ -34,8 +32,10 @@ void translate(std::exception_ptr raised) {
     const py::object type = py::module_::import("arapfields._native").attr("InvalidInput");
     PyErr_SetObject(type.ptr(), as_text(error.what()).ptr());
   } catch (const FileError& error) {
-    errno = error.number();
-    PyErr_SetFromErrnoWithFilenameObject(PyExc_OSError, as_text(error.path()).ptr());
+    // Not by errno: on Windows the one of Python's C library is not ours.
+    const py::object said = py::module_::import("os").attr("strerror")(error.number());
+    const py::object raised = py::handle(PyExc_OSError)(error.number(), said, as_text(error.path()));
+    PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(raised.ptr())), raised.ptr());
   } catch (const py::cast_error& error) {
     py::set_error(PyExc_TypeError, error.what());
   }

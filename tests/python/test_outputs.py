@@ -2,6 +2,7 @@
 """One writer for all outputs: whole or not at all, regular files alone, nothing left after a kill."""
 
 import os
+import re
 import stat
 import subprocess
 import sys
@@ -25,7 +26,8 @@ def examples(tmp_path_factory):
 
 
 def names(folder):
-    return sorted(path.name for path in folder.iterdir())
+    """Of files, less those by which Windows locks folders: they vanish with their process."""
+    return sorted(path.name for path in folder.iterdir() if path.suffix != ".lock")
 
 
 @pytest.mark.parametrize("kind", ["pipe", "folder", "device", "socket"])
@@ -42,7 +44,7 @@ def test_only_regular_files_are_written(kind, examples, tmp_path):
     sdf, field = archives.load(examples["sdf"]), archives.load(examples["radial"])
     before = os.stat(place)
     for call in (sdf.save, field.save, lambda path: write_text(path, "x"), lambda path: OutputFile(path)):
-        with pytest.raises((af.InvalidInput, IsADirectoryError), match=str(place)):
+        with pytest.raises((af.InvalidInput, IsADirectoryError), match=re.escape(str(place))):
             call(place)
     assert os.stat(place).st_mode == before.st_mode and names(tmp_path) == names(tmp_path)[:1]
 
