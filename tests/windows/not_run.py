@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What cannot run in a Windows Python under Wine 8: beginnings of tests' names, and why."""
+
+LIMITS = "Python on Windows cannot limit a process's memory, nor the size of its files"
+CTRL_C = "Windows sends Ctrl-C to the processes of a console, and there is none"
+KINDS = "on Windows pipes, sockets and devices are no files"
+OPEN = "Windows removes no open file"
+PROC = "it looks into /proc, which Windows lacks"
+LINKS = "Wine makes no symbolic links"
+BACKWARD = "PyTorch's backward pass ends with an exception of its own under Wine"
+
+PYTHON = {
+    "test_limits.py::test_objects_without_init_are_refused": LIMITS,
+    "test_limits.py::test_none_is_no_object": LIMITS,
+    "test_limits.py::test_arrays_that_cannot_be_copied_are_named": LIMITS,
+    "test_limits.py::test_sizes_that_memory_cannot_hold_are_named": LIMITS,
+    "test_limits.py::test_a_sparse_file_asks_for_no_memory": LIMITS,
+    "test_array_arguments.py::test_no_argument_asks_for_memory_that_is_not_there": LIMITS,
+    "test_animate.py::test_a_disk_that_is_full_for_usd_is_named": LIMITS,
+    "test_outputs.py::test_a_full_disk_is_named_and_changes_nothing": LIMITS,
+    "test_outputs.py::test_verbs_on_a_full_disk": LIMITS,
+    "test_point_cache.py::test_memory_does_not_grow_with_the_frames": LIMITS,
+    "test_point_cache_damage.py::test_a_disk_that_fills_meanwhile_is_named": LIMITS,
+    "test_interrupt.py::test_ctrl_c_in_a_script": CTRL_C,
+    "test_cli_errors.py::test_interrupt_cancels_and_leaves_nothing": CTRL_C,
+    "test_outputs.py::test_only_regular_files_are_written[pipe]": KINDS,
+    "test_outputs.py::test_only_regular_files_are_written[device]": KINDS,
+    "test_outputs.py::test_only_regular_files_are_written[socket]": KINDS,
+    "test_outputs.py::test_links_are_followed_and_permissions_stay": LINKS,
+    "test_outputs.py::test_two_outputs_need_two_files": LINKS,
+    "test_cli.py::test_a_bar_is_drawn_on_a_terminal_alone": "Windows has no pseudo-terminals for Python",
+    "test_point_cache.py::test_a_folder_that_goes_while_it_is_written_to_is_named": OPEN,
+    "test_jets.py::test_jets_and_parameter_gradients_equal_autograd": BACKWARD,
+    "test_invertible.py::test_jets_and_pull_back_equal_autograd": BACKWARD,
+}
+BLENDER = {
+    "test_commands.py::test_a_full_disk_is_named_and_changes_nothing": LIMITS,
+    "test_bake_failures.py::test_whatever_goes_wrong_is_named_and_the_last_good_cache_stays": LIMITS,
+    "test_export_animation.py::test_an_export_that_fails_is_named_and_changes_nothing": LIMITS,
+    "test_commands.py::test_ctrl_c_leaves_no_partial_file": CTRL_C,
+    "test_commands.py::test_a_batch_that_is_killed_takes_its_blenders_along": PROC,
+}
+NOT_RUN = {f"tests/python/{name}": why for name, why in PYTHON.items()}
+NOT_RUN |= {f"tests/blender/{name}": why for name, why in BLENDER.items()}
