@@ -15,7 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 WORK = ROOT / "build/windows-python"
 PREFIX = ROOT / "build/wine"
-COMPILER = "x86_64-w64-mingw32-gcc"
+COMPILER = "x86_64-w64-mingw32-gcc-posix"
 WINE = shutil.which("wine64") or shutil.which("/usr/lib/wine/wine64")
 EMBEDDED = {  # of the package, whose newest file holds 3.11.9 and 3.13.2
     "3.11": "3.11.0 --hash=sha256:8a4dbddadc63ca9700370bc95e5a8e27a03c00c7ac6ab3877102bd9bb4c4f5fa",
