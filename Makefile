@@ -95,7 +95,7 @@ test: build $(NATIVE_TESTS)  ## all tests but the slow ones; TESTS="tests/python
 test-slow: build $(NATIVE_TESTS)  ## every test
 	$(ALL_TESTS) tests
 
-# Debian: g++-mingw-w64-x86-64-posix and wine64.
+# Debian: g++-mingw-w64-x86-64-posix and wine64. WINDOWS takes arguments: WINDOWS="--python 3.13", files of tests.
 WINE := $(shell command -v wine64 || ls /usr/lib/wine/wine64 2> /dev/null)
 WINDOWS_TESTS := build/windows/tests/native_tests.exe
 
@@ -111,6 +111,7 @@ test-windows: windows-tools setup  ## the library without bindings, compiled for
 	  -DCMAKE_CXX_FLAGS_RELEASE="-O1 -DNDEBUG" -DPython_EXECUTABLE=$(abspath $(PY)) -DCMAKE_MAKE_PROGRAM=$(abspath $(VENV)/bin/ninja)
 	$(VENV)/bin/cmake --build build/windows --target native_tests
 	WINEPREFIX=$(abspath build/wine) WINEDEBUG=-all timeout 900 $(WINE) $(WINDOWS_TESTS) --color_output=no --report_level=short
+	@$(if $(wildcard dist/*-win_amd64.whl),$(PY) -m tests.windows dist $(WINDOWS),echo "No wheels for Windows in dist: the tests of Python did not run")
 
 # Debian: debootstrap, g++-aarch64-linux-gnu and qemu-user-static; and root, for debootstrap and chroot. ARM64 takes
 # arguments: ARM64="--only reference", "--all", "--jobs 1".

@@ -34,8 +34,8 @@ void translate(std::exception_ptr raised) {
   } catch (const FileError& error) {
     // Not by errno: on Windows the one of Python's C library is not ours.
     const py::object said = py::module_::import("os").attr("strerror")(error.number());
-    const py::object raised = py::handle(PyExc_OSError)(error.number(), said, as_text(error.path()));
-    PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(raised.ptr())), raised.ptr());
+    const py::object result = py::handle(PyExc_OSError)(error.number(), said, as_text(error.path()));
+    PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(result.ptr())), result.ptr());
   } catch (const py::cast_error& error) {
     py::set_error(PyExc_TypeError, error.what());
   }
