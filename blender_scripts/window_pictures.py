@@ -18,8 +18,7 @@ ROOT = Path(__file__).resolve().parents[1]
 STEP, INNER = 28.4, 26.0  # from one closed section to the next, and within Advanced
 LEFT, WORDS = slice(0, 258), slice(8, 120)  # a section, and where its header has words
 HEADER = 22  # height of what is compared
-STATUS = 72  # height of the section of one line, the last one
-SIDEBAR = (1028, 84, 1286, 904)
+LAST, STATUS = 10, 72  # row of the section of the status, and its height with a line
 SHOWN = (1280, 800)
 TOP = ("source", "handles", "deform", "stylize")
 WITHIN = ("surface", "result")
@@ -69,7 +68,8 @@ def of_panel(folder, target):
     Image.open(folder / "panel-styles.png").convert("RGB").crop(MENU).save(
         target / "style-menu.png", optimize=True
     )
-    return closed
+    top = round(STEP * LAST)
+    save(pixels(folder / "panel-status.png")[top : top + STATUS, LEFT], target / "panel-status.png")
 
 
 def main():
@@ -78,17 +78,13 @@ def main():
     parser.add_argument("jobs", type=Path, nargs="?", help="that of its parts `jobs` and `live`")
     parser.add_argument("--to", type=Path, default=ROOT / "docs/images")
     options = parser.parse_args()
-    closed = of_panel(options.panel, options.to)
+    of_panel(options.panel, options.to)
     for name in WINDOW:
         folder = options.panel if name == "handles" else options.jobs
         if folder is None:
             continue
         shown = Image.open(folder / f"{name}.png").convert("RGB")
         shown.resize(SHOWN, Image.Resampling.LANCZOS).save(options.to / f"blender-{name}.png", optimize=True)
-        if name == "cancelled":
-            sidebar = np.asarray(shown.crop(SIDEBAR), dtype=np.int16)
-            start = found(next_header(closed, 9, STEP, 0), sidebar) - 2
-            save(sidebar[start : start + STATUS, LEFT], options.to / "panel-status.png")
 
 
 if __name__ == "__main__":
