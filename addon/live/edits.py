@@ -5,15 +5,19 @@ import time
 from typing import NamedTuple
 
 import bpy
+import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack
 from ..blender.object_references import settings_of
+from ..core.geometry.spaces import space_of
 from ..field_modifier import motion
 from ..handles import empties, movers
+from ..handles.empties import matrix_of
 from ..solver import secondary_motion
 from ..solver.source_reader import SourceChanged, uses_handles
 from ..stiffness import painted
 
+SAME_STRETCH = 1e-6  # noise of a rotation in single precision
 STROKE = 0.3  # seconds without a touch of the brush after which a stroke has ended
 
 
@@ -42,6 +46,7 @@ class EditWatch:
 
     def __init__(self, reader):
         self.reader, self.may_be_edited, self.may_have_moved, self.edited_at = reader, False, False, 0.0
+        self.world = None  # the source's matrix when it was last looked at
 
     def note(self, updates):
         """Takes what Blender has just updated."""
@@ -57,6 +62,8 @@ class EditWatch:
 
     def require_unedited(self, context, source):
         """SourceChanged where the mesh is another than when it was read; else reads what has only moved."""
+        if source.animation_data is None and self.is_stretched(source):
+            raise SourceChanged(source.name)
         if self.may_be_edited and not self.is_in_stroke(source):
             self.may_be_edited = False
             if self.is_edited(context, source):
@@ -65,6 +72,13 @@ class EditWatch:
             self.may_have_moved = False
             self.reader.read_points(context, source)
         self.reader.refresh_carried(context)
+
+    def is_stretched(self, source):
+        """Whether it is scaled otherwise than when it was read, and not evenly; in all digits once it rests."""
+        world = matrix_of(source)
+        rests, self.world = np.array_equal(world, self.world), world
+        now, then = (one.local_to_solve for one in (space_of(world, source.name), self.reader.surface.space))
+        return not np.allclose(now, then, rtol=0.0, atol=0.0 if rests else SAME_STRETCH)
 
     def is_in_stroke(self, source):
         return source.mode == "WEIGHT_PAINT" and time.monotonic() - self.edited_at < STROKE

@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a live session's worker does: each shape goes on from the one before, and gets better in pauses."""
+"""What a live session's worker does: a drag's shapes go on from those before, and end in one from rest."""
 
 import time
 
 import numpy as np
 
-from ..solver.frame_solver import FINE_TOLERANCE, FrameSolver
+from ..core.runtime import native
+from ..solver.frame_solver import FrameSolver
 from ..solver.setup import sampled
 from .prefetch import prefetch
 
-# Quasi-Newton steps to the first shape of a request, and from there to the next. Each solve begins where the
-# last one ended: after three the shape is behind by a quarter of what the handles moved since then.
-FIRST_STEPS, FURTHER_STEPS = 3, 9
-REFINEMENTS, STEPS_AT_ONCE = 40, 10
+# Quasi-Newton steps to each shape of a request, for which a newer one has to wait, and how many there are at
+# most. After the first three the shape is behind by a quarter of what the handles moved since the last solve.
+STEPS, MOST_SHAPES = 3, 60
+TOLERANCE = 3e-5  # what single precision sees; a shape then is within about 0.3 % of the size
 PACE = 1 / 60  # seconds from one shape to the next in secondary motion
 MOST_PACES = 3  # that a step in real time stands for; fewer lengths of steps, fewer preconditioners
 STILL, STILL_STEPS = 1e-3, 20  # of the size a second, so many steps in turn: it has come to rest
@@ -51,34 +52,33 @@ class LiveSolver:
         self._stepped_at = None
 
     def solve(self, request):
-        """Yields a shape for this request, quickly, and then a better one."""
+        """Yields a shape for this request, quickly, and then better ones."""
         if request.motion is not None:
             self._step(request)
             self.solved_request = request
             yield self.frame_solver.tracked_shape(request)
             return
-        for steps in (FIRST_STEPS, FURTHER_STEPS):
-            taken = self.frame_solver.follow(request, iterations=steps)
-            shape, self.solved_request = self.frame_solver.tracked_shape(request), request
-            yield shape
-            if taken < steps:
+        earlier, self.solved_request = self.solved_request, request
+        if earlier is not None and not request.goes_on_from(earlier):
+            self.frame_solver.solver.reset()
+        for _ in range(MOST_SHAPES):
+            taken = self.frame_solver.follow(request, iterations=STEPS, tolerance=TOLERANCE)
+            yield self.frame_solver.tracked_shape(request)
+            if taken < STEPS:
                 break
 
     def refine(self, request, token):
-        """Yields better and better shapes, until the energy falls no more or the motion has ended."""
+        """Yields the request's own shape, from rest; where there is motion, once that has ended."""
         if self.is_playing:
             return
         if request.motion is not None:
             yield from self._settle(request, token)
-            return
-        for _ in range(REFINEMENTS):
-            taken = self.frame_solver.follow(request, iterations=STEPS_AT_ONCE, tolerance=FINE_TOLERANCE)
-            if token.cancelled:
-                return
-            if taken < STEPS_AT_ONCE:
-                break
-            yield self.frame_solver.tracked_shape(request)
-        yield self.frame_solver.exact_shape(request)
+        solver = self.frame_solver.solver
+        before = solver.motion_state
+        try:
+            yield self.frame_solver.solve_from_rest(request, token.watch(native.library().Task()))
+        except native.library().Cancelled:
+            solver.motion_state = before  # a drag goes on
 
     def _step(self, request):
         """Steps to the request in as many seconds as have passed since the last step."""

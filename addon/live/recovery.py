@@ -5,6 +5,7 @@ import contextlib
 
 import bpy
 
+from ..blender import timers
 from ..blender.language import translated
 from ..blender.object_references import in_scene, settings_of
 from ..core.errors import UserError
@@ -13,12 +14,15 @@ from ..field_modifier import motion
 from ..names import RESULT_SUFFIX
 from ..results import result_objects, visibility
 from . import live_object
-from .sessions import is_live, live, take_away
+from .sessions import is_live, live, poll_live, take_away
 
 
 def after_undo():
-    """A step was undone or redone: sessions go on with what it has, a live object without one goes."""
-    recover(discard_live_object)
+    """A step was undone or redone: sessions go on with what it has, and those of the step come back."""
+    live.returning.clear()
+    recover(bring_back)
+    if live.returning:
+        timers.start(poll_live, persistent=True)
 
 
 def after_load():
@@ -31,9 +35,9 @@ def recover(clear):
     to be live, and is not."""
     for uid, session in list(live.items()):
         source = session.source.find()
-        if source is None or not settings_of(source).live_kind:
-            live.pop(uid)
-            session.stop()
+        settings = None if source is None else settings_of(source)
+        if settings is None or not settings.live_kind or settings.live_number != session.number:
+            live.part_with(uid)
             if not session.display.in_place:
                 take_away(session)
         else:
@@ -41,8 +45,17 @@ def recover(clear):
     for source in bpy.data.objects:
         if settings_of(source).live_kind and not is_live(source):
             with contextlib.suppress(UserError, RuntimeError, AttributeError):
-                clear(source)
-                settings_of(source).live_kind = ""
+                if not clear(source):
+                    settings_of(source).live_kind = ""
+
+
+def bring_back(source):
+    """Whether the session by which the source was live comes back; a live object without one goes."""
+    former = live.past.get(settings_of(source).live_number)
+    if former is None or not former.display.in_place:
+        return discard_live_object(source)
+    live.returning[source.session_uid] = former
+    return True
 
 
 def discard_live_object(source):

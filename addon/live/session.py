@@ -2,6 +2,9 @@
 """One source that is live: its requests, the worker that solves them, and where the shape is shown."""
 
 import contextlib
+import itertools
+import time
+from typing import Any, NamedTuple
 
 import bpy
 
@@ -21,14 +24,28 @@ from .live_object import LiveObject
 from .live_solver import PACE, LiveSolver
 from .playback import Playback, scene_frame
 
+UNSETTLED = "?"  # the shape that the file has is on its way to another
 PATIENCE = 1.0  # seconds at most that playback waits for a frame of secondary motion
+numbers = itertools.count(int(time.time()) % 10**9)  # of sessions: others than those of an earlier Blender
+
+
+class Former(NamedTuple):
+    """What stays of a session that has ended, for one that takes its place."""
+
+    display: Any
+    carried: dict  # what carried objects had before
+    keeps_shape: bool
 
 
 class Session:
     """Reads its source when made, on the main thread; everything that takes time is done by the worker.
 
-    What is shown of an `earlier` session of the source is used again. `keeps_shape`: what it shows is the
-    user's work, which stays: bit for bit until a handle moves, and at the end.
+    What is shown of an `earlier` session of the source, a Former, is used again. `keeps_shape`: what it shows
+    is the user's work, which stays at the end.
+
+    The file tells by `shape_of` which request its shape is of. Where that is the one at hand, as after an
+    undone step, the shape stays bit for bit. Where it is not, a handle has moved, or the shape was stored
+    while it was on its way: the request's own shape is shown.
     """
 
     def __init__(self, context, source, kind="DEFORM", earlier=None, keeps_shape=False):
@@ -40,11 +57,15 @@ class Session:
         is_still = keeps_shape or animation_range(source, kind) is None
         self.playback = Playback(self.solver, scene_frame(context.scene) if is_still else None)
         self.requested = None  # the newest Request
-        self.is_restored = False  # whether the handles are where an undone step or a cancelled drag put them
+        self.is_restored = earlier is not None  # whether the file may have the shape of the request at hand
+        self.is_held = False  # whether its shape counts as that, whatever it is
         self.is_quiet = False  # whether nothing is shown, until a handle moves
         self.display = display_of(context, source, self.reader.surface, earlier)
-        self.carrying.bind(context, earlier.carrying.before if earlier else None)
-        settings.live_kind = kind
+        self.carrying.bind(context, earlier.carried if earlier else None)
+        self.number = next(numbers)
+        settings.live_kind, settings.live_number = kind, self.number
+        if earlier is None:
+            settings.shape_of = UNSETTLED
         self._reading = self._start(context)
 
     @property
@@ -87,6 +108,16 @@ class Session:
         if refined or self.has_motion:
             self.playback.wait(self.requested, seconds)
 
+    def settle(self, seconds):
+        """Shows the newest request's own shape, which then stays; motion is not waited for."""
+        self.wait(seconds, refined=not self.has_motion)
+        self.show()
+        self.keep_shown()
+
+    @property
+    def former(self):
+        return Former(self.display, self.carrying.before, self.keeps_shape)
+
     def stop(self):
         self._reading.close()
         self.playback.stop()
@@ -118,10 +149,36 @@ class Session:
             self.layout = layout
             self.reader.read_handles(source)
         self.edits.require_unedited(context, source)
-        self.set_request(self.reader.request(context), scene_frame(context.scene))
-        if self.is_restored:
+        request = self.reader.request(context)
+        if self.is_held:
+            settings_of(source).shape_of = self.digest(request)
+        self.is_held, stays = False, self.is_restored and settings_of(source).shape_of == self.digest(request)
+        if self.is_restored and not stays:
+            self.requested = None
+        self.is_restored = stays
+        self.set_request(request, scene_frame(context.scene))
+        if stays:
             self.is_restored, self.is_quiet = False, True
-            self.display.before = motion.snapshot(source)
+            self.keep_shown()
+
+    def digest(self, request):
+        """Equal for requests of the same shape."""
+        setup = self.reader.setup
+        surface = setup.surface
+        further = surface.space.local_to_solve, surface.stiffness, surface.solids, setup.region, setup.masses
+        return request.digest(self.reader.fingerprint, self.layout, *further)
+
+    def is_current(self, context):
+        """Whether the shape that the file has is the one that its handles ask for."""
+        if self.worker is None or self.is_restored:
+            return False
+        context.view_layer.update()
+        return settings_of(self.source.get()).shape_of == self.digest(self.reader.request(context))
+
+    def keep_shown(self):
+        """What is shown now stays at the end, where it is the user's work."""
+        if self.keeps_shape and self.display.in_place:
+            self.display.before = motion.snapshot(self.source.get())
             self.carrying.renew()
 
     def set_request(self, request, frame):
@@ -133,15 +190,13 @@ class Session:
                 self.worker.request(request)
         self.playback.advance(self.requested, frame)
 
-    def restored(self):
+    def restored(self, is_held=False):
         """What the source and its handles are now came from elsewhere: an undone step, a cancelled drag.
 
-        The solver follows, but shows nothing until a handle moves.
+        `is_held`: the shape stays as it is until a handle moves.
         """
-        if self.keeps_shape:
-            self.is_restored = self.is_quiet = True
-        else:
-            self.requested = None
+        self.is_restored = self.is_quiet = True
+        self.is_held = is_held
 
     def show(self):
         """Shows the newest shape; True when there was one."""
@@ -151,9 +206,13 @@ class Session:
         shape = self.playback.shape(self.requested, otherwise=shape)
         if shape is None or self.is_quiet:
             return False
-        is_shown = self.display.show(self.source.get(), shape)
+        source = self.source.get()
+        is_shown = self.display.show(source, shape)
         if is_shown:
             self.carrying.show(shape.carried)
+            shape_of = UNSETTLED if shape.of is None else self.digest(shape.of)
+            if settings_of(source).shape_of != shape_of:
+                settings_of(source).shape_of = shape_of
         return is_shown
 
     def show_frame(self, context):

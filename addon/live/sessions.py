@@ -23,6 +23,7 @@ from .edits import Updates
 from .session import Session
 
 INTERVAL = 1 / 60  # seconds between looks
+MOST_PAST = 20  # sessions that can come back
 WAIT = 30.0  # seconds at most that a script waits for the first shape
 
 
@@ -31,9 +32,25 @@ class Sessions(dict):
 
     is_rendering = False  # then frames are followed one by one, and nothing else
 
+    def __init__(self):
+        self.past = {}  # number of a session that has ended: Former
+        self.returning = {}  # session_uid of a source: Former, of which an undone step says that it is live
+
+    def part_with(self, uid):
+        """Stops a session, which an undone step may bring back; returns it, or None."""
+        session = self.pop(uid, None)
+        if session is not None:
+            session.stop()
+            self.past[session.number] = session.former
+        while len(self.past) > MOST_PAST:
+            del self.past[next(iter(self.past))]
+        return session
+
     def clear(self):
         """Ends every one and takes its shape away."""
         self.is_rendering = False
+        self.past.clear()
+        self.returning.clear()
         for uid in list(self):
             session = self.pop(uid)
             session.stop()
@@ -53,12 +70,10 @@ def begin(context, source, kind="DEFORM", keeps_shape=False):
 
     `keeps_shape`: what is shown stays when live mode ends.
     """
-    earlier = live.pop(source.session_uid, None)
-    if earlier is not None:
-        earlier.stop()
-    session = None
+    earlier, session = live.part_with(source.session_uid), None
+    former = live.returning.pop(source.session_uid, None) if earlier is None else earlier.former
     try:
-        session = Session(context, source, kind, earlier, keeps_shape)
+        session = Session(context, source, kind, former, keeps_shape)
         session.advance()  # a small mesh is read at once
         warn(session)
     except UserError:
@@ -71,11 +86,13 @@ def begin(context, source, kind="DEFORM", keeps_shape=False):
 
 def end(context, source, keep=False):
     """Ends live mode: the source looks as before; or the shape stays (`keep`), and its object is returned."""
-    session = live.pop(source.session_uid, None)
+    session = live.get(source.session_uid)
     if session is None:
         return None
-    session.stop()
-    session.show_last()
+    if keep or session.keeps_shape:
+        with contextlib.suppress(UserError, ValueError, ReferenceError):
+            session.settle(WAIT)
+    live.part_with(source.session_uid)
     if keep:
         return session.display.keep(context, source, session.kind)
     session.take_away(source)
@@ -100,12 +117,15 @@ def end_for_job(context, source, output, result):
 def stop_all():
     """Ends every worker; what is in the file stays as it is."""
     live.is_rendering = False
+    live.past.clear()
+    live.returning.clear()
     while live:
         live.popitem()[1].stop()
 
 
 def update(context, wait=0.0, refined=False):
     """Looks at every live source once, waiting at most so many seconds for the shapes to follow."""
+    return_all(context)
     for uid, session in list(live.items()):
         try:
             session.update(context)
@@ -117,6 +137,15 @@ def update(context, wait=0.0, refined=False):
             restart(context, uid, session)
         except (UserError, ValueError, ReferenceError) as error:
             end_with_error(uid, session, error)
+
+
+def settle(context, uid):
+    """Shows the own shape of what that source's handles ask for now."""
+    for _ in range(2):  # the first look may set a solver up anew
+        update(context, WAIT)
+        if uid in live:
+            with contextlib.suppress(SourceChanged):
+                return live[uid].settle(WAIT)
 
 
 def warn(session):
@@ -156,9 +185,21 @@ def restart(context, uid, session):
         jobs.add_message("ERROR", f"{source.name}: {translated(error)}")
 
 
+def return_all(context):
+    """Has what an undone step says to be live be so again."""
+    for source in [item for item in bpy.data.objects if item.session_uid in live.returning]:
+        former, kind = live.returning[source.session_uid], settings_of(source).live_kind
+        try:
+            begin(context, source, kind, former.keeps_shape)
+        except UserError as error:
+            settings_of(source).live_kind = ""
+            jobs.add_message("ERROR", f"{source.name}: {translated(error)}")
+    live.returning.clear()
+
+
 def poll_live():
     """Called between redraws; ends when nothing is live."""
-    if not live:
+    if not live and not live.returning:
         return None
     if not live.is_rendering:
         update(bpy.context)

@@ -18,7 +18,9 @@ class Snapshot:
 
     def __init__(self, context, source):
         settings, layer = settings_of(source), context.view_layer
-        self.source, self.was_live = ObjectReference(source), sessions.is_live(source)
+        self.source, session = ObjectReference(source), sessions.live.get(source.session_uid)
+        self.was_live, self.shape_of = session is not None, settings.shape_of
+        self.is_settled = session is None or session.is_current(context)
         self.motion = motion.snapshot(source)
         self.keep_rest, self.row = settings.keep_rest, settings.active_handle
         self.active = ObjectReference(layer.objects.active) if layer.objects.active else None
@@ -34,15 +36,18 @@ class Snapshot:
                 item.select_set(True)
         context.view_layer.objects.active = self.active.find() if self.active else None
 
-    def restore_shape(self, context):
-        """Makes the shape what it was; the solver follows."""
+    def restore_shape(self, context, is_held):
+        """Makes the shape what it was; the solver follows. `is_held`: it stays until a handle moves."""
         source = self.source.get()
         if self.motion is None:
             modifier = modifier_stack.find(source)
             motion.write_to(motion.carrier(source, modifier), motion.Motion(None))
         else:
             motion.restore(source, self.motion)
-        hold_shape(context, source.session_uid)
+        settings_of(source).shape_of = self.shape_of
+        if sessions.is_live(source):  # else it ended with an error, which the panel tells
+            sessions.live[source.session_uid].restored(is_held)
+            sessions.update(context)
 
 
 class Drag:
@@ -103,11 +108,9 @@ class Drag:
         """What is shown now stays; a press without a move changes no shape."""
         session = self.session()
         if not self.has_moved:
-            self.before.restore_shape(context)
+            self.before.restore_shape(context, is_held=self.before.is_settled)
         elif session is not None:
-            session.wait(sessions.WAIT, refined=False)
-            session.show()
-            hold_shape(context, self.before.source.uid)
+            sessions.settle(context, self.before.source.uid)
             insert_keys(context, self.empty.get())
 
     def cancel(self, context):
@@ -122,17 +125,12 @@ class Drag:
         settings = settings_of(source)
         settings.keep_rest, settings.active_handle = self.before.keep_rest, self.before.row
         self.before.restore_selection(context)
-        if sessions.is_live(source):
-            self.before.restore_shape(context)
-            if not self.before.was_live:
-                sessions.end(context, source)
-
-
-def hold_shape(context, uid):
-    """Has the live shape of that source stay as it is until a handle moves."""
-    if uid in sessions.live:  # else it ended with an error, which the panel tells
-        sessions.live[uid].restored()
-        sessions.update(context)
+        session = self.session()
+        if session is not None and self.before.was_live:
+            self.before.restore_shape(context, is_held=False)
+        elif session is not None:
+            session.keeps_shape = False
+            sessions.end(context, source)
 
 
 def insert_keys(context, empty):

@@ -11,6 +11,7 @@ from ..core.geometry.edges import Topology
 from ..core.runtime import native
 from ..core.settings.parameters import presets
 from ..handles.native_handles import native_handles
+from .request import Request
 from .setup import at_samples
 
 REST_STEPS, FINE_TOLERANCE = 400, 1e-6  # of a solve from rest: until the energy falls no more
@@ -27,6 +28,7 @@ class Shape:
     turns: np.ndarray | None = None  # (n, 3) axis · angle, for free custom normals
     topology: Topology | None = None
     carried: list = field(default_factory=list)  # what Carrying.moved made
+    of: Request | None = None  # whose own shape this is, from rest; None on the way there
 
 
 class FrameSolver:
@@ -129,7 +131,7 @@ class FrameSolver:
         """The request's own shape, whatever was solved before it: the same bits on any thread."""
         self.solver.reset()
         self.follow(request, iterations=REST_STEPS, tolerance=FINE_TOLERANCE, task=task)
-        return self.exact_shape(request)
+        return replace(self.exact_shape(request), of=request)
 
     def tracked_shape(self, request):
         """The request's shape as the solver tracks it, in single precision."""

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A pose that a solver turns into a shape, read on the main thread."""
 
+import hashlib
+from dataclasses import fields, is_dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +20,11 @@ class StyleTerm(NamedTuple):
     sharpness: float
     up: np.ndarray  # (3,)
 
+    @property
+    def what(self):
+        """Equal where only how strongly it acts differs."""
+        return self.key[:-2]
+
 
 class Request(NamedTuple):
     """One pose. Where two requests are alike, so are the shapes that are solved for them from rest."""
@@ -34,6 +41,20 @@ class Request(NamedTuple):
     def style_key(self):
         return None if self.style is None else self.style.key
 
+    def goes_on_from(self, earlier):
+        """Whether a solve may start from the shape of an earlier one: handles or a slider are dragged."""
+        what, before = (None if one.style is None else one.style.what for one in (self, earlier))
+        return what == before
+
+    def digest(self, *further):
+        """Equal for requests that ask for the same shape, of sources of which `further` is the same."""
+        carried = [(pose.points, pose.rest, pose.now, pose.parent) for pose in self.carried]
+        hashed = hashlib.sha1()
+        parts = self.targets, self.style_key, self.points, self.handles, self.energy, carried, self.motion
+        for part in flat((parts, further)):
+            hashed.update(part)
+        return hashed.hexdigest()
+
     def is_like(self, other):
         """Whether both ask for the same shape."""
         return (
@@ -47,3 +68,19 @@ class Request(NamedTuple):
             and len(self.targets) == len(other.targets)
             and all(map(np.array_equal, self.targets, other.targets))
         )
+
+
+def flat(value):
+    """The bytes of all that a value is made of."""
+    if isinstance(value, np.ndarray):
+        yield value.tobytes()
+    elif is_dataclass(value):
+        yield from flat([getattr(value, one.name) for one in fields(value)])
+    elif isinstance(value, dict):
+        yield from flat(sorted(value.items()))
+    elif isinstance(value, tuple | list):
+        yield b"("
+        for one in value:
+            yield from flat(one)
+    else:
+        yield repr(value).encode()

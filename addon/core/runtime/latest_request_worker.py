@@ -5,7 +5,6 @@ import threading
 
 from .threads import start_thread
 
-PAUSE = 0.02  # seconds for which a newer request is awaited before one gets better results
 REST = 0.4  # seconds without a new request after which the result is refined
 
 
@@ -39,8 +38,8 @@ class LatestRequestWorker:
     """Runs `prepare()` once, then `solve(request)` for the newest request, skipping those between.
 
     `solve` yields better and better results; it is left where a newer request has come.
-    After `rest` seconds without a new request, `refine(request, token)` yields better and better results
-    until the token is cancelled. `poll` returns the newest result, or the error.
+    After `rest` seconds without a new request, or at once where `hurry` was called or that is waited for,
+    `refine(request, token)` yields better and better results until the token is cancelled. `poll` returns the newest result, or the error.
     """
 
     def __init__(self, solve, prepare=None, refine=None, rest=REST, low_priority=False):
@@ -48,14 +47,21 @@ class LatestRequestWorker:
         self._changed = threading.Condition()
         self._request = self._result = self._error = self._token = None
         self._working, self._ended, self._refined = prepare is not None, False, True
-        self._waiting = 0  # callers that wait for all that a request can have
+        self._answers = False  # whether there was a result of the newest request
+        self._hurried = False  # whether the newest request is refined without a rest
         self._thread = start_thread("live", self._run, low_priority)
 
     def request(self, request):
         """Makes this the newest request; one that is still waiting is dropped."""
         with self._changed:
-            self._request = request
+            self._request, self._hurried, self._answers = request, False, False
             self._wake()
+
+    def hurry(self):
+        """Has the newest request refined at once."""
+        with self._changed:
+            self._hurried = True
+            self._changed.notify_all()
 
     def poll(self):
         """(result or None, error text) since the last call."""
@@ -65,11 +71,9 @@ class LatestRequestWorker:
             return newest
 
     def wait_for_result(self, timeout):
-        """Until there is something to poll or nothing left to do, so many seconds at most."""
+        """Until the newest request has a result or nothing is left to do, so many seconds at most."""
         with self._changed:
-            self._changed.wait_for(
-                lambda: self._result is not None or self._error or self._is_idle(), timeout
-            )
+            self._changed.wait_for(lambda: self._answers or self._error or self._is_idle(), timeout)
 
     def _is_idle(self):
         return self._request is None and not self._working
@@ -80,13 +84,10 @@ class LatestRequestWorker:
         def reached():
             return self._is_idle() and (self._refined or not refined or self._refine is None)
 
+        if refined:
+            self.hurry()
         with self._changed:
-            self._waiting += 1
-            self._changed.notify_all()
-            try:
-                return self._changed.wait_for(reached, timeout)
-            finally:
-                self._waiting -= 1
+            return self._changed.wait_for(reached, timeout)
 
     @property
     def is_settled(self):
@@ -114,7 +115,8 @@ class LatestRequestWorker:
             with self._changed:
                 due = self._refine is not None and not self._refined
                 self._changed.wait_for(
-                    lambda: self._request is not None or self._ended, self._rest if due else None
+                    lambda due=due: self._request is not None or self._ended or (due and self._hurried),
+                    self._rest if due else None,
                 )
                 if self._ended:
                     return
@@ -130,16 +132,11 @@ class LatestRequestWorker:
 
     def _follow(self, request):
         """Publishes one result after another, until a newer request comes."""
-
-        def is_over():
-            return self._request is not None or self._ended
-
         for result in self._solve(request):
             with self._changed:
-                self._result = result
+                self._result, self._answers = result, self._request is None
                 self._changed.notify_all()
-                self._changed.wait_for(lambda: is_over() or self._waiting, PAUSE)
-                if is_over():
+                if self._request is not None or self._ended:
                     break
 
     def _improve(self, request, token):

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The rule that a walk checks: what is shown is a function of what the file says, never of how one got there.
+
+After undo, redo and load the shape is the stored one, bit for bit. Of a live object it is a fresh solve's,
+from rest; where it is not live, nothing but a result moves it. A press without a move holds what is shown.
+"""
+
+import bpy
+import numpy as np
+
+from addon.blender.object_references import settings_of
+
+from . import world
+from .steps import CHANGES, OTHERS, Steps
+
+MOVES = {"drag", "pin", "transform", "place_source", "delete_pin", "live", "keep", "solve", "wrap"}
+MAY_MOVE = {"setting", "style"}  # a held shape, where live mode follows what was changed
+GIVES_SHAPE = {"live", "keep", "solve", "wrap", "delete_pin"}  # of an object that is not live afterwards
+
+
+class Broken(Exception):
+    """The rule is broken: by which step, at what, and by how much."""
+
+
+class Walk:
+    """A seeded walk through a scene of its own; `tolerance`: of a live shape, as a share of the size."""
+
+    def __init__(self, seed, tolerance):
+        self.rng, self.tolerance = np.random.default_rng(seed), tolerance
+        self.steps, self.said = Steps(self.rng), []
+        world.build()
+        self.begin()
+
+    def begin(self):
+        """What can be undone begins here."""
+        bpy.ops.ed.undo_push(message="begin")
+        world.settle()
+        self.history, self.position = [self.note({})], 0
+
+    def note(self, held):
+        """What is shown now: of all, and of each source in local coordinates; and what holds a shape."""
+        shapes = {item.name: world.shape(item) for item in world.sources()}
+        return world.everything(), shapes, held
+
+    def step(self):
+        """One step, and whether the rule holds after it."""
+        before = self.history[self.position]
+        table = CHANGES | OTHERS
+        odds = np.array(list(table.values()))
+        name = str(self.rng.choice(list(table), p=odds / odds.sum()))
+        if (name == "undo" and self.position == 0) or (name == "redo" and self.at_end()):
+            return False
+        items = world.sources()
+        source = items[self.rng.integers(len(items))]
+        old = source.name
+        said = self.steps.take(name, source)
+        if said is None:
+            return False
+        self.said.append(f"{old}: {said}")
+        if name in ("undo", "redo"):
+            self.position += 1 if name == "redo" else -1
+            world.settle()
+            self.require_same(self.history[self.position][0])
+        elif name == "save":
+            world.settle()
+            self.require_same(before[0])
+            self.begin()
+        else:
+            bpy.ops.ed.undo_push(message=name)
+            world.settle()
+            held = self.check(name, said, old, before)
+            del self.history[self.position + 1 :]
+            self.history.append(self.note(held))
+            self.position += 1
+            if len(self.history) > 40:
+                del self.history[0]
+                self.position -= 1
+        return True
+
+    def at_end(self):
+        return self.position + 1 == len(self.history)
+
+    def require_same(self, expected):
+        found = world.everything()
+        if found.keys() != expected.keys():
+            raise Broken(f"{sorted(found)} are there, not {sorted(expected)}")
+        for name, (place, seen) in expected.items():
+            if not np.allclose(found[name][0], place, atol=1e-5):
+                raise Broken(f"{name} is elsewhere")
+            if found[name][1] != seen:
+                shapes = self.history[self.position][1]
+                item = bpy.data.objects[name]
+                off = world.difference(world.shape(item), shapes[name]) if name in shapes else np.nan
+                raise Broken(f"{name} is not what was stored: {off:.2g} of its size off")
+
+    def check(self, name, said, old, before):
+        """The shapes after a change; which of them are held as they are, for the next."""
+        held = dict(before[2])
+        for item in world.sources():
+            now, kind = world.shape(item), settings_of(item).live_kind
+            mine = item == self.steps.source
+            key = old if mine else item.name
+            earlier = before[1].get(key)
+            if mine and said in ("press", "anchor"):
+                held[key] = earlier
+            elif mine and name in MOVES and said != "cancelled drag":
+                held.pop(key, None)
+            if mine:
+                held[item.name] = held.pop(key, None)
+            stays = held.get(item.name)
+            if stays is not None and mine and name in MAY_MOVE and np.any(stays != now):
+                stays = held[item.name] = None
+            if kind and stays is None and not waits(item, kind):
+                off = world.difference(now, world.fresh_shape(item, kind))
+                if not off <= self.tolerance:
+                    raise Broken(f"{item.name}, live {kind}, is {off:.2g} of its size off a fresh solve")
+            elif stays is not None or (not kind and not (mine and name in GIVES_SHAPE)):
+                off = world.difference(now, earlier)
+                if off != 0.0:
+                    raise Broken(f"{item.name} ({kind or 'not live'}) moved by {off:.2g} of its size")
+        return {one: kept for one, kept in held.items() if kept is not None}
+
+
+def waits(item, kind):
+    """Whether live mode waits for an object that is still to be chosen."""
+    style = settings_of(item).stylize
+    return kind == "STYLIZE" and style.style == "OBJECT" and style.style_object is None
