@@ -172,8 +172,9 @@ def wrap(dog, scan):
             ends = [Vector((side * x, y, z)) for x, y, z in (on_dog, on_scan)]
             rest, there = (at.matrix_world @ end for at, end in zip((dog, scan), ends, strict=True))
             bpy.ops.arapfields.add_landmark(rest=rest, on_target=there)
+    aside = dog.location.x - scan.location.x
     bpy.ops.arapfields.wrap()
-    dog.location.x += dog.location.x - scan.location.x
+    dog.location.x += aside
 
 
 def main():
@@ -198,11 +199,10 @@ def main():
     with alone(), timed("wrap onto a scan"):
         wrap(dogs["Wrapped"], scan)
     with alone(), timed("picture", lambda: (0.0, "Cycles at work")):
-        wrapped = dogs.pop("Wrapped")  # what counts for the frame is where its own shape would be: beyond it
         shown = [*dogs.values(), scan, *hats, *draw_pins(dogs["Mesh"]), *draw_pins(dogs["Posed"])]
         for column, text in enumerate(CAPTIONS):
             shown.append(stage.caption(text, ((column - 2) * SPACING, -1.3, -0.05), 0.2))
-        end = (wrapped.location.x - SPACING + 1.1, 0, 1.75)
+        end = (dogs["Wrapped"].location.x + 1.1, 0, 1.75)
         stage.photograph(
             shown, options.output / "demo.png", width=1600, elevation=8, samples=12, around=[end]
         )

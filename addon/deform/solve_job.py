@@ -13,6 +13,7 @@ from ..blender.property_definitions import effective_value
 from ..carried.carrying import Carrying
 from ..carried.world_matrices import depsgraph_of
 from ..core.errors import UserError
+from ..core.geometry.spaces import inverse, similarity, transform
 from ..core.poses import Pose
 from ..core.runtime import native
 from ..core.runtime.jobs import Item
@@ -25,8 +26,11 @@ from ..viewport.previews import Preview
 from .first_result import FirstResult
 
 
-def plan_solve_job(context, operator, source, kind, samples, seed, solve):
-    """The job's item. `solve(tracker, surface, samples, weight)` returns the field, on the worker."""
+def plan_solve_job(context, operator, source, kind, samples, seed, solve, places=False):
+    """The job's item. `solve(tracker, surface, samples, weight)` returns the field, on the worker.
+
+    `places`: the object itself takes what of the result is a similarity; the mesh takes the rest.
+    """
     settings = settings_of(source)
     output, result = destination(settings, operator)
     reason = placement.refusal(source, output, result)
@@ -58,13 +62,18 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
             after = field(before)
         if not np.isfinite(after).all():
             raise UserError("The result has vertices that are not finite; try other settings")
-        turns = surface.turns(field, before) if placement.keeps_mesh(output, result) else None
+        moves, place = np.eye(4), None
+        if places:
+            moves = similarity(before, after)
+            after = transform(inverse(moves), after)
+            place = surface.space.solve_to_world @ moves @ surface.space.world_to_solve
+        turns = surface.turns(field, before, moves) if placement.keeps_mesh(output, result) else None
         moved = carrying.moved(native.library(), points, field, carried)
         local = surface.space.to_local(after)
         if output == "WARP":
             local = surface.space.moved_to_local(after, before, surface.local)
         pose = Pose(field, points, surface.space.local_to_solve)
-        return SolvedMesh(local, topology, report, turns, moved), pose
+        return SolvedMesh(local, topology, report, turns, moved, place), pose
 
     def apply(work_result):
         solved, pose = work_result
@@ -72,6 +81,8 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve):
             preview.clear()
         owner = surface.reference.get()
         item = placement.place_result(bpy.context, owner, kind, output, result, solved, surface.local)
+        if solved.place is not None:
+            placement.move(bpy.context, item, solved.place)
         applying.solved[owner.session_uid] = pose
         carrying.put(bpy.context, solved.carried)
         operator.warnings += [f"{owner.name}: {translated(reason)}" for reason in carrying.take_warnings()]

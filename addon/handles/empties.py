@@ -77,7 +77,7 @@ def solve_handles(source, space, weights=None, where=matrix_of):
     refuse(lost_bone(source))
     handles = []
     for entry in used(source):
-        boxes = rest_box(source, entry, where), box_now(entry, where)
+        boxes = movers.rest_of(entry), where(source), box_now(entry, where)
         held = weights[entry.group] if weights and entry.group and entry.kind in ("GROUP", "BONE") else None
         options = {"weights": held, "weight": entry.weight, "hold_from": entry.hold_from}
         options["reach"] = from_single_precision(entry.reach)

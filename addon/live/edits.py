@@ -74,7 +74,7 @@ class EditWatch:
         self.reader.refresh_carried(context)
 
     def is_stretched(self, source):
-        """Whether it is scaled otherwise than when it was read, and not evenly; in all digits once it rests."""
+        """Whether it is scaled otherwise than when it was read, not evenly; once it rests, in any digit."""
         world = matrix_of(source)
         rests, self.world = np.array_equal(world, self.world), world
         now, then = (one.local_to_solve for one in (space_of(world, source.name), self.reader.surface.space))

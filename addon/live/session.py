@@ -140,7 +140,7 @@ class Session:
             return
         if self.is_restored:
             context.view_layer.update()
-        if self.kind == "STYLIZE" and style_settings.lacks_object(settings_of(source).stylize):
+        if self.kind == "STYLIZE" and style_settings.is_begun(source):
             return  # the user is about to choose it
         layout = layout_of(source, self.kind, context.scene)
         if layout != self.layout:

@@ -6,12 +6,14 @@ from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from ..blender import mesh_arrays, modifier_stack
 from ..blender.object_references import settings_of
 from ..blender.property_definitions import effective_value
 from ..core.errors import UserError, refuse
 from ..core.geometry.edges import Topology
+from ..core.geometry.spaces import space_of
 from ..field_modifier import armatures, motion
 from ..handles import empties
 from ..names import REPORT
@@ -27,6 +29,7 @@ class SolvedMesh:
     report: dict
     turns: np.ndarray | None = None  # (n, 3) axis · angle, for free custom normals
     carried: list = field(default_factory=list)  # what Carrying.moved made
+    place: np.ndarray | None = None  # (4, 4) world → world: how the object itself moves, if it does
 
 
 def destination(settings, operator):
@@ -90,6 +93,25 @@ def place_result(context, source, kind, output, result, moved, before):
         for entry in empties.used(source):
             empties.store_rest(source, entry)
     return source
+
+
+def holds_place(source):
+    """Whether its place in the world is not its own to change: something else sets it, or refers to it."""
+    settings, data = settings_of(source), source.animation_data
+    bound = source.constraints or settings.carried or empties.used(source)
+    posed = any(modifier.type == "ARMATURE" for modifier in source.modifiers)
+    moved = data is not None and (data.action or data.drivers or data.nla_tracks)
+    parent = source.parent
+    sheared = parent is not None and not np.array_equal(
+        space_of(parent.matrix_world).local_to_solve, np.eye(4)
+    )
+    return bool(bound or posed or moved or sheared)
+
+
+def move(context, item, place):
+    """Moves an object as a similarity, (4, 4) world → world, says."""
+    item.matrix_world = Matrix((place @ np.array(item.matrix_world)).tolist())
+    context.view_layer.update()
 
 
 def new_object(context, source, kind, output, moved, before):

@@ -45,11 +45,11 @@ def refusal(source):
     return reason or vertex_groups.missing(source, group_names(source, style))
 
 
-def lacks_object(settings):
-    """Whether the object that these settings need is still to be chosen."""
-    if settings.style in CUSTOM:
-        return settings.style_object is None
-    return settings.frame == "EMPTY" and settings.frame_object is None
+def is_begun(source):
+    """Whether the object or the handle that the settings ask for is still to be chosen."""
+    settings = settings_of(source).stylize
+    lacks_handle = settings.use_handles and not empties.used(source)
+    return lacks_handle or missing_object(settings.style, settings.frame, settings) is not None
 
 
 def missing_object(which, frame, settings):

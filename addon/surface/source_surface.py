@@ -65,11 +65,17 @@ class SourceSurface:
         weights = [None if one is None else np.exp(near.blend(np.log(one))) for one in self.stiffness]
         return samples.with_weights(*weights)
 
-    def turns(self, field, points):
-        """(n, 3) how a field turns free custom normals at points in solve space; None: there are none."""
+    def turns(self, field, points, place=None):
+        """(n, 3) how a field turns free custom normals at points in solve space; None: there are none.
+
+        `place`: the (4, 4) part of the motion that the object itself takes.
+        """
         if not self.has_free_normals:
             return None
-        return rotations.turns(field.jacobian(points), self.space.local_to_solve)
+        jacobians = field.jacobian(points)
+        if place is not None:
+            jacobians = np.linalg.inv(place[:3, :3]) @ jacobians
+        return rotations.turns(jacobians, self.space.local_to_solve)
 
     def extract(self, tracker, weight, **extraction):
         """(k, 3) vertices and the topology of the implicit surface, in solve space.

@@ -21,9 +21,9 @@ from ..deform.solve_job import SolveOperator, plan_solve_job
 from ..handles.empties import matrix_of
 from ..live.sessions import end_for_job
 from ..properties.choices import result_properties
-from ..results.placement import destination
+from ..results.placement import destination, holds_place
 from . import landmarks
-from .properties import fit_rig
+from .properties import fit_rig, move_object
 
 onto = text(
     "Onto", "Name of the mesh object to wrap onto; empty for the one in the settings", options={"SKIP_SAVE"}
@@ -42,6 +42,7 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
         **annotations(WRAP, options={"SKIP_SAVE"}),
         "onto": onto,
         "fit_rig": fit_rig(options={"SKIP_SAVE"}),
+        "move_object": move_object(options={"SKIP_SAVE"}),
         **result_properties(),
     }
 
@@ -91,7 +92,8 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
                 tracker.warnings += fitting.warnings
             return field
 
-        item = plan_solve_job(context, self, source, "WRAP", values["samples"], values["seed"], solve)
+        places = effective_value("move_object", settings.wrap, self) and not holds_place(source)
+        item = plan_solve_job(context, self, source, "WRAP", values["samples"], values["seed"], solve, places)
         return item if fitting is None else with_bones(item, fitting, below)
 
 

@@ -8,7 +8,7 @@ from ..carried import rest_bones
 from ..core.settings.parameters import WRAP
 from ..field_modifier import inputs
 from ..names import Op
-from ..results.placement import placement_refusal
+from ..results.placement import holds_place, placement_refusal
 from . import landmarks
 
 
@@ -46,6 +46,8 @@ class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
         settings_column(layout, wrap, WRAP, advanced=False)
         if rest_bones.armatures_of(source):
             layout.prop(wrap, "fit_rig")
+        if not holds_place(source):
+            layout.prop(wrap, "move_object")
         job_button(layout, Op.WRAP, "MOD_SHRINKWRAP")
         factor_slider(layout, source)
         if rest_bones.fitted(source):

@@ -30,6 +30,16 @@ def fit_rig(**extra):
     )
 
 
+def move_object(**extra):
+    return flag(
+        "Move Object",
+        "The object itself goes to the target, and the modifier has its change of shape alone; not where "
+        "an armature, handles, keys, constraints or what it carries hold its place",
+        default=True,
+        **extra,
+    )
+
+
 class ARAPFIELDS_PG_landmark(bpy.types.PropertyGroup):
     rest: pointer(bpy.types.Object, "Landmark", "Empty on the object at rest")
     on_target: pointer(bpy.types.Object, "On the Target", "Empty where it belongs on the target")
@@ -49,6 +59,7 @@ class ARAPFIELDS_PG_wrap(bpy.types.PropertyGroup):
             "Active Landmark", "Row chosen in the list of landmarks", update=row_chosen
         ),
         "fit_rig": fit_rig(),
+        "move_object": move_object(),
         **annotations(WRAP),
     }
 

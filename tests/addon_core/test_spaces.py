@@ -85,7 +85,7 @@ def test_a_handle_moves_alike_in_solve_space_and_in_the_world(name):
     rest = world_matrix(rng, (0.3, 0.2, 0.5))
     motion = np.eye(4)
     motion[:3, :3], motion[:3, 3] = rotation(rng), rng.normal(size=3)
-    handle = solve_handle("Empty", "CUBE", rest, motion @ rest, space)
+    handle = solve_handle("Empty", "CUBE", np.linalg.inv(world) @ rest, world, motion @ rest, space)
     in_solve = handle.target @ np.linalg.inv(handle.rest)
     points = rng.normal(size=(20, 3))
     moved = transform(space.solve_to_world, transform(in_solve, points))
@@ -98,12 +98,12 @@ def test_a_handle_moves_alike_in_solve_space_and_in_the_world(name):
 
 def test_an_unmoved_handle_is_exactly_an_anchor():
     rng = np.random.default_rng(4)
-    space = space_of(world_matrix(rng, (1.0, 3.0, -2.0)))
-    rest = world_matrix(rng, (0.3, 0.2, 0.5))
-    assert solve_handle("Empty", "CUBE", rest, rest + 1e-8, space).is_anchor
+    world, rest = world_matrix(rng, (1.0, 3.0, -2.0)), world_matrix(rng, (0.3, 0.2, 0.5))
+    at_rest = "Empty", "CUBE", np.linalg.inv(world) @ rest, world
+    assert solve_handle(*at_rest, rest + 1e-8, space_of(world)).is_anchor
     shifted = rest.copy()
     shifted[:3, 3] += 1e-3
-    assert not solve_handle("Empty", "CUBE", rest, shifted, space).is_anchor
+    assert not solve_handle(*at_rest, shifted, space_of(world)).is_anchor
 
 
 def test_scaling_a_handle_after_its_rest_is_no_motion():
@@ -122,7 +122,7 @@ def test_a_box_is_the_emptys_cube():
 
 def test_a_box_holds_what_is_inside_it():
     rest = np.diag([1.0, 2.0, 3.0, 1.0])
-    handle = solve_handle("Empty", "CUBE", rest, rest, space_of(np.eye(4)))
+    handle = solve_handle("Empty", "CUBE", rest, np.eye(4), rest, space_of(np.eye(4)))
     points = np.array([[0.9, 1.9, -2.9], [1.1, 0, 0], [0, 2.1, 0], [0, 0, -3.1]])
     assert handle.inside(points).tolist() == [True, False, False, False]
 
@@ -134,7 +134,7 @@ def test_handles_that_hold_nothing_are_named():
 
 def test_a_flat_box_is_refused():
     with pytest.raises(UserError, match="Empty: its box is flat"):
-        solve_handle("Empty", "CUBE", np.diag([1.0, 1.0, 0.0, 1.0]), np.eye(4), space_of(np.eye(4)))
+        solve_handle("Empty", "CUBE", np.diag([1.0, 1.0, 0.0, 1.0]), *2 * [np.eye(4)], space_of(np.eye(4)))
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])

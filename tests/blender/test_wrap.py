@@ -25,6 +25,7 @@ pytestmark = pytest.mark.in_blender
 
 
 def test_the_object_comes_to_lie_on_the_target_and_the_factor_goes_back():
+    """The object itself goes there: the factor changes its shape alone."""
     item, target = bar_and_target()
     rest, goal = scenes.world_points(item), scenes.world_points(target)
     for index in (0, len(rest) // 2, len(rest) - 1):
@@ -38,7 +39,26 @@ def test_the_object_comes_to_lie_on_the_target_and_the_factor_goes_back():
     modifier = modifier_stack.find(item)
     inputs.put(modifier, "Factor", 0.0)
     bpy.context.view_layer.update()
-    assert np.array_equal(scenes.world_points(item), rest)
+    plain = scenes.world_points(item)
+    size = np.ptp(goal, axis=0).max()
+    assert np.linalg.norm(np.mean(plain - after, axis=0)) < 0.01 * size
+    assert abs(np.std(plain) / np.std(after) - 1) < 0.02 and np.abs(plain - after).max() < 0.2 * size
+    assert np.linalg.norm(np.array(item.matrix_world.translation) - goal.mean(axis=0)) < 0.02 * size
+
+
+def test_the_object_stays_where_asked_and_where_pins_hold_it():
+    item, _ = bar_and_target()
+    rest, place = scenes.world_points(item), item.matrix_world.copy()
+    for given in ({"move_object": False}, {}):
+        if not given:
+            bpy.ops.arapfields.pin_add(location=rest[0])
+            scenes.activate(item)
+        assert bpy.ops.arapfields.wrap(**given, **SMALL) == {"FINISHED"}
+        assert item.matrix_world == place
+        inputs.put(modifier_stack.find(item), "Factor", 0.0)
+        bpy.context.view_layer.update()
+        assert np.array_equal(scenes.world_points(item), rest)
+        inputs.put(modifier_stack.find(item), "Factor", 1.0)
 
 
 def test_landmarks_are_pairs_of_empties_that_move_with_both():

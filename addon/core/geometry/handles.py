@@ -86,10 +86,13 @@ def box_matrix(matrix_world, size):
     return np.asarray(matrix_world, dtype=np.float64) @ np.diag([size, size, size, 1.0])
 
 
-def solve_handle(name, kind, rest_world, now_world, space, **further):
-    """A handle from its box at rest and its box now, both in world space."""
-    to_solve = space.world_to_solve
-    rest = to_solve @ rest_world
+def solve_handle(name, kind, rest_local, world, now_world, space, **further):
+    """A handle from its box at rest in the object's coordinates, and its box now in the world.
+
+    The rest does not depend on where the object is: `world`, (4, 4), is that now, `space` maybe an earlier one.
+    """
+    to_solve, rest_world = space.world_to_solve, world @ rest_local
+    rest = space.local_to_solve @ rest_local
     if abs(np.linalg.det(rest[:3, :3])) <= 1e-18 * np.abs(rest[:3, :3]).max() ** 3:
         raise UserError(
             "{name}: its box is flat; give the Empty a size and a scale other than zero", name=name

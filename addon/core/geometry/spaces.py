@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import UserError
+from .rotations import best_rotation
 
 UNIFORM_SCALE_TOLERANCE = 1e-5  # relative spread of the scales below which they count as equal
 FLAT_SCALE_TOLERANCE = 1e-6  # smallest scale, relative to the largest
@@ -105,6 +106,17 @@ def pose(matrix):
     result = np.eye(4)
     result[:3, :3] = left @ right
     result[:3, 3] = matrix[:3, 3]
+    return result
+
+
+def similarity(before, after):
+    """(4, 4) the proper similarity that takes (n, 3) points nearest to those after."""
+    turn = best_rotation(before, after)
+    middles = before.mean(axis=0), after.mean(axis=0)
+    turned, moved = (before - middles[0]) @ turn.T, after - middles[1]
+    result = np.eye(4)
+    result[:3, :3] = turn * ((turned * moved).sum() / (turned**2).sum())
+    result[:3, 3] = middles[1] - result[:3, :3] @ middles[0]
     return result
 
 

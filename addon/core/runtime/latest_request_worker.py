@@ -39,7 +39,8 @@ class LatestRequestWorker:
 
     `solve` yields better and better results; it is left where a newer request has come.
     After `rest` seconds without a new request, or at once where `hurry` was called or that is waited for,
-    `refine(request, token)` yields better and better results until the token is cancelled. `poll` returns the newest result, or the error.
+    `refine(request, token)` yields better and better results until the token is cancelled.
+    `poll` returns the newest result, or the error.
     """
 
     def __init__(self, solve, prepare=None, refine=None, rest=REST, low_priority=False):

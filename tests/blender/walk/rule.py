@@ -122,6 +122,7 @@ class Walk:
 
 
 def waits(item, kind):
-    """Whether live mode waits for an object that is still to be chosen."""
-    style = settings_of(item).stylize
-    return kind == "STYLIZE" and style.style == "OBJECT" and style.style_object is None
+    """Whether live mode waits for an object or a handle that is still to be chosen."""
+    style, handles = settings_of(item).stylize, settings_of(item).handles
+    lacks_object = style.style == "OBJECT" and style.style_object is None
+    return kind == "STYLIZE" and (lacks_object or (style.use_handles and not handles))

@@ -137,7 +137,8 @@ class Steps:
         elif which == 4:
             style.use_handles = not style.use_handles
         else:  # still to be chosen
-            style.style, style.style_object = "OBJECT", self.rng.choice((None, bpy.data.objects.get("Die")))
+            chosen = bpy.data.objects["Die"] if self.rng.random() < 0.5 else None
+            style.style, style.style_object = "OBJECT", chosen
         self.look()
         return "style"
 

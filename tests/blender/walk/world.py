@@ -23,15 +23,21 @@ FEW = {"coarse_centers": 10, "fine_centers": 40, "samples": 400}
 
 
 def few_centers():
-    """Solves take milliseconds, here and in what the walk compares them with."""
-    setup.SAMPLES = 800
-    user_preferences.machine_options = lambda: {"threads": 1}
+    """Solves take milliseconds, here and in what the walk compares them with; returns what ends that."""
+    places = (setup, "SAMPLES"), (user_preferences, "machine_options"), (frame_solver, "STYLE")
+    places += ((frame_solver, "options_of"),)
+    before = [getattr(owner, name) for owner, name in places]
     label, tip, options = frame_solver.STYLE
-    frame_solver.STYLE = label, tip, options | FEW
-    plain = frame_solver.options_of
-    frame_solver.options_of = lambda name, options, machine: plain(
-        name, options | FEW if name == "live" else options, machine
-    )
+
+    def options_of(name, values, machine):
+        return before[3](name, values | FEW if name == "live" else values, machine)
+
+    def put(values):
+        for (owner, name), value in zip(places, values, strict=True):
+            setattr(owner, name, value)
+
+    put([800, lambda: {"threads": 1}, (label, tip, options | FEW), options_of])
+    return lambda: put(before)
 
 
 def build():
@@ -48,6 +54,8 @@ def build():
     parent.scale, parent.rotation_euler, ball.parent = (1.5, 1.5, 1.5), (0.1, 0.7, 0.0), parent
     ball.modifiers.new("Twist", "SIMPLE_DEFORM").angle = 0.4
     ball.modifiers.new("Fine", "SUBSURF").levels = 1
+    bpy.ops.mesh.primitive_cube_add(location=(8, 0, 0), rotation=(0.4, 0.2, 0.1))
+    bpy.context.object.name = "Die"
     shell = scenes.bar("Shell")
     shell.location, shell.scale = (0, 4, 0), (0.5, 0.5, 0.5)
     edited = bmesh.new()
