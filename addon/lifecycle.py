@@ -15,7 +15,7 @@ from .deform import first_result
 from .field_modifier import copies, motion
 from .handles import held_counts, left_behind, row_selection
 from .jobs.display import display
-from .live import recovery, rendering, sessions
+from .live import recovery, rendering, sessions, stored
 from .live.prefetch import prefetch
 from .pin_tool import drawing as pin_drawing
 from .pin_tool import tool
@@ -31,7 +31,7 @@ from .wrap import drawing as landmark_drawing
 def before_load(*_):
     """The file is about to go: whatever works on it ends, and nothing of it is applied."""
     passing = (jobs.board, held_counts.pending, staleness.changed, row_selection.seen, prefetch)
-    for state in (*passing, applying.solved, first_result.steps, left_behind.seen):
+    for state in (*passing, applying.solved, first_result.steps, left_behind.seen, stored.shapes):
         state.clear()
     sessions.stop_all()
     jobs.forget_messages()
@@ -132,7 +132,7 @@ PARTS = (  # what begins with the extension, and how it ends
 # Timers are started by blender/timers.py, threads by core/runtime/threads.py.
 STATE = (jobs.board, display, sessions.live, held_counts.pending, staleness.changed, motion.written)
 STATE += (hover, prefetch, applying.solved, previews.shown, first_result.steps, row_selection.seen, timers)
-STATE += (style_object.cache, left_behind.seen)
+STATE += (style_object.cache, left_behind.seen, stored.shapes)
 
 LONGEST = 10.0  # seconds that the end of the process waits for a thread
 

@@ -12,6 +12,7 @@ PROPERTY = "arapfields"  # object.arapfields
 REPORT = "arapfields_report"  # custom property of results: figures as JSON
 WARP_KEY = "ARAP Fields"  # shape key that carries the motion
 FIELD_MODIFIER = "ARAP Fields"  # modifier that carries the motion, and its node group
+SHAPE_OF = "arapfields_shape_of"  # custom property of the mesh that carries a live motion: what that is of
 OFFSETS = "ARAP Fields"  # point attribute of the motion: an offset in the object's coordinates
 TURNS = "ARAP Fields Turns"  # and how free custom normals turn: axis · angle
 CACHE_MODIFIER = "ARAP Fields Cache"  # Blender's Mesh Cache modifier that plays a bake

@@ -83,7 +83,7 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     normals: choice(NORMALS, "Normals", "How meshes of the implicit surface are shaded")
     live_kind: text("Live", "DEFORM or STYLIZE while the object is live")
     live_number: integer("Live Session", "Number of the session that the object is live by")
-    shape_of: text("Shape Of", "Digest of the pose that the live shape is of")
+    held: text("Held", "Digests of a pose and of the shape that a press without a move holds for it")
     live_hidden: text("Hidden before Live", "Whether the object was hidden in viewport and renders, as JSON")
     set_aside: flag("Set Aside", "Hidden since what was made of it lies in its place")
     fit_key: text("Fit", "Name of the object's last fit in the cache")

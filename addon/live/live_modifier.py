@@ -8,6 +8,7 @@ from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..field_modifier import armatures, cache_modifier, motion
 from ..results import placement, visibility
+from . import stored
 from .live_object import LIVE
 
 
@@ -18,6 +19,7 @@ class LiveModifier:
 
     def __init__(self, context, source, _):
         self.before, self.shown = motion.snapshot(source), None
+        self.first = self.before  # where a step before this one is undone to
         self.was_silent = bool(settings_of(source).silenced)
         self.was_playing = cache_modifier.is_playing(source)
         self.bind(context, source)
@@ -44,6 +46,7 @@ class LiveModifier:
         """Gives the source the motion that it had before, or none."""
         if source is not None:
             settings_of(source).live_kind = ""
+            stored.put_mark(source, "")
             visibility.give_back(source)
             if source.mode != "EDIT":
                 motion.restore(source, self.before)
@@ -56,6 +59,7 @@ class LiveModifier:
         """Leaves the motion where it is, or puts it where the user wants the result; returns the object."""
         settings = settings_of(source)
         settings.live_kind = ""
+        stored.put_mark(source, "")
         visibility.forget(source)
         result, shape = settings.result, self.shown
         is_placed = result in ("REPLACE", "KEY") and shape is not None
@@ -63,6 +67,12 @@ class LiveModifier:
             solved = placement.SolvedMesh(shape.points.astype(np.float64), None, {"output": LIVE})
             placement.place_result(context, source, kind, "WARP", result, solved, shape.rest)
         return source
+
+    def leave(self, source):
+        """The source is as in a step without live mode; but its mesh may be as live mode left it."""
+        if stored.mark(source):
+            motion.restore(source, self.first)
+            stored.put_mark(source, "")
 
 
 PAUSING = ("EDIT", "SCULPT")  # modes in which the user changes the mesh

@@ -13,7 +13,7 @@ from ..core.runtime import jobs
 from ..field_modifier import motion
 from ..names import RESULT_SUFFIX
 from ..results import result_objects, visibility
-from . import live_object
+from . import live_object, stored
 from .sessions import is_live, live, poll_live, take_away
 
 
@@ -38,6 +38,8 @@ def recover(clear):
         settings = None if source is None else settings_of(source)
         if settings is None or not settings.live_kind or settings.live_number != session.number:
             live.part_with(uid)
+            if settings is not None and not settings.live_kind and session.display.in_place:
+                session.display.leave(source)
             if not session.display.in_place:
                 take_away(session)
         else:
@@ -53,6 +55,7 @@ def bring_back(source):
     """Whether the session by which the source was live comes back; a live object without one goes."""
     former = live.past.get(settings_of(source).live_number)
     if former is None or not former.display.in_place:
+        stored.put_mark(source, "")
         return discard_live_object(source)
     live.returning[source.session_uid] = former
     return True
@@ -73,6 +76,7 @@ def adopt(source):
         discard_live_object(source)
         return
     visibility.forget(source)
+    stored.put_mark(source, "")
     if item is not None:
         live_object.forget(source)
         item.name = item.data.name = f"{source.name}{RESULT_SUFFIX[kind]}"

@@ -4,7 +4,6 @@
 import contextlib
 import itertools
 import time
-from typing import Any, NamedTuple
 
 import bpy
 
@@ -18,23 +17,15 @@ from ..results import placement, visibility
 from ..solver import secondary_motion, style_settings
 from ..solver.frame_range import animation_range
 from ..solver.source_reader import SourceChanged, SourceReader
+from . import stored
+from .display import Former, display_of
 from .edits import EditWatch, differ_in_handles, layout_of
-from .live_modifier import PAUSING, LiveModifier
-from .live_object import LiveObject
+from .live_modifier import PAUSING
 from .live_solver import PACE, LiveSolver
 from .playback import Playback, scene_frame
 
-UNSETTLED = "?"  # the shape that the file has is on its way to another
 PATIENCE = 1.0  # seconds at most that playback waits for a frame of secondary motion
 numbers = itertools.count(int(time.time()) % 10**9)  # of sessions: others than those of an earlier Blender
-
-
-class Former(NamedTuple):
-    """What stays of a session that has ended, for one that takes its place."""
-
-    display: Any
-    carried: dict  # what carried objects had before
-    keeps_shape: bool
 
 
 class Session:
@@ -43,9 +34,8 @@ class Session:
     What is shown of an `earlier` session of the source, a Former, is used again. `keeps_shape`: what it shows
     is the user's work, which stays at the end.
 
-    The file tells by `shape_of` which request its shape is of. Where that is the one at hand, as after an
-    undone step, the shape stays bit for bit. Where it is not, a handle has moved, or the shape was stored
-    while it was on its way: the request's own shape is shown.
+    Where the shape that the file has is that of the request at hand (stored.py), as after an undone step, it
+    stays bit for bit. Where not, it was stored on its way, or too early: the request's own shape is shown.
     """
 
     def __init__(self, context, source, kind="DEFORM", earlier=None, keeps_shape=False):
@@ -64,8 +54,8 @@ class Session:
         self.carrying.bind(context, earlier.carried if earlier else None)
         self.number = next(numbers)
         settings.live_kind, settings.live_number = kind, self.number
-        if earlier is None:
-            settings.shape_of = UNSETTLED
+        if earlier is None and self.display.in_place:
+            stored.put_mark(source, stored.UNSETTLED)
         self._reading = self._start(context)
 
     @property
@@ -150,16 +140,21 @@ class Session:
             self.reader.read_handles(source)
         self.edits.require_unedited(context, source)
         request = self.reader.request(context)
-        if self.is_held:
-            settings_of(source).shape_of = self.digest(request)
-        self.is_held, stays = False, self.is_restored and settings_of(source).shape_of == self.digest(request)
-        if self.is_restored and not stays:
-            self.requested = None
-        self.is_restored = stays
+        if self.is_restored and not self.stays(source, request):
+            self.is_restored, self.requested = False, None
         self.set_request(request, scene_frame(context.scene))
-        if stays:
+        if self.is_restored:
             self.is_restored, self.is_quiet = False, True
             self.keep_shown()
+
+    def stays(self, source, request):
+        """Whether the source shows, or showed before, what the file says that this request has."""
+        if not self.display.in_place:
+            return False
+        if self.is_held:
+            stored.hold(source, self.digest(request))
+        self.is_held = False
+        return stored.recall(source, self.digest(request))
 
     def digest(self, request):
         """Equal for requests of the same shape."""
@@ -173,7 +168,8 @@ class Session:
         if self.worker is None or self.is_restored:
             return False
         context.view_layer.update()
-        return settings_of(self.source.get()).shape_of == self.digest(self.reader.request(context))
+        source = self.source.get()
+        return stored.mark(source) == stored.wanted(source, self.digest(self.reader.request(context)))
 
     def keep_shown(self):
         """What is shown now stays at the end, where it is the user's work."""
@@ -210,10 +206,16 @@ class Session:
         is_shown = self.display.show(source, shape)
         if is_shown:
             self.carrying.show(shape.carried)
-            shape_of = UNSETTLED if shape.of is None else self.digest(shape.of)
-            if settings_of(source).shape_of != shape_of:
-                settings_of(source).shape_of = shape_of
+            if self.display.in_place:
+                self.note(source, shape)
         return is_shown
+
+    def note(self, source, shape):
+        """Notes what the shape is of that is shown now."""
+        key = stored.UNSETTLED if shape.of is None else self.digest(shape.of)
+        stored.put_mark(source, key)
+        if shape.of is not None:
+            stored.shapes.keep(key, motion.Motion(shape.points - shape.rest, shape.turns))
 
     def show_frame(self, context):
         """Shows a frame that is solved already, or one of secondary motion, which is waited for."""
@@ -235,14 +237,3 @@ class Session:
             visibility.forget(source)
         self.display.take_away(source)
         self.carrying.take_away()
-
-
-def display_of(context, source, surface, earlier):
-    """Where the shape is shown; what an earlier session made is used again, or goes."""
-    display = earlier.display if earlier else None
-    if display is not None and display.in_place and surface.in_place:
-        display.bind(context, source)
-        return display
-    if display is not None:
-        display.take_away(source)
-    return (LiveModifier if surface.in_place else LiveObject)(context, source, surface)

@@ -6,7 +6,7 @@ from mathutils import Matrix, Vector
 from ..blender import modifier_stack
 from ..blender.object_references import ObjectReference, settings_of
 from ..field_modifier import motion
-from ..live import sessions
+from ..live import sessions, stored
 from . import pins
 
 SHAPE_WAIT, FIRST_SHAPE_WAIT = 0.015, 0.1  # seconds that a redraw waits for its shape; and the first one
@@ -19,7 +19,7 @@ class Snapshot:
     def __init__(self, context, source):
         settings, layer = settings_of(source), context.view_layer
         self.source, session = ObjectReference(source), sessions.live.get(source.session_uid)
-        self.was_live, self.shape_of = session is not None, settings.shape_of
+        self.was_live, self.mark = session is not None, stored.mark(source)
         self.is_settled = session is None or session.is_current(context)
         self.motion = motion.snapshot(source)
         self.keep_rest, self.row = settings.keep_rest, settings.active_handle
@@ -44,7 +44,7 @@ class Snapshot:
             motion.write_to(motion.carrier(source, modifier), motion.Motion(None))
         else:
             motion.restore(source, self.motion)
-        settings_of(source).shape_of = self.shape_of
+        stored.put_mark(source, self.mark)
         if sessions.is_live(source):  # else it ended with an error, which the panel tells
             sessions.live[source.session_uid].restored(is_held)
             sessions.update(context)

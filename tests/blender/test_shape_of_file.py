@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is shown is a function of what the file says: by a short walk, and by what hands once found."""
 
+import functools
+
 import numpy as np
 import pytest
 from support.blender.inside import IN_BLENDER
@@ -11,7 +13,6 @@ if IN_BLENDER:
     from support.blender.live import step
     from support.blender.pins import pin
 
-    from addon.core.runtime import jobs
     from addon.live import sessions
     from addon.pin_tool import drag
     from tests.blender.walk import world
@@ -22,15 +23,26 @@ pytestmark = pytest.mark.in_blender
 OFF = 5e-3  # of the size, that a live shape may be off its fresh solve, and a release may change
 
 
+def few_centers(test):
+    """Solves take milliseconds."""
+
+    @functools.wraps(test)
+    def wrapped(*given):
+        end = world.few_centers()
+        try:
+            test(*given)
+        finally:
+            end()
+
+    return wrapped
+
+
+@few_centers
 def test_a_walk():
     """The long one: `python -m tests.blender.walk`."""
-    restore = world.few_centers()
-    try:
-        walk, taken = Walk(4, 1e-5), 0
-        while taken < 40:
-            taken += walk.step()
-    finally:
-        restore()
+    walk, taken = Walk(4, 1e-5), 0
+    while taken < 40:
+        taken += walk.step()
 
 
 def push(message):
@@ -42,6 +54,7 @@ def undo_begins():
     push("begin")
 
 
+@few_centers
 def test_an_import_with_its_rotation_comes_back_as_stored():
     bar = scenes.bar()
     bar.rotation_euler.x = np.pi / 2
@@ -68,24 +81,26 @@ def test_an_import_with_its_rotation_comes_back_as_stored():
     assert world.difference(scenes.world_points(bpy.data.objects["Bar"]), stored) < OFF
 
 
+@few_centers
 def test_a_pin_moved_by_g_and_its_undo_take_the_mesh_along():
     bar = scenes.bar()
     undo_begins()
     pin(bar, (-1.0, 0.0, 0.25), anchor=True)
-    empty = pin(bar, (1.0, 0.0, 0.25), target=(1.0, 0.0, 0.4))
+    name = pin(bar, (1.0, 0.0, 0.25), target=(1.0, 0.0, 0.4)).name
     push("drag")
     for height in (0.6, 0.8, 1.0):
-        bpy.data.objects[empty.name].location.z = height
+        bpy.data.objects[name].location.z = height
         push("G")  # before the timer has come round
         world.settle()
     for again, height in ((bpy.ops.ed.undo, 0.8), (bpy.ops.ed.undo, 0.6), (bpy.ops.ed.redo, 0.8)):
         again()
         world.settle()
         bar = bpy.data.objects["Bar"]
-        assert abs(bpy.data.objects[empty.name].location.z - height) < 1e-6
+        assert abs(bpy.data.objects[name].location.z - height) < 1e-6
         assert world.difference(world.shape(bar), world.fresh_shape(bar, "DEFORM")) < OFF
 
 
+@few_centers
 def test_each_live_style_is_that_of_the_settings_and_strength_0_is_rest():
     """On a thin open shell, on which one style after another once piled up."""
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=16, y_subdivisions=16)
@@ -120,14 +135,3 @@ def test_a_release_changes_nothing_that_is_seen():
     bpy.context.view_layer.update()
     assert world.difference(scenes.world_points(bar), shown) < OFF
     assert world.difference(world.shape(bar), world.fresh_shape(bar, "DEFORM")) < 1e-5
-
-
-def test_what_a_step_told_goes_with_it():
-    bar = scenes.bar()
-    undo_begins()
-    bar.arapfields.stylize.style = "CUBE"
-    bpy.ops.arapfields.stylize(samples=400, iterations=5)
-    push("Stylize")
-    assert jobs.messages()
-    bpy.ops.ed.undo()
-    assert not jobs.messages()

@@ -89,7 +89,7 @@ def box_matrix(matrix_world, size):
 def solve_handle(name, kind, rest_local, world, now_world, space, **further):
     """A handle from its box at rest in the object's coordinates, and its box now in the world.
 
-    The rest does not depend on where the object is: `world`, (4, 4), is that now, `space` maybe an earlier one.
+    The rest does not depend on where the object is, which `world`, (4, 4), says; `space` may be earlier.
     """
     to_solve, rest_world = space.world_to_solve, world @ rest_local
     rest = space.local_to_solve @ rest_local

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which pose the shape is of that a live source has; and shapes once shown, for steps that are undone.
+
+Undo leaves a mesh as it is where two steps hold the same one, whatever live mode has written since. So a mark
+on the mesh itself tells what its shape is of, and the object tells where another shape is held for a pose.
+"""
+
+import hashlib
+
+from ..blender import modifier_stack
+from ..blender.object_references import settings_of
+from ..field_modifier import motion
+from ..names import SHAPE_OF
+
+UNSETTLED = "?"  # the mark of a shape that is on its way to another
+LARGEST = 1 << 28  # bytes of shapes that are kept
+
+
+class Shapes(dict):
+    """{mark: Motion}, the newest last."""
+
+    def keep(self, key, shape):
+        """Keeps a shape under its mark; the oldest ones go where there are too many."""
+        self.pop(key, None)
+        self[key] = shape
+        while sum(map(bytes_of, self.values())) > LARGEST:
+            del self[next(iter(self))]
+
+
+shapes = Shapes()
+
+
+def bytes_of(shape):
+    return sum(part.nbytes for part in (shape.offsets, shape.turns) if part is not None)
+
+
+def mark(source):
+    """What the motion that the source has is of; "" where live mode did not put it there."""
+    modifier = modifier_stack.find(source)
+    return "" if modifier is None else motion.carrier(source, modifier).get(SHAPE_OF, "")
+
+
+def put_mark(source, key):
+    modifier = modifier_stack.find(source)
+    if modifier is None or mark(source) == key:
+        return
+    mesh = motion.carrier(source, modifier)
+    if key:
+        mesh[SHAPE_OF] = key
+    else:
+        del mesh[SHAPE_OF]
+
+
+def hold(source, pose):
+    """The shape that the source has counts as that of a pose, by its digest."""
+    shape = motion.snapshot(source)
+    if shape is None:
+        return
+    offsets = b"" if shape.offsets is None else shape.offsets.tobytes()
+    key = f"{pose} {hashlib.sha1(offsets).hexdigest()}"
+    settings_of(source).held = key
+    put_mark(source, key)
+    shapes.keep(key, shape)
+
+
+def wanted(source, pose):
+    """The mark of the shape that the file has, or should have, of that pose."""
+    held = settings_of(source).held
+    return held if held.startswith(f"{pose} ") else pose
+
+
+def recall(source, pose):
+    """Has the source show that shape, bit for bit, where it does or did before; whether it does."""
+    key = wanted(source, pose)
+    if mark(source) != key:
+        shape, modifier = shapes.get(key), modifier_stack.find(source)
+        if shape is None or modifier is None:
+            return False
+        count = len(motion.carrier(source, modifier).vertices)
+        if settings_of(source).carried or (shape.offsets is not None and len(shape.offsets) != count):
+            return False
+        motion.restore(source, shape)
+        motion.written.add(source.session_uid)
+        put_mark(source, key)
+    return True
