@@ -88,7 +88,7 @@ def solve_handles(source, space, weights=None, where=matrix_of):
     centers, beyond = kept_rest(source)
     if not len(centers):
         return handles
-    centers = transform(space.world_to_solve @ where(source), np.array(centers))
+    centers = transform(space.local_to_solve, np.array(centers))
     mirror = symmetry.mirror_of(source)
     if mirror is not None:
         across = space.world_to_solve @ mirror @ space.solve_to_world
