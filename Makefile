@@ -28,7 +28,7 @@ endif
 NATIVE_TESTS := $(BUILD)/tests/native_tests
 export ARAPFIELDS_NATIVE_TESTS := $(NATIVE_TESTS)
 
-.PHONY: help setup build examples demo test test-slow test-windows test-arm64 fuzz bench sanitize format lint wheel workflows extension repository blenders gallery docs clean
+.PHONY: help setup build examples demo test test-slow test-windows test-arm64 fuzz bench sanitize format lint wheels workflows extension release blenders gallery docs clean
 
 help:  ## this list
 	@grep -E '^[a-z0-9-]+:.*##' Makefile | sed -E 's/:.*##/ -/'
@@ -113,10 +113,14 @@ test-windows: windows-tools setup  ## the library without bindings, compiled for
 	WINEPREFIX=$(abspath build/wine) WINEDEBUG=-all timeout 900 $(WINE) $(WINDOWS_TESTS) --color_output=no --report_level=short
 	@$(if $(wildcard dist/*-win_amd64.whl),$(PY) -m tests.windows dist $(WINDOWS),echo "No wheels for Windows in dist: the tests of Python did not run")
 
-# Debian: debootstrap, g++-aarch64-linux-gnu and qemu-user-static; and root, for debootstrap and chroot. ARM64 takes
-# arguments: ARM64="--only reference", "--all", "--jobs 1".
-test-arm64: build $(VENV)/.tools  ## slow: the library and its tests on 64-bit ARM, compiled here and run under qemu
-	$(PY) -m tests.arm64 $(ARM64)
+# Debian: g++-aarch64-linux-gnu and qemu-user-static.
+ARM64 := build/linux-arm64
+test-arm64: setup  ## the wheels' library for 64-bit ARM, and its native tests under qemu
+	@command -v qemu-aarch64-static > /dev/null || $(call lacks,An emulator is needed (Debian: qemu-user-static))
+	$(MAKE) --no-print-directory wheels PLATFORM=linux-arm64
+	$(VENV)/bin/cmake -S . -B $(ARM64) -DARAPFIELDS_NATIVE_TESTS=ON
+	$(VENV)/bin/cmake --build $(ARM64) --target native_tests
+	qemu-aarch64-static -L /usr/aarch64-linux-gnu $(ARM64)/tests/native_tests --color_output=no --report_level=short
 
 fuzz: build $(VENV)/.tools  ## the nets, long: 20,000 odd calls and 20,000 damaged files of every kind
 	$(PY) -m tests.fuzz
@@ -153,36 +157,26 @@ lint: git-clone setup  ## the same, checking alone
 	git ls-files '*.h' '*.cpp' | xargs $(VENV)/bin/clang-format --dry-run --Werror
 	$(VENV)/bin/ruff format --check -q . && $(VENV)/bin/ruff check .
 
-# GLIBC=2.28, as if nothing is said: the oldest C library to run with.
-GLIBC :=
-wheel: git-clone $(VENV)/.ready  ## for pip: a manylinux wheel for .venv's Python and the source distribution, in dist
+# linux-arm64 needs Debian's g++-aarch64-linux-gnu, windows-x64 its g++-mingw-w64-x86-64-posix.
+PLATFORM := linux-x64
+.PHONY: wheel-tools
+wheel-tools: $(VENV)/.ready
 	$(COMPILER)
-	$(PIP) -q -r cmake/wheel/requirements.txt
-	$(PY) cmake/wheel/build_wheel.py --output dist $(if $(GLIBC),--glibc $(GLIBC))
+	@$(PIP) -q -r cmake/wheel/requirements.txt
+
+wheels: wheel-tools  ## for pip, in dist: a wheel for each Python; PLATFORM=linux-arm64, windows-x64, windows-arm64, macos-arm64, macos-x64 or all
+	$(PY) cmake/wheel/build_wheels.py $(PLATFORM) --output dist
 
 # KEEP="NAME …" hands variables of this shell on to the steps, such as a compiler's cache.
 workflows: git-clone setup  ## the continuous integration's steps for Linux, run here one by one in fresh clones: build/workflows
 	$(PY) tests/packaging/run_workflow.py .github/workflows/*.yml $(if $(KEEP),--keep $(KEEP))
 
-# PYTHONS="3.11 3.13" makes those a must; else 3.11 and whatever headers are at hand or to be had. GLIBC=2.28 takes
-# the library that `make wheel` links for systems that old; else the zip needs a C library as new as this system's.
-PLATFORM := linux-x64
-EXTENSION_BUILD = $(if $(filter macos-%,$(PLATFORM)),build,$(if $(GLIBC),wheel,eigen-build))
-BUILD_EXTENSION = $(PY) blender_scripts/build_extension.py --output dist $(if $(PYTHONS),--python $(PYTHONS)) \
-  --build build/$(if $(filter macos-%,$(PLATFORM)),wheel,$(if $(GLIBC),wheel-$(GLIBC),eigen))
+extension: wheels  ## for Blender: dist/arapfields-<version>-linux-x64.zip, of these wheels; PLATFORM as above
+	$(PY) blender_scripts/build_extension.py $(PLATFORM) --output dist
 
-.PHONY: eigen-build
-eigen-build:
-	@$(MAKE) --no-print-directory build BACKEND=eigen
-
-extension: $(EXTENSION_BUILD)  ## dist/arapfields-<version>-linux-x64.zip for Blender; PLATFORM=macos-arm64 for a Mac
-	@$(if $(filter macos-%,$(PLATFORM)),$(PIP) -q -r blender_scripts/extension/macos-requirements.txt)
-	$(PY) blender_scripts/python_headers.py
-	$(BUILD_EXTENSION) --platform $(PLATFORM)
-
-repository: $(EXTENSION_BUILD)  ## the same, and dist/index.json: a repository of extensions to serve
-	$(PY) blender_scripts/python_headers.py
-	$(BUILD_EXTENSION) --repository
+release: git-clone  ## all that is published, in dist: wheels, zips, index.json, source distribution, licences, checksums
+	$(MAKE) --no-print-directory extension PLATFORM=all
+	$(PY) cmake/wheel/release.py --output dist
 
 # What PyPI has of other Blenders, for tests/blender/test_extension.py; the 5.2 needs a Python 3.13.
 blenders: build/blenders/4.2/.ready $(if $(PYTHON313),build/blenders/5.2/.ready)  ## other Blenders to test the extension in: build/blenders

@@ -26,14 +26,6 @@ foreach(name c10 torch_cpu torch)
   find_library(LIBTORCH_${name} NAMES ${name} PATHS "${LIBTORCH_DIR}/lib" NO_DEFAULT_PATH REQUIRED)
   target_link_libraries(libtorch::libtorch INTERFACE "${LIBTORCH_${name}}")
 endforeach()
-if(WIN32)  # the wheel has no import library of libiomp5md.dll
-  find_program(ARAPFIELDS_DLLTOOL NAMES llvm-dlltool REQUIRED)
-  set(LIBTORCH_IOMP "${PROJECT_BINARY_DIR}/libiomp5md")
-  file(WRITE "${LIBTORCH_IOMP}.def" "LIBRARY libiomp5md.dll\nEXPORTS\nomp_get_max_threads\nomp_set_num_threads\n")
-  execute_process(COMMAND_ERROR_IS_FATAL ANY
-    COMMAND "${ARAPFIELDS_DLLTOOL}" -m i386:x86-64 -d "${LIBTORCH_IOMP}.def" -l "${LIBTORCH_IOMP}.lib")
-  target_link_libraries(libtorch::libtorch INTERFACE "${LIBTORCH_IOMP}.lib")
-else()
 # The OpenMP library that libtorch brings along: a call tells it to keep to one thread (core/library_threads.h).
 file(GLOB LIBTORCH_OPENMP "${LIBTORCH_DIR}/lib/libgomp*.so*" "${LIBTORCH_DIR}/../torch.libs/libgomp*.so*"
   "${LIBTORCH_DIR}/lib/libomp.dylib")
@@ -42,7 +34,6 @@ if(NOT LIBTORCH_OPENMP)
 endif()
 list(GET LIBTORCH_OPENMP 0 LIBTORCH_OPENMP)
 target_link_libraries(libtorch::libtorch INTERFACE "${LIBTORCH_OPENMP}")
-endif()
 # A CUDA build registers its kernels when libtorch_cuda is loaded, though no symbol of it is named by us.
 find_library(LIBTORCH_torch_cuda NAMES torch_cuda PATHS "${LIBTORCH_DIR}/lib" NO_DEFAULT_PATH)
 if(LIBTORCH_torch_cuda)

@@ -1,21 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The extension's zip: manifest, add-on and wheel."""
+"""The extension's zip: manifest, add-on and wheels."""
 
 import re
 import tomllib
 import zipfile
 
-from .wheel import entry
-
-# Of platforms that were built and have not been run: what the manifest says of it, to readers and to users.
-NOT_RUN = {
-    "macos-arm64": (
-        "Built on Linux, and not yet run on a Mac: docs/install.md has a checklist",
-        " (not yet run)",
-    )
-}
-
 OPTIONS = "core/settings/options.json"  # where addon/core/settings/parameters.py looks for it
+RUN = ("linux-x64", "windows-x64")  # the others' manifests say that they were not run yet
+TIMESTAMP = (2020, 1, 1, 0, 0, 0)  # archives of the same content are the same bytes
+
+
+def entry(name, method=zipfile.ZIP_DEFLATED):
+    info = zipfile.ZipInfo(name, TIMESTAMP)
+    info.external_attr = 0o100644 << 16
+    info.compress_type = method
+    return info
 
 
 def read_manifest(addon):
@@ -30,38 +29,35 @@ def addon_files(addon):
     return names
 
 
-def platform_manifest(text, platform):
-    """The manifest's text for one platform alone."""
+def manifest_text(text, platform, wheels):
+    """The manifest's text for one platform and its wheels."""
     text = re.sub(r"^platforms = .*$", f'platforms = ["{platform}"]', text, flags=re.M)
-    if platform in NOT_RUN:
-        remark, mark = NOT_RUN[platform]
-        text = re.sub(r'^(tagline = ".*)"$', rf'# {remark}.\n\1{mark}"', text, flags=re.M)
-    return text
-
-
-def write_extension(addon, options, wheels, licence, guide, path, platform=None):
-    """Writes the extension's zip for `platform` to `path`; `options` is the library's options.json, that
-    makes the panel; `guide` the user's guide, archive name → bytes. Without a platform: the manifest's own.
-
-    Wheels, compressed already, are stored.
-    """
-    lines = "".join(f'  "./wheels/{wheel.name}",\n' for wheel in wheels)
+    if platform not in RUN:
+        text = re.sub(r'^(tagline = ".*)"$', r'\1 (not yet run)"', text, flags=re.M)
     # Keys after a table would belong to it: the wheels go before the first one.
-    text = (addon / "blender_manifest.toml").read_text()
-    text = platform_manifest(text, platform) if platform else text
     head, table, tail = text.partition("\n[")
-    manifest = f"{head}\nwheels = [\n{lines}]\n{table}{tail}"
+    lines = "".join(f'  "./wheels/{wheel.name}",\n' for wheel in wheels)
+    return f"{head}\nwheels = [\n{lines}]\n{table}{tail}"
+
+
+def write_extension(addon, wheels, licence, guide, path, platform):
+    """Writes the extension's zip to `path`; `guide` is the user's guide, archive name → bytes.
+
+    The first wheel's options.json makes the panel. Wheels, compressed already, are stored as they are.
+    """
+    manifest = manifest_text((addon / "blender_manifest.toml").read_text(), platform, wheels)
     tomllib.loads(manifest)
+    with zipfile.ZipFile(wheels[0]) as content:
+        options = content.read("arapfields/options.json")
     partial = path.with_suffix(".partial")
     with zipfile.ZipFile(partial, "w", compresslevel=9) as archive:
         archive.writestr(entry("blender_manifest.toml"), manifest)
         archive.writestr(entry("LICENSE"), licence)
+        archive.writestr(entry(OPTIONS), options)
         for name, source in addon_files(addon).items():
             archive.writestr(entry(name), source.read_bytes())
-        archive.writestr(entry(OPTIONS), options.read_bytes())
         for name, content in guide.items():
             archive.writestr(entry(name), content)
         for wheel in wheels:
-            archive.writestr(entry(f"wheels/{wheel.name}", method=zipfile.ZIP_STORED), wheel.read_bytes())
+            archive.writestr(entry(f"wheels/{wheel.name}", zipfile.ZIP_STORED), wheel.read_bytes())
     partial.replace(path)
-    return path

@@ -8,11 +8,10 @@ allows. What libstdc++ lacks then comes from its static archive, as in the manyl
 
 import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
-TARGET = "x86_64-linux-gnu"
+from platforms import run, zig
+
 NEWEST = {"GLIBCXX_3.4": 25, "CXXABI_1.3": 11}  # the last numbers that manylinux_2_28 allows, of GCC 8
 GLIBC = ["libc.so.6", "libm.so.6", "libpthread.so.0", "libdl.so.2", "librt.so.1"]
 # What headers of newer glibc name and older libraries lack: a process is never known to have one thread, and
@@ -20,40 +19,38 @@ GLIBC = ["libc.so.6", "libm.so.6", "libpthread.so.0", "libdl.so.2", "librt.so.1"
 COMPATIBLE = """
 #include <sys/stat.h>
 #define HIDDEN __attribute__((visibility("hidden")))
+#ifdef __x86_64__
+#define KERNELS 1
+#else
+#define KERNELS 0
+#endif
 HIDDEN char __libc_single_threaded = 0;
 int __fxstat(int version, int file, struct stat *to);
-HIDDEN int fstat(int file, struct stat *to) { return __fxstat(1, file, to); }
+HIDDEN int fstat(int file, struct stat *to) { return __fxstat(KERNELS, file, to); }
 int __xstat(int version, const char *path, struct stat *to);
-HIDDEN int stat(const char *path, struct stat *to) { return __xstat(1, path, to); }
+HIDDEN int stat(const char *path, struct stat *to) { return __xstat(KERNELS, path, to); }
 int __lxstat(int version, const char *path, struct stat *to);
-HIDDEN int lstat(const char *path, struct stat *to) { return __lxstat(1, path, to); }
+HIDDEN int lstat(const char *path, struct stat *to) { return __lxstat(KERNELS, path, to); }
 """
 
 
-def run(*command, **keywords):
-    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, **keywords)
-    if done.returncode != 0:
-        raise RuntimeError(f"{command[0]}: {done.stderr.strip() or done.stdout.strip()}")
-    return done.stdout
-
-
-def compiler_file(name):
-    """The path of a file that the system's compiler links with."""
-    path = Path(run("c++", f"-print-file-name={name}").strip())
+def compiler_file(compiler, name):
+    """The path of a file that the compiler links with."""
+    path = Path(run(compiler, f"-print-file-name={name}").strip())
     if not path.is_absolute():
         raise RuntimeError(f"the compiler has no {name}")
     return path.resolve()
 
 
-def glibc_stubs(version, folder):
+def glibc_stubs(target, folder):
     """ziglang makes stubs of its lists of symbols when it links a program."""
     cache = folder / "zig"
     (folder / "empty.c").write_text("int main(void) { return 0; }\n")
     environment = {**os.environ, "ZIG_GLOBAL_CACHE_DIR": str(cache), "ZIG_LOCAL_CACHE_DIR": str(cache)}
-    target = f"{TARGET}.{version[0]}.{version[1]}"
     libraries = ["-lm", "-lpthread", "-ldl", "-lrt"]
-    zig = [sys.executable, "-m", "ziglang", "cc", "-target", target]
-    run(*zig, folder / "empty.c", "-o", folder / "empty", *libraries, env=environment)
+    run(
+        *zig("cc", "-target", target), folder / "empty.c", "-o", folder / "empty", *libraries, env=environment
+    )
     (made,) = cache.rglob("libm.so.6")
     return [made.parent / name for name in GLIBC]
 
@@ -71,10 +68,10 @@ def cxx_symbols(library):
             yield found[2], found[1], found[3]
 
 
-def cxx_stub(folder):
+def cxx_stub(compiler, folder):
     """libstdc++.so.6 with those alone."""
     source, script, versions = [".text"], [], {}
-    for name, kind, version in cxx_symbols(compiler_file("libstdc++.so")):
+    for name, kind, version in cxx_symbols(compiler_file(compiler, "libstdc++.so")):
         versions.setdefault(version, []).append(name)
         section = {"FUNC": ".text", "OBJECT": ".data", "TLS": '.section .tbss,"awT",@nobits'}[kind]
         kind = {"FUNC": "function", "OBJECT": "object", "TLS": "tls_object"}[kind]
@@ -90,25 +87,21 @@ def cxx_stub(folder):
         "-Wl,-soname,libstdc++.so.6",
         f"-Wl,--version-script={folder / 'cxx.map'}",
     ]
-    run("cc", *flags, folder / "cxx.s", "-o", path)
+    run(compiler, *flags, folder / "cxx.s", "-o", path)
     return path
 
 
-def link_flags(version, folder):
+def link_flags(platform, version, folder):
     """CMake definitions that link against glibc `version`, (major, minor), with stubs made in `folder`."""
-    folder.mkdir(parents=True, exist_ok=True)
+    compiler = platform.compiler
     (folder / "compatible.c").write_text(COMPATIBLE)
-    run("cc", "-O2", "-fPIC", "-c", folder / "compatible.c", "-o", folder / "compatible.o")
-    glibc = glibc_stubs(version, folder)
-    libraries = [cxx_stub(folder), compiler_file("libstdc++.a"), *glibc, compiler_file("libgcc_s.so.1")]
+    run(compiler, "-x", "c", "-O2", "-fPIC", "-c", folder / "compatible.c", "-o", folder / "compatible.o")
+    glibc = glibc_stubs("{}.{}.{}".format(platform.target, *version), folder)
+    libraries = [cxx_stub(compiler, folder), compiler_file(compiler, "libstdc++.a"), *glibc]
     # The last: what is linked into each library even of glibc, such as atexit.
-    libraries += [
-        folder / "compatible.o",
-        *glibc[:2],
-        compiler_file("libgcc.a"),
-        compiler_file("libc_nonshared.a"),
-    ]
-    flags = "-nodefaultlibs -Wl,--exclude-libs,ALL -Wl,--as-needed"
+    libraries += [compiler_file(compiler, "libgcc_s.so.1"), folder / "compatible.o", *glibc[:2]]
+    libraries += [compiler_file(compiler, name) for name in ("libgcc.a", "libc_nonshared.a")]
+    flags = "-nodefaultlibs -s -Wl,--exclude-libs,ALL -Wl,--as-needed"
     return {
         "CMAKE_SHARED_LINKER_FLAGS": flags,
         "CMAKE_MODULE_LINKER_FLAGS": flags,

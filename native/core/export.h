@@ -4,7 +4,10 @@
 /// Marks the symbols that libarapfields exports; all others are hidden. A class that is thrown, or has
 /// virtual functions, is exported entirely, so that it is one type on both sides of the library's boundary.
 /// On Windows the library's own sources (ARAPFIELDS_BUILDING) export what those of others import.
-#if !defined(_WIN32)
+/// ARAPFIELDS_ONE_MODULE: the library lies inside the bindings' module, and has no boundary.
+#if defined(ARAPFIELDS_ONE_MODULE)
+#define ARAPFIELDS_EXPORT
+#elif !defined(_WIN32)
 #define ARAPFIELDS_EXPORT __attribute__((visibility("default")))
 #elif defined(ARAPFIELDS_BUILDING)
 #define ARAPFIELDS_EXPORT __declspec(dllexport)

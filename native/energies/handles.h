@@ -73,9 +73,9 @@ class ARAPFIELDS_EXPORT BoundHandles {
   void retarget(const std::vector<Handle>& moved);
   /// All pairs, or at most `per_handle` random ones of each handle (0: all).
   template <class Scalar>
-  HandleBatch<Scalar> batch(Index per_handle, Random& random) const;
+  ARAPFIELDS_EXPORT HandleBatch<Scalar> batch(Index per_handle, Random& random) const;
   template <class Scalar>
-  HandleBatch<Scalar> all() const;
+  ARAPFIELDS_EXPORT HandleBatch<Scalar> all() const;
 
  private:
   void move(Index i);

@@ -4,7 +4,6 @@
 import json
 import sys
 import threading
-import zipfile
 from pathlib import Path
 
 import pages
@@ -14,7 +13,6 @@ sys.path.insert(0, str(pages.ROOT / "blender_scripts"))
 
 import at_hand
 import gallery
-import windowed
 from figures import FIGURES
 
 COMMITTED = [figure for figure in FIGURES if not figure.published]
@@ -44,22 +42,6 @@ def test_what_a_solve_did_not_measure_is_left_out():
     report = {"energy": 0.1234567, "handle_error_mean": 0.0, "preference": None}
     field = type("Field", (), {"report": report})()
     assert measured(field) == {"energy": 0.12346, "handle_error_mean": 0.0}
-
-
-@pytest.mark.parametrize("built", ["cpython-314", "cpython-311"])
-def test_an_extension_for_another_python_than_that_blenders_is_named(built, tmp_path, monkeypatch):
-    inner, outer = tmp_path / "a.whl", tmp_path / "arapfields-1-linux-x64.zip"
-    with zipfile.ZipFile(inner, "w") as wheel:
-        wheel.writestr(f"arapfields/_native.{built}-x86_64-linux-gnu.so", "")
-    with zipfile.ZipFile(outer, "w") as extension:
-        extension.write(inner, "wheels/a.whl")
-    for name in ("python3", "python3.9", "python3.14"):
-        (tmp_path / "usr/lib" / name).mkdir(parents=True)
-    monkeypatch.setattr(windowed, "CHROOT", tmp_path)
-    monkeypatch.setattr(windowed, "missing", lambda: None)
-    monkeypatch.setattr(windowed, "extension", lambda: outer)
-    lacking = at_hand.lacking_of_window()
-    assert lacking is None if built == "cpython-314" else "make extension PYTHONS=3.14" in lacking
 
 
 def test_what_is_not_at_hand_is_named(tmp_path, monkeypatch):

@@ -13,12 +13,13 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @pytest.fixture(scope="session")
 def built(tmp_path_factory):
-    """(wheel, source distribution) as `make wheel` makes them; ARAPFIELDS_DIST names a folder with both."""
+    """(wheel, source distribution) as `make release` makes them; ARAPFIELDS_DIST names a folder with both."""
     folder = Path(os.environ.get("ARAPFIELDS_DIST", tmp_path_factory.mktemp("dist")))
     if not list(folder.glob("*.whl")):
         run(sys.executable, "-m", "pip", "install", "-q", "-r", ROOT / "cmake" / "wheel" / "requirements.txt")
-        run(sys.executable, ROOT / "cmake" / "wheel" / "build_wheel.py", "--output", folder, cwd=ROOT)
-    (wheel,), (source,) = folder.glob("*cp311*.whl"), folder.glob("*.tar.gz")
+        run(sys.executable, ROOT / "cmake" / "wheel" / "build_wheels.py", "linux-x64", "--output", folder)
+        run(sys.executable, ROOT / "cmake" / "wheel" / "release.py", "--output", folder)
+    (wheel,), (source,) = folder.glob("*cp311*manylinux*x86_64.whl"), folder.glob("*.tar.gz")
     return wheel.resolve(), source.resolve()
 
 

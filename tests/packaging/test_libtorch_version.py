@@ -42,12 +42,6 @@ def test_another_version_is_named(check, tmp_path):
     assert "2.8.0" in str(caught.value) and "\n" not in str(caught.value)
 
 
-def test_a_package_that_brings_libtorch_asks_nothing(check, tmp_path):
-    folder = beside(tmp_path, "2.8.0")
-    (folder / "libarapfields-torch_cpu.so").touch()
-    check(folder)
-
-
 def test_a_missing_torch_is_named(check, tmp_path, monkeypatch):
     def nowhere(name):
         raise metadata.PackageNotFoundError(name)

@@ -4,7 +4,6 @@
 import json
 import re
 import subprocess
-import sys
 import tarfile
 import tomllib
 import zipfile
@@ -50,14 +49,6 @@ def test_the_five_lines_of_the_readme_run_from_the_wheel(environment, tmp_path):
 
 
 @pytest.mark.slow
-def test_an_editor_finds_the_types(built):
-    with zipfile.ZipFile(built[0]) as archive:
-        names = archive.namelist()
-    assert {"arapfields/py.typed", "arapfields/_native.pyi"} <= set(names)
-    assert not [name for name in names if ".libs/" in name or "torch_cpu" in name]
-
-
-@pytest.mark.slow
 def test_metadata_are_those_of_the_project(built):
     with zipfile.ZipFile(built[0]) as archive:
         (name,) = [name for name in archive.namelist() if name.endswith(".dist-info/METADATA")]
@@ -65,8 +56,6 @@ def test_metadata_are_those_of_the_project(built):
     assert (said["Name"], said["Version"]) == (PROJECT["name"], PROJECT["version"])
     assert said.get_all("Classifier") == PROJECT["classifiers"]
     assert set(PROJECT["dependencies"]) <= set(said.get_all("Requires-Dist"))
-    assert "manylinux_2_28_x86_64" in built[0].name
-    run(sys.executable, "-m", "twine", "check", "--strict", *built)
 
 
 def in_source(path):
@@ -84,6 +73,7 @@ def known(*folders):
 @pytest.mark.slow
 def test_the_source_distribution_has_what_builds_and_nothing_else(built):
     top = {"CHANGELOG.md", "CMakeLists.txt", "LICENSE", "README.md", "pyproject.toml", "PKG-INFO"}
+    top.add("THIRD_PARTY.txt")
     cmake = {name for name in known("cmake") if not re.search(r"/wheel/|mingw", name)}
     assert in_source(built[1]) == top | cmake | known("native")
 

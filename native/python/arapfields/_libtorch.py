@@ -5,9 +5,6 @@ libtorch's C++ interface changes from version to version: with another one the l
 and crashes at worst. So importing this module compares the versions, before anything is loaded.
 """
 
-import importlib.util
-import os
-import sys
 from importlib import metadata
 from pathlib import Path
 
@@ -15,13 +12,10 @@ HERE = Path(__file__).parent
 
 
 def check(folder: Path = HERE) -> None:
-    """ImportError, in one line, where the installed torch is missing or another one than was built against.
-
-    Nothing is asked where the package carries libtorch itself, as in Blender's extension.
-    """
+    """ImportError, in one line, where the installed torch is missing or not the one built against."""
     noted = folder / "libtorch.txt"
     built_against = noted.read_text(encoding="utf-8").strip() if noted.is_file() else ""
-    if not built_against or any(folder.glob("*torch_cpu*")):
+    if not built_against:
         return
     remedy = f"pip install torch=={built_against}"
     try:
@@ -34,13 +28,4 @@ def check(folder: Path = HERE) -> None:
         raise ImportError(f"{found}: {remedy}, or build arapfields anew")
 
 
-def show_libraries() -> None:
-    """Tells Windows where torch's libraries are; elsewhere ours knows that itself. torch is not imported."""
-    if sys.platform == "win32":
-        found = importlib.util.find_spec("torch")
-        if found is not None and found.origin is not None:
-            os.add_dll_directory(str(Path(found.origin).parent / "lib"))
-
-
 check()
-show_libraries()

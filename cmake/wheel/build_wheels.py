@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Builds the wheels of `arapfields`: for each platform, one for each of Blender's Pythons, on Linux.
+
+python cmake/wheel/build_wheels.py linux-x64 windows-x64 --output dist
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import check_wheel
+import python_headers
+from platforms import PLATFORMS, PYTHONS, ROOT, definitions, python_library, run
+
+WORK = ROOT / "build"
+STUBS = "python/arapfields/_native.pyi"
+
+
+def stubs():
+    """A _native.pyi that a build for this system wrote of the bindings as they are."""
+    newest = max(path.stat().st_mtime for path in (ROOT / "native/bindings").iterdir())
+    found = [ROOT / build / STUBS for build in ("build/linux-x64", "build/eigen", "build/wheel")]
+    for path in found:
+        if path.exists() and path.stat().st_mtime > newest:
+            return path
+    run("make", "build", "BACKEND=eigen", cwd=ROOT)
+    return ROOT / "build/eigen" / STUBS
+
+
+def module_name(version):
+    return "_native_cp{}{}".format(*version)
+
+
+def settings(platform, build):
+    """CMake's definitions of a platform's build, which makes the modules of all Pythons."""
+    (build / "tools").mkdir(parents=True, exist_ok=True)
+    modules = []
+    for version in PYTHONS:
+        headers = python_headers.headers(version, WORK / "python-headers/flat")
+        library = python_library(platform, version, headers, build / "tools")
+        modules.append(f"{module_name(version)}|{headers}|{platform.module_suffix(version)}|{library}")
+    given = {"ARAPFIELDS_MODULES": ";".join(modules), "ARAPFIELDS_WERROR": "ON"}
+    if platform.name != "linux-x64":
+        given["ARAPFIELDS_STUBS"] = stubs()
+    return given | definitions(platform, build / "tools")
+
+
+def build_wheels(platform, output):
+    """The platform's wheels in `output`, checked; their paths."""
+    build = WORK / platform.name
+    targets = [*map(module_name, PYTHONS), "stubs"]
+    options = [f"build-dir={build}", "install.strip=false", f"build.targets={';'.join(targets)}"]
+    options += [f"cmake.define.{name}={value}" for name, value in settings(platform, build).items()]
+    made = []
+    for version in PYTHONS:
+        python = "cp{}{}".format(*version)
+        own = [
+            f"wheel.tags={python}-{python}-{platform.tag}",
+            f"install.components=python;{module_name(version)}",
+        ]
+        given = [part for option in [*options, *own] for part in ("-C", option)]
+        pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "wheel", "-v"]
+        command = [*pip, "--no-build-isolation", "--no-deps", *given, "--wheel-dir", output, ROOT]
+        with (build / "build.log").open("w") as log:
+            done = subprocess.run(command, stdout=log, stderr=log, env=environment())
+        if done.returncode:
+            raise RuntimeError("\n".join((build / "build.log").read_text().splitlines()[-60:]))
+        made += output.glob(f"arapfields-*-{python}-{python}-{platform.tag}.whl")
+    if said := check_wheel.problems(made):
+        raise RuntimeError("\n".join(said))
+    return made
+
+
+def environment():
+    """With this Python's own tools, such as ninja, first."""
+    own = str(Path(sys.executable).parent)
+    return {**os.environ, "PATH": f"{own}{os.pathsep}{os.environ['PATH']}"}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("platforms", nargs="+", choices=[*PLATFORMS, "all"], metavar="platform")
+    parser.add_argument("--output", type=Path, default=ROOT / "dist")
+    given = parser.parse_args()
+    names = list(PLATFORMS) if "all" in given.platforms else given.platforms
+    given.output.mkdir(parents=True, exist_ok=True)
+    for name in names:
+        start = time.monotonic()
+        print(f"{name}: some minutes the first time; all output: {WORK / name / 'build.log'}", flush=True)
+        for path in build_wheels(PLATFORMS[name], given.output.resolve()):
+            print(f"{path} ({path.stat().st_size / 1e6:.1f} MB)")
+        print(f"{name}: {time.monotonic() - start:.0f} s")
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except RuntimeError as error:
+        sys.exit(f"build_wheels: {error}")

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Headers of the Pythons that Blenders ship: this system's, else from Debian's packages.
+
+These are downloaded by apt-get into a folder of their own, with lists of packages of their own: no root is
+needed and nothing of the system changes.
+"""
+
+import re
+import shutil
+from pathlib import Path
+
+from platforms import ROOT, run
+
+RELEASES = {(3, 11): "bookworm", (3, 13): "trixie", (3, 14): "sid"}  # Debian's, that have that Python
+KEYRING = "/usr/share/keyrings/debian-archive-keyring.gpg"
+FETCHED = ROOT / "build/python-headers"
+SEARCHED = [
+    f"{FETCHED}/*/usr/include",
+    "/usr/include",
+    "/usr/local/include",
+    "/opt/*/usr/include",  # a chroot with another release's headers
+    "/opt/python/*/include",  # the manylinux containers
+    f"{Path.home()}/.pyenv/versions/*/include",
+]
+
+
+def header_version(folder):
+    """(major, minor) that the Python.h in `folder` belongs to, or None."""
+    patchlevel = Path(folder) / "patchlevel.h"
+    if not (Path(folder) / "Python.h").exists() or not patchlevel.exists():
+        return None
+    return tuple(map(int, re.findall(r"#define PY_(?:MAJOR|MINOR)_VERSION\s+(\d+)", patchlevel.read_text())))
+
+
+def at_hand(version):
+    """The folder of a Python's headers, or None."""
+    for pattern in SEARCHED:
+        for folder in sorted(Path("/").glob(f"{pattern.lstrip('/')}/python{version[0]}.{version[1]}")):
+            if header_version(folder) == version:
+                return folder
+    return None
+
+
+def headers(version, work):
+    """A copy of a Python's headers in `work`, with the pyconfig.h that serves every platform; its path."""
+    source = at_hand(version) or fetch(version)
+    copy = Path(work) / source.name
+    if not copy.is_dir():
+        shutil.copytree(source, copy, ignore=shutil.ignore_patterns("internal"))
+    config = (ROOT / "cmake/wheel/pyconfig.h").read_bytes()
+    if (copy / "pyconfig.h").read_bytes() != config:
+        (copy / "pyconfig.h").write_bytes(config)
+    return copy
+
+
+def mirror():
+    """The Debian mirror that this system uses."""
+    texts = [path.read_text() for path in Path("/etc/apt").glob("sources.list.d/*.sources")]
+    texts += [path.read_text() for path in Path("/etc/apt").glob("sources.list*") if path.is_file()]
+    for text in texts:
+        match = re.search(r"^(?:URIs:\s*|deb\s+(?:\[.*?\]\s*)?)(https?://\S+/debian)/?\s", text, flags=re.M)
+        if match:
+            return match[1]
+    raise RuntimeError("this system has no Debian mirror")
+
+
+def options(release, state):
+    """apt-get's arguments for a state of its own, with one release as its only source."""
+    for folder in ("lists/partial", "cache/archives/partial", "parts"):
+        (state / folder).mkdir(parents=True, exist_ok=True)
+    source = state / "sources.list"
+    source.write_text(f"deb [signed-by={KEYRING}] {mirror()} {release} main\n")
+    settings = {
+        "Dir::Etc::SourceList": source,
+        "Dir::Etc::SourceParts": state / "parts",
+        "Dir::State::Lists": state / "lists",
+        "Dir::Cache": state / "cache",
+        "APT::Sandbox::User": "root",
+        "Acquire::Languages": "none",
+        "Acquire::Check-Valid-Until": "false",
+    }
+    return [text for name, value in settings.items() for text in ("-o", f"{name}={value}")]
+
+
+def fetch(version):
+    """Unpacks the headers of one Python below FETCHED; their folder."""
+    package = "libpython{}.{}-dev".format(*version)
+    folder = FETCHED / RELEASES[version]
+    settings = options(RELEASES[version], folder / "apt")
+    try:
+        for command in (["update"], ["download", package]):
+            run("apt-get", "-q", *settings, *command, cwd=folder)
+        (archive,) = folder.glob(f"{package}_*.deb")
+        run("dpkg", "-x", archive, folder)
+    except (OSError, RuntimeError) as error:
+        raise RuntimeError("no headers of Python {}.{}: ".format(*version) + str(error)) from None
+    archive.unlink()
+    for rest in ("apt", "usr/lib", "usr/share", "usr/bin"):
+        shutil.rmtree(folder / rest, ignore_errors=True)
+    return at_hand(version)
