@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The report that says whether the library works on a machine: right here, and wrong where something is."""
 
+import platform
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from addon.core.runtime import self_check
+from addon.core.runtime import native, self_check
 
 
 def test_everything_works_here():
@@ -35,3 +36,14 @@ def test_wrong_figures_are_no_right_answer(answer):
 def test_what_should_have_been_refused():
     with pytest.raises(AssertionError, match="not refused"):
         self_check.refusal(SimpleNamespace(signed_distance=lambda *_: None, InvalidInput=ValueError))
+
+
+def test_a_zip_without_a_wheel_for_this_python_says_which_it_has(tmp_path, monkeypatch):
+    """Blender unpacks the wheels for its own Python and system alone."""
+    for python in ("cp311", "cp313"):
+        (tmp_path / f"arapfields-0.1.0-{python}-{python}-win_arm64.whl").touch()
+    monkeypatch.setattr(native, "WHEELS", tmp_path)
+    said = str(native._missing(ModuleNotFoundError(name="arapfields")))
+    assert platform.machine() in said and "(it has: 3.11, 3.13, win_arm64)" in said
+    monkeypatch.setattr(native, "WHEELS", tmp_path / "none")
+    assert "not part of this installation" in str(native._missing(ModuleNotFoundError(name="arapfields")))

@@ -123,3 +123,16 @@ def test_pyconfig_answers_what_the_headers_ask(version):
             asked |= set(re.findall(r"\b(?:SIZEOF|ALIGNOF)_\w+", text))
     assert asked & known - answered <= {"WITH_DTRACE", "_XOPEN_SOURCE_EXTENDED"}
     assert {"PyLong_FromLong": "FUNC", "PyLong_Type": "DATA"}.items() <= declared(folder).items()
+
+
+@pytest.mark.slow
+def test_a_library_for_macs_that_was_changed_after_signing_is_refused(tmp_path):
+    check_wheel = pytest.importorskip("check_wheel", reason="lief is not installed (make wheels)")
+    (tmp_path / "a.c").write_text("int PyInit__native(void) { return 3; }\n")
+    command = [sys.executable, "-m", "ziglang", "cc", "-target", PLATFORMS["macos-arm64"].target, "-shared"]
+    subprocess.run([*command, "a.c", "-o", "a.so"], cwd=tmp_path, check=True)
+    data = bytearray((tmp_path / "a.so").read_bytes())
+    image = check_wheel.lief.parse(list(data))
+    assert check_wheel.signature_problem(data, image) == ""
+    data[100] ^= 1
+    assert check_wheel.signature_problem(data, image) == "was changed after it was signed"

@@ -12,6 +12,7 @@ from pathlib import Path
 from ..errors import UserError
 from .threads import start_thread
 
+WHEELS = Path(__file__).resolve().parents[3] / "wheels"  # in the extension
 ADVICE = "Install arapfields-<version>-<platform>.zip of a release, not the source code"
 
 
@@ -81,20 +82,17 @@ def _try_import():
 
 
 def _missing(error):
-    if error.name == "arapfields":
-        return UserError(f"The native library is not part of this installation. {ADVICE}")
-    if error.name == "arapfields._native":
-        package = (
-            Path(sys.modules["arapfields"].__file__).parent if "arapfields" in sys.modules else _folder()
-        )
-        served = sorted(path.name.split("-")[1] for path in package.glob("_native.cpython-*"))
-        here = f"{sys.version_info.major}.{sys.version_info.minor}"
-        which = ", ".join(f"{tag[0]}.{tag[1:]}" for tag in served) or "none"
+    served = sorted(path.stem.split("-")[2:] for path in WHEELS.glob("arapfields-*.whl"))
+    if error.name == "arapfields" and served:  # Blender unpacks those for its Python and system alone
+        here = f"{sys.version_info.major}.{sys.version_info.minor}, {platform.system()} {platform.machine()}"
+        which = ", ".join([*(f"{python[2]}.{python[3:]}" for python, _, _ in served), served[0][2]])
         return UserError(
             "This build has no module for Python {here} (it has: {which}). Take a build for this Blender",
             here=here,
             which=which,
         )
+    if error.name == "arapfields":
+        return UserError(f"The native library is not part of this installation. {ADVICE}")
     return UserError(f"The native library lacks {{module}}. {ADVICE}", module=error.name)
 
 
