@@ -14,10 +14,13 @@ from platforms import run, zig
 
 NEWEST = {"GLIBCXX_3.4": 25, "CXXABI_1.3": 11}  # the last numbers that manylinux_2_28 allows, of GCC 8
 GLIBC = ["libc.so.6", "libm.so.6", "libpthread.so.0", "libdl.so.2", "librt.so.1"]
-# What headers of newer glibc name and older libraries lack: a process is never known to have one thread, and
-# stat and its kin go by their older names.
+# What headers of newer glibc name and older libraries lack: a process is never known to have one thread, stat and
+# its kin go by their older names, and locks wait by the clock of the day.
 COMPATIBLE = """
+#define _GNU_SOURCE
+#include <pthread.h>
 #include <sys/stat.h>
+#include <time.h>
 #define HIDDEN __attribute__((visibility("hidden")))
 #ifdef __x86_64__
 #define KERNELS 1
@@ -31,6 +34,16 @@ int __xstat(int version, const char *path, struct stat *to);
 HIDDEN int stat(const char *path, struct stat *to) { return __xstat(KERNELS, path, to); }
 int __lxstat(int version, const char *path, struct stat *to);
 HIDDEN int lstat(const char *path, struct stat *to) { return __lxstat(KERNELS, path, to); }
+HIDDEN int pthread_mutex_clocklock(pthread_mutex_t *mutex, clockid_t clock, const struct timespec *end) {
+  struct timespec now, real;
+  clock_gettime(clock, &now);
+  clock_gettime(CLOCK_REALTIME, &real);
+  real.tv_sec += end->tv_sec - now.tv_sec;
+  real.tv_nsec += end->tv_nsec - now.tv_nsec;
+  if (real.tv_nsec < 0) real.tv_nsec += 1000000000, --real.tv_sec;
+  if (real.tv_nsec >= 1000000000) real.tv_nsec -= 1000000000, ++real.tv_sec;
+  return pthread_mutex_timedlock(mutex, &real);
+}
 """
 
 
@@ -52,7 +65,7 @@ def glibc_stubs(target, folder):
         *zig("cc", "-target", target), folder / "empty.c", "-o", folder / "empty", *libraries, env=environment
     )
     (made,) = cache.rglob("libm.so.6")
-    return [made.parent / name for name in GLIBC]
+    return [*(made.parent / name for name in GLIBC), *made.parent.glob("libld.so.*")]
 
 
 def allowed(version):
