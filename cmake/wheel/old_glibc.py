@@ -14,8 +14,8 @@ from platforms import run, zig
 
 NEWEST = {"GLIBCXX_3.4": 25, "CXXABI_1.3": 11}  # the last numbers that manylinux_2_28 allows, of GCC 8
 GLIBC = ["libc.so.6", "libm.so.6", "libpthread.so.0", "libdl.so.2", "librt.so.1"]
-# What headers of newer glibc name and older libraries lack: a process never counts as having one thread, locks
-# wait by the clock of the day, and stat and its kin go by their older names.
+# What headers of newer glibc name and older libraries lack: a process never counts as having one thread, stat
+# and its kin go by their older names, and locks wait by the clock of the day.
 COMPATIBLE = """
 #define _GNU_SOURCE
 #include <pthread.h>
