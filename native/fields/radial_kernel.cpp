@@ -30,39 +30,69 @@ inline Bump<Scalar> bump(Pack<Scalar> square, Scalar g) {
   return result;
 }
 
+/// A center's displacement d = x − p at some lanes, its displacement q = ψ(x) − ψ(p) in the embedding, and
+/// the squared distance |d|² + |q|².
+template <bool embedded, class Scalar>
+struct Separation {
+  Pack<Scalar> d[3], q[3], square;
+
+  Separation(const RadialBlock<Scalar>& block, int offset, const Scalar* center) {
+    for (int k = 0; k < 3; ++k) d[k] = load(block.points + k * block_size + offset) - center[k];
+    square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    if constexpr (embedded) {
+      for (int k = 0; k < 3; ++k) q[k] = load(block.embedding + k * block_size + offset) - center[4 + k];
+      square += q[0] * q[0] + q[1] * q[1] + q[2] * q[2];
+    }
+  }
+};
+
+/// Derivatives of ψ at some lanes: ∂_j ψ_k, column c of the second ones, and the products of the first.
+template <class Scalar>
+struct Embedding {
+  const Scalar* rows;
+  int offset;
+  Pack<Scalar> first(int j, int k) const { return load(rows + (3 + 3 * j + k) * block_size + offset); }
+  Pack<Scalar> second(int c, int k) const { return load(rows + (12 + 3 * c + k) * block_size + offset); }
+  Pack<Scalar> product(int c) const { return load(rows + (30 + c) * block_size + offset); }
+};
+
+/// Half the gradient of the squared distance.
+template <bool embedded, class Scalar>
+inline void half_gradient(const Separation<embedded, Scalar>& s, const Embedding<Scalar>& psi,
+                          Pack<Scalar>* out) {
+  for (int i = 0; i < 3; ++i) {
+    out[i] = s.d[i];
+    if constexpr (embedded)
+      for (int k = 0; k < 3; ++k) out[i] += s.q[k] * psi.first(i, k);
+  }
+}
+
+constexpr int pairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
+
 /// The ten (four, one) jet columns of bump m at some lanes of the block.
 template <int order, bool embedded, class Scalar>
 inline void jet_of(const RadialBlock<Scalar>& block, int offset, std::int64_t m, Pack<Scalar>* out) {
-  constexpr int pairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
   const Scalar* center = block.centers + center_stride * m;
-  // Halves of the squared distance's derivatives: arm d, and what the embedding adds to it and to the
-  // identity.
-  Pack<Scalar> d[3], q[3];
-  for (int k = 0; k < 3; ++k) d[k] = load(block.points + k * block_size + offset) - center[k];
-  Pack<Scalar> square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-  const auto embedding = [&](int row) { return load(block.embedding + row * block_size + offset); };
-  if constexpr (embedded) {
-    for (int k = 0; k < 3; ++k) q[k] = embedding(k) - center[4 + k];
-    square += q[0] * q[0] + q[1] * q[1] + q[2] * q[2];
-  }
-  const Bump<Scalar> b = bump<order, Scalar>(square, center[3]);
+  const Separation<embedded, Scalar> s(block, offset, center);
+  const Bump<Scalar> b = bump<order, Scalar>(s.square, center[3]);
+  const Embedding<Scalar> psi{block.embedding, offset};
   out[0] = b.value;
-  if constexpr (embedded && order >= 1)
-    for (int i = 0; i < 3; ++i)
-      for (int k = 0; k < 3; ++k) d[i] += q[k] * embedding(3 + 3 * i + k);
-  if constexpr (order >= 1)
-    for (int k = 0; k < 3; ++k) out[1 + k] = b.slope * d[k];
-  if constexpr (order >= 2) {
-    Pack<Scalar> curved[3];
-    for (int k = 0; k < 3; ++k) curved[k] = b.curvature * d[k];
-    for (int c = 0; c < 6; ++c) {
-      out[4 + c] = curved[pairs[c][0]] * d[pairs[c][1]];
-      if constexpr (embedded) {
-        Pack<Scalar> more = embedding(30 + c);
-        for (int k = 0; k < 3; ++k) more += q[k] * embedding(12 + 3 * c + k);
-        out[4 + c] += b.slope * (c < 3 ? more + Scalar(1) : more);
-      } else if (c < 3) {
-        out[4 + c] += b.slope;
+  if constexpr (order >= 1) {
+    Pack<Scalar> half[3];
+    half_gradient(s, psi, half);
+    for (int k = 0; k < 3; ++k) out[1 + k] = b.slope * half[k];
+    if constexpr (order >= 2) {
+      Pack<Scalar> curved[3];
+      for (int k = 0; k < 3; ++k) curved[k] = b.curvature * half[k];
+      for (int c = 0; c < 6; ++c) {
+        out[4 + c] = curved[pairs[c][0]] * half[pairs[c][1]];
+        if constexpr (embedded) {
+          Pack<Scalar> more = psi.product(c);
+          for (int k = 0; k < 3; ++k) more += s.q[k] * psi.second(c, k);
+          out[4 + c] += b.slope * (c < 3 ? more + Scalar(1) : more);
+        } else if (c < 3) {
+          out[4 + c] += b.slope;
+        }
       }
     }
   }
@@ -91,22 +121,70 @@ void forward(const RadialBlock<Scalar>& block, const Scalar* coefficients, Scala
   }
 }
 
+/// Cotangents of one component of f at some lanes, as factors of what depends on a center: φ, φ' times d, 1
+/// and q, φ'' times the products of the half gradient.
+template <int order, bool embedded, class Scalar>
+struct CenterCotangents {
+  Pack<Scalar> value, d[3], one, q[3], products[6];
+
+  CenterCotangents(const Embedding<Scalar>& psi, const Scalar* cotangents) {
+    const auto column = [&](int c) { return load(cotangents + 3 * c * block_size); };
+    value = column(0);
+    if constexpr (order >= 1)
+      for (int k = 0; k < 3; ++k) {
+        d[k] = column(1 + k);
+        if constexpr (embedded) {
+          q[k] = Pack<Scalar>{};
+          for (int j = 0; j < 3; ++j) q[k] += column(1 + j) * psi.first(j, k);
+        }
+      }
+    if constexpr (order >= 2) {
+      one = column(4) + column(5) + column(6);
+      for (int c = 0; c < 6; ++c) {
+        products[c] = column(4 + c);
+        if constexpr (embedded) {
+          one += products[c] * psi.product(c);
+          for (int k = 0; k < 3; ++k) q[k] += products[c] * psi.second(c, k);
+        }
+      }
+    }
+  }
+};
+
 template <int order, bool embedded, class Scalar>
 void backward(const RadialBlock<Scalar>& block, const Scalar* cotangents, Scalar* gradient) {
-  constexpr int columns = columns_of<order>;
+  using P = Pack<Scalar>;
+  using Cotangents = CenterCotangents<order, embedded, Scalar>;
   for (int offset = 0; offset < block_size; offset += lanes<Scalar>) {
-    Pack<Scalar> cotangent[columns][3];
-    for (int column = 0; column < columns; ++column)
-      for (int i = 0; i < 3; ++i)
-        cotangent[column][i] = load(cotangents + (column * 3 + i) * block_size + offset);
+    const Embedding<Scalar> psi{block.embedding, offset};
+    const auto of = [&](int i) { return Cotangents(psi, cotangents + i * block_size + offset); };
+    const Cotangents components[3] = {of(0), of(1), of(2)};
     for (std::int64_t a = 0; a < block.active_count; ++a) {
       const std::int64_t m = block.active[a];
-      Pack<Scalar> basis[columns];
-      jet_of<order, embedded>(block, offset, m, basis);
+      const Scalar* center = block.centers + center_stride * m;
+      const Separation<embedded, Scalar> s(block, offset, center);
+      const Bump<Scalar> b = bump<order, Scalar>(s.square, center[3]);
+      P products[6];
+      if constexpr (order >= 2) {
+        P half[3];
+        half_gradient(s, psi, half);
+        for (int c = 0; c < 6; ++c) products[c] = half[pairs[c][0]] * half[pairs[c][1]];
+      }
       Scalar* sums = gradient + m * 3 * radial_lanes;
       for (int i = 0; i < 3; ++i) {
-        Pack<Scalar> sum = load(sums + i * radial_lanes);
-        for (int column = 0; column < columns; ++column) sum += basis[column] * cotangent[column][i];
+        const Cotangents& to = components[i];
+        P sum = load(sums + i * radial_lanes) + b.value * to.value;
+        if constexpr (order >= 1) {
+          P by_slope = s.d[0] * to.d[0] + s.d[1] * to.d[1] + s.d[2] * to.d[2];
+          if constexpr (order >= 2) by_slope += to.one;
+          if constexpr (embedded) by_slope += s.q[0] * to.q[0] + s.q[1] * to.q[1] + s.q[2] * to.q[2];
+          sum += b.slope * by_slope;
+        }
+        if constexpr (order >= 2) {
+          P by_curvature = products[0] * to.products[0];
+          for (int c = 1; c < 6; ++c) by_curvature += products[c] * to.products[c];
+          sum += b.curvature * by_curvature;
+        }
         store(sums + i * radial_lanes, sum);
       }
     }

@@ -5,8 +5,9 @@ import threading
 
 import numpy as np
 import pytest
+from support.geometry import cases
 from support.geometry.bar import LEFT, RIGHT, bar_samples, turned
-from support.tolerances import LIVE_KEEPS_UP
+from support.tolerances import LIVE_KEEPS_UP, LIVE_WAY_BACK
 
 import arapfields as af
 
@@ -92,3 +93,17 @@ def test_a_solve_after_a_cancelled_step_has_no_inertia(samples):
         live.step([LEFT, turned(40) @ RIGHT], 10.0, task=task)
     timer.join()
     assert np.array_equal(live.solve([LEFT, RIGHT])(samples.points), settled)
+
+
+def test_a_drag_comes_back_as_it_went(data_dir):
+    """Measurements that are updated from solve to solve stay those of the coefficients."""
+    samples = cases.published_samples(data_dir / "neural_sdf" / "bunny.pt")
+    held, moved = cases.bunny_handles()
+    rests = [af.Cuboid(handle.rest, handle.rest) for handle in (held, moved)]
+    live, fresh = af.LiveDeformer(samples, rests), af.LiveDeformer(samples, rests)
+    for degrees in [*range(0, 70, 2), *range(70, 8, -2)]:
+        pose = [held.rest, cases.turn([0, 1, 0], degrees, (-0.1, 0, 0.3)) @ moved.rest]
+        live.solve(pose)
+        if degrees % 20 == 10:
+            fresh.solve(pose, iterations=40)
+            assert live.report.value <= LIVE_WAY_BACK * fresh.report.value, degrees

@@ -37,6 +37,8 @@ LIVE_DRIFT = 1e-4
 LIVE_ROUNDING = 1e-5
 # Share of one step of a drag by which shapes of three iterations may be behind: less than a picture's delay.
 LIVE_KEEPS_UP = 0.5
+# Energy on a drag's way back over that of a solver which goes to the pose at once: steps end at 2e-4 of it.
+LIVE_WAY_BACK = 1.05
 # Single-precision fields against differences of fourth order with step 2e-3: rounding over the step, and
 # truncation where the encoding's highest octave bends most.
 FLOAT_FIELD_DIFFERENCES = 1e-3

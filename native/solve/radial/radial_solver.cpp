@@ -38,9 +38,15 @@ void follow_rigidly(RadialState& s) {
 SolveHistory::Start extrapolate(RadialState& s) {
   const SolveHistory::Start before = s.history.start.take(s.start_revisions());
   SolveHistory::Start now{s.shape.coefficients, s.measurements(s.fast)};
-  if (before.u.size() == 0) return now;
+  if (before.coefficients.size() == 0) return now;
   const RadialObjective<float>& objective = *s.fast.objective.latest();
-  VectorF further = 2.0f * now.u - before.u;
+  VectorF further;
+  if (before.u.size() > 0) {
+    further = 2.0f * now.u - before.u;
+  } else {
+    objective.measure(now.coefficients - before.coefficients, further);
+    further += now.u;
+  }
   const double value = objective.value(now.u, nullptr);
   if (objective.value(further, nullptr) < (1.0 - single_error) * value) {
     s.shape.coefficients += now.coefficients - before.coefficients;
@@ -151,6 +157,9 @@ Index RadialSolver::follow(Index iterations, double tolerance, const Progress& p
     if (s.report.iterations < iterations && !ended)
       s.descend(s.exact, {iterations - s.report.iterations, tolerance}, progress);
   }
+  // A difference of measurements taken at two times has their rounding errors, which an extrapolation adds
+  // anew in each solve.
+  if (is_exact || s.fast.uses == 0) start.u.resize(0);
   s.history.start.set(s.start_revisions(), std::move(start));
   if (!s.handles.any() && s.hooks.energies.empty()) anchor_lowest_point(s);
   s.dynamics.zero_velocity(motions_of(s.handles.bound()));

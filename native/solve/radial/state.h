@@ -46,7 +46,7 @@ struct RadialPreconditioner {
 struct SolveHistory {
   struct Start {
     RowMatrix<double> coefficients;
-    VectorF u;
+    VectorF u;  ///< empty: measured afresh since
   };
   Dependent<QuasiNewton, 6> optimizer;
   Dependent<Start, 3> start;  ///< where the last solve started
