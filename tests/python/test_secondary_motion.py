@@ -16,7 +16,8 @@ from arapfields._native import testing
 
 QUICK = {"samples": 600, "coarse_centers": 20, "fine_centers": 80}
 TIP = np.array([[2.0, 0.0, 0.0]])
-ENERGY_RISE, ALIKE = 0.01, 0.05  # agreed: of the total energy's rise, and of changes of period and decay
+# Agreed: of the total energy's rise, of changes of period and decay; the last between 360 and 1,500 centers.
+ENERGY_RISE, ALIKE, FINER_ALIKE = 0.01, 0.05, 0.06
 DECAY = 0.15  # of a rate against what was asked for: energy falls in turns, as it is kinetic or not
 LEFT_OF_3 = 2.4  # s; after these a damping of 3 leaves less than solves in single precision can tell
 
@@ -101,12 +102,11 @@ def test_periods_hold_from_360_to_1500_centers_and_from_24_to_240_frames_a_secon
         live = released(bar_samples(12000), further={"damping": damping}, **size)
         times, heights, energies = swung(live, seconds, rate)
         speeds.append((period_of(times, heights), decay_of(times, energies)))
-    for period, decay in speeds[1:]:
-        assert period == pytest.approx(speeds[0][0], rel=ALIKE)
-        if damping:
-            assert decay == pytest.approx(speeds[0][1], rel=ALIKE)
-        else:  # of the amplitude as much is left
-            assert np.exp(-seconds * decay) == pytest.approx(np.exp(-seconds * speeds[0][1]), rel=ALIKE)
+    for (period, decay), alike in zip(speeds[1:], (ALIKE, FINER_ALIKE), strict=True):
+        assert period == pytest.approx(speeds[0][0], rel=alike)
+        # Without damping: of the amplitude as much is left.
+        kept, first = (decay, speeds[0][1]) if damping else np.exp(-seconds * np.array([decay, speeds[0][1]]))
+        assert kept == pytest.approx(first, rel=alike)
 
 
 @pytest.mark.slow
