@@ -22,6 +22,7 @@ HOLDS = {
     "wrap": "one surface onto another",
     "attach": "what a body carries",
     "curve": "curves of the plane",
+    "skin": "bone weights from poses",
     "extraction": "marching cubes",
     "io": "files, whole or not",
 }

@@ -36,6 +36,10 @@ ARAPFIELDS_PYTHON_TYPE(NormalsArgument,
                        "arapfields._native.StyleName")
 ARAPFIELDS_PYTHON_TYPE(StyleArgument, "arapfields._native.StyleName")
 ARAPFIELDS_PYTHON_TYPE(HandlesArgument, "collections.abc.Iterable[arapfields._native.Handle]")
+ARAPFIELDS_PYTHON_TYPE(BonesArgument, "collections.abc.Iterable[arapfields._native.Bone]")
+ARAPFIELDS_PYTHON_TYPE(ShapeArgument,
+                       "tuple[arapfields.arrays.ArrayLike, arapfields.arrays.ArrayLike] | "
+                       "arapfields._native.SurfaceSamples")
 ARAPFIELDS_PYTHON_TYPE(CurveHandlesArgument, "collections.abc.Iterable[arapfields._native.CurveHandle]")
 ARAPFIELDS_PYTHON_TYPE(
     LandmarksArgument,

@@ -82,28 +82,34 @@ void InteriorGraph::join_parts(PointsIn nodes) {
 
 RowMatrix<double> InteriorGraph::distances(Index sources) const {
   RowMatrix<double> result(size(), sources);
-  using Entry = std::pair<float, std::int32_t>;
   parallel_for(0, sources, 1, [&](Index first, Index last) {
-    std::vector<float> distance(size());
     for (Index s = first; s < last; ++s) {
-      std::fill(distance.begin(), distance.end(), std::numeric_limits<float>::infinity());
-      std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> queue;
-      distance[s] = 0.0f;
-      queue.emplace(0.0f, static_cast<std::int32_t>(s));
-      while (!queue.empty()) {
-        const auto [length, node] = queue.top();
-        queue.pop();
-        if (length > distance[node]) continue;
-        for (const Edge& edge : edges(node))
-          if (length + edge.length < distance[edge.to]) {
-            distance[edge.to] = length + edge.length;
-            queue.emplace(distance[edge.to], edge.to);
-          }
-      }
-      for (Index i = 0; i < size(); ++i) result(i, s) = static_cast<double>(distance[i]);
+      std::vector<float> start(size(), std::numeric_limits<float>::infinity());
+      start[s] = 0.0f;
+      const std::vector<float> lengths = distances_from(std::move(start));
+      for (Index i = 0; i < size(); ++i) result(i, s) = static_cast<double>(lengths[i]);
     }
   });
   return result;
+}
+
+std::vector<float> InteriorGraph::distances_from(std::vector<float> start) const {
+  using Entry = std::pair<float, std::int32_t>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> queue;
+  for (Index i = 0; i < size(); ++i)
+    if (start[i] < std::numeric_limits<float>::infinity())
+      queue.emplace(start[i], static_cast<std::int32_t>(i));
+  while (!queue.empty()) {
+    const auto [length, node] = queue.top();
+    queue.pop();
+    if (length > start[node]) continue;
+    for (const Edge& edge : edges(node))
+      if (length + edge.length < start[edge.to]) {
+        start[edge.to] = length + edge.length;
+        queue.emplace(start[edge.to], edge.to);
+      }
+  }
+  return start;
 }
 
 }  // namespace arapfields

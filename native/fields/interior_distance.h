@@ -25,6 +25,8 @@ class InteriorGraph {
   const std::vector<Edge>& edges(Index node) const { return edges_[node]; }
   /// Lengths (n, sources) of the shortest paths from the first `sources` nodes.
   RowMatrix<double> distances(Index sources) const;
+  /// Lengths (n) of the shortest paths that begin at any node with that node's length; infinity: not there.
+  std::vector<float> distances_from(std::vector<float> start) const;
 
  private:
   void join_parts(PointsIn nodes);

@@ -27,6 +27,7 @@ FOLDERS = [
     "wrap",
     "attach",
     "curve",
+    "skin",
     "extraction",
     "io",
 ]

@@ -16,6 +16,7 @@
 #include "arapfields/mesh.h"
 #include "arapfields/sampling.h"
 #include "arapfields/sdf.h"
+#include "arapfields/skin.h"
 #include "arapfields/stylize.h"
 #include "arapfields/task.h"
 #include "arapfields/types.h"

@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Weights of bones from poses, and skinning with them.
+#pragma once
+
+#include "skin/bone_regions.h"
+#include "skin/correctives.h"
+#include "skin/skin_weights.h"
+#include "skin/skinning.h"

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "core/task.h"
+#include "mesh/triangle_mesh.h"
+#include "options/skin.h"
+#include "skin/skeleton.h"
+
+namespace arapfields {
+
+/// A shape key that takes the skin to the field's poses, driven by one joint. Its value is a polynomial of
+/// the joint's rotation in the bone's axes, the unit quaternion (w, x, y, z): Σ coefficients · (wx, wy, wz,
+/// xx, yy, zz, xy, xz, yz). It is the same for a quaternion and its negative, and 0 at rest.
+struct ARAPFIELDS_EXPORT Corrective {
+  Index bone;                          ///< among all bones
+  std::array<double, 9> coefficients;  ///< such that values of 1 are as large as they get
+  Points offsets;                      ///< (n,3) of the vertices at rest
+
+  double value(const Mat3& rotation) const;
+};
+
+/// At most options.correctives shape keys for weights (n, bones), those first that take most of what is left
+/// between the skin and the field. Throws InvalidInput as skin_weights does; Cancelled.
+ARAPFIELDS_EXPORT std::vector<Corrective> skin_correctives(const TriangleMesh& mesh,
+                                                           const std::vector<Bone>& bones,
+                                                           const RowMatrix<float>& weights,
+                                                           const SkinOptions& options,
+                                                           const Progress& progress = {});
+
+}  // namespace arapfields

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "skin/example_poses.h"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+
+namespace arapfields {
+namespace {
+
+/// Largest angle of a joint without limits.
+constexpr double largest_angle = 40.0 * std::numbers::pi / 180.0;
+
+LiveOptions solver_options(const SkinOptions& options) {
+  LiveOptions result;
+  result.seed = options.seed;
+  result.threads = options.threads;
+  return result;
+}
+
+Mat3 random_rotation(const Bone& bone, Random& random) {
+  Vec3 turn = random.direction() * random.uniform(0.0, largest_angle);
+  if (bone.limits)
+    for (int k = 0; k < 3; ++k) turn[k] = random.uniform((*bone.limits)(k, 0), (*bone.limits)(k, 1));
+  const double angle = turn.norm();
+  return angle > 0.0 ? Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix() : Mat3::Identity();
+}
+
+}  // namespace
+
+ExamplePoses::ExamplePoses(const RigShape& rig, PointsIn points, const SkinOptions& options,
+                           const Progress& progress)
+    : rig_(rig), solver_(rig.samples, rig.handles, solver_options(options), progress) {
+  solver_.track(points);
+}
+
+ExamplePose ExamplePoses::draw(Random& random, const Vector& activity, const Progress& progress) {
+  ExamplePose pose;
+  for (Index b = 0; b < rig_.skeleton.count(); ++b) {
+    const Bone& bone = rig_.skeleton.bone(b);
+    const Mat3 rotation = random_rotation(bone, random);  // drawn for each, so that poses stay comparable
+    const bool turns = bone.parent >= 0 && random.uniform() < activity[b];
+    pose.rotations.push_back(turns ? rotation : Mat3::Identity());
+  }
+  pose.motions = rig_.skeleton.motions(pose.rotations);
+  std::vector<Handle> moved = rig_.handles;
+  for (std::size_t b = 0; b < moved.size(); ++b) moved[b].target = pose.motions[b] * moved[b].rest;
+  solver_.reset();
+  solver_.set_targets(moved);
+  solver_.follow(0, 0.0, progress);
+  pose.shape = solver_.tracked();
+  return pose;
+}
+
+}  // namespace arapfields

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "skin/skeleton.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <limits>
+
+#include "core/errors.h"
+
+namespace arapfields {
+namespace {
+
+std::string name_of(const std::vector<Bone>& bones, Index i) {
+  return bones[i].name.empty() ? "bones[" + std::to_string(i) + "]" : "bone " + bones[i].name;
+}
+
+void require_bones(const std::vector<Bone>& bones) {
+  require(std::ranges::any_of(bones, &Bone::deform), "bones", "none deforms", "at least one is needed");
+  const Index n = static_cast<Index>(bones.size());
+  double longest = 0.0;
+  for (const Bone& bone : bones) longest = std::max(longest, (bone.tail - bone.head).norm());
+  for (Index i = 0; i < n; ++i) {
+    const Bone& bone = bones[i];
+    const std::string name = name_of(bones, i);
+    require(bone.head.allFinite() && bone.tail.allFinite() && std::isfinite(bone.roll), name,
+            "NaN or infinity", "head, tail and roll must be finite");
+    require(bone.parent >= -1 && bone.parent < n, name, "parent " + std::to_string(bone.parent),
+            "-1 for none, or below " + std::to_string(n));
+    Index steps = 0;
+    for (Index p = bone.parent; p >= 0 && steps <= n; p = bones[p].parent) ++steps;
+    require(steps <= n, name, "it is its own ancestor", "parents may not go in circles");
+    if (bone.limits)
+      require(bone.limits->allFinite() && (bone.limits->col(0).array() <= bone.limits->col(1).array()).all(),
+              name, "limits that are not finite, or a lowest above a highest", "(3, 2) angles are needed");
+    if (!bone.deform) continue;
+    require((bone.tail - bone.head).norm() > 1e-6 * longest, name, "it has no length",
+            "head and tail must differ");
+    for (Index j = 0; j < i; ++j)
+      require(!bones[j].deform || std::max((bones[j].head - bone.head).norm(),
+                                           (bones[j].tail - bone.tail).norm()) > 1e-6 * longest,
+              name, "it lies where " + name_of(bones, j) + " does", "each needs a place of its own");
+  }
+}
+
+}  // namespace
+
+Skeleton::Skeleton(const std::vector<Bone>& bones) {
+  require_bones(bones);
+  std::vector<Index> place(bones.size(), -1);
+  for (std::size_t i = 0; i < bones.size(); ++i)
+    if (bones[i].deform) {
+      place[i] = count();
+      bones_.push_back(bones[i]);
+      original_.push_back(static_cast<Index>(i));
+    }
+  for (Bone& bone : bones_) {
+    while (bone.parent >= 0 && !bones[bone.parent].deform) bone.parent = bones[bone.parent].parent;
+    if (bone.parent >= 0) bone.parent = place[bone.parent];
+  }
+  join_roots();
+  leaf_.assign(bones_.size(), true);
+  for (const Bone& bone : bones_)
+    if (bone.parent >= 0) leaf_[bone.parent] = false;
+  std::vector<Index> depth(bones_.size(), 0);
+  for (Index b = 0; b < count(); ++b)
+    for (Index p = bones_[b].parent; p >= 0; p = bones_[p].parent) ++depth[b];
+  for (Index b = 0; b < count(); ++b) order_.push_back(b);
+  std::ranges::stable_sort(order_, {}, [&](Index b) { return depth[b]; });
+}
+
+void Skeleton::join_roots() {
+  std::vector<Index> root(bones_.size()), size(bones_.size(), 0);
+  for (Index b = 0; b < count(); ++b) {
+    for (root[b] = b; bones_[root[b]].parent >= 0;) root[b] = bones_[root[b]].parent;
+    ++size[root[b]];
+  }
+  const Index main = std::max_element(size.begin(), size.end()) - size.begin();
+  for (;;) {  // the tree whose root is nearest to the main one joins it
+    double least = std::numeric_limits<double>::infinity();
+    Index joining = -1, to = -1;
+    for (Index r = 0; r < count(); ++r)
+      for (Index b = 0; b < count() && root[r] == r && r != main; ++b) {
+        if (root[b] != main) continue;
+        const double distance = (nearest(b, bones_[r].head) - bones_[r].head).norm();
+        if (distance < least) least = distance, joining = r, to = b;
+      }
+    if (joining < 0) return;
+    bones_[joining].parent = to;
+    std::ranges::replace(root, joining, main);
+  }
+}
+
+Mat3 bone_axes(const Bone& bone) {
+  const Vec3 y = (bone.tail - bone.head).normalized();
+  Mat3 shortest = Vec3(-1.0, -1.0, 1.0).asDiagonal();  // straight down, as Blender has it
+  if (y[1] > -1.0 + 1e-9) shortest = Eigen::Quaterniond::FromTwoVectors(Vec3::UnitY(), y).toRotationMatrix();
+  return Eigen::AngleAxisd(bone.roll, y) * shortest;
+}
+
+Mat4 bone_box(const Bone& bone) {
+  Mat4 box = Mat4::Identity();
+  box.topLeftCorner<3, 3>() = bone_axes(bone) * (0.5 * (bone.tail - bone.head).norm());
+  box.topRightCorner<3, 1>() = 0.5 * (bone.head + bone.tail);
+  return box;
+}
+
+std::vector<Mat4> Skeleton::motions(const std::vector<Mat3>& rotations) const {
+  std::vector<Mat4> result(bones_.size(), Mat4::Identity());
+  for (const Index b : order_) {
+    const Mat3 axis = bone_axes(bones_[b]), turn = axis * rotations[b] * axis.transpose();
+    Mat4 local = Mat4::Identity();
+    local.topLeftCorner<3, 3>() = turn;
+    local.topRightCorner<3, 1>() = bones_[b].head - turn * bones_[b].head;
+    result[b] = bones_[b].parent < 0 ? local : result[bones_[b].parent] * local;
+  }
+  return result;
+}
+
+std::vector<Index> Skeleton::mirrored(int axis, double offset, double tolerance) const {
+  const auto reflected = [&](Vec3 p) {
+    p[axis] = 2.0 * offset - p[axis];
+    return p;
+  };
+  std::vector<Index> result;
+  for (const Bone& bone : bones_) {
+    const Vec3 head = reflected(bone.head), tail = reflected(bone.tail);
+    for (Index c = 0; c < count(); ++c)
+      if ((bones_[c].head - head).norm() < tolerance && (bones_[c].tail - tail).norm() < tolerance) {
+        result.push_back(c);
+        break;
+      }
+  }
+  if (result.size() != bones_.size()) result.clear();
+  return result;
+}
+
+Index Skeleton::joints_between(Index a, Index b) const {
+  std::vector<Index> above;
+  for (Index bone = a; bone >= 0; bone = bones_[bone].parent) above.push_back(bone);
+  for (Index steps = 0; b >= 0; b = bones_[b].parent, ++steps)
+    if (const auto met = std::ranges::find(above, b); met != above.end())
+      return steps + (met - above.begin());
+  return count();
+}
+
+bool Skeleton::in_line(Index a, Index b) const {
+  const auto above = [&](Index upper, Index bone) {
+    while (bone >= 0 && bone != upper) bone = bones_[bone].parent;
+    return bone == upper;
+  };
+  return above(a, b) || above(b, a);
+}
+
+double Skeleton::along(Index b, const Vec3& point) const {
+  const Vec3 axis = bones_[b].tail - bones_[b].head;
+  return std::clamp((point - bones_[b].head).dot(axis) / axis.squaredNorm(), 0.0, 1.0);
+}
+
+}  // namespace arapfields

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/types.h"
+
+namespace arapfields {
+
+/// A bone at rest, in mesh coordinates. Its y axis runs from head to tail, and `roll` turns the others about
+/// it as in Blender.
+struct ARAPFIELDS_EXPORT Bone {
+  Vec3 head = Vec3::Zero(), tail = Vec3::UnitY();
+  Index parent = -1;   ///< among all bones; −1 for none
+  double roll = 0.0;   ///< radians
+  bool deform = true;  ///< whether it may have weights; helpers only join others
+  /// Lowest and highest rotation (3,2) about the bone's own axes, as a rotation vector in radians.
+  std::optional<Eigen::Matrix<double, 3, 2>> limits = std::nullopt;
+  std::string name = {};  ///< for messages
+};
+
+/// Its axes as columns, and the cube [-1,1]³ → a box as long as the bone, which is a handle's place at rest.
+Mat3 bone_axes(const Bone& bone);
+ARAPFIELDS_EXPORT Mat4 bone_box(const Bone& bone);
+
+/// The deforming bones of a rig, each with the nearest ancestor that deforms. Where there are several roots,
+/// all but that of the largest tree hang on the bone nearest to their heads.
+class Skeleton {
+ public:
+  /// Throws InvalidInput that names the bone: none deforms, numbers that are not finite, parents out of range
+  /// or in a circle, no length, two in one place.
+  explicit Skeleton(const std::vector<Bone>& bones);
+
+  Index count() const { return static_cast<Index>(bones_.size()); }
+  const Bone& bone(Index b) const { return bones_[b]; }  ///< its parent is among the deforming ones
+  Index original(Index b) const { return original_[b]; }
+  bool is_leaf(Index b) const { return leaf_[b]; }
+  /// Joints that the way from one bone to another passes.
+  Index joints_between(Index a, Index b) const;
+  /// Whether one is an ancestor of the other: parts of one limb.
+  bool in_line(Index a, Index b) const;
+  /// Motions (bones) from rest, from each bone's rotation in its own axes.
+  std::vector<Mat4> motions(const std::vector<Mat3>& rotations) const;
+  /// Mirrored bone of each across the plane where this coordinate has this value; empty where not all have
+  /// one.
+  std::vector<Index> mirrored(int axis, double offset, double tolerance) const;
+  /// Place along a bone, 0 at its head and 1 at its tail, that is nearest to a point.
+  double along(Index b, const Vec3& point) const;
+  Vec3 nearest(Index b, const Vec3& point) const { return place(b, along(b, point)); }
+
+ private:
+  Vec3 place(Index b, double t) const { return bones_[b].head + t * (bones_[b].tail - bones_[b].head); }
+  void join_roots();
+
+  std::vector<Bone> bones_;
+  std::vector<Index> original_, order_;  // order_: parents first
+  std::vector<bool> leaf_;
+};
+
+}  // namespace arapfields

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Weights of linear blend skinning, from poses of the field.
+#pragma once
+
+#include <vector>
+
+#include "core/task.h"
+#include "mesh/surface_samples.h"
+#include "mesh/triangle_mesh.h"
+#include "options/skin.h"
+#include "skin/skeleton.h"
+
+namespace arapfields {
+
+/// Weights (n, bones) of a mesh's vertices: ≥ 0, of sum one, at most options.influences of them above 0 a
+/// vertex. The field poses the shape by its bones; the weights are those under which linear blend skinning
+/// comes nearest to it. They depend on where vertices and triangles are, not on how they are joined: several
+/// meshes may be one list. Small closed pieces get one motion. A rig that is symmetric across a plane of the
+/// axes gives symmetric weights to vertices that are. Throws InvalidInput as sample_mesh and Skeleton do, and
+/// for a bone far outside; Cancelled.
+ARAPFIELDS_EXPORT RowMatrix<float> skin_weights(const TriangleMesh& mesh, const std::vector<Bone>& bones,
+                                                const SkinOptions& options, const Progress& progress = {});
+/// The same of samples of a surface.
+ARAPFIELDS_EXPORT RowMatrix<float> skin_weights(const SurfaceSamples& samples, const std::vector<Bone>& bones,
+                                                const SkinOptions& options, const Progress& progress = {});
+
+}  // namespace arapfields

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "skin/vertex_blend.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <map>
+#include <numeric>
+
+#include "core/parallel.h"
+#include "distance/is_closed.h"
+#include "sampling/oriented_points.h"
+
+namespace arapfields {
+namespace {
+
+/// Nodes within so many spacings are blended; a node of the other side counts by so much.
+constexpr double reach = 2.5, other_side = 1e-4;
+/// Slopes are damped by this, which matters where few nodes are near.
+constexpr double damping = 0.05;
+
+}  // namespace
+
+WeldedVertices::WeldedVertices(const TriangleMesh& mesh)
+    : first(first_at_position(mesh.vertices)), normals(Points::Zero(mesh.vertices.rows(), 3)) {
+  for (Index t = 0; t < mesh.triangles.rows(); ++t) {
+    const auto corner = [&](int k) { return Vec3(mesh.vertices.row(mesh.triangles(t, k))); };
+    const Vec3 area = (corner(1) - corner(0)).cross(corner(2) - corner(0));
+    for (int k = 0; k < 3; ++k) normals.row(first[mesh.triangles(t, k)]) += area;
+  }
+  normals.rowwise().normalize();
+}
+
+std::vector<std::vector<Index>> WeldedVertices::closed_pieces(const TriangleMesh& mesh, double size) const {
+  std::vector<std::int32_t> root = first;
+  const auto find = [&](std::int32_t v) {
+    while (root[v] != v) v = root[v] = root[root[v]];
+    return v;
+  };
+  std::map<std::pair<std::int32_t, std::int32_t>, int> open;  // edges, and how often they are passed
+  const auto edge_of = [&](Index t, int k) {
+    return std::pair(first[mesh.triangles(t, k)], first[mesh.triangles(t, (k + 1) % 3)]);
+  };
+  for (Index t = 0; t < mesh.triangles.rows(); ++t)
+    for (int k = 0; k < 3; ++k) {
+      const auto [a, b] = edge_of(t, k);
+      if (a == b) continue;
+      root[find(a)] = find(b);
+      open[std::minmax(a, b)] += a < b ? 1 : -1;
+    }
+  std::map<std::int32_t, std::vector<Index>> pieces;
+  for (std::size_t v = 0; v < first.size(); ++v) pieces[find(first[v])].push_back(static_cast<Index>(v));
+  for (const auto& [edge, balance] : open)
+    if (balance != 0) pieces.erase(find(edge.first));
+  std::vector<std::vector<Index>> result;
+  for (auto& [piece, members] : pieces) {
+    Eigen::AlignedBox3d box;
+    for (const Index v : members) box.extend(Vec3(mesh.vertices.row(v)));
+    if (box.diagonal().norm() <= size && normals.row(piece).squaredNorm() > 0.0)
+      result.push_back(std::move(members));
+  }
+  return result;
+}
+
+VertexBlend::VertexBlend(const RigShape& rig, PointsIn points, PointsIn normals) : entries_(points.rows()) {
+  const OrientedPoints tree(rig.nodes, rig.normals);
+  const double width = reach * rig.spacing;
+  const std::vector<Index> nearest = tree.nearest(points, normals, rig.spacing);
+  parallel_for(0, points.rows(), 64, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) {
+      const Vec3 point = points.row(i), normal = normals.row(i);
+      std::vector<Index> near = tree.within(point, width);
+      std::ranges::sort(near);
+      std::vector<Eigen::Vector4d> lines;
+      std::vector<double> kernel;
+      Eigen::Matrix4d moments = Eigen::Matrix4d::Zero();
+      for (const Index node : near) {
+        const Vec3 away = (Vec3(rig.nodes.row(node)) - point) / width;
+        const double side = normal.dot(rig.normals.row(node).transpose());
+        const double falls = std::max(0.0, 1.0 - away.squaredNorm());
+        kernel.push_back(falls * falls * falls * std::max(other_side, std::min(1.0, 0.5 + side)));
+        lines.push_back(Eigen::Vector4d(1.0, away[0], away[1], away[2]));
+        moments += kernel.back() * lines.back() * lines.back().transpose();
+      }
+      const double total = moments(0, 0);
+      if (!(total > 10.0 * other_side)) {
+        entries_[i] = {{nearest[i], 1.0f}};
+        continue;
+      }
+      moments.diagonal().tail<3>().array() += damping * total;
+      const Eigen::Vector4d factor = moments.ldlt().solve(Eigen::Vector4d::UnitX());
+      for (std::size_t k = 0; k < near.size(); ++k)
+        entries_[i].push_back({near[k], static_cast<float>(kernel[k] * factor.dot(lines[k]))});
+      double sum = 0.0;
+      for (const Entry& entry : entries_[i]) sum += static_cast<double>(entry.weight);
+      for (Entry& entry : entries_[i]) entry.weight /= static_cast<float>(sum);
+    }
+  });
+}
+
+RowMatrix<float> VertexBlend::operator()(const RowMatrix<float>& values) const {
+  RowMatrix<float> result = RowMatrix<float>::Zero(static_cast<Index>(entries_.size()), values.cols());
+  parallel_for(0, result.rows(), 64, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i)
+      for (const Entry& entry : entries_[i]) result.row(i) += entry.weight * values.row(entry.node);
+  });
+  return result;
+}
+
+}  // namespace arapfields
