@@ -17,9 +17,10 @@ struct RigShape {
   SurfaceSamples samples;
   Skeleton skeleton;
   std::vector<Handle> handles;
-  Points nodes, normals;  ///< (n,3)
-  double extent;          ///< size of the shape
-  double spacing;         ///< of the nodes
+  Points nodes;    ///< (n,3)
+  Points normals;  ///< (n,3) of the nodes, outwards
+  double extent;   ///< size of the shape
+  double spacing;  ///< of the nodes
   /// Neighbours of each node through the inside, with weights of sum one.
   std::vector<std::vector<std::pair<Index, double>>> neighbours;
   RowMatrix<float> bone_distances;  ///< (n, bones) through the inside

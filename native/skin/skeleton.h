@@ -12,7 +12,8 @@ namespace arapfields {
 /// A bone at rest, in mesh coordinates. Its y axis runs from head to tail, and `roll` turns the others about
 /// it as in Blender.
 struct ARAPFIELDS_EXPORT Bone {
-  Vec3 head = Vec3::Zero(), tail = Vec3::UnitY();
+  Vec3 head = Vec3::Zero();
+  Vec3 tail = Vec3::UnitY();
   Index parent = -1;   ///< among all bones; −1 for none
   double roll = 0.0;   ///< radians
   bool deform = true;  ///< whether it may have weights; helpers only join others
@@ -55,7 +56,8 @@ class Skeleton {
   void join_roots();
 
   std::vector<Bone> bones_;
-  std::vector<Index> original_, order_;  // order_: parents first
+  std::vector<Index> original_;
+  std::vector<Index> order_;  // parents first
   std::vector<bool> leaf_;
 };
 

@@ -71,7 +71,7 @@ def error(V, weights, poses):
 
 
 def test_weights_come_close_to_poses_that_they_have_not_seen(legs, weights):
-    """Measured 2026-11: 0.9 % of the height; nearest bone 2.6 %."""
+    """Measured 2026-11: 0.38 % of the height; nearest bone 0.69 %."""
     bones, V = rig(), legs[0]
     assert weights.shape == (len(V), len(bones)) and weights.min() >= 0
     assert np.allclose(weights.sum(1), 1, atol=1e-5) and ((weights > 0).sum(1) <= 4).all()
@@ -111,10 +111,8 @@ def test_loose_parts_take_what_lies_below_and_small_closed_ones_one_motion(legs,
     high = points[:, 2] > HIP
     patch = points[high][:30] + 0.02 * normals[high][:30]
     cube = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * 0.05 + [LEG, 0.08, 0.1]
-    faces = np.array(
-        [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1)]
-        + [(2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)]
-    )
+    sides = "013 032 467 475 045 051 237 276 026 064 157 173"
+    faces = np.array([[int(corner) for corner in side] for side in sides.split()])
     n = len(V)
     rows = np.arange(30).reshape(-1, 3) + n
     together = np.concatenate([V, patch, cube]), np.concatenate([F, rows, faces + n + 30])
