@@ -2,6 +2,7 @@
 #include "skin/weight_fit.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <numeric>
 
