@@ -66,7 +66,9 @@ def test_undone_past_live_and_back_leaves_nothing_astray(target):
             assert not source().modifiers and not source().arapfields.live_kind
             bpy.ops.ed.redo()
             sessions.update(bpy.context, wait=stages.WAIT)
-            assert not stray() and source().visible_get() and not source().hide_render
+            assert source().visible_get() and not source().hide_render
+            assert stray() == [str(uid) for uid in sessions.live]
+            assert bool(sessions.live) == bool(source().arapfields.live_kind)
         again()
     assert not errors, errors
     unlinked = [item.name for item in bpy.data.objects if not item.users_scene]

@@ -11,8 +11,8 @@ namespace {
 /// Samples × centers below which a step takes about a millisecond: waking other threads, which may be busy
 /// with drawing, would cost more than they do.
 constexpr Index worth_threads = 1000000;
-/// Fine centers from which a second layer pays (docs/notes/centers.md). Fewer are wider than the layers are
-/// apart: functions that are nearly dependent, and solves that take half as many steps again.
+/// Fine centers from which a second layer pays in live solves (docs/notes/centers.md). Fewer are wider than
+/// the layers are apart: functions that are nearly dependent, and solves that take half as many steps again.
 constexpr int worth_two_layers = 400;
 
 }  // namespace
@@ -28,13 +28,14 @@ RadialProblem::RadialProblem(const SurfaceSamples& surface, const LiveOptions& s
   if (axis >= 0) samples = across(samples, axis);
   require_samples(samples);
   const auto seed = static_cast<std::uint64_t>(options.seed);
+  // Deform and stylize, which hand a shape in, need the field off the surface as well.
+  const bool two_layers = shape || options.fine_centers >= worth_two_layers;
   if (!shape) shape = std::make_shared<const RestShape>(samples, options.interior, seed, axis);
   Random random(seed);
   add_energy_samples(stratified(shape->order, options.samples, random));
   std::vector<RadialScale> scales;
   if (options.coarse_centers > 0) scales.push_back({options.coarse_centers, options.coarse_radius_factor});
-  scales.push_back(
-      {options.fine_centers, options.fine_radius_factor, options.fine_centers >= worth_two_layers});
+  scales.push_back({options.fine_centers, options.fine_radius_factor, two_layers});
   if (axis >= 0) {
     mirror.emplace();
     mirror->axis = axis;
