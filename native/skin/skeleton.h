@@ -11,7 +11,7 @@ namespace arapfields {
 
 /// A bone at rest, in mesh coordinates. Its y axis runs from head to tail, and `roll` turns the others about
 /// it as in Blender.
-struct ARAPFIELDS_EXPORT Bone {
+struct Bone {
   Vec3 head = Vec3::Zero();
   Vec3 tail = Vec3::UnitY();
   Index parent = -1;   ///< among all bones; −1 for none

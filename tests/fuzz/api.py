@@ -15,6 +15,9 @@ LEFT_OUT = {  # public callables that the net does not call, and why
     "ImplicitFunction.gradient": "likewise: classes of ours have their own",
     "Energy.__call__": "a base for Python: tests/python/test_external_energies.py",
     "cmake_dir": "a path of the installation, without arguments",
+    "skin_weights": "seconds a call: tests/python/test_skin.py",
+    "skin_correctives": "seconds a call: tests/python/test_skin.py",
+    "Corrective.value": "of what skin_correctives returns",
     "LiveDeformer.reset": "without arguments; it would undo what other calls have set up",
     "PointCacheReader.close": "without arguments, after a reader that the file of each case gives",
 }

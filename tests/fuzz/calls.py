@@ -195,6 +195,12 @@ def members(t):
         "DeformationField.save": lambda: (t["field"].save, ["/nonexistent/x"]),
         "Frame.to_mesh": lambda: (t["frame"].to_mesh, [ROWS]),
         "SurfaceSamples.with_weights": lambda: (t["samples"].with_weights, [np.ones(60), np.ones(60)]),
+        "Bone": lambda: (
+            by_name(af.Bone, "deform", "limits", "name"),
+            [np.zeros(3), np.ones(3), None, 0.0, True, np.zeros((3, 2)), "spine"],
+        ),
+        "bone_handles": lambda: (af.bone_handles, [t["samples"], [af.Bone(np.zeros(3), np.ones(3))]]),
+        "skin": lambda: (af.skin, [ROWS, np.ones((60, 1)), [np.eye(4)], "linear"]),
         "Task": lambda: (af.Task, []),
         "Task.cancel": lambda: (af.Task.cancel, [af.Task()]),
         "rigid_motion": lambda: (by_name(af.rigid_motion, "weights"), [ROWS, moved, np.ones(60)]),

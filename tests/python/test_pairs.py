@@ -18,6 +18,8 @@ LONG = 60.0  # seconds a class
 OPTIONS = {name for name in dir(_native) if name.endswith("Options")} - {"DeformOptions"}
 # What only holds numbers, or is another class's base or kind.
 VALUES = {
+    "Bone",
+    "Corrective",
     "Handle",
     "CuboidHandle",
     "RegionHandle",
