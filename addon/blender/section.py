@@ -43,10 +43,11 @@ def settings_column(layout, group, parameters, advanced):
     """The everyday parameters, grey where they do nothing, or the advanced ones that do something."""
     column, method = layout.column(), method_of(group, parameters)
     for p in parameters:
-        if p.advanced != advanced or (advanced and not counts(p, group, method)):
+        is_used = counts(p, group, method)
+        if p.advanced != advanced or (advanced and not is_used):
             continue
         row = column.column()
-        row.enabled = counts(p, group, method)
+        row.enabled = is_used
         if p.zero:
             with_zero(row, group, p)
         else:

@@ -21,10 +21,10 @@ def draw():
     if source is None or not context.space_data.overlay.show_overlays:
         return
     used, size = landmarks.used(source), (context.region.width, context.region.height)
+    perspective = np.array(context.region_data.perspective_matrix)
     gpu.state.blend_set("ALPHA")
     for number, entry in enumerate(settings_of(source).wrap.landmarks, 1):
         for item in (entry.rest, entry.on_target) if entry in used else ():
-            perspective = np.array(context.region_data.perspective_matrix)
             spot = screen.project(perspective, size, item.matrix_world.translation)[0]
             if item.visible_get() and np.isfinite(spot).all():
                 disc(context, spot, tuple(entry.colour), str(number))
