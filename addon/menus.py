@@ -32,6 +32,7 @@ class ARAPFIELDS_MT_object(bpy.types.Menu):
         layout.operator(Op.LIVE, text="Live Stylize", icon=icon).kind = "STYLIZE"
         layout.operator(Op.WRAP, icon="MOD_SHRINKWRAP")
         layout.operator(Op.CLICK_LANDMARKS, icon="PINNED")
+        layout.operator(Op.SKIN, icon="MOD_ARMATURE")
         layout.operator(Op.LIVE_KEEP, icon="CHECKMARK")
         layout.operator(Op.BAKE, icon="REC")
         layout.menu("ARAPFIELDS_MT_export", icon="EXPORT")

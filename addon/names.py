@@ -10,6 +10,7 @@ RESULTS = "ARAP Fields"  # collection that holds results
 CONTEXT = "ARAP Fields"  # of our texts' translations, which Blender's own would replace otherwise
 PROPERTY = "arapfields"  # object.arapfields
 REPORT = "arapfields_report"  # custom property of results: figures as JSON
+CORRECTIVE = "ARAP Corrective "  # how names of shape keys begin that go with skin weights
 WARP_KEY = "ARAP Fields"  # shape key that carries the motion
 FIELD_MODIFIER = "ARAP Fields"  # modifier that carries the motion, and its node group
 SHAPE_OF = "arapfields_shape_of"  # custom property of the mesh that carries a live motion: what that is of
@@ -47,6 +48,7 @@ class Op(StrEnum):
     STYLIZE = "arapfields.stylize"
     SET_STYLE = "arapfields.set_style"
     WRAP = "arapfields.wrap"
+    SKIN = "arapfields.skin"
     ADD_LANDMARK = "arapfields.add_landmark"
     CLICK_LANDMARKS = "arapfields.click_landmarks"
     RESET_BONES = "arapfields.reset_bones"

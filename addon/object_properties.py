@@ -15,6 +15,7 @@ from .names import PROPERTY
 from .pin_tool.properties import ARAPFIELDS_PG_scene
 from .properties.choices import RESULT_ITEMS, extraction, output, result, surface
 from .properties.solve_settings import ARAPFIELDS_PG_deform, ARAPFIELDS_PG_fit, ARAPFIELDS_PG_stylize
+from .skin.properties import ARAPFIELDS_PG_skin
 from .stiffness.properties import ARAPFIELDS_PG_stiffness
 from .wrap.properties import ARAPFIELDS_PG_wrap
 
@@ -38,6 +39,7 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     deform: pointer(ARAPFIELDS_PG_deform, "Deform", "Settings of the deformation")
     stylize: pointer(ARAPFIELDS_PG_stylize, "Stylize", "Settings of the stylization")
     wrap: pointer(ARAPFIELDS_PG_wrap, "Wrap", "Settings of the wrap, its target and landmarks")
+    skin: pointer(ARAPFIELDS_PG_skin, "Skin", "How meshes are skinned to this armature")
     bake: pointer(ARAPFIELDS_PG_bake, "Bake", "Settings of bakes, and what the last one is")
     handles: collection(ARAPFIELDS_PG_handle, "Handles", "Empties that hold and move parts of the object")
     hold_far: flag(

@@ -13,6 +13,7 @@ CONTENTS = [  # modules with CLASSES
     # what is stored in the .blend: object.arapfields
     *("handles.properties", "carried.properties", "poses.properties", "pin_tool.properties"),
     *("stiffness.properties", "live.properties", "animation.properties", "wrap.properties"),
+    "skin.properties",
     *("properties.solve_settings", "object_properties"),
     # features
     *("surface.operators", "surface.panel"),
@@ -20,6 +21,7 @@ CONTENTS = [  # modules with CLASSES
     *("deform.operators", "deform.panel"),
     *("stylize.operators", "stylize.panel"),
     *("wrap.operators", "wrap.clicking", "wrap.panel"),
+    *("skin.operators", "skin.panel"),
     *("carried.operators", "carried.panel", "poses.operators", "poses.panel"),
     *("stiffness.operators", "stiffness.panel"),
     *("live.operators", "live.panel", "pin_tool.operators", "animation.operators"),

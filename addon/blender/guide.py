@@ -18,6 +18,7 @@ SETTINGS = {  # class of properties → page
     "ARAPFIELDS_PG_landmark": "wrap",
     "ARAPFIELDS_PG_handle": "handles",
     "ARAPFIELDS_PG_scene": "pins",
+    "ARAPFIELDS_PG_skin": "characters",
     "ARAPFIELDS_PG_carried": "characters",
     "ARAPFIELDS_PG_stiffness": "characters",
     "ARAPFIELDS_PG_secondary": "motion",

@@ -105,7 +105,12 @@ def nothing_in(name, vertices, faces):
 def read(context, source, in_place=False):
     """What there is to work on of an object; UserError that names it when there is nothing."""
     with modifier_stack.evaluated_mesh(context, source, in_place) as mesh:
-        arrays = MeshArrays(positions(mesh), triangles(mesh), bool(modifier_stack.free_normals(mesh)))
+        return arrays_of(source, mesh)
+
+
+def arrays_of(source, mesh):
+    """What there is to work on of an object's evaluated mesh; UserError when there is nothing."""
+    arrays = MeshArrays(positions(mesh), triangles(mesh), bool(modifier_stack.free_normals(mesh)))
     refuse(nothing_in(source.name, len(arrays.vertices), len(arrays.triangles)))
     if not np.isfinite(arrays.vertices).all():
         broken = np.flatnonzero(~np.isfinite(arrays.vertices).all(axis=1))

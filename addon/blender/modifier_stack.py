@@ -144,19 +144,20 @@ def cut_copy(source, kept):
 @contextmanager
 def evaluated_mesh(context, source, in_place=False):
     """The mesh that is worked on, for as long as the block runs."""
-    with _mesh_of(context, source, before(source, in_place)) as mesh:
+    with mesh_of(context, source, before(source, in_place)) as mesh:
         yield mesh
 
 
 @contextmanager
 def moved_mesh(context, source):
     """The mesh just after the field's modifier, for as long as the block runs."""
-    with _mesh_of(context, source, list(source.modifiers)[: place(source) + 1]) as mesh:
+    with mesh_of(context, source, list(source.modifiers)[: place(source) + 1]) as mesh:
         yield mesh
 
 
 @contextmanager
-def _mesh_of(context, source, kept):
+def mesh_of(context, source, kept):
+    """The mesh as these of its modifiers make it, for as long as the block runs."""
     with evaluated(context, source, kept) as (item, depsgraph):
         mesh = item.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
         if mesh is None:

@@ -55,6 +55,16 @@ def _read(reference, shown, names):
     return weights
 
 
+def weights_in(mesh, groups):
+    """{name: (n,) weights of a mesh's vertices} of the groups {name: index}."""
+    weights = {index: np.zeros(len(mesh.vertices)) for index in groups.values()}
+    for number, vertex in enumerate(mesh.vertices if groups else ()):
+        for entry in vertex.groups:
+            if entry.group in weights:
+                weights[entry.group][number] = entry.weight
+    return {name: weights[index] for name, index in groups.items()}
+
+
 def at_points(vertices, weights, points):
     """(p,) weights of points, each from its three nearest vertices by inverse distance."""
     return NearestVertices(vertices, points)(weights)

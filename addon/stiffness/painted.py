@@ -23,20 +23,28 @@ def refusal(source):
 
 
 def names(source):
+    return [group for group, times in pairs(source) if group and times != 1.0]
+
+
+def pairs(source):
+    """(group, times as stiff), and the same against bending."""
     settings = settings_of(source).stiffness
-    pairs = (settings.group, settings.times), (settings.bend_group, settings.bend_times)
-    return [group for group, times in pairs if group and times != 1.0]
+    return (settings.group, settings.times), (settings.bend_group, settings.bend_times)
 
 
 def read(context, source, in_place):
     """((n,) factors of the vertices' stiffness, (n,) of that against bending); None each where all are 1."""
     refuse(refusal(source))
-    settings = settings_of(source).stiffness
-    weights = run_to_completion(vertex_groups.read_weights(context, source, names(source), in_place))
-    pairs = (settings.group, settings.times), (settings.bend_group, settings.bend_times)
+    return of_weights(
+        source, run_to_completion(vertex_groups.read_weights(context, source, names(source), in_place))
+    )
+
+
+def of_weights(source, weights):
+    """The same from {group: (n,) weights}."""
     return tuple(
         factors(weights[group], times) if group in weights and times != 1.0 else None
-        for group, times in pairs
+        for group, times in pairs(source)
     )
 
 

@@ -26,24 +26,25 @@ std::vector<Bone> as_bones(const BonesArgument& bones) {
   return as_items<Bone>(bones, "bones", "Bones are needed");
 }
 
-/// call(samples) or call(mesh), as the argument is.
-template <class Call>
-auto on_shape(const ShapeArgument& shape, Call&& call) {
-  if (py::isinstance<SurfaceSamples>(shape)) return call(shape.cast<const SurfaceSamples&>());
+Eigen::MatrixXd weights_of(const ShapeArgument& shape, const BonesArgument& bones, const SkinOptions& options,
+                           const std::optional<ArrayArgument>& weights,
+                           const std::optional<ArrayArgument>& bend_weights, Task* task) {
+  const std::vector<Bone> rig = as_bones(bones);
+  const auto on = [&](const auto& given, const auto&... painted) {
+    return Eigen::MatrixXd(run_long(task, [&](const Progress& progress) {
+                             return skin_weights(given, rig, options, progress, painted...);
+                           }).template cast<double>());
+  };
+  const VertexWeights painted{as_vector(weights, "weights"), as_vector(bend_weights, "bend_weights")};
+  if (py::isinstance<SurfaceSamples>(shape)) {
+    require(!weights && !bend_weights, weights ? "weights" : "bend_weights", "given beside samples",
+            "samples have their own, by with_weights");
+    return on(shape.cast<const SurfaceSamples&>());
+  }
   require(py::isinstance<py::sequence>(shape) && py::len(shape) == 2, "mesh", "got " + type_text(shape),
           "a pair (vertices, triangles) or SurfaceSamples are needed");
   const auto pair = py::reinterpret_borrow<py::sequence>(shape);
-  return call(as_mesh(py::object(pair[0]), py::object(pair[1])));
-}
-
-Eigen::MatrixXd weights_of(const ShapeArgument& shape, const BonesArgument& bones, const SkinOptions& options,
-                           Task* task) {
-  const std::vector<Bone> rig = as_bones(bones);
-  return on_shape(shape, [&](const auto& given) {
-    return Eigen::MatrixXd(run_long(task, [&](const Progress& progress) {
-                             return skin_weights(given, rig, options, progress);
-                           }).template cast<double>());
-  });
+  return on(as_mesh(py::object(pair[0]), py::object(pair[1])), painted);
 }
 
 std::vector<Mat4> as_motions(const ArraysArgument& motions) {
@@ -75,12 +76,14 @@ components of its rotation vector in its own axes, in radians.)")
       .def_readonly("name", &Bone::name)
       .def("__repr__", [](const Bone& self) { return "Bone(" + self.name + ")"; });
   module.def("skin_weights", &weights_of, "mesh"_a, "bones"_a,
-             py::arg_v("options", SkinOptions(), "SkinOptions()"), py::kw_only(), "task"_a = py::none(), R"(
+             py::arg_v("options", SkinOptions(), "SkinOptions()"), py::kw_only(), "weights"_a = py::none(),
+             "bend_weights"_a = py::none(), "task"_a = py::none(), R"(
 Weights (n, bones) for linear blend skinning: not negative, of sum one, at most options.influences a vertex.
 
 `mesh` is a pair (vertices, triangles), of which several meshes may be parts, or SurfaceSamples, which get the
 weights. The field poses the shape by its bones, and the weights are those that come nearest to it. How the
-triangles are joined does not matter. Raises InvalidInput and Cancelled.)");
+triangles are joined does not matter. `weights` and `bend_weights` (n,) are the vertices' stiffness, as of
+sample_mesh. Raises InvalidInput and Cancelled.)");
   py::class_<Corrective>(module, "Corrective", "A shape key that takes a skin to the field's poses.")
       .def_readonly("bone", &Corrective::bone, "Index of the bone whose rotation drives it.")
       .def_property_readonly(
@@ -97,20 +100,25 @@ triangles are joined does not matter. Raises InvalidInput and Cancelled.)");
   module.def(
       "skin_correctives",
       [](const ArrayArgument& vertices, const ArrayArgument& triangles, const BonesArgument& bones,
-         const ArrayArgument& weights, const SkinOptions& options, Task* task) {
+         const ArrayArgument& weights, const SkinOptions& options,
+         const std::optional<ArrayArgument>& stiffness, const std::optional<ArrayArgument>& bend_weights,
+         Task* task) {
         const TriangleMesh mesh = as_mesh(vertices, triangles);
         const std::vector<Bone> rig = as_bones(bones);
         const RowMatrix<float> shares = as_matrix(weights, "weights").cast<float>();
+        const VertexWeights painted{as_vector(stiffness, "stiffness"),
+                                    as_vector(bend_weights, "bend_weights")};
         return run_long(task, [&](const Progress& progress) {
-          return skin_correctives(mesh, rig, shares, options, progress);
+          return skin_correctives(mesh, rig, shares, options, progress, painted);
         });
       },
       "vertices"_a, "triangles"_a, "bones"_a, "weights"_a,
-      py::arg_v("options", SkinOptions(), "SkinOptions()"), py::kw_only(), "task"_a = py::none(), R"(
+      py::arg_v("options", SkinOptions(), "SkinOptions()"), py::kw_only(), "stiffness"_a = py::none(),
+      "bend_weights"_a = py::none(), "task"_a = py::none(), R"(
 At most options.correctives shape keys that take linear blend skinning with these weights to the field's poses.
 
 Each is driven by one joint: its value is a polynomial of the rotation's quaternion. Those that gain most come
-first. Raises InvalidInput and Cancelled.)");
+first. `stiffness` and `bend_weights` (n,) are as skin_weights' `weights` and `bend_weights`. Raises InvalidInput and Cancelled.)");
   module.def(
       "skin",
       [](const ArrayArgument& vertices, const ArrayArgument& weights, const ArraysArgument& motions,

@@ -9,7 +9,6 @@
 
 #include "core/errors.h"
 #include "core/parallel.h"
-#include "mesh/sample_mesh.h"
 #include "skin/example_poses.h"
 
 namespace arapfields {
@@ -85,14 +84,14 @@ double Corrective::value(const Mat3& rotation) const {
 
 std::vector<Corrective> skin_correctives(const TriangleMesh& mesh, const std::vector<Bone>& bones,
                                          const RowMatrix<float>& weights, const SkinOptions& options,
-                                         const Progress& progress) {
+                                         const Progress& progress, const VertexWeights& painted) {
   options.validate();
   const ThreadScope threads(options.threads);
   require(weights.rows() == mesh.vertices.rows() && weights.cols() == static_cast<Index>(bones.size()),
           "weights", std::to_string(weights.rows()) + " by " + std::to_string(weights.cols()),
           "a row for each vertex and a column for each bone are needed");
-  const RigShape rig(sample_mesh(mesh.vertices, mesh.triangles, options.samples, options.seed), bones,
-                     progress);
+  const RigShape rig(sample_mesh(mesh.vertices, mesh.triangles, options.samples, options.seed, painted),
+                     bones, progress);
   const Skeleton& skeleton = rig.skeleton;
   const Index n = mesh.vertices.rows(), joints = skeleton.count();
   const Residuals left = residuals_of(rig, mesh.vertices, weights, options, progress.part(0.0, 0.7));

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/task.h"
+#include "mesh/sample_mesh.h"
 #include "mesh/triangle_mesh.h"
 #include "options/skin.h"
 #include "skin/skeleton.h"
@@ -24,10 +25,8 @@ struct ARAPFIELDS_EXPORT Corrective {
 
 /// At most options.correctives shape keys for weights (n, bones), those first that take most of what is left
 /// between the skin and the field. Throws InvalidInput as skin_weights does; Cancelled.
-ARAPFIELDS_EXPORT std::vector<Corrective> skin_correctives(const TriangleMesh& mesh,
-                                                           const std::vector<Bone>& bones,
-                                                           const RowMatrix<float>& weights,
-                                                           const SkinOptions& options,
-                                                           const Progress& progress = {});
+ARAPFIELDS_EXPORT std::vector<Corrective> skin_correctives(
+    const TriangleMesh& mesh, const std::vector<Bone>& bones, const RowMatrix<float>& weights,
+    const SkinOptions& options, const Progress& progress = {}, const VertexWeights& painted = {});
 
 }  // namespace arapfields

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "core/parallel.h"
-#include "mesh/sample_mesh.h"
 #include "sampling/oriented_points.h"
 #include "skin/example_poses.h"
 #include "skin/vertex_blend.h"
@@ -141,11 +140,12 @@ RowMatrix<float> skin_weights(const SurfaceSamples& samples, const std::vector<B
 }
 
 RowMatrix<float> skin_weights(const TriangleMesh& mesh, const std::vector<Bone>& bones,
-                              const SkinOptions& options, const Progress& progress) {
+                              const SkinOptions& options, const Progress& progress,
+                              const VertexWeights& painted) {
   options.validate();
   const ThreadScope threads(options.threads);
-  const RigShape rig(sample_mesh(mesh.vertices, mesh.triangles, options.samples, options.seed), bones,
-                     progress);
+  const RigShape rig(sample_mesh(mesh.vertices, mesh.triangles, options.samples, options.seed, painted),
+                     bones, progress);
   const WeldedVertices welded(mesh);
   const RowMatrix<float> nodes = node_weights(rig, options, progress);
   progress.report(0.95, "Weights");

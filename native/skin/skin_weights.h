@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/task.h"
+#include "mesh/sample_mesh.h"
 #include "mesh/surface_samples.h"
 #include "mesh/triangle_mesh.h"
 #include "options/skin.h"
@@ -16,10 +17,11 @@ namespace arapfields {
 /// vertex. The field poses the shape by its bones; the weights are those under which linear blend skinning
 /// comes nearest to it. They depend on where vertices and triangles are, not on how they are joined: several
 /// meshes may be one list. Small closed pieces get one motion. A rig that is symmetric across a plane of the
-/// axes gives symmetric weights to vertices that are. Throws InvalidInput as sample_mesh and Skeleton do, and
-/// for a bone far outside; Cancelled.
+/// axes gives symmetric weights to vertices that are. `painted` is the vertices' stiffness. Throws
+/// InvalidInput as sample_mesh and Skeleton do, and for a bone far outside; Cancelled.
 ARAPFIELDS_EXPORT RowMatrix<float> skin_weights(const TriangleMesh& mesh, const std::vector<Bone>& bones,
-                                                const SkinOptions& options, const Progress& progress = {});
+                                                const SkinOptions& options, const Progress& progress = {},
+                                                const VertexWeights& painted = {});
 /// The same of samples of a surface.
 ARAPFIELDS_EXPORT RowMatrix<float> skin_weights(const SurfaceSamples& samples, const std::vector<Bone>& bones,
                                                 const SkinOptions& options, const Progress& progress = {});

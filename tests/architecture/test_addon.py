@@ -27,6 +27,7 @@ ORDER = [
     "stylize",
     "pin_tool",
     "wrap",
+    "skin",
 ]
 ORDER += ["animation", "commands"]
 TOP = {

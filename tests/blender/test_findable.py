@@ -29,6 +29,7 @@ OPERATORS = (
     "DEFORM",
     "LIVE",
     "STYLIZE",
+    "SKIN",
     "LIVE_KEEP",
     "BAKE",
     "FIT",

@@ -31,6 +31,14 @@ SCOPES = (  # of a job
     ("SELECTED", "Selected", "Every selected mesh object, one after another"),
     ("COLLECTION", "Collection", "Every mesh object of the active object's collections"),
 )
+SKINNED = (
+    ("SELECTED", "Selected", "Every selected mesh object"),
+    ("COLLECTION", "Collection", "Every mesh object of the armature's collections"),
+)
+SKIN_GROUPS = (
+    ("REPLACE", "Replace", "The bones' groups are made anew, except locked ones; other groups stay"),
+    ("KEEP", "Keep", "Groups that bones have already stay; other bones share what these leave"),
+)
 SURFACES = (
     ("EXACT", "Exact", "The mesh's own triangles, as far as they lie between inside and outside; at once"),
     (

@@ -115,7 +115,8 @@ def presets(operation):
     return {key.upper(): (p["label"], p["sentence"], p["values"]) for key, p in given.items()}
 
 
-FIT, DEFORM, WRAP, EXTRACTION, MACHINE = map(parameters, ("fit", "deform", "wrap", "extraction", "machine"))
+OPERATIONS = ("fit", "deform", "wrap", "skin", "extraction", "machine")
+FIT, DEFORM, WRAP, SKIN, EXTRACTION, MACHINE = map(parameters, OPERATIONS)
 QUALITIES = presets("fit")  # identifier → label, tip, what it sets
 
 

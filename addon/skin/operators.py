@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+import numpy as np
+
+from ..blender.language import translated
+from ..blender.native_options import options_of
+from ..blender.object_references import ObjectReference, settings_of
+from ..blender.property_definitions import annotations, choice, effective_value, effective_values
+from ..core.errors import UserError, refuse
+from ..core.runtime import native
+from ..core.runtime.coroutines import Pause
+from ..core.runtime.jobs import Item
+from ..core.settings.choices import SKINNED
+from ..core.settings.parameters import SKIN
+from ..jobs.job_operator import JobOperator, busy
+from . import rig as rigs
+from . import shapes, writing
+from .properties import groups
+
+
+class ARAPFIELDS_OT_skin(JobOperator, bpy.types.Operator):
+    """Give the selected meshes weights of the armature's bones, by what poses of the field look like"""
+
+    bl_label = "Skin to Armature"
+    bl_options = {"UNDO"}
+    title = "Skin to Armature"
+    guide = "characters"
+
+    __annotations__ = {
+        "scope": choice(SKINNED, "Objects", "Which objects to work on", options={"SKIP_SAVE"}),
+        "groups": groups(options={"SKIP_SAVE"}),
+        **annotations(SKIN, options={"SKIP_SAVE"}),
+    }
+
+    @classmethod
+    def obstacle(cls, context):
+        rig = rigs.rig_of(context)
+        meshes = rigs.meshes_of(context, rig, "COLLECTION") if rig else []
+        chosen = rigs.meshes_of(context, rig, "SELECTED") if rig else []
+        return native.problem() or busy() or rigs.refusal(rig, chosen or meshes)
+
+    def prepare(self, context, job):
+        """Coroutine: the one item of the job, of all meshes together."""
+        try:
+            return [self.plan_all(context)]
+        except (UserError, ValueError) as error:
+            self.failures.append(translated(error))
+            return []
+        finally:
+            yield Pause.REDRAW
+
+    def plan_all(self, context):
+        context.view_layer.update()
+        rig = rigs.rig_of(context)
+        meshes = rigs.meshes_of(context, rig, self.scope) if rig else []
+        refuse(rigs.refusal(rig, meshes))
+        settings = settings_of(rig).skin
+        values = effective_values(SKIN, settings, self)
+        kept_groups = effective_value("groups", settings, self)
+        af, options = native.library(), options_of("skin", values)
+        with rigs.at_rest(context, rig):
+            read = [shapes.read(context, item, rig, kept_groups) for item in meshes]
+        bones = rigs.bones_of(af, rig)
+        names = [bone.name for bone in bones]
+        vertices, triangles, firsts = shapes.join(read)
+        painted = shapes.joined_stiffness(read)
+        reference = ObjectReference(rig)
+
+        def work(tracker):
+            share = 0.4 if options.correctives else 1.0
+            task = tracker.start("Posing", share)
+            stiff, bend = painted
+            weights = af.skin_weights(
+                (vertices, triangles), bones, options, weights=stiff, bend_weights=bend, task=task
+            )
+            own = []
+            for shape, first in zip(read, firsts, strict=False):
+                rows = slice(first, first + len(shape.vertices))
+                own.append(shapes.fill_up(shape.own(weights[rows]), shape.kept, names, options.influences))
+                if shape.nearest is None:
+                    weights[rows] = own[-1]
+            if not options.correctives:
+                return own, []
+            task = tracker.start("Correctives", 1.0)
+            return own, af.skin_correctives(
+                vertices, triangles, bones, weights, options, stiffness=stiff, bend_weights=bend, task=task
+            )
+
+        def apply(solved):
+            weights, correctives = solved
+            armature, items = reference.get(), [shape.get() for shape in read]
+            for item, shape, own, first in zip(items, read, weights, firsts, strict=False):
+                writing.write_weights(item, names, own, shape.kept)
+                writing.remove_correctives(item)
+                writing.follow(item, armature)
+                rows = slice(first, first + len(own))
+                if not writing.takes_correctives(item, shape):
+                    if correctives:
+                        self.warnings.append(
+                            translated(
+                                UserError("{name} takes no correctives: its vertices are not its own", item)
+                            )
+                        )
+                elif correctives:
+                    writing.add_correctives(item, armature, shape, rows, correctives, names)
+            used = np.count_nonzero(sum(np.asarray(own).max(axis=0) > 0 for own in weights))
+            return translated("{count} bones move {meshes}", count=used, meshes=names_of(items))
+
+        return Item(rig.name, work, apply)
+
+
+def names_of(items):
+    return ", ".join(item.name for item in items)
+
+
+CLASSES = [ARAPFIELDS_OT_skin]

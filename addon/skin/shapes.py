@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes at rest as they are skinned, in the armature's coordinates, and what their groups hold."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from mathutils.kdtree import KDTree
+
+from ..blender import mesh_arrays, modifier_stack, vertex_groups
+from ..blender.object_references import ObjectReference
+from ..core.errors import UserError, refuse
+from ..core.geometry.spaces import inverse, space_of, transform
+from ..handles.movers import matrix_of
+from ..stiffness import painted
+
+
+@dataclass
+class Shape:
+    """One mesh object; its shape is that which its armature modifier gets, or would."""
+
+    reference: ObjectReference
+    arrays: mesh_arrays.MeshArrays
+    vertices: np.ndarray  # (n, 3) in the armature's coordinates
+    triangles: np.ndarray
+    to_rig: np.ndarray  # (4, 4) from the object's
+    nearest: np.ndarray | None  # (own vertices,) of these; None where they are the mesh's own
+    kept: dict  # bone → (own vertices,) weights that stay
+    stiffness: tuple  # (n,) factors of the stiffness, and of that against bending; None each where all are 1
+    mark: tuple
+
+    def own(self, weights):
+        """The rows of the mesh's own vertices."""
+        return weights if self.nearest is None else weights[self.nearest]
+
+    def get(self):
+        """The object; UserError where its mesh is another by now."""
+        item = self.reference.get()
+        if mesh_arrays.fingerprint(item.data) != self.mark:
+            raise UserError("{name} changed while it was worked on; run again", item)
+        return item
+
+
+def place(item, rig):
+    """Where the armature's modifier is in the object's stack, or would come."""
+    stack = list(item.modifiers)
+    found = next((k for k, m in enumerate(stack) if m.type == "ARMATURE" and m.object == rig), None)
+    if found is not None:
+        return found
+    end = len(stack)
+    while end and (stack[end - 1].type in modifier_stack.REFINING or stack[end - 1].use_pin_to_last):
+        end -= 1
+    return end
+
+
+def read(context, item, rig, groups):
+    """The Shape of an object while the armature is at rest; UserError where there is nothing to skin."""
+    space_of(item.matrix_world, item.name)
+    refuse(painted.refusal(item))
+    before = [m for m in list(item.modifiers)[: place(item, rig)] if m.show_viewport]
+    with modifier_stack.mesh_of(context, item, before) as mesh:
+        arrays = mesh_arrays.arrays_of(item, mesh)
+        painted_groups = {name: item.vertex_groups[name].index for name in painted.names(item)}
+        stiffness = painted.of_weights(item, vertex_groups.weights_in(mesh, painted_groups))
+    own = mesh_arrays.positions(item.data)
+    keeps = all(m.type in modifier_stack.KEEPING for m in before) and len(own) == len(arrays.vertices)
+    to_rig = inverse(matrix_of(rig)) @ matrix_of(item)
+    mirrored = np.linalg.det(to_rig[:3, :3]) < 0
+    return Shape(
+        ObjectReference(item),
+        arrays,
+        transform(to_rig, arrays.vertices),
+        arrays.triangles[:, ::-1] if mirrored else arrays.triangles,
+        to_rig,
+        None if keeps else nearest(arrays.vertices, own),
+        kept_weights(item, rig, groups),
+        stiffness,
+        mesh_arrays.fingerprint(item.data),
+    )
+
+
+def nearest(vertices, points):
+    """(p,) which of (n, 3) vertices each point is nearest to."""
+    tree = KDTree(len(vertices))
+    for index, vertex in enumerate(vertices):
+        tree.insert(vertex, index)
+    tree.balance()
+    return np.array([tree.find(point)[1] for point in points])
+
+
+def kept_weights(item, rig, groups):
+    """{bone: (own vertices,) weights} of the groups that stay: locked ones, or all where `groups` is KEEP."""
+    deforming = {bone.name for bone in rig.data.bones if bone.use_deform}
+    kept = [g for g in item.vertex_groups if g.name in deforming and (groups == "KEEP" or g.lock_weight)]
+    return vertex_groups.weights_in(item.data, {group.name: group.index for group in kept})
+
+
+def fill_up(weights, kept, names, influences):
+    """(n, bones) weights whose kept columns stay, and whose others share what these leave of one."""
+    if not kept:
+        return weights
+    fixed = [names.index(bone) for bone in kept]
+    result = weights.copy()
+    result[:, fixed] = 0.0
+    held = np.stack(list(kept.values()), axis=1)
+    room = np.clip(influences - (held > 0).sum(axis=1), 1, influences)
+    order = np.argsort(np.argsort(-result, axis=1, kind="stable"), axis=1)
+    result[order >= room[:, None]] = 0.0
+    total, left = result.sum(axis=1), np.clip(1.0 - held.sum(axis=1), 0.0, 1.0)
+    result *= (left / np.where(total > 0, total, 1.0))[:, None]
+    result[:, fixed] = held
+    return result
+
+
+def join(shapes):
+    """((n, 3) vertices, (m, 3) triangles, the first vertex of each) of all shapes as one mesh."""
+    firsts = np.cumsum([0, *(len(shape.vertices) for shape in shapes)])
+    rows = [shape.triangles + first for shape, first in zip(shapes, firsts, strict=False)]
+    return np.concatenate([shape.vertices for shape in shapes]), np.concatenate(rows), firsts
+
+
+def joined_stiffness(shapes):
+    """((n,) factors of the stiffness of all shapes together, and of that against bending); None for ones."""
+    joined = []
+    for parts in zip(*(shape.stiffness for shape in shapes), strict=True):
+        ones = [np.ones(len(shape.vertices)) for shape in shapes]
+        filled = [one if part is None else part for one, part in zip(ones, parts, strict=True)]
+        joined.append(None if all(part is None for part in parts) else np.concatenate(filled))
+    return joined

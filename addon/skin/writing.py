@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Weights as vertex groups, and correctives as shape keys whose drivers are plain formulas.
+
+Blender evaluates such formulas itself: they play where Python may not run, and without the extension.
+"""
+
+import numpy as np
+
+from ..blender import mesh_arrays
+from ..names import CORRECTIVE
+from ..results.placement import single_user
+from . import rig as rigs
+from .shapes import place
+
+LEAST_OFFSET = 1e-5  # of the shape's size; a corrective that moves a mesh by less is left out
+QUATERNION = "wxyz"
+PRODUCTS = ("w*x", "w*y", "w*z", "x*x", "y*y", "z*z", "x*y", "x*z", "y*z")  # as af.Corrective has them
+
+
+def write_weights(item, names, weights, kept):
+    """Puts (n, bones) weights into the bones' groups; those of `kept` stay as they are."""
+    single_user(item)
+    every = list(range(len(weights)))
+    for column, name in zip(np.asarray(weights).T, names, strict=True):
+        if name in kept:
+            continue
+        group, used = item.vertex_groups.get(name), np.flatnonzero(column)
+        if group is None and not len(used):
+            continue
+        group = group or item.vertex_groups.new(name=name)
+        group.remove(every)
+        for index, weight in zip(used.tolist(), column[used].tolist(), strict=True):
+            group.add((index,), weight, "REPLACE")
+
+
+def follow(item, rig):
+    """The armature poses the object: by the modifier it has, or a new one; and it goes where that goes."""
+    modifier = next((m for m in item.modifiers if m.type == "ARMATURE" and m.object == rig), None)
+    if modifier is not None:
+        modifier.use_vertex_groups = True
+    elif not (rigs.is_posed_by_parent(item) and item.parent == rig):
+        index = place(item, rig)
+        modifier = item.modifiers.new("Armature", "ARMATURE")
+        modifier.object = rig
+        item.modifiers.move(len(item.modifiers) - 1, index)
+    if item.parent is None:
+        item.parent = rig
+        item.matrix_parent_inverse = rig.matrix_world.inverted()
+
+
+def takes_correctives(item, shape):
+    """Whether shape keys can move the vertices that are skinned."""
+    keys = item.data.shape_keys
+    return shape.nearest is None and (keys is None or keys.use_relative) and not item.show_only_shape_key
+
+
+def remove_correctives(item):
+    keys = item.data.shape_keys
+    for key in list(keys.key_blocks) if keys else ():
+        if key.name.startswith(CORRECTIVE):
+            key.driver_remove("value")
+            item.shape_key_remove(key)
+
+
+def add_correctives(item, rig, shape, rows, correctives, names):
+    """Shape keys of these rows of the correctives' offsets; returns how many there are."""
+    back, size = np.linalg.inv(shape.to_rig[:3, :3]), np.ptp(shape.vertices, axis=0).max()
+    count = 0
+    for number, corrective in enumerate(correctives, 1):
+        offsets = corrective.offsets[rows]
+        if np.abs(offsets).max() < LEAST_OFFSET * size:
+            continue
+        if item.data.shape_keys is None:
+            item.shape_key_add(name="Basis", from_mix=False)
+        bone = names[corrective.bone]
+        key = item.shape_key_add(name=f"{CORRECTIVE}{number} {bone}", from_mix=False)
+        basis = mesh_arrays.vectors(key.relative_key.data, "co").astype(np.float64)
+        mesh_arrays.put_vectors(key.data, basis + offsets @ back.T, "co")
+        key.slider_min, key.slider_max = -10.0, 10.0
+        drive(key, rig, bone, corrective.coefficients)
+        count += 1
+    return count
+
+
+def drive(key, rig, bone, coefficients):
+    """The key's value becomes this polynomial of the bone's own turn, a unit quaternion."""
+    driver = key.driver_add("value").driver
+    driver.type = "SCRIPTED"
+    for component in QUATERNION:
+        variable = driver.variables.new()
+        variable.name, variable.type = component, "TRANSFORMS"
+        target = variable.targets[0]
+        target.id, target.bone_target = rig, bone
+        target.transform_type, target.transform_space = f"ROT_{component.upper()}", "LOCAL_SPACE"
+        target.rotation_mode = "QUATERNION"
+    driver.expression = formula(coefficients)
+
+
+def formula(coefficients):
+    """Of at most 255 characters, which is what a driver holds."""
+    terms = [f"{value:+.7g}*{product}" for value, product in zip(coefficients, PRODUCTS, strict=True)]
+    text = "".join(terms).removeprefix("+")
+    return (
+        text
+        if len(text) < 256
+        else "".join(
+            f"{value:+.4g}*{product}" for value, product in zip(coefficients, PRODUCTS, strict=True)
+        ).removeprefix("+")
+    )

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Skin to Armature: groups, modifier, several meshes, correctives, what is kept, refusals, one undo."""
+
+import numpy as np
+import pytest
+from support.blender.inside import IN_BLENDER
+
+if IN_BLENDER:
+    import bpy
+    from mathutils import Quaternion
+    from support.blender import scenes
+    from support.blender.skins import SIDES, eye, person, rest_rig, shirt, weights_of
+
+    from addon.names import CORRECTIVE
+
+pytestmark = pytest.mark.in_blender
+
+QUICK = {"poses": 16, "samples": 1500}
+
+
+def posed(rig, **turns):
+    for name, (axis, angle) in turns.items():
+        bone = rig.pose.bones[name.replace("_", ".")]
+        bone.rotation_mode, bone.rotation_quaternion = "QUATERNION", Quaternion(axis, angle)
+    bpy.context.view_layer.update()
+
+
+def test_several_meshes_get_weights_and_a_modifier():
+    body, rig = person()
+    cloth, ball = shirt(body), eye()
+    scenes.activate(cloth, ball, body, rig)
+    assert bpy.ops.arapfields.skin(**QUICK) == {"FINISHED"}
+    names = [bone.name for bone in rig.data.bones]
+    for item in (body, cloth, ball):
+        weights = weights_of(item, names)
+        assert np.allclose(weights.sum(axis=1), 1, atol=1e-5) and ((weights > 0).sum(axis=1) <= 4).all()
+        (modifier,) = [m for m in item.modifiers if m.type == "ARMATURE"]
+        assert modifier.object == rig and item.parent == rig and "Helper" not in item.vertex_groups
+    # the eye moves as one, the cloth as what lies under it
+    assert np.ptp(weights_of(ball, names), axis=0).max() == 0
+    before = scenes.world_points(body), scenes.world_points(cloth), scenes.world_points(ball)
+    below = np.linalg.norm(before[1][:, None] - before[0], axis=2).argmin(axis=1)
+    assert np.abs(weights_of(cloth, names) - weights_of(body, names)[below]).mean() < 0.02
+    posed(rig, Thigh_L=((1, 0, 0), 0.6))
+    after = scenes.world_points(body)
+    low = before[0][:, 2] < 0.3
+    moved = np.linalg.norm(after - before[0], axis=1)
+    assert moved[low & (before[0][:, 0] > 0)].min() > 0.1 and moved[low & (before[0][:, 0] < 0)].max() < 2e-3
+    rig.location.x += 1.0
+    bpy.context.view_layer.update()
+    assert np.allclose(scenes.world_points(body), after + np.eye(3)[0], atol=1e-5)
+
+
+def test_sides_are_alike_and_a_second_time_uses_the_modifier():
+    body, rig = person()
+    scenes.activate(body, rig)
+    for _ in range(2):
+        assert bpy.ops.arapfields.skin(**QUICK) == {"FINISHED"}
+    assert len(body.modifiers) == 1
+    names = [bone.name for bone in rig.data.bones]
+    weights, points = weights_of(body, names), scenes.world_points(body)
+    twin = np.linalg.norm(points[:, None] * [-1, 1, 1] - points, axis=2)
+    paired, twin = twin.min(axis=1) < 1e-5, twin.argmin(axis=1)
+    other = [names.index(bpy.utils.flip_name(name)) for name in names]
+    assert paired.mean() > 0.9 and np.abs(weights[paired] - weights[twin[paired]][:, other]).max() < 1e-3
+
+
+def test_locked_groups_stay_and_others_are_kept_by_choice():
+    body, rig = person()
+    names = [bone.name for bone in rig.data.bones]
+    spine, other = body.vertex_groups.new(name="Spine"), body.vertex_groups.new(name="Pins")
+    spine.add(range(0, len(body.data.vertices), 2), 0.25, "REPLACE")
+    other.add([3], 0.5, "REPLACE")
+    spine.lock_weight = True
+    scenes.activate(body, rig)
+    bpy.ops.arapfields.skin(**QUICK)
+    weights = weights_of(body, names)
+    assert np.allclose(weights[:, names.index("Spine")], np.arange(len(weights)) % 2 * -0.25 + 0.25)
+    shared = weights.sum(axis=1)[weights.max(axis=1) > 0.26]
+    assert np.allclose(shared, 1, atol=1e-5) and ((weights > 0).sum(axis=1) <= 4).all()
+    assert len(shared) > 0.4 * len(weights)
+    assert np.flatnonzero(weights_of(body, ["Pins"])).tolist() == [3]
+    spine.lock_weight = False
+    scenes.activate(body, rig)
+    bpy.ops.arapfields.skin(groups="KEEP", **QUICK)
+    assert np.allclose(weights_of(body, names), weights, atol=1e-6)
+    bpy.ops.arapfields.skin(**QUICK)
+    assert np.abs(weights_of(body, names) - weights).max() > 0.1
+
+
+def test_generated_vertices_and_a_scaled_turned_object():
+    """A half that Mirror completes, and Subdivision after the armature."""
+    body, rig = person(half=True)
+    body.modifiers.new("Mirror", "MIRROR")
+    body.modifiers.new("Subdivision", "SUBSURF")
+    for item in (body, rig):
+        item.scale, item.rotation_euler.z, item.location.x = (2, 2, 2), 0.7, 3
+    scenes.activate(body, rig)
+    assert bpy.ops.arapfields.skin(correctives=2, **QUICK) == {"FINISHED"}
+    assert [m.type for m in body.modifiers] == ["MIRROR", "ARMATURE", "SUBSURF"]
+    weights = weights_of(body, [bone.name for bone in rig.data.bones])
+    assert np.allclose(weights.sum(axis=1), 1, atol=1e-5) and body.data.shape_keys is None
+    assert {group.name[-2:] for group in body.vertex_groups} == {"ne", ".L", ".R"}
+
+
+def test_correctives_are_keys_with_plain_drivers():
+    body, rig = person()
+    scenes.activate(body, rig)
+    for count in (5, 3):  # the second time replaces the first
+        assert bpy.ops.arapfields.skin(correctives=count, **QUICK) == {"FINISHED"}
+    keys = [key for key in body.data.shape_keys.key_blocks if key.name.startswith(CORRECTIVE)]
+    drivers = body.data.shape_keys.animation_data.drivers
+    assert len(keys) == 3 == len(drivers) and len(body.data.shape_keys.key_blocks) == 4
+    assert all(curve.driver.is_valid and curve.driver.is_simple_expression for curve in drivers)
+    assert max(abs(key.value) for key in keys) < 1e-6
+    turns = {f"{bone}_{side}": ((1, 0.3, 0.2), 0.5) for bone in ("Thigh", "Shin") for side in SIDES}
+    posed(rig, **turns)
+    assert max(abs(key.value) for key in keys) > 0.05
+    bpy.ops.arapfields.skin(**QUICK)
+    assert len(body.data.shape_keys.key_blocks) == 1
+
+
+def test_the_pose_at_hand_does_not_matter():
+    body, rig = person()
+    scenes.activate(body, rig)
+    bpy.ops.arapfields.skin(**QUICK)
+    names = [bone.name for bone in rig.data.bones]
+    first = weights_of(body, names)
+    posed(rig, Thigh_L=((1, 0, 0), 0.6))
+    bpy.ops.arapfields.skin(**QUICK)
+    assert rig.data.pose_position == "POSE" and np.allclose(weights_of(body, names), first, atol=1e-5)
+
+
+def far_bone(body, rig):
+    rest_rig(rig, lambda bones: setattr(bones["Spine"], "tail", (0, 0, 1.0)) or far(bones.new("Far")))
+
+
+def far(bone):
+    bone.head, bone.tail = (9, 0, 0), (9, 0, 1)
+
+
+def twin(body, rig):
+    def add(bones):
+        one = bones.new("Twin")
+        one.head, one.tail = bones["Spine"].head, bones["Spine"].tail
+
+    rest_rig(rig, add)
+
+
+def no_deforming(body, rig):
+    for bone in rig.data.bones:
+        bone.use_deform = False
+
+
+def no_bones(body, rig):
+    rest_rig(rig, lambda bones: [bones.remove(bone) for bone in list(bones)])
+
+
+def no_faces(body, rig):
+    body.data.clear_geometry()
+    body.data.vertices.add(3)
+
+
+def on_a_bone(body, rig):
+    body.parent, body.parent_type, body.parent_bone = rig, "BONE", "Spine"
+
+
+def in_edit_mode(body, rig):
+    scenes.activate(rig)
+    bpy.ops.object.mode_set(mode="EDIT")
+
+
+def bones_are_handles(body, rig):
+    scenes.activate(rig, body)
+    bpy.ops.arapfields.add_bones()
+
+
+REFUSALS = {
+    "far outside": far_bone,
+    "where bone Spine does": twin,
+    "No bone of Rig deforms": no_deforming,
+    "Rig has no bones": no_bones,
+    "Body: the mesh has no faces": no_faces,
+    "Body moves with a bone already": on_a_bone,
+    "Rig is in Edit Mode": in_edit_mode,
+    "bones of Rig are handles of Body": bones_are_handles,
+    "Select the meshes, then the armature": lambda body, rig: bpy.data.objects.remove(rig),
+    "Body is linked from another file": None,
+}
+
+
+@pytest.mark.parametrize("reason", REFUSALS)
+def test_refusals_name_the_reason_and_change_nothing(reason, tmp_path):
+    body, rig = person()
+    if REFUSALS[reason] is None:
+        path = f"{tmp_path}/body.blend"
+        bpy.data.libraries.write(path, {body.data})
+        with bpy.data.libraries.load(path, link=True) as (_, wanted):
+            wanted.meshes = ["Body"]
+        body.data = wanted.meshes[0]
+    else:
+        REFUSALS[reason](body, rig)
+    scenes.activate(body) if "then" in reason else scenes.activate(body, rig)
+    with pytest.raises(RuntimeError, match=reason):
+        bpy.ops.arapfields.skin(**QUICK)
+    assert not body.modifiers and not body.vertex_groups and body.data.shape_keys is None

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A body with two legs, its armature, cloth and an eye, to be skinned."""
+
+import bpy
+import numpy as np
+from support.blender import scenes
+from support.geometry.characters import FOOT, HIP, LEG, trousers
+
+import arapfields as af
+
+KNEE = 0.38
+SIDES = "LR"
+
+
+def link(name, data):
+    item = bpy.data.objects.new(name, data)
+    bpy.context.collection.objects.link(item)
+    return item
+
+
+def mesh_of(name, vertices, triangles):
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(np.asarray(vertices).tolist(), [], np.asarray(triangles).tolist())
+    return link(name, mesh)
+
+
+def person(half=False):
+    """(body, rig): all of the body, or what has x ≥ 0."""
+    vertices, triangles = af.extract_surface(trousers(), 24)[:2]
+    if half:
+        triangles = triangles[(vertices[triangles][:, :, 0] > -1e-6).all(axis=1)]
+        used, triangles = np.unique(triangles, return_inverse=True)
+        vertices, triangles = vertices[used], triangles.reshape(-1, 3)
+    body = mesh_of("Body", vertices, triangles)
+    rig = link("Rig", bpy.data.armatures.new("Rig"))
+
+    def add(bones):
+        def bone(name, head, tail, parent=None):
+            one = bones.new(name)
+            one.head, one.tail, one.parent = head, tail, parent
+            return one
+
+        spine = bone("Spine", (0, 0, HIP), (0, 0, HIP + 0.5))
+        helper = bone("Helper", (0, 0.5, HIP), (0, 0.5, HIP + 0.2), spine)
+        helper.use_deform = False
+        for side, x in zip(SIDES, (LEG, -LEG), strict=True):
+            thigh = bone(f"Thigh.{side}", (x, 0, HIP), (x, 0, KNEE), spine)
+            bone(f"Shin.{side}", (x, 0, KNEE), (x, 0, FOOT), thigh)
+
+    rest_rig(rig, add)
+    return body, rig
+
+
+def rest_rig(rig, change):
+    """Changes the bones at rest: change(edit_bones)."""
+    scenes.activate(rig)
+    bpy.ops.object.mode_set(mode="EDIT")
+    change(rig.data.edit_bones)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.update()
+
+
+def shirt(body):
+    """A band of the body's surface, a little off it."""
+    points = scenes.world_points(body)
+    body.data.calc_loop_triangles()
+    triangles = np.array([t.vertices for t in body.data.loop_triangles])
+    normals = np.array([v.normal for v in body.data.vertices])
+    band = (points[triangles][:, :, 2] > HIP).all(axis=1)
+    used, corners = np.unique(triangles[band], return_inverse=True)
+    return mesh_of("Shirt", (points + 0.02 * normals)[used], corners.reshape(-1, 3))
+
+
+def eye():
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=8, ring_count=6, radius=0.03, location=(LEG, 0.1, 0.2))
+    return bpy.context.object
+
+
+def weights_of(item, names):
+    """(n, groups) weights of an object's vertices; 0 where there is no group."""
+    result = np.zeros((len(item.data.vertices), len(names)))
+    columns = {g.index: names.index(g.name) for g in item.vertex_groups if g.name in names}
+    for vertex in item.data.vertices:
+        for entry in vertex.groups:
+            if entry.group in columns:
+                result[vertex.index, columns[entry.group]] = entry.weight
+    return result
