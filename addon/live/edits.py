@@ -120,7 +120,7 @@ def layout_of(source, kind, scene):
 
 def differ_in_handles(a, b):
     """Whether two layouts differ in handles alone, and the solver can take those of `a` as it stands."""
-    return a[2:] == b[2:] and bool(a[0]) and not any(group for _, _, group, *_ in a[0])
+    return a[2:] == b[2:] and bool(a[0]) and bool(b[0]) and not any(group for _, _, group, *_ in a[0])
 
 
 def stack_of(source):

@@ -10,9 +10,10 @@ from ..solver.frame_solver import FrameSolver
 from ..solver.setup import sampled
 from .prefetch import prefetch
 
-# Quasi-Newton steps to each shape of a request, for which a newer one has to wait, and how many there are at
-# most. After the first three the shape is behind by a quarter of what the handles moved since the last solve.
-STEPS, MOST_SHAPES = 3, 60
+STEPS, MOST_SHAPES = 3, 60  # quasi-Newton steps to each shape of a request, and how many of these there are
+# A shape is shown once it is that near the one before, as a share of the size: then it is about twice as near
+# its own last. After so many seconds any is. A newer request waits for one that is shown.
+NEAR, LATEST = 1.5e-3, 0.08
 TOLERANCE = 3e-5  # what single precision sees; a shape then is within about 0.3 % of the size
 PACE = 1 / 60  # seconds from one shape to the next in secondary motion
 MOST_PACES = 3  # that a step in real time stands for; fewer lengths of steps, fewer preconditioners
@@ -28,6 +29,7 @@ class LiveSolver:
         self.is_playing = False  # whether the newest request is a frame's, which another thread solves
         self._stepped_at = None  # when the last step in real time ended; None: the next begins at rest
         self._stepped_motion = None
+        self._tracked = None  # (n, 3) the points of the last shape, in solve space
 
     @property
     def samples(self):
@@ -61,11 +63,19 @@ class LiveSolver:
         earlier, self.solved_request = self.solved_request, request
         if earlier is not None and not request.goes_on_from(earlier):
             self.frame_solver.solver.reset()
+        latest = time.monotonic() + LATEST
         for _ in range(MOST_SHAPES):
             taken = self.frame_solver.follow(request, iterations=STEPS, tolerance=TOLERANCE)
-            yield self.frame_solver.tracked_shape(request)
+            if self._is_near() or taken < STEPS or time.monotonic() > latest:
+                yield self.frame_solver.tracked_shape(request)
             if taken < STEPS:
                 break
+
+    def _is_near(self):
+        """Whether the points are near where they were when this was asked before."""
+        before, self._tracked = self._tracked, self.frame_solver.solver.tracked()
+        size = np.ptp(self.samples.points, axis=0).max()
+        return before is not None and np.abs(self._tracked - before).max() < NEAR * size
 
     def refine(self, request, token):
         """Yields the request's own shape, from rest; where there is motion, once that has ended."""

@@ -9,7 +9,7 @@ from ..field_modifier import motion
 from ..live import sessions, stored
 from . import pins
 
-SHAPE_WAIT, FIRST_SHAPE_WAIT = 0.015, 0.1  # seconds that a redraw waits for its shape; and the first one
+SHAPE_WAIT = 0.1  # seconds at most that a redraw waits for its shape
 TRANSFORMS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
 
 
@@ -85,7 +85,7 @@ class Drag:
         self.empty.get().matrix_world = matrix
         sessions.update(context)
         if session is not None and session.worker is not None:
-            session.worker.wait_for_result(SHAPE_WAIT if self.has_moved else FIRST_SHAPE_WAIT)
+            session.worker.wait_for_result(SHAPE_WAIT)
             sessions.update(context)
         self.has_moved = True
 

@@ -54,7 +54,7 @@ class SourceReader:
         weights = yield from vertex_groups.read_weights(context, source, [*held, *soft], in_place)
         source = self.reference.get()
         settings = settings_of(source)
-        if uses_handles(settings, self.kind):
+        if self.kind == "DEFORM" or (uses_handles(settings, self.kind) and empties.used(source)):
             self.read_handles(source, weights)
         if self.kind == "STYLIZE":
             region = style_settings.region_weights(context, source, settings.stylize, weights, in_place)

@@ -20,12 +20,12 @@ def test_the_shape_moves_with_the_pin_in_the_same_picture():
     dragged = drag.of_new_pin(bpy.context, bar, np.array([0.9, -0.25, 0.0]), 0.1)
     sessions.update(bpy.context, wait=30)
     # However busy the machine is: the picture waits for its shape.
-    moments, drag.SHAPE_WAIT, drag.FIRST_SHAPE_WAIT = (drag.SHAPE_WAIT, drag.FIRST_SHAPE_WAIT), 30.0, 30.0
+    moment, drag.SHAPE_WAIT = drag.SHAPE_WAIT, 30.0
     moved = []
     for height in (0.1, 0.2, 0.3, 0.4):
         before = scenes.world_points(bar)
         dragged.move(bpy.context, (0.9, -0.25, height))
         moved.append(float(np.abs(scenes.world_points(bar) - before).max()))
-    drag.SHAPE_WAIT, drag.FIRST_SHAPE_WAIT = moments
+    drag.SHAPE_WAIT = moment
     assert min(moved) > 0.02, moved
     dragged.cancel(bpy.context)

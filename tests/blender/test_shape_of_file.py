@@ -13,7 +13,7 @@ if IN_BLENDER:
     from support.blender.live import step
     from support.blender.pins import pin
 
-    from addon.live import sessions
+    from addon.live import live_solver, sessions
     from addon.pin_tool import drag
     from tests.blender.walk import world
     from tests.blender.walk.rule import Walk
@@ -27,10 +27,10 @@ def few_centers(test):
     """Solves take milliseconds."""
 
     @functools.wraps(test)
-    def wrapped(*given):
+    def wrapped(*given, **named):
         end = world.few_centers()
         try:
-            test(*given)
+            test(*given, **named)
         finally:
             end()
 
@@ -121,15 +121,38 @@ def test_each_live_style_is_that_of_the_settings_and_strength_0_is_rest():
     assert sessions.is_live(shell) and np.array_equal(world.shape(shell), rest)
 
 
+@few_centers
+@pytest.mark.parametrize("lacks", ["style_object", "handle"])
+def test_a_style_that_waits_for_what_is_to_be_chosen_comes_back(lacks):
+    ball = scenes.bar()
+    style = ball.arapfields.stylize
+    undo_begins()
+    bpy.ops.arapfields.live(kind="STYLIZE")
+    push("live")
+    if lacks == "handle":
+        style.use_handles = True
+    else:
+        style.style = "OBJECT"
+    push("waits")
+    stored = world.everything()
+    bpy.ops.arapfields.live(kind="STYLIZE")
+    push("off")
+    bpy.ops.ed.undo()
+    world.settle()
+    assert sessions.is_live(bpy.data.objects["Bar"]) and world.everything() == stored
+
+
 def test_a_release_changes_nothing_that_is_seen():
+    """The hand goes fast, and each move's shape is shown in the same picture."""
     bar = scenes.bar(length=3.0)
     for x, y in ((-3.0, -0.25), (-3.0, 0.25), (0.0, -0.25)):
         pin(bar, (x, y, -0.25), 0.1, anchor=True)
     dragged = drag.of_new_pin(bpy.context, bar, np.array([3.0, 0.25, -0.25]), 0.1)
     start = np.array(dragged.empty.get().location)
-    for share in (0.25, 0.5, 0.75, 1.0):
+    limits, drag.SHAPE_WAIT, live_solver.LATEST = (drag.SHAPE_WAIT, live_solver.LATEST), 30.0, 30.0
+    for share in np.linspace(0, 0.9, 10)[1:]:
         dragged.move(bpy.context, start + share * np.array([-1.2, 0.3, 1.6]))
-        step()
+    drag.SHAPE_WAIT, live_solver.LATEST = limits
     shown = scenes.world_points(bar)
     dragged.end(bpy.context)
     bpy.context.view_layer.update()
