@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads a source and its handles for a solver, on the main thread: the setup once, then requests."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack, user_preferences, vertex_groups
@@ -73,7 +75,8 @@ class SourceReader:
 
     def read_handles(self, source, weights=None):
         """The handles at rest; `weights` are those of the vertex groups, where any of them needs one."""
-        self.handles = empties.solve_handles(source, self.surface.space, weights)
+        handles = empties.solve_handles(source, self.surface.space, weights)
+        self.handles = [replace(handle, target=handle.rest) for handle in handles]
 
     def read_points(self, context, source):
         """Where the modifiers before have the points now: the field is evaluated there."""

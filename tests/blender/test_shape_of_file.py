@@ -122,6 +122,21 @@ def test_each_live_style_is_that_of_the_settings_and_strength_0_is_rest():
 
 
 @few_centers
+def test_a_pose_has_one_digest_wherever_its_session_began():
+    bar = scenes.bar()
+    empty = pin(bar, (1.0, 0.0, 0.25), target=(1.0, 0.0, 0.4))
+    found = set()
+    for height in (0.4, 0.7):
+        empty.location.z = height
+        sessions.begin(bpy.context, bar)
+        empty.location.z = 0.5
+        step()
+        session = sessions.live[bar.session_uid]
+        found.add(session.digest(session.reader.request(bpy.context)))
+    assert len(found) == 1
+
+
+@few_centers
 @pytest.mark.parametrize("lacks", ["style_object", "handle"])
 def test_a_style_that_waits_for_what_is_to_be_chosen_comes_back(lacks):
     ball = scenes.bar()
