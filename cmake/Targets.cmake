@@ -11,16 +11,14 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # STB_GNU_UNIQUE symbols are shared by the whole process: two libtorch copies would then clash.
   target_compile_options(arapfields_options INTERFACE -fno-gnu-unique)
 endif()
-if(MINGW)
+if(WIN32 AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # GCC keeps the stack aligned to 16 bytes on Windows, and moves wider vectors to it as if it were to 32 (its bug
   # 54412): the assembler makes these moves unaligned ones.
   target_compile_options(arapfields_options INTERFACE -Wa,-muse-unaligned-vector-move)
-endif()
-if(WIN32 AND CMAKE_CXX_COMPILER_ID STREQUAL "Clang" AND NOT MINGW)
-  target_link_options(arapfields_options INTERFACE -rtlib=compiler-rt)  # asks the processor what it can do
+  target_compile_definitions(arapfields_options INTERFACE _WIN32_WINNT=0x0A00)  # zig says so itself
 endif()
 if(WIN32)
-  target_compile_definitions(arapfields_options INTERFACE NOMINMAX WIN32_LEAN_AND_MEAN _WIN32_WINNT=0x0A00)
+  target_compile_definitions(arapfields_options INTERFACE NOMINMAX WIN32_LEAN_AND_MEAN)
 endif()
 if(ARAPFIELDS_ONE_MODULE)
   target_compile_definitions(arapfields_options INTERFACE ARAPFIELDS_ONE_MODULE)

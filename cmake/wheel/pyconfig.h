@@ -25,7 +25,7 @@
 #define WITH_MIMALLOC 1
 #define WITH_PYMALLOC 1
 #define _Py_STACK_GROWS_DOWN 1
-#if defined(__APPLE__) && defined(__aarch64__)
+#if (defined(__APPLE__) || defined(_WIN32)) && defined(__aarch64__)
 #define ALIGNOF_MAX_ALIGN_T 8
 #else
 #define ALIGNOF_MAX_ALIGN_T 16
@@ -46,6 +46,7 @@
 #define _DARWIN_C_SOURCE 1
 #endif
 #include <pthread.h>
+#include <sys/types.h>
 static_assert(sizeof(pthread_t) == SIZEOF_PTHREAD_T && sizeof(pid_t) == SIZEOF_PID_T, "of configure");
 #endif
 #include <cstddef>

@@ -81,9 +81,9 @@ Vector LocalThickness::at(PointsIn points) const {
   parallel_for(0, points.rows(), 64, [&](Index first, Index last) {
     Vector squares(n);
     for (Index i = first; i < last; ++i) {
-      squares.array() = (nodes_.col(0).array() - points(i, 0)).square() +
-                        (nodes_.col(1).array() - points(i, 1)).square() +
-                        (nodes_.col(2).array() - points(i, 2)).square();
+      squares.head(n).array() = (nodes_.col(0).array() - points(i, 0)).square() +
+                                (nodes_.col(1).array() - points(i, 1)).square() +
+                                (nodes_.col(2).array() - points(i, 2)).square();
       const double nearest = squares.minCoeff(), farthest = nearest + width * width;
       double sum = 0.0, total = 0.0;
       for (Index j = 0; j < n; ++j)

@@ -2,6 +2,7 @@
 """The report that says whether the library works on a machine: right here, and wrong where something is."""
 
 import platform
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,6 +15,7 @@ def test_everything_works_here():
     lines, works = self_check.run()
     assert works, lines
     assert sum(": right (" in line for line in lines) == len(self_check.CHECKS)
+    assert any("kernels for" in line and "products by" in line for line in lines)
 
 
 def test_a_failure_is_named_and_the_others_go_on():
@@ -47,3 +49,13 @@ def test_a_zip_without_a_wheel_for_this_python_says_which_it_has(tmp_path, monke
     assert platform.machine() in said and "(it has: 3.11, 3.13, win_arm64)" in said
     monkeypatch.setattr(native, "WHEELS", tmp_path / "none")
     assert "not part of this installation" in str(native._missing(ModuleNotFoundError(name="arapfields")))
+
+
+def test_a_system_that_the_library_does_not_support_is_named_in_one_line(tmp_path, monkeypatch):
+    """As the loader of a system that is too old, or of another processor, says it."""
+    (tmp_path / "arapfields.py").write_text("raise ImportError('GLIBC_2.28 not found')", encoding="utf-8")
+    for name in [name for name in sys.modules if name.partition(".")[0] == "arapfields"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.syspath_prepend(tmp_path)
+    said = str(native._try_import())
+    assert said == "The native library cannot be loaded: GLIBC_2.28 not found"

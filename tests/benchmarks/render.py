@@ -29,6 +29,7 @@ SECTIONS = {  # titles; a module's first sentence stands below
     "distance": "Signed distances",
     "extraction": "Extraction",
     "fit": "Fits",
+    "backends": "Backends",
 }
 HEADINGS = {
     "reference_energy": "reference's energy",

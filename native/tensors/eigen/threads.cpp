@@ -25,7 +25,10 @@ int library_threads() {
 }
 
 SerialLibrary::SerialLibrary() : openmp_(serial), mkl_(0) { serial = true; }
-SerialLibrary::~SerialLibrary() { serial = openmp_ != 0; }
+SerialLibrary::~SerialLibrary() {
+  static_cast<void>(mkl_);  // which only libtorch brings along
+  serial = openmp_ != 0;
+}
 
 void keep_library_serial() { serial = true; }
 
