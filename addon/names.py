@@ -49,6 +49,7 @@ class Op(StrEnum):
     SET_STYLE = "arapfields.set_style"
     WRAP = "arapfields.wrap"
     SKIN = "arapfields.skin"
+    TRANSFER = "arapfields.transfer"
     ADD_LANDMARK = "arapfields.add_landmark"
     CLICK_LANDMARKS = "arapfields.click_landmarks"
     RESET_BONES = "arapfields.reset_bones"

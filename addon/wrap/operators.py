@@ -22,8 +22,8 @@ from ..handles.empties import matrix_of
 from ..live.sessions import end_for_job
 from ..properties.choices import result_properties
 from ..results.placement import destination, holds_place
-from . import landmarks
-from .properties import fit_rig, move_object
+from . import landmarks, transfer
+from .properties import carried_kinds, fit_rig, move_object
 
 onto = text(
     "Onto", "Name of the mesh object to wrap onto; empty for the one in the settings", options={"SKIP_SAVE"}
@@ -183,8 +183,28 @@ class ARAPFIELDS_OT_reset_bones(SourceOperator, bpy.types.Operator):
         rest_bones.reset(context, source)
 
 
+class ARAPFIELDS_OT_transfer(SourceOperator, bpy.types.Operator):
+    """Give the target what the wrapped object has: shape keys, vertex groups, attributes, its armature"""
+
+    bl_label = "Transfer to Target"
+    bl_options = {"REGISTER", "UNDO"}
+    guide = "wrap"
+
+    __annotations__ = {"onto": onto, "transfer": carried_kinds(options=("SKIP_SAVE",))}
+
+    @classmethod
+    def refuses(cls, source):
+        return (landmarks.refusal(source) if has_window() else None) or transfer.not_wrapped(source)
+
+    def change(self, context, source):
+        target = landmarks.target_of(source, self.onto)
+        kinds = effective_value("transfer", settings_of(source).wrap, self)
+        return transfer.message(target, transfer.Transfer(context, source, target).carry(kinds))
+
+
 CLASSES = [
     ARAPFIELDS_OT_wrap,
+    ARAPFIELDS_OT_transfer,
     ARAPFIELDS_OT_reset_bones,
     ARAPFIELDS_OT_add_landmark,
     ARAPFIELDS_OT_remove_landmark,

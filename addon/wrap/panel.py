@@ -50,6 +50,8 @@ class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
             layout.prop(wrap, "move_object")
         job_button(layout, Op.WRAP, "MOD_SHRINKWRAP")
         factor_slider(layout, source)
+        layout.column(align=True).prop(wrap, "transfer")
+        layout.operator(Op.TRANSFER, icon="MOD_DATA_TRANSFER")
         if rest_bones.fitted(source):
             layout.operator(Op.RESET_BONES, icon="BONE_DATA")
         note(layout, landmarks.refusal(source), placement_refusal(source))

@@ -3,9 +3,10 @@
 
 import bpy
 
-from ..blender.property_definitions import annotations, collection, colour, flag, integer, pointer
+from ..blender.property_definitions import annotations, choice, collection, colour, flag, integer, pointer
 from ..blender.selection import select_alone
 from ..core.settings.parameters import WRAP
+from .transfer import KINDS
 
 
 def is_target(group, item):
@@ -40,6 +41,16 @@ def move_object(**extra):
     )
 
 
+def carried_kinds(options=()):
+    return choice(
+        [(*kind, "NONE", 1 << index) for index, kind in enumerate(KINDS)],
+        "Transfer",
+        "What the target receives",
+        default={kind for kind, _, _ in KINDS},
+        options={"ENUM_FLAG", *options},
+    )
+
+
 class ARAPFIELDS_PG_landmark(bpy.types.PropertyGroup):
     rest: pointer(bpy.types.Object, "Landmark", "Empty on the object at rest")
     on_target: pointer(bpy.types.Object, "On the Target", "Empty where it belongs on the target")
@@ -60,6 +71,7 @@ class ARAPFIELDS_PG_wrap(bpy.types.PropertyGroup):
         ),
         "fit_rig": fit_rig(),
         "move_object": move_object(),
+        "transfer": carried_kinds(),
         **annotations(WRAP),
     }
 

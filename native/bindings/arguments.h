@@ -40,6 +40,9 @@ ARAPFIELDS_PYTHON_TYPE(BonesArgument, "collections.abc.Iterable[arapfields._nati
 ARAPFIELDS_PYTHON_TYPE(ShapeArgument,
                        "tuple[arapfields.arrays.ArrayLike, arapfields.arrays.ArrayLike] | "
                        "arapfields._native.SurfaceSamples")
+ARAPFIELDS_PYTHON_TYPE(MeshArgument, "tuple[arapfields.arrays.ArrayLike, arapfields.arrays.ArrayLike]")
+ARAPFIELDS_PYTHON_TYPE(MovedArgument, "arapfields._native.DeformationField | arapfields.arrays.ArrayLike")
+ARAPFIELDS_PYTHON_TYPE(TransferArgument, "dict[str, arapfields.arrays.ArrayLike]")
 ARAPFIELDS_PYTHON_TYPE(CurveHandlesArgument, "collections.abc.Iterable[arapfields._native.CurveHandle]")
 ARAPFIELDS_PYTHON_TYPE(
     LandmarksArgument,

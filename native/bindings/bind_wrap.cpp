@@ -4,6 +4,7 @@
 #include "bindings/bind.h"
 #include "bindings/python_function.h"
 #include "bindings/reports.h"
+#include "wrap/transfer.h"
 #include "wrap/wrap.h"
 
 namespace arapfields::python {
@@ -45,9 +46,116 @@ WrapResult wrap_samples(const SurfaceSamples& samples, const FunctionArgument& t
   return field;
 }
 
+TriangleMesh mesh_of(const MeshArgument& mesh, const std::string& name) {
+  require(py::isinstance<py::sequence>(mesh) && py::len(mesh) == 2, name, "got " + type_text(mesh),
+          "a pair (vertices, triangles) is needed");
+  const auto pair = py::reinterpret_borrow<py::sequence>(mesh);
+  return as_mesh(py::object(pair[0]), py::object(pair[1]));
+}
+
+Correspondence correspondence(const MovedArgument& field, const MeshArgument& source,
+                              const MeshArgument& target, bool back, Task* task) {
+  const TriangleMesh rest = mesh_of(source, "source"), onto = mesh_of(target, "target");
+  const bool by_field = py::isinstance<DeformationField>(field);
+  const auto* given = by_field ? &field.cast<const DeformationField&>() : nullptr;
+  const Points moved = by_field ? Points() : as_finite_points(field, "field");
+  return run_long(task, [&](const Progress& progress) {
+    return Correspondence(given != nullptr ? WrappedMesh(rest, *given) : WrappedMesh(rest, moved), onto,
+                          back ? Correspondence::Direction::to_source : Correspondence::Direction::to_target,
+                          progress);
+  });
+}
+
+/// Arrays whose vertices are one axis, as a matrix of a row a vertex, and back.
+py::array_t<double> carried(const Correspondence& self, const ArrayArgument& argument, bool displacements) {
+  const std::string name = displacements ? "displacements" : "values";
+  const py::array_t<double> given = as_doubles(argument, name);
+  std::vector<py::ssize_t> shape(given.shape(), given.shape() + given.ndim());
+  const std::size_t axis = displacements && given.ndim() == 3 ? 1 : 0;
+  require(displacements ? (given.ndim() == 2 || given.ndim() == 3) && shape.back() == 3 : given.ndim() > 0,
+          name, "got shape " + py::str(given.attr("shape")).cast<std::string>(),
+          displacements ? "(n, 3) or (k, n, 3) is needed" : "(n, …) is needed");
+  require(shape[axis] == self.giving(), name, std::to_string(shape[axis]) + " vertices",
+          std::to_string(self.giving()) + " are needed");
+  const Index keys = axis == 1 ? shape[0] : 1, rows = shape[axis],
+              columns = rows > 0 && keys > 0 ? given.size() / rows / keys : 0;
+  shape[axis] = self.places().shares.rows();
+  py::array_t<double> result(shape);
+  double* out = result.mutable_data();
+  run_long([&] {
+    for (Index k = 0; k < keys; ++k) {
+      const Eigen::Map<const RowMatrix<double>> part(given.data() + k * rows * columns, rows, columns);
+      const RowMatrix<double> moved =
+          displacements ? RowMatrix<double>(self.displacements(part)) : self.values(part);
+      out = std::copy(moved.data(), moved.data() + moved.size(), out);
+    }
+  });
+  return result;
+}
+
+py::dict transfer(const MovedArgument& field, const MeshArgument& source, const MeshArgument& target,
+                  const TransferArgument& what, bool back, Task* task) {
+  const std::string allowed = "a dict of \"values\" and \"displacements\" is needed";
+  require(py::isinstance<py::dict>(what), "what", "got " + type_text(what), allowed);
+  py::dict result;
+  std::optional<Correspondence> places;
+  for (const auto& [key, array] : py::reinterpret_borrow<py::dict>(what)) {
+    const std::string name = as_text(key, "what");
+    require(name == "values" || name == "displacements", "what", "unknown key " + name, allowed);
+    if (!places) places.emplace(correspondence(field, source, target, back, task));
+    result[key] = carried(*places, py::reinterpret_borrow<ArrayArgument>(array), name == "displacements");
+  }
+  return result;
+}
+
+void bind_transfer(py::module_& module) {
+  py::class_<Correspondence>(module, "Correspondence", R"(
+Which place of one mesh belongs to each vertex of another, after a wrap of a source onto a target.
+
+The places are the nearest ones of the wrapped source, on the side that faces the same way. Build one for any
+number of arrays; `transfer` is the same for one use.)")
+      .def(py::init(&correspondence), "field"_a, "source"_a, "target"_a, py::kw_only(), "back"_a = false,
+           "task"_a = py::none(), R"(
+field: the DeformationField of `wrap`, or the source's vertices as another tool wrapped them, (n, 3). source
+and target: pairs (vertices, triangles). Gives to the target's vertices, with back=True to the source's.
+
+Raises InvalidInput and Cancelled.)")
+      .def_property_readonly(
+          "triangles",
+          [](const Correspondence& self) { return py::array(py::cast(self.places().triangles)); },
+          "(m,) the triangle of the giving mesh on which each receiving vertex lies.")
+      .def_property_readonly(
+          "shares", [](const Correspondence& self) { return self.places().shares; },
+          "(m, 3) barycentric coordinates on that triangle: not negative, of sum one.")
+      .def_property_readonly(
+          "distances", [](const Correspondence& self) { return self.places().distances; },
+          "(m,) from each vertex to its place, in the target's units.")
+      .def(
+          "values",
+          [](const Correspondence& self, const ArrayArgument& values) {
+            return carried(self, values, false);
+          },
+          "values"_a, "Values (n, …) of the giving vertices, interpolated linearly: (m, …).")
+      .def(
+          "displacements",
+          [](const Correspondence& self, const ArrayArgument& offsets) {
+            return carried(self, offsets, true);
+          },
+          "displacements"_a, R"(
+Displacements (n, 3) or (k, n, 3), as of shape keys, turned and scaled by the wrap's Jacobian: (…, m, 3).)");
+  module.def("transfer", &transfer, "field"_a, "source"_a, "target"_a, "what"_a, py::kw_only(),
+             "back"_a = false, "task"_a = py::none(), R"(
+Carries what a mesh has over to the mesh that it was wrapped onto, or back.
+
+`what` has arrays under "values" (n, …), such as weights or colours, and under "displacements" (n, 3) or
+(k, n, 3), such as shape keys. The result has the same keys, with a row for each vertex of the target. Other
+arguments as for Correspondence. Source: Sumner and Popović 2004. Raises InvalidInput and Cancelled.)");
+}
+
 }  // namespace
 
 void bind_wrap(py::module_& module) {
+  bind_transfer(module);
   module.def("wrap", &wrap_samples, "samples"_a, "target"_a, "landmarks"_a = py::tuple(),
              py::arg_v("options", WrapOptions(), "WrapOptions()"), py::kw_only(), "task"_a = py::none(), R"(
 The DeformationField that lays a surface onto the zero surface of `target`, as rigidly as possible.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One surface onto another: wrap.
+// One surface onto another: wrap, Correspondence.
 #pragma once
 
+#include "wrap/transfer.h"
 #include "wrap/wrap.h"

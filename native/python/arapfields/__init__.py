@@ -10,6 +10,7 @@ from ._native import (
     Bone,
     Cancelled,
     Corrective,
+    Correspondence,
     CuboidHandle,
     CurveField,
     CurveHandle,
@@ -69,6 +70,7 @@ from ._native import (
     stylize,
     thread_count,
     train_inverse,
+    transfer,
     winding_number,
     wrap,
 )
@@ -105,6 +107,7 @@ __all__ = [
     "Bone",
     "Cancelled",
     "Corrective",
+    "Correspondence",
     "Cuboid",
     "CuboidHandle",
     "CurveField",
@@ -189,6 +192,7 @@ __all__ = [
     "stylize",
     "thread_count",
     "train_inverse",
+    "transfer",
     "winding_number",
     "wrap",
 ]

@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "wrap/transfer.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <cmath>
+#include <utility>
+
+#include "core/errors.h"
+#include "core/parallel.h"
+#include "distance/is_closed.h"
+#include "distance/signed_distance.h"
+#include "sampling/oriented_points.h"
+
+namespace arapfields {
+namespace {
+
+/// Turning by one radian counts as so much distance, a share of the diagonal of the mesh's bounding box.
+constexpr double turn_share = 0.1;
+
+/// Edges of a triangle from its first corner, and its normal times twice its area.
+struct TriangleEdges {
+  TriangleEdges(PointsIn vertices, TrianglesIn triangles, Index t)
+      : origin(vertices.row(triangles(t, 0))),
+        first(vertices.row(triangles(t, 1)).transpose() - origin),
+        second(vertices.row(triangles(t, 2)).transpose() - origin),
+        area(first.cross(second)) {}
+
+  /// Shares of the corners in the nearest point of the triangle (Ericson 2004, section 5.1.5).
+  Vec3 nearest(const Vec3& point) const {
+    const Vec3 a = point - origin, b = a - first, c = a - second;
+    const double d1 = first.dot(a), d2 = second.dot(a), d3 = first.dot(b), d4 = second.dot(b);
+    const double d5 = first.dot(c), d6 = second.dot(c);
+    if (d1 <= 0.0 && d2 <= 0.0) return {1.0, 0.0, 0.0};
+    if (d3 >= 0.0 && d4 <= d3) return {0.0, 1.0, 0.0};
+    if (d6 >= 0.0 && d5 <= d6) return {0.0, 0.0, 1.0};
+    const double va = d3 * d6 - d5 * d4, vb = d5 * d2 - d1 * d6, vc = d1 * d4 - d3 * d2;
+    const auto along = [](double part, double whole) { return whole > 0.0 ? part / whole : 0.0; };
+    if (vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0) {
+      const double t = along(d1, d1 - d3);
+      return {1.0 - t, t, 0.0};
+    }
+    if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0) {
+      const double t = along(d2, d2 - d6);
+      return {1.0 - t, 0.0, t};
+    }
+    if (va <= 0.0 && d4 >= d3 && d5 >= d6) {
+      const double t = along(d4 - d3, (d4 - d3) + (d5 - d6));
+      return {0.0, 1.0 - t, t};
+    }
+    const double sum = va + vb + vc;
+    if (!(sum > 0.0)) return {1.0, 0.0, 0.0};
+    return {1.0 - (vb + vc) / sum, vb / sum, vc / sum};
+  }
+  Vec3 at(const Vec3& shares) const { return origin + shares[1] * first + shares[2] * second; }
+
+  Vec3 origin, first, second, area;
+};
+
+/// Unit normals of vertices, those at one position taken as one; 0 where there is none.
+Points vertex_normals(const TriangleMesh& mesh) {
+  const std::vector<std::int32_t> first = first_at_position(mesh.vertices);
+  Points normals = Points::Zero(mesh.vertices.rows(), 3);
+  for (Index t = 0; t < mesh.triangles.rows(); ++t) {
+    const TriangleEdges edges(mesh.vertices, mesh.triangles, t);
+    for (int k = 0; k < 3; ++k) normals.row(first[mesh.triangles(t, k)]) += edges.area;
+  }
+  for (Index v = 0; v < normals.rows(); ++v) normals.row(v) = normals.row(first[v]).normalized().eval();
+  return normals;
+}
+
+/// The triangles about each vertex, vertices at one position taken as one.
+class Surroundings {
+ public:
+  explicit Surroundings(const TriangleMesh& mesh)
+      : triangles_(mesh.triangles), first_(first_at_position(mesh.vertices)), about_(first_.size()) {
+    for (Index t = 0; t < triangles_.rows(); ++t)
+      for (int k = 0; k < 3; ++k) about_[first_[triangles_(t, k)]].push_back(static_cast<std::int32_t>(t));
+  }
+  template <class Visit>
+  void visit(Index triangle, Visit&& visit) const {
+    for (int k = 0; k < 3; ++k)
+      for (const std::int32_t t : about_[first_[triangles_(triangle, k)]]) visit(t);
+  }
+
+ private:
+  const Triangles& triangles_;
+  std::vector<std::int32_t> first_;
+  std::vector<std::vector<std::int32_t>> about_;
+};
+
+}  // namespace
+
+SurfacePlaces places_on(const TriangleMesh& mesh, PointsIn points, PointsIn normals,
+                        const Progress& progress) {
+  const Index count = points.rows();
+  ClosestPoints closest = SignedDistance(mesh.vertices, mesh.triangles, progress).closest(points, progress);
+  SurfacePlaces places{std::move(closest.triangles), Points(count, 3), std::move(closest.distances)};
+  const auto edges_of = [&](Index t) { return TriangleEdges(mesh.vertices, mesh.triangles, t); };
+
+  // The other side of thin parts: the triangle nearest in place and direction, then the best about it.
+  std::vector<Index> doubtful;
+  for (Index i = 0; i < count; ++i)
+    if (edges_of(places.triangles[i]).area.dot(normals.row(i)) < 0.0) doubtful.push_back(i);
+  if (!doubtful.empty()) {
+    Points centers(mesh.triangles.rows(), 3), facing(mesh.triangles.rows(), 3);
+    for (Index t = 0; t < centers.rows(); ++t) {
+      centers.row(t) = edges_of(t).at(Vec3::Constant(1.0 / 3.0));
+      facing.row(t) = edges_of(t).area.normalized();
+    }
+    const double diagonal = (mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff()).norm();
+    const std::vector<Index> near =
+        OrientedPoints(centers, facing)
+            .nearest(points(doubtful, Eigen::all), normals(doubtful, Eigen::all), turn_share * diagonal);
+    const Surroundings surroundings(mesh);
+    for (std::size_t k = 0; k < doubtful.size(); ++k) {
+      const Index i = doubtful[k];
+      const Vec3 point = points.row(i), normal = normals.row(i);
+      double least = turn_share * diagonal;
+      surroundings.visit(near[k], [&](std::int32_t t) {
+        const TriangleEdges edges = edges_of(t);
+        const double distance = (edges.at(edges.nearest(point)) - point).norm();
+        if (!(edges.area.dot(normal) > 0.0 && distance < least)) return;
+        least = places.distances[i] = distance;
+        places.triangles[i] = t;
+      });
+      if (k % 1024 == 0) progress.check();
+    }
+  }
+  for (Index i = 0; i < count; ++i)
+    places.shares.row(i) = edges_of(places.triangles[i]).nearest(points.row(i));
+  return places;
+}
+
+WrappedMesh::WrappedMesh(const TriangleMesh& source, const DeformationField& field) : moved(source) {
+  validate(source);
+  const Index count = source.vertices.rows();
+  JetBlock<double> jets(count, JetOrder::first);
+  field.evaluate(field.frame().to_cube(source.vertices), jets.view());
+  jacobians.resize(count);
+  Points values(count, 3);
+  const JetView<const double> view = std::as_const(jets).view();
+  for (Index v = 0; v < count; ++v) {
+    values.row(v) = Eigen::Map<const Eigen::RowVector3d>(view.at(0, v));
+    for (int k = 0; k < 3; ++k) jacobians[v].col(k) = Eigen::Map<const Vec3>(view.at(first_column(k), v));
+  }
+  moved.vertices = field.frame().to_mesh(values);
+}
+
+WrappedMesh::WrappedMesh(const TriangleMesh& source, PointsIn positions)
+    : moved{positions, source.triangles}, jacobians(positions.rows(), Mat3::Zero()) {
+  validate(source);
+  require(positions.rows() == source.vertices.rows(), "field",
+          std::to_string(positions.rows()) + " moved vertices", "one for each of the source is needed");
+  validate(moved);
+  const std::vector<std::int32_t> first = first_at_position(source.vertices);
+  std::vector<double> areas(jacobians.size(), 0.0);
+  const auto basis = [](const TriangleEdges& edges) {
+    Mat3 columns;
+    columns << edges.first, edges.second, edges.area / std::sqrt(edges.area.norm());
+    return columns;
+  };
+  for (Index t = 0; t < source.triangles.rows(); ++t) {
+    const TriangleEdges rest(source.vertices, source.triangles, t), now(positions, source.triangles, t);
+    const double area = rest.area.norm();
+    if (!(area > 0.0 && now.area.norm() > 0.0)) continue;
+    const Mat3 gradient = basis(now) * basis(rest).inverse();
+    if (!gradient.allFinite()) continue;
+    for (int k = 0; k < 3; ++k) {
+      const std::int32_t v = first[source.triangles(t, k)];
+      jacobians[v] += area * gradient;
+      areas[v] += area;
+    }
+  }
+  for (std::size_t v = 0; v < areas.size(); ++v)
+    if (areas[v] > 0.0)
+      jacobians[v] /= areas[v];
+    else if (first[v] == static_cast<std::int32_t>(v))
+      jacobians[v].setIdentity();
+  for (std::size_t v = 0; v < areas.size(); ++v) jacobians[v] = jacobians[first[v]];
+}
+
+Correspondence::Correspondence(const WrappedMesh& source, const TriangleMesh& target, Direction direction,
+                               const Progress& progress)
+    : direction_(direction), jacobians_(source.jacobians) {
+  validate(target);
+  const bool forward = direction == Direction::to_target;
+  const TriangleMesh &giving = forward ? source.moved : target, &receiving = forward ? target : source.moved;
+  giving_ = giving.vertices.rows();
+  triangles_ = giving.triangles;
+  places_ = places_on(giving, receiving.vertices, vertex_normals(receiving), progress);
+  if (!forward)
+    for (Mat3& jacobian : jacobians_) {
+      require(jacobian.determinant() != 0.0, "field", "the wrap flattens a vertex of the source",
+              "each must keep a volume about it for the way back");
+      jacobian = jacobian.inverse().eval();
+    }
+}
+
+RowMatrix<double> Correspondence::values(const RowMatrix<double>& given) const {
+  require(given.rows() == giving_, "values", std::to_string(given.rows()) + " rows",
+          "one for each of " + std::to_string(giving_) + " vertices is needed");
+  RowMatrix<double> result(places_.shares.rows(), given.cols());
+  parallel_for(0, result.rows(), 4096, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) {
+      const auto corner = [&](int k) {
+        return places_.shares(i, k) * given.row(triangles_(places_.triangles[i], k));
+      };
+      result.row(i) = corner(0) + corner(1) + corner(2);
+    }
+  });
+  return result;
+}
+
+Points Correspondence::displacements(PointsIn given) const {
+  require(given.rows() == giving_, "displacements", std::to_string(given.rows()) + " rows",
+          "one for each of " + std::to_string(giving_) + " vertices is needed");
+  const auto turned = [&](PointsIn points) {
+    Points result(points.rows(), 3);
+    for (Index v = 0; v < points.rows(); ++v) result.row(v) = jacobians_[v] * points.row(v).transpose();
+    return result;
+  };
+  return direction_ == Direction::to_target ? Points(values(turned(given))) : turned(Points(values(given)));
+}
+
+}  // namespace arapfields

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a wrapped object has, handed on to its target inside Blender."""
+
+import numpy as np
+import pytest
+from support.blender.inside import IN_BLENDER
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.wraps import rigged_bar
+
+    from addon.blender import mesh_arrays
+    from addon.field_modifier import motion
+
+pytestmark = pytest.mark.in_blender
+
+SINGLE = 1e-5  # Blender keeps coordinates in single precision
+TURN = np.array([[0.0, -1.4, 0.0], [1.4, 0.0, 0.0], [0.0, 0.0, 1.4]])
+
+
+def wrapped_bar():
+    """A decorated, rigged bar, turned and scaled onto a copy of its mesh whose vertices come in reverse."""
+    item, _ = rigged_bar()
+    mesh = item.data
+    rest = mesh_arrays.positions(mesh)
+    colour = mesh.attributes.new("Paint", "FLOAT_COLOR", "CORNER")
+    corners = mesh_arrays.corner_vertices(mesh)
+    colour.data.foreach_set("color", np.c_[rest[corners], np.ones(len(corners))].astype(np.float32).ravel())
+    fat = mesh.shape_keys.key_blocks["Fat"]
+    fat.value, fat.slider_max = 0.25, 2.0
+    driver = fat.driver_add("value").driver
+    driver.type, driver.expression = "SCRIPTED", "frame / 100"
+    belly = item.shape_key_add(name="Belly", from_mix=False)
+    belly.relative_key, belly.mute = fat, True
+    faces = [[len(rest) - 1 - v for v in face.vertices] for face in mesh.polygons]
+    copied = bpy.data.meshes.new("Other")
+    copied.from_pydata((rest @ TURN.T + [3, 0, 1])[::-1].tolist(), [], faces)
+    target = bpy.data.objects.new("Other", copied)
+    bpy.context.collection.objects.link(target)
+    item.arapfields.wrap.onto = target
+    item.arapfields.under_rig = True
+    motion.bind(bpy.context, item)
+    fat.driver_remove("value")
+    fat.value = 0.0
+    fat.driver_add("value").driver.expression = "0 * frame"
+    motion.write(item, motion.Motion(rest @ TURN.T + [3, 0, 1] - rest))
+    bpy.context.view_layer.update()
+    scenes.activate(item)
+    return item, target, rest
+
+
+def offsets(item, name):
+    block = item.data.shape_keys.key_blocks[name]
+    places = [mesh_arrays.vectors(key.data, "co").astype(float) for key in (block, block.relative_key)]
+    return places[0] - places[1]
+
+
+def test_all_that_an_object_has_comes_along():
+    item, target, rest = wrapped_bar()
+    own = mesh_arrays.positions(target.data)
+    assert bpy.ops.arapfields.transfer() == {"FINISHED"}
+    for name in ("Fat", "Belly"):
+        assert np.abs(offsets(target, name) - offsets(item, name)[::-1] @ TURN.T).max() < SINGLE
+    fat, belly = (target.data.shape_keys.key_blocks[name] for name in ("Fat", "Belly"))
+    assert fat.slider_max == 2.0 and belly.mute and belly.relative_key == fat
+    assert target.data.shape_keys.animation_data.drivers[0].driver.expression == "0 * frame"
+    assert np.abs(mesh_arrays.positions(target.data) - own).max() == 0
+    for group in item.vertex_groups:
+        there = target.vertex_groups[group.name]
+        for vertex in range(0, len(rest), 7):
+            given = {g.group: g.weight for g in item.data.vertices[vertex].groups}.get(group.index, 0.0)
+            got = {g.group: g.weight for g in target.data.vertices[len(rest) - 1 - vertex].groups}
+            assert abs(got.get(there.index, 0.0) - given) < 2 * SINGLE
+    paint = target.data.attributes["Paint"]
+    colours = np.empty(len(paint.data) * 4, np.float32)
+    paint.data.foreach_get("color", colours)
+    at = mesh_arrays.corner_vertices(target.data)
+    assert np.abs(colours.reshape(-1, 4)[:, :3] - rest[::-1][at]).max() < SINGLE * 10
+    (modifier,) = (m for m in target.modifiers if m.type == "ARMATURE")
+    (rig,) = (m.object for m in item.modifiers if m.type == "ARMATURE")
+    assert modifier.object != rig and modifier.object.data != rig.data
+    assert [bone.name for bone in modifier.object.data.bones] == [bone.name for bone in rig.data.bones]
+
+    def counts():
+        return len(target.vertex_groups), len(target.data.shape_keys.key_blocks), len(bpy.data.objects)
+
+    before = counts()
+    assert bpy.ops.arapfields.transfer() == {"FINISHED"}  # again: nothing comes twice
+    assert counts() == before
+
+
+def test_only_what_is_chosen_and_no_locked_group():
+    item, target, _ = wrapped_bar()
+    group = target.vertex_groups.new(name=item.vertex_groups[0].name)
+    group.add([0], 0.5, "REPLACE")
+    group.lock_weight = True
+    assert bpy.ops.arapfields.transfer(transfer={"GROUPS"}) == {"FINISHED"}
+    assert target.data.shape_keys is None and not target.modifiers
+    assert [round(g.weight, 3) for g in target.data.vertices[0].groups if g.group == 0] == [0.5]
+    assert not [v for v in target.data.vertices if v.index and 0 in [g.group for g in v.groups]]
+
+
+def test_what_cannot_take_anything_is_named_and_kept():
+    item, target, _ = wrapped_bar()
+    kept = scenes.everything(target)
+    modifier = item.modifiers.new("Two", "MIRROR")
+    item.modifiers.move(len(item.modifiers) - 1, 0)
+    with pytest.raises(RuntimeError, match="Modifiers of Bar"):
+        bpy.ops.arapfields.transfer()
+    item.modifiers.remove(modifier)
+    with pytest.raises(RuntimeError, match="no object Gone"):
+        bpy.ops.arapfields.transfer(onto="Gone")
+    motion.remove(item)
+    with pytest.raises(RuntimeError, match="Wrap Bar first"):
+        bpy.ops.arapfields.transfer()
+    assert scenes.everything(target) == kept

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What one mesh has, carried over to another that it was wrapped onto, and back."""
+
+import numpy as np
+import pytest
+from support.geometry import wrap_cases as cases
+
+import arapfields as af
+
+ROUNDING = 1e-12
+# Of a key on a mesh of other triangles, in its largest motion: what linear interpolation leaves.
+INTERPOLATION = 0.03
+TURN = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
+
+
+@pytest.fixture(scope="module")
+def figure():
+    return cases.figure(4)
+
+
+def key_at(points, center, radius=0.5):
+    """A bulge that also turns, as an expression does."""
+    return np.exp(-(((points - center) / radius) ** 2).sum(axis=1))[:, None] * [0.05, 0.1, -0.04]
+
+
+@pytest.mark.parametrize("back", [False, True])
+def test_a_similarity_carries_exactly(figure, back):
+    v, f = figure
+    moved = 2.5 * v @ TURN.T + [1, 2, 3]
+    target = (moved, f) if not back else (moved[::-1].copy(), len(v) - 1 - f)
+    places = af.Correspondence(moved, (v, f), target, back=back)
+    assert places.distances.max() < ROUNDING * 100
+    assert np.abs(places.shares.sum(axis=1) - 1).max() < ROUNDING and places.shares.min() >= 0
+    rng = np.random.default_rng(0)
+    given = rng.normal(size=(4, len(v), 3))
+    turned = given[:, ::-1] @ TURN / 2.5 if back else 2.5 * given @ TURN.T
+    assert np.abs(places.displacements(given) - turned).max() < 1e-9
+    colours = rng.random((len(v), 4))
+    assert np.abs(places.values(colours) - (colours[::-1] if back else colours)).max() < 1e-9
+
+
+def test_keys_follow_a_known_map_onto_other_triangles(figure):
+    """f itself is the wrap; the target is the moved surface, cut into other triangles."""
+    v, f = figure
+    fine, faces = cases.figure(5)
+    turn = np.eye(4)
+    turn[:3, :3], turn[:3, 3] = TURN, [0.3, 0.2, 0.1]
+    ends = [af.CuboidHandle(box_at(x), m) for x, m in ((-1.2, box_at(-1.2)), (1.2, turn @ box_at(1.2)))]
+    field = af.deform(af.sample_mesh(v, f, 1500), ends, af.DeformOptions(centers=60))
+    rows = np.random.default_rng(1).permutation(len(fine))
+    target = field(fine[rows]), np.argsort(rows)[faces].astype(np.int32)
+    for center in v[[0, len(v) // 3, len(v) // 2]]:
+        told = field(fine[rows] + key_at(fine[rows], center)) - target[0]
+        found = af.transfer(field, (v, f), target, {"displacements": key_at(v, center), "values": v[:, 0]})
+        assert np.abs(found["values"] - fine[rows][:, 0]).max() < 0.05
+        assert (
+            np.linalg.norm(found["displacements"] - told, axis=1).mean() < INTERPOLATION * np.abs(told).max()
+        )
+        by_mesh = af.transfer(field(v), (v, f), target, {"displacements": key_at(v, center)})
+        away = np.linalg.norm(by_mesh["displacements"] - told, axis=1)
+        assert away.mean() < INTERPOLATION * np.abs(told).max()
+
+
+def box_at(x):
+    box = np.diag([0.4, 2.0, 2.0, 1.0])
+    box[0, 3] = x
+    return box
+
+
+def test_both_sides_of_a_thin_sheet_keep_theirs():
+    """Its upper side lies nearest to the target's lower one."""
+    n = 12
+    x, y = np.meshgrid(np.linspace(0, 1, n), np.linspace(0, 1, n), indexing="ij")
+    sheet = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
+    at = np.arange(n * n).reshape(n, n)
+    corners = [at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]]
+    quads = np.stack([c.ravel() for c in corners], axis=1)
+    up = np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]).astype(np.int32)
+    thin = np.concatenate([sheet, sheet + np.array([0, 0, 0.01])])
+    faces = np.concatenate([up[:, ::-1], up + n * n]).astype(np.int32)
+    side = np.repeat([0.0, 1.0], n * n)
+    target = thin - np.array([0, 0, 0.008])
+    found = af.transfer(thin, (thin, faces), (target, faces), {"values": side})["values"]
+    assert np.array_equal(found, side)
+
+
+def test_bad_input_is_named(figure):
+    v, f = figure
+    places = af.Correspondence(v, (v, f), (v, f))
+    with pytest.raises(af.InvalidInput, match="field: 3 moved vertices"):
+        af.Correspondence(v[:3], (v, f), (v, f))
+    with pytest.raises(af.InvalidInput, match="what: unknown key keys"):
+        af.transfer(v, (v, f), (v, f), {"keys": v})
+    with pytest.raises(af.InvalidInput, match="displacements: 5 vertices"):
+        places.displacements(np.zeros((5, 3)))
+    with pytest.raises(af.InvalidInput, match="displacements: got shape"):
+        places.displacements(np.zeros(len(v)))
+    with pytest.raises(af.InvalidInput, match="target: got"):
+        af.Correspondence(v, (v, f), v[0])
+    with pytest.raises(af.InvalidInput, match="triangles"):
+        af.Correspondence(v, (v, f), (v, f + 1))
+    with pytest.raises(af.Cancelled):
+        task = af.Task()
+        task.cancel()
+        af.Correspondence(v, (v, f), (v, f), task=task)
