@@ -5,8 +5,8 @@ import bpy
 
 from ..blender.property_definitions import annotations, choice, collection, colour, flag, integer, pointer
 from ..blender.selection import select_alone
+from ..core.settings.choices import TRANSFERRED
 from ..core.settings.parameters import WRAP
-from .transfer import KINDS
 
 
 def is_target(group, item):
@@ -43,10 +43,10 @@ def move_object(**extra):
 
 def carried_kinds(options=()):
     return choice(
-        [(*kind, "NONE", 1 << index) for index, kind in enumerate(KINDS)],
+        [(*kind, "NONE", 1 << index) for index, kind in enumerate(TRANSFERRED)],
         "Transfer",
         "What the target receives",
-        default={kind for kind, _, _ in KINDS},
+        default={kind for kind, _, _ in TRANSFERRED},
         options={"ENUM_FLAG", *options},
     )
 

@@ -9,20 +9,11 @@ from ..blender.object_references import settings_of
 from ..core.errors import UserError, refuse
 from ..core.geometry.spaces import transform
 from ..core.runtime import native
+from ..core.settings.choices import TRANSFERRED
 from ..handles.empties import matrix_of
 from ..names import OFFSETS, TURNS
 from ..results.placement import single_user
 
-KINDS = (
-    ("KEYS", "Shape Keys", "Each key of the object, turned and scaled as the wrap does, with its drivers"),
-    ("GROUPS", "Vertex Groups", "Weights and groups; locked groups of the target stay"),
-    ("ATTRIBUTES", "Attributes", "Colours and other attributes of vertices and corners; no UV maps"),
-    (
-        "ARMATURE",
-        "Armature",
-        "A copy of the armature that was fitted to the wrapped shape, with its modifier",
-    ),
-)
 # Attributes' types: (name of a value in Blender, numbers a value, whether values between two make sense).
 TYPES = {
     "FLOAT": ("value", 1, True),
@@ -108,7 +99,7 @@ class Transfer:
             "ATTRIBUTES": self.attributes,
             "ARMATURE": self.armature,
         }
-        return {label: steps[kind]() for kind, label, _ in KINDS if kind in kinds}
+        return {label: steps[kind]() for kind, label, _ in TRANSFERRED if kind in kinds}
 
     def keys(self):
         given = self.source.data.shape_keys

@@ -55,6 +55,7 @@ ARAPFIELDS_PYTHON_TYPE(EnergiesArgument,
 ARAPFIELDS_PYTHON_TYPE(FunctionArgument, "arapfields._native.ImplicitFunction")
 
 // Results: fields and meshes with what was measured on the way.
+ARAPFIELDS_PYTHON_TYPE(TransferResult, "dict[str, numpy.typing.NDArray[numpy.float64]]")
 ARAPFIELDS_PYTHON_TYPE(SurfaceSamplesResult, "arapfields._native.SurfaceSamples")
 ARAPFIELDS_PYTHON_TYPE(NeuralSdfResult, "arapfields._native.NeuralSdf")
 ARAPFIELDS_PYTHON_TYPE(FieldResult, "arapfields._native.DeformationField[arapfields.reports.SolveReport]")

@@ -93,8 +93,8 @@ py::array_t<double> carried(const Correspondence& self, const ArrayArgument& arg
   return result;
 }
 
-py::dict transfer(const MovedArgument& field, const MeshArgument& source, const MeshArgument& target,
-                  const TransferArgument& what, bool back, Task* task) {
+TransferResult transfer(const MovedArgument& field, const MeshArgument& source, const MeshArgument& target,
+                        const TransferArgument& what, bool back, Task* task) {
   const std::string allowed = "a dict of \"values\" and \"displacements\" is needed";
   require(py::isinstance<py::dict>(what), "what", "got " + type_text(what), allowed);
   py::dict result;
@@ -105,7 +105,7 @@ py::dict transfer(const MovedArgument& field, const MeshArgument& source, const 
     if (!places) places.emplace(correspondence(field, source, target, back, task));
     result[key] = carried(*places, py::reinterpret_borrow<ArrayArgument>(array), name == "displacements");
   }
-  return result;
+  return TransferResult(result);
 }
 
 void bind_transfer(py::module_& module) {
@@ -122,7 +122,9 @@ and target: pairs (vertices, triangles). Gives to the target's vertices, with ba
 Raises InvalidInput and Cancelled.)")
       .def_property_readonly(
           "triangles",
-          [](const Correspondence& self) { return py::array(py::cast(self.places().triangles)); },
+          [](const Correspondence& self) {
+            return py::array_t<std::int32_t>(py::array(py::cast(self.places().triangles)));
+          },
           "(m,) the triangle of the giving mesh on which each receiving vertex lies.")
       .def_property_readonly(
           "shares", [](const Correspondence& self) { return self.places().shares; },

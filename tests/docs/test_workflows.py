@@ -94,7 +94,8 @@ def wrap():
     (_, dog), (_, scan) = seen("Dog"), seen("Scan")
     triangles = [tuple(face.vertices) for face in bpy.data.objects["Scan"].data.polygons]
     tree = BVHTree.FromPolygons(scan.tolist(), triangles)
-    laid = dog + np.array(bpy.data.objects["Dog"].location)  # seen from the scan's own origin
+    place = np.array(bpy.data.objects["Dog"].matrix_world)  # seen from the scan's own origin
+    laid = dog @ place[:3, :3].T + place[:3, 3]
     off = np.array([tree.find_nearest(point)[3] for point in laid])
     size = np.linalg.norm(np.ptp(scan, axis=0))
     assert np.mean(off) < 0.01 * size, np.mean(off) / size

@@ -213,6 +213,16 @@ def members(t):
             by_name(af.wrap, "task"),
             [t["samples"], t["mesh_sdf"], [], af.WrapOptions(**WRAP), af.Task()],
         ),
+        "Correspondence": lambda: (
+            by_name(af.Correspondence, "back"),
+            [TETRAHEDRON, (TETRAHEDRON, FACES), (TETRAHEDRON, FACES), False],
+        ),
+        "Correspondence.values": lambda: (t["places"].values, [TETRAHEDRON]),
+        "Correspondence.displacements": lambda: (t["places"].displacements, [TETRAHEDRON]),
+        "transfer": lambda: (
+            af.transfer,
+            [TETRAHEDRON, (TETRAHEDRON, FACES), (TETRAHEDRON, FACES), {"values": TETRAHEDRON}],
+        ),
         "PointCacheReader": lambda: (af.PointCacheReader, ["/nonexistent"]),
         "PointCacheWriter": lambda: (
             by_name(writer, "start", "step"),

@@ -92,6 +92,7 @@ def make_things():
         "task": af.Task(),
         "frame": field.frame,
         "mesh_sdf": af.MeshSdf(TETRAHEDRON, FACES),
+        "places": af.Correspondence(TETRAHEDRON, (TETRAHEDRON, FACES), (TETRAHEDRON, FACES)),
         "style": af.ObjectStyle(TETRAHEDRON, FACES),
         "attachment": af.Attachment(samples, ROWS[:5]),
         "curve_field": af.deform_curve(curve.points, [af.CurveHandle([0, 1])], af.CurveOptions(spacing=0.3)),

@@ -116,3 +116,15 @@ LIVE_KINDS = (
     ("DEFORM", "Deform", "The shape follows its handles"),
     ("STYLIZE", "Stylize", "The shape follows the style's settings, and its handles where the style does"),
 )
+
+# What goes from a wrapped object to its target.
+TRANSFERRED = (
+    ("KEYS", "Shape Keys", "Each key of the object, turned and scaled as the wrap does, with its drivers"),
+    ("GROUPS", "Vertex Groups", "Weights and groups; locked groups of the target stay"),
+    ("ATTRIBUTES", "Attributes", "Colours and other attributes of vertices and corners; no UV maps"),
+    (
+        "ARMATURE",
+        "Armature",
+        "A copy of the armature that was fitted to the wrapped shape, with its modifier",
+    ),
+)
