@@ -85,6 +85,16 @@ TriangleMesh as_mesh(const py::handle& vertices, const py::handle& triangles) {
   return {as_points(vertices, "vertices"), as_triangles(triangles, "triangles")};
 }
 
+TriangleMesh as_mesh_pair(const py::handle& value, const std::string& argument, const std::string& allowed) {
+  std::vector<py::object> parts;
+  for_each_item(value, argument, allowed, 0.0, [&](const py::object& part, const std::string&) {
+    require(parts.size() < 2, argument, "more than two of them", allowed);
+    parts.push_back(part);
+  });
+  require(parts.size() == 2, argument, std::to_string(parts.size()) + " of them", allowed);
+  return as_mesh(parts[0], parts[1]);
+}
+
 Triangles as_triangles(const py::handle& value, const std::string& argument) {
   const std::string allowed = "expected integers of shape (m, 3) that fit 32 bits";
   using Wide = Eigen::Matrix<std::int64_t, Eigen::Dynamic, 3, Eigen::RowMajor>;

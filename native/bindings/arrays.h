@@ -19,6 +19,9 @@ Points as_points(const py::handle& value, const std::string& argument);
 Points as_finite_points(const py::handle& value, const std::string& argument);
 /// The arguments `vertices` and `triangles`, not yet validated.
 TriangleMesh as_mesh(const py::handle& vertices, const py::handle& triangles);
+/// A pair of both.
+TriangleMesh as_mesh_pair(const py::handle& value, const std::string& argument,
+                          const std::string& allowed = "a pair (vertices, triangles) is needed");
 Triangles as_triangles(const py::handle& value, const std::string& argument);
 Vector as_vector(const py::handle& value, const std::string& argument);
 /// The same; empty for an argument that was not given.

@@ -41,10 +41,8 @@ Eigen::MatrixXd weights_of(const ShapeArgument& shape, const BonesArgument& bone
             "samples have their own, by with_weights");
     return on(shape.cast<const SurfaceSamples&>());
   }
-  require(py::isinstance<py::sequence>(shape) && py::len(shape) == 2, "mesh", "got " + type_text(shape),
-          "a pair (vertices, triangles) or SurfaceSamples are needed");
-  const auto pair = py::reinterpret_borrow<py::sequence>(shape);
-  return on(as_mesh(py::object(pair[0]), py::object(pair[1])), painted);
+  return on(as_mesh_pair(shape, "mesh", "a pair (vertices, triangles) or SurfaceSamples are needed"),
+            painted);
 }
 
 std::vector<Mat4> as_motions(const ArraysArgument& motions) {

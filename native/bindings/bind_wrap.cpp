@@ -46,16 +46,9 @@ WrapResult wrap_samples(const SurfaceSamples& samples, const FunctionArgument& t
   return field;
 }
 
-TriangleMesh mesh_of(const MeshArgument& mesh, const std::string& name) {
-  require(py::isinstance<py::sequence>(mesh) && py::len(mesh) == 2, name, "got " + type_text(mesh),
-          "a pair (vertices, triangles) is needed");
-  const auto pair = py::reinterpret_borrow<py::sequence>(mesh);
-  return as_mesh(py::object(pair[0]), py::object(pair[1]));
-}
-
 Correspondence correspondence(const MovedArgument& field, const MeshArgument& source,
                               const MeshArgument& target, bool back, Task* task) {
-  const TriangleMesh rest = mesh_of(source, "source"), onto = mesh_of(target, "target");
+  const TriangleMesh rest = as_mesh_pair(source, "source"), onto = as_mesh_pair(target, "target");
   const bool by_field = py::isinstance<DeformationField>(field);
   const auto* given = by_field ? &field.cast<const DeformationField&>() : nullptr;
   const Points moved = by_field ? Points() : as_finite_points(field, "field");
