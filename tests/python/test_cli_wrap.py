@@ -13,6 +13,8 @@ import arapfields as af
 
 SMALL = ["--centers", "50", "--stages", "2", "--iterations", "5", "--samples", "1000", "--quiet"]
 
+COARSE = 0.15  # of a key's length, off on average: what 66 vertices leave
+
 
 @pytest.fixture
 def pair(tmp_path):
@@ -65,3 +67,31 @@ def test_bad_input_is_named_and_nothing_is_written(pair, arguments, said, capsys
     assert run("wrap", "template.obj", "scan.ply", *arguments, "--quiet") == 2
     assert said in capsys.readouterr().err
     assert not (pair / "out.obj").exists()
+
+
+def test_transfer_gives_the_scan_what_the_template_has(pair):
+    v, f = cases.figure(2)
+    scan = trimesh.load(pair / "scan.ply", process=False)
+    trimesh.Trimesh(cases.moved(v), f, process=False).export(pair / "wrapped.obj")
+    trimesh.Trimesh(1.1 * v, f, process=False).export(pair / "fat.obj")
+    np.savez(pair / "weights.npz", weights=np.eye(len(v))[:, :5])
+    meshes = [pair / name for name in ("wrapped.obj", "template.obj", "scan.ply")]
+    assert run("transfer", *meshes, "--quiet") == 2
+    flags = ["--keys", pair / "fat.obj", "--into", pair / "keys", "--places", pair / "places.npz", "--quiet"]
+    flags += ["--values", pair / "weights.npz", "--values-output", pair / "out.npz"]
+    assert run("transfer", *meshes, *flags) == 2  # there is no such folder
+    (pair / "keys").mkdir()
+    assert run("transfer", *meshes, *flags) == 0
+    fat = trimesh.load(pair / "keys" / "fat.ply", process=False)
+    away = np.linalg.norm(fat.vertices - cases.moved(1.1 * v), axis=1)
+    assert away.mean() < COARSE * np.linalg.norm(fat.vertices - scan.vertices, axis=1).mean()
+    with np.load(pair / "places.npz") as places, np.load(pair / "out.npz") as values:
+        assert places["distances"].max() < 1e-4
+        corners = np.einsum("nk,nkj->nj", places["shares"], cases.moved(v)[f[places["triangles"]]])
+        assert np.abs(corners - scan.vertices).max() < 1e-4
+        assert np.abs(values["weights"] - np.eye(len(v))[:, :5]).max() < 1e-3
+    back = [*flags[:-4], "--back"]
+    back[back.index(pair / "fat.obj")] = pair / "keys" / "fat.ply"
+    assert run("transfer", *meshes, *back) == 0
+    again = trimesh.load(pair / "keys" / "fat.obj", process=False)
+    assert np.abs(again.vertices - 1.1 * v).max() < 1e-3

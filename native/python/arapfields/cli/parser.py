@@ -4,10 +4,11 @@
 import argparse
 import re
 import sys
+from functools import partial
 
 import arapfields as af
 
-from . import usd, verbs, wrapping
+from . import transferring, usd, verbs, wrapping
 from .animate import animate
 from .flags import (
     MESH,
@@ -56,7 +57,8 @@ def _parser():
         "--cmake-dir", action=CMakeDir, nargs=0, help="print where CMake finds the C++ package, and exit"
     )
     added = parser.add_subparsers(dest="verb", metavar="VERB", required=True, parser_class=OneLineParser)
-    for add in (_fit, _sample, _deform, _stylize, _wrap, _extract, _warp, _grid, _animate):
+    by_module = [partial(_by_module, module) for module in (wrapping, transferring)]
+    for add in (_fit, _sample, _deform, _stylize, _extract, _warp, _grid, _animate, *by_module):
         verb = add(added)
         verb.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
     return parser
@@ -139,9 +141,10 @@ def _stylize(added):
     return parser
 
 
-def _wrap(added):
-    parser = _verb(added, "wrap", wrapping.wrap, wrapping.SUMMARY, *wrapping.EXAMPLES)
-    wrapping.wrap_flags(parser)
+def _by_module(module, added):
+    """The verb of a module of its own."""
+    parser = _verb(added, module.NAME, module.run, module.SUMMARY, *module.EXAMPLES)
+    module.add_flags(parser)
     return parser
 
 
@@ -230,13 +233,7 @@ def _animate(added):
     parser.add_argument(
         "-o", "--output", required=True, metavar="FILE", help=".pc2, .mdd, or .usd, .usda, .usdc by usd-core"
     )
-    parser.add_argument(
-        "--frames",
-        nargs=2,
-        type=int,
-        metavar=("FIRST", "LAST"),
-        help="these frames of the tracks alone [all]",
-    )
+    parser.add_argument("--frames", nargs=2, type=int, metavar=("FIRST", "LAST"), help="these alone [all]")
     parser.add_argument(
         "--shard", type=shard, metavar="I/N", help="solve the part I of N; the last part writes the output"
     )

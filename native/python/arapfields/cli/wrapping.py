@@ -15,6 +15,7 @@ from .options import add_option_flags, given, given_options
 from .points import read_numbers
 from .running import Outputs, with_progress
 
+NAME = "wrap"
 SUMMARY = "lay a shape onto another, as rigidly as possible"
 EXAMPLES = (
     "template.obj scan.ply -o wrapped.obj",
@@ -24,7 +25,7 @@ EXAMPLES = (
 LANDMARKS = (".json", ".txt", ".csv", ".npy")
 
 
-def wrap_flags(parser):
+def add_flags(parser):
     parser.add_argument("input", help=SOURCE)
     parser.add_argument("target", help=f"what it is laid onto; {SOURCE}; a mesh may be open and broken")
     outputs = parser.add_argument_group("outputs (one or more)")
@@ -50,7 +51,7 @@ def wrap_flags(parser):
     add_option_flags(parser, "wrap", "wrap")
 
 
-def wrap(args):
+def run(args):
     options = given_options(af.WrapOptions, args)
     with Outputs() as outputs:
         places = {
