@@ -15,8 +15,9 @@
 namespace arapfields {
 namespace {
 
-/// Turning by one radian counts as so much distance, a share of the diagonal of the mesh's bounding box.
-constexpr double turn_share = 0.1;
+/// Shares of the diagonal of the mesh's bounding box: the distance that a turn by one radian counts as, and
+/// how far a place that faces the right way may lie. Wraps come much nearer; normals of scans may be wrong.
+constexpr double turn_share = 0.1, thin_share = 0.01;
 
 /// Edges of a triangle from its first corner, and its normal times twice its area.
 struct TriangleEdges {
@@ -116,7 +117,7 @@ SurfacePlaces places_on(const TriangleMesh& mesh, PointsIn points, PointsIn norm
     for (std::size_t k = 0; k < doubtful.size(); ++k) {
       const Index i = doubtful[k];
       const Vec3 point = points.row(i), normal = normals.row(i);
-      double least = turn_share * diagonal;
+      double least = thin_share * diagonal;
       surroundings.visit(near[k], [&](std::int32_t t) {
         const TriangleEdges edges = edges_of(t);
         const double distance = (edges.at(edges.nearest(point)) - point).norm();
