@@ -15,6 +15,8 @@ namespace {
 constexpr Index most_nodes = 4000;
 /// Within so many spacings nodes count as neighbours.
 constexpr double neighbour_spacings = 2.5;
+/// In sizes of the shape, how closely bones are mirrored.
+constexpr double symmetric_bones = 1e-3;
 
 const SurfaceSamples& checked(const SurfaceSamples& samples) {
   require_samples(samples);
@@ -32,6 +34,12 @@ RigShape::RigShape(const SurfaceSamples& surface, const std::vector<Bone>& bones
   normals = rows_of(samples.normals, chosen);
   extent = body_size(points);
   // A sphere's area by its radius of gyration.
+  symmetry = skeleton.symmetry(symmetric_bones * extent);
+  for (Index b = 0; b < skeleton.count(); ++b) {
+    const Index other = symmetry.mirrored[b];
+    const double middle = 0.5 * (skeleton.bone(b).head + skeleton.bone(b).tail)[symmetry.axis];
+    sides.push_back(other < 0 || other == b ? 0 : middle < symmetry.offset ? -1 : 1);
+  }
   spacing = std::sqrt(4.0 * std::numbers::pi / static_cast<double>(size())) * extent / 2.5;
   progress.check();
   const InteriorGraph graph(nodes, normals, spacing);

@@ -16,6 +16,8 @@ struct RigShape {
 
   SurfaceSamples samples;
   Skeleton skeleton;
+  Skeleton::Symmetry symmetry;
+  std::vector<int> sides;  ///< of each bone: −1 and 1 off the plane of symmetry, 0 elsewhere
   std::vector<Handle> handles;
   Points nodes;    ///< (n,3)
   Points normals;  ///< (n,3) of the nodes, outwards

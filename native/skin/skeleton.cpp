@@ -116,39 +116,32 @@ std::vector<Mat4> Skeleton::motions(const std::vector<Mat3>& rotations) const {
   return result;
 }
 
-std::vector<Index> Skeleton::mirrored(int axis, double offset, double tolerance) const {
-  const auto reflected = [&](Vec3 p) {
-    p[axis] = 2.0 * offset - p[axis];
-    return p;
-  };
-  std::vector<Index> result;
-  for (const Bone& bone : bones_) {
-    const Vec3 head = reflected(bone.head), tail = reflected(bone.tail);
-    for (Index c = 0; c < count(); ++c)
-      if ((bones_[c].head - head).norm() < tolerance && (bones_[c].tail - tail).norm() < tolerance) {
-        result.push_back(c);
-        break;
+Skeleton::Symmetry Skeleton::symmetry(double tolerance) const {
+  Symmetry best;
+  best.mirrored.assign(bones_.size(), -1);
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> places;
+    for (const Bone& bone : bones_) places.push_back(bone.head[axis]);
+    std::ranges::sort(places);
+    // Of a symmetric rig the outermost and the middle heads say where the plane is.
+    for (const double offset : {0.5 * (places.front() + places.back()), places[places.size() / 2], 0.0}) {
+      Symmetry found{axis, offset, {}, 0};
+      const auto reflected = [&](Vec3 p) {
+        p[axis] = 2.0 * offset - p[axis];
+        return p;
+      };
+      for (Index b = 0; b < count(); ++b) {
+        const Vec3 head = reflected(bones_[b].head), tail = reflected(bones_[b].tail);
+        const auto twin = std::ranges::find_if(bones_, [&](const Bone& other) {
+          return (other.head - head).norm() < tolerance && (other.tail - tail).norm() < tolerance;
+        });
+        found.mirrored.push_back(twin == bones_.end() ? -1 : twin - bones_.begin());
+        if (found.mirrored[b] >= 0 && found.mirrored[b] != b) ++found.pairs;
       }
+      if (found.pairs > best.pairs) best = std::move(found);
+    }
   }
-  if (result.size() != bones_.size()) result.clear();
-  return result;
-}
-
-Index Skeleton::joints_between(Index a, Index b) const {
-  std::vector<Index> above;
-  for (Index bone = a; bone >= 0; bone = bones_[bone].parent) above.push_back(bone);
-  for (Index steps = 0; b >= 0; b = bones_[b].parent, ++steps)
-    if (const auto met = std::ranges::find(above, b); met != above.end())
-      return steps + (met - above.begin());
-  return count();
-}
-
-bool Skeleton::in_line(Index a, Index b) const {
-  const auto above = [&](Index upper, Index bone) {
-    while (bone >= 0 && bone != upper) bone = bones_[bone].parent;
-    return bone == upper;
-  };
-  return above(a, b) || above(b, a);
+  return best;
 }
 
 double Skeleton::along(Index b, const Vec3& point) const {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <vector>
@@ -38,15 +39,17 @@ class Skeleton {
   const Bone& bone(Index b) const { return bones_[b]; }  ///< its parent is among the deforming ones
   Index original(Index b) const { return original_[b]; }
   bool is_leaf(Index b) const { return leaf_[b]; }
-  /// Joints that the way from one bone to another passes.
-  Index joints_between(Index a, Index b) const;
-  /// Whether one is an ancestor of the other: parts of one limb.
-  bool in_line(Index a, Index b) const;
   /// Motions (bones) from rest, from each bone's rotation in its own axes.
   std::vector<Mat4> motions(const std::vector<Mat3>& rotations) const;
-  /// Mirrored bone of each across the plane where this coordinate has this value; empty where not all have
-  /// one.
-  std::vector<Index> mirrored(int axis, double offset, double tolerance) const;
+  /// Mirrored bone of each across the plane of the axes where most have one, −1 for none.
+  struct Symmetry {
+    int axis = 0;
+    double offset = 0.0;
+    std::vector<Index> mirrored;
+    Index pairs = 0;
+    bool is_whole() const { return pairs > 0 && std::ranges::find(mirrored, -1) == mirrored.end(); }
+  };
+  Symmetry symmetry(double tolerance) const;
   /// Place along a bone, 0 at its head and 1 at its tail, that is nearest to a point.
   double along(Index b, const Vec3& point) const;
   Vec3 nearest(Index b, const Vec3& point) const { return place(b, along(b, point)); }

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "core/parallel.h"
-#include "sampling/oriented_points.h"
 #include "skin/example_poses.h"
 #include "skin/vertex_blend.h"
 #include "skin/weight_fit.h"
@@ -16,11 +15,11 @@ namespace {
 constexpr std::uint64_t stream = 34;
 /// Poses of a round. Rounds go on until new poses are off by at most so many times what known ones are.
 constexpr int round_poses = 8;
-constexpr double good_ratio = 1.03;
+constexpr double good_ratio = 1.0;
 /// How often each joint turns at least.
 constexpr double least_activity = 0.5;
-/// In sizes of the shape: how closely bones and vertices are mirrored, and closed pieces that stay rigid.
-constexpr double symmetric_bones = 1e-3, symmetric_vertices = 1e-4, rigid_size = 0.12;
+/// In sizes of the shape, closed pieces that stay rigid.
+constexpr double rigid_size = 0.12;
 /// The share of a piece's weights from which one bone has them all.
 constexpr float one_bone = 0.8f;
 
@@ -36,28 +35,56 @@ Vector activity_of(const RigShape& rig, const Vector& errors) {
   return (result / std::max(result.mean(), 1e-300)).cwiseMin(1.0).cwiseMax(least_activity);
 }
 
-RowMatrix<float> node_weights(const RigShape& rig, const SkinOptions& options, const Progress& progress) {
-  ExamplePoses poses(rig, rig.nodes, options, progress.part(0.0, 0.1));
+/// Weights at a rig's nodes, and the poses that they were fitted to.
+struct Fitted {
+  RowMatrix<float> nodes;
+  std::vector<ExamplePose> poses;
+};
+
+/// The poses have the nodes and then these points.
+Fitted fitted_nodes(const RigShape& rig, PointsIn points, const SkinOptions& options,
+                    const Progress& progress) {
+  Points moved(rig.size() + points.rows(), 3);
+  moved << rig.nodes, points;
+  ExamplePoses poses(rig, moved, options, progress.part(0.0, 0.1));
   WeightFit fit(rig);
+  Fitted result;
   Random random(options.seed, stream);
   Vector activity = Vector::Ones(rig.skeleton.count());
   for (int done = 0; done < options.poses; done += round_poses) {
     const double share = static_cast<double>(done) / options.poses;
     Vector errors = Vector::Zero(rig.size());
-    std::vector<ExamplePose> round;
-    for (int k = 0; k < std::min(round_poses, options.poses - done); ++k) {
+    const int count = std::min(round_poses, options.poses - done);
+    for (int k = 0; k < count; ++k) {
       progress.report(0.1 + 0.8 * share, "Posing");
-      round.push_back(poses.draw(random, activity, progress));
-      errors += fit.squared_errors(round.back()) / round_poses;
+      result.poses.push_back(poses.draw(random, activity, progress));
+      errors += fit.squared_errors(result.poses.back()) / count;
     }
     const double known = fit.mean_squared_error();
-    for (const ExamplePose& pose : round) fit.add(pose);
+    for (int k = 0; k < count; ++k) fit.add(result.poses[result.poses.size() - count + k]);
     const bool enough = done >= 3 * round_poses && errors.mean() < good_ratio * good_ratio * known;
-    fit.solve(options.influences, options.smoothness, progress.part(0.1 + 0.8 * share, 0.1 + 0.8 * share));
+    fit.solve(options.smoothness, progress.part(0.1 + 0.8 * share, 0.1 + 0.8 * share));
     activity = activity_of(rig, errors);
     if (enough) break;
   }
-  return fit.weights();
+  result.nodes = fit.weights();
+  return result;
+}
+
+/// Weights of points with normals (n,3) of the shape.
+RowMatrix<float> fitted_points(const RigShape& rig, PointsIn points, PointsIn normals,
+                               const SkinOptions& options, const Progress& progress) {
+  const Fitted fitted = fitted_nodes(rig, points, options, progress);
+  progress.report(0.9, "Weights");
+  const VertexBlend blend(rig, points, normals);
+  const Mirror mirror(rig, points);
+  RowMatrix<float> nearby = blend(fitted.nodes), distances = blend(rig.bone_distances);
+  mirror.average(nearby);
+  mirror.average(distances);
+  progress.report(0.93, "Weights");
+  RowMatrix<float> result = point_weights(rig, points, fitted.poses, nearby, distances, mirror, options);
+  mirror.average(result);
+  return result;
 }
 
 /// The largest `influences` of a row ≥ 0 that are larger than all others, of sum one.
@@ -72,32 +99,6 @@ void keep_largest(Eigen::Ref<RowMatrix<float>> row, int influences) {
   }
   row = (row.array() < 1e-3f * row.maxCoeff()).select(0.0f, row);
   row /= row.sum();
-}
-
-/// Rows of vertices that are mirrored, where the skeleton is symmetric across a plane of the axes, become
-/// mirrored.
-void make_symmetric(const RigShape& rig, PointsIn vertices, RowMatrix<float>& weights) {
-  const Skeleton& skeleton = rig.skeleton;
-  for (int axis = 0; axis < 3; ++axis) {
-    double offset = 0.0;
-    for (Index b = 0; b < skeleton.count(); ++b)
-      offset += skeleton.bone(b).head[axis] / static_cast<double>(skeleton.count());
-    const std::vector<Index> mirrored = skeleton.mirrored(axis, offset, symmetric_bones * rig.extent);
-    bool any = false;
-    for (std::size_t b = 0; b < mirrored.size(); ++b) any |= mirrored[b] != static_cast<Index>(b);
-    if (!any) continue;
-    Points reflected = vertices;
-    reflected.col(axis) = (2.0 * offset - vertices.col(axis).array()).matrix();
-    const Points none = Points::Zero(vertices.rows(), 3);
-    const std::vector<Index> twins = OrientedPoints(vertices, none).nearest(reflected, none, 0.0);
-    RowMatrix<float> result = weights;
-    for (Index i = 0; i < weights.rows(); ++i)
-      if ((vertices.row(twins[i]) - reflected.row(i)).norm() < symmetric_vertices * rig.extent)
-        for (Index b = 0; b < weights.cols(); ++b)
-          result(i, b) = 0.5f * (weights(i, b) + weights(twins[i], mirrored[b]));
-    weights = std::move(result);
-    return;
-  }
 }
 
 /// Each small closed piece gets one motion: of one bone, where that moves nearly all of it.
@@ -134,9 +135,9 @@ RowMatrix<float> skin_weights(const SurfaceSamples& samples, const std::vector<B
   options.validate();
   const ThreadScope threads(options.threads);
   const RigShape rig(samples, bones, progress);
-  const RowMatrix<float> nodes = node_weights(rig, options, progress);
-  const VertexBlend blend(rig, samples.frame.to_mesh(samples.points), samples.normals);
-  return finished(rig, blend(nodes), static_cast<Index>(bones.size()), options.influences);
+  const Points points = samples.frame.to_mesh(samples.points);
+  return finished(rig, fitted_points(rig, points, samples.normals, options, progress),
+                  static_cast<Index>(bones.size()), options.influences);
 }
 
 RowMatrix<float> skin_weights(const TriangleMesh& mesh, const std::vector<Bone>& bones,
@@ -147,10 +148,7 @@ RowMatrix<float> skin_weights(const TriangleMesh& mesh, const std::vector<Bone>&
   const RigShape rig(sample_mesh(mesh.vertices, mesh.triangles, options.samples, options.seed, painted),
                      bones, progress);
   const WeldedVertices welded(mesh);
-  const RowMatrix<float> nodes = node_weights(rig, options, progress);
-  progress.report(0.95, "Weights");
-  RowMatrix<float> fitted = VertexBlend(rig, mesh.vertices, welded.normals)(nodes);
-  make_symmetric(rig, mesh.vertices, fitted);
+  RowMatrix<float> fitted = fitted_points(rig, mesh.vertices, welded.normals, options, progress);
   make_rigid(rig, mesh, welded, fitted);
   for (Index i = 0; i < fitted.rows(); ++i) fitted.row(i) = fitted.row(welded.first[i]).eval();
   return finished(rig, std::move(fitted), static_cast<Index>(bones.size()), options.influences);

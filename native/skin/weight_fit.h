@@ -4,23 +4,25 @@
 #include <vector>
 
 #include "core/task.h"
+#include "skin/bone_choice.h"
 #include "skin/example_poses.h"
+#include "skin/mirror.h"
 
 namespace arapfields {
+
+/// Weight of the smoothness at option 1, for squared distances in sizes of the shape.
+constexpr double smoothness_weight = 3e-4;
 
 /// Linear blend weights of a rig's nodes: ≥ 0, of sum one, that reproduce example poses in least squares and
 /// vary smoothly through the shape.
 class WeightFit {
  public:
-  static constexpr Index most_candidates = 8;  ///< bones that a node's weights are sought among
-  using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_candidates, most_candidates>;
-
   explicit WeightFit(const RigShape& rig);
 
-  /// Takes a pose into account.
+  /// Takes a pose into account, whose first rows are the nodes'.
   void add(const ExamplePose& pose);
-  /// Solves for the weights, with so many bones a node at most.
-  void solve(int influences, double smoothness, const Progress& progress);
+  /// Solves for the weights.
+  void solve(double smoothness, const Progress& progress);
   /// (nodes, bones)
   const RowMatrix<float>& weights() const { return weights_; }
   /// Mean square distance (nodes) of the weights' shape from a pose's, and that of all poses added.
@@ -28,16 +30,20 @@ class WeightFit {
   double mean_squared_error() const;
 
  private:
-  using Candidates = std::vector<Index>;
-  void choose_candidates();
-  void update(Index node, int influences, double smoothness);
+  void update(Index node, double smoothness);
 
   const RigShape& rig_;
-  std::vector<Candidates> candidates_;
-  /// wᵀ G w is the sum over the poses of the squared distance from the pose, for weights of sum one.
-  std::vector<Square> squares_;
+  std::vector<BoneChoice> choices_;
+  std::vector<BonePairs> squares_;  // over all poses
   Index poses_ = 0;
   RowMatrix<float> weights_;
 };
+
+/// Weights of other points of the shape, at most `influences` a point above 0, that reproduce the same poses,
+/// whose rows from `first` on are the points'. What the poses leave open is as in `nearby` (points, bones),
+/// the nodes' weights there; `distances` are to the bones through the inside.
+RowMatrix<float> point_weights(const RigShape& rig, PointsIn points, const std::vector<ExamplePose>& poses,
+                               const RowMatrix<float>& nearby, const RowMatrix<float>& distances,
+                               const Mirror& mirror, const SkinOptions& options);
 
 }  // namespace arapfields

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "skin/bone_choice.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <numeric>
+
+namespace arapfields {
+namespace {
+
+/// A bone matters where it is at most so many times as far as the nearest, through the inside.
+constexpr float farthest_share = 6.0f;
+/// The same for bones of the other side: a leg does not move the other.
+constexpr float side_share = 2.0f;
+/// Of the distances of bones, and of those of the other side, in squared sizes of the shape.
+constexpr double distance_weight = 2e-6, side_weight = 1e-5;
+
+}  // namespace
+
+BoneChoice::BoneChoice(const RigShape& rig,
+                       const Eigen::Ref<const Eigen::Matrix<float, 1, Eigen::Dynamic>>& distances) {
+  const Skeleton& skeleton = rig.skeleton;
+  std::vector<Index> all(skeleton.count());
+  std::iota(all.begin(), all.end(), Index{0});
+  const Index most = std::min<Index>(most_candidates, skeleton.count());
+  std::ranges::partial_sort(all, all.begin() + most, {}, [&](Index b) { return distances[b]; });
+  const float least = std::max(distances[all.front()], static_cast<float>(rig.spacing));
+  std::vector<double> costs;
+  for (Index k = 0; k < most; ++k) {
+    const bool across = rig.sides[all[k]] * rig.sides[all[0]] < 0;
+    if (k > 0 && !(distances[all[k]] < (across ? side_share : farthest_share) * least)) continue;
+    const double farther = static_cast<double>(distances[all[k]] / least) - 1.0;
+    bones.push_back(all[k]);
+    costs.push_back((across ? side_weight : distance_weight) * farther * farther);
+  }
+  penalties = Eigen::Map<const Vector>(costs.data(), static_cast<Index>(costs.size()));
+}
+
+BonePairs BoneChoice::square(const Vec3& rest, const std::vector<Mat4>& motions, const Vec3& there,
+                             double extent) const {
+  Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, most_candidates> off(3, count());
+  for (Index k = 0; k < count(); ++k)
+    off.col(k) = ((motions[bones[k]] * rest.homogeneous()).head<3>() - there) / extent;
+  return off.transpose() * off;
+}
+
+}  // namespace arapfields

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "skin/mirror.h"
+
+#include "sampling/oriented_points.h"
+
+namespace arapfields {
+namespace {
+
+/// In sizes of the shape: how closely points are mirrored.
+constexpr double symmetric_points = 1e-4;
+
+}  // namespace
+
+Mirror::Mirror(const RigShape& rig, PointsIn points) {
+  if (!rig.symmetry.is_whole()) return;
+  bones = rig.symmetry.mirrored;
+  Points reflected = points;
+  reflected.col(rig.symmetry.axis) =
+      (2.0 * rig.symmetry.offset - points.col(rig.symmetry.axis).array()).matrix();
+  const Points none = Points::Zero(points.rows(), 3);
+  twins = OrientedPoints(points, none).nearest(reflected, none, 0.0);
+  for (Index i = 0; i < points.rows(); ++i)
+    if ((points.row(twins[i]) - reflected.row(i)).norm() > symmetric_points * rig.extent) twins[i] = -1;
+}
+
+void Mirror::average(RowMatrix<float>& values) const {
+  if (bones.empty()) return;
+  const RowMatrix<float> before = values;
+  for (Index i = 0; i < values.rows(); ++i)
+    if (const Index other = twin(i); other >= 0)
+      for (Index b = 0; b < values.cols(); ++b)
+        values(i, b) = 0.5f * (before(i, b) + before(other, bones[b]));
+}
+
+}  // namespace arapfields

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "skin/simplex_fit.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <numeric>
+#include <vector>
+
+namespace arapfields {
+namespace {
+
+/// Of the sum of one, as a heavy row.
+constexpr double sum_weight = 10.0;
+
+/// argmin of wᵀHw/2 − gᵀw over w ≥ 0 (Lawson, Hanson 1974, chapter 23, on the normal equations).
+FewBones non_negative(const BonePairs& h, const FewBones& g) {
+  const Index n = g.size();
+  FewBones w = FewBones::Zero(n);
+  std::vector<Index> free;
+  const auto solve_free = [&] {
+    BonePairs part(free.size(), free.size());
+    FewBones right(free.size());
+    for (std::size_t i = 0; i < free.size(); ++i) {
+      right[i] = g[free[i]];
+      for (std::size_t j = 0; j < free.size(); ++j) part(i, j) = h(free[i], free[j]);
+    }
+    return FewBones(part.ldlt().solve(right));
+  };
+  for (Index round = 0; round < 3 * n; ++round) {
+    const FewBones dual = g - h * w;
+    Index entering = -1;
+    for (Index i = 0; i < n; ++i)
+      if (std::ranges::find(free, i) == free.end() &&
+          dual[i] > 1e-10 * std::max(1.0, g.cwiseAbs().maxCoeff()) &&
+          (entering < 0 || dual[i] > dual[entering]))
+        entering = i;
+    if (entering < 0) break;
+    free.push_back(entering);
+    while (!free.empty()) {
+      const FewBones next = solve_free();
+      double step = 1.0;
+      for (std::size_t i = 0; i < free.size(); ++i)
+        if (next[i] <= 0.0) step = std::min(step, w[free[i]] / std::max(w[free[i]] - next[i], 1e-300));
+      for (std::size_t i = 0; i < free.size(); ++i) w[free[i]] += step * (next[i] - w[free[i]]);
+      if (step >= 1.0) break;
+      std::erase_if(free, [&](Index i) {
+        if (w[i] > 1e-12) return false;
+        w[i] = 0.0;
+        return true;
+      });
+    }
+  }
+  return w;
+}
+
+}  // namespace
+
+FewBones simplex_minimum(const BonePairs& h, const FewBones& g, int influences) {
+  const Index k = g.size();
+  if (k == 1) return FewBones::Ones(1);
+  const double scale = sum_weight * h.diagonal().mean();
+  BonePairs square = (h.array() + scale) / scale;
+  FewBones right = (g.array() + scale) / scale;
+  FewBones w = non_negative(square, right);
+  std::vector<Index> largest(k);
+  std::iota(largest.begin(), largest.end(), Index{0});
+  std::ranges::stable_sort(largest, std::ranges::greater(), [&](Index j) { return w[j]; });
+  if (k > influences && w[largest[influences]] > 0.0) {
+    for (Index j = influences; j < k; ++j) {  // bones that may not enter
+      square.row(largest[j]).setZero();
+      square.col(largest[j]).setZero();
+      square(largest[j], largest[j]) = 1.0;
+      right[largest[j]] = 0.0;
+    }
+    w = non_negative(square, right);
+  }
+  return w / w.sum();
+}
+
+}  // namespace arapfields
