@@ -72,6 +72,8 @@ def begin(context, source, kind="DEFORM", keeps_shape=False):
     """
     earlier, session = live.part_with(source.session_uid), None
     former = live.returning.pop(source.session_uid, None) if earlier is None else earlier.former
+    if former is None or settings_of(source).live_kind != kind:
+        settings_of(source).held = ""
     try:
         session = Session(context, source, kind, former, keeps_shape)
         session.advance()  # a small mesh is read at once

@@ -19,7 +19,8 @@ class Snapshot:
     def __init__(self, context, source):
         settings, layer = settings_of(source), context.view_layer
         self.source, session = ObjectReference(source), sessions.live.get(source.session_uid)
-        self.was_live, self.mark = session is not None, stored.mark(source)
+        self.live = None if session is None else (session.kind, session.keeps_shape)
+        self.mark = stored.mark(source)
         self.is_settled = session is None or session.is_current(context)
         self.motion = motion.snapshot(source)
         self.keep_rest, self.row = settings.keep_rest, settings.active_handle
@@ -126,7 +127,10 @@ class Drag:
         settings.keep_rest, settings.active_handle = self.before.keep_rest, self.before.row
         self.before.restore_selection(context)
         session = self.session()
-        if session is not None and self.before.was_live:
+        if session is not None and self.before.live:
+            kind, session.keeps_shape = self.before.live
+            if session.kind != kind:
+                sessions.begin(context, source, kind, session.keeps_shape)
             self.before.restore_shape(context, is_held=False)
         elif session is not None:
             session.keeps_shape = False

@@ -28,6 +28,8 @@ class ARAPFIELDS_TOOL_pin(bpy.types.WorkSpaceTool):
     bl_keymap = (
         (Op.PIN_HOVER, {"type": "MOUSEMOVE", "value": "ANY", "any": True}, None),
         (Op.PIN_DRAG, {"type": "LEFTMOUSE", "value": "PRESS"}, None),
+        # Beside the mesh, where Blender's own drag would move what is selected.
+        ("view3d.select_box", {"type": "LEFTMOUSE", "value": "CLICK_DRAG"}, None),
         (Op.PIN_ANCHOR, {"type": "LEFTMOUSE", "value": "PRESS", "shift": True}, None),
         (
             Op.PIN_DELETE,

@@ -103,6 +103,51 @@ py::handle call_naming(function_call& call) {
   return result;
 }
 
+_PyCFunctionFastWithKeywords dispatcher = nullptr;  // of pybind11, the same for all functions
+
+/// What is wrong with how many arguments there are, or with their names; "" where that is right.
+std::string misfit(const function_record& function, std::size_t given, const py::tuple& named) {
+  if (function.has_args || function.has_kwargs) return {};
+  std::string known, missing;
+  for (std::size_t i = function.is_method ? 1 : 0; i < function.nargs; ++i) {
+    const bool has_record = i < function.args.size() && function.args[i].name != nullptr;
+    const std::string name = has_record ? function.args[i].name : "argument";
+    const bool is_named = named.contains(name), is_given = i < given && i < function.nargs_pos;
+    if (is_named && is_given) return name + ": is given twice";
+    const bool is_needed = !has_record || !function.args[i].value;
+    if (!is_named && !is_given && is_needed && missing.empty()) missing = name + ": is missing";
+    known += (known.empty() ? "" : ", ") + name;
+  }
+  const std::string takes = std::string(function.name) + "() takes " + (known.empty() ? "nothing" : known);
+  for (const py::handle name : named) {
+    const std::string text = py::cast<std::string>(py::str(name));
+    if ((", " + known + ", ").find(", " + text + ", ") == known.npos)
+      return text + ": there is no such argument; " + takes;
+  }
+  if (given > function.nargs_pos) return "arguments: there are too many; " + takes;
+  return missing;
+}
+
+/// As pybind11 alone, but for calls of which it only lists the whole signature.
+PyObject* dispatch_naming(PyObject* self, PyObject* const* given, Py_ssize_t count, PyObject* names) {
+  PyObject* const result = dispatcher(self, given, count, names);
+  if (result != nullptr || PyErr_Occurred() != PyExc_TypeError) return result;
+  py::error_already_set error;
+  try {
+    const py::tuple named = names ? py::reinterpret_borrow<py::tuple>(names) : py::tuple();
+    const auto positional = static_cast<std::size_t>(PyVectorcall_NARGS(static_cast<std::size_t>(count)));
+    const std::string what = misfit(*py::detail::function_record_ptr_from_PyObject(self), positional, named);
+    if (!what.empty()) {
+      const py::object type = py::module_::import("arapfields._native").attr("_WrongType");
+      PyErr_SetObject(type.ptr(), py::str(what).ptr());
+      return nullptr;
+    }
+  } catch (py::error_already_set&) {  // the error at hand says more
+  }
+  error.restore();
+  return nullptr;
+}
+
 void watch(const py::handle& bound) {
   const py::handle function = py::detail::get_function(bound);
   if (!function || !PyCFunction_Check(function.ptr())) return;
@@ -110,7 +155,10 @@ void watch(const py::handle& bound) {
   if (!self) return;
   function_record* record = py::detail::function_record_ptr_from_PyObject(self.ptr());
   if (record == nullptr || record->next != nullptr || record->is_operator) return;
-  if (implementations().try_emplace(record, record->impl).second) record->impl = &call_naming;
+  if (!implementations().try_emplace(record, record->impl).second) return;
+  record->impl = &call_naming;
+  dispatcher = reinterpret_cast<_PyCFunctionFastWithKeywords>(reinterpret_cast<void*>(record->def->ml_meth));
+  record->def->ml_meth = reinterpret_cast<PyCFunction>(reinterpret_cast<void*>(&dispatch_naming));
 }
 
 void watch_all(const py::handle& members) {

@@ -5,8 +5,8 @@
 
 namespace arapfields::python {
 
-/// To be called when all is bound: from then on an argument of the wrong type raises InvalidInput that names
-/// it (of a kind that is a TypeError too), where pybind11 alone lists the whole signature.
+/// To be called when all is bound: from then on an argument that is of the wrong type, missing or unknown
+/// raises InvalidInput that names it (a TypeError, too), where pybind11 alone lists the whole signature.
 void name_wrong_types(const pybind11::module_& module);
 
 }  // namespace arapfields::python

@@ -19,8 +19,14 @@ if IN_BLENDER:
 pytestmark = pytest.mark.in_blender
 
 
+def five_frames():
+    """The folder of a saved animation."""
+    bpy.context.scene.frame_end = 5
+    return saved_animation()[1]
+
+
 def test_a_folder_is_made_where_its_parent_exists():
-    _, folder = saved_animation()
+    folder = five_frames()
     bpy.ops.arapfields.export_animation(format="GLTF", filepath="//new/a.glb")
     assert [path.name for path in (folder / "new").iterdir()] == ["a.glb"]
 
@@ -66,7 +72,7 @@ def menu_rows():
 
 def test_a_press_overwrites_only_what_is_the_objects_own_or_confirmed():
     """A script has confirmed by its call."""
-    _, folder = saved_animation()
+    folder = five_frames()
     cache, file, asked = folder / "a.pc2", folder / "a.glb", []
     has_window, ask = bake_operator.has_window, bake_operator.ask
     bake_operator.has_window, bake_operator.ask = lambda: True, lambda *given: asked.append(given[-1])

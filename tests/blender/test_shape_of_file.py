@@ -137,6 +137,29 @@ def test_a_pose_has_one_digest_wherever_its_session_began():
 
 
 @few_centers
+def test_presses_and_cancelled_drags_of_a_live_style():
+    """A cancelled one leaves the style live; what a press holds ends with the mode that shows it."""
+    bar = scenes.bar()
+    entry = pin(bar, (1.0, 0.0, 0.25), target=(1.0, 0.0, 0.4)).name
+    entry = next(one for one in bar.arapfields.handles if one.empty.name == entry)
+    bpy.ops.arapfields.live(kind="STYLIZE")
+    world.settle()
+    styled = scenes.world_points(bar)
+    dragged = drag.of_entry(bpy.context, bar, entry)
+    dragged.move(bpy.context, (0.9, 0.1, 0.6))
+    dragged.cancel(bpy.context)
+    world.settle()
+    assert sessions.is_live(bar, "STYLIZE") and np.array_equal(scenes.world_points(bar), styled)
+    drag.of_entry(bpy.context, bar, entry).end(bpy.context)
+    world.settle()
+    assert np.array_equal(scenes.world_points(bar), styled)
+    for kind in ("STYLIZE", "DEFORM"):
+        bpy.ops.arapfields.live(kind=kind)
+        world.settle()
+        assert world.difference(world.shape(bar), world.fresh_shape(bar, kind)) < 1e-5
+
+
+@few_centers
 @pytest.mark.parametrize("lacks", ["style_object", "handle"])
 def test_a_style_that_waits_for_what_is_to_be_chosen_comes_back(lacks):
     ball = scenes.bar()

@@ -53,6 +53,7 @@ def state():
 def by_hand(figures, folder):
     bar = set_stage()
     yield 0.5
+    yield from beside(figures, bar)
     rest, before = scenes.world_points(bar), state()
     spot = pixel(END)
     yield from hover(spot)
@@ -75,6 +76,21 @@ def by_hand(figures, folder):
     yield from anchor_turn_delete(figures, folder, bar)
     with stage.override():
         sessions.end(bpy.context, bar)
+
+
+def beside(figures, bar):
+    """A drag that begins beside the mesh, with the object selected."""
+    with stage.override():
+        scenes.activate(bar)
+    before, spot = state(), pixel((0.0, -0.25, 0.8))
+    yield from hover(spot)
+    stage.tool("mousedown", 1)
+    for step in range(1, 9):
+        stage.tool("mousemove", spot[0] + 10 * step, spot[1] + 2 * step)
+        yield 0.05
+    stage.tool("mouseup", 1)
+    yield 0.8
+    figures["pins_beside_the_mesh_stays"] = state() == before
 
 
 def anchor_turn_delete(figures, folder, bar):

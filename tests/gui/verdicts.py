@@ -125,7 +125,7 @@ EXPECTED = {  # of each part, every entry that it finds
         "pins_drag_moves": above(0.2),
         "pins_escape_of_a_new_pin": TRUE,
         "pins_after_the_drag": FIGURE.each(1),
-        **all_of(TRUE, "pins_escape_of_a_drag", "pins_anchor"),
+        **all_of(TRUE, "pins_beside_the_mesh_stays", "pins_escape_of_a_drag", "pins_anchor"),
         "pins_ring_turns_degrees": near(45.0, 10.0),
         "pins_r_turns_degrees": Rule("turned", lambda figures: abs(figures) > 5),
         "pins_wheel_during_a_drag": having(

@@ -60,6 +60,26 @@ def test_a_wrong_type_is_a_type_error_too():
     assert isinstance(error.value, af.InvalidInput)
 
 
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda: af.sample_mesh(POINTS), "triangles: is missing"),
+        (
+            lambda: af.sample_mesh(POINTS, TRIANGLES, sede=1),
+            "sede: there is no such argument; sample_mesh() takes",
+        ),
+        (lambda: af.sample_mesh(POINTS, TRIANGLES, vertices=POINTS), "vertices: is given twice"),
+        (lambda: af.Task().cancel(3), "arguments: there are too many; cancel() takes nothing"),
+        (lambda: af.LiveDeformer(), "samples: is missing"),
+        (lambda: FIELD.solve(steps=3), "steps: there is no such argument; solve() takes"),
+    ],
+)
+def test_missing_and_unknown_arguments_are_named(call, says):
+    with pytest.raises(af.InvalidInput) as error:
+        call()
+    assert str(error.value).startswith(says) and isinstance(error.value, TypeError)
+
+
 @pytest.mark.parametrize("weight", [0.0, -1.0, np.nan, np.inf])
 def test_weights_are_checked_where_they_enter(weight):
     for make in (
