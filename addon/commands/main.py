@@ -37,7 +37,7 @@ def run(arguments, script=None):
 
 def verb(name):
     """The function behind a verb; bpy is imported for single files alone."""
-    module = name if name in ("batch", "check", "bake") else "single"
+    module = name if name in ("batch", "check", "bake", "skin") else "single"
     return getattr(importlib.import_module(f".{module}", __package__), f"run_{module}")
 
 

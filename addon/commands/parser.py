@@ -6,8 +6,8 @@ import re
 import sys
 from pathlib import Path, PurePath
 
-from ..core.settings.choices import BAKE_FORMATS, LIVE_KINDS, ORIENTATIONS, OUTPUTS, SURFACES
-from ..core.settings.parameters import DEFORM, EXTRACTION, QUALITIES
+from ..core.settings.choices import BAKE_FORMATS, LIVE_KINDS, ORIENTATIONS, OUTPUTS, SKIN_GROUPS, SURFACES
+from ..core.settings.parameters import DEFORM, EXTRACTION, QUALITIES, SKIN
 from ..core.settings.styles import STYLES, STYLIZE
 
 FORMATS = ("ply", "obj", "stl", "blend")
@@ -79,9 +79,10 @@ def parser():
         one.add_argument("--quiet", action="store_true", help="no progress")
     add_batch(verbs)
     add_bake(verbs)
+    add_skin(verbs)
     text = "say in one report what this is running on, and whether the library works here"
-    check = verbs.add_parser("check", help=text, description=text)
-    check.set_defaults(handles=None)
+    verbs.add_parser("check", help=text, description=text)
+    root.set_defaults(handles=None)
     return root
 
 
@@ -109,7 +110,19 @@ def add_bake(verbs):
         "--shard", type=shard, metavar="I/N", help="solve the part I of N; the last makes the cache"
     )
     bake.add_argument("--quiet", action="store_true", help="no progress")
-    bake.set_defaults(handles=None)
+
+
+def add_skin(verbs):
+    text = "weights of an armature's bones for the meshes of a .blend"
+    skin = verbs.add_parser("skin", help=text, description=text)
+    skin.add_argument("-i", "--input", type=Path, required=True, metavar="FILE", help="a .blend")
+    skin.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="a .blend")
+    skin.add_argument("--armature", metavar="NAME", help="whose bones [the only one]")
+    skin.add_argument("--objects", nargs="+", metavar="NAME", help="only these meshes [all]")
+    skin.add_argument("--groups", choices=lower(SKIN_GROUPS), help="what becomes of the bones' groups")
+    for parameter in SKIN:
+        add_parameter(skin, parameter)
+    skin.add_argument("--quiet", action="store_true", help="no progress")
 
 
 def frames(text):
@@ -152,8 +165,6 @@ def add_solve_flags(one, verbs):
         group.add_argument(
             "--handles", type=Path, metavar="FILE", help="handles as JSON, in the file's space"
         )
-    if "deform" not in verbs:
-        one.set_defaults(handles=None)
     if "stylize" not in verbs:
         one.set_defaults(style=None, frame=None)
     group.add_argument("--result", choices=lower(OUTPUTS), help="the mesh itself moved, or a new one")

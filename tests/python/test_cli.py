@@ -29,7 +29,7 @@ def made(tmp_path_factory):
 
 
 @pytest.mark.parametrize(
-    "verb", ["", "fit", "sample", "deform", "stylize", "wrap", "transfer", "extract", "warp", "grid"]
+    "verb", ["", "fit", "sample", "deform", "stylize", "wrap", "transfer", "skin", "extract", "warp", "grid"]
 )
 def test_help_has_examples(verb, capsys):
     assert run(*([verb] if verb else []), "--help") == 0

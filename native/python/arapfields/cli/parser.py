@@ -8,7 +8,7 @@ from functools import partial
 
 import arapfields as af
 
-from . import transferring, usd, verbs, wrapping
+from . import skinning, transferring, usd, verbs, wrapping
 from .animate import animate
 from .flags import (
     MESH,
@@ -57,7 +57,7 @@ def _parser():
         "--cmake-dir", action=CMakeDir, nargs=0, help="print where CMake finds the C++ package, and exit"
     )
     added = parser.add_subparsers(dest="verb", metavar="VERB", required=True, parser_class=OneLineParser)
-    by_module = [partial(_by_module, module) for module in (wrapping, transferring)]
+    by_module = [partial(_by_module, module) for module in (wrapping, transferring, skinning)]
     for add in (_fit, _sample, _deform, _stylize, _extract, _warp, _grid, _animate, *by_module):
         verb = add(added)
         verb.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
