@@ -101,6 +101,7 @@ def anchor_turn_delete(figures, folder, bar):
     stage.tool("keyup", "shift")
     figures["pins_anchor"] = [entry.anchor for entry in bar.arapfields.handles] == [False, True]
     pin = bar.arapfields.handles[0].empty
+    bar.arapfields.handles[0].hold_turn = True  # the Empty turns as the surface is turned there
     spot, before = pixel(pin.location), pin.rotation_euler.copy()
     yield from hover(spot)
     stage.tool("click", 1)
