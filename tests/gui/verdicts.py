@@ -146,7 +146,7 @@ EXPECTED = {  # of each part, every entry that it finds
         "wrap_target_by_eyedropper": TRUE,
         "wrap_first_pair": is_(1),
         "wrap_taken_back": is_(0),
-        "wrap_landmarks_off_by": below(0.15).each(5),
+        "wrap_landmarks_off_by": below(0.15).each(10),
         "wrap_escape": TRUE,
         "wrap_press_s": FIGURE,
         "wrap_moves": above(0.05).each(2),

@@ -120,7 +120,7 @@ def press(figures, folder):
     begin = time.perf_counter()
     yield from click(WRAP, pause=1.0)
     stage.picture(folder, "wrap-running")
-    yield from until_idle(120.0)
+    yield from until_idle(400.0)
     figures["wrap_press_s"] = round(time.perf_counter() - begin, 1)
     yield 1.0
     stage.tool("mousemove", 500, 850)
@@ -151,7 +151,7 @@ def target_gone(figures, folder):
     yield from click(WRAP, pause=1.0)
     was_running = jobs.running() is not None
     bpy.data.objects.remove(bpy.data.objects["Scan"])
-    yield from until_idle(120.0)
+    yield from until_idle(400.0)
     yield 1.0
     stage.picture(folder, "wrap-target-gone")
     figures["wrap_outlives_its_target"] = was_running and fielded(bpy.data.objects["Body"])
