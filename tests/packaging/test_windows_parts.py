@@ -5,11 +5,16 @@ import json
 import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+
+from tests.windows import __main__ as windows  # noqa: E402
+
 TOOLS = ("x86_64-w64-mingw32-g++-posix", "make")
 WINE = shutil.which("wine64") or shutil.which("/usr/lib/wine/wine64")
 POSIX = re.compile(r"#include <(sys/|unistd|fcntl|pthread|dlfcn|sched|poll|dirent)")
@@ -27,6 +32,12 @@ def test_native_tests_pass_under_wine():
     assert re.search(r"(\d+) test cases out of \1 passed", said) and "warning:" not in said
     commands = json.loads((ROOT / "build/windows/compile_commands.json").read_text(encoding="utf-8"))
     assert commands and all(" -Werror " in one["command"] for one in commands)
+
+
+def test_a_folder_without_enough_that_passed_is_no_success():
+    assert windows.table({"a": {"b": ("passed", "")}})
+    for found in ({}, {"b": ("passed", ""), "c": ("skipped", "")}, {"b": ("begun", "")}):
+        assert not windows.table({"a": found})
 
 
 def test_posix_stands_only_where_windows_has_a_twin():
