@@ -103,6 +103,7 @@ def definitions(platform, work):
         script.write_text(f'#!/bin/sh\nexec {shlex.join(zig("c++", "-target", platform.target))} "$@"\n')
         script.chmod(0o755)
         found["CMAKE_CXX_COMPILER"] = script
+        found["CMAKE_MODULE_LINKER_FLAGS"] = "-s"
         # Options that GCC alone has.
         found["CMAKE_CXX_FLAGS"] = "-Wno-unused-command-line-argument -Wno-unknown-warning-option"
     elif not shutil.which(platform.compiler):
@@ -133,7 +134,8 @@ def macos(platform, work):
         | cross("Darwin", processor)
         | {
             "CMAKE_INSTALL_NAME_TOOL": "/bin/true",  # nothing is to rename
-            "CMAKE_SHARED_MODULE_CREATE_CXX_FLAGS": "-shared -undefined dynamic_lookup",
+            "CMAKE_SHARED_MODULE_CREATE_CXX_FLAGS": "-shared -undefined dynamic_lookup "
+            "-Wl,-install_name,@rpath/_native.so",
         }
     )
 
