@@ -129,15 +129,8 @@ def windows(platform, work):
 
 def macos(platform, work):
     processor = "arm64" if platform.name == "macos-arm64" else "x86_64"
-    return (
-        ONE_MODULE
-        | cross("Darwin", processor)
-        | {
-            "CMAKE_INSTALL_NAME_TOOL": "/bin/true",  # nothing is to rename
-            "CMAKE_SHARED_MODULE_CREATE_CXX_FLAGS": "-shared -undefined dynamic_lookup "
-            "-Wl,-install_name,@rpath/_native.so",
-        }
-    )
+    # Nothing is to rename.
+    return ONE_MODULE | cross("Darwin", processor) | {"CMAKE_INSTALL_NAME_TOOL": "/bin/true"}
 
 
 def cross(system, processor):
