@@ -13,9 +13,8 @@ namespace arapfields {
 namespace {
 
 constexpr std::uint64_t stream = 34;
-/// Poses of a round. Rounds go on until new poses are off by at most so many times what known ones are.
+/// Poses of a round; each shows most what the round before was farthest from.
 constexpr int round_poses = 8;
-constexpr double good_ratio = 1.0;
 /// How often each joint turns at least.
 constexpr double least_activity = 0.5;
 /// In sizes of the shape, closed pieces that stay rigid.
@@ -60,12 +59,9 @@ Fitted fitted_nodes(const RigShape& rig, PointsIn points, const SkinOptions& opt
       result.poses.push_back(poses.draw(random, activity, progress));
       errors += fit.squared_errors(result.poses.back()) / count;
     }
-    const double known = fit.mean_squared_error();
     for (int k = 0; k < count; ++k) fit.add(result.poses[result.poses.size() - count + k]);
-    const bool enough = done >= 3 * round_poses && errors.mean() < good_ratio * good_ratio * known;
     fit.solve(options.smoothness, progress.part(0.1 + 0.8 * share, 0.1 + 0.8 * share));
     activity = activity_of(rig, errors);
-    if (enough) break;
   }
   result.nodes = fit.weights();
   return result;

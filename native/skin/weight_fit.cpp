@@ -63,16 +63,6 @@ Vector WeightFit::squared_errors(const ExamplePose& pose) const {
   return result;
 }
 
-double WeightFit::mean_squared_error() const {
-  double total = 0.0;
-  for (Index i = 0; i < rig_.size(); ++i) {
-    FewBones w(choices_[i].count());
-    for (Index j = 0; j < w.size(); ++j) w[j] = static_cast<double>(weights_(i, choices_[i].bones[j]));
-    total += w.dot(squares_[i] * w);
-  }
-  return total / static_cast<double>(rig_.size() * std::max<Index>(poses_, 1));
-}
-
 RowMatrix<float> point_weights(const RigShape& rig, PointsIn points, const std::vector<ExamplePose>& poses,
                                const RowMatrix<float>& nearby, const RowMatrix<float>& distances,
                                const Mirror& mirror, const SkinOptions& options) {

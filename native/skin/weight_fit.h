@@ -25,9 +25,8 @@ class WeightFit {
   void solve(double smoothness, const Progress& progress);
   /// (nodes, bones)
   const RowMatrix<float>& weights() const { return weights_; }
-  /// Mean square distance (nodes) of the weights' shape from a pose's, and that of all poses added.
+  /// Squared distances (nodes) of the weights' shape from a pose's, in sizes of the shape.
   Vector squared_errors(const ExamplePose& pose) const;
-  double mean_squared_error() const;
 
  private:
   void update(Index node, double smoothness);
