@@ -33,11 +33,9 @@ class ARAPFIELDS_UL_handles(bpy.types.UIList):
         if item.kind in empties.PINS:
             row.prop(item, "anchor", text="", emboss=False, **anchor_icon(item))
         if item.inside >= 0:
-            row.label(
-                text=f"{item.inside:,}" if item.inside else translated("empty"),
-                icon="NONE" if item.inside else "ERROR",
-                translate=False,
-            )
+            text, held = f"{item.inside:,}" if item.inside else translated("empty"), row.row()
+            held.ui_units_x = 0.4 * len(text) + (0.6 if item.inside else 1.6)  # the name has the rest
+            held.label(text=text, icon="NONE" if item.inside else "ERROR", translate=False)
 
 
 class ARAPFIELDS_MT_add_handle(bpy.types.Menu):

@@ -9,7 +9,7 @@ from ..field_modifier import motion
 from ..live import sessions, stored
 from . import pins
 
-SHAPE_WAIT = 0.1  # seconds at most that a redraw waits for its shape
+SHAPE_WAIT = 0.25  # seconds at most that a redraw waits for its shape
 TRANSFORMS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
 
 
