@@ -88,6 +88,8 @@ void require_fitting(const std::string& name, const std::string& hint, const py:
 
 py::handle call_naming(function_call& call) {
   py::handle result = PYBIND11_TRY_NEXT_OVERLOAD;
+  if (call.func.is_method && call.args.size() > 0 && call.args[0].is_none())  // a null pointer to a member
+    require_fitting("self", hint_of(call.func.signature, "self"), call.args[0]);
   try {
     result = implementations().at(&call.func)(call);
   } catch (const py::reference_cast_error&) {  // None where an object is needed

@@ -70,6 +70,7 @@ def test_a_wrong_type_is_a_type_error_too():
         ),
         (lambda: af.sample_mesh(POINTS, TRIANGLES, vertices=POINTS), "vertices: is given twice"),
         (lambda: af.Task().cancel(3), "arguments: there are too many; cancel() takes nothing"),
+        (lambda: af.Task.cancel(None), "self: got"),
         (lambda: af.LiveDeformer(), "samples: is missing"),
         (lambda: FIELD.solve(steps=3), "steps: there is no such argument; solve() takes"),
     ],
