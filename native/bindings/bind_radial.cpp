@@ -175,14 +175,16 @@ The energy is that of deform (stretch, bend, handles), or with a style that of s
 L-BFGS preconditioned with the factored stiffness of the rest surface minimises it. Any thread
 may call it: one at a time works, the others wait.)")
       .def(py::init([](const SurfaceSamples& samples, const HandlesArgument& handles, LiveOptions options,
-                       Task* task) {
+                       const std::optional<Contact>& contact, Task* task) {
              const auto held = as_handles(handles);
              return run_long(task, [&](const Progress& progress) {
-               return std::make_unique<Live>(samples, held, options, progress);
+               auto live = std::make_unique<Live>(samples, held, options, progress);
+               live->run(progress, [&](RadialSolver& solver) { solver.set_contact(contact); });
+               return live;
              });
            }),
            "samples"_a, "handles"_a = py::tuple(), py::arg_v("options", LiveOptions(), "LiveOptions()"),
-           py::kw_only(), "task"_a = py::none(), R"(
+           py::kw_only(), "contact"_a = py::none(), "task"_a = py::none(), R"(
 samples: SurfaceSamples at rest. handles: CuboidHandle, PointHandle or RegionHandle in mesh coordinates; with
 none, for a style alone, the lowest sample is held. InvalidInput names the handle or option that does not fit.)")
       .def("solve", &solved_field, "targets"_a = py::none(), py::kw_only(), "iterations"_a = 0,
@@ -261,6 +263,13 @@ Gives the surface a mass from the next step() on: it lags behind its handles, ov
 `masses` ≥ 0, one for each sample given to the constructor, distribute the mass; 0 follows at once. Gravity
 points against `up` (3,), z unless given. `ground` is a height along `up` that the surface cannot pass.
 solve() finds the rest state. None or strength 0: no mass.)")
+      .def(
+          "set_contact",
+          [](Live& live, const std::optional<Contact>& contact) {
+            run_alone(live, nullptr,
+                      [&](RadialSolver& solver, const Progress&) { solver.set_contact(contact); });
+          },
+          "contact"_a, "What the surface does not pass from the next solve on; None: nothing.")
       .def("step", &step, "targets"_a, "seconds"_a, py::kw_only(), "coordinates"_a = py::none(),
            "task"_a = py::none(), R"(
 Moves the handles to `targets` within `seconds` (1e-5 to 10) and integrates the surface's motion.

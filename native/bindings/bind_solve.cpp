@@ -58,9 +58,11 @@ FieldResult solve(Task* task, Solve&& call) {
 
 FieldResult deform_samples(const SurfaceSamples& samples, const HandlesArgument& handles,
                            DeformOptions options, const EnergiesArgument& energies,
-                           const std::optional<CallbackArgument>& callback, Task* task) {
+                           const std::optional<CallbackArgument>& callback,
+                           const std::optional<Contact>& contact, Task* task) {
   const auto held = as_handles(handles);
-  const SolveHooks hooks{as_energies(energies, samples.frame), as_observer(callback.value_or(py::none()))};
+  const SolveHooks hooks{as_energies(energies, samples.frame), as_observer(callback.value_or(py::none())),
+                         contact};
   return solve(task, [&](const Progress& p) { return deform(samples, held, options, p, hooks); });
 }
 
@@ -77,12 +79,14 @@ FieldResult stylize_samples(const SurfaceSamples& samples, const NormalsArgument
                             const std::optional<ArrayArgument>& weights,
                             const std::optional<ArrayArgument>& orientation,
                             const std::optional<ArrayArgument>& up, const EnergiesArgument& energies,
-                            const std::optional<CallbackArgument>& callback, Task* task) {
+                            const std::optional<CallbackArgument>& callback,
+                            const std::optional<Contact>& contact, Task* task) {
   const Style style = turned_style(normals, orientation);
   const Vector blend = as_vector(weights, "weights");
   const Vec3 upwards = up ? as_vec3(*up, "up") : Vec3(Vec3::UnitZ());
   const auto held = as_handles(handles);
-  const SolveHooks hooks{as_energies(energies, samples.frame), as_observer(callback.value_or(py::none()))};
+  const SolveHooks hooks{as_energies(energies, samples.frame), as_observer(callback.value_or(py::none())),
+                         contact};
   return solve(task, [&](const Progress& p) {
     return stylize(samples, style, options, p, blend, held, upwards, hooks);
   });
@@ -115,7 +119,8 @@ std::pair<double, double> energy_of(const DeformationField& field, const ArrayAr
 void bind_solve(py::module_& module) {
   module.def("deform", &deform_samples, "samples"_a, "handles"_a,
              py::arg_v("options", DeformOptions(), "DeformOptions()"), py::kw_only(),
-             "energies"_a = py::tuple(), "callback"_a = py::none(), "task"_a = py::none(), R"(
+             "energies"_a = py::tuple(), "callback"_a = py::none(), "contact"_a = py::none(),
+             "task"_a = py::none(), R"(
 The DeformationField that moves the handles to their targets and is as rigid as possible elsewhere.
 
 It minimises mean stretch + bending · mean bend + handle_weight · mean squared handle distance, over the
@@ -134,7 +139,7 @@ last field with finite numbers.)");
              py::arg_v("options", StylizeOptions(), "StylizeOptions()"), py::kw_only(),
              "handles"_a = py::tuple(), "weights"_a = py::none(), "orientation"_a = py::none(),
              "up"_a = py::none(), "energies"_a = py::tuple(), "callback"_a = py::none(),
-             "task"_a = py::none(), R"(
+             "contact"_a = py::none(), "task"_a = py::none(), R"(
 The DeformationField that turns the surface's normals to preferred ones, as rigidly as possible.
 
 `normals` is an array (k, 3), the name of a preset style, or an ObjectStyle; `orientation` (3, 3) rotates it.

@@ -19,6 +19,7 @@ PYBIND11_MODULE(_native, module) {
   bind_fields(module);
   bind_energies(module);
   bind_object_style(module);
+  bind_contact(module);
   bind_solve(module);
   bind_extraction(module);
   bind_radial(module);

@@ -3,6 +3,7 @@
 
 #include "energies/external_energy.h"
 #include "optimize/iteration.h"
+#include "solve/contact.h"
 
 namespace arapfields {
 
@@ -10,6 +11,7 @@ namespace arapfields {
 struct SolveHooks {
   ExternalEnergies energies;   ///< terms that join the loss
   IterationObserver observer;  ///< called after each iteration
+  std::optional<Contact> contact = {};  ///< what the surface does not pass
 };
 
 }  // namespace arapfields

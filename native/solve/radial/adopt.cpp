@@ -49,6 +49,7 @@ void RadialSolver::adopt(const DeformationField& field) {
   constexpr int rounds = 8;
   RadialState& s = *state_;
   const ThreadScope threads(s.problem.options.threads);
+  s.contact.release();
   s.precondition(0.0);
   const RadialObjective<float>& objective = s.objective(s.fast);
   s.invalidate_history();
@@ -75,6 +76,7 @@ void RadialSolver::adopt(const DeformationField& field) {
     square = next;
   }
   s.dynamics.zero_velocity(motions_of(s.handles.bound()));
+  s.contact.begin(coefficients);
 }
 
 Index RadialSolver::add_fold_samples(double barrier) {

@@ -41,6 +41,13 @@ void RadialObjective<Scalar>::set_targets(PointsIn targets) {
 }
 
 template <class Scalar>
+void RadialObjective<Scalar>::set_contact(const ContactSet& contact) {
+  planes_ = &contact;
+  contact_ = contact.planes.empty() ? RadialEvaluator<Scalar>()
+                                    : RadialEvaluator<Scalar>(problem_.basis, contact.places, JetOrder::value);
+}
+
+template <class Scalar>
 bool RadialObjective<Scalar>::accepted(const Measurements& u) const {
   if (!hooks_.observer) return true;
   const RadialTerms terms = evaluate(u, nullptr);
@@ -50,6 +57,7 @@ bool RadialObjective<Scalar>::accepted(const Measurements& u) const {
   if (stance_) parts.push_back({"stance", stance_->weight * terms.stance});
   if (barrier() > 0.0) parts.push_back({"barrier", barrier() * terms.barrier});
   if (body_) parts.push_back({"motion", terms.body.sum()});
+  if (contact_.size() > 0) parts.push_back({"contact", terms.contact});
   parts.push_back({"handles", handle_weight() * terms.handles});
   for (std::size_t i = 0; i < terms.external.size(); ++i)
     parts.push_back({"energies[" + std::to_string(i) + "]", terms.external[i]});
@@ -58,13 +66,22 @@ bool RadialObjective<Scalar>::accepted(const Measurements& u) const {
 
 template <class Scalar>
 void RadialObjective<Scalar>::measure(const RowMatrix<double>& c, Measurements& u) const {
-  u.resize(center_offset() + 3 * center_count());
+  u.resize(contact_offset() + 3 * contact_.size());
   samples_.evaluate(c, {u.data(), samples_.size(), JetOrder::second});
   blend_.multiply({u.data(), samples_.size(), JetOrder::second});
   const PointsOf<Scalar> rounded = c.cast<Scalar>();
   Eigen::Map<PointsOf<Scalar>>(u.data() + handle_offset(), pairs_.sources.rows(), 3) =
       handle_basis_.times(rounded);
-  u.tail(3 * center_count()) = Eigen::Map<const Measurements>(rounded.data(), 3 * center_count());
+  u.segment(center_offset(), 3 * center_count()) =
+      Eigen::Map<const Measurements>(rounded.data(), 3 * center_count());
+  measure_contact(c, u);
+}
+
+template <class Scalar>
+void RadialObjective<Scalar>::measure_contact(const RowMatrix<double>& c, Measurements& u) const {
+  u.conservativeResize(contact_offset() + 3 * contact_.size());
+  if (contact_.size() > 0)
+    contact_.evaluate(c, {u.data() + contact_offset(), contact_.size(), JetOrder::value});
 }
 
 template <class Scalar>
@@ -96,6 +113,9 @@ RadialTerms RadialObjective<Scalar>::evaluate(JetView<const Scalar> jets, const 
     terms.barrier =
         fold_barrier<Scalar>(jets, problem_.options.surface.barrier_threshold, barrier(), jet_cotangents);
   if (body_) terms.body = body_energy<Scalar>(jets, *body_, jet_cotangents);
+  if (contact_.size() > 0)
+    terms.contact = contact_energy<Scalar>(planes_->planes, ContactTerms::stiffness, u.data() + contact_offset(),
+                                           out != nullptr ? out + contact_offset() : nullptr);
   terms.external =
       external_energies<Scalar>(hooks_.energies, problem_.energy_points, jets, hooks_.weight, jet_cotangents);
   return terms;
@@ -123,12 +143,12 @@ Eigen::VectorX<Scalar> RadialObjective<Scalar>::weighted(const Measurements& u) 
 template <class Scalar>
 double RadialObjective<Scalar>::value(const Measurements& u, Measurements* cotangents) const {
   const RadialTerms terms = evaluate(u, cotangents);
-  const auto centers = u.tail(3 * center_count());
+  const auto centers = u.segment(center_offset(), 3 * center_count());
   if (cotangents != nullptr)
-    cotangents->tail(3 * center_count()) = Scalar(2.0 * coefficient_weight) * centers;
+    cotangents->segment(center_offset(), 3 * center_count()) = Scalar(2.0 * coefficient_weight) * centers;
   return terms.arap.energy + handle_weight() * terms.handles + (style_ ? style_->weight * terms.gauss : 0.0) +
          (stance_ ? stance_->weight * terms.stance : 0.0) + barrier() * terms.barrier +
-         (body_ ? terms.body.sum() : 0.0) +
+         (body_ ? terms.body.sum() : 0.0) + terms.contact +
          std::accumulate(terms.external.begin(), terms.external.end(), 0.0) +
          coefficient_weight * static_cast<double>(centers.squaredNorm());
 }
@@ -145,7 +165,9 @@ RowMatrix<double> RadialObjective<Scalar>::pull_back(const Measurements& cotange
   }
   gradient += handle_basis_.transpose_times(handle_values(cotangents)).template cast<double>();
   Eigen::Map<Vector>(gradient.data(), 3 * center_count()) +=
-      cotangents.tail(3 * center_count()).template cast<double>();
+      cotangents.segment(center_offset(), 3 * center_count()).template cast<double>();
+  if (contact_.size() > 0)
+    contact_.pull_back({cotangents.data() + contact_offset(), contact_.size(), JetOrder::value}, gradient);
   if (problem_.mirror) problem_.mirror->symmetrise(gradient);
   return gradient;
 }
@@ -155,8 +177,9 @@ RowMatrix<double> RadialObjective<Scalar>::precondition(const RowMatrix<double>&
   const double size = gradient.norm();
   if (!(size > 0.0)) return gradient;
   const PointsF scaled = (gradient / size).cast<float>();
-  RowMatrix<double> step =
-      (0.5 * size) * inverse_factor_->transpose_times(inverse_factor_->times(scaled)).cast<double>();
+  PointsF half = inverse_factor_->times(scaled);
+  contact_stiffness_.apply(half);
+  RowMatrix<double> step = (0.5 * size) * inverse_factor_->transpose_times(half).cast<double>();
   if (problem_.mirror) problem_.mirror->symmetrise(step);
   return step;
 }

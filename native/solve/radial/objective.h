@@ -8,15 +8,16 @@
 #include "fields/radial_evaluator.h"
 #include "optimize/quasi_newton.h"
 #include "solve/radial/blend.h"
+#include "solve/radial/contact_stiffness.h"
 #include "solve/radial/hooks.h"
 #include "solve/radial/problem.h"
 #include "solve/radial/terms.h"
 
 namespace arapfields {
 
-/// mean (stretch + λ·bend) + weight·handles + λ_Gauss·gauss + stance + barrier + body + external + a
+/// mean (stretch + λ·bend) + weight·handles + λ_Gauss·gauss + stance + barrier + body + contact + external + a
 /// vanishing pull of all centers towards zero, of the fields of one radial basis. Measurements: jets at the
-/// energy samples, values at the handles' sources, centers. In single precision a step costs half, and the
+/// energy samples, values at the handles' sources, centers, values at the places of the contact. In single precision a step costs half, and the
 /// value is good to some 1e-6 of itself.
 template <class Scalar>
 class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
@@ -37,6 +38,10 @@ class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
   /// What a body with mass feels; none: the solve is one of shapes alone.
   void set_body(std::optional<Body<Scalar>> body) { body_ = std::move(body); }
   void set_hooks(const RadialHooks& hooks) { hooks_ = hooks; }
+  /// The planes that the surface is kept beyond; borrowed. Measurements of others fit after measure_contact().
+  void set_contact(const ContactSet& contact);
+  void measure_contact(const RowMatrix<double>& c, Measurements& u) const;
+  void set_contact_stiffness(ContactStiffness stiffness) { contact_stiffness_ = std::move(stiffness); }
 
   RadialTerms terms(const Measurements& u) const { return evaluate(u, nullptr); }
   /// What `call` makes of the jets of f at the samples.
@@ -65,6 +70,11 @@ class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
     return {u.data() + handle_offset(), pairs_.sources.rows(), 3};
   }
 
+  /// Where the places of the contact are.
+  Eigen::Map<const PointsOf<Scalar>> contact_values(const Measurements& u) const {
+    return {u.data() + contact_offset(), contact_.size(), 3};
+  }
+
   /// Twice the weights of the surrogate mean (‖J‖² + λ‖D‖²) + weight·handles, whose inverse precondition()
   /// has, times measurements.
   Measurements weighted(const Measurements& u) const;
@@ -81,6 +91,7 @@ class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
   Index center_count() const { return samples_.center_count(); }
   Index handle_offset() const { return 30 * samples_.size(); }
   Index center_offset() const { return handle_offset() + 3 * pairs_.sources.rows(); }
+  Index contact_offset() const { return center_offset() + 3 * center_count(); }
   double handle_weight() const { return problem_.options.handle_weight; }
   double barrier() const { return problem_.options.surface.barrier; }
 
@@ -96,6 +107,9 @@ class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
   std::optional<StanceTerm<Scalar>> stance_;
   std::optional<Body<Scalar>> body_;
   RadialHooks hooks_;
+  const ContactSet* planes_ = nullptr;
+  RadialEvaluator<Scalar> contact_;
+  ContactStiffness contact_stiffness_;
 };
 
 }  // namespace arapfields

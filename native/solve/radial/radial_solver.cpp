@@ -6,6 +6,7 @@
 #include "core/parallel.h"
 #include "energies/alignment.h"
 #include "sampling/sample_weights.h"
+#include "solve/radial/contact_solve.h"
 #include "solve/radial/handle_motion.h"
 #include "solve/radial/state.h"
 #include "solve/setup.h"
@@ -53,6 +54,27 @@ SolveHistory::Start extrapolate(RadialState& s) {
     s.set_measurements(s.fast, std::move(further));
   }
   return now;
+}
+
+/// Without contact.
+void follow_freely(RadialState& s, Index iterations, double tolerance, const Progress& progress) {
+  s.precondition(0.0);
+  s.objective(s.fast);
+  if (s.handles.any() && !s.style.any()) follow_rigidly(s);
+  SolveHistory::Start start = extrapolate(s);
+  const QuasiNewtonOptions single{iterations, std::max(tolerance, single_tolerance), single_floor};
+  const bool ended = s.descend(s.fast, single, progress).ended;
+  const bool is_exact = tolerance < single_tolerance;
+  if (is_exact) {
+    ++s.shape.revision;  // measured afresh in double precision, and by the next solve in single
+    s.objective(s.exact);
+    if (s.report.iterations < iterations && !ended)
+      s.descend(s.exact, {iterations - s.report.iterations, tolerance}, progress);
+  }
+  // A difference of measurements taken at two times has their rounding errors, which an extrapolation adds
+  // anew in each solve.
+  if (is_exact || s.fast.uses == 0) start.u.resize(0);
+  s.history.start.set(s.start_revisions(), std::move(start));
 }
 
 /// No energy of ours feels a translation: what is left of one is taken out exactly.
@@ -129,10 +151,17 @@ void RadialSolver::set_symmetry(SymmetryPlane symmetry, const Progress& progress
     next.set_style(request->style, request->strength, request->sharpness, request->weights, request->up);
   next.set_hooks(s.hooks);
   next.set_secondary_motion(s.dynamics.motion());
+  next.set_contact(s.contact.contact());
   next.adopt(*field());
   if (s.tracked.size() > 0) next.track(s.tracked.rest());
   next.state_->report.setup_seconds += s.report.setup_seconds;
   *this = std::move(next);
+}
+
+void RadialSolver::set_contact(const std::optional<Contact>& contact) {
+  const ThreadScope threads(state_->problem.options.threads);
+  state_->contact.set(contact);
+  if (contact) state_->contact.begin(state_->shape.coefficients);
 }
 
 void RadialSolver::set_targets(const std::vector<Handle>& moved) { state_->handles.set_targets(moved); }
@@ -144,24 +173,13 @@ Index RadialSolver::follow(Index iterations, double tolerance, const Progress& p
   if (iterations <= 0) iterations = s.problem.options.iterations;
   if (tolerance <= 0.0) tolerance = s.problem.options.tolerance;
   s.report.iterations = s.report.evaluations = 0;
-  s.precondition(0.0);
-  s.objective(s.fast);
-  if (s.handles.any() && !s.style.any()) follow_rigidly(s);
-  SolveHistory::Start start = extrapolate(s);
-  const QuasiNewtonOptions single{iterations, std::max(tolerance, single_tolerance), single_floor};
-  const bool ended = s.descend(s.fast, single, progress).ended;
   const bool is_exact = tolerance < single_tolerance;
-  if (is_exact) {
-    ++s.shape.revision;  // measured afresh in double precision, and by the next solve in single
-    s.objective(s.exact);
-    if (s.report.iterations < iterations && !ended)
-      s.descend(s.exact, {iterations - s.report.iterations, tolerance}, progress);
-  }
-  // A difference of measurements taken at two times has their rounding errors, which an extrapolation adds
-  // anew in each solve.
-  if (is_exact || s.fast.uses == 0) start.u.resize(0);
-  s.history.start.set(s.start_revisions(), std::move(start));
-  if (!s.handles.any() && s.hooks.energies.empty()) anchor_lowest_point(s);
+  const auto freely = [&] { follow_freely(s, iterations, tolerance, progress); };
+  if (s.contact.any())
+    follow_in_contact(s, iterations, std::max(tolerance, single_tolerance), freely, progress);
+  else
+    freely();
+  if (!s.handles.any() && s.hooks.energies.empty() && !s.contact.presses()) anchor_lowest_point(s);
   s.dynamics.zero_velocity(motions_of(s.handles.bound()));
   s.report.kinetic = s.report.speed = 0.0;
   s.unmeasured = is_exact ? RadialState::Unmeasured::exact : RadialState::Unmeasured::fast;
@@ -190,6 +208,7 @@ void RadialSolver::reset() {
   RadialState& s = *state_;
   s.shape.coefficients = s.problem.basis.identity();
   s.shape.jump();
+  s.contact.begin(s.shape.coefficients);
   std::vector<Handle> at_rest = handles();
   for (Handle& handle : at_rest) {
     handle.target = handle.rest;

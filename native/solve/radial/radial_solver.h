@@ -9,6 +9,7 @@
 #include "fields/radial_field.h"
 #include "mesh/surface_samples.h"
 #include "options/live.h"
+#include "solve/contact.h"
 #include "solve/radial/hooks.h"
 #include "solve/radial/report.h"
 #include "solve/radial/secondary_motion.h"
@@ -47,6 +48,9 @@ class ARAPFIELDS_EXPORT RadialSolver {
   void set_symmetry(SymmetryPlane symmetry, const Progress& progress = {});
   /// Energies that join the solver's own, and an observer of its steps.
   void set_hooks(const RadialHooks& hooks);
+  /// What the surface does not pass from the next solve on; none: nothing. Throws InvalidInput as
+  /// require_contact() does, and with exact handles.
+  void set_contact(const std::optional<Contact>& contact);
   /// Moves the handles' targets.
   void set_targets(const std::vector<Handle>& moved);
   /// Improves the field for the current targets and style; 0 iterations or tolerance: the options'.

@@ -8,6 +8,7 @@
 #include "core/types.h"
 #include "energies/arap.h"
 #include "energies/distortion.h"
+#include "solve/contact.h"
 
 namespace arapfields {
 
@@ -22,6 +23,7 @@ struct RadialReport {
   double kinetic = 0.0;              ///< energy of the motion, in the unit of `value`; 0 after a solve
   double speed = 0.0;                ///< root mean square over the samples, mesh units a second
   Distortion distortion;
+  ContactReport contact;
   Index iterations = 0;
   Index evaluations = 0;  ///< of the objective
   bool converged = false;

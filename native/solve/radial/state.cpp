@@ -21,7 +21,8 @@ RadialState::RadialState(const SurfaceSamples& samples, const LiveOptions& optio
       handles(problem),
       style(problem),
       stiffness(problem),
-      dynamics(problem) {
+      dynamics(problem),
+      contact(problem) {
   shape.coefficients = problem.basis.identity();
 }
 
@@ -63,7 +64,7 @@ TallMatrix<float> RadialState::factor(double inertia) {
 template <class Scalar>
 RadialObjective<Scalar>& RadialState::objective(RadialPrecision<Scalar>& precision) {
   RadialObjective<Scalar>& result = *precision.objective.get({problem.energy_revision}, [&] {
-    precision.handles = 0;
+    precision.handles = precision.contact = 0;
     return std::make_unique<RadialObjective<Scalar>>(problem);
   });
   if (precision.handles != handles.revision()) result.set_handles(handles.pairs(), handles.basis_values());
@@ -78,6 +79,15 @@ RadialObjective<Scalar>& RadialState::objective(RadialPrecision<Scalar>& precisi
   result.set_stance(cast(style.stance(handles.any())));
   result.set_body(dynamics.inertia_terms<Scalar>());
   result.set_hooks(hooks);
+  if (precision.contact != contact.found().revision) {
+    Eigen::VectorX<Scalar> u = precision.u.take(measured_revisions());
+    result.set_contact(contact.found());
+    precision.contact = contact.found().revision;
+    if (u.size() > 0) {
+      result.measure_contact(shape.coefficients, u);
+      precision.u.set(measured_revisions(), std::move(u));
+    }
+  }
   return result;
 }
 template RadialObjective<float>& RadialState::objective(RadialPrecision<float>&);
@@ -97,7 +107,8 @@ template <class Scalar>
 QuasiNewtonReport RadialState::descend(RadialPrecision<Scalar>& precision, const QuasiNewtonOptions& how,
                                        const Progress& progress) {
   QuasiNewton& optimizer = history.optimizer.get({problem.energy_revision, hooks_revision, style.revision(),
-                                                  preconditioner.revision, dynamics.revision(), shape.jumps},
+                                                  preconditioner.revision, dynamics.revision(), shape.jumps,
+                                                  contact.found().revision},
                                                  [] { return QuasiNewton(); });
   Eigen::VectorX<Scalar> u = precision.u.take(measured_revisions());
   ++shape.revision;  // at once: cancelled between two steps, the coefficients have gone on

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "fields/tracked_points.h"
+#include "solve/radial/contact_terms.h"
 #include "solve/radial/dynamics.h"
 #include "solve/radial/handle_terms.h"
 #include "solve/radial/objective.h"
@@ -30,7 +31,7 @@ struct RadialShape {
 template <class Scalar>
 struct RadialPrecision {
   Dependent<std::unique_ptr<RadialObjective<Scalar>>, 1> objective;
-  Revision handles = 0;                    ///< that the objective knows
+  Revision handles = 0, contact = 0;       ///< that the objective knows
   Dependent<Eigen::VectorX<Scalar>, 4> u;  ///< measurements of the current shape
   int uses = 0;                            ///< solves since they were measured afresh
 };
@@ -48,8 +49,8 @@ struct SolveHistory {
     RowMatrix<double> coefficients;
     VectorF u;  ///< empty: measured afresh since
   };
-  Dependent<QuasiNewton, 6> optimizer;
-  Dependent<Start, 3> start;  ///< where the last solve started
+  Dependent<QuasiNewton, 7> optimizer;
+  Dependent<Start, 4> start;  ///< where the last solve started
 };
 
 struct RadialState {
@@ -77,8 +78,8 @@ struct RadialState {
   void measure(RadialPrecision<Scalar>& precision);
   /// What follows depends on the coefficients alone.
   void invalidate_history();
-  std::array<Revision, 3> start_revisions() const {
-    return {problem.energy_revision, preconditioner.revision, shape.jumps};
+  std::array<Revision, 4> start_revisions() const {
+    return {problem.energy_revision, preconditioner.revision, shape.jumps, contact.found().revision};
   }
 
   RadialProblem problem;
@@ -86,6 +87,7 @@ struct RadialState {
   StyleTerms style;
   StiffnessTerms stiffness;
   SurfaceDynamics dynamics;
+  ContactTerms contact;
   RadialHooks hooks;
   Revision hooks_revision = 0;
   RadialPreconditioner preconditioner;

@@ -56,6 +56,7 @@ struct RadialTerms {
   double barrier = 0.0;          ///< energies/distortion.h
   double stance = 0.0;           ///< energies/stance.h
   BodyEnergy body;               ///< energies/body.h, weighted
+  double contact = 0.0;          ///< energies/contact.h
   std::vector<double> external;  ///< weighted
 };
 

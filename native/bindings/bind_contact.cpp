@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "bindings/arguments.h"
+#include "bindings/arrays.h"
+#include "bindings/bind.h"
+#include "bindings/python_function.h"
+#include "solve/contact.h"
+
+namespace arapfields::python {
+
+void bind_contact(py::module_& module) {
+  py::class_<Obstacle>(module, "Obstacle", R"(
+A solid that a surface stays outside of: an implicit function, negative inside, in mesh coordinates.
+
+An open MeshSdf is a sheet, which nothing passes from either side.)")
+      .def(py::init([](const py::object& function, double margin) {
+             require_not_negative("margin", margin);
+             return Obstacle{as_function(function, "function"), margin};
+           }),
+           "function"_a, "margin"_a = 0.0, "`margin`: the distance that is kept, in mesh units.")
+      .def_readonly("margin", &Obstacle::margin, "The distance that is kept.");
+  py::class_<Contact>(module, "Contact", R"(
+What a surface does not pass: obstacles, itself, and a ground at a height along `up`.
+
+For deform, stylize and LiveDeformer. Handles whose targets lie beyond give way: report.contact says which.)")
+      .def(py::init([](std::vector<Obstacle> obstacles, bool itself, std::optional<double> ground,
+                       const std::optional<ArrayArgument>& up) {
+             Contact contact{std::move(obstacles), itself, ground};
+             if (up) contact.up = as_vec3(*up, "up");
+             require_contact(contact);
+             return contact;
+           }),
+           "obstacles"_a = py::tuple(), "itself"_a = false, "ground"_a = py::none(), py::kw_only(),
+           "up"_a = py::none(), "`up` (3,) is z unless given.")
+      .def_readonly("itself", &Contact::itself, "Whether the surface does not pass itself.")
+      .def_readonly("ground", &Contact::ground, "The ground's height, or None.");
+}
+
+}  // namespace arapfields::python

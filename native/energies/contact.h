@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "core/jets.h"
+
+namespace arapfields {
+
+/// A place of the surface stays on one side of a plane, or of a plane that another place carries along:
+/// normal·(f_first − f_second) ≥ offset.
+struct ContactPlane {
+  Index first = 0;          ///< row of the places
+  Index second = -1;        ///< −1: none
+  Vec3 normal;              ///< unit length
+  double offset = 0.0;
+  double pressure = 0.0;    ///< multiplier, ≥ 0
+  double share = 0.0;       ///< of the surface's area
+  Index obstacle = 0;       ///< which obstacle's it is
+
+  /// normal·(f_first − f_second) − offset at places (n,3).
+  template <class Scalar>
+  double gap(const Scalar* places) const {
+    double result = -offset;
+    for (int k = 0; k < 3; ++k)
+      result += normal[k] * (static_cast<double>(places[3 * first + k]) -
+                             (second < 0 ? 0.0 : static_cast<double>(places[3 * second + k])));
+    return result;
+  }
+  /// The pressure after a solve that left this gap: what the plane presses with.
+  double pressed(double gap, double stiffness) const {
+    return pressure > stiffness * gap ? pressure - stiffness * gap : 0.0;
+  }
+};
+
+/// The augmented Lagrangian Σ share (max(0, pressure − stiffness·gap)² − pressure²)/(2 stiffness) of the
+/// planes at places (n,3) of the surface; adds its cotangents there (null: the value alone).
+template <class Scalar>
+ARAPFIELDS_EXPORT_TO_TESTS double contact_energy(const std::vector<ContactPlane>& planes, double stiffness,
+                                                 const Scalar* places, Scalar* cotangents);
+
+}  // namespace arapfields

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/export.h"
+#include "core/implicit.h"
+
+namespace arapfields {
+
+/// A solid that a surface stays outside of, at this distance of mesh units. A function that is not continuous,
+/// such as the distance from an open mesh, is a sheet that nothing passes.
+struct Obstacle {
+  std::shared_ptr<const ImplicitFunction> function;
+  double margin = 0.0;
+};
+
+/// What a surface does not pass.
+struct Contact {
+  std::vector<Obstacle> obstacles;
+  bool itself = false;
+  std::optional<double> ground;  ///< height along `up`, in mesh coordinates; none: no ground
+  Vec3 up = Vec3::UnitZ();
+  bool any() const { return !obstacles.empty() || itself || ground; }
+};
+
+/// A handle that contact keeps from its target.
+struct HeldBack {
+  Index handle;
+  std::string by;   ///< "obstacles[0]", "ground" or "itself"
+  double distance;  ///< mesh units
+};
+
+/// How a surface touches, after a solve.
+struct ContactReport {
+  double deepest = 0.0;        ///< how far a sample is beyond an obstacle's margin; mesh units
+  double touching = 0.0;       ///< share of the area that presses
+  bool unsettled = false;      ///< more steps would bring it out
+  std::vector<HeldBack> held;
+};
+
+/// Throws InvalidInput for null functions and for numbers that are negative or not finite.
+ARAPFIELDS_EXPORT void require_contact(const Contact& contact);
+
+}  // namespace arapfields

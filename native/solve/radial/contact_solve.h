@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <functional>
+
+#include "solve/radial/state.h"
+
+namespace arapfields {
+
+/// Solves outside of the contact's obstacles. What a solve `freely` does not bring near any stays as that
+/// left it; else the targets are approached in steps that no sample jumps through anything by.
+void follow_in_contact(RadialState& state, Index iterations, double tolerance,
+                       const std::function<void()>& freely, const Progress& progress);
+
+}  // namespace arapfields

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "solve/radial/contact_stiffness.h"
+
+#include <algorithm>
+
+#include "fields/radial_evaluator.h"
+#include "sampling/sample_choice.h"
+#include "tensors/dense.h"
+
+namespace arapfields {
+namespace {
+
+/// Planes that stand for all: more would tell apart what no basis function does.
+constexpr Index most_planes = 240;
+
+}  // namespace
+
+ContactStiffness::ContactStiffness(const RadialBasis& basis, const ContactSet& set, PointsIn places,
+                                   const TallMatrix<float>& inverse_factor) {
+  std::vector<const ContactPlane*> pressing;
+  for (const ContactPlane& plane : set.planes)
+    if (plane.pressed(plane.gap(places.data()), ContactTerms::stiffness) > 0.0) pressing.push_back(&plane);
+  const auto all = std::ssize(pressing), count = std::min<Index>(all, most_planes);
+  if (count == 0) return;
+  std::vector<Index> first(static_cast<std::size_t>(count));
+  normals_.resize(count, 3);
+  Vector softness(count);
+  const auto pick = [&](Index i) { return pressing[static_cast<std::size_t>(i * all / count)]; };
+  for (Index i = 0; i < count; ++i) {
+    first[static_cast<std::size_t>(i)] = pick(i)->first;
+    normals_.row(i) = pick(i)->normal.transpose();
+    softness[i] = 2.0 * static_cast<double>(count) /
+                  (static_cast<double>(all) * ContactTerms::stiffness * pick(i)->share);
+  }
+  const RowMatrix<double> values = radial_rows(basis, rows_of(set.places, first), JetOrder::value);
+  rows_.resize(count, basis.size());
+  for (Index i = 0; i < count; i += 3) {
+    const Index some = std::min<Index>(3, count - i);
+    PointsF columns = PointsF::Zero(basis.size(), 3);
+    columns.leftCols(some) = values.middleRows(i, some).transpose().cast<float>();
+    rows_.middleRows(i, some) = inverse_factor.times(columns).leftCols(some).transpose();
+  }
+  RowMatrix<float> products(count, count);
+  lower_gram<float>(Transpose::no, rows_, 0.0f, products);
+  RowMatrix<double> matrix = products.cast<double>().cwiseProduct(normals_ * normals_.transpose());
+  matrix.diagonal() += softness;
+  factor_ = cholesky<double>(matrix);
+}
+
+void ContactStiffness::apply(PointsF& y) const {
+  if (rows_.rows() == 0) return;
+  const PointsF along = rows_ * y;
+  Vector pull = along.cast<double>().cwiseProduct(normals_).rowwise().sum();
+  pull = factor_.triangularView<Eigen::Lower>().solve(pull);
+  pull = factor_.transpose().triangularView<Eigen::Upper>().solve(pull);
+  y -= rows_.transpose() * (pull.asDiagonal() * normals_).cast<float>();
+}
+
+}  // namespace arapfields

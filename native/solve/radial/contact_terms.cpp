@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "solve/radial/contact_terms.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/errors.h"
+#include "core/random.h"
+#include "sampling/sample_choice.h"
+
+namespace arapfields {
+namespace {
+
+/// Samples that are followed at most; they lie denser than any detail of a radial field.
+constexpr Index most_samples = 20000;
+/// What is nearer has a plane, in cube units.
+constexpr double near = 0.04;
+/// The cosine above which two normals are of one side of a solid.
+constexpr double same_side = 0.3;
+
+}  // namespace
+
+void ContactTerms::set(const std::optional<Contact>& contact) {
+  if (contact) {
+    require_contact(*contact);
+    require(!problem_.blend, "contact", "beside exact handles", "it needs handles that give way");
+  }
+  contact_ = contact;
+  surfaces_.clear();
+  if (contact_) {
+    for (const Obstacle& obstacle : contact_->obstacles) surfaces_.emplace_back(obstacle, problem_.frame());
+    if (contact_->ground)
+      surfaces_.push_back(BarrierSurface::ground(*contact_->ground, contact_->up, problem_.frame()));
+  }
+  if (samples_.empty() && any()) {
+    Random random(static_cast<std::uint64_t>(problem_.options.seed), 3);
+    samples_ = stratified(problem_.shape->order, std::min(most_samples, problem_.samples.size()), random);
+  }
+  begin(problem_.basis.identity());
+}
+
+Points ContactTerms::places_at(const RowMatrix<double>& coefficients) {
+  const RadialEvaluator<double>& evaluator = evaluator_.get({1}, [&] {
+    return RadialEvaluator<double>(problem_.basis, rows_of(problem_.surface(), samples_), JetOrder::value);
+  });
+  Points places(evaluator.size(), 3);
+  evaluator.evaluate(coefficients, {places.data(), places.rows(), JetOrder::value});
+  return places;
+}
+
+void ContactTerms::release() {
+  if (!found_.planes.empty()) ++found_.revision;
+  found_.planes.clear();
+  found_.places.resize(0, 3);
+  pressures_.setZero();
+  deepest_ = 0.0;
+}
+
+void ContactTerms::begin(const RowMatrix<double>& coefficients) {
+  if (!any()) return release();
+  seen_ = places_at(coefficients);
+  const auto count = static_cast<Index>(surfaces_.size());
+  clear_.resize(seen_.rows(), count);
+  pressures_.resize(seen_.rows(), count);
+  for (Index k = 0; k < count; ++k)
+    clear_.col(k) = surfaces_[static_cast<std::size_t>(k)].distances(seen_);
+  release();
+}
+
+double ContactTerms::find(const RowMatrix<double>& coefficients) {
+  const Points places = places_at(coefficients);
+  std::vector<Index> rows;
+  for (Index i = 0; i < places.rows(); ++i) {
+    const double way = (places.row(i) - seen_.row(i)).norm();
+    for (Index k = 0; k < clear_.cols(); ++k)
+      if (clear_(i, k) - way < near + surfaces_[static_cast<std::size_t>(k)].margin()) {
+        rows.push_back(i);
+        break;
+      }
+  }
+  const Points now = rows_of(places, rows);
+  found_.planes.clear();
+  deepest_ = 0.0;
+  RowMatrix<double> distances(now.rows(), clear_.cols());
+  for (Index k = 0; k < clear_.cols(); ++k) distances.col(k) = add_planes(k, rows, now);
+  for (Index i = 0; i < now.rows(); ++i) {
+    if (distances.row(i).minCoeff() <= 0.0) continue;  // it was last outside before
+    const Index row = rows[static_cast<std::size_t>(i)];
+    seen_.row(row) = now.row(i);
+    clear_.row(row) = distances.row(i);
+  }
+  gather_places();
+  return deepest_;
+}
+
+/// Adds the planes of one surface for samples (rows) that are `now` there. Returns their distances from it,
+/// negative also beyond what they came through.
+Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsIn now) {
+  const BarrierSurface& surface = surfaces_[static_cast<std::size_t>(k)];
+  BarrierSurface::Nearest nearest = surface.nearest(now);
+  std::vector<Index> moved;  // those that may have come through
+  for (Index i = 0; i < now.rows(); ++i) {
+    const Index row = rows[static_cast<std::size_t>(i)];
+    const double way = (now.row(i) - seen_.row(row)).norm(), clear = clear_(row, k);
+    if (clear > 0.0 && way > clear + std::max(0.0, nearest.distances[i])) moved.push_back(i);
+  }
+  std::vector<Index> starts;
+  for (const Index i : moved) starts.push_back(rows[static_cast<std::size_t>(i)]);
+  const std::vector<BarrierSurface::Hit> hits =
+      surface.first_hits(rows_of(seen_, starts), rows_of(now, moved));
+  Vector offsets(now.rows());
+  for (Index i = 0; i < now.rows(); ++i)
+    offsets[i] = nearest.normals.row(i).dot(now.row(i)) - nearest.distances[i];
+  for (std::size_t m = 0; m < moved.size(); ++m) {
+    const BarrierSurface::Hit& hit = hits[m];
+    if (hit.share > 1.0) continue;
+    const Index i = moved[m];
+    const double beyond = hit.normal.dot(now.row(i).transpose() - hit.place);
+    if (surface.is_sheet() && beyond < 0.0) {  // the side that it came from is the outer one
+      nearest.normals.row(i) *= -1.0;
+      nearest.distances[i] *= -1.0;
+      offsets[i] *= -1.0;
+    }
+    if (nearest.distances[i] < near && nearest.normals.row(i).dot(hit.normal) > same_side) continue;
+    if (beyond > 0.0 && nearest.distances[i] > 0.0) continue;  // around it
+    nearest.normals.row(i) = hit.normal.transpose();
+    nearest.distances[i] = beyond;
+    offsets[i] = hit.normal.dot(hit.place);
+  }
+  for (Index i = 0; i < now.rows(); ++i) {
+    const double gap = nearest.distances[i] - surface.margin();
+    const Index row = rows[static_cast<std::size_t>(i)];
+    if (gap > near) {
+      pressures_(row, k) = 0.0;
+      continue;
+    }
+    deepest_ = std::max(deepest_, -gap);
+    found_.planes.push_back({row, -1, nearest.normals.row(i).transpose(), offsets[i] + surface.margin(),
+                             pressures_(row, k), 1.0 / static_cast<double>(samples_.size()), k});
+  }
+  return nearest.distances;
+}
+
+/// The places of the planes' samples, once each.
+void ContactTerms::gather_places() {
+  std::vector<Index>& used = found_.samples;
+  used.clear();
+  for (const ContactPlane& plane : found_.planes) used.push_back(plane.first);
+  std::sort(used.begin(), used.end());
+  used.erase(std::unique(used.begin(), used.end()), used.end());
+  found_.places.resize(std::ssize(used), 3);
+  for (std::size_t i = 0; i < used.size(); ++i)
+    found_.places.row(static_cast<Index>(i)) =
+        problem_.surface().row(samples_[static_cast<std::size_t>(used[i])]);
+  for (ContactPlane& plane : found_.planes)
+    plane.first = std::lower_bound(used.begin(), used.end(), plane.first) - used.begin();
+  ++found_.revision;
+}
+
+ContactReport ContactTerms::report() const {
+  ContactReport report;
+  report.deepest = deepest_;
+  for (const ContactPlane& plane : found_.planes)
+    if (plane.pressure > 0.0) report.touching += plane.share;
+  return report;
+}
+
+void ContactTerms::press(const double* places) {
+  for (ContactPlane& plane : found_.planes) {
+    plane.pressure = plane.pressed(plane.gap(places), stiffness);
+    pressures_(found_.samples[static_cast<std::size_t>(plane.first)], plane.obstacle) = plane.pressure;
+  }
+}
+
+}  // namespace arapfields

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "energies/contact.h"
+#include "fields/radial_evaluator.h"
+#include "solve/radial/barrier_surface.h"
+#include "solve/radial/problem.h"
+
+namespace arapfields {
+
+/// The planes that places of a surface are kept beyond, until they are found anew.
+struct ContactSet {
+  std::vector<Index> samples;  ///< which of the samples that are followed
+  Points places;               ///< (n,3) theirs at rest
+  std::vector<ContactPlane> planes;
+  Revision revision = 0;
+};
+
+/// Where a surface meets obstacles, and how hard it presses there. What is beyond a plane is told by
+/// the way that each sample took since begin(): nothing that is thinner than a step is passed.
+class ContactTerms {
+ public:
+  explicit ContactTerms(const RadialProblem& problem) : problem_(problem) {}
+  /// Throws InvalidInput for what cannot be.
+  void set(const std::optional<Contact>& contact);
+  const std::optional<Contact>& contact() const { return contact_; }
+  bool any() const { return !surfaces_.empty(); }
+
+  /// The ways start here, without pressure.
+  void begin(const RowMatrix<double>& coefficients);
+  /// Follows the surface, and finds the planes near it. Returns how deep a sample is beyond a margin.
+  double find(const RowMatrix<double>& coefficients);
+  /// Pressures after a solve that left the places of found() there.
+  void press(const double* places);
+  /// No planes: the surface is free.
+  void release();
+
+  const ContactSet& found() const { return found_; }
+  bool presses() const { return !found_.planes.empty(); }
+  ContactReport report() const;
+  /// Of energy a unit of area for a unit of squared depth, halved.
+  static constexpr double stiffness = 2e4;
+
+ private:
+  Vector add_planes(Index k, const std::vector<Index>& rows, PointsIn now);
+  void gather_places();
+  Points places_at(const RowMatrix<double>& coefficients);
+
+  const RadialProblem& problem_;
+  std::optional<Contact> contact_;
+  std::vector<BarrierSurface> surfaces_;
+  Dependent<RadialEvaluator<double>, 1> evaluator_;
+  std::vector<Index> samples_;          // rows of the problem's samples that are followed
+  Points seen_;                         // where they were last known outside
+  RowMatrix<double> clear_;             // (samples, surfaces) no surface nearer to there
+  RowMatrix<double> pressures_;         // (samples, surfaces)
+  ContactSet found_;
+  double deepest_ = 0.0;
+};
+
+}  // namespace arapfields
