@@ -74,8 +74,8 @@ LiveReportResult as_python(const RadialReport& r) {
                      "iterations"_a = r.iterations, "evaluations"_a = r.evaluations,
                      "converged"_a = r.converged, "seconds"_a = r.seconds,
                      "setup_seconds"_a = r.setup_seconds, "notes"_a = py::tuple(py::cast(r.warnings)),
-                     "preference"_a = r.preference, "kinetic"_a = r.kinetic, "speed"_a = r.speed,
-                     **field_measures(r.arap, r.distortion));
+                     "preference"_a = r.preference, "contact"_a = contact_report(r.contact),
+                     "kinetic"_a = r.kinetic, "speed"_a = r.speed, **field_measures(r.arap, r.distortion));
 }
 
 /// The field and report that call(solver, progress) leaves.

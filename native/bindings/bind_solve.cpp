@@ -37,7 +37,8 @@ py::object solve_report(const SolveReport& report, double scale) {
                      "seconds"_a = report.loop.seconds, "stopped_by"_a = name_of(report.loop.stopped_by),
                      "scale"_a = scale, "loss"_a = py::tuple(loss),
                      "notes"_a = py::tuple(py::cast(report.warnings)), "preference"_a = report.preference,
-                     "far_target"_a = report.far_target, **field_measures(report.arap, report.distortion));
+                     "far_target"_a = report.far_target, "contact"_a = contact_report(report.contact),
+                     **field_measures(report.arap, report.distortion));
 }
 
 py::object solved(const Solution& solution) {

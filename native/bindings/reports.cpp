@@ -11,6 +11,14 @@ py::dict field_measures(const ArapValue& arap, const Distortion& distortion) {
                   "flipped_share"_a = distortion.flipped_share);
 }
 
+py::object contact_report(const ContactReport& contact) {
+  py::list held;
+  for (const HeldBack& h : contact.held)
+    held.append(make_report("HeldBack", "handle"_a = h.handle, "by"_a = h.by, "distance"_a = h.distance));
+  return make_report("ContactReport", "deepest"_a = contact.deepest, "touching"_a = contact.touching,
+                     "held"_a = py::tuple(held));
+}
+
 const char* name_of(StopReason reason) {
   switch (reason) {
     case StopReason::time_budget:

@@ -7,6 +7,7 @@
 #include "energies/distortion.h"
 #include "optimize/iteration.h"
 #include "optimize/loop_result.h"
+#include "solve/contact.h"
 
 namespace arapfields::python {
 
@@ -18,6 +19,8 @@ py::object make_report(const char* kind, Fields&&... fields) {
 }
 /// The fields that all reports on a field share, for `**` in make_report.
 py::dict field_measures(const ArapValue& arap, const Distortion& distortion);
+/// How a surface touches, as an arapfields.reports.ContactReport.
+py::object contact_report(const ContactReport& contact);
 /// What a report's `stopped_by` says.
 const char* name_of(StopReason reason);
 

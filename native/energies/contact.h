@@ -10,13 +10,13 @@ namespace arapfields {
 /// A place of the surface stays on one side of a plane, or of a plane that another place carries along:
 /// normal·(f_first − f_second) ≥ offset.
 struct ContactPlane {
-  Index first = 0;          ///< row of the places
-  Index second = -1;        ///< −1: none
-  Vec3 normal;              ///< unit length
+  Index first = 0;    ///< row of the places
+  Index second = -1;  ///< −1: none
+  Vec3 normal;        ///< unit length
   double offset = 0.0;
-  double pressure = 0.0;    ///< multiplier, ≥ 0
-  double share = 0.0;       ///< of the surface's area
-  Index obstacle = 0;       ///< which obstacle's it is
+  double pressure = 0.0;  ///< multiplier, ≥ 0
+  double share = 0.0;     ///< of the surface's area
+  Index obstacle = 0;     ///< which obstacle's it is
 
   /// normal·(f_first − f_second) − offset at places (n,3).
   template <class Scalar>

@@ -11,8 +11,8 @@
 
 namespace arapfields {
 
-/// A solid that a surface stays outside of, at this distance of mesh units. A function that is not continuous,
-/// such as the distance from an open mesh, is a sheet that nothing passes.
+/// A solid that a surface stays outside of, at this distance of mesh units. A function that is not
+/// continuous, such as the distance from an open mesh, is a sheet that nothing passes.
 struct Obstacle {
   std::shared_ptr<const ImplicitFunction> function;
   double margin = 0.0;
@@ -30,17 +30,20 @@ struct Contact {
 /// A handle that contact keeps from its target.
 struct HeldBack {
   Index handle;
-  std::string by;   ///< "obstacles[0]", "ground" or "itself"
-  double distance;  ///< mesh units
+  std::string by;   ///< "obstacles[0]" or "ground"
+  double distance;  ///< mean distance to the target, mesh units
 };
 
 /// How a surface touches, after a solve.
 struct ContactReport {
-  double deepest = 0.0;        ///< how far a sample is beyond an obstacle's margin; mesh units
-  double touching = 0.0;       ///< share of the area that presses
-  bool unsettled = false;      ///< more steps would bring it out
+  double deepest = 0.0;    ///< how far a sample is beyond a margin, mesh units
+  double touching = 0.0;   ///< share of the area that presses
+  bool unsettled = false;  ///< more steps would bring it out
   std::vector<HeldBack> held;
 };
+
+/// Sentences that say which handles are held back by what.
+std::vector<std::string> notes_on(const ContactReport& report);
 
 /// Throws InvalidInput for null functions and for numbers that are negative or not finite.
 ARAPFIELDS_EXPORT void require_contact(const Contact& contact);

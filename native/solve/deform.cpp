@@ -89,6 +89,8 @@ Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handle
                                  : deform_radial(samples, handles, options, progress, hooks);
   require(options.symmetry == SymmetryPlane::none, "options.symmetry",
           std::string(name_of(options.symmetry)) + " with options of a network", "it needs field='radial'");
+  require(!hooks.contact || !hooks.contact->any(), "contact", "with options of a network",
+          "it needs field='radial'");
   require_no_reach(handles, "a network");
   const ThreadScope threads(options.machine.threads);
   ObjectiveTerms terms = terms_of(samples, handles, options);

@@ -9,8 +9,8 @@ namespace arapfields {
 
 /// What a caller of deform or stylize may add to the solve.
 struct SolveHooks {
-  ExternalEnergies energies;   ///< terms that join the loss
-  IterationObserver observer;  ///< called after each iteration
+  ExternalEnergies energies;            ///< terms that join the loss
+  IterationObserver observer;           ///< called after each iteration
   std::optional<Contact> contact = {};  ///< what the surface does not pass
 };
 

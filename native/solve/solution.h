@@ -11,6 +11,7 @@
 #include "energies/distortion.h"
 #include "fields/field.h"
 #include "optimize/loop_result.h"
+#include "solve/contact.h"
 
 namespace arapfields {
 
@@ -23,6 +24,7 @@ struct SolveReport {
   std::optional<double> far_target;  ///< sizes of the shape to the farthest target, where that is far
   std::optional<double> preference;  ///< mean g of the deformed normals, or mean ñ·t of an object's style
   Distortion distortion;
+  ContactReport contact;
   LoopResult loop;
   std::vector<std::string> warnings;  ///< sentences: folds, far targets, margins that were reduced
 };

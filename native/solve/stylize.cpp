@@ -48,6 +48,8 @@ Solution stylize(const SurfaceSamples& samples, const Style& style, const Styliz
   require_no_reach(handles);
   if (chosen_field(options) == FieldKind::radial)
     return stylize_radial(samples, style, options, progress, weights, handles, up, hooks);
+  require(!hooks.contact || !hooks.contact->any(), "contact", "with options of a network",
+          "it needs field='radial'");
   const ThreadScope threads(options.machine.threads);
   ObjectiveTerms terms;
   terms.batch = options.training.batch;

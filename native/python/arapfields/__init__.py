@@ -82,12 +82,14 @@ from .energies import Energy, EnergyValue, Jets
 from .grids import save_grid, sdf_grid
 from .point_cache import PointCacheReader, PointCacheWriter
 from .reports import (
+    ContactReport,
     DeformedExtractionReport,
     EnergyReport,
     Extraction,
     ExtractionReport,
     FitReport,
     HandleError,
+    HeldBack,
     InverseReport,
     Iteration,
     LiveReport,
@@ -109,6 +111,7 @@ __all__ = [
     "Bone",
     "Cancelled",
     "Contact",
+    "ContactReport",
     "Corrective",
     "Correspondence",
     "Cuboid",
@@ -133,6 +136,7 @@ __all__ = [
     "Frame",
     "Handle",
     "HandleError",
+    "HeldBack",
     "ImplicitFunction",
     "InvalidInput",
     "InverseOptions",

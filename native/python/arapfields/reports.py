@@ -47,6 +47,28 @@ class HandleError(Report):
 
 
 @dataclass(frozen=True, kw_only=True)
+class HeldBack(Report):
+    """A handle that contact keeps from its target."""
+
+    handle: int
+    by: str
+    """"obstacles[0]", say, or "ground"."""
+    distance: float
+    """Mean distance to the target, in mesh units."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactReport(Report):
+    """How a surface touches."""
+
+    deepest: float
+    """How far a sample is beyond an obstacle's margin, in mesh units."""
+    touching: float
+    """Share of the area that presses."""
+    held: tuple[HeldBack, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
 class EnergyReport(Report):
     """What the reports of deform, stylize and LiveDeformer share, measured at surface samples."""
 
@@ -70,6 +92,7 @@ class EnergyReport(Report):
     """Smallest singular value of J."""
     iterations: int
     seconds: float
+    contact: ContactReport
     preference: float | None = None
     """Mean agreement with the preferred normals, where there are any."""
     notes: tuple[str, ...] = ()

@@ -31,6 +31,14 @@ void require_contact(const Contact& contact) {
           "a finite direction of any positive length is allowed");
 }
 
+std::vector<std::string> notes_on(const ContactReport& report) {
+  std::vector<std::string> notes;
+  for (const HeldBack& held : report.held)
+    notes.push_back("handles[" + std::to_string(held.handle) + "] is held back by " + held.by + ", " +
+                    number_text(held.distance) + " from its target");
+  return notes;
+}
+
 BarrierSurface::BarrierSurface(const Obstacle& obstacle, const Frame& frame)
     : function_(obstacle.function),
       frame_(frame),

@@ -15,35 +15,83 @@ constexpr Index most_steps = 16;
 /// Quasi-Newton steps of each, and between two searches for planes.
 constexpr Index steps_on_the_way = 3, steps_between = 6;
 /// A surface may be so deep beyond a margin, in cube units.
-constexpr double deep = 1e-3;
+constexpr double deep = 5e-4;
 /// Rounds beyond the iterations that were asked for, while something is deeper.
 constexpr Index more_rounds = 2;
+/// Handles farther from their targets against a force, in cube units, are held back.
+constexpr double held_back = 0.02;
 /// What single precision cannot see of an energy.
 constexpr double floor = 1e-10;
 
-/// Finds planes, descends, and updates the pressures. Whether the descent converged.
-bool solve_round(RadialState& s, Index iterations, double tolerance, const Progress& progress) {
-  RadialObjective<float>& objective = s.objective(s.fast);
+Points contact_places(RadialState& s) {
   const VectorF& u = s.measurements(s.fast);
-  const Points places = objective.contact_values(u).cast<double>();
-  objective.set_contact_stiffness(
-      ContactStiffness(s.problem.basis, s.contact.found(), places, s.preconditioner.inverse_factor.latest()));
+  return s.fast.objective.latest()->contact_values(u).cast<double>();
+}
+
+/// Descends, and updates the pressures. Whether the descent converged.
+bool solve_round(RadialState& s, Index iterations, double tolerance, const Progress& progress) {
+  stiffen_contact(s);
   const bool converged = s.descend(s.fast, {iterations, tolerance, floor}, progress).converged;
-  const Points ends = objective.contact_values(s.measurements(s.fast)).cast<double>();
-  s.contact.press(ends.data());
+  press_contact(s);
   return converged;
+}
+
+/// How the surface touches, and which handles are kept from their targets.
+void report_contact(RadialState& s) {
+  const double scale = s.problem.frame().scale;
+  ContactReport& report = s.report.contact;
+  report = {scale * s.contact.deepest(), s.contact.touching(), s.contact.deepest() > deep, {}};
+  const RadialObjective<float>& objective = *s.fast.objective.latest();
+  const Points places = contact_places(s);
+  const Points values = objective.handle_values(s.measurements(s.fast)).cast<double>();
+  const Points& targets = s.handles.pairs().targets;
+  const Index own = s.handles.any() ? s.handles.own_count() : 0;
+  for (Index first = 0, last = 0; first < own; first = last) {
+    const Index handle = s.handles.handle_of(first);
+    while (last < own && s.handles.handle_of(last) == handle) ++last;
+    const Points left = (targets - values).middleRows(first, last - first);
+    const double distance = left.rowwise().norm().mean();
+    if (distance < held_back) continue;
+    const Vec3 middle = values.middleRows(first, last - first).colwise().mean();
+    const Vector along = s.contact.forces_at(middle, places.data()) * left.colwise().mean().transpose();
+    Index by = 0;
+    if (along.minCoeff(&by) < 0.0) report.held.push_back({handle, s.contact.name_of(by), scale * distance});
+  }
 }
 
 }  // namespace
 
+void stiffen_contact(RadialState& s) {
+  if (!s.contact.presses()) return;
+  s.fast.objective.latest()->set_contact_stiffness(
+      {s.problem.basis, s.contact.found(), contact_places(s), s.preconditioner.inverse_factor.latest()});
+}
+
+bool would_press(RadialState& s) {
+  if (!s.contact.presses()) return false;
+  const Points places = contact_places(s);
+  return std::any_of(
+      s.contact.found().planes.begin(), s.contact.found().planes.end(),
+      [&](const ContactPlane& p) { return p.pressed(p.gap(places.data()), ContactTerms::stiffness) > 0.0; });
+}
+
+bool press_contact(RadialState& s) {
+  if (s.contact.presses()) s.contact.press(contact_places(s).data());
+  return s.contact.touching() > 0.0;
+}
+
 void follow_in_contact(RadialState& s, Index iterations, double tolerance,
                        const std::function<void()>& freely, const Progress& progress) {
   std::vector<Mat4> before = s.dynamics.motions;
-  if (std::ssize(before) != s.handles.bound().count()) before = motions_of(s.handles.bound());
+  if (std::ssize(before) != s.handles.bound().count()) {
+    before = motions_of(s.handles.bound());
+    if (s.shape.coefficients == s.problem.basis.identity()) before.assign(before.size(), Mat4::Identity());
+  }
   if (!s.contact.presses() && s.contact.find(s.shape.coefficients) <= 0.0) {
     s.contact.release();
     const RowMatrix<double> start = s.shape.coefficients;
     freely();
+    s.report.contact = {};
     if (s.contact.find(s.shape.coefficients) <= 0.0) {
       s.contact.release();
       return;
@@ -58,7 +106,8 @@ void follow_in_contact(RadialState& s, Index iterations, double tolerance,
   s.precondition(0.0);
   Index left = iterations;
   for (Index k = 1; k <= steps; ++k) {
-    const Points targets = s.handles.targets_between(before, static_cast<double>(k) / static_cast<double>(steps));
+    const Points targets =
+        s.handles.targets_between(before, static_cast<double>(k) / static_cast<double>(steps));
     for (Index extra = more_rounds;;) {
       s.contact.find(s.shape.coefficients);
       s.objective(s.fast).set_targets(targets);
@@ -71,9 +120,7 @@ void follow_in_contact(RadialState& s, Index iterations, double tolerance,
       if (left <= 0 && (depth < deep || extra-- == 0)) break;
     }
   }
-  s.report.contact = s.contact.report();
-  s.report.contact.unsettled = s.report.contact.deepest > deep;
-  s.report.contact.deepest *= s.problem.frame().scale;
+  report_contact(s);
 }
 
 }  // namespace arapfields

@@ -12,4 +12,10 @@ namespace arapfields {
 void follow_in_contact(RadialState& state, Index iterations, double tolerance,
                        const std::function<void()>& freely, const Progress& progress);
 
+/// The preconditioner feels the planes that press on the current shape.
+void stiffen_contact(RadialState& state);
+/// Updates the pressures; whether any is left.
+bool press_contact(RadialState& state);
+bool would_press(RadialState& state);
+
 }  // namespace arapfields

@@ -21,9 +21,9 @@ class ContactStiffness {
   void apply(PointsF& y) const;
 
  private:
-  RowMatrix<float> rows_;       // (planes, size) L⁻¹ b of each plane's basis values b
-  RowMatrix<double> normals_;   // (planes, 3)
-  RowMatrix<double> factor_;    // Cholesky factor of 2/(stiffness·share) + rows·rowsᵀ ∘ normals·normalsᵀ
+  RowMatrix<float> rows_;      // (planes, size) L⁻¹ b of each plane's basis values b
+  RowMatrix<double> normals_;  // (planes, 3)
+  RowMatrix<double> factor_;   // Cholesky factor of 2/(stiffness·share) + rows·rowsᵀ ∘ normals·normalsᵀ
 };
 
 }  // namespace arapfields

@@ -17,6 +17,12 @@ constexpr Index most_samples = 20000;
 constexpr double near = 0.04;
 /// The cosine above which two normals are of one side of a solid.
 constexpr double same_side = 0.3;
+/// Distance that is kept beyond each margin, in cube units: what solves leave of a depth is within.
+constexpr double kept = 1e-3;
+/// Pressures follow from gaps that are no deeper, in cube units.
+constexpr double shallow = 0.01;
+/// Forces farther than this from a handle, in cube units, count less.
+constexpr double handle_reach = 0.2;
 
 }  // namespace
 
@@ -49,7 +55,7 @@ Points ContactTerms::places_at(const RowMatrix<double>& coefficients) {
 }
 
 void ContactTerms::release() {
-  if (!found_.planes.empty()) ++found_.revision;
+  found_.revision = 0;
   found_.planes.clear();
   found_.places.resize(0, 3);
   pressures_.setZero();
@@ -62,8 +68,7 @@ void ContactTerms::begin(const RowMatrix<double>& coefficients) {
   const auto count = static_cast<Index>(surfaces_.size());
   clear_.resize(seen_.rows(), count);
   pressures_.resize(seen_.rows(), count);
-  for (Index k = 0; k < count; ++k)
-    clear_.col(k) = surfaces_[static_cast<std::size_t>(k)].distances(seen_);
+  for (Index k = 0; k < count; ++k) clear_.col(k) = surfaces_[static_cast<std::size_t>(k)].distances(seen_);
   release();
 }
 
@@ -128,14 +133,14 @@ Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsI
     offsets[i] = hit.normal.dot(hit.place);
   }
   for (Index i = 0; i < now.rows(); ++i) {
-    const double gap = nearest.distances[i] - surface.margin();
+    const double margin = surface.margin() + kept, gap = nearest.distances[i] - margin;
     const Index row = rows[static_cast<std::size_t>(i)];
     if (gap > near) {
       pressures_(row, k) = 0.0;
       continue;
     }
-    deepest_ = std::max(deepest_, -gap);
-    found_.planes.push_back({row, -1, nearest.normals.row(i).transpose(), offsets[i] + surface.margin(),
+    deepest_ = std::max(deepest_, -gap - kept);
+    found_.planes.push_back({row, -1, nearest.normals.row(i).transpose(), offsets[i] + margin,
                              pressures_(row, k), 1.0 / static_cast<double>(samples_.size()), k});
   }
   return nearest.distances;
@@ -154,20 +159,35 @@ void ContactTerms::gather_places() {
         problem_.surface().row(samples_[static_cast<std::size_t>(used[i])]);
   for (ContactPlane& plane : found_.planes)
     plane.first = std::lower_bound(used.begin(), used.end(), plane.first) - used.begin();
-  ++found_.revision;
+  found_.revision = found_.planes.empty() ? 0 : ++sets_;
 }
 
-ContactReport ContactTerms::report() const {
-  ContactReport report;
-  report.deepest = deepest_;
+double ContactTerms::touching() const {
+  double share = 0.0;
   for (const ContactPlane& plane : found_.planes)
-    if (plane.pressure > 0.0) report.touching += plane.share;
-  return report;
+    if (plane.pressure > 0.0) share += plane.share;
+  return share;
+}
+
+std::string ContactTerms::name_of(Index surface) const {
+  return surface < std::ssize(contact_->obstacles) ? "obstacles[" + std::to_string(surface) + "]" : "ground";
+}
+
+Points ContactTerms::forces_at(const Vec3& place, const double* places) const {
+  Points forces = Points::Zero(std::ssize(surfaces_), 3);
+  for (const ContactPlane& plane : found_.planes) {
+    const double square = (Eigen::Map<const Vec3>(places + 3 * plane.first) - place).squaredNorm();
+    forces.row(plane.obstacle) +=
+        plane.share * plane.pressure / (square + handle_reach * handle_reach) * plane.normal.transpose();
+  }
+  return forces;
 }
 
 void ContactTerms::press(const double* places) {
   for (ContactPlane& plane : found_.planes) {
-    plane.pressure = plane.pressed(plane.gap(places), stiffness);
+    const double gap = plane.gap(places);
+    if (gap < -shallow) continue;  // a solve that has only begun says nothing of forces
+    plane.pressure = plane.pressed(gap, stiffness);
     pressures_(found_.samples[static_cast<std::size_t>(plane.first)], plane.obstacle) = plane.pressure;
   }
 }

@@ -16,7 +16,7 @@ struct ContactSet {
   std::vector<Index> samples;  ///< which of the samples that are followed
   Points places;               ///< (n,3) theirs at rest
   std::vector<ContactPlane> planes;
-  Revision revision = 0;
+  Revision revision = 0;  ///< 0: no planes
 };
 
 /// Where a surface meets obstacles, and how hard it presses there. What is beyond a plane is told by
@@ -40,9 +40,13 @@ class ContactTerms {
 
   const ContactSet& found() const { return found_; }
   bool presses() const { return !found_.planes.empty(); }
-  ContactReport report() const;
+  /// Forces of each surface, (surfaces, 3), on what is at a place: nearer ones count more.
+  Points forces_at(const Vec3& place, const double* places) const;
+  std::string name_of(Index surface) const;
+  double deepest() const { return deepest_; }
+  double touching() const;
   /// Of energy a unit of area for a unit of squared depth, halved.
-  static constexpr double stiffness = 2e4;
+  static constexpr double stiffness = 5e4;
 
  private:
   Vector add_planes(Index k, const std::vector<Index>& rows, PointsIn now);
@@ -53,11 +57,12 @@ class ContactTerms {
   std::optional<Contact> contact_;
   std::vector<BarrierSurface> surfaces_;
   Dependent<RadialEvaluator<double>, 1> evaluator_;
-  std::vector<Index> samples_;          // rows of the problem's samples that are followed
-  Points seen_;                         // where they were last known outside
-  RowMatrix<double> clear_;             // (samples, surfaces) no surface nearer to there
-  RowMatrix<double> pressures_;         // (samples, surfaces)
+  std::vector<Index> samples_;   // rows of the problem's samples that are followed
+  Points seen_;                  // where they were last known outside
+  RowMatrix<double> clear_;      // (samples, surfaces) no surface nearer to there
+  RowMatrix<double> pressures_;  // (samples, surfaces)
   ContactSet found_;
+  Revision sets_ = 0;  // that were found
   double deepest_ = 0.0;
 };
 

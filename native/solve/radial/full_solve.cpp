@@ -114,9 +114,12 @@ LoopResult run(RadialSolver& live, const TrainingOptions& how, const Progress& p
 }
 
 Solution finish(const Shown& shown, const SurfaceSamples& samples, const ObjectiveTerms& terms,
-                LoopResult loop, const Progress& progress) {
+                LoopResult loop, const ContactReport& contact, const Progress& progress) {
   progress.report(0.98, "measuring the result");
-  return measured(shown(), samples, terms, std::move(loop));
+  Solution solution = measured(shown(), samples, terms, std::move(loop));
+  solution.report.contact = contact;
+  for (std::string& note : notes_on(contact)) solution.report.warnings.push_back(std::move(note));
+  return solution;
 }
 
 }  // namespace
@@ -162,7 +165,7 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
   terms.stiffness = SurfaceStiffness(shape->thickness, options.surface);
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
   terms.weights = energy_weights(samples, terms.handles);
-  return finish(shown, samples, terms, std::move(loop), progress);
+  return finish(shown, samples, terms, std::move(loop), solver.report().contact, progress);
 }
 
 DeformOptions followed_closely(DeformOptions options) {
@@ -227,7 +230,7 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
   terms.style = StyleAtSamples::of(style, samples.normals, options.sharpness);
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
   terms.weights = energy_weights(samples, terms.handles);
-  return finish(shown, samples, terms, loop, progress);
+  return finish(shown, samples, terms, loop, solver.report().contact, progress);
 }
 
 }  // namespace arapfields

@@ -155,6 +155,12 @@ Points HandleTerms::targets_between(const std::vector<Mat4>& before, double shar
   return with_reflections(std::move(own));
 }
 
+Index HandleTerms::handle_of(Index pair) const {
+  Index handle = 0;
+  while (any() && rows_[static_cast<std::size_t>(pair)] >= bound_.begin(handle + 1)) ++handle;
+  return handle;
+}
+
 const RowMatrix<double>& HandleTerms::basis_values() {
   return basis_values_.get({revision_},
                            [&] { return radial_rows(problem_.basis, pairs_.sources, JetOrder::value); });

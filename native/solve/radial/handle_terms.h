@@ -27,6 +27,8 @@ class HandleTerms {
   const HandleBatch<double>& pairs() const { return pairs_; }
   /// The first of the pairs, which are the handles' own; without handles all of them.
   Index own_count() const { return any() ? static_cast<Index>(rows_.size()) : pairs_.sources.rows(); }
+  /// Which handle each of its own pairs is of.
+  Index handle_of(Index pair) const;
   /// The pairs' targets at a share of the way from earlier motions of the handles to the current ones.
   Points targets_between(const std::vector<Mat4>& before, double share) const;
   /// How far the motion reaches; null: everywhere.

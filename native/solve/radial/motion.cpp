@@ -6,6 +6,7 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
+#include "solve/radial/contact_solve.h"
 #include "solve/radial/handle_motion.h"
 #include "solve/radial/state.h"
 #include "solve/radial/time_scheme.h"
@@ -80,11 +81,14 @@ void TimeIntegrator::integrate(const Progress& progress) {
     const auto share = [&](double within) {
       return (static_cast<double>(k) + within) / static_cast<double>(steps_);
     };
+    if (state_.contact.any()) state_.contact.find(state_.shape.coefficients);
     const auto integrated = [&](const TimeScheme& scheme) {
+      if (state_.contact.any()) state_.objective(state_.fast);
       objective.set_targets(state_.handles.targets_between(before_, share(scheme.w)));
       return integrate_step(scheme, progress.part(share(0.0), share(1.0)));
     };
-    if (!integrated(body_.accelerations.size() > 0 ? usual : TimeScheme::midpoint()))
+    const bool touches = state_.contact.touching() > 0.0;
+    if (touches || !integrated(body_.accelerations.size() > 0 ? usual : TimeScheme::midpoint()))
       integrated(TimeScheme::backward_euler());
   }
   state_.report.kinetic = kinetic_energy();
@@ -111,6 +115,7 @@ bool TimeIntegrator::integrate_step(const TimeScheme& scheme, const Progress& pr
                       carried_.of(q + w * h_ * v, state_.problem.basis.center_count()));
   objective.set_body(
       body_.inertia_terms<float>(inertia, objective.sample_values_of(ahead - unit / inert * known)));
+  stiffen_contact(state_);
   // Solve, starting where the known acceleration leads.
   coefficients = ahead + unit * a;
   ++state_.shape.revision;
@@ -120,7 +125,9 @@ bool TimeIntegrator::integrate_step(const TimeScheme& scheme, const Progress& pr
                  {tries * state_.problem.options.iterations, motion_tolerance,
                   share * state_.report.kinetic + motion_floor},
                  progress);
-  if (!state_.report.converged && scheme != TimeScheme::backward_euler()) {
+  // A surface that touches ends its steps on the planes, at the cost of energy.
+  const bool pressed = scheme == TimeScheme::backward_euler() ? press_contact(state_) : would_press(state_);
+  if ((pressed || !state_.report.converged) && scheme != TimeScheme::backward_euler()) {
     coefficients = q;
     state_.set_measurements(state_.fast, u);
     return false;

@@ -43,8 +43,10 @@ void RadialObjective<Scalar>::set_targets(PointsIn targets) {
 template <class Scalar>
 void RadialObjective<Scalar>::set_contact(const ContactSet& contact) {
   planes_ = &contact;
-  contact_ = contact.planes.empty() ? RadialEvaluator<Scalar>()
-                                    : RadialEvaluator<Scalar>(problem_.basis, contact.places, JetOrder::value);
+  contact_stiffness_ = {};
+  contact_ = contact.planes.empty()
+                 ? RadialEvaluator<Scalar>()
+                 : RadialEvaluator<Scalar>(problem_.basis, contact.places, JetOrder::value);
 }
 
 template <class Scalar>
@@ -114,8 +116,9 @@ RadialTerms RadialObjective<Scalar>::evaluate(JetView<const Scalar> jets, const 
         fold_barrier<Scalar>(jets, problem_.options.surface.barrier_threshold, barrier(), jet_cotangents);
   if (body_) terms.body = body_energy<Scalar>(jets, *body_, jet_cotangents);
   if (contact_.size() > 0)
-    terms.contact = contact_energy<Scalar>(planes_->planes, ContactTerms::stiffness, u.data() + contact_offset(),
-                                           out != nullptr ? out + contact_offset() : nullptr);
+    terms.contact =
+        contact_energy<Scalar>(planes_->planes, ContactTerms::stiffness, u.data() + contact_offset(),
+                               out != nullptr ? out + contact_offset() : nullptr);
   terms.external =
       external_energies<Scalar>(hooks_.energies, problem_.energy_points, jets, hooks_.weight, jet_cotangents);
   return terms;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <optional>
 
 #include "core/tall_product.h"
@@ -15,10 +16,10 @@
 
 namespace arapfields {
 
-/// mean (stretch + λ·bend) + weight·handles + λ_Gauss·gauss + stance + barrier + body + contact + external + a
-/// vanishing pull of all centers towards zero, of the fields of one radial basis. Measurements: jets at the
-/// energy samples, values at the handles' sources, centers, values at the places of the contact. In single precision a step costs half, and the
-/// value is good to some 1e-6 of itself.
+/// mean (stretch + λ·bend) + weight·handles + λ_Gauss·gauss + stance + barrier + body + contact + external +
+/// a vanishing pull of all centers towards zero, of the fields of one radial basis. Measurements: jets at the
+/// energy samples, values at the handles' sources, centers, values at the places of the contact. In single
+/// precision a step costs half, and the value is good to some 1e-6 of itself.
 template <class Scalar>
 class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
  public:
@@ -38,7 +39,8 @@ class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
   /// What a body with mass feels; none: the solve is one of shapes alone.
   void set_body(std::optional<Body<Scalar>> body) { body_ = std::move(body); }
   void set_hooks(const RadialHooks& hooks) { hooks_ = hooks; }
-  /// The planes that the surface is kept beyond; borrowed. Measurements of others fit after measure_contact().
+  /// The planes that the surface is kept beyond; borrowed. Measurements of others fit after
+  /// measure_contact().
   void set_contact(const ContactSet& contact);
   void measure_contact(const RowMatrix<double>& c, Measurements& u) const;
   void set_contact_stiffness(ContactStiffness stiffness) { contact_stiffness_ = std::move(stiffness); }
@@ -93,7 +95,10 @@ class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
   Index center_offset() const { return handle_offset() + 3 * pairs_.sources.rows(); }
   Index contact_offset() const { return center_offset() + 3 * center_count(); }
   double handle_weight() const { return problem_.options.handle_weight; }
-  double barrier() const { return problem_.options.surface.barrier; }
+  double barrier() const {
+    return std::max(problem_.options.surface.barrier, contact_.size() > 0 ? contact_barrier : 0.0);
+  }
+  static constexpr double contact_barrier = 10.0;  ///< handles that pull into an obstacle fold no surface
 
   const RadialProblem& problem_;
   RadialEvaluator<Scalar> samples_;

@@ -106,10 +106,10 @@ template const VectorF& RadialState::measurements(RadialPrecision<float>&);
 template <class Scalar>
 QuasiNewtonReport RadialState::descend(RadialPrecision<Scalar>& precision, const QuasiNewtonOptions& how,
                                        const Progress& progress) {
-  QuasiNewton& optimizer = history.optimizer.get({problem.energy_revision, hooks_revision, style.revision(),
-                                                  preconditioner.revision, dynamics.revision(), shape.jumps,
-                                                  contact.found().revision},
-                                                 [] { return QuasiNewton(); });
+  QuasiNewton& optimizer = history.optimizer.get(
+      {problem.energy_revision, hooks_revision, style.revision(), preconditioner.revision,
+       dynamics.revision(), shape.jumps, contact.found().revision},
+      [] { return QuasiNewton(); });
   Eigen::VectorX<Scalar> u = precision.u.take(measured_revisions());
   ++shape.revision;  // at once: cancelled between two steps, the coefficients have gone on
   const QuasiNewtonReport found =
@@ -141,6 +141,7 @@ void RadialState::measure(RadialPrecision<Scalar>& precision) {
       measured.with_jets(u, [](JetView<const Scalar> jets) { return distortion<Scalar>(jets); });
   report.warnings =
       warnings_on(report.distortion, far_target(handles.bound(), problem.surface()), handles.bound());
+  for (std::string& note : notes_on(report.contact)) report.warnings.push_back(std::move(note));
   const Points values = measured.handle_values(u).template cast<double>();
   const HandleBatch<double>& pairs = handles.pairs();
   const Index own = handles.own_count();

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <array>
+#include <boost/test/unit_test.hpp>
+
+#include "energies/contact.h"
+
+using namespace arapfields;
+
+BOOST_AUTO_TEST_SUITE(contact)
+
+BOOST_AUTO_TEST_CASE(cotangents_are_those_of_differences) {
+  std::array<double, 9> places{0.1, -0.2, 0.3, 0.4, 0.2, -0.1, -0.3, 0.5, 0.2}, slopes{};
+  const Vec3 normal = Vec3(0.3, -0.5, 0.8).normalized();
+  const std::vector<ContactPlane> planes{{0, -1, normal, 0.5, 0.0, 0.2, 0},
+                                         {1, -1, normal, 0.1, 7.0, 0.3, 0},
+                                         {2, 0, normal, 0.1, 1.0, 0.5, 1},
+                                         {2, -1, normal, -9.0, 0.5, 0.5, 1}};  // out of reach
+  contact_energy<double>(planes, 50.0, places.data(), slopes.data());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const double step = 1e-6, here = places[i];
+    places[i] = here + step;
+    const double more = contact_energy<double>(planes, 50.0, places.data(), nullptr);
+    places[i] = here - step;
+    const double less = contact_energy<double>(planes, 50.0, places.data(), nullptr);
+    places[i] = here;
+    BOOST_TEST(std::abs((more - less) / (2.0 * step) - slopes[i]) < 1e-6);
+  }
+  BOOST_TEST(slopes[0] != 0.0);
+}
+
+BOOST_AUTO_TEST_SUITE_END()

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Contact on a bar: nothing is inside an obstacle, what touches nothing is as without, and nothing is remembered."""
+
+import numpy as np
+import pytest
+import trimesh
+from support.geometry.bar import LEFT, RIGHT, bar_samples, turned
+
+import arapfields as af
+
+QUICK = af.LiveOptions(samples=800, coarse_centers=30, fine_centers=150)
+DEEPEST = 0.004  # 0.1 % of the bar's length
+DOWN = turned(0, shift=(0, 0, -0.9))
+DEEP = [LEFT, DOWN @ RIGHT]
+
+
+@pytest.fixture(scope="module")
+def samples():
+    return bar_samples(16000)
+
+
+def solid(mesh, center):
+    return af.MeshSdf(mesh.vertices + np.array(center), mesh.faces)
+
+
+BALL = solid(trimesh.creation.icosphere(3, 0.5), [1.2, 0, -1.2])
+BLOCK = solid(trimesh.creation.box((0.6, 3, 0.6)), [1.0, 0, -1.1])
+PLATE = solid(trimesh.creation.box((3, 3, 0.03)), [1.5, 0, -0.8])
+SHEET = af.MeshSdf(
+    np.array([[0, -2, -0.8], [4, -2, -0.8], [4, 2, -0.8], [0, 2, -0.8]]), np.array([[0, 1, 2], [0, 2, 3]])
+)
+
+
+class Plane(af.ImplicitFunction):
+    gradient_bound = 1.0
+
+    def __call__(self, points):
+        return points[:, 2] + 0.8
+
+
+def live(samples, contact=None):
+    return af.LiveDeformer(samples, [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)], QUICK, contact=contact)
+
+
+@pytest.mark.parametrize("function", [BALL, BLOCK, PLATE, SHEET, Plane()])
+def test_nothing_is_inside_an_obstacle(samples, function):
+    pressed = live(samples, af.Contact([af.Obstacle(function)]))
+    field = pressed.solve(DEEP, iterations=60, tolerance=1e-4)
+    moved, points = field(samples.points), bar_samples(5000, seed=1).points
+    depth = -np.asarray(function(field(points)))
+    if function is SHEET:
+        depth = -0.8 - field(points)[:, 2]
+    assert depth.max() < 1.5 * DEEPEST  # between the samples
+    assert pressed.report.flipped_share == 0
+    assert moved[:, 2].min() < -0.7
+    if function not in (BALL, BLOCK):
+        (held,) = pressed.report.contact.held
+        assert held.handle == 1 and held.by == "obstacles[0]" and held.distance > 0.1
+        assert "handles[1] is held back by obstacles[0]" in " ".join(pressed.report.notes)
+
+
+def test_what_touches_nothing_is_as_without(samples):
+    far = af.Contact([af.Obstacle(BALL)], ground=-5.0)
+    up = [LEFT, turned(20, shift=(0, 0, 0.3)) @ RIGHT]
+    assert (live(samples, far).solve(up)(samples.points) == live(samples).solve(up)(samples.points)).all()
+    few = af.DeformOptions(centers=100)
+    handles = [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, up[1])]
+    shapes = [af.deform(samples, handles, few, contact=c)(samples.points) for c in (None, far)]
+    assert (shapes[0] == shapes[1]).all()
+
+
+def test_a_drag_through_and_back_leaves_nothing(samples):
+    dragged = live(samples, af.Contact([af.Obstacle(PLATE)]))
+    start = dragged.solve(DEEP[:1] + [RIGHT], iterations=60)(samples.points)
+    for share in (0.3, 0.6, 1.0, 0.6, 0.3, 0.0):
+        dragged.follow([LEFT, turned(0, shift=(0, 0, -1.4 * share)) @ RIGHT], iterations=4)
+    end = dragged.solve(iterations=60, tolerance=1e-6)(samples.points)
+    assert np.abs(end - start).max() < 4e-3
+
+
+def test_deform_keeps_its_margin_and_says_what_is_held(samples):
+    handles = [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, DEEP[1])]
+    contact = af.Contact([af.Obstacle(BALL, 0.05)], ground=-1.0)
+    field = af.deform(samples, handles, af.DeformOptions(centers=200, handle_weight=100), contact=contact)
+    assert np.asarray(BALL(field(samples.points))).min() > 0.05 - DEEPEST
+    assert field(samples.points)[:, 2].min() > -1.0 - DEEPEST
+    assert field.report.contact.held[0].handle == 1 and field.report.contact.touching > 0
+
+
+def test_a_body_that_falls_lands_on_the_ground(samples):
+    falling = live(samples, af.Contact(ground=-0.7))
+    falling.set_secondary_motion(af.SecondaryMotionOptions(gravity=200.0, damping=0.5))
+    lowest = []
+    for _ in range(12):
+        field = falling.step([LEFT, RIGHT], 1 / 24)
+        lowest.append(field(samples.points)[:, 2].min())
+    assert min(lowest) > -0.7 - DEEPEST
+    assert min(lowest) < -0.69
+
+
+def test_what_cannot_be_is_named(samples):
+    handles = [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)]
+    with pytest.raises(af.InvalidInput, match="margin"):
+        af.Obstacle(BALL, -1)
+    with pytest.raises(af.InvalidInput, match="function"):
+        af.Obstacle("ball")
+    with pytest.raises(af.InvalidInput, match="ground"):
+        af.Contact(ground=np.nan)
+    touch = af.Contact([af.Obstacle(BALL)])
+    with pytest.raises(af.InvalidInput, match="exact handles"):
+        af.deform(samples, handles, af.DeformOptions(centers=50, exact_handles=True), contact=touch)
+    with pytest.raises(af.InvalidInput, match="field='radial'"):
+        af.deform(samples, handles, af.DeformOptions(field="neural"), contact=touch)
