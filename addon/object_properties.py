@@ -8,6 +8,7 @@ from .blender.object_references import owner_of, settings_of
 from .blender.property_definitions import choice, collection, flag, integer, number, pointer, text
 from .blender.selection import row_chosen
 from .carried.properties import ARAPFIELDS_PG_carried
+from .contact.properties import ARAPFIELDS_PG_contact
 from .core.settings.choices import NORMALS
 from .handles.properties import ARAPFIELDS_PG_handle
 from .live.properties import ARAPFIELDS_PG_secondary
@@ -60,6 +61,7 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     active_handle: integer("Active Handle", "Row chosen in the list of handles", update=row_chosen)
     stiffness: pointer(ARAPFIELDS_PG_stiffness, "Stiffness", "Vertex groups that are stiffer or softer")
     secondary: pointer(ARAPFIELDS_PG_secondary, "Secondary Motion", "How the surface swings")
+    contact: pointer(ARAPFIELDS_PG_contact, "Contact", "What the surface does not pass")
     carried: collection(ARAPFIELDS_PG_carried, "Carried Objects", "Objects that the field moves as well")
     active_carried: integer("Active Carried Object", "Row chosen in the list of carried objects")
     carried_by: pointer(bpy.types.Object, "Carried By", "The object whose field moves this one")

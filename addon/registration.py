@@ -13,7 +13,7 @@ CONTENTS = [  # modules with CLASSES
     # what is stored in the .blend: object.arapfields
     *("handles.properties", "carried.properties", "poses.properties", "pin_tool.properties"),
     *("stiffness.properties", "live.properties", "animation.properties", "wrap.properties"),
-    "skin.properties",
+    *("skin.properties", "contact.properties"),
     *("properties.solve_settings", "object_properties"),
     # features
     *("surface.operators", "surface.panel"),
@@ -24,7 +24,7 @@ CONTENTS = [  # modules with CLASSES
     *("skin.operators", "skin.panel"),
     *("carried.operators", "carried.panel", "poses.operators", "poses.panel"),
     *("stiffness.operators", "stiffness.panel"),
-    *("live.operators", "live.panel", "pin_tool.operators", "animation.operators"),
+    *("contact.panel", "live.operators", "live.panel", "pin_tool.operators", "animation.operators"),
     *("animation.export_operators", "animation.panel"),
     *("results.operators", "results.panel", "jobs.operators", "jobs.panel"),
     *("menus", "preferences"),

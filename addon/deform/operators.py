@@ -15,6 +15,7 @@ from ..handles.native_handles import native_handles
 from ..live.sessions import end_for_job
 from ..properties.choices import result_properties
 from ..results.placement import destination
+from ..solver.contact import for_job, native_contact
 from .solve_job import SolveOperator, plan_solve_job
 
 
@@ -46,6 +47,7 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
         options = options_of("deform", values)
         handles = empties.solve_handles(source, space_of(source.matrix_world, source.name), weights)
 
+        contact = for_job(context, source)
         require_reach_supported(handles, values)
         scaled = scaling.ignored(source)
         if scaled is not None:
@@ -53,7 +55,13 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
 
         def solve(tracker, rest, samples, weight):
             natives = native_handles(af, handles, rest, samples)
-            return af.deform(samples, natives, options, task=tracker.start("Deforming", weight))
+            return af.deform(
+                samples,
+                natives,
+                options,
+                contact=native_contact(contact),
+                task=tracker.start("Deforming", weight),
+            )
 
         return plan_solve_job(context, self, source, "DEFORM", values["samples"], values["seed"], solve)
 

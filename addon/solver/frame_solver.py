@@ -11,6 +11,7 @@ from ..core.geometry.edges import Topology
 from ..core.runtime import native
 from ..core.settings.parameters import presets
 from ..handles.native_handles import native_handles
+from .contact import native_contact
 from .request import Request
 from .setup import at_samples
 
@@ -79,6 +80,7 @@ class FrameSolver:
         self.solver = af.LiveDeformer(self.sampled.samples, held, options_of("live", options, setup.machine))
         self.solver.track(self.rest)
         self.handles, self.energy, self.style_key, self.motion = handles, energy, None, None
+        self.contact_key = None
 
     def _native_handles(self, handles):
         setup = self.sampled.setup
@@ -99,6 +101,9 @@ class FrameSolver:
             self.style_key, directions, strength, sharpness, up = request.style
             weights = self.sampled.region
             self.solver.set_style(directions, strength, sharpness=sharpness, weights=weights, up=up)
+        if request.contact_key != self.contact_key:
+            self.contact_key = request.contact_key
+            self.solver.set_contact(native_contact(request.contact))
         if request.motion != self.motion:
             self._set_motion(request.motion)
         return request.targets if request.handles else None

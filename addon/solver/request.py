@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..carried.carried_objects import CarriedPose
+from .contact import ContactTerm
 from .secondary_motion import SecondaryMotion
 
 
@@ -36,10 +37,15 @@ class Request(NamedTuple):
     energy: dict  # weights of the energy's terms, by name
     carried: list  # carried.carried_objects.CarriedPose of what goes along
     motion: SecondaryMotion | None
+    contact: ContactTerm | None = None
 
     @property
     def style_key(self):
         return None if self.style is None else self.style.key
+
+    @property
+    def contact_key(self):
+        return None if self.contact is None else self.contact.key
 
     def goes_on_from(self, earlier):
         """Whether a solve may start from the shape of an earlier one: handles or a slider are dragged."""
@@ -51,6 +57,7 @@ class Request(NamedTuple):
         carried = [(pose.points, pose.rest, pose.now, pose.parent) for pose in self.carried]
         hashed = hashlib.sha1()
         parts = self.targets, self.style_key, self.points, self.handles, self.energy, carried, self.motion
+        parts += (self.contact_key,)
         for part in flat((parts, further)):
             hashed.update(part)
         return hashed.hexdigest()
@@ -61,6 +68,7 @@ class Request(NamedTuple):
             self.style_key == other.style_key
             and self.energy == other.energy
             and self.motion == other.motion
+            and self.contact_key == other.contact_key
             and self.handles is other.handles
             and (self.points is other.points or np.array_equal(self.points, other.points))
             and len(self.carried) == len(other.carried)

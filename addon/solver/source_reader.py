@@ -16,6 +16,7 @@ from ..core.runtime import native
 from ..handles import empties
 from ..surface.source_surface import read_surface
 from . import secondary_motion, style_settings
+from .contact import contact_of
 from .request import Request, StyleTerm
 from .setup import SolverSetup, energy_weights
 
@@ -117,6 +118,7 @@ class SourceReader:
             energy_weights(settings, self.kind),
             carried,
             secondary_motion.motion_of(settings, space),
+            contact_of(source, settings, space, rendered or depsgraph_of(context)),
         )
 
 

@@ -18,6 +18,7 @@ from ..live.sessions import end_for_job
 from ..properties.choices import orientation, result_properties, style
 from ..results.placement import destination
 from ..solver import style_settings
+from ..solver.contact import for_job, native_contact
 
 
 class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
@@ -55,6 +56,8 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
         handles = empties.solve_handles(source, space, of_groups) if settings.use_handles else []
         weights = style_settings.region_weights(context, source, settings, of_groups, self.in_place(source))
 
+        contact = for_job(context, source)
+
         def solve(tracker, rest, samples, weight):
             blend = (
                 None if weights is None else vertex_groups.at_points(rest.vertices, weights, samples.points)
@@ -66,6 +69,7 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
                 weights=blend,
                 up=style.up,
                 handles=native_handles(af, handles, rest, samples, reaches=False),
+                contact=native_contact(contact),
                 task=tracker.start("Stylizing", weight),
             )
 

@@ -21,6 +21,7 @@ ORDER = [
     "results",
     "viewport",
     "solver",
+    "contact",
     "live",
     "poses",
     "deform",

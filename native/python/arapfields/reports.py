@@ -10,6 +10,8 @@ from typing import Any, Generic, Literal, NamedTuple, Self, TypeAlias, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from ._contact_report import ContactReport as ContactReport
+from ._contact_report import HeldBack as HeldBack
 from ._report import Iteration as Iteration
 from ._report import Report as Report
 
@@ -44,28 +46,6 @@ class HandleError(Report):
 
     error_mean: float
     error_max: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class HeldBack(Report):
-    """A handle that contact keeps from its target."""
-
-    handle: int
-    by: str
-    """"obstacles[0]", say, or "ground"."""
-    distance: float
-    """Mean distance to the target, in mesh units."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ContactReport(Report):
-    """How a surface touches."""
-
-    deepest: float
-    """How far a sample is beyond an obstacle's margin, in mesh units."""
-    touching: float
-    """Share of the area that presses."""
-    held: tuple[HeldBack, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
