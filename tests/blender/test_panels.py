@@ -64,7 +64,7 @@ def test_the_panel_draws(state):
         assert shown == ["ARAPFIELDS_PT_source"]
     else:
         said = "ARAPFIELDS_PT_status" in shown
-        assert len(shown) == 17 + said and said == (
+        assert len(shown) == 18 + said and said == (
             state in ("modifiers and keys", "fitted", "fit cleared", "running", "a failure")
         )
     if state in EXPECTED:

@@ -75,6 +75,12 @@ bool would_press(RadialState& s) {
       [&](const ContactPlane& p) { return p.pressed(p.gap(places.data()), ContactTerms::stiffness) > 0.0; });
 }
 
+bool is_deep(RadialState& s) {
+  const Points places = contact_places(s);
+  return std::any_of(s.contact.found().planes.begin(), s.contact.found().planes.end(),
+                     [&](const ContactPlane& p) { return p.gap(places.data()) < -3.0 * deep; });
+}
+
 bool press_contact(RadialState& s) {
   if (s.contact.presses()) s.contact.press(contact_places(s).data());
   return s.contact.touching() > 0.0;

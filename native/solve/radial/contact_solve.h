@@ -17,5 +17,7 @@ void stiffen_contact(RadialState& state);
 /// Updates the pressures; whether any is left.
 bool press_contact(RadialState& state);
 bool would_press(RadialState& state);
+/// Whether a place is deeper than solves leave it.
+bool is_deep(RadialState& state);
 
 }  // namespace arapfields

@@ -21,7 +21,7 @@ constexpr double same_side = 0.3;
 constexpr double kept = 1.5e-3;
 /// Factor on what a depth adds to a pressure: fewer rounds, and below 2 they converge.
 constexpr double relaxed = 1.8;
-/// Pressures follow from gaps that are no deeper, in cube units.
+/// Pressures grow by no deeper gaps, in cube units: a solve that has only begun says little of forces.
 constexpr double shallow = 0.01;
 /// Forces farther than this from a handle, in cube units, count less.
 constexpr double handle_reach = 0.2;
@@ -74,13 +74,18 @@ void ContactTerms::begin(const RowMatrix<double>& coefficients) {
   release();
 }
 
-double ContactTerms::find(const RowMatrix<double>& coefficients) {
+double ContactTerms::fastest(const RowMatrix<double>& rates) {
+  return std::sqrt(places_at(rates).rowwise().squaredNorm().maxCoeff());
+}
+
+double ContactTerms::find(const RowMatrix<double>& coefficients, double further) {
+  further_ = further;
   const Points places = places_at(coefficients);
   std::vector<Index> rows;
   for (Index i = 0; i < places.rows(); ++i) {
     const double way = (places.row(i) - seen_.row(i)).norm();
     for (Index k = 0; k < clear_.cols(); ++k)
-      if (clear_(i, k) - way < near + surfaces_[static_cast<std::size_t>(k)].margin()) {
+      if (clear_(i, k) - way < near + further_ + surfaces_[static_cast<std::size_t>(k)].margin()) {
         rows.push_back(i);
         break;
       }
@@ -128,7 +133,7 @@ Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsI
       nearest.distances[i] *= -1.0;
       offsets[i] *= -1.0;
     }
-    if (nearest.distances[i] < near && nearest.normals.row(i).dot(hit.normal) > same_side) continue;
+    if (nearest.distances[i] < near + further_ && nearest.normals.row(i).dot(hit.normal) > same_side) continue;
     if (beyond > 0.0 && nearest.distances[i] > 0.0) continue;  // around it
     nearest.normals.row(i) = hit.normal.transpose();
     nearest.distances[i] = beyond;
@@ -137,7 +142,7 @@ Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsI
   for (Index i = 0; i < now.rows(); ++i) {
     const double margin = surface.margin() + kept, gap = nearest.distances[i] - margin;
     const Index row = rows[static_cast<std::size_t>(i)];
-    if (gap > near) {
+    if (gap > near + further_) {
       pressures_(row, k) = 0.0;
       continue;
     }
@@ -187,8 +192,7 @@ Points ContactTerms::forces_at(const Vec3& place, const double* places) const {
 
 void ContactTerms::press(const double* places) {
   for (ContactPlane& plane : found_.planes) {
-    const double gap = plane.gap(places);
-    if (gap < -shallow) continue;  // a solve that has only begun says nothing of forces
+    const double gap = std::max(-shallow, plane.gap(places));
     plane.pressure = plane.pressed(gap, gap < 0.0 ? relaxed * stiffness : stiffness);
     pressures_(found_.samples[static_cast<std::size_t>(plane.first)], plane.obstacle) = plane.pressure;
   }

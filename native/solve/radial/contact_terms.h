@@ -32,7 +32,10 @@ class ContactTerms {
   /// The ways start here, without pressure.
   void begin(const RowMatrix<double>& coefficients);
   /// Follows the surface, and finds the planes near it. Returns how deep a sample is beyond a margin.
-  double find(const RowMatrix<double>& coefficients);
+  /// `further`: how much farther than usual, in cube units, what is near lies.
+  double find(const RowMatrix<double>& coefficients, double further = 0.0);
+  /// The largest speed of a sample, where coefficients change at these rates.
+  double fastest(const RowMatrix<double>& rates);
   /// Pressures after a solve that left the places of found() there.
   void press(const double* places);
   /// No planes: the surface is free.
@@ -63,7 +66,7 @@ class ContactTerms {
   RowMatrix<double> pressures_;  // (samples, surfaces)
   ContactSet found_;
   Revision sets_ = 0;  // that were found
-  double deepest_ = 0.0;
+  double deepest_ = 0.0, further_ = 0.0;
 };
 
 }  // namespace arapfields

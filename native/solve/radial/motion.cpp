@@ -29,6 +29,9 @@ constexpr Index first_iterations = 4;
 /// Largest correction of a step that was not solved to its end, as a share of the step.
 constexpr double most_left = 0.1;
 
+/// Solves of a step at most, beside the first, while what touches is deep.
+constexpr Index contact_rounds = 8;
+
 /// Limits of a frame in seconds.
 constexpr double shortest_frame = 1e-5, longest_frame = 10.0;
 
@@ -81,7 +84,8 @@ void TimeIntegrator::integrate(const Progress& progress) {
     const auto share = [&](double within) {
       return (static_cast<double>(k) + within) / static_cast<double>(steps_);
     };
-    if (state_.contact.any()) state_.contact.find(state_.shape.coefficients);
+    if (state_.contact.any())
+      state_.contact.find(state_.shape.coefficients, 2.0 * h_ * state_.contact.fastest(body_.velocities));
     const auto integrated = [&](const TimeScheme& scheme) {
       if (state_.contact.any()) state_.objective(state_.fast);
       objective.set_targets(state_.handles.targets_between(before_, share(scheme.w)));
@@ -125,6 +129,14 @@ bool TimeIntegrator::integrate_step(const TimeScheme& scheme, const Progress& pr
                  {tries * state_.problem.options.iterations, motion_tolerance,
                   share * state_.report.kinetic + motion_floor},
                  progress);
+  for (Index round = 0; scheme == TimeScheme::backward_euler() && round < contact_rounds; ++round) {
+    if (!press_contact(state_) || !is_deep(state_)) break;
+    stiffen_contact(state_);
+    state_.descend(
+        state_.fast,
+        {state_.problem.options.iterations, motion_tolerance, share * state_.report.kinetic + motion_floor},
+        progress);
+  }
   // A surface that touches ends its steps on the planes, at the cost of energy.
   const bool pressed = scheme == TimeScheme::backward_euler() ? press_contact(state_) : would_press(state_);
   if ((pressed || !state_.report.converged) && scheme != TimeScheme::backward_euler()) {
