@@ -12,7 +12,7 @@ void bind_contact(py::module_& module) {
 A solid that a surface stays outside of: an implicit function, negative inside, in mesh coordinates.
 
 An open MeshSdf is a sheet, which nothing passes from either side.)")
-      .def(py::init([](const py::object& function, double margin) {
+      .def(py::init([](const FunctionArgument& function, double margin) {
              require_not_negative("margin", margin);
              return Obstacle{as_function(function, "function"), margin};
            }),

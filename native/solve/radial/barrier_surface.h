@@ -24,7 +24,8 @@ class BarrierSurface {
 
   struct Hit {
     double share = 2.0;  ///< of the way; above 1: free
-    Vec3 place, normal;  ///< the normal is towards where the way began
+    Vec3 place;
+    Vec3 normal;  ///< towards where the way began
   };
   /// Where straight ways first meet the surface, from places outside.
   std::vector<Hit> first_hits(PointsIn from, PointsIn to) const;
@@ -34,9 +35,12 @@ class BarrierSurface {
   PointsF in_function(PointsIn points, Vector& beyond, Points* outward) const;
 
   std::shared_ptr<const ImplicitFunction> function_;  // null: the plane
-  Frame frame_, own_;                                 // of the surface, and of the function
-  bool sheet_ = false, is_distance_ = true;
-  double margin_ = 0.0, height_ = 0.0;  // cube units
+  Frame frame_;                                       // of the surface
+  Frame own_;                                         // of the function
+  bool sheet_ = false;
+  bool is_distance_ = true;
+  double margin_ = 0.0;  // cube units
+  double height_ = 0.0;
   Vec3 up_ = Vec3::UnitZ();
 };
 

@@ -133,7 +133,8 @@ Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsI
       nearest.distances[i] *= -1.0;
       offsets[i] *= -1.0;
     }
-    if (nearest.distances[i] < near + further_ && nearest.normals.row(i).dot(hit.normal) > same_side) continue;
+    if (nearest.distances[i] < near + further_ && nearest.normals.row(i).dot(hit.normal) > same_side)
+      continue;
     if (beyond > 0.0 && nearest.distances[i] > 0.0) continue;  // around it
     nearest.normals.row(i) = hit.normal.transpose();
     nearest.distances[i] = beyond;

@@ -66,7 +66,8 @@ class ContactTerms {
   RowMatrix<double> pressures_;  // (samples, surfaces)
   ContactSet found_;
   Revision sets_ = 0;  // that were found
-  double deepest_ = 0.0, further_ = 0.0;
+  double deepest_ = 0.0;
+  double further_ = 0.0;
 };
 
 }  // namespace arapfields

@@ -31,7 +31,8 @@ struct RadialShape {
 template <class Scalar>
 struct RadialPrecision {
   Dependent<std::unique_ptr<RadialObjective<Scalar>>, 1> objective;
-  Revision handles = 0, contact = 0;       ///< that the objective knows
+  Revision handles = 0;                    ///< that the objective knows
+  Revision contact = 0;                    ///< likewise
   Dependent<Eigen::VectorX<Scalar>, 4> u;  ///< measurements of the current shape
   int uses = 0;                            ///< solves since they were measured afresh
 };
