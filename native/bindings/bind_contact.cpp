@@ -19,19 +19,18 @@ An open MeshSdf is a sheet, which nothing passes from either side.)")
            "function"_a, "margin"_a = 0.0, "`margin`: the distance that is kept, in mesh units.")
       .def_readonly("margin", &Obstacle::margin, "The distance that is kept.");
   py::class_<Contact>(module, "Contact", R"(
-What a surface does not pass: obstacles, itself, and a ground at a height along `up`.
+What a surface does not pass: obstacles, and a ground at a height along `up`.
 
 For deform, stylize and LiveDeformer. Handles whose targets lie beyond give way: report.contact says which.)")
-      .def(py::init([](std::vector<Obstacle> obstacles, bool itself, std::optional<double> ground,
+      .def(py::init([](std::vector<Obstacle> obstacles, std::optional<double> ground,
                        const std::optional<ArrayArgument>& up) {
-             Contact contact{std::move(obstacles), itself, ground};
+             Contact contact{std::move(obstacles), ground};
              if (up) contact.up = as_vec3(*up, "up");
              require_contact(contact);
              return contact;
            }),
-           "obstacles"_a = py::tuple(), "itself"_a = false, "ground"_a = py::none(), py::kw_only(),
-           "up"_a = py::none(), "`up` (3,) is z unless given.")
-      .def_readonly("itself", &Contact::itself, "Whether the surface does not pass itself.")
+           "obstacles"_a = py::tuple(), py::kw_only(), "ground"_a = py::none(), "up"_a = py::none(),
+           "`up` (3,) is z unless given.")
       .def_readonly("ground", &Contact::ground, "The ground's height, or None.");
 }
 

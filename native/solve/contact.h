@@ -21,10 +21,9 @@ struct Obstacle {
 /// What a surface does not pass.
 struct Contact {
   std::vector<Obstacle> obstacles;
-  bool itself = false;
   std::optional<double> ground;  ///< height along `up`, in mesh coordinates; none: no ground
   Vec3 up = Vec3::UnitZ();
-  bool any() const { return !obstacles.empty() || itself || ground; }
+  bool any() const { return !obstacles.empty() || ground; }
 };
 
 /// A handle that contact keeps from its target.
