@@ -37,6 +37,7 @@ ARAPFIELDS_PYTHON_TYPE(NormalsArgument,
 ARAPFIELDS_PYTHON_TYPE(StyleArgument, "arapfields._native.StyleName")
 ARAPFIELDS_PYTHON_TYPE(HandlesArgument, "collections.abc.Iterable[arapfields._native.Handle]")
 ARAPFIELDS_PYTHON_TYPE(BonesArgument, "collections.abc.Iterable[arapfields._native.Bone]")
+ARAPFIELDS_PYTHON_TYPE(ObstaclesArgument, "collections.abc.Iterable[arapfields._native.Obstacle]")
 ARAPFIELDS_PYTHON_TYPE(ShapeArgument,
                        "tuple[arapfields.arrays.ArrayLike, arapfields.arrays.ArrayLike] | "
                        "arapfields._native.SurfaceSamples")

@@ -22,9 +22,9 @@ An open MeshSdf is a sheet, which nothing passes from either side.)")
 What a surface does not pass: obstacles, and a ground at a height along `up`.
 
 For deform, stylize and LiveDeformer. Handles whose targets lie beyond give way: report.contact says which.)")
-      .def(py::init([](std::vector<Obstacle> obstacles, std::optional<double> ground,
+      .def(py::init([](const ObstaclesArgument& obstacles, std::optional<double> ground,
                        const std::optional<ArrayArgument>& up) {
-             Contact contact{std::move(obstacles), ground};
+             Contact contact{as_items<Obstacle>(obstacles, "obstacles", "Obstacles are needed"), ground};
              if (up) contact.up = as_vec3(*up, "up");
              require_contact(contact);
              return contact;

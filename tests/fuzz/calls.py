@@ -213,6 +213,12 @@ def members(t):
             by_name(af.wrap, "task"),
             [t["samples"], t["mesh_sdf"], [], af.WrapOptions(**WRAP), af.Task()],
         ),
+        "Obstacle": lambda: (af.Obstacle, [t["mesh_sdf"], 0.1]),
+        "Contact": lambda: (
+            by_name(af.Contact, "ground", "up"),
+            [[af.Obstacle(t["mesh_sdf"])], 0.0, np.ones(3)],
+        ),
+        "LiveDeformer.set_contact": lambda: (t["live"].set_contact, [af.Contact(ground=-1.0)]),
         "Correspondence": lambda: (
             by_name(af.Correspondence, "back"),
             [TETRAHEDRON, (TETRAHEDRON, FACES), (TETRAHEDRON, FACES), False],
