@@ -11,7 +11,7 @@ from . import caches, played
 
 class ARAPFIELDS_PT_animation(Section, bpy.types.Panel):
     bl_label = "Bake and Export"
-    bl_order = 8
+    bl_order = 10
     bl_options = {"DEFAULT_CLOSED"}
 
     def fill(self, context, source, settings):

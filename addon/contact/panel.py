@@ -8,7 +8,7 @@ from ..solver import contact
 
 class ARAPFIELDS_PT_contact(Section, bpy.types.Panel):
     bl_label = "Contact"
-    bl_order = 6
+    bl_order = 8
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw_header(self, context):

@@ -40,7 +40,7 @@ class ARAPFIELDS_PT_status(Section, bpy.types.Panel):
     """Last: what comes and goes moves nothing above it."""
 
     bl_label = "Status"
-    bl_order = 10
+    bl_order = 12
     needs_source = False
 
     @classmethod

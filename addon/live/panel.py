@@ -38,7 +38,7 @@ def playback_progress(layout, source, kind):
 
 class ARAPFIELDS_PT_secondary(Section, bpy.types.Panel):
     bl_label = "Secondary Motion"
-    bl_order = 6
+    bl_order = 7
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw_header(self, context):

@@ -12,7 +12,7 @@ class ARAPFIELDS_UL_poses(bpy.types.UIList):
 
 class ARAPFIELDS_PT_poses(Section, bpy.types.Panel):
     bl_label = "Poses"
-    bl_order = 7
+    bl_order = 9
     bl_options = {"DEFAULT_CLOSED"}
 
     def fill(self, context, source, settings):

@@ -10,7 +10,7 @@ from . import rig as rigs
 
 class ARAPFIELDS_PT_skin(Section, bpy.types.Panel):
     bl_label = "Skin"
-    bl_order = 6
+    bl_order = 5
     bl_options = {"DEFAULT_CLOSED"}
     needs_source = False
 

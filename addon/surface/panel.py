@@ -41,7 +41,7 @@ class ARAPFIELDS_PT_source(Section, bpy.types.Panel):
 
 class ARAPFIELDS_PT_advanced(Section, bpy.types.Panel):
     bl_label = "Advanced"
-    bl_order = 9
+    bl_order = 11
     bl_options = {"DEFAULT_CLOSED"}
 
     def fill(self, context, source, settings):

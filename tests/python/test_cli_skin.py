@@ -39,7 +39,7 @@ def test_weights_are_those_of_the_library(tmp_path):
         ([{**BONES[0], "parent": "Nobody"}], "bone Spine: Nobody is not known"),
         ([{**BONES[0], "roles": 3}], "bone Spine: roles is not known"),
         ({"bones": BONES}, "a list of bones"),
-        ([{"name": "Spine", "head": [0, 0]}], "not readable as bones"),
+        ([{"name": "Spine", "head": [0, 0]}], "bone Spine: tail: is missing"),
     ],
 )
 def test_bones_are_checked(tmp_path, capsys, rows, text):

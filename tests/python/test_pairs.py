@@ -19,7 +19,9 @@ OPTIONS = {name for name in dir(_native) if name.endswith("Options")} - {"Deform
 # What only holds numbers, or is another class's base or kind.
 VALUES = {
     "Bone",
+    "Contact",
     "Corrective",
+    "Obstacle",
     "Handle",
     "CuboidHandle",
     "RegionHandle",

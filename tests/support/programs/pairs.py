@@ -86,6 +86,7 @@ CLASSES = {
             "set_weights": lambda it: it.set_weights(np.linspace(1, 2, len(BALL))),
             "set_symmetry": lambda it: it.set_symmetry("x"),
             "set_style": lambda it: it.set_style("cube", 1.0),
+            "set_contact": lambda it: it.set_contact(None),
             "set_secondary_motion": lambda it: it.set_secondary_motion(),
             "set motion_state": assign("motion_state", STATE),
             "reset": lambda it: it.reset(),
@@ -127,6 +128,13 @@ CLASSES = {
     "Attachment": (
         lambda: af.Attachment(SAMPLES, 1.3 * POINTS),
         {"positions": lambda it: it.positions(MOVED), "__len__": len, "__repr__": repr},
+    ),
+    "Correspondence": (
+        lambda: af.Correspondence(TETRAHEDRON[0], TETRAHEDRON, TETRAHEDRON),
+        {
+            "values": lambda it: it.values(TETRAHEDRON[0]),
+            "displacements": lambda it: it.displacements(TETRAHEDRON[0]),
+        },
     ),
     "ObjectStyle": (
         lambda: af.ObjectStyle(*TETRAHEDRON),

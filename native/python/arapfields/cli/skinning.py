@@ -90,5 +90,8 @@ def read_bones(path):
             if unknown:
                 raise af.InvalidInput(f"{path}: bone {row['name']}: {unknown[0]} is not known")
             given = {key: value for key, value in row.items() if key != "parent"}
-            found.append(af.Bone(parent=numbers.get(row.get("parent")), **given))
+            try:
+                found.append(af.Bone(parent=numbers.get(row.get("parent")), **given))
+            except af.InvalidInput as error:
+                raise af.InvalidInput(f"{path}: bone {row['name']}: {error}") from None
     return found
