@@ -221,14 +221,11 @@ def members(t):
         "LiveDeformer.set_contact": lambda: (t["live"].set_contact, [af.Contact(ground=-1.0)]),
         "Correspondence": lambda: (
             by_name(af.Correspondence, "back"),
-            [TETRAHEDRON, (TETRAHEDRON, FACES), (TETRAHEDRON, FACES), False],
+            [TETRAHEDRON, t["mesh"], t["mesh"], False],
         ),
         "Correspondence.values": lambda: (t["places"].values, [TETRAHEDRON]),
         "Correspondence.displacements": lambda: (t["places"].displacements, [TETRAHEDRON]),
-        "transfer": lambda: (
-            af.transfer,
-            [TETRAHEDRON, (TETRAHEDRON, FACES), (TETRAHEDRON, FACES), {"values": TETRAHEDRON}],
-        ),
+        "transfer": lambda: (af.transfer, [TETRAHEDRON, t["mesh"], t["mesh"], {"values": TETRAHEDRON}]),
         "PointCacheReader": lambda: (af.PointCacheReader, ["/nonexistent"]),
         "PointCacheWriter": lambda: (
             by_name(writer, "start", "step"),

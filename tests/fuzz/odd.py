@@ -91,6 +91,7 @@ def make_things():
         "curve_handle": af.CurveHandle([0, 1]),
         "task": af.Task(),
         "frame": field.frame,
+        "mesh": (TETRAHEDRON, FACES),
         "mesh_sdf": af.MeshSdf(TETRAHEDRON, FACES),
         "places": af.Correspondence(TETRAHEDRON, (TETRAHEDRON, FACES), (TETRAHEDRON, FACES)),
         "style": af.ObjectStyle(TETRAHEDRON, FACES),
