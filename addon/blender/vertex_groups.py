@@ -65,6 +65,14 @@ def weights_in(mesh, groups):
     return {name: weights[index] for name, index in groups.items()}
 
 
+def put(item, name, weights):
+    """Gives the object's group of this name, made where there is none, these weights (n,); 0: no member."""
+    group = item.vertex_groups.get(name) or item.vertex_groups.new(name=name)
+    group.remove(range(len(weights)))
+    for index in np.flatnonzero(weights).tolist():
+        group.add((index,), float(weights[index]), "REPLACE")
+
+
 def at_points(vertices, weights, points):
     """(p,) weights of points, each from its three nearest vertices by inverse distance."""
     return NearestVertices(vertices, points)(weights)

@@ -6,7 +6,7 @@ Blender evaluates such formulas itself: they play where Python may not run, and 
 
 import numpy as np
 
-from ..blender import mesh_arrays
+from ..blender import mesh_arrays, vertex_groups
 from ..names import CORRECTIVE
 from ..results.placement import single_user
 from . import rig as rigs
@@ -20,17 +20,9 @@ PRODUCTS = ("w*x", "w*y", "w*z", "x*x", "y*y", "z*z", "x*y", "x*z", "y*z")  # as
 def write_weights(item, names, weights, kept):
     """Puts (n, bones) weights into the bones' groups; those of `kept` stay as they are."""
     single_user(item)
-    every = list(range(len(weights)))
     for column, name in zip(np.asarray(weights).T, names, strict=True):
-        if name in kept:
-            continue
-        group, used = item.vertex_groups.get(name), np.flatnonzero(column)
-        if group is None and not len(used):
-            continue
-        group = group or item.vertex_groups.new(name=name)
-        group.remove(every)
-        for index, weight in zip(used.tolist(), column[used].tolist(), strict=True):
-            group.add((index,), weight, "REPLACE")
+        if name not in kept and (column.any() or name in item.vertex_groups):
+            vertex_groups.put(item, name, column)
 
 
 def follow(item, rig):
@@ -98,12 +90,9 @@ def drive(key, rig, bone, coefficients):
 
 def formula(coefficients):
     """Of at most 255 characters, which is what a driver holds."""
-    terms = [f"{value:+.7g}*{product}" for value, product in zip(coefficients, PRODUCTS, strict=True)]
-    text = "".join(terms).removeprefix("+")
-    return (
-        text
-        if len(text) < 256
-        else "".join(
-            f"{value:+.4g}*{product}" for value, product in zip(coefficients, PRODUCTS, strict=True)
-        ).removeprefix("+")
-    )
+    for digits in (7, 4):
+        terms = [f"{c:+.{digits}g}*{product}" for c, product in zip(coefficients, PRODUCTS, strict=True)]
+        text = "".join(terms).removeprefix("+")
+        if len(text) < 256:
+            break
+    return text

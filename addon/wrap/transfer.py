@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from ..blender import mesh_arrays, modifier_stack
+from ..blender import mesh_arrays, modifier_stack, vertex_groups
 from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..core.errors import UserError, refuse
@@ -141,26 +141,16 @@ class Transfer:
         )
 
     def groups(self):
-        names = [group.name for group in self.source.vertex_groups]
+        indices = {group.name: group.index for group in self.source.vertex_groups}
         with modifier_stack.moved_mesh(self.context, self.source) as mesh:
-            weights = np.zeros((len(mesh.vertices), len(names)))
-            for index, vertex in enumerate(mesh.vertices):
-                for member in vertex.groups:
-                    if member.group < len(names):
-                        weights[index, member.group] = member.weight
-        carried = self.places.values(weights)
+            given = vertex_groups.weights_in(mesh, indices)
         done = 0
-        for column, name in enumerate(names):
-            group = self.target.vertex_groups.get(name)
-            if group is not None and group.lock_weight:
-                continue
-            if group is not None:
-                group.remove(range(len(carried)))
-            else:
-                group = self.target.vertex_groups.new(name=name)
-            for index in np.flatnonzero(carried[:, column] > LEAST_WEIGHT):
-                group.add([int(index)], float(carried[index, column]), "REPLACE")
-            done += 1
+        for name, weights in given.items():
+            there = self.target.vertex_groups.get(name)
+            if there is None or not there.lock_weight:
+                carried = self.places.values(weights)
+                vertex_groups.put(self.target, name, np.where(carried > LEAST_WEIGHT, carried, 0.0))
+                done += 1
         return done
 
     def attributes(self):
