@@ -44,11 +44,11 @@ def recover(clear):
                 take_away(session)
         else:
             session.restored()  # what it wrote may have been undone
-    for source in bpy.data.objects:
-        if settings_of(source).live_kind and not is_live(source):
-            with contextlib.suppress(UserError, RuntimeError, AttributeError):
-                if not clear(source):
-                    settings_of(source).live_kind = ""
+    # A list: clear() deletes objects, and Blender's own iterator would go on from one that is gone.
+    for source in [s for s in bpy.data.objects if settings_of(s).live_kind and not is_live(s)]:
+        with contextlib.suppress(UserError, RuntimeError, AttributeError):
+            if not clear(source):
+                settings_of(source).live_kind = ""
 
 
 def bring_back(source):

@@ -94,6 +94,8 @@ class SolvedFrames:
                 if self._ended:
                     return
                 frame, request = self._next()
+                if frame in self._kept and self._kept[frame][0].is_like(request):
+                    continue  # requested again while it was being solved
                 edition = self._edition
             try:
                 self._solver = self._solver or self._clone()

@@ -30,6 +30,7 @@ def isolated(folder):
         "BLENDER_USER_RESOURCES": str(folder),
         "TMPDIR": str(folder),
         "OMP_NUM_THREADS": "1",  # the solves here are too small for more
+        "MALLOC_PERTURB_": "165",  # glibc: memory is filled when it is freed, so that who reads it then fails
     }
 
 

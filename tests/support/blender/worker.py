@@ -4,6 +4,7 @@
 Reads lines of JSON, {"file", "function", "arguments"}, and answers each with one line: "" or a traceback.
 """
 
+import faulthandler
 import functools
 import importlib.util
 import json
@@ -41,6 +42,7 @@ def run(order):
 
 
 def main():
+    faulthandler.enable()  # a crash names the lines that every thread is at
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)  # what Blender prints must not pass for an answer
     for line in sys.stdin:
