@@ -29,6 +29,10 @@ class LiveModifier:
         motion.bind(context, source)
         visibility.show_alone(source, source, for_now=True)
 
+    @property
+    def arrays(self):
+        return (*stored.arrays_of(self.before), *stored.arrays_of(self.first))
+
     def require(self, source):
         """UserError where the user has removed or applied it."""
         if modifier_stack.find(source) is None:

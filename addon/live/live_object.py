@@ -14,7 +14,7 @@ LIVE = "LIVE"  # kind of the result that a live source has
 class LiveObject:
     """Made at the start; the source is out of sight and out of renders meanwhile."""
 
-    in_place = False
+    in_place, arrays = False, ()
 
     def __init__(self, context, source, surface):
         mesh = result_objects.shown_mesh(context, source, len(surface.local))

@@ -53,10 +53,12 @@ def recover(clear):
 
 def bring_back(source):
     """Whether the session by which the source was live comes back; a live object without one goes."""
-    former = live.past.get(settings_of(source).live_number)
+    number = settings_of(source).live_number
+    former = live.past.get(number)
     if former is None or not former.display.in_place:
         stored.put_mark(source, "")
         return discard_live_object(source)
+    live.past.keep(number, former)
     live.returning[source.session_uid] = former
     return True
 

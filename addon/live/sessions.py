@@ -21,9 +21,9 @@ from ..solver.frame_range import scene_range
 from ..solver.source_reader import SourceChanged
 from .edits import Updates
 from .session import Session
+from .stored import Kept
 
 INTERVAL = 1 / 60  # seconds between looks
-MOST_PAST = 20  # sessions that can come back
 WAIT = 30.0  # seconds at most that a script waits for the first shape
 
 
@@ -33,7 +33,8 @@ class Sessions(dict):
     is_rendering = False  # then frames are followed one by one, and nothing else
 
     def __init__(self):
-        self.past = {}  # number of a session that has ended: Former
+        # {number of a session that has ended: Former}; Blender undoes up to 256 steps.
+        self.past = Kept(lambda former: former.display.arrays)
         self.returning = {}  # session_uid of a source: Former, of which an undone step says that it is live
 
     def part_with(self, uid):
@@ -41,9 +42,7 @@ class Sessions(dict):
         session = self.pop(uid, None)
         if session is not None:
             session.stop()
-            self.past[session.number] = session.former
-        while len(self.past) > MOST_PAST:
-            del self.past[next(iter(self.past))]
+            self.past.keep(session.number, session.former)
         return session
 
     def clear(self):

@@ -13,25 +13,34 @@ from ..field_modifier import motion
 from ..names import SHAPE_OF
 
 UNSETTLED = "?"  # the mark of a shape that is on its way to another
-LARGEST = 1 << 28  # bytes of shapes that are kept
+MOST, LARGEST = 1000, 1 << 28  # items that are kept, and bytes of their arrays
 
 
-class Shapes(dict):
-    """{mark: Motion}, the newest last."""
+class Kept(dict):
+    """{key: item}, the one used last at the end; the first ones go where there are too many.
 
-    def keep(self, key, shape):
-        """Keeps a shape under its mark; the oldest ones go where there are too many."""
+    `arrays_of(item)` are its arrays, or None; items may share them.
+    """
+
+    def __init__(self, arrays_of):
+        self._arrays_of = arrays_of
+
+    def keep(self, key, item):
         self.pop(key, None)
-        self[key] = shape
-        while sum(map(bytes_of, self.values())) > LARGEST:
+        self[key] = item
+        while len(self) > MOST or self._size() > LARGEST:
             del self[next(iter(self))]
 
+    def _size(self):
+        arrays = {id(one): one for item in self.values() for one in self._arrays_of(item) if one is not None}
+        return sum(one.nbytes for one in arrays.values())
 
-shapes = Shapes()
+
+def arrays_of(shape):
+    return () if shape is None else (shape.offsets, shape.turns)
 
 
-def bytes_of(shape):
-    return sum(part.nbytes for part in (shape.offsets, shape.turns) if part is not None)
+shapes = Kept(arrays_of)  # {mark: Motion}
 
 
 def mark(source):

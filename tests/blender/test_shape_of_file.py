@@ -180,6 +180,22 @@ def test_a_style_that_waits_for_what_is_to_be_chosen_comes_back(lacks):
     assert sessions.is_live(bpy.data.objects["Bar"]) and world.everything() == stored
 
 
+@few_centers
+def test_a_step_comes_back_live_however_many_sessions_later():
+    bar = scenes.bar()
+    undo_begins()
+    bpy.ops.arapfields.live(kind="STYLIZE")
+    world.settle()
+    push("live")
+    stored = world.everything()
+    for _ in range(25):  # as undone and redone steps, and changed handles, begin them
+        sessions.begin(bpy.context, bar, "STYLIZE")
+    push("other")
+    bpy.ops.ed.undo()
+    world.settle()
+    assert sessions.is_live(bpy.data.objects["Bar"]) and world.everything() == stored
+
+
 def test_a_release_changes_nothing_that_is_seen():
     """The hand goes fast, and each move's shape is shown in the same picture."""
     bar = scenes.bar(length=3.0)
