@@ -130,8 +130,8 @@ class Session:
             return
         if self.is_restored:
             context.view_layer.update()
-        if self.kind == "STYLIZE" and style_settings.is_begun(source):
-            return  # the user is about to choose it
+        if self.waits(source):
+            return
         layout = layout_of(source, self.kind, context.scene)
         if layout != self.layout:
             if not differ_in_handles(layout, self.layout):
@@ -146,6 +146,10 @@ class Session:
         if self.is_restored:
             self.is_restored, self.is_quiet = False, True
             self.keep_shown()
+
+    def waits(self, source):
+        """Whether the user is about to choose what the style needs."""
+        return self.kind == "STYLIZE" and style_settings.is_begun(source)
 
     def stays(self, source, request):
         """Whether the source shows, or showed before, what the file says that this request has."""
@@ -169,6 +173,8 @@ class Session:
             return False
         context.view_layer.update()
         source = self.source.get()
+        if self.waits(source):
+            return stored.mark(source) != stored.UNSETTLED
         return stored.mark(source) == stored.wanted(source, self.digest(self.reader.request(context)))
 
     def keep_shown(self):

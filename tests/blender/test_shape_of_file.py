@@ -181,6 +181,19 @@ def test_a_style_that_waits_for_what_is_to_be_chosen_comes_back(lacks):
 
 
 @few_centers
+def test_a_press_where_a_style_waits_for_its_object_holds_what_is_shown():
+    bar = scenes.bar()
+    pin(bar, (1.0, 0.0, 0.25), target=(1.0, 0.0, 0.4))
+    bpy.ops.arapfields.live(kind="STYLIZE")
+    world.settle()
+    shown = scenes.world_points(bar)
+    bar.arapfields.stylize.style = "OBJECT"
+    drag.of_entry(bpy.context, bar, bar.arapfields.handles[0]).end(bpy.context)
+    world.settle()
+    assert np.array_equal(scenes.world_points(bar), shown)
+
+
+@few_centers
 def test_a_step_comes_back_live_however_many_sessions_later():
     bar = scenes.bar()
     undo_begins()
