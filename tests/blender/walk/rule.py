@@ -110,6 +110,8 @@ class Walk:
             stays = held.get(item.name)
             if stays is not None and mine and name in MAY_MOVE and np.any(stays != now):
                 stays = held[item.name] = None
+            if not mine and stays is None and np.array_equal(now, earlier):
+                continue  # as it was found right
             if kind and stays is None and not waits(item, kind):
                 off = world.difference(now, world.fresh_shape(item, kind))
                 if not off <= self.tolerance:

@@ -74,9 +74,12 @@ def sources():
 
 def settle():
     """As the timer does, until every shape is as good as it gets."""
-    for _ in range(3):  # the first look may set a solver up anew
+    for _ in range(5):
+        before = dict(sessions.live)
         bpy.context.view_layer.update()
         sessions.update(bpy.context, wait=WAIT, refined=True)
+        if before == sessions.live:  # no solver was set up anew
+            break
     bpy.context.view_layer.update()
 
 
