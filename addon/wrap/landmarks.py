@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Landmarks: pairs of Empties, one on the source at rest and one on the target, which move with these."""
 
+import re
+
 import bpy
 import numpy as np
 from mathutils import Matrix
 
 from ..blender import mesh_arrays
-from ..blender.object_references import in_scene, settings_of
+from ..blender.object_references import ObjectReference, in_scene, settings_of
 from ..core.errors import UserError
 from ..core.geometry.spaces import inverse, transform
 from ..handles.empties import make_empty, matrix_of
@@ -117,3 +119,21 @@ def remove(source, index):
         if item is not None:
             bpy.data.objects.remove(item)
     entries.remove(index)
+
+
+class Marks:
+    """Which rows of the list of landmarks a wrap leaves out."""
+
+    def __init__(self, source):
+        entries = list(settings_of(source).wrap.landmarks)
+        self.source, self.left_out = ObjectReference(source), ()
+        self.rows = [entries.index(entry) for entry in used(source)]
+
+    def numbered(self, text):
+        """Landmarks by their number in the list."""
+        return re.sub(r"landmarks\[(\d+)\]", lambda match: f"#{self.rows[int(match[1])] + 1}", text)
+
+    def put(self):
+        chosen = {self.rows[index] for index in self.left_out}
+        for row, entry in enumerate(settings_of(self.source.get()).wrap.landmarks):
+            entry.left_out = row in chosen

@@ -82,11 +82,15 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
         else:
             pairs = landmarks.read(source, space)
         vertices, triangles = read_target(context, other, space)
+        marks = landmarks.Marks(source)
 
         def solve(tracker, rest, samples, weight):
             task = tracker.start("Wrapping", weight)
             field = af.wrap(samples, af.MeshSdf(vertices, triangles), pairs, options, task=task)
-            tracker.warnings += [UserError("note: {text}", text=text) for text in field.report.notes]
+            marks.left_out = field.report.left_out
+            tracker.warnings += [
+                UserError("note: {text}", text=marks.numbered(text)) for text in field.report.notes
+            ]
             if fitting is not None:
                 fitting.move(field)
                 tracker.warnings += fitting.warnings
@@ -94,16 +98,18 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
 
         places = effective_value("move_object", settings.wrap, self) and not holds_place(source)
         item = plan_solve_job(context, self, source, "WRAP", values["samples"], values["seed"], solve, places)
-        return item if fitting is None else with_bones(item, fitting, below)
+        return with_rest(item, marks, fitting, below)
 
 
-def with_bones(item, fitting, below):
-    """The same item, which moves the bones as well."""
+def with_rest(item, marks, fitting, below):
+    """The same item, which marks landmarks and moves the bones as well."""
 
     def apply(solved):
         said = item.apply(solved)
-        below.kept = True
-        fitting.put(bpy.context)
+        marks.put()
+        if fitting is not None:
+            below.kept = True
+            fitting.put(bpy.context)
         return said
 
     return replace(item, apply=apply)

@@ -22,6 +22,8 @@ class ARAPFIELDS_UL_landmarks(bpy.types.UIList):
             row.prop(item.rest, "name", text="", emboss=False)
         else:
             row.label(text="(deleted)", icon="ERROR")
+        if item.left_out:
+            row.prop(item, "left_out", text="", icon="ERROR", emboss=False)
         row.label(text=str(index + 1), translate=False)
 
 

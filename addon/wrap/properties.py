@@ -55,6 +55,7 @@ class ARAPFIELDS_PG_landmark(bpy.types.PropertyGroup):
     rest: pointer(bpy.types.Object, "Landmark", "Empty on the object at rest")
     on_target: pointer(bpy.types.Object, "On the Target", "Empty where it belongs on the target")
     colour: colour("Colour of the landmark in the viewport")
+    left_out: flag("Left Out", "The last wrap left this pair out, as it contradicts the others")
 
 
 class ARAPFIELDS_PG_wrap(bpy.types.PropertyGroup):

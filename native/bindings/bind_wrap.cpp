@@ -40,9 +40,9 @@ WrapResult wrap_samples(const SurfaceSamples& samples, const FunctionArgument& t
       make_report("WrapReport", "to_target_mean"_a = r.to_target_mean, "to_target_95"_a = r.to_target_95,
                   "from_target_mean"_a = r.from_target_mean, "from_target_95"_a = r.from_target_95,
                   "matched_share"_a = r.matched_share, "landmarks"_a = py::tuple(py::cast(r.landmarks)),
-                  "diagonal"_a = r.diagonal, "scale"_a = r.scale, "iterations"_a = r.iterations,
-                  "seconds"_a = r.seconds, "notes"_a = py::tuple(py::cast(r.warnings)),
-                  **field_measures(r.arap, r.distortion)));
+                  "left_out"_a = py::tuple(py::cast(r.left_out)), "diagonal"_a = r.diagonal,
+                  "scale"_a = r.scale, "iterations"_a = r.iterations, "seconds"_a = r.seconds,
+                  "notes"_a = py::tuple(py::cast(r.warnings)), **field_measures(r.arap, r.distortion)));
   return field;
 }
 
@@ -158,7 +158,8 @@ The DeformationField that lays a surface onto the zero surface of `target`, as r
 `target` is an ImplicitFunction: a MeshSdf, which may be open and broken, a NeuralSdf, or a subclass of your
 own. The surface is first moved, rotated and scaled as a whole, then deformed in stages of falling stiffness.
 `landmarks` are pairs (rest, on_target) of corresponding points (3,). Without them the best of many rotations
-is taken, which suits shapes that are alike.
+is taken, which suits shapes that are alike. Pairs that contradict the others are left out and named in the
+report; those of a mirror image are refused.
 
 Parts without a counterpart on an open target follow their neighbours. The samples' weights set where the
 surface is stiffer. field.report is a WrapReport. Raises InvalidInput and Cancelled.)");

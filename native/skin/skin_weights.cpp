@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/parallel.h"
+#include "distance/welded_vertices.h"
 #include "skin/example_poses.h"
 #include "skin/vertex_blend.h"
 #include "skin/weight_fit.h"

@@ -9,6 +9,7 @@
 #include "core/errors.h"
 #include "energies/alignment.h"
 #include "sampling/nearest_sample.h"
+#include "sampling/sample_choice.h"
 #include "wrap/parameters.h"
 
 namespace arapfields {
@@ -20,36 +21,14 @@ double diagonal_of(PointsIn points) {
   return (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm();
 }
 
-std::string name_of(Index i) { return "landmarks[" + std::to_string(i) + "]"; }
-
-std::string percent(double share) { return number_text(std::round(1000.0 * share) / 10.0) + " %"; }
-
 void require_on(PointsIn surface, PointsIn places, const char* which) {
   const Vector distances = nearest_distances(surface, places);
   const double size = diagonal_of(surface);
   for (Index i = 0; i < places.rows(); ++i)
-    require(
-        distances[i] <= off_surface * size, name_of(i),
-        std::string(which) + " is " + percent(distances[i] / size) + " of the surface's size away from it",
-        "a place on the surface is needed");
-}
-
-Similarity fit(PointsIn from, PointsIn to, const Vector& weights, double scale) {
-  Similarity result;
-  result.rotation = best_alignment(from, to, weights).rotation;
-  const double total = weights.sum();
-  const Eigen::RowVector3d a = weights.transpose() * from / total, b = weights.transpose() * to / total;
-  const Points arms = from.rowwise() - a, target_arms = to.rowwise() - b;
-  const double square = weights.dot(arms.rowwise().squaredNorm());
-  const double along =
-      weights.dot((arms * result.rotation.transpose()).cwiseProduct(target_arms).rowwise().sum());
-  result.scale = scale > 0.0 ? scale : square > 0.0 && along > 0.0 ? along / square : 1.0;
-  result.translation = b.transpose() - result.scale * result.rotation * a.transpose();
-  return result;
-}
-
-double residual(const WrapSource& source, const Similarity& placement) {
-  return (placement.of(source.landmarks) - source.landmark_targets).rowwise().norm().mean();
+    require(distances[i] <= off_surface * size, landmark_name(i),
+            std::string(which) + " is " + percent_text(distances[i] / size) +
+                " of the surface's size away from it",
+            "a place on the surface is needed");
 }
 
 Points some_rows(PointsIn points, Index count) {
@@ -109,9 +88,9 @@ class IterativeClosestPoints {
         from.bottomRows(k) = source_.landmarks;
         to.bottomRows(k) = source_.landmark_targets;
         weights.tail(k).setConstant(landmark_share * weights.head(n + m).sum() / static_cast<double>(k));
-        mean += residual(source_, at);
+        mean += source_.distances(at).mean();
       }
-      if (round < rounds) at = fit(from, to, weights, scale_);
+      if (round < rounds) at = fitted_similarity(from, to, weights, scale_);
     }
     return {mean, at};
   }
@@ -154,10 +133,6 @@ std::vector<Mat3> candidate_rotations(PointsIn from, PointsIn to) {
   return result;
 }
 
-double gyration(PointsIn points) {
-  return std::sqrt((points.rowwise() - points.colwise().mean()).rowwise().squaredNorm().mean());
-}
-
 Similarity by_shape(const WrapSource& source, const WrapTarget& target, double scale, double normal_weight,
                     std::vector<std::string>& warnings, const Progress& progress) {
   const IterativeClosestPoints coarse(source, target, coarse_samples, scale, normal_weight),
@@ -183,7 +158,7 @@ Similarity by_shape(const WrapSource& source, const WrapTarget& target, double s
   const double share = best.first / target.diagonal;
   if (share > unlike_shapes)
     warnings.push_back(
-        "the shapes are not alike: the best turn leaves them " + percent(share) +
+        "the shapes are not alike: the best turn leaves them " + percent_text(share) +
         " of the target's size apart, normals counted; pairs of landmarks would say what belongs "
         "to what");
   return best.second;
@@ -191,29 +166,56 @@ Similarity by_shape(const WrapSource& source, const WrapTarget& target, double s
 
 void check_fit(const WrapSource& source, const WrapTarget& target, const Similarity& placement,
                std::vector<std::string>& warnings) {
-  const Vector distances = (placement.of(source.landmarks) - source.landmark_targets).rowwise().norm();
+  const Vector distances = source.distances(placement);
   const double share = distances.mean() / target.diagonal;
-  if (share <= poor_if_mirrored) return;
   Index worst = 0;
   distances.maxCoeff(&worst);
-  WrapSource mirrored = source;
-  mirrored.landmarks.col(0) *= -1.0;
-  const Similarity reflected =
-      fit(mirrored.landmarks, mirrored.landmark_targets, Vector::Ones(distances.size()), 0.0);
-  if (mirrored_gain * residual(mirrored, reflected) < distances.mean())
-    warnings.emplace_back("the landmarks ask for a mirror image: left and right may be exchanged in them");
-  else if (share > poor_landmarks)
-    warnings.push_back("the landmarks fit no turn of the whole: they stay " + percent(share) +
-                       " of the target's size from where they belong, " + name_of(worst) + " the farthest");
+  if (share > poor_landmarks)
+    warnings.push_back("the landmarks fit no turn of the whole: they stay " + percent_text(share) +
+                       " of the target's size from where they belong, " + landmark_name(worst) +
+                       " the farthest");
 }
 
 }  // namespace
 
+std::string landmark_name(Index i) { return "landmarks[" + std::to_string(i) + "]"; }
+
+std::string percent_text(double share) { return number_text(std::round(1000.0 * share) / 10.0) + " %"; }
+
+double gyration(PointsIn points) {
+  return std::sqrt((points.rowwise() - points.colwise().mean()).rowwise().squaredNorm().mean());
+}
+
+Similarity fitted_similarity(PointsIn from, PointsIn to, const Vector& weights, double scale) {
+  Similarity result;
+  result.rotation = best_alignment(from, to, weights).rotation;
+  const double total = weights.sum();
+  const Eigen::RowVector3d a = weights.transpose() * from / total, b = weights.transpose() * to / total;
+  const Points arms = from.rowwise() - a, target_arms = to.rowwise() - b;
+  const double square = weights.dot(arms.rowwise().squaredNorm());
+  const double along =
+      weights.dot((arms * result.rotation.transpose()).cwiseProduct(target_arms).rowwise().sum());
+  result.scale = scale > 0.0 ? scale : square > 0.0 && along > 0.0 ? along / square : 1.0;
+  result.translation = b.transpose() - result.scale * result.rotation * a.transpose();
+  return result;
+}
+
+WrapSource WrapSource::with_landmarks(const std::vector<Index>& rows) const {
+  WrapSource result = *this;
+  result.landmarks = rows_of(landmarks, rows);
+  result.landmark_targets = rows_of(landmark_targets, rows);
+  return result;
+}
+
+Vector WrapSource::distances(const Similarity& placement) const {
+  return (placement.of(landmarks) - landmark_targets).rowwise().norm();
+}
+
 void check_landmarks(const WrapSource& source, const WrapTarget& target) {
   const Index count = source.landmarks.rows();
   for (Index i = 0; i < count; ++i)
-    require(source.landmarks.row(i).allFinite() && source.landmark_targets.row(i).allFinite(), name_of(i),
-            "a coordinate is NaN or infinite", "all must be finite");
+    require(source.landmarks.row(i).allFinite() && source.landmark_targets.row(i).allFinite(),
+            landmark_name(i), "a coordinate is NaN or infinite", "all must be finite");
   if (count == 0) return;
   require_on(source.points, source.landmarks, "its place at rest");
   require_on(target.points, source.landmark_targets, "its place on the target");
@@ -225,7 +227,7 @@ void check_landmarks(const WrapSource& source, const WrapTarget& target) {
           (source.landmark_targets.row(i) - source.landmark_targets.row(j)).norm() / target.diagonal;
       const bool torn = source_distance < same_point && target_distance > different_points,
                  merged = target_distance < same_point && source_distance > different_points;
-      require(!torn && !merged, name_of(j) + " and " + name_of(i),
+      require(!torn && !merged, landmark_name(j) + " and " + landmark_name(i),
               torn ? "one place at rest belongs to two on the target" : "two places at rest belong to one",
               "they contradict each other");
     }
@@ -237,8 +239,8 @@ Similarity wrap_alignment(const WrapSource& source, const WrapTarget& target, Al
   const double scale = kind == AlignmentKind::similar ? 0.0 : source.frame.scale;
   if (kind == AlignmentKind::none) return {scale, Mat3::Identity(), source.frame.center};
   if (source.landmarks.rows() < 3) return by_shape(source, target, scale, normal_weight, warnings, progress);
-  const Similarity placement =
-      fit(source.landmarks, source.landmark_targets, Vector::Ones(source.landmarks.rows()), scale);
+  const Similarity placement = fitted_similarity(source.landmarks, source.landmark_targets,
+                                                 Vector::Ones(source.landmarks.rows()), scale);
   check_fit(source, target, placement, warnings);
   return placement;
 }

@@ -15,7 +15,22 @@ struct WrapSource {
   Points landmarks;         ///< (k,3)
   Points landmark_targets;  ///< (k,3) the corresponding points of the target
   Frame frame;
+
+  /// The same surface with these of its landmarks.
+  WrapSource with_landmarks(const std::vector<Index>& rows) const;
+  /// Distances of the landmarks, so placed, to their targets.
+  Vector distances(const Similarity& placement) const;
 };
+
+/// The similarity that takes points to others in weighted least squares; `scale` 0: its own.
+Similarity fitted_similarity(PointsIn from, PointsIn to, const Vector& weights, double scale);
+
+/// The size of points about their mean.
+double gyration(PointsIn points);
+/// "landmarks[i]".
+std::string landmark_name(Index i);
+/// "12.3 %".
+std::string percent_text(double share);
 
 /// Throws InvalidInput that names a landmark which is not finite or far off its surface, and two landmarks
 /// that coincide on one surface alone.

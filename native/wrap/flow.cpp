@@ -18,6 +18,32 @@ namespace {
 using namespace wrap_parameters;
 using RowMat3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
+/// t: 0 in the first stage, 1 in the last.
+WrapStage stage_at(double t, const WrapOptions& options) {
+  const auto most_centers = static_cast<double>(options.centers);
+  const Schedule closeness{correspondence_weight.first, correspondence_weight.last * options.closeness},
+      centers{std::min(first_centers, most_centers), most_centers};
+  WrapStage stage;
+  stage.correspondences = {.weight = closeness.at(t),
+                           .coverage = coverage * options.coverage,
+                           .normals = options.normal_weight,
+                           .tangential = tangential_weight.at(t),
+                           .unoriented = unoriented_weight * t * t};
+  stage.landmarks = landmark_weight * options.landmark_weight;
+  stage.rigidity = rigidity.at(t);
+  stage.viscosity = viscosity * options.bending;
+  stage.center_radius = center_radius.at(t);
+  stage.centers = static_cast<Index>(std::round(centers.at(t)));
+  return stage;
+}
+
+/// The squared singular values, ascending.
+Vec3 squared_singular_values(const Mat3& matrix) {
+  Eigen::SelfAdjointEigenSolver<Mat3> solver;
+  solver.computeDirect(matrix.transpose() * matrix, Eigen::EigenvaluesOnly);
+  return solver.eigenvalues();
+}
+
 /// The largest singular value of the velocity's gradient over the points.
 double gradient_norm(const RadialBasis& basis, const RowMatrix<double>& velocity, PointsIn points) {
   JetBlock<double> jets(points.rows(), JetOrder::first);
@@ -26,9 +52,7 @@ double gradient_norm(const RadialBasis& basis, const RowMatrix<double>& velocity
   for (Index i = 0; i < points.rows(); ++i) {
     Mat3 gradient;
     for (int k = 0; k < 3; ++k) gradient.col(k) = Eigen::Map<const Vec3>(jets.view().at(first_column(k), i));
-    Eigen::SelfAdjointEigenSolver<Mat3> solver;
-    solver.computeDirect(gradient.transpose() * gradient, Eigen::EigenvaluesOnly);
-    largest = std::max(largest, solver.eigenvalues()[2]);
+    largest = std::max(largest, squared_singular_values(gradient)[2]);
   }
   return std::sqrt(largest);
 }
@@ -57,8 +81,12 @@ struct WrapFlow::StepSamples {
 };
 
 WrapFlow::WrapFlow(const SurfaceSamples& samples, const WrapTarget& target, PointsIn landmarks,
-                   PointsIn landmark_targets, std::uint64_t seed)
-    : target_(target), random_(seed), landmarks_(landmarks), landmark_targets_(landmark_targets) {
+                   PointsIn landmark_targets, std::vector<Index> pulled, std::uint64_t seed)
+    : target_(target),
+      random_(seed),
+      landmarks_(landmarks),
+      landmark_targets_(landmark_targets),
+      pulled_(std::move(pulled)) {
   const std::vector<Index> rows = stratified(morton_order(samples.points), moved_samples, random_);
   points_ = rows_of(samples.points, rows);
   rest_normals_ = rows_of(samples.normals, rows);
@@ -170,11 +198,32 @@ void WrapFlow::step(const WrapStage& stage, const Progress& progress) {
     stiffness.viscosity = stiffness.viscosity.cwiseProduct(samples.bend_weights);
 
   // Velocity, and the motion along it.
-  const LandmarkTerm landmarks{landmarks_, landmark_targets_ - landmarks_, stage.landmarks * unit};
+  const LandmarkTerm landmarks{rows_of(landmarks_, pulled_), rows_of(landmark_targets_ - landmarks_, pulled_),
+                               stage.landmarks * unit};
   const RadialBasis centers = basis(stage, samples.surface.points);
   move(centers, solve_velocity(centers, stiffness, correspondences, landmarks, progress.part(0.2, 0.8)),
        samples.surface.points);
   progress.report(1.0);
+}
+
+void WrapFlow::run(const WrapOptions& options, const Progress& progress, const std::function<void()>& after) {
+  const double all = options.stages * options.iterations;
+  for (int done = 0; done < all; ++done) {
+    const int stage = done / options.iterations;
+    const double t = options.stages > 1 ? static_cast<double>(stage) / (options.stages - 1) : 1.0;
+    step(stage_at(t, options), progress.part(done / all, (done + 1) / all));
+    if (after) after();
+  }
+}
+
+double WrapFlow::stretch() const {
+  const Index all = points_.rows(), count = std::min(all, stretch_samples);
+  double sum = 0.0;
+  for (Index k = 0; k < count; ++k) {
+    const Mat3 jacobian = Eigen::Map<const RowMat3>(&jacobians_(k * all / count, 0));
+    sum += (squared_singular_values(jacobian).array().max(0.0).sqrt() - 1.0).square().sum();
+  }
+  return sum / static_cast<double>(count);
 }
 
 }  // namespace arapfields

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "core/random.h"
@@ -28,15 +29,20 @@ struct WrapStage {
 /// the velocity stand on both surfaces in their current positions.
 class WrapFlow {
  public:
-  /// Landmarks and their targets are (k,3). `target` must outlive the flow.
+  /// Landmarks and their targets are (k,3); those with these rows are pulled, the others go along. `target`
+  /// must outlive the flow.
   WrapFlow(const SurfaceSamples& samples, const WrapTarget& target, PointsIn landmarks,
-           PointsIn landmark_targets, std::uint64_t seed);
+           PointsIn landmark_targets, std::vector<Index> pulled, std::uint64_t seed);
 
   void step(const WrapStage& stage, const Progress& progress);
+  /// All steps of all stages; `after` is called after each.
+  void run(const WrapOptions& options, const Progress& progress, const std::function<void()>& after = {});
   const std::vector<FieldStep>& steps() const { return steps_; }
   double matched_share() const { return matched_share_; }
   /// Current positions (k,3) of the landmarks.
   const Points& landmarks() const { return landmarks_; }
+  /// Mean ‖J − R‖² of some samples.
+  double stretch() const;
 
  private:
   struct StepSamples;
@@ -50,6 +56,7 @@ class WrapFlow {
   RowMatrix<double> jacobians_;   // (n,9), row-major
   Vector weights_, bend_weights_;
   Points landmarks_, landmark_targets_;
+  std::vector<Index> pulled_;
   std::vector<FieldStep> steps_;
   double matched_share_ = 1.0;
 };

@@ -75,6 +75,8 @@ constexpr int regularization_retries = 4;
 constexpr Index target_samples = 12000, flow_target_samples = 6000;
 /// Samples at which distances and det J, and at which energies, are measured for the report.
 constexpr Index measured_samples = 20000, energy_samples = 4000;
+/// Samples of which a flow tells the stretch.
+constexpr Index stretch_samples = 1500;
 /// Rest samples that the field keeps as starting points of its inverse.
 constexpr Index kept_rest_points = 4000;
 /// Neighbourhood of a target sample, in spacings: about twenty samples.
@@ -100,11 +102,9 @@ constexpr double upright_preference = 0.9;
 constexpr double off_surface = 0.1;
 /// Two landmarks closer than the first on one surface and farther than the second on the other contradict.
 constexpr double same_point = 0.005, different_points = 0.1;
-/// Mean landmark error that is worth a warning, and above which a mirrored set is tried.
-constexpr double poor_landmarks = 0.2, poor_if_mirrored = 0.05;
+/// Mean landmark error that is worth a warning.
+constexpr double poor_landmarks = 0.2;
 /// Mean distance of aligned shapes above which they are reported as unlike.
 constexpr double unlike_shapes = 0.035;
-/// Factor by which a mirrored set of landmarks must fit better to be suggested.
-constexpr double mirrored_gain = 2.0;
 
 }  // namespace arapfields::wrap_parameters

@@ -10,6 +10,7 @@
 #include "core/parallel.h"
 #include "distance/is_closed.h"
 #include "distance/signed_distance.h"
+#include "distance/welded_vertices.h"
 #include "sampling/oriented_points.h"
 
 namespace arapfields {
@@ -57,18 +58,6 @@ struct TriangleEdges {
 
   Vec3 origin, first, second, area;
 };
-
-/// Unit normals of vertices, those at one position taken as one; 0 where there is none.
-Points vertex_normals(const TriangleMesh& mesh) {
-  const std::vector<std::int32_t> first = first_at_position(mesh.vertices);
-  Points normals = Points::Zero(mesh.vertices.rows(), 3);
-  for (Index t = 0; t < mesh.triangles.rows(); ++t) {
-    const TriangleEdges edges(mesh.vertices, mesh.triangles, t);
-    for (int k = 0; k < 3; ++k) normals.row(first[mesh.triangles(t, k)]) += edges.area;
-  }
-  for (Index v = 0; v < normals.rows(); ++v) normals.row(v) = normals.row(first[v]).normalized().eval();
-  return normals;
-}
 
 /// The triangles about each vertex, vertices at one position taken as one.
 class Surroundings {
@@ -189,7 +178,8 @@ Correspondence::Correspondence(const WrappedMesh& source, const TriangleMesh& ta
   const TriangleMesh &giving = forward ? source.moved : target, &receiving = forward ? target : source.moved;
   giving_ = giving.vertices.rows();
   triangles_ = giving.triangles;
-  places_ = places_on(giving, receiving.vertices, vertex_normals(receiving), progress);
+  const WeldedVertices welded(receiving);
+  places_ = places_on(giving, receiving.vertices, welded.normals(welded.first, Eigen::all), progress);
   if (!forward)
     for (Mat3& jacobian : jacobians_) {
       require(jacobian.determinant() != 0.0, "field", "the wrap flattens a vertex of the source",

@@ -13,30 +13,13 @@
 #include "solve/warnings.h"
 #include "wrap/alignment.h"
 #include "wrap/flow.h"
+#include "wrap/landmark_check.h"
 #include "wrap/parameters.h"
 
 namespace arapfields {
 namespace {
 
 using namespace wrap_parameters;
-
-WrapStage stage_at(double t, const WrapOptions& options) {
-  const auto most_centers = static_cast<double>(options.centers);
-  const Schedule closeness{correspondence_weight.first, correspondence_weight.last * options.closeness},
-      centers{std::min(first_centers, most_centers), most_centers};
-  WrapStage stage;
-  stage.correspondences = {.weight = closeness.at(t),
-                           .coverage = coverage * options.coverage,
-                           .normals = options.normal_weight,
-                           .tangential = tangential_weight.at(t),
-                           .unoriented = unoriented_weight * t * t};
-  stage.landmarks = landmark_weight * options.landmark_weight;
-  stage.rigidity = rigidity.at(t);
-  stage.viscosity = viscosity * options.bending;
-  stage.center_radius = center_radius.at(t);
-  stage.centers = static_cast<Index>(std::round(centers.at(t)));
-  return stage;
-}
 
 /// The flow's steps and the alignment as one field of the samples' own cube.
 std::shared_ptr<ComposedField> field_of(std::vector<FieldStep> steps, const Similarity& placement,
@@ -116,27 +99,23 @@ WrapSolution wrap(const SurfaceSamples& samples, const ImplicitFunction& functio
   // Alignment as a whole.
   const WrapTarget mesh_target = wrap_target(function, target_samples, seed, progress.part(0.0, 0.1));
   check_landmarks(source, mesh_target);
-  const Similarity placement = wrap_alignment(source, mesh_target, options.alignment, options.normal_weight,
-                                              report.warnings, progress.part(0.1, 0.15));
+  const LandmarkVerdict verdict =
+      trusted_landmarks(samples, source, mesh_target, options, report.warnings, progress.part(0.1, 0.15));
+  report.left_out = verdict.left_out;
+  const Similarity placement =
+      wrap_alignment(source.with_landmarks(verdict.kept), mesh_target, options.alignment,
+                     options.normal_weight, report.warnings, progress.part(0.15, 0.2));
   const WrapTarget target = mesh_target.transformed_back(placement);
   const Points landmark_targets = placement.inverse_of(source.landmark_targets);
   progress.report(0.2, "aligned");
 
   // Stages of falling stiffness.
   const WrapTarget flow_target = target.subsample(flow_target_samples);
-  WrapFlow flow(samples, flow_target, source.landmarks, landmark_targets, seed);
-  const Progress flowing = progress.part(0.2, 0.95);
-  const double all = options.stages * options.iterations;
-  for (int stage = 0; stage < options.stages; ++stage) {
-    const double t = options.stages > 1 ? static_cast<double>(stage) / (options.stages - 1) : 1.0;
-    for (int k = 0; k < options.iterations; ++k) {
-      flow.step(stage_at(t, options), flowing.part(static_cast<double>(report.iterations) / all,
-                                                   static_cast<double>(report.iterations + 1) / all));
-      ++report.iterations;
-      progress.preview(
-          [&](PointsIn points) { return field_of(flow.steps(), placement, samples)->at(points); });
-    }
-  }
+  WrapFlow flow(samples, flow_target, source.landmarks, landmark_targets, verdict.kept, seed);
+  flow.run(options, progress.part(0.2, 0.95), [&] {
+    ++report.iterations;
+    progress.preview([&](PointsIn points) { return field_of(flow.steps(), placement, samples)->at(points); });
+  });
 
   // Result and report.
   progress.report(0.95, "measuring the result");

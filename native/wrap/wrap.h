@@ -32,6 +32,7 @@ struct WrapReport {
   double diagonal = 0.0;          ///< in mesh units
   double scale = 1.0;             ///< of the alignment
   std::vector<double> landmarks;  ///< each one's distance to its target, in mesh units
+  std::vector<Index> left_out;    ///< landmarks that contradict the others, by number from 0
   Index iterations = 0;
   double seconds = 0.0;
   std::vector<std::string> warnings;
@@ -47,7 +48,8 @@ struct WrapSolution {
 /// both directions and by landmarks. Each step is invertible, so that the surface does not pass through
 /// itself. Parts without a counterpart on an open target follow their neighbours. The samples need normals;
 /// their weights scale the stiffness. Throws InvalidInput that names bad options, samples, landmarks off
-/// their surfaces or contradicting each other, and a target without a surface; Cancelled.
+/// their surfaces or contradicting each other, a mirror image of them, and a target without a surface;
+/// Cancelled.
 ARAPFIELDS_EXPORT WrapSolution wrap(const SurfaceSamples& samples, const ImplicitFunction& target,
                                     const std::vector<Landmark>& landmarks, const WrapOptions& options,
                                     const Progress& progress = {});

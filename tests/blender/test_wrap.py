@@ -76,6 +76,18 @@ def test_landmarks_are_pairs_of_empties_that_move_with_both():
     assert not landmarks.used(item) and not [o for o in bpy.data.objects if o.type == "EMPTY"]
 
 
+def test_a_pair_that_lies_is_marked_in_the_list():
+    item, target = bar_and_target()
+    rest, goal = scenes.world_points(item), scenes.world_points(target)
+    rows = [int(np.argmax(rest @ way)) for way in np.array(list(np.ndindex(2, 2, 2))) - 0.5]
+    for row, there in zip(rows, [*rows[:6], rows[0], rows[7]], strict=True):
+        bpy.ops.arapfields.add_landmark(rest=rest[row], on_target=goal[there] + (0.05 if row != there else 0))
+    bpy.ops.arapfields.add_landmark(rest=rest[0], on_target=goal[0])
+    bpy.data.objects.remove(item.arapfields.wrap.landmarks[1].rest)
+    assert bpy.ops.arapfields.wrap(**SMALL) == {"FINISHED"}
+    assert [row for row, pair in enumerate(item.arapfields.wrap.landmarks) if pair.left_out] == [6]
+
+
 def test_what_cannot_be_wrapped_onto_is_named_and_nothing_is_lost():
     item, target = bar_and_target()
     kept = scenes.everything(item)

@@ -123,14 +123,48 @@ def test_landmarks_that_cannot_be_meant_are_named(figure, samples):
             af.wrap(samples, sdf, landmarks, options)
 
 
-def test_exchanged_sides_are_noted(figure, samples):
+def ends_of(v):
+    """Vertices at ten ends of the figure."""
+    up, aside = np.array([0, 0.6, 0.8]), np.array([0, 0.8, -0.6])
+    ahead = np.array([1, 0, 0])
+    ways = [ahead, -ahead, up, -up, aside, -aside, ahead - 2 * up, ahead + 2 * aside]
+    ways += [-ahead - aside, up - ahead]
+    return [int(np.argmax(v @ way)) for way in ways]
+
+
+def test_a_mirror_image_is_refused(figure, samples):
     v, f = figure
-    ahead, up, aside = np.array([1, 0, 0]), np.array([0, 0.6, 0.8]), np.array([0, 0.8, -0.6])
-    ends = [v[np.argmax(v @ d)] for d in (ahead, -ahead, up, -up, aside, -aside)]
-    exchanged = [*ends[:4], ends[5], ends[4]]
+    ends = v[ends_of(v)[:6]]
+    exchanged = ends[[0, 1, 2, 3, 5, 4]]
     options = af.WrapOptions(centers=20, stages=1, iterations=1)
-    field = af.wrap(samples, af.MeshSdf(v, f), list(zip(ends, exchanged, strict=True)), options)
-    assert any("mirror" in note for note in field.report.notes)
+    with pytest.raises(af.InvalidInput, match="mirror image"):
+        af.wrap(samples, af.MeshSdf(v, f), list(zip(ends, exchanged, strict=True)), options)
+
+
+@pytest.mark.parametrize("wrong", [{0: 8}, {4: 5, 5: 4}, {2: 8, 4: 9}])
+def test_landmarks_that_lie_are_named_and_left_out(figure, samples, wrong):
+    v, f = figure
+    target_v, ends = cases.moved(v), ends_of(v)
+    pairs = [(v[end], target_v[ends[wrong.get(i, i)]]) for i, end in enumerate(ends[:8])]
+    sdf, options = af.MeshSdf(target_v, f), af.WrapOptions(**cases.SMALL)
+    field = af.wrap(samples, sdf, pairs, options)
+    assert field.report.left_out == tuple(wrong)
+    assert [note.split(" contradicts")[0] for note in field.report.notes] == [
+        f"landmarks[{i}]" for i in wrong
+    ]
+    right = [pair for i, pair in enumerate(pairs) if i not in wrong]
+    assert np.array_equal(field(v), af.wrap(samples, sdf, right, options)(v))
+    followed = af.wrap(samples, sdf, pairs, af.WrapOptions(check_landmarks=False, **cases.SMALL)).report
+    assert not followed.left_out and followed.stretch > field.report.stretch
+
+
+def test_landmarks_of_which_most_lie_are_not_followed_without_a_word(figure, samples):
+    v, f = figure
+    target_v, ends = cases.moved(v), ends_of(v)
+    pairs = [(v[a], target_v[b]) for a, b in zip(ends, ends[3:] + ends[:3], strict=True)]
+    options = af.WrapOptions(centers=20, stages=1, iterations=1)
+    report = af.wrap(samples, af.MeshSdf(target_v, f), pairs, options).report
+    assert not report.left_out and any("contradict each other" in note for note in report.notes)
 
 
 def test_targets_without_a_surface_are_named(samples):

@@ -130,6 +130,8 @@ class WrapReport(Report):
     """Share of the surface that has a counterpart; 1 where the target is closed."""
     landmarks: tuple[float, ...]
     """Distance of each landmark to its place on the target, in mesh units."""
+    left_out: tuple[int, ...]
+    """Landmarks that contradict the others, by number from 0: the wrap does not follow them."""
     diagonal: float
     """Of the target's bounding box, in mesh units."""
     scale: float

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "distance/welded_vertices.h"
+
+#include <Eigen/Geometry>
+#include <map>
+
+#include "distance/is_closed.h"
+
+namespace arapfields {
+
+WeldedVertices::WeldedVertices(const TriangleMesh& mesh)
+    : first(first_at_position(mesh.vertices)), normals(Points::Zero(mesh.vertices.rows(), 3)) {
+  for (Index t = 0; t < mesh.triangles.rows(); ++t) {
+    const auto corner = [&](int k) { return Vec3(mesh.vertices.row(mesh.triangles(t, k))); };
+    const Vec3 area = (corner(1) - corner(0)).cross(corner(2) - corner(0));
+    for (int k = 0; k < 3; ++k) normals.row(first[mesh.triangles(t, k)]) += area;
+  }
+  normals.rowwise().normalize();
+}
+
+std::vector<std::vector<Index>> WeldedVertices::closed_pieces(const TriangleMesh& mesh, double size) const {
+  std::vector<std::int32_t> root = first;
+  const auto find = [&](std::int32_t v) {
+    while (root[v] != v) v = root[v] = root[root[v]];
+    return v;
+  };
+  std::map<std::pair<std::int32_t, std::int32_t>, int> open;  // edges, and how often they are passed
+  const auto edge_of = [&](Index t, int k) {
+    return std::pair(first[mesh.triangles(t, k)], first[mesh.triangles(t, (k + 1) % 3)]);
+  };
+  for (Index t = 0; t < mesh.triangles.rows(); ++t)
+    for (int k = 0; k < 3; ++k) {
+      const auto [a, b] = edge_of(t, k);
+      if (a == b) continue;
+      root[find(a)] = find(b);
+      open[std::minmax(a, b)] += a < b ? 1 : -1;
+    }
+  std::map<std::int32_t, std::vector<Index>> pieces;
+  for (std::size_t v = 0; v < first.size(); ++v) pieces[find(first[v])].push_back(static_cast<Index>(v));
+  for (const auto& [edge, balance] : open)
+    if (balance != 0) pieces.erase(find(edge.first));
+  std::vector<std::vector<Index>> result;
+  for (auto& [piece, members] : pieces) {
+    Eigen::AlignedBox3d box;
+    for (const Index v : members) box.extend(Vec3(mesh.vertices.row(v)));
+    if (box.diagonal().norm() <= size && normals.row(piece).squaredNorm() > 0.0)
+      result.push_back(std::move(members));
+  }
+  return result;
+}
+
+}  // namespace arapfields

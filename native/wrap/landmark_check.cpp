@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "wrap/landmark_check.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+
+#include "core/errors.h"
+#include "sampling/sample_choice.h"
+#include "wrap/flow.h"
+#include "wrap/parameters.h"
+
+namespace arapfields {
+namespace {
+
+// All distances are shares of the target's diagonal.
+
+/// Pairs that it takes to say which of them is wrong, and the largest share of wrong ones.
+constexpr Index least_pairs = 4;
+constexpr double most_wrong = 0.4;
+/// Triples that are tried at most, rounds of reweighting of each, and the range of their scale about the
+/// ratio of the shapes' sizes.
+constexpr Index most_triples = 600;
+constexpr int reweightings = 3;
+constexpr double scale_range = 3.0;
+/// Distance at which a pair counts half (Geman, McClure 1987).
+constexpr double half_distance = 0.15;
+/// Placements that are tried, those that differ by as much, and how much worse than the best they may be.
+constexpr std::size_t most_placements = 3;
+constexpr double differ = 0.1, worse_factor = 1.3, worse = 0.2;
+/// Where the best placement brings all pairs as near, none is in doubt.
+constexpr double no_doubt = 0.05;
+/// A pair is wrong if it stays as many medians away, and at least and at most as far (tuned).
+constexpr double medians = 2.5, least_far = 0.08, most_far = 0.13;
+/// A pair that was left out returns if the stretch grows by no more than this, and is nearer than that.
+constexpr double more_stretch = 1.3, least_stretch = 0.02, may_return = 0.35;
+/// Rounds of a wrap, and the factor by which a mirror image must fit better.
+constexpr int rounds = 4;
+constexpr double mirrored_gain = 2.0;
+/// The coarse wrap.
+constexpr int coarse_centers = 100, coarse_stages = 3, coarse_iterations = 3;
+constexpr double soft_pull = 0.3;
+constexpr Index coarse_target_samples = 3000;
+
+/// Penalties of distances, each below 1 and their sum.
+double penalty(const Vector& distances) {
+  const auto squares = distances.array().square();
+  return (squares / (squares + half_distance * half_distance)).sum();
+}
+
+struct Placement {
+  double score = std::numeric_limits<double>::infinity();
+  Similarity similarity;
+  Vector distances;
+};
+
+std::vector<std::array<Index, 3>> triples(Index count, std::uint64_t seed) {
+  std::vector<std::array<Index, 3>> result;
+  if (count * (count - 1) * (count - 2) <= 6 * most_triples) {
+    for (Index a = 0; a < count; ++a)
+      for (Index b = a + 1; b < count; ++b)
+        for (Index c = b + 1; c < count; ++c) result.push_back({a, b, c});
+    return result;
+  }
+  Random random(seed);
+  for (Index k = 0; k < most_triples; ++k) {
+    const std::vector<Index> rows = random_subset(count, 3, random);
+    result.push_back({rows[0], rows[1], rows[2]});
+  }
+  return result;
+}
+
+/// Placements by triples, improved with all pairs, the best first.
+std::vector<Placement> placements(const WrapSource& source, const WrapTarget& target, double scale,
+                                  std::uint64_t seed, const Progress& progress) {
+  const double size = gyration(target.points) / gyration(source.points);
+  std::vector<Placement> result;
+  for (const std::array<Index, 3>& triple : triples(source.landmarks.rows(), seed)) {
+    Vector weights = Vector::Zero(source.landmarks.rows());
+    for (const Index row : triple) weights[row] = 1.0;
+    Placement placed;
+    for (int round = 0; round <= reweightings; ++round) {
+      placed.similarity = fitted_similarity(source.landmarks, source.landmark_targets, weights, scale);
+      placed.distances = source.distances(placed.similarity) / target.diagonal;
+      if (round == 0 && std::abs(std::log(placed.similarity.scale / size)) > std::log(scale_range)) break;
+      weights = (1.0 + (placed.distances / half_distance).array().square()).square().inverse();
+      if (round == reweightings) placed.score = penalty(placed.distances);
+    }
+    if (std::isfinite(placed.score)) result.push_back(std::move(placed));
+    progress.check();
+  }
+  std::ranges::stable_sort(result, {}, &Placement::score);
+  return result;
+}
+
+std::vector<Placement> distinct(const std::vector<Placement>& all) {
+  std::vector<Placement> result;
+  for (const Placement& placed : all) {
+    if (!result.empty() && placed.score > worse_factor * result[0].score + worse) break;
+    if (std::ranges::all_of(result, [&](const Placement& other) {
+          return (placed.distances - other.distances).cwiseAbs().maxCoeff() > differ;
+        }))
+      result.push_back(placed);
+    if (result.size() == most_placements) break;
+  }
+  return result;
+}
+
+/// What a coarse wrap that pulls at some pairs makes of all of them.
+struct Trial {
+  Vector distances;
+  double stretch = 0.0;
+};
+
+/// Which pairs agree, by wraps from one placement.
+class Vote {
+ public:
+  Vote(const SurfaceSamples& samples, const WrapSource& source, const WrapTarget& target,
+       const WrapOptions& options, const Progress& progress)
+      : samples_(samples),
+        source_(source),
+        target_(target.subsample(coarse_target_samples)),
+        options_(options),
+        progress_(progress) {
+    options_.centers = std::min(options_.centers, coarse_centers);
+    options_.stages = coarse_stages;
+    options_.iterations = coarse_iterations;
+    options_.landmark_weight = soft_pull;
+  }
+
+  void from(const Similarity& start, double scale, bool is_fixed) {
+    std::vector<Index> kept(source_.landmarks.rows());
+    std::iota(kept.begin(), kept.end(), 0);
+    Similarity at = start;
+    Trial trial;
+    for (int round = 0; round < rounds; ++round) {
+      trial = tried(at, kept);
+      std::vector<Index> near = near_of(trial, kept);
+      if (is_too_few(near)) return;
+      const bool is_done = near == kept;
+      kept = std::move(near);
+      if (is_done) break;
+      if (!is_fixed) at = fit(kept, scale);
+    }
+    take_back(at, kept, trial);
+    const double score = penalty(trial.distances);
+    if (score >= score_) return;
+    score_ = score;
+    kept_ = std::move(kept);
+    last_ = std::move(trial);
+  }
+
+  /// The pairs that agree with each other; none where too few do.
+  const std::optional<std::vector<Index>>& kept() const { return kept_; }
+  /// How far the wrap without them leaves those left out.
+  const Vector& distances() const { return last_.distances; }
+
+ private:
+  Trial tried(const Similarity& at, const std::vector<Index>& pulled) const {
+    const WrapTarget placed = target_.transformed_back(at);
+    WrapFlow flow(samples_, placed, source_.landmarks, at.inverse_of(source_.landmark_targets), pulled,
+                  static_cast<std::uint64_t>(options_.seed));
+    flow.run(options_, progress_);
+    return {(at.of(flow.landmarks()) - source_.landmark_targets).rowwise().norm() / target_.diagonal,
+            flow.stretch()};
+  }
+  Similarity fit(const std::vector<Index>& rows, double scale) const {
+    const WrapSource some = source_.with_landmarks(rows);
+    return fitted_similarity(some.landmarks, some.landmark_targets,
+                             Vector::Ones(static_cast<Index>(rows.size())), scale);
+  }
+  bool is_too_few(const std::vector<Index>& rows) const {
+    const auto count = static_cast<double>(source_.landmarks.rows());
+    return static_cast<double>(rows.size()) < std::max(3.0, (1.0 - most_wrong) * count);
+  }
+  static double limit(const Trial& trial, const std::vector<Index>& pulled) {
+    std::vector<double> sorted;
+    for (const Index row : pulled) sorted.push_back(trial.distances[row]);
+    std::ranges::sort(sorted);
+    const double median = (sorted[(sorted.size() - 1) / 2] + sorted[sorted.size() / 2]) / 2.0;
+    return std::clamp(medians * median, least_far, most_far);
+  }
+  static std::vector<Index> near_of(const Trial& trial, const std::vector<Index>& pulled) {
+    std::vector<Index> result;
+    const double far = limit(trial, pulled);
+    for (Index row = 0; row < trial.distances.size(); ++row)
+      if (trial.distances[row] < far) result.push_back(row);
+    return result;
+  }
+
+  /// A pair that others had pushed away returns where the wrap reaches it without much more stretch.
+  void take_back(const Similarity& at, std::vector<Index>& kept, Trial& trial) const {
+    std::vector<Index> away;
+    for (Index row = 0; row < trial.distances.size(); ++row)
+      if (!std::ranges::binary_search(kept, row) && trial.distances[row] < may_return) away.push_back(row);
+    std::ranges::sort(away, {}, [&](Index row) { return trial.distances[row]; });
+    for (const Index row : away) {
+      std::vector<Index> more = kept;
+      more.insert(std::ranges::upper_bound(more, row), row);
+      const Trial with = tried(at, more);
+      const double far = limit(with, more);
+      if (with.stretch > more_stretch * trial.stretch + least_stretch ||
+          std::ranges::any_of(more, [&](Index one) { return with.distances[one] >= far; }))
+        continue;
+      kept = std::move(more);
+      trial = with;
+    }
+  }
+
+  const SurfaceSamples& samples_;
+  const WrapSource& source_;
+  WrapTarget target_;
+  WrapOptions options_;
+  Progress progress_;
+  double score_ = std::numeric_limits<double>::infinity();
+  std::optional<std::vector<Index>> kept_;
+  Trial last_;
+};
+
+WrapSource mirrored(WrapSource source) {
+  source.landmarks.col(0) *= -1.0;
+  return source;
+}
+
+}  // namespace
+
+LandmarkVerdict trusted_landmarks(const SurfaceSamples& samples, const WrapSource& source,
+                                  const WrapTarget& target, const WrapOptions& options,
+                                  std::vector<std::string>& warnings, const Progress& progress) {
+  const Index count = source.landmarks.rows();
+  LandmarkVerdict verdict;
+  verdict.kept.resize(count);
+  std::iota(verdict.kept.begin(), verdict.kept.end(), 0);
+  if (!options.check_landmarks || count < least_pairs) return verdict;
+  const bool is_fixed = options.alignment == AlignmentKind::none;
+  const double scale = options.alignment == AlignmentKind::similar ? 0.0 : source.frame.scale;
+  const auto seed = static_cast<std::uint64_t>(options.seed);
+
+  std::vector<Placement> starts;
+  if (is_fixed) {
+    starts.push_back({0.0, {scale, Mat3::Identity(), source.frame.center}, {}});
+  } else {
+    starts = placements(source, target, scale, seed, progress);
+    const std::vector<Placement> turned = placements(mirrored(source), target, scale, seed, progress);
+    if (starts.empty()) return verdict;
+    require(turned.empty() || starts[0].distances.mean() <= no_doubt ||
+                mirrored_gain * turned[0].score > starts[0].score,
+            "landmarks", "they ask for a mirror image", "left and right are exchanged in them");
+    if (starts[0].distances.maxCoeff() <= no_doubt) return verdict;
+    starts = distinct(starts);
+  }
+
+  Vote vote(samples, source, target, options, progress);
+  for (const Placement& start : starts) {
+    vote.from(start.similarity, scale, is_fixed);
+    if (vote.kept() == verdict.kept) break;
+  }
+  if (!vote.kept()) {
+    warnings.emplace_back(
+        "the landmarks contradict each other, too many of them to say which are wrong; the result may be "
+        "badly stretched");
+    return verdict;
+  }
+  verdict.kept = *vote.kept();
+  for (Index row = 0; row < count; ++row)
+    if (!std::ranges::binary_search(verdict.kept, row)) {
+      verdict.left_out.push_back(row);
+      warnings.push_back(landmark_name(row) + " contradicts the others and was left out: they take it " +
+                         percent_text(vote.distances()[row]) + " of the target's size from its place");
+    }
+  return verdict;
+}
+
+}  // namespace arapfields
