@@ -26,9 +26,10 @@ class Steps(dict):
 
     def recover(self):
         """After a step was undone or redone: puts back what a solve has moved in it."""
-        for source in bpy.data.objects:
-            known = self.get(source.session_uid)
-            shown = motion.snapshot(source) if known and source.mode != "EDIT" else None
+        # A list: restoring removes helper objects, at which Blender's own iterator may stand.
+        for source in [item for item in bpy.data.objects if item.session_uid in self]:
+            known = self[source.session_uid]
+            shown = motion.snapshot(source) if source.mode != "EDIT" else None
             if shown is not None and digest(shown) in known:
                 motion.restore(source, known[digest(shown)])
 

@@ -13,7 +13,8 @@ if IN_BLENDER:
     from addon import lifecycle
     from addon.blender import modifier_stack, timers
     from addon.core.runtime import threads
-    from addon.deform.first_result import FirstResult
+    from addon.deform.first_result import FirstResult, steps
+    from addon.field_modifier import motion
     from addon.live import sessions
     from addon.names import OFFSETS
     from addon.surface.source_surface import read_surface
@@ -71,6 +72,17 @@ def test_steps_that_were_pushed_meanwhile_hold_nothing_of_it():
         for step in (bpy.ops.ed.undo, bpy.ops.ed.redo, bpy.ops.ed.undo, bpy.ops.ed.undo):
             step()
             assert state(bpy.data.objects[name]) == before
+
+
+def test_an_undone_step_takes_the_helper_of_a_shared_mesh_away():
+    """The object behind its source in Blender's list, whose memory the next look at that would read."""
+    bar = scenes.bar()
+    bpy.data.objects.new("Twin", bar.data)
+    motion.bind(bpy.context, bar)
+    steps.note(bar, motion.snapshot(bar), None)
+    lifecycle.after_restore()
+    steps.clear()
+    assert [item.name for item in bpy.data.objects] == ["Bar", "Twin"]
 
 
 def test_a_first_result_waits_for_the_end_of_edit_mode():
