@@ -97,7 +97,7 @@ test-slow: build $(NATIVE_TESTS)  ## every test
 
 # Debian: g++-mingw-w64-x86-64-posix and wine64. WINDOWS takes arguments: WINDOWS="--python 3.13", files of tests.
 WINE := $(shell command -v wine64 || ls /usr/lib/wine/wine64 2> /dev/null)
-WINDOWS_TESTS := build/windows/tests/native_tests.exe
+WINDOWS_BUILD := build/windows-x64
 
 .PHONY: windows-tools
 windows-tools:
@@ -105,13 +105,12 @@ windows-tools:
 	  $(call lacks,A compiler for Windows is needed (Debian: g++-mingw-w64-x86-64-posix))
 	@test -n "$(WINE)" || $(call lacks,Wine is needed (Debian: wine64))
 
-test-windows: windows-tools setup  ## the library without bindings, compiled for Windows by mingw-w64, and its native tests under Wine
-	$(VENV)/bin/cmake -S . -B build/windows -G Ninja -DCMAKE_TOOLCHAIN_FILE=cmake/mingw-w64.cmake -DARAPFIELDS_BACKEND=eigen \
-	  -DARAPFIELDS_PYTHON=OFF -DARAPFIELDS_NATIVE_TESTS=ON -DARAPFIELDS_WERROR=ON \
-	  -DCMAKE_CXX_FLAGS_RELEASE="-O1 -DNDEBUG" -DPython_EXECUTABLE=$(abspath $(PY)) -DCMAKE_MAKE_PROGRAM=$(abspath $(VENV)/bin/ninja)
-	$(VENV)/bin/cmake --build build/windows --target native_tests
-	WINEPREFIX=$(abspath build/wine) WINEDEBUG=-all timeout 900 $(WINE) $(WINDOWS_TESTS) --color_output=no --report_level=short
-	@$(if $(wildcard dist/*-win_amd64.whl),$(PY) -m tests.windows dist $(WINDOWS),echo "No wheels for Windows in dist: the tests of Python did not run")
+test-windows: windows-tools setup  ## the zip for Windows; its library's native tests, the tests of Python and the zip itself under Wine
+	$(MAKE) --no-print-directory extension PLATFORM=windows-x64
+	$(VENV)/bin/cmake -S . -B $(WINDOWS_BUILD) -DARAPFIELDS_NATIVE_TESTS=ON
+	$(VENV)/bin/cmake --build $(WINDOWS_BUILD) --target native_tests
+	WINEPREFIX=$(abspath build/wine) WINEDEBUG=-all timeout 900 $(WINE) $(WINDOWS_BUILD)/tests/native_tests.exe --color_output=no --report_level=short
+	$(PY) -m tests.windows dist $(WINDOWS)
 
 # Debian: g++-aarch64-linux-gnu and qemu-user-static.
 ARM64 := build/linux-arm64

@@ -41,7 +41,7 @@ PLATFORMS = {
             "linux-x64",
             "manylinux_{}_{}_x86_64".format(*GLIBC),
             ".cpython-{}-x86_64-linux-gnu.so",
-            "c++",
+            "g++",
             "x86_64-linux-gnu",
         ),
         Platform(

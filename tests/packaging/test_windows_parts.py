@@ -30,7 +30,7 @@ def test_native_tests_pass_under_wine():
     said = done.stdout + done.stderr
     assert done.returncode == 0, said[-4000:]
     assert re.search(r"(\d+) test cases out of \1 passed", said) and "warning:" not in said
-    commands = json.loads((ROOT / "build/windows/compile_commands.json").read_text(encoding="utf-8"))
+    commands = json.loads((ROOT / "build/windows-x64/compile_commands.json").read_text(encoding="utf-8"))
     assert commands and all(" -Werror " in one["command"] for one in commands)
 
 

@@ -85,6 +85,7 @@ def run(folder, *arguments, seconds=SECONDS, **environment):
     paths = ";".join(map(windows, (ROOT / "tests", ROOT)))
     environment = {
         **{name: value for name, value in os.environ.items() if not name.startswith("PYTHON")},
+        "LC_ALL": "C.UTF-8",  # of names of files
         "WINEPREFIX": str(PREFIX),
         "WINEDEBUG": "-all",
         "PYTHONPATH": paths,
