@@ -51,7 +51,7 @@ def settings_column(layout, group, parameters, advanced):
         if p.zero:
             with_zero(row, group, p)
         else:
-            row.prop(group, p.name)
+            draw_settings(row, group, p.name)
 
 
 def with_zero(layout, group, parameter):
@@ -64,8 +64,12 @@ def with_zero(layout, group, parameter):
 
 
 def draw_settings(layout, group, *names):
+    """In a narrow sidebar a switch has the whole width for its name."""
     for name in names:
-        layout.prop(group, name)
+        row = layout.row()
+        if group.bl_rna.properties[name].type == "BOOLEAN" and characters() < NARROW:
+            row.use_property_split = False
+        row.prop(group, name)
 
 
 def modifier_row(layout, modifier, icon, remove):
@@ -120,6 +124,7 @@ def presets(layout, name):
 
 
 MARGIN, CHARACTER = 80, 5.6  # pixels beside a label, and of a letter, at a scale of 1
+NARROW = 30  # letters
 
 
 def characters():

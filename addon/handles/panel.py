@@ -4,7 +4,7 @@ import bpy
 from ..blender import icons
 from ..blender.language import translated
 from ..blender.object_references import source_of
-from ..blender.section import Section, note, wrapped
+from ..blender.section import Section, draw_settings, note, wrapped
 from ..names import Op
 from . import empties, movers, scaling
 
@@ -97,17 +97,16 @@ class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
             beyond = row.row()
             beyond.enabled = settings.keep_rest
             beyond.prop(settings, "keep_beyond", text="")
-        row = layout.row(align=True)
-        row.operator(Op.SET_REST, icon="PINNED")
-        row.operator(Op.RESET_HANDLE, icon="LOOP_BACK")
+        column = layout.column(align=True)
+        column.operator(Op.SET_REST, icon="PINNED")
+        column.operator(Op.RESET_HANDLE, icon="LOOP_BACK")
         if 0 <= settings.active_handle < len(settings.handles):
             entry = settings.handles[settings.active_handle]
-            layout.prop(entry, "weight")
-            layout.prop(entry, "reach")
+            draw_settings(layout, entry, "weight", "reach")
             if entry.kind in empties.PINS:
-                layout.prop(entry, "hold_turn")
+                draw_settings(layout, entry, "hold_turn")
             if entry.kind != "POINT":
-                layout.prop(entry, "allow_scale")
+                draw_settings(layout, entry, "allow_scale")
             if entry.kind in ("GROUP", "BONE"):
                 layout.prop_search(entry, "group", source, "vertex_groups")
             if entry.group:

@@ -8,6 +8,7 @@ import bpy
 import stage
 from support.blender import panels
 
+from addon.blender.section import Advanced
 from addon.names import CONTEXT
 
 MARGINS, LABELS = 23, 0.4  # pixels beside what a section shows; share of it that labels before values have
@@ -15,7 +16,8 @@ ICON, PADDING = 20, 8  # pixels at a scale of 1
 
 
 def checks(figures, folder):
-    """At the sidebar's first width, with all methods' settings in sight, in English and in German."""
+    """At the sidebar's first width, with all methods' settings in sight, in English and in German; made
+    narrow by mouse, what is not advanced."""
     bar, interface = bpy.data.objects["Bar"].arapfields, bpy.context.preferences.view
     bar.surface = "FIT"
     bar.deform.field = bar.stylize.field = "neural"
@@ -32,7 +34,24 @@ def checks(figures, folder):
     yield 1.0
     stage.picture(folder, "light")
     bpy.ops.preferences.reset_default_theme()
+    yield from narrower()
+    stage.picture(folder, "narrow")
+    figures["cut_narrow"] = cut(everyday=True)
+
+
+def narrower():
+    """Drags the sidebar's edge."""
+    window, area, _ = stage.view()
+    region = next(one for one in area.regions if one.type == "UI")
+    x, y = region.x, window.height - region.y - region.height // 2
+    stage.tool("mousemove", x, y)
     yield 0.5
+    stage.tool("mousedown", 1)
+    for step in range(1, 9):
+        yield 0.15
+        stage.tool("mousemove", x + 8 * step, y)
+    stage.tool("mouseup", 1)
+    yield 1.0
 
 
 class Measured(panels.Layout):
@@ -40,7 +59,12 @@ class Measured(panels.Layout):
 
     def __init__(self, found, width, row=None):
         super().__init__([])
-        self.__dict__.update(found=found, width=width, buttons=row)
+        self.__dict__.update(found=found, width=width, buttons=row, is_split=True)
+
+    def __setattr__(self, name, value):
+        super().__setattr__(name, value)
+        if name == "use_property_split":
+            self.__dict__["is_split"] = value
 
     def note(self, text, room):
         self.found.append((bpy.app.translations.pgettext_iface(text, CONTEXT), room))
@@ -50,7 +74,7 @@ class Measured(panels.Layout):
         text, prop = self.texts.pop(), data.bl_rna.properties.get(name)
         if prop is None or options.get("icon_only") or not text.strip():
             return
-        values = (1 - LABELS) * self.width - PADDING
+        values = ((1 - LABELS) if self.is_split else 1) * self.width - PADDING
         is_switch = prop.type == "BOOLEAN" and not options.get("icon")
         self.note(text, values - ICON if is_switch else LABELS * self.width - PADDING)
         for item in prop.enum_items if prop.type == "ENUM" and not options.get("expand") else ():
@@ -92,8 +116,9 @@ def of_rows(found, row):
         row.note(text, left / len(words) - icon - PADDING)
 
 
-def cut():
-    """Texts of the sections as they show now that are wider than their place, longest excess first."""
+def cut(everyday=False):
+    """Texts of the sections as they show now that are wider than their place; `everyday`: not of advanced
+    ones."""
     window, area, _ = stage.view()
     region = next(one for one in area.regions if one.type == "UI")
     scale = bpy.context.preferences.system.ui_scale
@@ -109,6 +134,8 @@ def cut():
 
     with bpy.context.temp_override(window=window, area=area, region=region):
         for cls in panels.shown():
+            if everyday and issubclass(cls, Advanced):
+                continue
             section = type("Section", (), {"layout": Layout(found, region.width / scale - MARGINS)})()
             section.fill = cls.fill.__get__(section)
             cls.draw(section, bpy.context)

@@ -1,16 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The live solver and its threads; the thread sanitizer runs these.
+// The live solver and its threads, and what several of them read; the thread sanitizer runs these.
 #include <atomic>
 #include <boost/test/unit_test.hpp>
 #include <functional>
 #include <stdexcept>
 #include <thread>
 
+#include "attach/attachment.h"
 #include "core/errors.h"
 #include "core/one_at_a_time.h"
 #include "core/parallel.h"
 #include "core/random.h"
+#include "distance/mesh_sdf.h"
+#include "energies/object_style.h"
+#include "fields/apply_field.h"
+#include "fields/inverse.h"
+#include "fields/neural_field.h"
+#include "shapes.h"
 #include "solve/radial/radial_solver.h"
+#include "wrap/transfer.h"
 
 using namespace arapfields;
 
@@ -137,6 +145,49 @@ BOOST_AUTO_TEST_CASE(one_solver_serves_threads_one_at_a_time) {
         [&] { BOOST_CHECK_THROW(live.run(Progress(&task), [](RadialSolver&) {}), Cancelled); });
     waiting.join();
   });
+}
+
+/// Every answer is the one that it is alone, also those that fill a cache, of two fields in turn.
+BOOST_AUTO_TEST_CASE(objects_answer_threads_at_once) {
+  const SurfaceSamples samples = ball(600);
+  RadialSolver live(samples, pose(0.0), small_options(1));
+  live.set_targets(pose(0.3));
+  const RadialField field = *live.solve();
+  const RadialField other(field.basis(), 0.5 * field.coefficients());
+  MlpShape shape;
+  shape.outputs = 3, shape.width = 8, shape.layers = 1;
+  const NeuralField network(shape, 1);
+  const TriangleMesh torus = shapes::torus(12, 8);
+  const MeshSdf distance(torus.vertices, torus.triangles);
+  const ObjectStyle style(torus.vertices, torus.triangles);
+  const Correspondence places(WrappedMesh(torus, field), torus, Correspondence::Direction::to_target);
+  const Attachment attached(samples, 1.5 * samples.points.topRows(40));
+  const NewtonInverse inverse(field, samples.points);
+  const Points points = samples.points.topRows(60);
+  const std::vector<std::function<RowMatrix<double>()>> calls = {
+      [&] { return RowMatrix<double>(field.at(points)); },
+      [&] { return network.at(points); },
+      [&] { return inverse(points).points; },
+      [&] { return apply_field(field, points, 0.5); },
+      [&] { return attached.positions(field); },
+      [&] { return attached.positions(other); },
+      [&] { return distance.distances(points); },
+      [&] { return distance.gradients(points); },
+      [&] { return style.normals(points, 0.1); },
+      [&] { return places.displacements(torus.vertices); }};
+  std::vector<RowMatrix<double>> alone;
+  for (const auto& call : calls) alone.push_back(call());
+  std::atomic<int> wrong{0};
+  std::vector<std::thread> callers;
+  for (std::size_t first = 0; first < 3; ++first)
+    callers.emplace_back([&, first] {
+      for (std::size_t k = 0; k < 4 * calls.size(); ++k) {
+        const std::size_t which = (first + (2 * first + 1) * k) % calls.size();
+        wrong += calls[which]() != alone[which];
+      }
+    });
+  for (std::thread& caller : callers) caller.join();
+  BOOST_CHECK_EQUAL(wrong, 0);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -40,9 +40,13 @@ def few_centers():
     return lambda: put(before)
 
 
+def empty_file():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+
+
 def build():
     """A bar that is turned as an import is, a stretched ball under a parent with modifiers, an open shell."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    empty_file()
     edit = bpy.context.preferences.edit
     edit.use_global_undo, edit.undo_steps = True, 64
     scenes.bar("Bar").rotation_euler.x = np.pi / 2
