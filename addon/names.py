@@ -52,6 +52,7 @@ class Op(StrEnum):
     TRANSFER = "arapfields.transfer"
     ADD_LANDMARK = "arapfields.add_landmark"
     CLICK_LANDMARKS = "arapfields.click_landmarks"
+    SUGGEST_LANDMARKS = "arapfields.suggest_landmarks"
     RESET_BONES = "arapfields.reset_bones"
     MIRROR_LANDMARKS = "arapfields.mirror_landmarks"
     REMOVE_LANDMARK = "arapfields.remove_landmark"

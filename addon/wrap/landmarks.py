@@ -68,12 +68,16 @@ def read(source, space, seen=None, rest=None):
 
 def place(context, source, target, rest, on_target):
     """A new pair at the places of both surfaces that are nearest to two in the world, (3,) each."""
-    number = len(settings_of(source).wrap.landmarks) + 1
     at_rest = places.find(context, source, rest, 0.0).rest
-    at_target = places.find(context, target, on_target, 0.0).now
+    return add(context, source, target, (at_rest, places.find(context, target, on_target, 0.0).now))
+
+
+def add(context, source, target, pair):
+    """A new pair at these places in the world: of the source at rest, of the target."""
+    number = len(settings_of(source).wrap.landmarks) + 1
     ends = [
-        empty_at(context, source, at_rest, f"Landmark {number}"),
-        empty_at(context, target, at_target, f"Landmark {number} {target.name}"),
+        empty_at(context, source, pair[0], f"Landmark {number}"),
+        empty_at(context, target, pair[1], f"Landmark {number} {target.name}"),
     ]
     wrap = settings_of(source).wrap
     colour = free_colour(wrap.landmarks)

@@ -4,6 +4,7 @@
 #include "bindings/bind.h"
 #include "bindings/python_function.h"
 #include "bindings/reports.h"
+#include "wrap/suggestion.h"
 #include "wrap/transfer.h"
 #include "wrap/wrap.h"
 
@@ -44,6 +45,19 @@ WrapResult wrap_samples(const SurfaceSamples& samples, const FunctionArgument& t
                   "scale"_a = r.scale, "iterations"_a = r.iterations, "seconds"_a = r.seconds,
                   "notes"_a = py::tuple(py::cast(r.warnings)), **field_measures(r.arap, r.distortion)));
   return field;
+}
+
+py::array_t<double> suggest(const SurfaceSamples& samples, const FunctionArgument& target, int count,
+                            WrapOptions options, Task* task) {
+  const std::shared_ptr<const ImplicitFunction> function = as_function(target, "target");
+  const std::vector<Landmark> pairs = run_long(task, [&](const Progress& progress) {
+    return suggest_landmarks(samples, *function, count, options, progress);
+  });
+  py::array_t<double> result({static_cast<py::ssize_t>(pairs.size()), py::ssize_t{2}, py::ssize_t{3}});
+  double* out = result.mutable_data();
+  for (const Landmark& pair : pairs)
+    for (const Vec3* end : {&pair.rest, &pair.target}) out = std::copy(end->begin(), end->end(), out);
+  return result;
 }
 
 Correspondence correspondence(const MovedArgument& field, const MeshArgument& source,
@@ -163,6 +177,12 @@ report; those of a mirror image are refused.
 
 Parts without a counterpart on an open target follow their neighbours. The samples' weights set where the
 surface is stiffer. field.report is a WrapReport. Raises InvalidInput and Cancelled.)");
+  module.def("suggest_landmarks", &suggest, "samples"_a, "target"_a, "count"_a = 8,
+             py::arg_v("options", WrapOptions(), "WrapOptions()"), py::kw_only(), "task"_a = py::none(), R"(
+Pairs of landmarks (k, 2, 3) for `wrap`, at most `count`: places at rest and on the target.
+
+They are ends of the shape, which lie far from each other inside it, and where a coarse wrap without landmarks
+takes them. Look at them before use. Arguments as for `wrap`. Raises InvalidInput and Cancelled.)");
 }
 
 }  // namespace arapfields::python

@@ -76,6 +76,27 @@ def test_landmarks_are_pairs_of_empties_that_move_with_both():
     assert not landmarks.used(item) and not [o for o in bpy.data.objects if o.type == "EMPTY"]
 
 
+def test_pairs_are_suggested_once():
+    item, target = bar_and_target()
+    bpy.ops.arapfields.add_landmark(
+        rest=scenes.world_points(item)[0], on_target=scenes.world_points(target)[0]
+    )
+    before = len(bpy.data.objects)
+    assert bpy.ops.arapfields.suggest_landmarks(count=6) == {"FINISHED"}
+    made = len(landmarks.used(item)) - 1
+    assert 4 <= made <= 6 and len(bpy.data.objects) == before + 2 * made
+    corners = np.array([t.vertices for t in target.data.polygons])
+    ends = [np.array(entry.on_target.matrix_world.translation) for entry in landmarks.used(item)]
+    assert np.abs(af.MeshSdf(scenes.world_points(target), triangles_of(corners))(ends)).max() < 0.03
+    assert all(entry.rest.parent == item for entry in landmarks.used(item))
+    assert bpy.ops.arapfields.suggest_landmarks(count=6) == {"FINISHED"}
+    assert len(landmarks.used(item)) == made + 1  # none lies where there is one
+
+
+def triangles_of(faces):
+    return np.concatenate([faces[:, [0, k, k + 1]] for k in range(1, faces.shape[1] - 1)])
+
+
 def test_a_pair_that_lies_is_marked_in_the_list():
     item, target = bar_and_target()
     rest, goal = scenes.world_points(item), scenes.world_points(target)

@@ -213,6 +213,10 @@ def members(t):
             by_name(af.wrap, "task"),
             [t["samples"], t["mesh_sdf"], [], af.WrapOptions(**WRAP), af.Task()],
         ),
+        "suggest_landmarks": lambda: (
+            by_name(af.suggest_landmarks, "task"),
+            [t["samples"], t["mesh_sdf"], 4, af.WrapOptions(**WRAP), af.Task()],
+        ),
         "Obstacle": lambda: (af.Obstacle, [t["mesh_sdf"], 0.1]),
         "Contact": lambda: (
             by_name(af.Contact, "ground", "up"),

@@ -10,6 +10,7 @@ from support.geometry import wrap_cases as cases
 from support.programs.cli import run
 
 import arapfields as af
+from arapfields.cli.wrapping import read_landmarks, write_landmarks
 
 SMALL = ["--centers", "50", "--stages", "2", "--iterations", "5", "--samples", "1000", "--quiet"]
 
@@ -51,10 +52,22 @@ def test_a_mesh_goes_onto_another(pair, landmarks):
     assert np.abs(field(template.vertices) - out.vertices).max() < 1e-4
 
 
+def test_landmarks_are_suggested(pair):
+    meshes, found = (pair / "template.obj", pair / "scan.ply"), pair / "found.csv"
+    assert run("wrap", *meshes, "--suggest", found, *SMALL) == 0
+    pairs = np.array(read_landmarks(found))
+    assert pairs.shape == (8, 2, 3)
+    for suffix in (".json", ".npy", ".txt"):
+        again = pair / f"again{suffix}"
+        write_landmarks(again, suffix, pairs)
+        assert np.array_equal(read_landmarks(again), pairs)
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
         ([], "no output"),
+        (["--suggest", "found.json", "--report", "r.json"], "--report: give --output"),
         (["-o", "out.obj", "--landmarks", "gone.json"], "gone.json"),
         (["-o", "out.obj", "--landmarks", "bad.json"], "pairs of places"),
         (["-o", "out.obj", "--landmark", "99,0,0", "0,0,0"], "landmarks[0]"),

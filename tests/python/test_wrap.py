@@ -167,6 +167,20 @@ def test_landmarks_of_which_most_lie_are_not_followed_without_a_word(figure, sam
     assert not report.left_out and any("contradict each other" in note for note in report.notes)
 
 
+def test_suggested_landmarks_are_ends_and_lie_where_they_belong(figure, samples):
+    v, f = figure
+    target_v = cases.moved(v)
+    pairs = af.suggest_landmarks(samples, af.MeshSdf(target_v, f), 6)
+    assert pairs.shape == (6, 2, 3)
+    size = np.linalg.norm(np.ptp(target_v, axis=0))
+    away = np.linalg.norm(cases.moved(pairs[:, 0]) - pairs[:, 1], axis=1) / size
+    assert np.median(away) < 0.05 and away.max() < 0.2  # the round back slides
+    nose = v[v[:, 0].argmax()]
+    assert np.linalg.norm(pairs[:, 0] - nose, axis=1).min() < 0.1
+    with pytest.raises(af.InvalidInput, match="count"):
+        af.suggest_landmarks(samples, af.MeshSdf(v, f), 0)
+
+
 def test_targets_without_a_surface_are_named(samples):
     class Nothing(af.ImplicitFunction):
         def __call__(self, points):

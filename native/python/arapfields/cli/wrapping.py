@@ -20,6 +20,7 @@ SUMMARY = "lay a shape onto another, as rigidly as possible"
 EXAMPLES = (
     "template.obj scan.ply -o wrapped.obj",
     "shirt.obj body.obj -o worn.obj --landmark 0,0,1.4 0,0.02,1.5 --landmark 0.3,0,1.3 0.35,0,1.4",
+    "template.obj scan.ply --suggest pairs.json",
     "template.obj scan.safetensors --save-field wrap.safetensors --landmarks pairs.json",
 )
 LANDMARKS = (".json", ".txt", ".csv", ".npy")
@@ -31,6 +32,9 @@ def add_flags(parser):
     outputs = parser.add_argument_group("outputs (one or more)")
     outputs.add_argument("-o", "--output", metavar="FILE", help="the input mesh with its vertices moved")
     outputs.add_argument("--save-field", metavar="FILE", help=".safetensors with the deformation field")
+    outputs.add_argument(
+        "--suggest", metavar="FILE", help="pairs of landmarks proposed by shape, as --landmarks reads them"
+    )
     report_flag(outputs)
     landmarks = parser.add_argument_group("landmarks: places of both that belong together")
     landmarks.add_argument(
@@ -59,21 +63,35 @@ def run(args):
             for flag, path, suffixes in (
                 ("--output", args.output, files.MESH_SUFFIXES),
                 ("--save-field", args.save_field, files.STATE_SUFFIXES),
+                ("--suggest", args.suggest, LANDMARKS),
             )
             if path is not None
         }
         if not places:
-            raise af.InvalidInput("no output: give --output or --save-field")
+            raise af.InvalidInput("no output: give --output, --save-field or --suggest")
         report = verbs.report_place(outputs, args)
+        if report is not None and not places.keys() - {"--suggest"}:
+            raise af.InvalidInput("--report: give --output or --save-field, of which it tells")
         pairs = (read_landmarks(args.landmarks) if args.landmarks else []) + (args.landmark or [])
         source = verbs.Source(args)
         if source.mesh is None and "--output" in places:
             raise af.InvalidInput(f"--output: {source.path} holds no mesh to move; use --save-field")
         target = read_target(args.target)
         samples = verbs.samples(source, given(args, "wrap", "samples"), options.seed, args)
-        field = with_progress(
-            "wrap", lambda task: af.wrap(samples, target, pairs, options, task=task), args.quiet
-        )
+        if "--suggest" in places:
+            found = with_progress(
+                "suggest",
+                lambda task: af.suggest_landmarks(samples, target, options=options, task=task),
+                args.quiet,
+            )
+            outputs.write(
+                places["--suggest"], lambda path: write_landmarks(path, places["--suggest"].suffix, found)
+            )
+        field = None
+        if places.keys() - {"--suggest"}:
+            field = with_progress(
+                "wrap", lambda task: af.wrap(samples, target, pairs, options, task=task), args.quiet
+            )
         if "--output" in places:
             outputs.write(
                 places["--output"],
@@ -81,8 +99,10 @@ def run(args):
             )
         if "--save-field" in places:
             outputs.write(places["--save-field"], field.save)
-        verbs.write_report(outputs, report, field.report)
-    verbs.summary(args, "wrote " + ", ".join(str(path) for path in places.values()), field.report)
+        if field is not None:
+            verbs.write_report(outputs, report, field.report)
+    written = "wrote " + ", ".join(str(path) for path in places.values())
+    verbs.summary(args, written, field.report if field is not None else None)
 
 
 def read_target(path):
@@ -106,3 +126,15 @@ def read_landmarks(path):
             f"{path}: holds an array of shape {rows.shape}; pairs of places are needed, six numbers each"
         )
     return list(rows.reshape(-1, 2, 3))
+
+
+def write_landmarks(path, suffix, pairs):
+    """As read_landmarks reads them; the kind follows from the suffix."""
+    if suffix.lower() == ".json":
+        path.write_text(json.dumps(pairs.tolist()), encoding="utf-8")
+        return
+    with path.open("wb") as file:
+        if suffix.lower() == ".npy":
+            np.save(file, pairs)
+        else:
+            np.savetxt(file, pairs.reshape(-1, 6), delimiter="," if suffix.lower() == ".csv" else " ")
