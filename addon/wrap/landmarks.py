@@ -30,6 +30,14 @@ def target_of(source, name=""):
     return target
 
 
+def read_target(context, target, space):
+    """(n, 3) vertices and (m, 3) triangles of the target as it is shown, in solve space."""
+    mesh = mesh_arrays.read(context, target)
+    to_solve = space.world_to_solve @ matrix_of(target)
+    mirrored = np.linalg.det(to_solve[:3, :3]) < 0
+    return transform(to_solve, mesh.vertices), mesh.triangles[:, ::-1] if mirrored else mesh.triangles
+
+
 def refusal(source):
     """Why there is nothing to wrap onto, as a UserError; None where there is."""
     try:

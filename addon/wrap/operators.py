@@ -4,7 +4,6 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ..blender import mesh_arrays
 from ..blender.host import has_window
 from ..blender.language import translated
 from ..blender.native_options import options_of
@@ -14,11 +13,10 @@ from ..blender.property_definitions import annotations, effective_value, effecti
 from ..blender.source_operator import SourceOperator
 from ..carried import rest_bones
 from ..core.errors import UserError
-from ..core.geometry.spaces import space_of, transform
+from ..core.geometry.spaces import space_of
 from ..core.runtime import native
 from ..core.settings.parameters import WRAP
 from ..deform.solve_job import SolveOperator, plan_solve_job
-from ..handles.empties import matrix_of
 from ..live.sessions import end_for_job
 from ..properties.choices import result_properties
 from ..results.placement import destination, holds_place
@@ -81,7 +79,7 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
             pairs = landmarks.read(source, space, before, landmarks.world_vertices_at_rest(context, source))
         else:
             pairs = landmarks.read(source, space)
-        vertices, triangles = read_target(context, other, space)
+        vertices, triangles = landmarks.read_target(context, other, space)
         marks = landmarks.Marks(source)
 
         def solve(tracker, rest, samples, weight):
@@ -113,14 +111,6 @@ def with_rest(item, marks, fitting, below):
         return said
 
     return replace(item, apply=apply)
-
-
-def read_target(context, target, space):
-    """(n, 3) vertices and (m, 3) triangles of the target as it is shown, in solve space."""
-    mesh = mesh_arrays.read(context, target)
-    to_solve = space.world_to_solve @ matrix_of(target)
-    mirrored = np.linalg.det(to_solve[:3, :3]) < 0
-    return transform(to_solve, mesh.vertices), mesh.triangles[:, ::-1] if mirrored else mesh.triangles
 
 
 class ARAPFIELDS_OT_add_landmark(SourceOperator, bpy.types.Operator):
@@ -190,7 +180,7 @@ class ARAPFIELDS_OT_reset_bones(SourceOperator, bpy.types.Operator):
 
 
 class ARAPFIELDS_OT_transfer(SourceOperator, bpy.types.Operator):
-    """Give the target what the wrapped object has: shape keys, vertex groups, attributes, its armature"""
+    """Give the target what the wrapped object has: shape keys, weights, attributes, seams, its armature"""
 
     bl_label = "Transfer to Target"
     bl_options = {"REGISTER", "UNDO"}
@@ -205,7 +195,8 @@ class ARAPFIELDS_OT_transfer(SourceOperator, bpy.types.Operator):
     def change(self, context, source):
         target = landmarks.target_of(source, self.onto)
         kinds = effective_value("transfer", settings_of(source).wrap, self)
-        return transfer.message(target, transfer.Transfer(context, source, target).carry(kinds))
+        work = transfer.Transfer(context, source, target)
+        return transfer.message(target, work.carry(kinds), work.notes)
 
 
 CLASSES = [

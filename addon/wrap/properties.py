@@ -46,7 +46,7 @@ def carried_kinds(options=()):
         [(*kind, "NONE", 1 << index) for index, kind in enumerate(TRANSFERRED)],
         "Transfer",
         "What the target receives",
-        default={kind for kind, _, _ in TRANSFERRED},
+        default={kind for kind, _, _ in TRANSFERRED} - {"UV_MAPS"},
         options={"ENUM_FLAG", *options},
     )
 

@@ -15,7 +15,6 @@ from ..core.settings.parameters import WRAP
 from ..jobs.job_operator import JobOperator
 from ..surface.source_surface import read_surface
 from . import landmarks
-from .operators import read_target
 
 
 class ARAPFIELDS_OT_suggest_landmarks(JobOperator, bpy.types.Operator):
@@ -37,7 +36,7 @@ class ARAPFIELDS_OT_suggest_landmarks(JobOperator, bpy.types.Operator):
         options, count = options_of("wrap", values), self.count
         surface = read_surface(context, source, exact=True)
         target = landmarks.target_of(source)
-        vertices, triangles = read_target(context, target, surface.space)
+        vertices, triangles = landmarks.read_target(context, target, surface.space)
         ends = ObjectReference(source), ObjectReference(target)
 
         def work(tracker):

@@ -1,31 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a wrapped object has, carried over to its target: shape keys, vertex groups, attributes, armature."""
+"""What a wrapped object has, carried over to its target: shape keys, groups, attributes, edges, armature."""
 
 import numpy as np
+from mathutils.kdtree import KDTree
 
 from ..blender import mesh_arrays, modifier_stack, vertex_groups
 from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..core.errors import UserError, refuse
+from ..core.geometry import uv_transfer
+from ..core.geometry.edge_paths import carried_marks
 from ..core.geometry.spaces import transform
 from ..core.runtime import native
 from ..core.settings.choices import TRANSFERRED
 from ..handles.empties import matrix_of
-from ..names import OFFSETS, TURNS
 from ..results.placement import single_user
+from .given import Given
 
-# Attributes' types: (name of a value in Blender, numbers a value, whether values between two make sense).
-TYPES = {
-    "FLOAT": ("value", 1, True),
-    "FLOAT2": ("vector", 2, True),
-    "FLOAT_VECTOR": ("vector", 3, True),
-    "FLOAT_COLOR": ("color", 4, True),
-    "BYTE_COLOR": ("color", 4, True),
-    "QUATERNION": ("value", 4, False),
-    "INT": ("value", 1, False),
-    "INT8": ("value", 1, False),
-    "BOOLEAN": ("value", 1, False),
-}
 LEAST_WEIGHT = 1e-4  # what is below is no member of a group
 
 
@@ -72,21 +63,18 @@ class Transfer:
 
     def __init__(self, context, source, target):
         refuse(refusal(source, target))
-        self.context, self.source, self.target = context, source, target
-        rest = mesh_arrays.read(context, source, in_place=True)
-        with modifier_stack.moved_mesh(context, source) as mesh:
-            moved = mesh_arrays.positions(mesh)
-        if len(moved) != len(rest.vertices):
-            raise UserError("{name} changed while it was worked on; run again", source)
-        to_world, from_world = matrix_of(source), np.linalg.inv(matrix_of(target))
-        self.triangles = rest.triangles
-        own = mesh_arrays.positions(target.data)
-        # In the target's coordinates, as keys are.
-        self.places = native.library().Correspondence(
-            transform(from_world @ to_world, moved),
-            (rest.vertices, rest.triangles),
-            (own, mesh_arrays.triangles(target.data)),
-        )
+        self.source, self.target = source, target
+        self.given = Given(context, source)
+        to_target = np.linalg.inv(matrix_of(target)) @ matrix_of(source)
+        self.moved = transform(to_target, self.given.moved)  # in the target's coordinates, as keys are
+        self.own = mesh_arrays.positions(target.data)
+        self.places = self.places_of(self.own, mesh_arrays.triangles(target.data))
+        self.notes = []
+
+    def places_of(self, vertices, triangles):
+        """Where the vertices of a mesh lie on the wrapped source."""
+        rest = self.given.rest, self.given.triangles
+        return native.library().Correspondence(self.moved, rest, (vertices, triangles))
 
     def carry(self, kinds):
         """Carries the kinds over; returns how many of each by label."""
@@ -97,6 +85,8 @@ class Transfer:
             "KEYS": self.keys,
             "GROUPS": self.groups,
             "ATTRIBUTES": self.attributes,
+            "EDGES": self.edges,
+            "UV_MAPS": self.uv_maps,
             "ARMATURE": self.armature,
         }
         return {label: steps[kind]() for kind, label, _ in TRANSFERRED if kind in kinds}
@@ -141,11 +131,8 @@ class Transfer:
         )
 
     def groups(self):
-        indices = {group.name: group.index for group in self.source.vertex_groups}
-        with modifier_stack.moved_mesh(self.context, self.source) as mesh:
-            given = vertex_groups.weights_in(mesh, indices)
         done = 0
-        for name, weights in given.items():
+        for name, weights in self.given.groups.items():
             there = self.target.vertex_groups.get(name)
             if there is None or not there.lock_weight:
                 carried = self.places.values(weights)
@@ -154,39 +141,59 @@ class Transfer:
         return done
 
     def attributes(self):
-        done = 0
-        uv_maps = {layer.name for layer in self.source.data.uv_layers}
-        with modifier_stack.moved_mesh(self.context, self.source) as mesh:
-            mesh.calc_loop_triangles()
-            corners = np.array([one.loops for one in mesh.loop_triangles]).reshape(-1, 3)
-            for attribute in mesh.attributes:
-                known = TYPES.get(attribute.data_type)
-                internal = attribute.is_required or attribute.is_internal or attribute.name.startswith(".")
-                if known is None or internal or attribute.name in {*uv_maps, OFFSETS, TURNS, "custom_normal"}:
-                    continue
-                if attribute.domain in ("POINT", "CORNER"):
-                    self.attribute(attribute, corners, *known)
-                    done += 1
-        self.target.data.update()
+        mesh = self.target.data
+        for layer in self.given.attributes:
+            on_vertices = layer.domain == "POINT"
+            at = (self.given.triangles if on_vertices else self.given.corners)[self.places.triangles]
+            shares = self.places.shares
+            shares = shares if layer.is_smooth else np.eye(3)[shares.argmax(axis=1)]
+            carried = (shares[:, :, None] * layer.values[at].astype(float)).sum(axis=1)
+            layer.put(mesh, carried if on_vertices else carried[mesh_arrays.corner_vertices(mesh)])
+        mesh.update()
+        return len(self.given.attributes)
+
+    def edges(self):
+        """Seams, sharp edges, creases and the like."""
+        mesh, done = self.target.data, 0
+        edges = np.empty(2 * len(mesh.edges), np.int32)
+        mesh.edges.foreach_get("vertices", edges)
+        tree = KDTree(len(self.own))
+        for index, vertex in enumerate(self.own):
+            tree.insert(vertex, index)
+        tree.balance()
+        for layer in self.given.marks:
+            marked = np.flatnonzero(layer.values[:, 0])
+            if len(marked):
+                ends = self.moved[self.given.edges[marked]]
+                nearest = np.array([[tree.find(end)[1] for end in pair] for pair in ends])
+                values = layer.values[marked, 0].astype(float)
+                layer.put(mesh, carried_marks(ends, values, nearest, self.own, edges.reshape(-1, 2)))
+                done += 1
+        mesh.update()
         return done
 
-    def attribute(self, given, corners, field, width, smooth):
-        values = np.empty(len(given.data) * width, bool if given.data_type == "BOOLEAN" else np.float32)
-        given.data.foreach_get(field, values)
-        values = values.reshape(-1, width)
-        at = (self.triangles if given.domain == "POINT" else corners)[self.places.triangles]
-        shares = self.places.shares if smooth else np.eye(3)[self.places.shares.argmax(axis=1)]
-        carried = (shares[:, :, None] * values[at].astype(float)).sum(axis=1)
+    def uv_maps(self):
         mesh = self.target.data
-        old = mesh.attributes.get(given.name)
-        if old is not None and (old.domain, old.data_type) != (given.domain, given.data_type):
-            mesh.attributes.remove(old)
-            old = None
-        new = old or mesh.attributes.new(given.name, given.data_type, given.domain)
-        if given.domain == "CORNER":
-            carried = carried[mesh_arrays.corner_vertices(mesh)]
-        kind = bool if given.data_type == "BOOLEAN" else np.int32 if "INT" in given.data_type else np.float32
-        new.data.foreach_set(field, np.ascontiguousarray(carried.ravel(), dtype=kind))
+        starts = np.empty(len(mesh.polygons), np.int32)
+        mesh.polygons.foreach_get("loop_start", starts)
+        corners = mesh_arrays.corner_vertices(mesh)
+        points, triangles, face = uv_transfer.fan(self.own, starts, corners)
+        places = self.places_of(points, triangles)
+        crossing = set()
+        for layer in self.given.uv_maps:
+            values, beyond = uv_transfer.corner_coordinates(
+                *(points, places.triangles, places.shares, corners, face),
+                *(self.moved[self.given.triangles], layer.values[self.given.corners].astype(float)),
+            )
+            there = mesh.uv_layers.get(layer.name) or mesh.uv_layers.new(name=layer.name, do_init=False)
+            if there is None:
+                raise UserError("{name} has no room for another UV map", self.target)
+            there.uv.foreach_set("vector", values.astype(np.float32).ravel())
+            crossing |= set(face[beyond].tolist())
+        if crossing:
+            self.notes.append(translated("{count} faces cross a seam of the texture", count=len(crossing)))
+        mesh.update()
+        return len(self.given.uv_maps)
 
     def armature(self):
         """A rig of the target's own; only where the wrap fitted the bones to the wrapped shape."""
@@ -227,7 +234,7 @@ def copy_drivers(given, keys):
         keys.animation_data_create().drivers.from_existing(src_driver=curve)
 
 
-def message(target, counts):
+def message(target, counts, notes):
     """What was carried, as the line to report."""
-    listed = ", ".join(f"{translated(label)}: {count}" for label, count in counts.items())
+    listed = ", ".join([*(f"{translated(label)}: {count}" for label, count in counts.items()), *notes])
     return translated("{name} has {what}", name=target.name, what=listed)

@@ -90,6 +90,35 @@ def test_all_that_an_object_has_comes_along():
     assert counts() == before
 
 
+def test_edges_and_uv_maps_come_where_asked():
+    item, target, rest = wrapped_bar()
+    mesh, other = item.data, target.data
+    pairs = [frozenset(edge.vertices) for edge in mesh.edges]
+    seams = {pairs[k] for k in range(0, len(pairs), 5)}
+    for edge, pair in zip(mesh.edges, pairs, strict=True):
+        edge.use_seam = pair in seams
+        edge.use_edge_sharp = False
+    crease = mesh.attributes.new("crease_edge", "FLOAT", "EDGE")
+    crease.data.foreach_set("value", np.linspace(0, 1, len(pairs), dtype=np.float32))
+    layer, corners = mesh.uv_layers[0], mesh_arrays.corner_vertices(mesh)
+    name, faces = layer.name, np.repeat(np.arange(len(mesh.polygons)), [p.loop_total for p in mesh.polygons])
+    islands = (faces % 3)[:, None] * [10.0, 0.0] + rest[corners][:, :2] + rest[corners][:, 2:] * [0.3, 0.7]
+    layer.uv.foreach_set("vector", islands.astype(np.float32).ravel())
+    bpy.context.view_layer.update()
+    assert bpy.ops.arapfields.transfer() == {"FINISHED"}
+    last = len(rest) - 1
+    back = [frozenset(last - v for v in edge.vertices) for edge in other.edges]
+    assert {pair for edge, pair in zip(other.edges, back, strict=True) if edge.use_seam} == seams
+    given = dict(zip(pairs, np.linspace(0, 1, len(pairs)), strict=True))
+    got = other.attributes["crease_edge"].data
+    assert max(abs(got[k].value - given[pair]) for k, pair in enumerate(back)) < SINGLE
+    assert not other.uv_layers
+    assert bpy.ops.arapfields.transfer(transfer={"UV_MAPS"}) == {"FINISHED"}
+    found = np.empty(2 * len(other.loops), np.float32)
+    other.uv_layers[name].uv.foreach_get("vector", found)
+    assert np.abs(found.reshape(-1, 2) - islands).max() < SINGLE * 100  # each face its own island
+
+
 def test_only_what_is_chosen_and_no_locked_group():
     item, target, _ = wrapped_bar()
     group = target.vertex_groups.new(name=item.vertex_groups[0].name)

@@ -121,10 +121,16 @@ LIVE_KINDS = (
 TRANSFERRED = (
     ("KEYS", "Shape Keys", "Each key of the object, turned and scaled as the wrap does, with its drivers"),
     ("GROUPS", "Vertex Groups", "Weights and groups; locked groups of the target stay"),
-    ("ATTRIBUTES", "Attributes", "Colours and other attributes of vertices and corners; no UV maps"),
+    ("ATTRIBUTES", "Attributes", "Colours and other attributes of vertices and corners"),
+    ("EDGES", "Seams and Creases", "Seams, sharp edges, creases and bevel weights, along the nearest edges"),
     (
         "ARMATURE",
         "Armature",
         "A copy of the armature that was fitted to the wrapped shape, with its modifier",
+    ),
+    (
+        "UV_MAPS",
+        "UV Maps",
+        "Replaces maps of these names; faces across a seam show a strip beyond it, and maps overlap there",
     ),
 )

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Marked edges of one mesh along the edges of another that lie nearest."""
+
+import heapq
+from collections import defaultdict
+
+import numpy as np
+
+ASIDE = 2.0  # what a detour from the marked edge costs, in lengths of its own
+LONGEST = 3.0  # a path that is so many times as long as its edge is none
+
+
+def carried_marks(ends, values, nearest, vertices, edges):
+    """(m,) values of a mesh's edges (m, 2): along the shortest ways between the ends of each marked edge.
+
+    `ends` (k, 2, 3): the marked edges' ends, and `nearest` (k, 2) the mesh's vertices next to them; `values`
+    (k,) of which the largest counts.
+    """
+    about = defaultdict(list)
+    for number, (a, b) in enumerate(edges.tolist()):
+        about[a].append((b, number))
+        about[b].append((a, number))
+    result = np.zeros(len(edges))
+    for pair, value, (start, goal) in zip(ends, values, nearest.tolist(), strict=True):
+        for number in path(pair, start, goal, vertices, about):
+            result[number] = max(result[number], value)
+    return result
+
+
+def path(pair, start, goal, vertices, about):
+    """Numbers of the edges from one vertex to another that stay near a straight line; none where too far."""
+    if start == goal:
+        return []
+    along = pair[1] - pair[0]
+    size = np.linalg.norm(along) or 1.0
+    furthest = LONGEST * max(size, np.linalg.norm(vertices[goal] - vertices[start]))
+
+    def cost(a, b):
+        middle = (vertices[a] + vertices[b]) / 2 - pair[0]
+        beside = middle - np.clip(middle @ along / size**2, 0, 1) * along
+        return np.linalg.norm(vertices[b] - vertices[a]) * (1 + ASIDE * np.linalg.norm(beside) / size)
+
+    reached, queue = {}, [(0.0, start, None, None)]
+    while queue:
+        length, here, before, number = heapq.heappop(queue)
+        if here in reached or length > furthest:
+            continue
+        reached[here] = before, number
+        if here == goal:
+            break
+        for there, edge in about[here]:
+            if there not in reached:
+                heapq.heappush(queue, (length + cost(here, there), there, here, edge))
+    found = []
+    while goal in reached and goal != start:
+        goal, number = reached[goal]
+        found.append(number)
+    return found

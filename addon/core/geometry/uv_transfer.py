@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Texture coordinates of one mesh for the corners of another, whose faces may cross the seams."""
+
+import numpy as np
+
+CUT = 3.0  # a corner this many times farther off than it should be lies beyond a seam
+
+
+def fan(vertices, starts, corners):
+    """((n + m, 3), (c, 3), (c,)): vertices and faces' centres, triangles, each corner's face."""
+    counts = np.diff(np.append(starts, len(corners)))
+    face = np.repeat(np.arange(len(starts)), counts)
+    centres = np.add.reduceat(vertices[corners], starts) / counts[:, None]
+    following = np.arange(1, len(corners) + 1)
+    following[starts + counts - 1] = starts
+    triangles = np.stack([len(vertices) + face, corners, corners[following]], axis=1).astype(np.int32)
+    return np.concatenate([vertices, centres]), triangles, face
+
+
+def corner_coordinates(points, places, shares, corners, face, moved, uv):
+    """((c, 2), (c,)): coordinates at corners, and which of them are beyond a seam from their face's centre.
+
+    `points` (n + m, 3) of `fan` lie at `places` (n + m,) and `shares` (n + m, 3) on triangles of which
+    `moved` (t, 3, 3) has the corners and `uv` (t, 3, 2) their coordinates. Beyond a seam the map of the
+    face's centre goes on.
+    """
+    at = (shares[:, :, None] * uv[places]).sum(axis=1)
+    centre = len(points) - (face.max() + 1) + face
+    own = places[centre]
+    sides = moved[own][:, 1:] - moved[own][:, :1]
+    slopes = uv[own][:, 1:] - uv[own][:, :1]
+    metric = sides @ sides.transpose(0, 2, 1)
+    metric += 1e-9 * np.trace(metric, axis1=1, axis2=2)[:, None, None] * np.eye(2) + 1e-30 * np.eye(2)
+    offset = points[corners] - points[centre]
+    parts = np.linalg.solve(metric, (sides @ offset[:, :, None]))[:, :, 0]
+    step = (parts[:, :, None] * slopes).sum(axis=1)
+    straight, direct = at[centre] + step, at[corners]
+    beyond = np.linalg.norm(direct - straight, axis=1) > CUT * np.linalg.norm(step, axis=1) + 1e-6
+    return np.where(beyond[:, None], straight, direct), beyond
