@@ -219,9 +219,14 @@ void check_landmarks(const WrapSource& source, const WrapTarget& target) {
   if (count == 0) return;
   require_on(source.points, source.landmarks, "its place at rest");
   require_on(target.points, source.landmark_targets, "its place on the target");
+}
+
+void check_contradictions(const WrapSource& source, const WrapTarget& target,
+                          const std::vector<Index>& rows) {
   const double size = diagonal_of(source.points);
-  for (Index i = 0; i < count; ++i)
-    for (Index j = 0; j < i; ++j) {
+  for (const Index i : rows)
+    for (const Index j : rows) {
+      if (j >= i) break;
       const double source_distance = (source.landmarks.row(i) - source.landmarks.row(j)).norm() / size;
       const double target_distance =
           (source.landmark_targets.row(i) - source.landmark_targets.row(j)).norm() / target.diagonal;

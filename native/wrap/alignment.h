@@ -32,9 +32,10 @@ std::string landmark_name(Index i);
 /// "12.3 %".
 std::string percent_text(double share);
 
-/// Throws InvalidInput that names a landmark which is not finite or far off its surface, and two landmarks
-/// that coincide on one surface alone.
+/// Throws InvalidInput that names a landmark which is not finite or far off its surface.
 void check_landmarks(const WrapSource& source, const WrapTarget& target);
+/// Throws InvalidInput that names two landmarks, of these ascending rows, that coincide on one surface alone.
+void check_contradictions(const WrapSource& source, const WrapTarget& target, const std::vector<Index>& rows);
 
 /// The similarity, cube → the target's coordinates, with which a wrap begins. With three landmarks or more it
 /// is their least-squares fit; else it is the best result of iterative closest points (Besl, McKay 1992) from

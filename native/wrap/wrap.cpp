@@ -101,6 +101,7 @@ WrapSolution wrap(const SurfaceSamples& samples, const ImplicitFunction& functio
   check_landmarks(source, mesh_target);
   const LandmarkVerdict verdict =
       trusted_landmarks(samples, source, mesh_target, options, report.warnings, progress.part(0.1, 0.15));
+  check_contradictions(source, mesh_target, verdict.kept);
   report.left_out = verdict.left_out;
   const Similarity placement =
       wrap_alignment(source.with_landmarks(verdict.kept), mesh_target, options.alignment,

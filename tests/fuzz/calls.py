@@ -225,7 +225,7 @@ def members(t):
         "LiveDeformer.set_contact": lambda: (t["live"].set_contact, [af.Contact(ground=-1.0)]),
         "Correspondence": lambda: (
             by_name(af.Correspondence, "back"),
-            [TETRAHEDRON, t["mesh"], t["mesh"], False],
+            [TETRAHEDRON, *2 * [t["mesh"]], False],
         ),
         "Correspondence.values": lambda: (t["places"].values, [TETRAHEDRON]),
         "Correspondence.displacements": lambda: (t["places"].displacements, [TETRAHEDRON]),
