@@ -124,8 +124,10 @@ class Vote {
         source_(source),
         target_(target.subsample(coarse_target_samples)),
         options_(options),
-        progress_(progress) {
-    options_.centers = std::min(options_.centers, coarse_centers);
+        progress_(progress),
+        fewest_(std::max<Index>(
+            3, std::lround(std::ceil((1.0 - most_wrong) * static_cast<double>(source.landmarks.rows()))))) {
+    options_.centers = coarse_centers;
     options_.stages = coarse_stages;
     options_.iterations = coarse_iterations;
     options_.landmark_weight = soft_pull;
@@ -136,15 +138,18 @@ class Vote {
     std::iota(kept.begin(), kept.end(), 0);
     Similarity at = start;
     Trial trial;
+    bool are_enough = true;
     for (int round = 0; round < rounds; ++round) {
       trial = tried(at, kept);
       std::vector<Index> near = near_of(trial, kept);
-      if (is_too_few(near)) return;
+      are_enough = static_cast<Index>(near.size()) >= fewest_;
+      if (!are_enough) near = nearest_of(trial);
       const bool is_done = near == kept;
       kept = std::move(near);
       if (is_done) break;
       if (!is_fixed) at = fit(kept, scale);
     }
+    if (!are_enough) return;
     take_back(at, kept, trial);
     const double score = penalty(trial.distances);
     if (score >= score_) return;
@@ -172,9 +177,14 @@ class Vote {
     return fitted_similarity(some.landmarks, some.landmark_targets,
                              Vector::Ones(static_cast<Index>(rows.size())), scale);
   }
-  bool is_too_few(const std::vector<Index>& rows) const {
-    const auto count = static_cast<double>(source_.landmarks.rows());
-    return static_cast<double>(rows.size()) < std::max(3.0, (1.0 - most_wrong) * count);
+  /// As many as must agree.
+  std::vector<Index> nearest_of(const Trial& trial) const {
+    std::vector<Index> result(trial.distances.size());
+    std::iota(result.begin(), result.end(), 0);
+    std::ranges::stable_sort(result, {}, [&](Index row) { return trial.distances[row]; });
+    result.resize(fewest_);
+    std::ranges::sort(result);
+    return result;
   }
   static double limit(const Trial& trial, const std::vector<Index>& pulled) {
     std::vector<double> sorted;
@@ -215,6 +225,7 @@ class Vote {
   WrapTarget target_;
   WrapOptions options_;
   Progress progress_;
+  Index fewest_;
   double score_ = std::numeric_limits<double>::infinity();
   std::optional<std::vector<Index>> kept_;
   Trial last_;

@@ -179,6 +179,10 @@ def members(t):
     """Calls of objects that others make, and of functions with few arguments."""
     writer = af.PointCacheWriter
     moved = ROWS + 0.1
+
+    def wrapping(third):
+        return [t["samples"], t["mesh_sdf"], third, af.WrapOptions(**WRAP), af.Task()]
+
     return {
         "MeshSdf": lambda: (by_name(af.MeshSdf, "task"), [TETRAHEDRON, FACES, af.Task()]),
         "MeshSdf.__call__": lambda: (t["mesh_sdf"], [ROWS]),
@@ -209,14 +213,8 @@ def members(t):
             [[(TETRAHEDRON, FACES)], 50, 0, None, None],
         ),
         "save_grid": lambda: (af.save_grid, ["grid.npz", np.zeros((3, 3, 3)), np.zeros(3), 0.1]),
-        "wrap": lambda: (
-            by_name(af.wrap, "task"),
-            [t["samples"], t["mesh_sdf"], [], af.WrapOptions(**WRAP), af.Task()],
-        ),
-        "suggest_landmarks": lambda: (
-            by_name(af.suggest_landmarks, "task"),
-            [t["samples"], t["mesh_sdf"], 4, af.WrapOptions(**WRAP), af.Task()],
-        ),
+        "wrap": lambda: (by_name(af.wrap, "task"), wrapping([])),
+        "suggest_landmarks": lambda: (by_name(af.suggest_landmarks, "task"), wrapping(4)),
         "Obstacle": lambda: (af.Obstacle, [t["mesh_sdf"], 0.1]),
         "Contact": lambda: (
             by_name(af.Contact, "ground", "up"),
@@ -225,7 +223,7 @@ def members(t):
         "LiveDeformer.set_contact": lambda: (t["live"].set_contact, [af.Contact(ground=-1.0)]),
         "Correspondence": lambda: (
             by_name(af.Correspondence, "back"),
-            [TETRAHEDRON, *2 * [t["mesh"]], False],
+            [TETRAHEDRON, t["mesh"], t["mesh"], False],
         ),
         "Correspondence.values": lambda: (t["places"].values, [TETRAHEDRON]),
         "Correspondence.displacements": lambda: (t["places"].displacements, [TETRAHEDRON]),

@@ -154,8 +154,6 @@ def test_landmarks_that_lie_are_named_and_left_out(figure, samples, wrong):
     ]
     right = [pair for i, pair in enumerate(pairs) if i not in wrong]
     assert np.array_equal(field(v), af.wrap(samples, sdf, right, options)(v))
-    followed = af.wrap(samples, sdf, pairs, af.WrapOptions(check_landmarks=False, **cases.SMALL)).report
-    assert not followed.left_out and followed.stretch > field.report.stretch
 
 
 def test_landmarks_of_which_most_lie_are_not_followed_without_a_word(figure, samples):
