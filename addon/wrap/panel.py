@@ -38,9 +38,9 @@ class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
     def fill(self, context, source, settings):
         layout, wrap = self.layout, settings.wrap
         layout.prop(wrap, "onto")
-        row = layout.row(align=True)
-        row.operator(Op.CLICK_LANDMARKS, icon="PINNED")
-        row.operator(Op.SUGGEST_LANDMARKS, text="Suggest", icon="LIGHT")
+        column = layout.column(align=True)
+        column.operator(Op.SUGGEST_LANDMARKS, icon="LIGHT")
+        column.operator(Op.CLICK_LANDMARKS, icon="PINNED")
         row = layout.row()
         row.template_list("ARAPFIELDS_UL_landmarks", "", wrap, "landmarks", wrap, "active_landmark", rows=3)
         column = row.column(align=True)

@@ -2,16 +2,17 @@
 """The verb wrap: a mesh onto a target, with pairs of landmarks from flags or a file."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 
 import arapfields as af
 
 from .._files import existing_file
-from . import files, verbs
+from . import files, verbs, wrap_folder
 from .flags import SOURCE, report_flag, sdf_flag, stiffness_flags
 from .handles import triple
-from .options import add_option_flags, given, given_options
+from .options import add_option_flags, given, given_options, shard
 from .points import read_numbers
 from .running import Outputs, with_progress
 
@@ -20,6 +21,7 @@ SUMMARY = "lay a shape onto another, as rigidly as possible"
 EXAMPLES = (
     "template.obj scan.ply -o wrapped.obj",
     "shirt.obj body.obj -o worn.obj --landmark 0,0,1.4 0,0.02,1.5 --landmark 0.3,0,1.3 0.35,0,1.4",
+    "template.obj scans -o wrapped --shard 2/8",
     "template.obj scan.ply --suggest pairs.json",
     "template.obj scan.safetensors --save-field wrap.safetensors --landmarks pairs.json",
 )
@@ -28,9 +30,15 @@ LANDMARKS = (".json", ".txt", ".csv", ".npy")
 
 def add_flags(parser):
     parser.add_argument("input", help=SOURCE)
-    parser.add_argument("target", help=f"what it is laid onto; {SOURCE}; a mesh may be open and broken")
+    parser.add_argument("target", help=f"what it is laid onto; {SOURCE}; or a folder of these")
     outputs = parser.add_argument_group("outputs (one or more)")
-    outputs.add_argument("-o", "--output", metavar="FILE", help="the input mesh with its vertices moved")
+    outputs.add_argument(
+        "-o",
+        "--output",
+        metavar="FILE",
+        help="the input mesh with its vertices moved; a folder where the target is one",
+    )
+    parser.add_argument("--shard", type=shard, metavar="I/N", help="the part I of N of a folder alone")
     outputs.add_argument("--save-field", metavar="FILE", help=".safetensors with the deformation field")
     outputs.add_argument(
         "--suggest", metavar="FILE", help="pairs of landmarks proposed by shape, as --landmarks reads them"
@@ -57,6 +65,11 @@ def add_flags(parser):
 
 def run(args):
     options = given_options(af.WrapOptions, args)
+    if Path(args.target).is_dir():
+        wrap_folder.run(args, options, read_target)
+        return
+    if args.shard:
+        raise af.InvalidInput(f"--shard: {args.target} is no folder")
     with Outputs() as outputs:
         places = {
             flag: outputs.check(path, suffixes, flag)

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""wrap with a folder as its target: one template onto every mesh in it; what is done already is skipped."""
+
+import hashlib
+import json
+from pathlib import Path
+
+import arapfields as af
+
+from .._files import existing_file, json_text
+from . import files, verbs
+from .options import given
+from .running import Outputs, with_progress
+
+ONE_TARGET = ("landmark", "landmarks", "save_field", "suggest")  # flags of which each target has its own
+
+
+def run(args, options, read_target):
+    """Wraps each file; InvalidInput at the end where some failed."""
+    for name in ONE_TARGET:
+        if getattr(args, name):
+            raise af.InvalidInput(f"--{name.replace('_', '-')}: {args.target} is a folder; wrap one by one")
+    output, template = Path(args.output or ""), existing_file(args.input, files.MESH_SUFFIXES)
+    if (
+        not args.output
+        or output.suffix
+        or output.is_file()
+        or output.resolve() == Path(args.target).resolve()
+    ):
+        raise af.InvalidInput("--output: another folder is needed where the target is one")
+    everything = sorted(p for p in Path(args.target).iterdir() if p.suffix.lower() in verbs.SOURCES)
+    if not everything:
+        raise af.InvalidInput(f"{args.target}: holds no mesh")
+    names = [path.stem for path in everything]
+    if twins := sorted({name for name in names if names.count(name) > 1}):
+        raise af.InvalidInput(f"{args.target}: {twins[0]} is there twice, with different extensions")
+    number, parts = args.shard or (1, 1)
+    output.mkdir(parents=True, exist_ok=True)
+    source = verbs.Source(args)
+    samples = verbs.samples(source, given(args, "wrap", "samples"), options.seed, args)
+    common = hashlib.blake2b(template.read_bytes())
+    common.update(repr((af.__version__, options.to_dict(), samples.points.tobytes())).encode())
+    done, failed = {}, []
+    for path in everything[number - 1 :: parts]:
+        place = output / f"{path.stem}{template.suffix.lower()}"
+        mark = common.copy()
+        mark.update(path.read_bytes())
+        try:
+            done[path.name] = read_done(place, mark) or wrap_one(
+                place, mark, lambda path=path: read_target(path), source, samples, options, args
+            )
+        except (af.InvalidInput, af.Diverged) as error:
+            failed.append(f"{path.name}: {error}")
+    if not args.quiet:
+        for name in sorted(done, key=lambda name: -off(done[name])):
+            notes = "; ".join(done[name]["notes"])
+            print(f"{name}: {off(done[name]):.2%} of the target's size off{notes and '; ' + notes}")
+    if failed:
+        raise af.InvalidInput(f"{len(failed)} of {len(done) + len(failed)} failed: {'; '.join(failed)}")
+
+
+def off(report):
+    return max(report["to_target_mean"], report["from_target_mean"])
+
+
+def read_done(place, mark):
+    """The report of an output that the same input and settings made; None where there is none."""
+    try:
+        found = json.loads(place.with_suffix(".json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    made = place.is_file() and isinstance(found, dict) and found.get("made_with") == mark.hexdigest()
+    return found if made else None
+
+
+def wrap_one(place, mark, target, source, samples, options, args):
+    with Outputs() as outputs:
+        outputs.check(place, files.MESH_SUFFIXES, "--output")
+        function = target()
+        field = with_progress(
+            place.stem, lambda task: af.wrap(samples, function, [], options, task=task), args.quiet
+        )
+        outputs.write(place, lambda path: files.write_moved_mesh(path, source.path, source.mesh, field))
+        report = {**field.report.to_dict(), "made_with": mark.hexdigest()}
+        outputs.write(
+            place.with_suffix(".json"),
+            lambda path: path.write_text(json_text(report, indent=2) + "\n", encoding="utf-8"),
+        )
+    return report
