@@ -4,6 +4,7 @@
 import fnmatch
 from pathlib import Path
 from urllib.parse import urlparse
+from urllib.request import url2pathname
 
 import pytest
 from support.blender.inside import IN_BLENDER
@@ -73,7 +74,7 @@ def test_an_empty_added_as_a_handle_is_one():
 
 def test_every_operator_names_its_page_and_every_page_exists():
     address, patterns = guide.manual_map()
-    folder = Path(urlparse(address).path)
+    folder = Path(url2pathname(urlparse(address).path))
     assert all((folder / page).is_file() for _, page in patterns)
 
     def page(name):

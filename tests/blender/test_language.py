@@ -49,7 +49,8 @@ def test_wrapped_lines_and_every_form_of_a_po_file_are_read():
         '# a remark\nmsgid ""\n"{name} was deleted "\n"while it was worked on"\n'
         'msgstr ""\n"{name} wurde gelöscht, "\n"während daran gearbeitet wurde"\n\n'
         'msgctxt "Operator"\nmsgid "Fit \\"it\\""\nmsgstr "„Anpassen“"\n\n'
-        'msgid "not yet"\nmsgstr ""\n'
+        'msgid "not yet"\nmsgstr ""\n',
+        encoding="utf-8",
     )
     texts = read_po(path)
     assert texts == {

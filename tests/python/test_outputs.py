@@ -7,6 +7,7 @@ import stat
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -44,7 +45,7 @@ def test_only_regular_files_are_written(kind, examples, tmp_path):
     sdf, field = archives.load(examples["sdf"]), archives.load(examples["radial"])
     before = os.stat(place)
     for call in (sdf.save, field.save, lambda path: write_text(path, "x"), lambda path: OutputFile(path)):
-        with pytest.raises((af.InvalidInput, IsADirectoryError), match=re.escape(str(place))):
+        with pytest.raises((af.InvalidInput, IsADirectoryError), match=re.escape(Path(place).name)):
             call(place)
     assert os.stat(place).st_mode == before.st_mode and names(tmp_path) == names(tmp_path)[:1]
 

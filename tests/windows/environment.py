@@ -88,6 +88,7 @@ def run(folder, *arguments, seconds=SECONDS, **environment):
         "LC_ALL": "C.UTF-8",  # of names of files
         "WINEPREFIX": str(PREFIX),
         "WINEDEBUG": "-all",
+        "WINEDLLOVERRIDES": "explorer.exe=d",  # whoever started it would wait for its pipes to close
         "PYTHONPATH": paths,
         "PYTHONDONTWRITEBYTECODE": "1",
         "PYTHONIOENCODING": "utf-8",

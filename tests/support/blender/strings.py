@@ -50,7 +50,7 @@ def of_source():
     for path in sorted(ADDON.rglob("*.py")):
         if "commands" in path.parts:  # what a terminal shows is English
             continue
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if not isinstance(node, ast.Call):
                 continue
             name = getattr(node.func, "id", getattr(node.func, "attr", ""))
@@ -61,7 +61,7 @@ def of_source():
             for keyword in node.keywords:
                 if keyword.arg == "text":
                     yield from literal(keyword.value)
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             targets = getattr(node, "targets", [])
             if isinstance(node, ast.Assign) and getattr(targets[0], "id", "") == "title":
                 yield from literal(node.value)
