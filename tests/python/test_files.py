@@ -202,14 +202,8 @@ def test_structures_that_do_not_fit(where, value, examples, tmp_path):
 
 def test_foreign_files_and_places(examples, tmp_path):
     whole = examples["sdf"].read_bytes()
-    for content in (
-        b"",
-        b"short",
-        whole[: len(whole) // 2],
-        whole[:-4],
-        os.urandom(500),
-        b"PK\3\4" + bytes(80),
-    ):
+    halves = (whole[: len(whole) // 2], whole[:-4])
+    for content in (b"", b"short", *halves, os.urandom(500), b"PK\3\4" + bytes(80)):
         refusal(tmp_path / "x", content)
     np.savez(tmp_path / "a.npz", a=1)
     refusal(tmp_path / "a.npz")
