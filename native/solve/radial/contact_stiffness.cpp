@@ -20,7 +20,7 @@ ContactStiffness::ContactStiffness(const RadialBasis& basis, const ContactSet& s
   std::vector<const ContactPlane*> pressing;
   for (const ContactPlane& plane : set.planes)
     if (plane.pressed(plane.gap(places.data()), ContactTerms::stiffness) > 0.0) pressing.push_back(&plane);
-  const auto all = std::ssize(pressing), count = std::min<Index>(all, most_planes);
+  const Index all = std::ssize(pressing), count = std::min<Index>(all, most_planes);
   if (count == 0) return;
   std::vector<Index> first(static_cast<std::size_t>(count));
   normals_.resize(count, 3);
