@@ -201,7 +201,8 @@ class Vote {
     return result;
   }
 
-  /// A pair that others had pushed away returns where the wrap reaches it without much more stretch.
+  /// A pair that others had pushed away returns where the wrap reaches it without much more stretch; where it
+  /// stretches less with it, the pair may stay farther away.
   void take_back(const Similarity& at, std::vector<Index>& kept, Trial& trial) const {
     std::vector<Index> away;
     for (Index row = 0; row < trial.distances.size(); ++row)
@@ -211,7 +212,7 @@ class Vote {
       std::vector<Index> more = kept;
       more.insert(std::ranges::upper_bound(more, row), row);
       const Trial with = tried(at, more);
-      const double far = limit(with, more);
+      const double far = with.stretch < trial.stretch ? most_far : limit(with, more);
       if (with.stretch > more_stretch * trial.stretch + least_stretch ||
           std::ranges::any_of(more, [&](Index one) { return with.distances[one] >= far; }))
         continue;
