@@ -39,6 +39,7 @@ void bind_radial(py::module_& module);
 void bind_attach(py::module_& module);
 void bind_curve(py::module_& module);
 void bind_skin(py::module_& module);
+void bind_splats(py::module_& module);
 void bind_contact(py::module_& module);
 void bind_solve_testing(py::module_& module);
 void bind_invertible_testing(py::module_& module);

@@ -27,6 +27,7 @@ PYBIND11_MODULE(_native, module) {
   bind_attach(module);
   bind_curve(module);
   bind_skin(module);
+  bind_splats(module);
   bind_io(module);
   bind_solve_testing(module);
   bind_invertible_testing(module);

@@ -28,6 +28,7 @@ FOLDERS = [
     "attach",
     "curve",
     "skin",
+    "splats",
     "extraction",
     "io",
 ]

@@ -8,6 +8,7 @@ import arapfields as af
 
 from .calls import calls
 from .odd import ROWS, odd
+from .splats import splat_calls
 
 LEFT_OUT = {  # public callables that the net does not call, and why
     "ImplicitFunction": "a base for Python: tests/python/test_implicit_function.py",
@@ -65,7 +66,7 @@ def unbound(rng):
 
 def case(rng, things):
     """(name, function, arguments): a call with up to three odd arguments."""
-    known = calls(rng, things) | {"unbound": lambda: unbound(rng)}
+    known = calls(rng, things) | splat_calls(things) | {"unbound": lambda: unbound(rng)}
     name = sorted(known)[rng.integers(len(known))]
     function, arguments = known[name]()
     for _ in range(int(rng.integers(4))):

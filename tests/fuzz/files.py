@@ -16,6 +16,7 @@ from arapfields.cli import files
 from arapfields.cli.handles import build_handles, read_handles
 
 from . import mutate
+from .splats import GIVEN
 
 POINTS = np.random.default_rng(1).uniform(-1, 1, (5, 3))
 FEW = POINTS[:2]
@@ -98,6 +99,21 @@ class Meshes(Target):
     def use(self, path):
         mesh = files.read_mesh(path)
         files.write_moved_mesh(self.folder / f"moved{path.suffix}", path, mesh, lambda points: points + 1.0)
+
+
+class Splats(Target):
+    """Splats' files."""
+
+    def make(self):
+        path = self.folder / "splats.ply"
+        af.GaussianSplats(*[rows[:12] for rows in GIVEN]).save(path)
+        return {"splats": path}
+
+    def use(self, path):
+        af.GaussianSplats.is_file(path)
+        splats = af.GaussianSplats.load(path)
+        assert len(splats.scales) == len(splats.opacities) == len(splats.harmonics)
+        splats.save(self.folder / "again.ply")
 
 
 class Handles(Target):
@@ -216,5 +232,6 @@ class CommandLine(Target):
 
 
 TARGETS = {
-    kind.__name__.lower(): kind for kind in (Fields, Sdfs, Meshes, Handles, Normals, Records, CommandLine)
+    kind.__name__.lower(): kind
+    for kind in (Fields, Sdfs, Meshes, Splats, Handles, Normals, Records, CommandLine)
 }

@@ -8,6 +8,7 @@ from .api import LEFT_OUT, public_callables
 from .calls import calls
 from .odd import make_things
 from .run import refusals, run_target, unreached
+from .splats import splat_calls
 
 COUNTS = {
     "fields": 1400,
@@ -54,6 +55,7 @@ def test_the_readers_refusals_are_reached(findings):
 def test_every_public_callable_is_called_or_left_out_with_its_reason():
     public = set(public_callables())
     assert {"wrap", "MeshSdf", "Attachment", "ObjectStyle", "LiveDeformer.step"} <= public
-    called = set(calls(np.random.default_rng(0), make_things()))
+    things = make_things()
+    called = set(calls(np.random.default_rng(0), things)) | set(splat_calls(things))
     assert not called & set(LEFT_OUT)
     assert public == called | set(LEFT_OUT), public ^ (called | set(LEFT_OUT))

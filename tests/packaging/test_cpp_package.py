@@ -39,7 +39,7 @@ def prefix(tmp_path_factory):
     return folder
 
 
-def build_example(folder, *definitions, python=sys.executable):
+def build_example(folder, *definitions, python=sys.executable, target="bend"):
     """Configures and compiles a copy of the example in `folder`; the program's path.
 
     `python` is one whose cmeel-eigen has Eigen.
@@ -48,7 +48,7 @@ def build_example(folder, *definitions, python=sys.executable):
     ninja = ["-G", "Ninja", f"-DCMAKE_MAKE_PROGRAM={cached('CMAKE_MAKE_PROGRAM')}"]
     python = f"-DPython_EXECUTABLE={python}"
     run(CMAKE, "-S", folder / "source", "-B", folder / "build", *ninja, python, *definitions)
-    run(CMAKE, "--build", folder / "build")
+    run(CMAKE, "--build", folder / "build", "--target", target)
     return folder / "build" / "bend"
 
 
@@ -114,7 +114,7 @@ def test_one_version_of_cmake_is_asked_for():
 def test_the_example_gives_what_python_gives(place, prefix, tmp_path):
     """The wheel's neighbour has Eigen: no Python need be found, no environment be activated."""
     if place == "prefix":
-        program = build_example(tmp_path, f"-DCMAKE_PREFIX_PATH={prefix}")
+        program = build_example(tmp_path, f"-DCMAKE_PREFIX_PATH={prefix}", target="all")
     else:
         found = f"-Darapfields_DIR={run(sys.executable, '-m', 'arapfields', '--cmake-dir').strip()}"
         program = build_example(tmp_path, found, python=tmp_path / "absent")

@@ -22,6 +22,7 @@ VALUES = {
     "Contact",
     "Corrective",
     "Obstacle",
+    "GaussianSplats",
     "Handle",
     "CuboidHandle",
     "RegionHandle",

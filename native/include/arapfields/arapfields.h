@@ -17,6 +17,7 @@
 #include "arapfields/sampling.h"
 #include "arapfields/sdf.h"
 #include "arapfields/skin.h"
+#include "arapfields/splats.h"
 #include "arapfields/stylize.h"
 #include "arapfields/task.h"
 #include "arapfields/types.h"

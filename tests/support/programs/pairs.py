@@ -14,6 +14,9 @@ BALL = RNG.normal(size=(150, 3))
 BALL /= np.linalg.norm(BALL, axis=1, keepdims=True)
 SAMPLES = af.SurfaceSamples(BALL, BALL)
 POINTS = 0.9 * BALL[:20]
+SPLATS = af.GaussianSplats(
+    POINTS, np.eye(4)[[0] * 20], np.full((20, 3), 0.1), np.full(20, 0.5), np.zeros((20, 4, 3))
+)
 TETRAHEDRON = (
     np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]]),
     [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]],
@@ -65,6 +68,7 @@ def changes_under_way(name, calls):
 FIELD = {
     "__call__": lambda it: it(POINTS),
     "apply": lambda it: it.apply(POINTS),
+    "apply_to": lambda it: it.apply_to(SPLATS).centers,
     "jacobian": lambda it: it.jacobian(POINTS),
     "hessian": lambda it: it.hessian(POINTS),
     "inverse": lambda it: it.inverse(POINTS[:4]),
@@ -147,7 +151,7 @@ CLASSES = {
         {"__call__": lambda it: it(POINTS[:, :2]), "jacobian": lambda it: it.jacobian(POINTS[:, :2])},
     ),
 }
-STATIC = {"load", "from_layers", "preset", "save", "fields"}  # and what other tests do with files
+STATIC = {"load", "from_layers", "preset", "save", "fields", "is_file"}  # and what other tests do with files
 
 
 def calls_of(name):

@@ -9,13 +9,12 @@ import numpy as np
 import arapfields as af
 
 from .. import grids
-from .._files import existing_file, json_text
+from .._files import json_text
 from . import files, points
 from .handles import build_handles, read_handles, rotation, triple, turn_upright
 from .options import given, given_options
 from .running import Outputs, with_progress
-
-SOURCES = (*files.MESH_SUFFIXES, *files.STATE_SUFFIXES)
+from .sources import Source, fitted, samples
 
 
 def fit(args):
@@ -24,7 +23,7 @@ def fit(args):
         report = report_place(outputs, args)
         options = given_options(af.FitOptions, args)
         vertices, triangles = files.read_mesh(args.input)
-        sdf = _fitted(vertices, triangles, options, args)
+        sdf = fitted(vertices, triangles, options, args)
         outputs.write(output, sdf.save)
         write_report(outputs, report, sdf.report)
     summary(args, f"wrote {args.output}", sdf.report)
@@ -98,6 +97,9 @@ def warp(args):
     with Outputs() as outputs:
         output = outputs.check(args.output, points.WARPED, "--output")
         field = files.read_field(args.field)
+        if af.GaussianSplats.is_file(args.input):
+            _warp_splats(args, outputs, output, field)
+            return
         write = points.warped(args.input)
         body = af.sample_mesh(*files.read_mesh(args.body)) if args.body else None
 
@@ -107,6 +109,16 @@ def warp(args):
             return rest + args.share * (af.Attachment(body, rest).positions(field) - rest)
 
         outputs.write(output, lambda path: write(path, move))
+    summary(args, f"wrote {args.output}")
+
+
+def _warp_splats(args, outputs, output, field):
+    for flag, used in (("--body", args.body is not None), ("--share", args.share != 1.0)):
+        if used:
+            raise af.InvalidInput(f"{flag}: splats follow the field itself; a mesh or points are needed")
+    splats = af.GaussianSplats.load(args.input)
+    moved = with_progress("warp", lambda task: field.apply_to(splats, task=task), args.quiet)
+    outputs.write(output, moved.save)
     summary(args, f"wrote {args.output}")
 
 
@@ -122,45 +134,6 @@ def grid(args):
         outputs.write(output, lambda path: grids.save_grid(path, *made))
     shape = " × ".join(map(str, made[0].shape))
     summary(args, f"wrote {shape} distances, {made[2]:.4g} apart, to {args.output}")
-
-
-class Source:
-    """A verb's input: a mesh or a saved signed distance, and what can be made of each."""
-
-    def __init__(self, args):
-        self._args = args
-        self.path = existing_file(args.input, SOURCES)
-        self.mesh = files.read_mesh(self.path) if files.is_mesh(self.path) else None
-        self._sdf = None if self.mesh else files.read_sdf(self.path)
-
-    def sdf(self):
-        if self._sdf is None:
-            exact = self._args.sdf == "exact"
-            self._sdf = self.distances() if exact else _fitted(*self.mesh, af.FitOptions(), self._args)
-        return self._sdf
-
-    def distances(self):
-        return af.MeshSdf(*self.mesh) if self.mesh else self._sdf
-
-
-def _fitted(vertices, triangles, options, args):
-    return with_progress("fit", lambda task: af.fit_sdf(vertices, triangles, options, task=task), args.quiet)
-
-
-def samples(source, count, seed, args):
-    painted = {name: getattr(args, name) for name in ("weights", "bend_weights") if getattr(args, name, None)}
-    if source.mesh:
-        count_of = len(source.mesh[0])
-        weights = {name: points.read_weights(path, count_of) for name, path in painted.items()}
-        return af.sample_mesh(*source.mesh, count, seed=seed, **weights)
-    if painted:
-        flag = "--" + next(iter(painted)).replace("_", "-")
-        raise af.InvalidInput(
-            f"{flag}: {source.path} has no vertices that numbers could be of; a mesh is needed"
-        )
-    return with_progress(
-        "sample", lambda task: af.sample_surface(source.sdf(), count=count, seed=seed, task=task), args.quiet
-    )
 
 
 def _extracted(sdf, args, field=None):
@@ -196,17 +169,16 @@ def _solve(args, solve, seed, needs_handles):
         report = report_place(outputs, args)
         described = (read_handles(args.handles) if args.handles else []) + (args.flagged or [])
         source = Source(args)
-        if source.mesh is None and "--output" in places:
+        if not (source.mesh or source.splats) and "--output" in places:
             raise af.InvalidInput(f"--output: {source.path} holds no mesh to move; use --surface")
+        if source.splats and "--output" in places and places["--output"].suffix.lower() != ".ply":
+            raise af.InvalidInput(f"--output: {places['--output'].name} is no place for splats; use .ply")
         points_on = samples(source, given(args, args.verb, "samples"), seed, args)
         bounds = np.array([points_on.points.min(0), points_on.points.max(0)])
         handles = build_handles(described, bounds) if described or needs_handles else []
         field = with_progress(args.verb, lambda task: solve(points_on, handles, task), args.quiet)
         if "--output" in places:
-            outputs.write(
-                places["--output"],
-                lambda path: files.write_moved_mesh(path, source.path, source.mesh, field),
-            )
+            outputs.write(places["--output"], lambda path: source.write_moved(path, field))
         if "--surface" in places:
             surface = _extracted(source.sdf(), args, field)
             outputs.write(places["--surface"], lambda path: files.write_mesh(path, *surface))

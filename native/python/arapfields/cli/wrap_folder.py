@@ -8,7 +8,7 @@ from pathlib import Path
 import arapfields as af
 
 from .._files import existing_file, json_text
-from . import files, verbs
+from . import files, sources
 from .options import given
 from .running import Outputs, with_progress
 
@@ -28,7 +28,7 @@ def run(args, options, read_target):
         or output.resolve() == Path(args.target).resolve()
     ):
         raise af.InvalidInput("--output: another folder is needed where the target is one")
-    everything = sorted(p for p in Path(args.target).iterdir() if p.suffix.lower() in verbs.SOURCES)
+    everything = sorted(p for p in Path(args.target).iterdir() if p.suffix.lower() in sources.SOURCES)
     if not everything:
         raise af.InvalidInput(f"{args.target}: holds no mesh")
     names = [path.stem for path in everything]
@@ -36,8 +36,8 @@ def run(args, options, read_target):
         raise af.InvalidInput(f"{args.target}: {twins[0]} is there twice, with different extensions")
     number, parts = args.shard or (1, 1)
     output.mkdir(parents=True, exist_ok=True)
-    source = verbs.Source(args)
-    samples = verbs.samples(source, given(args, "wrap", "samples"), options.seed, args)
+    source = sources.Source(args)
+    samples = sources.samples(source, given(args, "wrap", "samples"), options.seed, args)
     common = hashlib.blake2b(template.read_bytes())
     common.update(repr((af.__version__, options.to_dict(), samples.points.tobytes())).encode())
     done, failed = {}, []

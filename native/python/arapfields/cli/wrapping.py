@@ -9,7 +9,7 @@ import numpy as np
 import arapfields as af
 
 from .._files import existing_file
-from . import files, verbs, wrap_folder
+from . import files, sources, verbs, wrap_folder
 from .flags import SOURCE, report_flag, sdf_flag, stiffness_flags
 from .handles import triple
 from .options import add_option_flags, given, given_options, shard
@@ -86,11 +86,11 @@ def run(args):
         if report is not None and not places.keys() - {"--suggest"}:
             raise af.InvalidInput("--report: give --output or --save-field, of which it tells")
         pairs = (read_landmarks(args.landmarks) if args.landmarks else []) + (args.landmark or [])
-        source = verbs.Source(args)
+        source = sources.Source(args)
         if source.mesh is None and "--output" in places:
             raise af.InvalidInput(f"--output: {source.path} holds no mesh to move; use --save-field")
         target = read_target(args.target)
-        samples = verbs.samples(source, given(args, "wrap", "samples"), options.seed, args)
+        samples = sources.samples(source, given(args, "wrap", "samples"), options.seed, args)
         if "--suggest" in places:
             found = with_progress(
                 "suggest",
@@ -120,7 +120,7 @@ def run(args):
 
 def read_target(path):
     """A mesh's exact distance, or a signed distance that fit saved."""
-    path = existing_file(path, verbs.SOURCES)
+    path = existing_file(path, sources.SOURCES)
     return af.MeshSdf(*files.read_mesh(path)) if files.is_mesh(path) else files.read_sdf(path)
 
 

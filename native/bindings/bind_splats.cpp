@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <cmath>
+
+#include "bindings/arguments.h"
+#include "bindings/arrays.h"
+#include "bindings/bind.h"
+#include "bindings/files.h"
+#include "io/splat_file.h"
+#include "splats/move_splats.h"
+#include "splats/sample_splats.h"
+
+namespace arapfields::python {
+namespace {
+
+RowMatrix<float> as_columns(const ArrayArgument& given, const std::string& name, Index columns) {
+  const Eigen::MatrixXd read = as_matrix(given, name);
+  require(read.cols() == columns, name, "another shape", "(n, " + std::to_string(columns) + ") is needed");
+  return read.cast<float>();
+}
+
+GaussianSplats make(const ArrayArgument& centers, const ArrayArgument& rotations, const ArrayArgument& scales,
+                    const ArrayArgument& opacities, const ArrayArgument& harmonics) {
+  GaussianSplats splats;
+  splats.centers = as_columns(centers, "centers", 3);
+  splats.rotations = as_columns(rotations, "rotations", 4);
+  const Eigen::MatrixXd widths = as_columns(scales, "scales", 3).cast<double>();
+  require(widths.allFinite() && (widths.array() > 0.0).all(), "scales", "0, negative or not finite",
+          "standard deviations above 0 are needed");
+  splats.log_scales = widths.array().log().cast<float>();
+  const Vector alpha = as_vector(opacities, "opacities");
+  require(alpha.allFinite() && (alpha.array() > 0.0).all() && (alpha.array() < 1.0).all(), "opacities",
+          "outside of (0, 1)", "numbers between 0 and 1 are needed");
+  splats.opacity_logits = (alpha.array() / (1.0 - alpha.array())).log().cast<float>();
+  const py::array_t<double> colours = as_doubles(harmonics, "harmonics");
+  require(colours.ndim() == 3 && colours.shape(2) == 3, "harmonics", "another shape", "(n, k, 3) is needed");
+  splats.harmonics =
+      Eigen::Map<const RowMatrix<double>>(colours.data(), colours.shape(0), 3 * colours.shape(1))
+          .cast<float>();
+  splats.other_values.resize(splats.size(), 0);
+  splats.validate();
+  splats.rotations.rowwise().normalize();
+  return splats;
+}
+
+using FloatArray = py::array_t<float>;
+
+}  // namespace
+
+void bind_splats(py::module_& module) {
+  py::class_<GaussianSplats>(module, "GaussianSplats", R"(
+Gaussian splats: anisotropic Gaussians with opacity and view-dependent colour, in the scan's coordinates.
+
+Arrays are float32 and new each time.)")
+      .def(py::init(&make), "centers"_a, "rotations"_a, "scales"_a, "opacities"_a, "harmonics"_a, R"(
+centers (n, 3); rotations (n, 4), unit quaternions (w, x, y, z); scales (n, 3), standard deviations along their
+axes; opacities (n,) between 0 and 1; harmonics (n, k, 3), colours of k = 1, 4, 9 or 16 real spherical harmonics.
+InvalidInput for other shapes and values.)")
+      .def("__len__", &GaussianSplats::size)
+      .def("__repr__",
+           [](const GaussianSplats& self) {
+             return "GaussianSplats(" + std::to_string(self.size()) + " splats, " +
+                    std::to_string(self.harmonics.cols() / 3) + " harmonics)";
+           })
+      .def_property_readonly(
+          "centers", [](const GaussianSplats& self) { return PointsF(self.centers); }, "(n, 3)")
+      .def_property_readonly(
+          "rotations", [](const GaussianSplats& self) { return RowMatrix<float>(self.rotations); },
+          "(n, 4) unit quaternions (w, x, y, z).")
+      .def_property_readonly(
+          "scales", [](const GaussianSplats& self) { return PointsF(self.log_scales.array().exp()); },
+          "(n, 3) standard deviations along the axes.")
+      .def_property_readonly(
+          "opacities",
+          [](const GaussianSplats& self) {
+            return VectorF(1.0f / (1.0f + (-self.opacity_logits.array()).exp()));
+          },
+          "(n,) between 0 and 1.")
+      .def_property_readonly(
+          "harmonics",
+          [](const GaussianSplats& self) {
+            FloatArray result({self.size(), self.harmonics.cols() / 3, Index{3}});
+            std::copy_n(self.harmonics.data(), self.harmonics.size(), result.mutable_data());
+            return result;
+          },
+          "(n, k, 3) colours of the real spherical harmonics.")
+      .def(
+          "save",
+          [](const GaussianSplats& self, const PathArgument& path, Task* task) {
+            const std::string place = as_path(path);
+            run_long(task, [&](const Progress& progress) { save_splats(place, self, progress); });
+          },
+          "path"_a, py::kw_only(), "task"_a = py::none(),
+          "Writes a binary PLY file in the common layout, in whole or not at all. OSError where the system "
+          "refuses.")
+      .def_static(
+          "load",
+          [](const PathArgument& path, Task* task) {
+            const std::string place = as_path(path);
+            return run_long(task, [&](const Progress& progress) { return load_splats(place, progress); });
+          },
+          "path"_a, py::kw_only(), "task"_a = py::none(), R"(
+Splats of a binary PLY file in the common layout: x, y, z, f_dc_*, f_rest_*, opacity, scale_*, rot_*.
+
+Other properties are kept, and saved again. OSError for a file that cannot be read; InvalidInput, naming the
+file, for one that is damaged or laid out otherwise.)")
+      .def_static(
+          "is_file", [](const PathArgument& path) { return is_splat_file(as_path(path)); }, "path"_a,
+          "Whether a file's header has the layout that load() reads; False where it cannot be read.");
+  module.def(
+      "sample_splats",
+      [](const GaussianSplats& splats, Index count, Task* task) {
+        return run_long(task,
+                        [&](const Progress& progress) { return sample_splats(splats, count, progress); });
+      },
+      "splats"_a, "count"_a = 20000, py::kw_only(), "task"_a = py::none(), R"(
+SurfaceSamples of what splats show: at most `count` centers of opaque splats, spread evenly.
+
+Normals are the shortest axes, turned outward (Hoppe et al. 1992). Parts with less than 1 % of the samples are
+left out. Raises InvalidInput and Cancelled.)");
+  auto field = py::reinterpret_borrow<py::class_<DeformationField, std::shared_ptr<DeformationField>>>(
+      module.attr("DeformationField"));
+  field.def(
+      "apply_to",
+      [](const DeformationField& self, const GaussianSplats& splats, double max_stretch, Task* task) {
+        return run_long(
+            task, [&](const Progress& progress) { return move_splats(self, splats, max_stretch, progress); });
+      },
+      "splats"_a, py::kw_only(), "max_stretch"_a = default_max_stretch, "task"_a = py::none(), R"(
+GaussianSplats moved by the field: f(μ), J Σ Jᵀ, and colours turned by the rotation closest to J.
+
+Gaussians that the field stretches by more than `max_stretch` along an axis, or bends, are divided first; the new
+ones come last. math.inf divides none. Raises InvalidInput and Cancelled.)");
+}
+
+}  // namespace arapfields::python

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A verb's input, and what can be made of each kind."""
+
+import arapfields as af
+
+from .._files import existing_file
+from . import files, points
+from .running import with_progress
+
+SOURCES = (*files.MESH_SUFFIXES, *files.STATE_SUFFIXES)
+
+
+class Source:
+    """A mesh, splats or a saved signed distance."""
+
+    def __init__(self, args):
+        self._args = args
+        self.path = existing_file(args.input, SOURCES)
+        self.splats = af.GaussianSplats.load(self.path) if af.GaussianSplats.is_file(self.path) else None
+        self.mesh = files.read_mesh(self.path) if files.is_mesh(self.path) and not self.splats else None
+        self._sdf = None if self.mesh or self.splats else files.read_sdf(self.path)
+
+    def sdf(self):
+        if self.splats:
+            raise af.InvalidInput(f"{self.path}: holds splats; a mesh or a signed distance is needed")
+        if self._sdf is None:
+            exact = self._args.sdf == "exact"
+            self._sdf = self.distances() if exact else fitted(*self.mesh, af.FitOptions(), self._args)
+        return self._sdf
+
+    def distances(self):
+        return af.MeshSdf(*self.mesh) if self.mesh else self._sdf
+
+    def write_moved(self, path, field):
+        """The mesh, or the splats, moved."""
+        if self.splats:
+            field.apply_to(self.splats).save(path)
+        else:
+            files.write_moved_mesh(path, self.path, self.mesh, field)
+
+
+def fitted(vertices, triangles, options, args):
+    return with_progress("fit", lambda task: af.fit_sdf(vertices, triangles, options, task=task), args.quiet)
+
+
+def samples(source, count, seed, args):
+    painted = {name: getattr(args, name) for name in ("weights", "bend_weights") if getattr(args, name, None)}
+    if source.mesh:
+        count_of = len(source.mesh[0])
+        weights = {name: points.read_weights(path, count_of) for name, path in painted.items()}
+        return af.sample_mesh(*source.mesh, count, seed=seed, **weights)
+    if painted:
+        flag = "--" + next(iter(painted)).replace("_", "-")
+        raise af.InvalidInput(
+            f"{flag}: {source.path} has no vertices that numbers could be of; a mesh is needed"
+        )
+    if source.splats:
+        return with_progress(
+            "sample", lambda task: af.sample_splats(source.splats, count, task=task), args.quiet
+        )
+    return with_progress(
+        "sample", lambda task: af.sample_surface(source.sdf(), count=count, seed=seed, task=task), args.quiet
+    )

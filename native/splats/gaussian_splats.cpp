@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "splats/gaussian_splats.h"
+
+#include <Eigen/Geometry>
+
+#include "core/errors.h"
+
+namespace arapfields {
+namespace {
+
+constexpr float largest_log_scale = 80.0f;  // e^80 is still a finite float
+constexpr float unit_tolerance = 1e-3f;     // of a quaternion's length
+
+template <class Matrix>
+void append_rows(Matrix& matrix, const std::vector<Index>& rows) {
+  const Index before = matrix.rows();
+  matrix.conservativeResize(before + static_cast<Index>(rows.size()), matrix.cols());
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    matrix.row(before + static_cast<Index>(k)) = matrix.row(rows[k]).eval();
+}
+
+}  // namespace
+
+void GaussianSplats::append_copies(const std::vector<Index>& rows) {
+  append_rows(centers, rows);
+  append_rows(rotations, rows);
+  append_rows(log_scales, rows);
+  append_rows(opacity_logits, rows);
+  append_rows(harmonics, rows);
+  append_rows(other_values, rows);
+}
+
+void GaussianSplats::validate() const {
+  const auto check = [&](const char* name, Index rows, bool finite) {
+    require(rows == size(), name, std::to_string(rows) + " rows", "one for each center is needed");
+    require(finite, name, "NaN or infinity", "all must be finite");
+  };
+  check("centers", size(), centers.allFinite());
+  check("rotations", rotations.rows(), rotations.allFinite());
+  check("scales", log_scales.rows(), log_scales.allFinite());
+  check("opacities", opacity_logits.rows(), opacity_logits.allFinite());
+  check("harmonics", harmonics.rows(), harmonics.allFinite());
+  check("other_values", other_values.rows(), true);
+  require(rotations.cols() == 4, "rotations", "another shape", "(n, 4) quaternions are needed");
+  const Index bands = harmonics.cols();
+  require(bands == 3 || bands == 12 || bands == 27 || bands == 48, "harmonics", "another shape",
+          "(n, k, 3) with k = 1, 4, 9 or 16 is needed");
+  require(size() == 0 || log_scales.maxCoeff() <= largest_log_scale, "scales", "too large",
+          "e^80 at most are allowed");
+  require(((rotations.rowwise().norm().array() - 1.0f).abs() < unit_tolerance).all(), "rotations",
+          "a quaternion is not of length 1", "unit quaternions are needed");
+}
+
+Mat3 axes_of(const Eigen::Ref<const Eigen::RowVector4f>& rotation) {
+  const Eigen::Vector4d q = rotation.cast<double>().transpose();
+  return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized().toRotationMatrix();
+}
+
+}  // namespace arapfields

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/types.h"
+
+namespace arapfields {
+
+/// Gaussian splats (Kerbl et al. 2023): anisotropic Gaussians with an opacity and a colour that depends on
+/// the direction they are seen from. Coordinates are the scan's own.
+struct ARAPFIELDS_EXPORT GaussianSplats {
+  PointsF centers;             ///< (n,3)
+  RowMatrix<float> rotations;  ///< (n,4) unit quaternions (w, x, y, z); columns of the rotation are the axes
+  PointsF log_scales;          ///< (n,3) logarithms of the standard deviations along the axes
+  VectorF opacity_logits;      ///< (n) log(a / (1 − a)) of the opacities a
+  RowMatrix<float> harmonics;  ///< (n, 3 k) colours of k = 1, 4, 9 or 16 real spherical harmonics
+  std::string other_properties;  ///< declarations in a PLY file of what else each splat has
+  RowMatrix<char> other_values;  ///< (n, bytes) of these
+
+  Index size() const { return centers.rows(); }
+  /// Appends copies of these splats.
+  void append_copies(const std::vector<Index>& rows);
+  /// Throws InvalidInput that names what has another number of rows, or is not finite.
+  void validate() const;
+};
+
+/// R with the axes of a unit quaternion (w, x, y, z) as columns.
+Mat3 axes_of(const Eigen::Ref<const Eigen::RowVector4f>& rotation);
+
+}  // namespace arapfields

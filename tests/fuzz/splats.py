@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Good calls of what concerns Gaussian splats."""
+
+import numpy as np
+
+import arapfields as af
+
+from .odd import ROWS, by_name
+
+PLAIN = (ROWS, np.tile([1.0, 0, 0, 0], (len(ROWS), 1)), np.full((len(ROWS), 3), 0.1))
+GIVEN = [*PLAIN, np.full(len(ROWS), 0.9), np.zeros((len(ROWS), 4, 3))]
+
+
+def splat_calls(things):
+    """{name: (function, arguments)} of what concerns splats."""
+    splats = af.GaussianSplats(*GIVEN)
+    return {
+        "GaussianSplats": lambda: (af.GaussianSplats, list(GIVEN)),
+        "GaussianSplats.save": lambda: (by_name(splats.save, "task"), ["/nonexistent/x", af.Task()]),
+        "GaussianSplats.load": lambda: (by_name(af.GaussianSplats.load, "task"), ["/nonexistent", af.Task()]),
+        "GaussianSplats.is_file": lambda: (af.GaussianSplats.is_file, ["/nonexistent"]),
+        "DeformationField.apply_to": lambda: (
+            by_name(things["field"].apply_to, "max_stretch", "task"),
+            [splats, 2.0, af.Task()],
+        ),
+        "sample_splats": lambda: (by_name(af.sample_splats, "task"), [splats, 30, af.Task()]),
+    }

@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Gaussian splats: moved by fields, sampled, read and written."""
+
+import numpy as np
+import pytest
+from support.geometry import cases, meshes
+from support.oracles.splat_render import axes, covariances, psnr, render
+
+import arapfields as af
+from arapfields.__main__ import main
+
+SINGLE = 1e-5  # what single precision leaves of a covariance
+AXES = 2e-5  # of like lengths: they amplify that a solved field is rigid to 1e-6
+DRAWN = 0.02  # a covariance of points that are drawn
+PSNR_SAME = 60.0  # dB: the same picture but for rounding
+SIZE = np.array([0.8, 0.25, 0.2])
+MESH = (meshes.sphere(1.0, 4)[0] * SIZE, meshes.sphere(1.0, 4)[1])
+
+
+def splats(count=250, harmonics=16, width=0.05, seed=0):
+    """Flat splats of all colours on an ellipsoid."""
+    rng = np.random.default_rng(seed)
+    samples = af.sample_mesh(*MESH, count=count, seed=seed)
+    x, y, z = samples.normals.T  # the turns that take z to the normal
+    turns = np.column_stack([1 + z + 1e-9, -y, x, 0 * x])
+    scales = width * np.array([1.0, 0.7, 0.1]) * rng.uniform(0.9, 1.1, (count, 3))
+    colours = 0.25 * rng.normal(size=(count, harmonics, 3))
+    turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+    return af.GaussianSplats(samples.points, turns, scales, rng.uniform(0.3, 0.95, count), colours)
+
+
+def bent(degrees=70.0):
+    samples = af.sample_mesh(*MESH, count=4000)
+    held, turned = (
+        cases.box([-0.9, -0.4, -0.4], [-0.5, 0.4, 0.4]),
+        cases.box([0.5, -0.4, -0.4], [0.9, 0.4, 0.4]),
+    )
+    return af.deform(samples, [cases.moved(held), cases.moved(turned, cases.turn([0, 1, 0], degrees))])
+
+
+MOTION = cases.turn([1, 2, 3], 130, (0.2, 0.1, -0.3)) @ cases.shift([0.4, -0.2, 0.1])
+
+
+def rigid():
+    samples = af.sample_mesh(*MESH, count=2000)
+    ends = [cases.box([x - 0.2, -0.4, -0.4], [x + 0.2, 0.4, 0.4]) for x in (-0.7, 0.7)]
+    return af.deform(samples, [cases.moved(end, MOTION) for end in ends])
+
+
+def test_a_rigid_motion_gives_the_same_picture_to_a_camera_that_moves_along():
+    motion, field = MOTION, rigid()
+    rest = splats()
+    moved = field.apply_to(rest)
+    turn = motion[:3, :3]
+    assert np.abs(moved.centers - (rest.centers @ turn.T + motion[:3, 3])).max() < SINGLE
+    assert np.abs(axes(moved.rotations) - turn @ axes(rest.rotations)).max() < AXES
+    assert np.abs(moved.scales / rest.scales - 1).max() < SINGLE
+    assert np.array_equal(moved.opacities, rest.opacities) and not np.array_equal(
+        moved.harmonics, rest.harmonics
+    )
+    for axis, degrees in (([0, 1, 0], 20), ([1, 0, 1], 115)):
+        camera = cases.shift([0, 0, -2.2]) @ cases.turn(axis, degrees)
+        before, after = render(rest, camera), render(moved, camera @ np.linalg.inv(motion))
+        assert before.std() > 0.05 and psnr(before, after) > PSNR_SAME
+        unturned = af.GaussianSplats(
+            moved.centers, moved.rotations, moved.scales, moved.opacities, rest.harmonics
+        )
+        assert psnr(before, render(unturned, camera @ np.linalg.inv(motion))) < 35.0
+
+
+def test_covariances_are_those_of_points_that_the_field_moves():
+    field, rest = bent(), splats(40, harmonics=1, width=0.01)
+    moved = covariances(field.apply_to(rest, max_stretch=np.inf))
+    jacobian = field.jacobian(rest.centers)
+    exact = jacobian @ covariances(rest) @ jacobian.swapaxes(1, 2)
+    assert np.abs(moved - exact).max() < SINGLE * np.abs(exact).max()
+    rng = np.random.default_rng(1)
+    turned = axes(rest.rotations) * np.asarray(rest.scales, float)[:, None, :]
+    for i in range(0, 40, 8):
+        points = rest.centers[i] + rng.normal(size=(40000, 3)) @ turned[i].T
+        drawn = np.cov(field(points).T)
+        assert np.linalg.norm(drawn - moved[i]) < DRAWN * np.linalg.norm(moved[i])
+
+
+def test_what_is_stretched_or_bent_is_divided_and_keeps_its_moments():
+    rest = splats(60, harmonics=4, width=0.3)
+    field = bent(150.0)
+    assert len(field.apply_to(rest, max_stretch=np.inf)) == len(rest) < len(field.apply_to(rest))
+    small = splats(60, harmonics=4, width=0.005)
+    assert len(rigid().apply_to(small, max_stretch=1.01)) == len(small)
+    whole = rigid().apply_to(small, max_stretch=np.inf)
+    parts = rigid().apply_to(small, max_stretch=1.0)  # what rounding stretches
+    first = np.flatnonzero(parts.scales.prod(1)[:60] < 0.75 * whole.scales.prod(1))
+    second = 60 + np.arange(len(first))
+    once = np.isclose(parts.scales[second].prod(1), whole.scales[first].prod(1) / 2, rtol=1e-3, atol=0)
+    once &= np.isclose(parts.scales[first].prod(1), whole.scales[first].prod(1) / 2, rtol=1e-3, atol=0)
+    divided, others = first[once], second[once]
+    assert len(divided) > 10
+    halves = np.stack([parts.centers[divided], parts.centers[others]]).astype(float)
+    size = whole.scales[divided].max(1)
+    assert np.abs(halves.mean(0) - whole.centers[divided]).max() < 1e-6
+    spread = np.einsum("hni,hnj->nij", halves - halves.mean(0), halves - halves.mean(0)) / 2
+    of_parts = covariances(parts)
+    mixed = (of_parts[divided] + of_parts[others]) / 2 + spread
+    off = np.abs(mixed - covariances(whole)[divided]).max((1, 2))
+    assert (off < 1e-4 * size**2).all()  # centers are in single precision
+    assert np.abs(parts.harmonics[divided] - parts.harmonics[others]).max() < SINGLE
+
+
+def test_samples_lie_where_splats_are_and_look_outward():
+    many = splats(6000, harmonics=1, width=0.01, seed=2)
+    floating = np.random.default_rng(3).uniform(-3, 3, (40, 3)) + np.array([0, 5, 0])
+    mixed = af.GaussianSplats(
+        np.concatenate([many.centers, floating]),
+        np.concatenate([many.rotations, np.tile([1, 0, 0, 0], (40, 1))]),
+        np.concatenate([many.scales, np.full((40, 3), 0.1)]),
+        np.concatenate([np.full(6000, 0.9), np.full(40, 0.9)]),
+        np.zeros((6040, 1, 3)),
+    )
+    samples = af.sample_splats(mixed, 1500)
+    assert 1000 < len(samples) <= 1500 and samples.points[:, 1].max() < 1
+    outward = samples.points / SIZE**2
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    assert (samples.normals * outward).sum(1).min() > 0.7
+    exact = bent()
+    held, turned = (
+        cases.box([-0.9, -0.4, -0.4], [-0.5, 0.4, 0.4]),
+        cases.box([0.5, -0.4, -0.4], [0.9, 0.4, 0.4]),
+    )
+    handles = [cases.moved(held), cases.moved(turned, cases.turn([0, 1, 0], 70))]
+    off = np.abs(af.deform(samples, handles)(MESH[0]) - exact(MESH[0])).max()
+    assert off < 0.03 * 1.6, off
+
+
+def test_a_file_comes_back_and_keeps_what_it_has_besides(tmp_path):
+    for harmonics in (1, 4, 9, 16):
+        given = splats(7, harmonics)
+        given.save(tmp_path / "a.ply")
+        back = af.GaussianSplats.load(tmp_path / "a.ply")
+        for name in ("centers", "rotations", "scales", "opacities", "harmonics"):
+            assert np.array_equal(getattr(back, name), getattr(given, name)), name
+    text, rows = (tmp_path / "a.ply").read_bytes().split(b"end_header\n")
+    width = len(rows) // 7
+    more = b"".join(rows[i * width : (i + 1) * width] + bytes([i, 0, 0, 0, 0, 0, 0, 64, 9]) for i in range(7))
+    text += b"property double weight\nproperty uchar label\nend_header\n"
+    (tmp_path / "b.ply").write_bytes(text + more)
+    af.GaussianSplats.load(tmp_path / "b.ply").save(tmp_path / "c.ply")
+    assert (tmp_path / "c.ply").read_bytes() == text + more
+    assert af.GaussianSplats.is_file(tmp_path / "b.ply") and not af.GaussianSplats.is_file(
+        tmp_path / "no.ply"
+    )
+
+
+def test_what_cannot_be_read_is_named(tmp_path):
+    splats(5, 4).save(tmp_path / "a.ply")
+    good = (tmp_path / "a.ply").read_bytes()
+    bad = tmp_path / "bad.ply"
+    nan = np.array([np.nan], "<f4").tobytes()
+    for content, word in (
+        (good[:10], "no PLY"),
+        (good[:-3], "cut off"),
+        (good.replace(b"vertex 5", b"vertex 4000000000"), "cut off"),
+        (good.replace(b"vertex 5", b"vertex -5"), "no count"),
+        (good.replace(b"binary_little_endian", b"ascii"), "ascii"),
+        (good.replace(b"property float opacity\n", b""), "lacks properties"),
+        (good.replace(b"property float rot_1", b"property blob rot_1"), "unknown"),
+        (good.replace(b"float f_rest_3", b"float f_rest_2"), "lacks properties"),
+        (good.replace(b"end_header", b"element face 3\nend_header"), "elements face"),
+        (good[:-4] + nan, "splat 4 has NaN"),
+        (good[:-16] + bytes(16), "rotation of splat 4 is zero"),
+    ):
+        bad.write_bytes(content)
+        with pytest.raises(af.InvalidInput, match=f"bad.ply.*{word}"):
+            af.GaussianSplats.load(bad)
+    with pytest.raises(OSError):
+        af.GaussianSplats.load(tmp_path / "absent.ply")
+    with pytest.raises(OSError):
+        splats(5).save(tmp_path / "absent" / "a.ply")
+    given = [np.zeros((2, 3)), [[1, 0, 0, 0]] * 2, np.ones((2, 3)), [0.5, 0.5], np.zeros((2, 4, 3))]
+    for at, value, word in (
+        (0, np.zeros((2, 2)), "centers"),
+        (1, [[2, 0, 0, 0]] * 2, "rotations"),
+        (2, np.zeros((2, 3)), "scales"),
+        (3, [0.5, 1.5], "opacities"),
+        (3, [0.5], "opacities"),
+        (4, np.zeros((2, 5, 3)), "harmonics"),
+    ):
+        with pytest.raises(af.InvalidInput, match=word):
+            af.GaussianSplats(*given[:at], value, *given[at + 1 :])
+    with pytest.raises(af.InvalidInput, match="opaque"):
+        af.sample_splats(af.GaussianSplats(*given))
+    with pytest.raises(af.InvalidInput, match="max_stretch"):
+        bent().apply_to(splats(5), max_stretch=0.5)
+
+
+def test_the_command_line_bends_a_scan(tmp_path, capsys):
+    scan, out = tmp_path / "scan.ply", tmp_path / "bent.ply"
+    splats(3000, 4, width=0.02).save(scan)
+    box = ["--box", "-inf,-inf,-inf", "-0.5,inf,inf", "--point", "0.7,0,0", "0.7,0,0.3"]
+    saved = tmp_path / "field.safetensors"
+    assert main(["deform", str(scan), "-o", str(out), "--save-field", str(saved), *box, "--quiet"]) == 0
+    rest, moved = af.GaussianSplats.load(scan), af.GaussianSplats.load(out)
+    field = af.DeformationField.load(saved)
+    assert np.abs(moved.centers[: len(rest)] - field(rest.centers)).max() < SINGLE
+    assert main(["warp", str(saved), str(scan), "-o", str(tmp_path / "again.ply"), "--quiet"]) == 0
+    assert (tmp_path / "again.ply").read_bytes() == out.read_bytes()
+    for arguments, word in (
+        (["deform", str(scan), "-o", str(tmp_path / "bent.obj"), *box], "no place for splats"),
+        (["warp", str(saved), str(scan), "-o", str(out), "--share", "0.5"], "--share"),
+        (["extract", str(scan), "-o", str(tmp_path / "bent.obj")], "holds splats"),
+    ):
+        assert main(arguments) == 2
+        assert word in capsys.readouterr().err
