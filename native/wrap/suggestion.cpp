@@ -36,7 +36,7 @@ struct FarPlaces {
   std::vector<bool> is_end;
 
   FarPlaces(PointsIn samples, PointsIn sample_normals, Index count, const Progress& progress) {
-    const FarthestPoints chosen = farthest_points(samples, std::min(most_nodes, samples.rows()));
+    const FarthestPoints chosen = farthest_points(samples, std::min<Index>(most_nodes, samples.rows()));
     const auto nodes = static_cast<Index>(chosen.indices.size());
     const Points places = rows_of(samples, chosen.indices), sides = rows_of(sample_normals, chosen.indices);
     const InteriorGraph graph(places, sides, chosen.fill_distance);
