@@ -23,6 +23,7 @@ class ARAPFIELDS_PT_contact(Section, bpy.types.Panel):
         height = row.row()
         height.enabled = group.use_ground
         height.prop(group, "ground", text="")
+        draw_settings(layout, group, "itself")
         note(layout, contact.refusal(source))
 
 

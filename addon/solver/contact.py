@@ -23,12 +23,13 @@ class ContactTerm(NamedTuple):
     margin: float
     ground: float | None  # height along `up`
     up: tuple  # (3,)
+    itself: bool
 
     def made(self):
         """The library's Contact; on a worker."""
         af = native.library()
         obstacles = [af.Obstacle(af.MeshSdf(*solid), self.margin) for solid in self.solids]
-        return af.Contact(obstacles, ground=self.ground, up=self.up)
+        return af.Contact(obstacles, ground=self.ground, up=self.up, itself=self.itself)
 
 
 def native_contact(term):
@@ -53,8 +54,8 @@ def refusal(source):
         return UserError("{name} is no mesh; a mesh object is needed as an obstacle", group.obstacle)
     if group.obstacle == source:
         return UserError("{name} cannot be its own obstacle", source)
-    if not group.use_ground and not obstacles_of(source, group):
-        return UserError("{name}: Contact has neither an obstacle nor a ground", source)
+    if not (group.use_ground or group.itself or obstacles_of(source, group)):
+        return UserError("{name}: Contact has neither an obstacle nor a ground, nor itself", source)
     return None
 
 
@@ -72,10 +73,10 @@ def contact_of(source, settings, space, depsgraph):
     height = (ground - world[2, 3]) / scale if group.use_ground else None
     up = tuple((world[2, :3] / scale).tolist())
     solids = tuple(read(item, space, depsgraph) for item in obstacles_of(source, group))
-    hashed = hashlib.sha1(repr((margin / scale, height, up)).encode())
+    hashed = hashlib.sha1(repr((margin / scale, height, up, group.itself)).encode())
     for part in (array for solid in solids for array in solid):
         hashed.update(np.ascontiguousarray(part).tobytes())
-    return ContactTerm(hashed.hexdigest(), solids, margin / scale, height, up)
+    return ContactTerm(hashed.hexdigest(), solids, margin / scale, height, up, group.itself)
 
 
 def for_job(context, source):

@@ -19,18 +19,23 @@ An open MeshSdf is a sheet, which nothing passes from either side.)")
            "function"_a, "margin"_a = 0.0, "`margin`: the distance that is kept, in mesh units.")
       .def_readonly("margin", &Obstacle::margin, "The distance that is kept.");
   py::class_<Contact>(module, "Contact", R"(
-What a surface does not pass: obstacles, and a ground at a height along `up`.
+What a surface does not pass: obstacles, a ground at a height along `up`, and itself.
 
 For deform, stylize and LiveDeformer. Handles whose targets lie beyond give way: report.contact says which.)")
       .def(py::init([](const ObstaclesArgument& obstacles, std::optional<double> ground,
-                       const std::optional<ArrayArgument>& up) {
+                       const std::optional<ArrayArgument>& up, bool itself) {
              Contact contact{as_items<Obstacle>(obstacles, "obstacles", "Obstacles are needed"), ground};
+             contact.itself = itself;
              if (up) contact.up = as_vec3(*up, "up");
              require_contact(contact);
              return contact;
            }),
            "obstacles"_a = py::tuple(), py::kw_only(), "ground"_a = py::none(), "up"_a = py::none(),
-           "`up` (3,) is z unless given.")
+           "itself"_a = false,
+           "`up` (3,) is z unless given. `itself`: parts do not pass each other, but for what touches or "
+           "overlaps at "
+           "rest.")
+      .def_readonly("itself", &Contact::itself, "Whether parts of the shape do not pass each other.")
       .def_readonly("ground", &Contact::ground, "The ground's height, or None.");
 }
 

@@ -23,13 +23,14 @@ struct Contact {
   std::vector<Obstacle> obstacles;
   std::optional<double> ground;  ///< height along `up`, in mesh coordinates; none: no ground
   Vec3 up = Vec3::UnitZ();
-  bool any() const { return !obstacles.empty() || ground; }
+  bool itself = false;  ///< its own parts, but for what touches or overlaps at rest
+  bool any() const { return !obstacles.empty() || ground || itself; }
 };
 
 /// A handle that contact keeps from its target.
 struct HeldBack {
   Index handle;
-  std::string by;   ///< "obstacles[0]" or "ground"
+  std::string by;   ///< "obstacles[0]", "ground" or "itself"
   double distance;  ///< mean distance to the target, mesh units
 };
 

@@ -41,8 +41,7 @@ def test_a_live_shape_stays_outside_as_its_obstacle_comes_and_goes():
     size = max(bar.dimensions)
     assert bpy.ops.arapfields.live(kind="DEFORM") == {"FINISHED"}
     free = lowest(bar)
-    bar.arapfields.contact.use = True
-    bar.arapfields.contact.use_ground = True
+    bar.arapfields.contact.use = bar.arapfields.contact.use_ground = bar.arapfields.contact.itself = True
     bar.arapfields.contact.ground = low - 0.2
     bpy.context.view_layer.update()
     assert lowest(bar) > low - 0.2 - 2e-3 * size > free
@@ -66,7 +65,9 @@ def test_what_cannot_be_an_obstacle_is_said():
     assert contact.refusal(bar) is None
     group.use = True
     assert "neither" in str(contact.refusal(bar))
-    group.obstacle = bar
+    group.itself = True
+    assert contact.refusal(bar) is None and contact.for_job(bpy.context, bar).made().itself
+    group.itself, group.obstacle = False, bar
     assert "its own" in str(contact.refusal(bar))
     group.obstacle = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
     assert "no mesh" in str(contact.refusal(bar))

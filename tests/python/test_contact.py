@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contact on a bar: nothing enters an obstacle, nothing is remembered, and off is as before."""
+"""Contact: nothing enters an obstacle or another part, nothing is remembered, and off is as before."""
 
 import numpy as np
 import pytest
 import trimesh
-from support.geometry.bar import LEFT, RIGHT, bar_samples, turned
+from support.geometry.bar import LEFT, RIGHT, bar_samples, box, turned
+from support.geometry.characters import FOOT, HIP, LEG, trousers
 
 import arapfields as af
+from arapfields.__main__ import main
 
 QUICK = af.LiveOptions(samples=800, coarse_centers=30, fine_centers=150)
 DEEPEST = 0.004  # 0.1 % of the bar's length
@@ -60,13 +62,78 @@ def test_nothing_is_inside_an_obstacle(samples, function):
 
 
 def test_what_touches_nothing_is_as_without(samples):
-    far = af.Contact([af.Obstacle(BALL)], ground=-5.0)
+    far = af.Contact([af.Obstacle(BALL)], ground=-5.0, itself=True)
     up = [LEFT, turned(20, shift=(0, 0, 0.3)) @ RIGHT]
     assert (live(samples, far).solve(up)(samples.points) == live(samples).solve(up)(samples.points)).all()
     few = af.DeformOptions(centers=100)
     handles = [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, up[1])]
     shapes = [af.deform(samples, handles, few, contact=c)(samples.points) for c in (None, far)]
     assert (shapes[0] == shapes[1]).all()
+
+
+def overlapping(vertices, triangles):
+    """Share of the vertices that lie inside another part, too."""
+    normals = trimesh.Trimesh(vertices, triangles, process=False).vertex_normals
+    return (np.abs(af.winding_number(vertices, triangles, vertices - 1e-3 * normals)) > 1.5).mean()
+
+
+def test_crossed_legs_do_not_pass_each_other():
+    vertices, triangles = af.extract_surface(trousers(), 48)[:2]
+    samples = af.sample_mesh(vertices, triangles, 12000)
+    trunk = box([0, 0, 1.1], [0.3, 0.3, 0.3])
+    feet = [box([side * LEG, 0, FOOT], [0.1, 0.1, 0.1]) for side in (-1, 1)]
+    crossed = [
+        turned(0, shift=(2.4 * s * LEG, 0.03 * s, 0)) @ foot for s, foot in zip((1, -1), feet, strict=True)
+    ]
+    shares = []
+    for itself in (False, True):
+        live = af.LiveDeformer(
+            samples, [af.Cuboid(m, m) for m in (trunk, *feet)], contact=af.Contact(itself=itself)
+        )
+        field = live.solve([trunk, *crossed], iterations=60)
+        shares.append(overlapping(field(vertices), triangles))
+    assert shares[0] > 0.01 and shares[1] == 0
+    assert live.report.flipped_share == 0 and live.report.handle_error_max < 0.05 * HIP
+    assert live.report.contact.touching > 0
+    again = live.solve([trunk, *feet], iterations=60, tolerance=1e-6)(vertices)
+    assert np.abs(again - vertices).max() < 1e-3 * HIP
+
+
+def test_what_overlaps_at_rest_is_left_alone(samples):
+    other = samples.points @ np.diag([0.3, 0.3, 0.3]) + [0, 0, 0.6]
+    both = af.SurfaceSamples(np.vstack([samples.points, other]), np.vstack([samples.normals] * 2))
+    shapes = [
+        live(both, contact).solve([LEFT, turned(10) @ RIGHT])(both.points)
+        for contact in (None, af.Contact(itself=True))
+    ]
+    assert np.abs(shapes[0] - shapes[1]).max() < 1e-6
+
+
+def test_the_command_line_asks_for_the_same(tmp_path, capsys):
+    mesh, ball, out = (str(tmp_path / name) for name in ("bar.ply", "ball.ply", "out.ply"))
+    bar = trimesh.creation.box((4, 1, 1)).subdivide().subdivide().subdivide().subdivide()
+    bar.export(mesh)
+    trimesh.creation.icosphere(3, 0.5).apply_translation([1.2, 0, -1.2]).export(ball)
+    down = [
+        "--box",
+        "-inf,-inf,-inf",
+        "-1.5,inf,inf",
+        "--box",
+        "1.5,-inf,-inf",
+        "inf,inf,inf",
+        "--shift",
+        "0,0,-0.9",
+    ]
+    flags = ["--centers", "60", "--obstacle", f"{ball}:0.05", "--ground", "z", "-1", "--itself", "--quiet"]
+    assert main(["deform", mesh, "-o", out, *down, *flags]) == 0
+    low = trimesh.load(out).vertices
+    assert np.asarray(BALL(low)).min() > 0.05 - 2 * DEEPEST and low[:, 2].min() > -1 - DEEPEST
+    for wrong, text in (
+        (["--ground", "up", "1"], "is not an axis"),
+        (["--obstacle", ball + ":-1"], "margin"),
+    ):
+        assert main(["deform", mesh, "-o", out, *down, *wrong]) == 2
+        assert text in capsys.readouterr().err
 
 
 def test_a_drag_through_and_back_leaves_nothing(samples):

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "solve/radial/handle_motion.h"
 
@@ -10,8 +11,8 @@ namespace arapfields {
 namespace {
 
 /// How far a target moves in one step, in cube units, and how many steps there are at most.
-constexpr double step_length = 0.15;
-constexpr Index most_steps = 16;
+constexpr double step_length = 0.15, step_length_itself = 0.06;
+constexpr Index most_steps = 24;
 /// Quasi-Newton steps of each, and between two searches for planes.
 constexpr Index steps_on_the_way = 3, steps_between = 6;
 /// A surface may be so deep beyond a margin, in cube units.
@@ -59,6 +60,34 @@ void report_contact(RadialState& s) {
   }
 }
 
+/// Takes the handles from earlier motions to their targets in so many steps.
+void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Index iterations,
+              double tolerance, const Progress& progress) {
+  s.precondition(0.0);
+  Index left = iterations;
+  for (Index k = 1; k <= steps; ++k) {
+    const Points targets =
+        s.handles.targets_between(before, static_cast<double>(k) / static_cast<double>(steps));
+    for (Index extra = more_rounds;;) {
+      s.contact.find(s.shape.coefficients);
+      s.objective(s.fast).set_targets(targets);
+      const Index at_once = k < steps ? steps_on_the_way : std::clamp<Index>(left, 2, steps_between);
+      const bool converged = solve_round(s, at_once, tolerance, progress);
+      if (k < steps) break;
+      left -= at_once;
+      const double depth = s.contact.find(s.shape.coefficients);
+      if (converged && depth < deep) break;
+      if (left <= 0 && (depth < deep || extra-- == 0)) break;
+    }
+  }
+}
+
+void back_to(RadialState& s, const RowMatrix<double>& coefficients) {
+  s.shape.coefficients = coefficients;
+  s.shape.jump();
+  if (s.contact.itself()) s.contact.begin(coefficients);
+}
+
 }  // namespace
 
 void stiffen_contact(RadialState& s) {
@@ -93,39 +122,31 @@ void follow_in_contact(RadialState& s, Index iterations, double tolerance,
     before = motions_of(s.handles.bound());
     if (s.shape.coefficients == s.problem.basis.identity()) before.assign(before.size(), Mat4::Identity());
   }
-  if (!s.contact.presses() && s.contact.find(s.shape.coefficients) <= 0.0) {
+  const Points from = s.handles.targets_between(before, 0.0);
+  const double way = (s.handles.targets_between(before, 1.0) - from).rowwise().norm().maxCoeff();
+  const double length = s.contact.itself() ? step_length_itself : step_length;
+  RowMatrix<double> start;  // where parts were pushed apart that a free solve let overlap
+  const bool leaps = s.contact.only_itself() && way > length;  // the way back may be another one
+  if (leaps ||
+      (!s.contact.presses() && s.contact.find(s.shape.coefficients) <= 0.0 && !s.contact.touches_itself())) {
     s.contact.release();
-    const RowMatrix<double> start = s.shape.coefficients;
+    start = s.shape.coefficients;
     freely();
     s.report.contact = {};
-    if (s.contact.find(s.shape.coefficients) <= 0.0) {
+    if (s.contact.find(s.shape.coefficients, 0.0, true) <= 0.0) {
       s.contact.release();
       return;
     }
-    s.shape.coefficients = start;
-    s.shape.jump();
+    if (s.contact.deepest_outside() > 0.0) back_to(s, std::exchange(start, {}));
     s.report.iterations = s.report.evaluations = 0;
   }
-  const Points from = s.handles.targets_between(before, 0.0);
-  const double way = (s.handles.targets_between(before, 1.0) - from).rowwise().norm().maxCoeff();
-  const Index steps = std::clamp<Index>(static_cast<Index>(std::ceil(way / step_length)), 1, most_steps);
-  s.precondition(0.0);
-  Index left = iterations;
-  for (Index k = 1; k <= steps; ++k) {
-    const Points targets =
-        s.handles.targets_between(before, static_cast<double>(k) / static_cast<double>(steps));
-    for (Index extra = more_rounds;;) {
-      s.contact.find(s.shape.coefficients);
-      s.objective(s.fast).set_targets(targets);
-      const Index at_once = k < steps ? steps_on_the_way : std::clamp<Index>(left, 2, steps_between);
-      const bool converged = solve_round(s, at_once, tolerance, progress);
-      if (k < steps) break;
-      left -= at_once;
-      const double depth = s.contact.find(s.shape.coefficients);
-      if (converged && depth < deep) break;
-      if (left <= 0 && (depth < deep || extra-- == 0)) break;
-    }
+  if (start.size() > 0) {
+    approach(s, before, 1, iterations, tolerance, progress);
+    if (!s.contact.overlaps(s.shape.coefficients)) return report_contact(s);
+    back_to(s, start);
   }
+  const auto parts = static_cast<Index>(std::ceil(way / length));
+  approach(s, before, std::clamp<Index>(parts, 1, most_steps), iterations, tolerance, progress);
   report_contact(s);
 }
 

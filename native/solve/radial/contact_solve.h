@@ -8,7 +8,8 @@
 namespace arapfields {
 
 /// Solves outside of the contact's obstacles. What a solve `freely` does not bring near any stays as that
-/// left it; else the targets are approached in steps that no sample jumps through anything by.
+/// left it. Parts that overlap there are pushed apart. Where that does not do, and at obstacles, the targets
+/// are approached in steps that no sample jumps through anything by.
 void follow_in_contact(RadialState& state, Index iterations, double tolerance,
                        const std::function<void()>& freely, const Progress& progress);
 

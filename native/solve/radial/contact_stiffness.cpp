@@ -32,7 +32,12 @@ ContactStiffness::ContactStiffness(const RadialBasis& basis, const ContactSet& s
     softness[i] = 2.0 * static_cast<double>(count) /
                   (static_cast<double>(all) * ContactTerms::stiffness * pick(i)->share);
   }
-  const RowMatrix<double> values = radial_rows(basis, rows_of(set.places, first), JetOrder::value);
+  RowMatrix<double> values = radial_rows(basis, rows_of(set.places, first), JetOrder::value);
+  std::vector<Index> carrying, carriers;
+  for (Index i = 0; i < count; ++i)
+    if (pick(i)->second >= 0) carrying.push_back(i), carriers.push_back(pick(i)->second);
+  if (!carriers.empty())
+    values(carrying, Eigen::all) -= radial_rows(basis, rows_of(set.places, carriers), JetOrder::value);
   rows_.resize(count, basis.size());
   for (Index i = 0; i < count; i += 3) {
     const Index some = std::min<Index>(3, count - i);

@@ -19,6 +19,7 @@ from . import files, usd
 from .frames import FrameStore
 from .options import given_options
 from .running import Outputs, with_progress
+from .touching import contact_key, contact_of
 from .tracks import read_tracks
 
 STEPS, TOLERANCE = 300, 1e-6  # of a frame's solve, which starts from rest, where nothing else is said
@@ -35,7 +36,8 @@ def animate(args):
     wanted = frames_wanted(args, tracks)
     vertices, triangles = files.read_mesh(args.input)
     secondary = secondary_motion(args)
-    solver = FrameSolver(vertices, triangles, tracks, options, solve_limits(args), secondary)
+    contact = contact_of(args), contact_key(args)
+    solver = FrameSolver(vertices, triangles, tracks, options, solve_limits(args), secondary, contact)
     solver.check(wanted)
     store = FrameStore(output, len(vertices), solver.description(wanted[0]))
     places = {index: store.place(tracks.start + index, solver.key(index)) for index in wanted}
@@ -108,9 +110,10 @@ class FrameSolver:
     """Shapes of a mesh: each from rest, a function of its own frame alone; or with secondary motion, each
     from the one before, the tracks' first at rest."""
 
-    def __init__(self, vertices, triangles, tracks, options, limits, secondary=None):
+    def __init__(self, vertices, triangles, tracks, options, limits, secondary=None, contact=(None, [])):
         self._vertices, self._triangles, self._tracks = vertices, triangles, tracks
         self._options, self._limits, self._secondary = options, limits, secondary
+        self._contact, self._contact_key = contact
         self._samples = af.sample_mesh(vertices, triangles, seed=options.seed)
         points = self._samples.points
         self._bounds = np.array([points.min(0), points.max(0)])
@@ -130,7 +133,7 @@ class FrameSolver:
         options = {name: value for name, value in self._options.to_dict().items() if name != "threads"}
         rest = [(type(h).__name__, np.asarray(h.rest).tolist(), h.weight) for h in self._handles(index)]
         further = [] if self._secondary is None else [self._tracks.fps, self._secondary.to_dict()]
-        text = repr([af.__version__, options, self._limits, rest, *further])
+        text = repr([af.__version__, options, self._limits, rest, *further, *self._contact_key])
         return text.encode() + self._vertices.tobytes() + self._triangles.tobytes()
 
     def key(self, index):
@@ -147,7 +150,8 @@ class FrameSolver:
     def positions(self, index, task=None, is_cancelled=bool):
         """(n, 3)"""
         if self._live is None:
-            self._live = af.LiveDeformer(self._samples, self._handles(index), self._options, task=task)
+            settings = {"contact": self._contact, "task": task}
+            self._live = af.LiveDeformer(self._samples, self._handles(index), self._options, **settings)
             self._live.set_secondary_motion(self._secondary)
         if self._secondary is None or self._at is None or index < self._at:
             self._live.reset()

@@ -5,6 +5,7 @@ import arapfields as af
 
 from .handles import AddHandle, MoveHandle, triple
 from .options import add_option_flag
+from .touching import contact_flags
 
 MESH = "mesh: .ply, .obj, .stl or .off"
 SOURCE = f"{MESH}; or .safetensors: a signed distance that fit saved"
@@ -21,6 +22,7 @@ def solve_flags(parser):
     inverse_flag(parser)
     sdf_flag(parser)
     stiffness_flags(parser)
+    contact_flags(parser)
     handles = parser.add_argument_group(
         "handles (x, y, z in the mesh's coordinates; inf and -inf leave a side of a box open)"
     )

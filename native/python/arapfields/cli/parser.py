@@ -21,6 +21,7 @@ from .flags import (
     style_flags,
 )
 from .options import add_option_flag, add_option_flags, shard
+from .touching import contact_flags
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -238,6 +239,7 @@ def _animate(added):
         "--shard", type=shard, metavar="I/N", help="solve the part I of N; the last part writes the output"
     )
     parser.add_argument("--up-axis", choices=usd.AXES, default="z", help="upward axis of the USD file [z]")
+    contact_flags(parser)
     parser.add_argument("--secondary", action="store_true", help="lag behind the handles, and settle")
     add_option_flags(parser, "secondary", "secondary motion (--secondary)")
     add_option_flags(

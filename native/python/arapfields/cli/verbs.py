@@ -15,6 +15,7 @@ from .handles import build_handles, read_handles, rotation, triple, turn_upright
 from .options import given, given_options
 from .running import Outputs, with_progress
 from .sources import Source, fitted, samples
+from .touching import contact_of
 
 
 def fit(args):
@@ -44,10 +45,10 @@ def sample(args):
 
 
 def deform(args):
-    options = given_options(af.DeformOptions, args)
+    options, contact = given_options(af.DeformOptions, args), contact_of(args)
 
     def solve(samples, handles, task):
-        return af.deform(samples, handles, options, task=task)
+        return af.deform(samples, handles, options, contact=contact, task=task)
 
     _solve(args, solve, options.seed, needs_handles=True)
 
@@ -62,7 +63,7 @@ def stylize(args):
         normals = files.read_style_object(args.style_object)
     else:
         normals = af.preferred_normals(args.style) if args.style else files.read_normals(args.normals)
-    up, orientation = None, np.eye(3)
+    up, orientation, contact = None, np.eye(3), contact_of(args)
     if args.up:
         try:
             up = np.array(triple(args.up))
@@ -77,9 +78,8 @@ def stylize(args):
             raise af.InvalidInput(f"--style-turn: expected AXIS as x,y,z and DEGREES ({error})") from error
 
     def solve(samples, handles, task):
-        return af.stylize(
-            samples, normals, options, handles=handles, orientation=orientation, up=up, task=task
-        )
+        settings = {"handles": handles, "orientation": orientation, "up": up, "contact": contact}
+        return af.stylize(samples, normals, options, **settings, task=task)
 
     _solve(args, solve, options.seed, needs_handles=False)
 

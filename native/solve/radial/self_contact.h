@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "sampling/point_grid.h"
+#include "solve/radial/problem.h"
+
+namespace arapfields {
+
+/// A place of a surface that faces another one, far from it inside the shape.
+struct FacingPair {
+  Index first = 0;
+  Index second = 0;
+  Vec3 normal;         ///< of the second, outwards
+  double gap = 0.0;    ///< along the normal
+  double least = 0.0;  ///< gap to be kept: as at rest where that is less
+};
+
+/// Where a surface meets itself. Samples that are near each other inside the shape, and those that touch or
+/// overlap others at rest, are left alone. Which side a sample came from tells what is beyond.
+class SelfContact {
+ public:
+  using Normals = std::function<Points()>;  ///< (n,3) as long as the surface there is stretched
+  /// For these rows of the problem's samples. Throws InvalidInput without normals.
+  SelfContact(const RadialProblem& problem, const std::vector<Index>& rows, double kept);
+
+  /// For each sample the nearest one that it faces, within `near`, of cube units, at places (n,3); `normals`
+  /// are asked for where parts are near each other. `jumped`: the way here is not known.
+  std::vector<FacingPair> find(PointsIn places, const Normals& normals, double near, bool jumped = false);
+  /// Whether a part is inside another one, however deep, where it is not at rest.
+  bool overlaps(PointsIn places, PointsIn normals) const;
+  /// The ways start here.
+  void begin(PointsIn places, const Normals& normals);
+
+ private:
+  enum class Beyond { as_came, shallow, all };  // which gaps below zero are pairs
+  std::vector<FacingPair> search(PointsIn places, const Normals& normals, double near, Beyond beyond) const;
+  std::vector<std::vector<Index>> near_parts(const PointGrid& grid) const;
+  bool is_far(Index i, Index j, double distance) const;
+  bool came_through(Index i, Index j, const Vec3& normal) const;
+  void remember(PointsIn places, const std::vector<FacingPair>& pairs);
+
+  RowMatrix<double> inside_;  // (n,6) rest places and their embedding
+  std::vector<std::int32_t> meshes_;
+  Vector windings(PointsIn places, PointsIn normals) const;
+
+  std::vector<Index> probes_;  // rows where windings are taken
+  Vector windings_;            // there at rest
+  double share_ = 1.0;         // of a sample in them
+  Vector widths_;              // (n) of the shape there
+  Vector least_;               // (n) gaps at rest, at most what is kept; 0: left alone
+  double aside_ = 0.0;         // what is farther aside does not face
+  Points seen_;                // places at the last search
+  std::vector<Index> faced_;   // what each faced then; −1: nothing
+};
+
+}  // namespace arapfields
