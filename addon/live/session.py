@@ -169,12 +169,14 @@ class Session:
 
     def is_current(self, context):
         """Whether the shape that the file has is the one that its handles ask for."""
-        if self.worker is None or self.is_restored:
+        if self.worker is None:
             return False
         context.view_layer.update()
         source = self.source.get()
         if self.waits(source):
             return stored.mark(source) != stored.UNSETTLED
+        if self.is_restored:
+            return False
         return stored.mark(source) == stored.wanted(source, self.digest(self.reader.request(context)))
 
     def keep_shown(self):

@@ -181,13 +181,24 @@ def test_a_style_that_waits_for_what_is_to_be_chosen_comes_back(lacks):
 
 
 @few_centers
-def test_a_press_where_a_style_waits_for_its_object_holds_what_is_shown():
+@pytest.mark.parametrize("comes_back", [False, True])
+def test_a_press_where_a_style_waits_for_its_object_holds_what_is_shown(comes_back):
+    """Also after live mode was ended, and that was undone."""
+    bpy.context.preferences.edit.use_global_undo = True
     bar = scenes.bar()
     pin(bar, (1.0, 0.0, 0.25), target=(1.0, 0.0, 0.4))
     bpy.ops.arapfields.live(kind="STYLIZE")
     world.settle()
     shown = scenes.world_points(bar)
     bar.arapfields.stylize.style = "OBJECT"
+    if comes_back:
+        bpy.ops.ed.undo_push(message="waits")
+        bpy.ops.arapfields.live(kind="STYLIZE")
+        bpy.ops.ed.undo_push(message="ended")
+        bpy.ops.ed.undo()
+        world.settle()
+        bar = bpy.data.objects["Bar"]
+        assert np.array_equal(scenes.world_points(bar), shown)
     drag.of_entry(bpy.context, bar, bar.arapfields.handles[0]).end(bpy.context)
     world.settle()
     assert np.array_equal(scenes.world_points(bar), shown)
