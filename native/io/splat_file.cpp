@@ -189,6 +189,8 @@ GaussianSplats load_splats(const std::string& path, const Progress& progress) {
   }
   GaussianSplats splats = sized(header, harmonics, others);
   std::vector<char> rows(static_cast<std::size_t>(chunk) * header.stride);
+  std::vector<std::size_t> offsets;
+  for (const std::string& name : wanted) offsets.push_back(known.at(name)->offset);
   Eigen::RowVectorXf numbers(static_cast<Index>(wanted.size()));
   for (Index first = 0; first < header.count; first += chunk) {
     progress.report(static_cast<double>(first) / static_cast<double>(header.count));
@@ -197,8 +199,8 @@ GaussianSplats load_splats(const std::string& path, const Progress& progress) {
               static_cast<std::size_t>(count) * header.stride);
     for (Index i = 0; i < count; ++i) {
       const char* row = rows.data() + static_cast<std::size_t>(i) * header.stride;
-      for (std::size_t k = 0; k < wanted.size(); ++k)
-        std::memcpy(&numbers[static_cast<Index>(k)], row + known.at(wanted[k])->offset, sizeof(float));
+      for (std::size_t k = 0; k < offsets.size(); ++k)
+        std::memcpy(&numbers[static_cast<Index>(k)], row + offsets[k], sizeof(float));
       if (!numbers.allFinite()) refuse(path, "splat " + std::to_string(first + i) + " has NaN or infinity");
       take(splats, first + i, numbers);
       char* other = splats.other_values.data() + (first + i) * splats.other_values.cols();

@@ -61,3 +61,9 @@ def samples(source, count, seed, args):
     return with_progress(
         "sample", lambda task: af.sample_surface(source.sdf(), count=count, seed=seed, task=task), args.quiet
     )
+
+
+def read_distance(path):
+    """A mesh's exact distance, or a signed distance that fit saved."""
+    path = existing_file(path, SOURCES)
+    return af.MeshSdf(*files.read_mesh(path)) if files.is_mesh(path) else files.read_sdf(path)

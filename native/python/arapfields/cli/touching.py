@@ -5,9 +5,8 @@ import contextlib
 import hashlib
 from pathlib import Path
 
-from .._files import existing_file
-from .._native import Contact, InvalidInput, MeshSdf, Obstacle
-from . import files
+from .._native import Contact, InvalidInput, Obstacle
+from . import sources
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
@@ -64,8 +63,7 @@ def _parts(text):
 
 def _obstacle(text):
     path, margin = _parts(text)
-    existing_file(path, (*files.MESH_SUFFIXES, *files.STATE_SUFFIXES))
-    function = MeshSdf(*files.read_mesh(path)) if files.is_mesh(path) else files.read_sdf(path)
+    function = sources.read_distance(path)
     try:
         return Obstacle(function, margin)
     except InvalidInput as error:

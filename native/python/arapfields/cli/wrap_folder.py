@@ -15,7 +15,7 @@ from .running import Outputs, with_progress
 ONE_TARGET = ("landmark", "landmarks", "save_field", "suggest")  # flags of which each target has its own
 
 
-def run(args, options, read_target):
+def run(args, options):
     """Wraps each file; InvalidInput at the end where some failed."""
     for name in ONE_TARGET:
         if getattr(args, name):
@@ -47,7 +47,7 @@ def run(args, options, read_target):
         mark.update(path.read_bytes())
         try:
             done[path.name] = read_done(place, mark) or wrap_one(
-                place, mark, lambda path=path: read_target(path), source, samples, options, args
+                place, mark, lambda path=path: sources.read_distance(path), source, samples, options, args
             )
         except (af.InvalidInput, af.Diverged) as error:
             failed.append(f"{path.name}: {error}")

@@ -66,7 +66,7 @@ def add_flags(parser):
 def run(args):
     options = given_options(af.WrapOptions, args)
     if Path(args.target).is_dir():
-        wrap_folder.run(args, options, read_target)
+        wrap_folder.run(args, options)
         return
     if args.shard:
         raise af.InvalidInput(f"--shard: {args.target} is no folder")
@@ -89,7 +89,7 @@ def run(args):
         source = sources.Source(args)
         if source.mesh is None and "--output" in places:
             raise af.InvalidInput(f"--output: {source.path} holds no mesh to move; use --save-field")
-        target = read_target(args.target)
+        target = sources.read_distance(args.target)
         samples = sources.samples(source, given(args, "wrap", "samples"), options.seed, args)
         if "--suggest" in places:
             found = with_progress(
@@ -116,12 +116,6 @@ def run(args):
             verbs.write_report(outputs, report, field.report)
     written = "wrote " + ", ".join(str(path) for path in places.values())
     verbs.summary(args, written, field.report if field is not None else None)
-
-
-def read_target(path):
-    """A mesh's exact distance, or a signed distance that fit saved."""
-    path = existing_file(path, sources.SOURCES)
-    return af.MeshSdf(*files.read_mesh(path)) if files.is_mesh(path) else files.read_sdf(path)
 
 
 def read_landmarks(path):
