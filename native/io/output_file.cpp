@@ -19,6 +19,7 @@ namespace fs = std::filesystem;
 constexpr const char* ending = ".tmp";
 constexpr std::size_t token_length = 8;
 constexpr std::size_t kept_name = 200;  ///< of a name's bytes; a file system allows 255 with what is added
+constexpr std::size_t added_name = 64;  ///< more than what temporary names add to twice the file's own
 constexpr int most_links = 40;          ///< as Linux follows
 constexpr int most_tries = 100;
 
@@ -43,30 +44,25 @@ fs::path temporary_prefix(const fs::path& target) {
 
 /// Removes a temporary folder and what lies beside it under a name that continues the folder's.
 void remove_temporary(const fs::path& folder) noexcept {
-  std::error_code ignored;
   const fs::path::string_type name = folder.filename().native();
-  for (fs::directory_iterator entry(folder.parent_path(), ignored), end; !ignored && entry != end;
-       entry.increment(ignored)) {
-    const fs::path::string_type other = entry->path().filename().native();
-    std::error_code kept;
-    if (other.size() > name.size() && other.starts_with(name)) fs::remove(entry->path(), kept);
+  for (const fs::path& entry : system_file::entries(folder.parent_path())) {
+    const fs::path::string_type other = entry.filename().native();
+    if (other.size() > name.size() && other.starts_with(name)) system_file::remove_tree(entry);
   }
-  fs::remove_all(folder, ignored);
+  system_file::remove_tree(folder);
 }
 
 /// Removes what dead processes left of this output.
 void remove_stale(const fs::path& target) {
-  std::error_code ignored;
   const fs::path prefix = temporary_prefix(target), last(ending);
   const std::size_t length = prefix.native().size() + token_length + last.native().size();
-  for (fs::directory_iterator entry(target.parent_path(), ignored), end; !ignored && entry != end;
-       entry.increment(ignored)) {
-    const fs::path::string_type name = entry->path().filename().native();
+  for (const fs::path& entry : system_file::entries(target.parent_path())) {
+    const fs::path::string_type name = entry.filename().native();
     if (name.size() != length || !name.starts_with(prefix.native()) || !name.ends_with(last.native()))
       continue;
-    const int lock = system_file::lock_folder(entry->path());
+    const int lock = system_file::lock_folder(entry);
     if (lock < 0) continue;
-    remove_temporary(entry->path());
+    remove_temporary(entry);
     system_file::close_file(lock);
   }
 }
@@ -89,7 +85,8 @@ OutputFile::OutputFile(const std::string& path) : path_(path) {
   require(!path.empty() && path.find('\0') == std::string::npos, "path",
           std::string("'").append(path.c_str()).append("'"), "the name of a file is needed");
   try {
-    open_folder(followed(path));
+    const fs::path target = followed(path);
+    open_folder(system_file::reachable(target, 2 * target.filename().native().size() + added_name));
   } catch (const std::system_error&) {  // a name that is no text of the system's
     throw FileError(path, EILSEQ);
   }
@@ -98,15 +95,13 @@ OutputFile::OutputFile(const std::string& path) : path_(path) {
 void OutputFile::open_folder(const fs::path& target) {
   target_ = text_of(target);
   const fs::path name = target.filename();
-  std::error_code none;
-  const fs::file_status there = fs::status(target, none);
-  const bool exists = fs::exists(there);
+  const system_file::Kind there = system_file::kind(target);
   const auto& text = name.native();  // "", "." and ".." are folders
   const bool dots = text.size() <= 2 && text.find_first_not_of(fs::path::value_type('.')) == text.npos;
-  if (dots || fs::is_directory(there)) throw FileError(path_, EISDIR);
-  require(!exists || fs::is_regular_file(there), path_, "is not a regular file",
+  if (dots || there == system_file::Kind::folder) throw FileError(path_, EISDIR);
+  require(there != system_file::Kind::other, path_, "is not a regular file",
           "pipes, devices and sockets cannot be written to");
-  if (exists && !system_file::may_write(target)) throw FileError(path_, errno);
+  if (there == system_file::Kind::file && !system_file::may_write(target)) throw FileError(path_, errno);
   remove_stale(target);
   const fs::path prefix = temporary_prefix(target);
   for (int tries = 0; lock_ < 0; ++tries) {
@@ -142,12 +137,11 @@ void OutputFile::write(const void* data, std::size_t bytes) {
 
 void OutputFile::finish() {
   const fs::path target = path_of(target_);
-  std::error_code ignored;
-  if (fs::exists(path_of(beside()), ignored)) partial_ = beside();
+  const auto exists = [](const fs::path& path) { return system_file::kind(path) != system_file::Kind::none; };
+  if (exists(path_of(beside()))) partial_ = beside();
   const int arrived = system_file::open_written(path_of(partial_));
   if (arrived < 0)
-    require(fs::exists(target.parent_path(), ignored), path_, "its folder is gone",
-            "bring it back, or choose another");
+    require(exists(target.parent_path()), path_, "its folder is gone", "bring it back, or choose another");
   require(arrived >= 0, path_, "nothing was written", "the disk may be full");
   const bool done = system_file::take_permissions(arrived, target) && system_file::to_disk(arrived);
   const int problem = done ? 0 : errno;

@@ -6,8 +6,19 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <vector>
 
 namespace arapfields::system_file {
+
+enum class Kind { none, file, folder, other };
+/// Of what is there, behind links.
+Kind kind(const std::filesystem::path& path);
+std::vector<std::filesystem::path> entries(const std::filesystem::path& folder);
+/// Removes a file, or a folder with all in it, as far as the system lets it.
+void remove_tree(const std::filesystem::path& path);
+/// The path in the form that Windows takes beyond its 260 letters, where it, or one `longer` than it, has
+/// them.
+std::filesystem::path reachable(const std::filesystem::path& path, std::size_t longer = 0);
 
 /// For reading; never waits for the other end of a pipe. A folder is refused by EISDIR.
 int open_to_read(const std::filesystem::path& path);

@@ -11,7 +11,32 @@
 
 namespace arapfields::system_file {
 
-int open_to_read(const std::filesystem::path& path) {
+namespace fs = std::filesystem;
+
+Kind kind(const fs::path& path) {
+  std::error_code none;
+  const fs::file_status there = fs::status(path, none);
+  if (!fs::exists(there)) return Kind::none;
+  if (fs::is_directory(there)) return Kind::folder;
+  return fs::is_regular_file(there) ? Kind::file : Kind::other;
+}
+
+std::vector<fs::path> entries(const fs::path& folder) {
+  std::vector<fs::path> found;
+  std::error_code ignored;
+  for (fs::directory_iterator entry(folder, ignored), end; !ignored && entry != end; entry.increment(ignored))
+    found.push_back(entry->path());
+  return found;
+}
+
+void remove_tree(const fs::path& path) {
+  std::error_code ignored;
+  fs::remove_all(path, ignored);
+}
+
+fs::path reachable(const fs::path& path, std::size_t) { return path; }
+
+int open_to_read(const fs::path& path) {
   const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   struct stat status{};
   if (file < 0) return -1;
@@ -22,13 +47,9 @@ int open_to_read(const std::filesystem::path& path) {
   return -1;
 }
 
-int create(const std::filesystem::path& path) {
-  return open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-}
+int create(const fs::path& path) { return open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666); }
 
-int open_written(const std::filesystem::path& path) {
-  return open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC);
-}
+int open_written(const fs::path& path) { return open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC); }
 
 void close_file(int file) noexcept { close(file); }
 
@@ -58,7 +79,7 @@ std::ptrdiff_t append(int file, const void* from, std::size_t bytes) {
 
 bool to_disk(int file) { return fsync(file) == 0; }
 
-bool take_permissions(int file, const std::filesystem::path& path) {
+bool take_permissions(int file, const fs::path& path) {
   struct stat own{}, previous{};
   if (fstat(file, &own) != 0) return false;
   if (stat(path.c_str(), &previous) != 0) return true;
@@ -71,15 +92,13 @@ bool take_permissions(int file, const std::filesystem::path& path) {
   return done;
 }
 
-bool may_write(const std::filesystem::path& path) { return access(path.c_str(), W_OK) == 0; }
+bool may_write(const fs::path& path) { return access(path.c_str(), W_OK) == 0; }
 
-bool replace(const std::filesystem::path& from, const std::filesystem::path& to) {
-  return rename(from.c_str(), to.c_str()) == 0;
-}
+bool replace(const fs::path& from, const fs::path& to) { return rename(from.c_str(), to.c_str()) == 0; }
 
-bool make_folder(const std::filesystem::path& folder) { return mkdir(folder.c_str(), 0700) == 0; }
+bool make_folder(const fs::path& folder) { return mkdir(folder.c_str(), 0700) == 0; }
 
-int lock_folder(const std::filesystem::path& folder) {
+int lock_folder(const fs::path& folder) {
   const int descriptor = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
   if (descriptor < 0) return -1;
   struct stat status{};
@@ -92,11 +111,9 @@ int lock_folder(const std::filesystem::path& folder) {
   return -1;
 }
 
-int hold_folder(const std::filesystem::path& folder) {
-  return open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-}
+int hold_folder(const fs::path& folder) { return open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC); }
 
-void folder_to_disk(const std::filesystem::path& folder) {
+void folder_to_disk(const fs::path& folder) {
   const int descriptor = hold_folder(folder);
   if (descriptor < 0) return;
   fsync(descriptor);  // not all file systems can; the file itself is on the disk

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <string>
 
 #include "io/system_file.h"
 
@@ -51,27 +52,70 @@ int open_shared(const fs::path& path, int flags, int sharing) {
   return -1;
 }
 
-bool is_folder(const fs::path& path) {
-  std::error_code none;
-  return fs::is_directory(path, none);
-}
-
 /// The name under which a folder is locked: of a file beside it that vanishes with the lock.
 fs::path lock_name(const fs::path& folder) { return fs::path(folder).concat(L".lock"); }
 
 }  // namespace
 
-int open_to_read(const fs::path& path) {
+// Of the standard library's own, GCC's take no long paths, and its remove_all() never ends at what it cannot
+// reach.
+Kind kind(const fs::path& path) {
+  const DWORD attributes = GetFileAttributesW(path.c_str());
+  if (attributes == INVALID_FILE_ATTRIBUTES) return Kind::none;
+  if ((attributes & FILE_ATTRIBUTE_DIRECTORY) != 0) return Kind::folder;
+  constexpr DWORD shared = FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE;
+  const HANDLE file = CreateFileW(path.c_str(), 0, shared, nullptr, OPEN_EXISTING, 0, nullptr);
+  if (file == INVALID_HANDLE_VALUE) return Kind::file;
+  const bool regular = GetFileType(file) == FILE_TYPE_DISK;
+  CloseHandle(file);
+  return regular ? Kind::file : Kind::other;
+}
+
+std::vector<fs::path> entries(const fs::path& folder) {
+  std::vector<fs::path> found;
+  WIN32_FIND_DATAW entry;
+  const HANDLE search = FindFirstFileW((folder / L"*").c_str(), &entry);
+  if (search == INVALID_HANDLE_VALUE) return found;
+  do {
+    const std::wstring name = entry.cFileName;
+    if (name != L"." && name != L"..") found.push_back(folder / name);
+  } while (FindNextFileW(search, &entry) != 0);
+  FindClose(search);
+  return found;
+}
+
+void remove_tree(const fs::path& path) {
+  const DWORD attributes = GetFileAttributesW(path.c_str());
+  if (attributes == INVALID_FILE_ATTRIBUTES) return;
+  if ((attributes & FILE_ATTRIBUTE_DIRECTORY) == 0) {
+    DeleteFileW(path.c_str());
+    return;
+  }
+  if ((attributes & FILE_ATTRIBUTE_REPARSE_POINT) == 0)  // what a link leads to stays
+    for (const fs::path& entry : entries(path)) remove_tree(entry);
+  RemoveDirectoryW(path.c_str());
+}
+
+fs::path reachable(const fs::path& path, std::size_t longer) {
+  const DWORD length = GetFullPathNameW(path.c_str(), 0, nullptr, nullptr);
+  if (length == 0 || length + longer < MAX_PATH) return path;
+  std::wstring whole(length, L'\0');
+  whole.resize(GetFullPathNameW(path.c_str(), length, whole.data(), nullptr));
+  if (whole.starts_with(LR"(\\?\)")) return whole;
+  return whole.starts_with(LR"(\\)") ? LR"(\\?\UNC)" + whole.substr(1) : LR"(\\?\)" + whole;
+}
+
+int open_to_read(const fs::path& given) {
+  const fs::path path = reachable(given);
   const int file = open_shared(path, _O_RDONLY, _SH_DENYNO);
-  if (file < 0 && errno == EACCES && is_folder(path)) errno = EISDIR;
+  if (file < 0 && errno == EACCES && kind(path) == Kind::folder) errno = EISDIR;
   return file;
 }
 
 int create(const fs::path& path) { return open_shared(path, _O_WRONLY | _O_CREAT | _O_EXCL, _SH_DENYNO); }
 
 int open_written(const fs::path& path) {
-  std::error_code none;
-  if (!fs::is_regular_file(fs::symlink_status(path, none))) {
+  if (kind(path) != Kind::file) {
     errno = ENOENT;
     return -1;
   }
@@ -135,8 +179,7 @@ int lock_folder(const fs::path& folder) {
     if (errno == EACCES) errno = EWOULDBLOCK;
     return -1;
   }
-  std::error_code none;
-  if (fs::is_directory(fs::symlink_status(folder, none))) return lock;
+  if (kind(folder) == Kind::folder) return lock;
   _close(lock);
   errno = EWOULDBLOCK;
   return -1;

@@ -13,6 +13,7 @@
 #include "core/file_error.h"
 #include "io/input_file.h"
 #include "io/output_file.h"
+#include "io/system_file.h"
 #include "temporary_folder.h"
 
 using namespace arapfields;
@@ -86,6 +87,28 @@ BOOST_AUTO_TEST_CASE(names_are_utf8) {
   while (longest.size() < 210) longest += "\xe2\x82\xac";
   save(folder / longest.c_str(), "long");
   BOOST_TEST(content(folder / longest.c_str()) == "long");
+}
+
+// Longer paths than Windows takes as they are: of a file, of its temporary folder, of its own folder.
+BOOST_AUTO_TEST_CASE(paths_are_of_any_length) {
+  const Folder folder;
+  const std::string part(100, 'y');
+  std::string path = text_of(folder.path);
+  for (int depth = 0; depth < 4; ++depth) {
+    for (const std::size_t length : {1, 60, 200}) {
+      const std::string name = path + "/" + std::string(length, 'x');
+      save(name, "old");
+      save(name, "new");
+      BOOST_TEST(content(name) == "new");
+      {
+        const OutputFile given_up(name);
+      }
+    }
+    BOOST_TEST(system_file::entries(system_file::reachable(path_of(path))).size() == 3u);
+    path += "/" + part;
+    BOOST_TEST(system_file::make_folder(system_file::reachable(path_of(path), part.size())));
+  }
+  system_file::remove_tree(system_file::reachable(folder.path / part));
 }
 
 BOOST_AUTO_TEST_CASE(what_a_killed_process_left_is_swept_and_what_a_live_one_uses_is_not) {
