@@ -16,7 +16,7 @@ if IN_BLENDER:
 
 pytestmark = pytest.mark.in_blender
 
-ROUNDS = 4
+ROUNDS = 2
 
 
 def test_rounds_of_undo_and_redo_are_exact():
