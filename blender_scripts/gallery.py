@@ -31,6 +31,7 @@ sys.path[:0] = [str(HERE)]
 import at_hand  # noqa: E402
 import windowed  # noqa: E402
 from figures import FIGURES  # noqa: E402
+from pictures import SUFFIX, store  # noqa: E402
 
 SHARED = ["stage.py", "shapes.py", "creatures.py", "menagerie.py", "figures/common.py"]
 OF_PAGES = [
@@ -76,12 +77,14 @@ def content_hash(figure):
 
 def pictures(folder):
     """Those of a figure: sheets, and loops with the frame that stands for each."""
-    return [path for path in folder.iterdir() if path.suffix in (".png", ".webp", ".jpg")]
+    return [path for path in folder.iterdir() if path.suffix in (SUFFIX, ".jpg")]
 
 
 def draw(name, folder):
     """In the figure's own process: renders into an empty folder, and leaves what was measured there."""
     measured = importlib.import_module(f"figures.{name}").render(folder)
+    for path in folder.glob("*.png"):
+        store(path)
     files = sorted(path.name for path in pictures(folder))
     (folder / DRAWN).write_text(json.dumps({"files": files, "measured": measured}))
 

@@ -11,6 +11,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+from pictures import STORED
 from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -22,7 +23,7 @@ LAST, STATUS = 10, 72  # row of the section of the status, and its height with a
 SHOWN = (1280, 800)
 TOP = ("source", "handles", "deform", "stylize")
 WITHIN = ("surface", "result")
-WINDOW = ("handles", "running", "cancelled", "live")  # blender-NAME.png
+WINDOW = ("handles", "running", "cancelled", "live")  # blender-NAME.webp
 MENU = (940, 167, 1284, 411)  # the menu of styles and the header of its section
 
 
@@ -53,23 +54,21 @@ def section(folder, name, row, closed, step, beginning):
     return whole[round(beginning + step * row) : end, LEFT]
 
 
-def save(array, path):
-    Image.fromarray(array.astype(np.uint8)).save(path, optimize=True)
+def save(picture, path):
+    Image.fromarray(np.asarray(picture, dtype=np.uint8)).save(path, **STORED)
     print(path)
 
 
 def of_panel(folder, target):
     closed, advanced = pixels(folder / "panel-closed.png"), pixels(folder / "panel-advanced.png")
     for row, name in enumerate(TOP):
-        save(section(folder, name, row, closed, STEP, 0), target / f"panel-{name}.png")
+        save(section(folder, name, row, closed, STEP, 0), target / f"panel-{name}.webp")
     first = found(next_header(closed, 8, STEP, 0), advanced) - 2 + STEP  # within Advanced
     for name, row in zip(WITHIN, (0, 5), strict=True):
-        save(section(folder, name, row, advanced, INNER, first), target / f"panel-{name}.png")
-    Image.open(folder / "panel-styles.png").convert("RGB").crop(MENU).save(
-        target / "style-menu.png", optimize=True
-    )
+        save(section(folder, name, row, advanced, INNER, first), target / f"panel-{name}.webp")
+    save(Image.open(folder / "panel-styles.png").convert("RGB").crop(MENU), target / "style-menu.webp")
     top = round(STEP * LAST)
-    save(pixels(folder / "panel-status.png")[top : top + STATUS, LEFT], target / "panel-status.png")
+    save(pixels(folder / "panel-status.png")[top : top + STATUS, LEFT], target / "panel-status.webp")
 
 
 def main():
@@ -84,7 +83,7 @@ def main():
         if folder is None:
             continue
         shown = Image.open(folder / f"{name}.png").convert("RGB")
-        shown.resize(SHOWN, Image.Resampling.LANCZOS).save(options.to / f"blender-{name}.png", optimize=True)
+        save(shown.resize(SHOWN, Image.Resampling.LANCZOS), options.to / f"blender-{name}.webp")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bends a drawn figure as rigidly as possible; makes docs/images/curves.png.
+"""Bends a drawn figure as rigidly as possible; makes docs/images/curves.webp.
 
-python docs/examples/curves.py [output.png]
+python docs/examples/curves.py [output.webp]
 """
 
 import sys
@@ -105,8 +105,8 @@ def main(output: str | Path) -> None:
             axes.scatter(*moved.T, s=14, color=color, label=name, zorder=3)
         axes.set(title=title, xlim=(-2, 2), ylim=(-2.1, 2.3), aspect="equal", xticks=[], yticks=[])
     all_axes[0].legend(loc="lower left", frameon=False, fontsize=8)
-    plot.savefig(output, dpi=110)
+    plot.savefig(output, dpi=110, pil_kwargs={"quality": 95})
 
 
 if __name__ == "__main__":
-    main(sys.argv[1] if len(sys.argv) > 1 else Path(__file__).parents[1] / "images" / "curves.png")
+    main(sys.argv[1] if len(sys.argv) > 1 else Path(__file__).parents[1] / "images" / "curves.webp")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measures deformations of a bar and of the authors' published hand; makes docs/images/hand.png.
+"""Measures deformations of a bar and of the authors' published hand; makes docs/images/hand.webp.
 
-ARAPFIELDS_DATA=folder python docs/examples/hand.py [output.png]
+ARAPFIELDS_DATA=folder python docs/examples/hand.py [output.webp]
 The folder holds neural_sdf/hand.pt; reading it needs PyTorch. The handles are those of the tests.
 """
 
@@ -86,7 +86,7 @@ def draw(bar: Array, hand: Array, moved: dict[str, dict[str, float]], output: st
     draw_trade(axes[1], hand, "Hand, one finger moved")
     draw_coupling(axes[2], moved)
     figure.tight_layout()
-    figure.savefig(output)
+    figure.savefig(output, pil_kwargs={"quality": 95})
 
 
 def main(output: str | Path) -> None:
@@ -99,4 +99,4 @@ def main(output: str | Path) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1] if len(sys.argv) > 1 else ROOT / "docs" / "images" / "hand.png")
+    main(sys.argv[1] if len(sys.argv) > 1 else ROOT / "docs" / "images" / "hand.webp")

@@ -68,8 +68,8 @@ def main(resolution=80):
         field = live.solve(iterations=100)
         draw(place, field(vertices), triangles, view, f"{name}: E = {live.report['energy']:.4f}")
     figure.tight_layout()
-    target = ROOT / "docs" / "images" / "live-compare.png"
-    figure.savefig(target, dpi=110)
+    target = ROOT / "docs" / "images" / "live-compare.webp"
+    figure.savefig(target, dpi=110, pil_kwargs={"quality": 95})
     print("wrote", target)
 
 

@@ -2,6 +2,7 @@
 """What `make gallery` renders and what it skips, without rendering."""
 
 import json
+import subprocess
 import sys
 import threading
 from pathlib import Path
@@ -34,6 +35,19 @@ def test_every_committed_figure_has_its_pictures_and_figures():
         entry = manifest[figure.name]
         assert entry["files"] and entry["measured"]
         assert all((pages.ROOT / "docs" / "gallery" / file).is_file() for file in entry["files"])
+
+
+MOST_BYTES = 6_000_000  # of the tree's pictures, meshes and JSON: a clone fetches them all
+
+
+def test_pictures_meshes_and_json_stay_small():
+    kinds = "png", "jpg", "webp", "svg", "json", "obj", "ply", "npz", "blend", "safetensors"
+    listed = ["git", "-C", str(pages.ROOT), "ls-files", "-z", *(f"*.{kind}" for kind in kinds)]
+    files = subprocess.run(listed, capture_output=True, text=True)
+    if files.returncode:
+        pytest.skip("not a clone")
+    sizes = [(pages.ROOT / name).stat().st_size for name in files.stdout.split("\0") if name]
+    assert len(sizes) > 50 and sum(sizes) < MOST_BYTES
 
 
 def test_what_a_solve_did_not_measure_is_left_out():
