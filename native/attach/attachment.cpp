@@ -36,27 +36,18 @@ class CachedEvaluation {
  public:
   CachedEvaluation(const RadialField& field, PointsIn mesh_points, PointsIn frame_points,
                    const SurfaceFrames& frames, const CarriedPoints& carried)
-      : basis_(field.basis()),
-        frame_(field.frame()),
-        influence_(field.influence()),
-        mesh_points_(mesh_points) {
-    const Points cube = frame_.to_cube(mesh_points_);
-    points_ = {basis_, cube, JetOrder::value};
-    frame_points_ = frame_points;
-    at_frames_ = {basis_, frame_points, JetOrder::first};
-    if (!influence_) return;
-    point_influence_ = influence_->at(cube);
+      : field_(field), mesh_points_(mesh_points), frame_points_(frame_points) {
+    const Points cube = field.frame().to_cube(mesh_points_);
+    points_ = {field.basis(), cube, JetOrder::value};
+    at_frames_ = {field.basis(), frame_points, JetOrder::first};
+    if (!field.influence()) return;
+    point_influence_ = field.influence()->at(cube);
     // Frames blend over long distances: a point does not follow where nothing nearby moves.
-    carried_influence_ = carried.nearby_means(frames, influence_->at(frame_points));
+    carried_influence_ = carried.nearby_means(frames, field.influence()->at(frame_points));
     for (double& value : carried_influence_) value = smooth_between(0.0, full_influence, value);
   }
 
-  /// Whether a field has the basis, the frame and the influence that were cached.
-  bool matches(const RadialField& field) const {
-    return field.basis().embedding == basis_.embedding && field.frame() == frame_ &&
-           field.influence() == influence_ && field.basis().center_count() == basis_.center_count() &&
-           field.basis().radii == basis_.radii && field.basis().centers == basis_.centers;
-  }
+  bool matches(const RadialField& field) const { return field.shares_places_with(field_); }
 
   /// The moved points (n,3) in mesh coordinates; exactly at rest where nothing moves.
   Points moved(const RadialField& field) const {
@@ -68,7 +59,7 @@ class CachedEvaluation {
     parallel_for(0, shifts.rows(), 4096, [&](Index first, Index last) {
       for (Index i = first; i < last; ++i) {
         const double influence = point_influence_.size() > 0 ? point_influence_[i] : 1.0;
-        result.row(i) = mesh_points_.row(i) + (influence * frame_.scale) * shifts.row(i);
+        result.row(i) = mesh_points_.row(i) + (influence * field_.frame().scale) * shifts.row(i);
       }
     });
     return result;
@@ -79,13 +70,11 @@ class CachedEvaluation {
 
   void evaluate_at_frames(const RadialField& field, JetView<double> jets) const {
     at_frames_.evaluate(field.coefficients(), jets);
-    if (influence_) influence_->confine(frame_points_, jets);
+    if (field_.influence()) field_.influence()->confine(frame_points_, jets);
   }
 
  private:
-  RadialBasis basis_;
-  Frame frame_;
-  std::shared_ptr<const Influence> influence_;
+  RadialField field_;  // whatever its coefficients
   Points mesh_points_, frame_points_;
   Vector point_influence_, carried_influence_;  // empty: all 1
   RadialEvaluator<double> points_;

@@ -47,7 +47,7 @@ using FloatArray = py::array_t<float>;
 }  // namespace
 
 void bind_splats(py::module_& module) {
-  py::class_<GaussianSplats>(module, "GaussianSplats", R"(
+  py::class_<GaussianSplats, std::shared_ptr<GaussianSplats>>(module, "GaussianSplats", R"(
 Gaussian splats: anisotropic Gaussians with opacity and view-dependent colour, in the scan's coordinates.
 
 Arrays are float32 and new each time.)")
@@ -117,6 +117,28 @@ SurfaceSamples of what splats show: at most `count` centers of opaque splats, sp
 
 Normals are the shortest axes, turned outward (Hoppe et al. 1992). Parts with less than 1 % of the samples are
 left out. Raises InvalidInput and Cancelled.)");
+  py::class_<PreparedSplats>(module, "PreparedSplats", R"(
+GaussianSplats that are moved again and again, as in a live session.
+
+The first radial field prepares what it needs at the centers; those of the same live session find it there.
+They are moved in single precision: errors are some 1e-5 of the size.)")
+      .def(py::init<GaussianSplats>(), "splats"_a, "InvalidInput for splats that do not fit together.")
+      .def("__len__", [](const PreparedSplats& self) { return self.rest().size(); })
+      .def(
+          "moved",
+          [](const PreparedSplats& self, const DeformationField& field, std::shared_ptr<GaussianSplats> into,
+             double max_stretch, Task* task) {
+            if (into == nullptr) into = std::make_shared<GaussianSplats>();
+            *into = run_long(task, [&](const Progress& progress) {
+              return self.moved(field, max_stretch, progress, std::move(*into));
+            });
+            return into;
+          },
+          "field"_a, "into"_a = py::none(), py::kw_only(), "max_stretch"_a = default_max_stretch,
+          "task"_a = py::none(), R"(
+As field.apply_to(splats). May be called from any thread. Raises InvalidInput and Cancelled.
+
+`into`: splats of an earlier call that are no longer needed; they become the result, without new memory.)");
   auto field = py::reinterpret_borrow<py::class_<DeformationField, std::shared_ptr<DeformationField>>>(
       module.attr("DeformationField"));
   field.def(

@@ -59,4 +59,10 @@ Points RadialField::at(PointsIn mesh_points) const {
   return result;
 }
 
+bool RadialField::shares_places_with(const RadialField& other) const {
+  return basis_.embedding == other.basis_.embedding && frame() == other.frame() &&
+         influence_ == other.influence_ && basis_.center_count() == other.basis_.center_count() &&
+         basis_.radii == other.basis_.radii && basis_.centers == other.basis_.centers;
+}
+
 }  // namespace arapfields

@@ -20,6 +20,9 @@ class ARAPFIELDS_EXPORT RadialField : public DeformationField {
   const RadialBasis& basis() const { return basis_; }
   const RowMatrix<double>& coefficients() const { return coefficients_; }
   const std::shared_ptr<const Influence>& influence() const { return influence_; }
+  /// Whether what is prepared at points for one serves the other: only the coefficients may differ, as those
+  /// of one live session do.
+  bool shares_places_with(const RadialField& other) const;
 
  private:
   RadialBasis basis_;

@@ -21,6 +21,28 @@ void append_rows(Matrix& matrix, const std::vector<Index>& rows) {
 
 }  // namespace
 
+GaussianSplats GaussianSplats::copies(const std::vector<Index>& rows) const {
+  GaussianSplats result;
+  result.centers = centers(rows, Eigen::all);
+  result.rotations = rotations(rows, Eigen::all);
+  result.log_scales = log_scales(rows, Eigen::all);
+  result.opacity_logits = opacity_logits(rows);
+  result.harmonics = harmonics(rows, Eigen::all);
+  result.other_properties = other_properties;
+  result.other_values = other_values(rows, Eigen::all);
+  return result;
+}
+
+void GaussianSplats::be_places_of(const GaussianSplats& other) {
+  centers.resize(other.size(), 3);
+  rotations.resize(other.size(), 4);
+  log_scales.resize(other.size(), 3);
+  opacity_logits = other.opacity_logits;
+  harmonics.resize(other.size(), other.harmonics.cols());
+  other_properties = other.other_properties;
+  other_values = other.other_values;
+}
+
 void GaussianSplats::append_copies(const std::vector<Index>& rows) {
   append_rows(centers, rows);
   append_rows(rotations, rows);

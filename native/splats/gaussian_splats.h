@@ -20,8 +20,12 @@ struct ARAPFIELDS_EXPORT GaussianSplats {
   RowMatrix<char> other_values;  ///< (n, bytes) of these
 
   Index size() const { return centers.rows(); }
+  /// Copies of these splats.
+  GaussianSplats copies(const std::vector<Index>& rows) const;
   /// Appends copies of these splats.
   void append_copies(const std::vector<Index>& rows);
+  /// Becomes as many splats as these with their opacities and other values; the rest is not set.
+  void be_places_of(const GaussianSplats& other);
   /// Throws InvalidInput that names what has another number of rows, or is not finite.
   void validate() const;
 };

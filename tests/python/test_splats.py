@@ -1,18 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Gaussian splats: moved by fields, sampled, read and written."""
 
+from functools import cache
+
 import numpy as np
 import pytest
+from support.files import archives
 from support.geometry import cases, meshes
-from support.oracles.splat_render import axes, covariances, psnr, render
+from support.oracles.splat_render import axes, covariances, harmonics, psnr, render
 
 import arapfields as af
 from arapfields.__main__ import main
 
 SINGLE = 1e-5  # what single precision leaves of a covariance
-AXES = 2e-5  # of like lengths: they amplify that a solved field is rigid to 1e-6
+EXACT = 1e-6  # a rigid motion, of single-precision numbers of a size of 1
+PREPARED = 2e-4  # of the size: jets in single precision
 DRAWN = 0.02  # a covariance of points that are drawn
 PSNR_SAME = 60.0  # dB: the same picture but for rounding
+FIELDS = ("centers", "rotations", "scales", "opacities", "harmonics")
 SIZE = np.array([0.8, 0.25, 0.2])
 MESH = (meshes.sphere(1.0, 4)[0] * SIZE, meshes.sphere(1.0, 4)[1])
 
@@ -29,6 +34,7 @@ def splats(count=250, harmonics=16, width=0.05, seed=0):
     return af.GaussianSplats(samples.points, turns, scales, rng.uniform(0.3, 0.95, count), colours)
 
 
+@cache
 def bent(degrees=70.0):
     samples = af.sample_mesh(*MESH, count=4000)
     held, turned = (
@@ -41,20 +47,33 @@ def bent(degrees=70.0):
 MOTION = cases.turn([1, 2, 3], 130, (0.2, 0.1, -0.3)) @ cases.shift([0.4, -0.2, 0.1])
 
 
-def rigid():
-    samples = af.sample_mesh(*MESH, count=2000)
-    ends = [cases.box([x - 0.2, -0.4, -0.4], [x + 0.2, 0.4, 0.4]) for x in (-0.7, 0.7)]
-    return af.deform(samples, [cases.moved(end, MOTION) for end in ends])
+def affine(tmp_path, motion):
+    """Exactly: its kernels are zero."""
+    saved = tmp_path / "affine.safetensors"
+    bent().save(saved)
+    texts, arrays = archives.read(saved)
+    frame = texts["structure"]["frame"]
+    center, turn = np.array(frame["center"]), motion[:3, :3]
+    arrays["coefficients"] = np.zeros_like(arrays["coefficients"])
+    arrays["coefficients"][-4] = (turn @ center + motion[:3, 3] - center) / frame["scale"]
+    arrays["coefficients"][-3:] = turn.T
+    saved.write_bytes(archives.packed(texts, arrays))
+    return af.DeformationField.load(saved)
 
 
-def test_a_rigid_motion_gives_the_same_picture_to_a_camera_that_moves_along():
-    motion, field = MOTION, rigid()
+def test_a_rigid_motion_gives_the_same_picture_to_a_camera_that_moves_along(tmp_path):
+    motion, field = MOTION, affine(tmp_path, MOTION)
     rest = splats()
     moved = field.apply_to(rest)
     turn = motion[:3, :3]
-    assert np.abs(moved.centers - (rest.centers @ turn.T + motion[:3, 3])).max() < SINGLE
-    assert np.abs(axes(moved.rotations) - turn @ axes(rest.rotations)).max() < AXES
-    assert np.abs(moved.scales / rest.scales - 1).max() < SINGLE
+    assert np.abs(moved.centers - (rest.centers @ turn.T + motion[:3, 3])).max() < EXACT
+    assert np.abs(axes(moved.rotations) - turn @ axes(rest.rotations)).max() < EXACT
+    assert np.abs(moved.scales / rest.scales - 1).max() < EXACT
+    directions = np.random.default_rng(4).normal(size=(20, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    seen, seen_before = harmonics(directions @ turn.T, 16), harmonics(directions, 16)
+    colours = np.einsum("dk,nkc->ndc", seen, np.asarray(moved.harmonics, float))
+    assert np.abs(colours - np.einsum("dk,nkc->ndc", seen_before, rest.harmonics)).max() < EXACT
     assert np.array_equal(moved.opacities, rest.opacities) and not np.array_equal(
         moved.harmonics, rest.harmonics
     )
@@ -82,20 +101,17 @@ def test_covariances_are_those_of_points_that_the_field_moves():
         assert np.linalg.norm(drawn - moved[i]) < DRAWN * np.linalg.norm(moved[i])
 
 
-def test_what_is_stretched_or_bent_is_divided_and_keeps_its_moments():
+def test_what_is_stretched_or_bent_is_divided_and_keeps_its_moments(tmp_path):
     rest = splats(60, harmonics=4, width=0.3)
     field = bent(150.0)
     assert len(field.apply_to(rest, max_stretch=np.inf)) == len(rest) < len(field.apply_to(rest))
-    small = splats(60, harmonics=4, width=0.005)
-    assert len(rigid().apply_to(small, max_stretch=1.01)) == len(small)
-    whole = rigid().apply_to(small, max_stretch=np.inf)
-    parts = rigid().apply_to(small, max_stretch=1.0)  # what rounding stretches
-    first = np.flatnonzero(parts.scales.prod(1)[:60] < 0.75 * whole.scales.prod(1))
-    second = 60 + np.arange(len(first))
-    once = np.isclose(parts.scales[second].prod(1), whole.scales[first].prod(1) / 2, rtol=1e-3, atol=0)
-    once &= np.isclose(parts.scales[first].prod(1), whole.scales[first].prod(1) / 2, rtol=1e-3, atol=0)
-    divided, others = first[once], second[once]
-    assert len(divided) > 10
+    field = affine(tmp_path, MOTION @ np.diag([1.5, 1, 1, 1]))
+    assert len(field.apply_to(rest, max_stretch=1.51)) == len(rest)
+    whole = field.apply_to(rest, max_stretch=np.inf)
+    parts = field.apply_to(rest, max_stretch=1.2)
+    divided = np.flatnonzero(parts.scales.prod(1)[:60] < 0.75 * whole.scales.prod(1))
+    others = 60 + np.arange(len(divided))
+    assert len(divided) > 30 and len(parts) == 60 + len(divided)
     halves = np.stack([parts.centers[divided], parts.centers[others]]).astype(float)
     size = whole.scales[divided].max(1)
     assert np.abs(halves.mean(0) - whole.centers[divided]).max() < 1e-6
@@ -103,8 +119,26 @@ def test_what_is_stretched_or_bent_is_divided_and_keeps_its_moments():
     of_parts = covariances(parts)
     mixed = (of_parts[divided] + of_parts[others]) / 2 + spread
     off = np.abs(mixed - covariances(whole)[divided]).max((1, 2))
-    assert (off < 1e-4 * size**2).all()  # centers are in single precision
+    assert (off < EXACT * size**2).all()
     assert np.abs(parts.harmonics[divided] - parts.harmonics[others]).max() < SINGLE
+
+
+def test_prepared_splats_move_as_others_do():
+    rest = splats(3000, harmonics=9, width=0.05)
+    prepared, again = af.PreparedSplats(rest), None
+    for degrees, most in ((70.0, np.inf), (150.0, 1.2)):
+        field = bent(degrees)
+        again, moved = prepared.moved(field, again, max_stretch=most), field.apply_to(rest, max_stretch=most)
+        assert len(prepared) == len(rest) and abs(len(again) - len(moved)) <= 0.002 * len(moved)
+        assert np.abs(again.centers - moved.centers)[: len(rest)].max() < 0.05
+        if most == np.inf:
+            assert np.abs(again.centers - moved.centers).max() < PREPARED
+            off = np.abs(covariances(again) - covariances(moved)).max((1, 2))
+            assert (off < 5 * PREPARED * moved.scales.max(1) ** 2).all()
+            assert np.abs(again.harmonics - moved.harmonics).max() < 5 * PREPARED
+    given = af.GaussianSplats(*[getattr(rest, name) for name in FIELDS])
+    with pytest.raises(af.InvalidInput, match="max_stretch"):
+        af.PreparedSplats(given).moved(field, max_stretch=0.5)
 
 
 def test_samples_lie_where_splats_are_and_look_outward():
@@ -133,11 +167,11 @@ def test_samples_lie_where_splats_are_and_look_outward():
 
 
 def test_a_file_comes_back_and_keeps_what_it_has_besides(tmp_path):
-    for harmonics in (1, 4, 9, 16):
-        given = splats(7, harmonics)
+    for count in (1, 4, 9, 16):
+        given = splats(7, count)
         given.save(tmp_path / "a.ply")
         back = af.GaussianSplats.load(tmp_path / "a.ply")
-        for name in ("centers", "rotations", "scales", "opacities", "harmonics"):
+        for name in FIELDS:
             assert np.array_equal(getattr(back, name), getattr(given, name)), name
     text, rows = (tmp_path / "a.ply").read_bytes().split(b"end_header\n")
     width = len(rows) // 7

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Shapes and colours of splats under a linear map, compiled for each instruction set.
+#pragma once
+
+#include <cstdint>
+
+#include "core/simd.h"
+#include "splats/harmonics.h"
+
+namespace arapfields {
+
+/// Splats i = 0 … count−1: row from[i] of what is at rest becomes row to[i] of what is moved. Rows are laid
+/// out as GaussianSplats has them.
+template <class Scalar>
+struct SplatBatch {
+  const Scalar* jacobians;  ///< (3, count, 3), the first derivatives of jets
+  std::int64_t count;
+  const std::int64_t *from, *to;
+  const float *rotations, *log_scales, *harmonics;
+  float *moved_rotations, *moved_log_scales, *moved_harmonics;
+  int functions;  ///< 1, 4, 9 or 16 harmonics
+  const HarmonicTables<Scalar>* tables;
+  Scalar* stretches;  ///< (count, 3) |J u| for the axes u at rest
+};
+
+// Covariances J Σ Jᵀ, and colours turned by the rotation closest to J, for splats begin to end − 1.
+ARAPFIELDS_DECLARE(template <class Scalar>
+                   void turn_splats(const SplatBatch<Scalar>&, std::int64_t begin, std::int64_t end))
+
+}  // namespace arapfields
