@@ -147,7 +147,7 @@ SCENES = (pins, character, animate, walk, stylize, wrap)
 
 def comfortable():
     """Viewports that show the colours, through the camera, with the sidebar open."""
-    for screen in bpy.data.screens:
+    for screen in list(bpy.data.screens):
         for area in screen.areas:
             for space in area.spaces:
                 if space.type == "VIEW_3D":

@@ -216,7 +216,7 @@ def set_up(objects, width=1200, samples=24, elevation=12.0, azimuth=0.0, threads
 
 def brighten(times):
     """More light from everywhere: for one figure alone, whose wall is far away."""
-    for data in bpy.data.lights:
+    for data in list(bpy.data.lights):
         data.energy *= times
     bpy.context.scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value *= times
 

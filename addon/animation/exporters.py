@@ -9,6 +9,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ..blender import mesh_arrays
+from ..blender.evaluation import updated
 from ..core.errors import UserError
 from ..core.runtime.coroutines import Pause
 from ..solver.frame_range import curves_of
@@ -60,7 +61,7 @@ def require_room(context, path, items, frames):
     """UserError where the disk has no room for the frames: Alembic's writer would take Blender down."""
     need, samples = 1e6, frames.count + (count_of("ABC", frames) if frames.step > 1 else 0)
     for item in items:
-        mesh = item.evaluated_get(context.evaluated_depsgraph_get()).data
+        mesh = item.evaluated_get(updated(context.view_layer)).data
         moving, still = (
             12 * (len(mesh.vertices) + len(mesh.loops)),
             32 * (len(mesh.vertices) + len(mesh.loops)),
@@ -137,7 +138,7 @@ class MorphingCopy:
         self.animate(keys, list(frames))
 
     def key(self, number, frame):
-        depsgraph = self.context.evaluated_depsgraph_get()
+        depsgraph = updated(self.context.view_layer)
         evaluated = self.source.evaluated_get(depsgraph)
         world = evaluated.matrix_world.copy()
         if number == 0:

@@ -10,6 +10,7 @@ import bpy
 
 from ..core.errors import UserError
 from ..names import FIELD_GROUP
+from .evaluation import updated
 from .object_references import settings_of
 
 STAGE = "arapfields_stage"  # custom property of the scene that holds the copy
@@ -110,7 +111,7 @@ def is_stage(scene):
 def evaluated(context, source, kept):
     """(object, depsgraph) of the object with these of its modifiers alone, for as long as the block runs."""
     if all(modifier in kept for modifier in source.modifiers if modifier.show_viewport):
-        depsgraph = context.evaluated_depsgraph_get()
+        depsgraph = updated(context.view_layer)
         yield source.evaluated_get(depsgraph), depsgraph
         return
     stage = bpy.data.scenes.new("ARAP Fields")
@@ -119,11 +120,10 @@ def evaluated(context, source, kept):
         stage[STAGE] = True
         stage.frame_current, stage.frame_subframe = context.scene.frame_current, context.scene.frame_subframe
         layer = stage.view_layers[0]
-        with context.temp_override(scene=stage, view_layer=layer):
-            context.evaluated_depsgraph_get()  # the frame is set before there is anything to animate
-            copied = cut_copy(source, {modifier.name for modifier in kept})
-            stage.collection.objects.link(copied)
-            depsgraph = context.evaluated_depsgraph_get()
+        updated(layer)  # the frame is set before there is anything to animate
+        copied = cut_copy(source, {modifier.name for modifier in kept})
+        stage.collection.objects.link(copied)
+        depsgraph = updated(layer)
         yield copied.evaluated_get(depsgraph), depsgraph
     finally:
         if copied is not None:

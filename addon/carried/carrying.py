@@ -4,6 +4,7 @@
 import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack
+from ..blender.evaluation import depsgraph_of
 from ..blender.object_references import ObjectReference, settings_of
 from ..core.errors import UserError, refuse
 from ..core.geometry.spaces import transform
@@ -12,7 +13,7 @@ from . import refusals
 from .carried_objects import CarriedObject, CarriedPose, find, give_back, is_carried_otherwise
 from .carriers import MeshCarrier
 from .transforms import BonesCarrier
-from .world_matrices import depsgraph_of, world_matrices
+from .world_matrices import world_matrices
 
 SAME_PLACE = 1e-6  # of an object's size: matrices in single precision
 

@@ -28,11 +28,6 @@ def array(matrix):
     return np.array(matrix, dtype=np.float64)
 
 
-def depsgraph_of(context):
-    """What Blender has evaluated last; nothing is evaluated for it."""
-    return context.view_layer.depsgraph or context.evaluated_depsgraph_get()
-
-
 def world_matrices(item, rigs, depsgraph, basis=None):
     """The object's matrices; `basis` is its own motion where that is not the object's present one."""
     seen = item.evaluated_get(depsgraph)

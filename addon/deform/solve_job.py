@@ -6,12 +6,12 @@ import math
 import bpy
 import numpy as np
 
+from ..blender.evaluation import depsgraph_of
 from ..blender.host import has_window
 from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..blender.property_definitions import effective_value
 from ..carried.carrying import Carrying
-from ..carried.world_matrices import depsgraph_of
 from ..core.errors import UserError
 from ..core.geometry.spaces import inverse, similarity, transform
 from ..core.poses import Pose

@@ -25,7 +25,7 @@ def find_or_make(normals=PLAIN):
 
 def kept_group(key, mark, build):
     """The file's own group with this mark under its custom property `key`; built where there is none."""
-    for group in bpy.data.node_groups:
+    for group in list(bpy.data.node_groups):
         if group.get(key) == mark and group.library is None:
             return group
     group = build()

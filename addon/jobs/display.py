@@ -63,7 +63,7 @@ class Display:
         self.clear_previews()
         if self._timer is not None:
             timers.stop_events(self._timer)
-            for workspace in bpy.data.workspaces:
+            for workspace in list(bpy.data.workspaces):
                 workspace.status_text_set(None)
             redraw(bpy.context, "UI", "WINDOW")
         self._timer = None

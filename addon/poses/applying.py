@@ -4,10 +4,11 @@
 import numpy as np
 
 from ..blender import modifier_stack
+from ..blender.evaluation import depsgraph_of
 from ..blender.mesh_arrays import positions
 from ..blender.object_references import settings_of
 from ..carried.carrying import Carrying
-from ..carried.world_matrices import array, depsgraph_of
+from ..carried.world_matrices import array
 from ..core.errors import UserError
 from ..core.geometry import rotations
 from ..core.geometry.spaces import Space

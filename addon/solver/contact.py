@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..blender import mesh_arrays
+from ..blender.evaluation import depsgraph_of
 from ..blender.object_references import settings_of
 from ..blender.property_definitions import from_single_precision
-from ..carried.world_matrices import depsgraph_of
 from ..core.errors import UserError
 from ..core.geometry.spaces import space_of, transform
 from ..core.runtime import native

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack, user_preferences, vertex_groups
+from ..blender.evaluation import depsgraph_of
 from ..blender.object_references import ObjectReference, settings_of
 from ..blender.property_definitions import from_single_precision
 from ..carried.carrying import Carrying, Reshaped
-from ..carried.world_matrices import depsgraph_of
 from ..core.errors import UserError
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native

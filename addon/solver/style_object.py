@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack
-from ..carried.world_matrices import depsgraph_of
+from ..blender.evaluation import depsgraph_of
 from ..core.errors import UserError
 from ..core.runtime import native
 from ..handles.empties import matrix_of

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-ADDON = Path(__file__).resolve().parents[2] / "addon"
+ROOT = Path(__file__).resolve().parents[2]
+ADDON = ROOT / "addon"
 # Each folder imports itself and those before it.
 ORDER = [
     "core",
@@ -154,6 +155,25 @@ def test_the_contents_page_lists_all_that_is_registered():
 @pytest.mark.parametrize("call", ALONE)
 def test_each_thing_has_one_way(call):
     assert [name(path) for path in modules() if call in path.read_text()] == [ALONE[call]]
+
+
+def live_loops(path):
+    """The statement loops of a module straight over what Blender holds: "path:line: what"."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.For) and ast.unparse(node.iter).startswith("bpy.data."):
+            yield f"{path.relative_to(ROOT)}:{node.lineno}: {ast.unparse(node.iter)}"
+
+
+def test_nothing_is_done_that_crashes_blender():
+    """What a loop deletes, or has Blender delete, is where Blender's own iterator stands. And overrides are
+    read without Python's lock (blender/evaluation.py); a window's events are never in one."""
+    folders = ("addon", "blender_scripts", "tests/blender", "tests/gui", "tests/support")
+    found = [one for folder in folders for path in (ROOT / folder).rglob("*.py") for one in live_loops(path)]
+    assert not found, found
+    texts = {name(path): path.read_text() for path in modules()}
+    assert not [one for one, text in texts.items() if ".temp_override(" in text]
+    asking = {one for one, text in texts.items() if "evaluated_depsgraph_get()" in text}
+    assert asking == {"blender/evaluation.py", "pin_tool/hover.py", "wrap/clicking.py"}, asking
 
 
 def names_of(node):

@@ -108,7 +108,7 @@ def everything():
         for kind in ("objects", "meshes", "collections", "actions", "materials", "shape_keys")
     }
     points = {}
-    for mesh in bpy.data.meshes:
+    for mesh in list(bpy.data.meshes):
         flat = np.empty(3 * len(mesh.vertices), dtype=np.float32)
         mesh.vertices.foreach_get("co", flat)
         points[mesh.name] = flat.tobytes()

@@ -65,6 +65,6 @@ def checks(figures, folder):
         scenes.activate(suzanne)
         bpy.ops.arapfields.stylize(style="CUBE")
         figures["stylized_by"] = round(float(np.abs(scenes.world_points(suzanne) - deformed).max()), 3)
-        for item in bpy.data.objects:
+        for item in list(bpy.data.objects):
             item.hide_set(item != suzanne)
     yield from picture(folder, "style", {"source", "stylize"})
