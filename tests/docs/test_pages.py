@@ -90,6 +90,16 @@ def test_the_troubleshooting_page_has_every_message_of_the_extension():
     assert len(found) > 50 and not missing
 
 
+def test_the_tables_of_options_are_filled():
+    sys.path.insert(0, str(pages.ROOT / "docs" / "hooks"))
+    import options
+
+    table = options.resolved()
+    filled = [options.filled(page.read_text(), table) for page in pages.PAGES]
+    assert not [text for text in filled if options.MARK.search(text)]
+    assert sum(text.count("| flag | default |") for text in filled) > 5
+
+
 def test_the_diagram_is_that_of_the_code():
     sys.path.insert(0, str(pages.ROOT / "docs" / "hooks"))
     import diagram
