@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <cmath>
+#include <utility>
 
 #include "bindings/arguments.h"
 #include "bindings/arrays.h"
@@ -43,6 +44,17 @@ GaussianSplats make(const ArrayArgument& centers, const ArrayArgument& rotations
 }
 
 using FloatArray = py::array_t<float>;
+/// What a call without the GIL holds on to, so that nobody takes its memory away (memory_of).
+using Kept = std::shared_ptr<GaussianSplats>;
+
+/// The memory of splats that no call is at work on; they are empty afterwards. The GIL is held.
+GaussianSplats memory_of(const Kept& into) {
+  if (into == nullptr) return {};
+  constexpr long owners = 2;  // Python's object and the argument
+  require(into.use_count() == owners, "into", "another call is at work on it",
+          "splats of a call that is over are needed");
+  return std::exchange(*into, {});
+}
 
 }  // namespace
 
@@ -85,9 +97,9 @@ InvalidInput for other shapes and values.)")
           "(n, k, 3) colours of the real spherical harmonics.")
       .def(
           "save",
-          [](const GaussianSplats& self, const PathArgument& path, Task* task) {
+          [](const Kept& self, const PathArgument& path, Task* task) {
             const std::string place = as_path(path);
-            run_long(task, [&](const Progress& progress) { save_splats(place, self, progress); });
+            run_long(task, [&](const Progress& progress) { save_splats(place, *self, progress); });
           },
           "path"_a, py::kw_only(), "task"_a = py::none(),
           "Writes a binary PLY file in the common layout, in whole or not at all. OSError where the system "
@@ -108,9 +120,9 @@ file, for one that is damaged or laid out otherwise.)")
           "Whether a file's header has the layout that load() reads; False where it cannot be read.");
   module.def(
       "sample_splats",
-      [](const GaussianSplats& splats, Index count, Task* task) {
+      [](const Kept& splats, Index count, Task* task) {
         return run_long(task,
-                        [&](const Progress& progress) { return sample_splats(splats, count, progress); });
+                        [&](const Progress& progress) { return sample_splats(*splats, count, progress); });
       },
       "splats"_a, "count"_a = 20000, py::kw_only(), "task"_a = py::none(), R"(
 SurfaceSamples of what splats show: at most `count` centers of opaque splats, spread evenly.
@@ -126,26 +138,26 @@ They are moved in single precision: errors are some 1e-5 of the size.)")
       .def("__len__", [](const PreparedSplats& self) { return self.rest().size(); })
       .def(
           "moved",
-          [](const PreparedSplats& self, const DeformationField& field, std::shared_ptr<GaussianSplats> into,
-             double max_stretch, Task* task) {
-            if (into == nullptr) into = std::make_shared<GaussianSplats>();
-            *into = run_long(task, [&](const Progress& progress) {
-              return self.moved(field, max_stretch, progress, std::move(*into));
+          [](const PreparedSplats& self, const DeformationField& field, const Kept& into, double max_stretch,
+             Task* task) {
+            GaussianSplats memory = memory_of(into);
+            return run_long(task, [&](const Progress& progress) {
+              return self.moved(field, max_stretch, progress, std::move(memory));
             });
-            return into;
           },
           "field"_a, "into"_a = py::none(), py::kw_only(), "max_stretch"_a = default_max_stretch,
           "task"_a = py::none(), R"(
 As field.apply_to(splats). May be called from any thread. Raises InvalidInput and Cancelled.
 
-`into`: splats of an earlier call that are no longer needed; they become the result, without new memory.)");
+`into`: splats of an earlier call that are no longer needed. The result takes their memory; they are empty then.)");
   auto field = py::reinterpret_borrow<py::class_<DeformationField, std::shared_ptr<DeformationField>>>(
       module.attr("DeformationField"));
   field.def(
       "apply_to",
-      [](const DeformationField& self, const GaussianSplats& splats, double max_stretch, Task* task) {
-        return run_long(
-            task, [&](const Progress& progress) { return move_splats(self, splats, max_stretch, progress); });
+      [](const DeformationField& self, const Kept& splats, double max_stretch, Task* task) {
+        return run_long(task, [&](const Progress& progress) {
+          return move_splats(self, *splats, max_stretch, progress);
+        });
       },
       "splats"_a, py::kw_only(), "max_stretch"_a = default_max_stretch, "task"_a = py::none(), R"(
 GaussianSplats moved by the field: f(μ), J Σ Jᵀ, and colours turned by the rotation closest to J.

@@ -15,9 +15,14 @@ template <class Scalar>
 struct SplatBatch {
   const Scalar* jacobians;  ///< (3, count, 3), the first derivatives of jets
   std::int64_t count;
-  const std::int64_t *from, *to;
-  const float *rotations, *log_scales, *harmonics;
-  float *moved_rotations, *moved_log_scales, *moved_harmonics;
+  const std::int64_t* from;
+  const std::int64_t* to;
+  const float* rotations;
+  const float* log_scales;
+  const float* harmonics;
+  float* moved_rotations;
+  float* moved_log_scales;
+  float* moved_harmonics;
   int functions;  ///< 1, 4, 9 or 16 harmonics
   const HarmonicTables<Scalar>* tables;
   Scalar* stretches;  ///< (count, 3) |J u| for the axes u at rest

@@ -23,5 +23,10 @@ def splat_calls(things):
             by_name(things["field"].apply_to, "max_stretch", "task"),
             [splats, 2.0, af.Task()],
         ),
+        "PreparedSplats": lambda: (af.PreparedSplats, [splats]),
+        "PreparedSplats.moved": lambda: (
+            by_name(af.PreparedSplats(splats).moved, "max_stretch", "task"),
+            [things["field"], af.GaussianSplats(*GIVEN), 2.0, af.Task()],
+        ),
         "sample_splats": lambda: (by_name(af.sample_splats, "task"), [splats, 30, af.Task()]),
     }

@@ -146,6 +146,10 @@ CLASSES = {
     ),
     "PointHandle": (lambda: pins()[0], {}),
     "DeformOptions": (af.DeformOptions, {"to_dict": lambda it: it.to_dict(), "set": assign("width", 32)}),
+    "PreparedSplats": (
+        lambda: af.PreparedSplats(SPLATS),
+        {"moved": lambda it: it.moved(MOVED).rotations, "__len__": len},
+    ),
     "CurveField": (
         lambda: af.deform_curve(BALL[:40, :2], [af.CurveHandle([0])], af.CurveOptions(iterations=2)),
         {"__call__": lambda it: it(POINTS[:, :2]), "jacobian": lambda it: it.jacobian(POINTS[:, :2])},
