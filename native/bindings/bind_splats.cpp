@@ -90,7 +90,7 @@ InvalidInput for other shapes and values.)")
       .def_property_readonly(
           "harmonics",
           [](const GaussianSplats& self) {
-            FloatArray result({self.size(), self.harmonics.cols() / 3, Index{3}});
+            FloatArray result({self.size(), Index{self.harmonics.cols() / 3}, Index{3}});
             std::copy_n(self.harmonics.data(), self.harmonics.size(), result.mutable_data());
             return result;
           },
