@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every pair of methods of each bound class from two threads: each answer is that of some order of calls."""
 
+import contextlib
 import itertools
 import random
 import signal
+import threading
 import time
 from pathlib import Path
 
@@ -14,6 +16,7 @@ from support.programs import pairs
 import arapfields as af
 from arapfields import _native
 
+SPLATS = ("centers", "rotations", "scales", "opacities", "harmonics")
 LONG = 60.0  # seconds a class
 OPTIONS = {name for name in dir(_native) if name.endswith("Options")} - {"DeformOptions"}
 # What only holds numbers, or is another class's base or kind.
@@ -123,3 +126,14 @@ def test_two_and_three_methods_for_a_minute(name):
         if some not in known:
             known[some] = pairs.possible(make, several)
         assert pairs.at_once(make, several) in known[some], some
+
+
+def test_nobody_takes_the_memory_of_splats_that_are_written(tmp_path):
+    many = af.GaussianSplats(*(np.repeat(getattr(pairs.SPLATS, name), 2000, axis=0) for name in SPLATS))
+    prepared, path = af.PreparedSplats(pairs.SPLATS), tmp_path / "kept.ply"
+    saving = threading.Thread(target=many.save, args=(path,))
+    saving.start()
+    with contextlib.suppress(af.InvalidInput):  # "another call is at work on it"
+        prepared.moved(pairs.MOVED, into=many)
+    saving.join()
+    assert len(af.GaussianSplats.load(path)) in (40000, 0)
