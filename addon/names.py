@@ -18,6 +18,7 @@ OFFSETS = "ARAP Fields"  # point attribute of the motion: an offset in the objec
 TURNS = "ARAP Fields Turns"  # and how free custom normals turn: axis · angle
 CACHE_MODIFIER = "ARAP Fields Cache"  # Blender's Mesh Cache modifier that plays a bake
 FIELD_GROUP = "arapfields_group"  # custom property of that modifier's node groups: which, and its version
+FIELD_NODES = "arapfields_nodes"  # custom property of the node group that evaluates a field: its version
 RESULT_SUFFIX = {
     "DEFORM": "_deformed",
     "STYLIZE": "_stylized",
@@ -29,6 +30,7 @@ RESULT_SUFFIX = {
 PLAYED_GROUP = "arapfields_played"  # custom property of the node group that plays baked points
 PLAYED_SUFFIX = "_played"  # of the mesh that has baked points of hair, point clouds and Grease Pencil
 ROWS = "ARAP Fields Rows"  # point attribute: which of these points each is
+FIELD_SUFFIX = "_field"  # of the mesh whose vertices are the numbers of a field
 HELPER_SUFFIX = "_offsets"  # of the mesh that carries offsets where the source cannot
 
 
@@ -70,6 +72,7 @@ class Op(StrEnum):
     REMOVE_FIELD = "arapfields.remove_field"
     MIRROR_HANDLE = "arapfields.mirror_handle"
     BAKE = "arapfields.bake"
+    FIELD_NODES = "arapfields.field_as_nodes"
     REMOVE_BAKE = "arapfields.remove_bake"
     EXPORT = "arapfields.export_animation"
     PIN_TOOL = "arapfields.pin_tool"

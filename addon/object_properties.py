@@ -65,6 +65,9 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     carried: collection(ARAPFIELDS_PG_carried, "Carried Objects", "Objects that the field moves as well")
     active_carried: integer("Active Carried Object", "Row chosen in the list of carried objects")
     carried_by: pointer(bpy.types.Object, "Carried By", "The object whose field moves this one")
+    field_helper: pointer(
+        bpy.types.Object, "Field as Nodes", "What has the field's numbers, where nodes evaluate it"
+    )
     silenced: text(
         "Armatures Switched Off",
         "Armature modifiers that the field replaces, and whether they were on, as JSON",

@@ -25,7 +25,7 @@ CONTENTS = [  # modules with CLASSES
     *("carried.operators", "carried.panel", "poses.operators", "poses.panel"),
     *("stiffness.operators", "stiffness.panel"),
     *("contact.panel", "live.operators", "live.panel", "pin_tool.operators", "animation.operators"),
-    *("animation.export_operators", "animation.panel"),
+    *("animation.export_operators", "animation.nodes_operator", "animation.panel"),
     *("results.operators", "results.panel", "jobs.operators", "jobs.panel"),
     *("menus", "preferences"),
 ]

@@ -33,6 +33,9 @@ class CarriedBake:
     def __init__(self, carrying, frames, cache_of, fps, is_shared):
         self.carrying, self.frames, self.warnings = carrying, frames, []
         self.shapes, self.caches = {}, {}  # by carried object
+        if carrying.nodes is not None:
+            name = carrying.source.name
+            self.warnings.append(UserError("The field of {name} as nodes is not baked: it stands", name=name))
         for carried in list(carrying.objects):
             name = carried.reference.name
             if is_shared:
@@ -48,6 +51,8 @@ class CarriedBake:
     def add(self, shapes):
         """Takes what one frame's shape carries; on the worker."""
         for carried, shape in shapes:
+            if carried is self.carrying.nodes:
+                continue
             if carried in self.caches:
                 self.caches[carried].add(shape)
             else:

@@ -53,10 +53,17 @@ def place(source):
         return own
     if settings_of(source).under_rig:
         return next((index for index, one in enumerate(stack) if is_posing(source, one)), len(stack))
-    end = len(stack)
-    while end and (stack[end - 1].type in REFINING or getattr(stack[end - 1], "use_pin_to_last", False)):
-        end -= 1
-    return end
+    return end(stack)
+
+
+def end(stack):
+    """Where a modifier comes that deforms what those of a stack make, before those that only refine it."""
+    index = len(stack)
+    while index and (
+        stack[index - 1].type in REFINING or getattr(stack[index - 1], "use_pin_to_last", False)
+    ):
+        index -= 1
+    return index
 
 
 def before(source, in_place):

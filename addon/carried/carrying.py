@@ -9,6 +9,8 @@ from ..blender.object_references import ObjectReference, settings_of
 from ..core.errors import UserError, refuse
 from ..core.geometry.spaces import transform
 from ..field_modifier import masks, motion
+from ..field_nodes import helper
+from ..field_nodes.helper import FieldRefused
 from . import refusals
 from .carried_objects import CarriedObject, CarriedPose, find, give_back, is_carried_otherwise
 from .carriers import MeshCarrier
@@ -24,6 +26,7 @@ class Carrying:
     def __init__(self, context, source):
         self.source, self.warnings, self.objects, self.before = ObjectReference(source), [], [], {}
         self.rigs = modifier_stack.handle_rigs(source)
+        self.nodes = helper.Follower(source) if helper.of(source) else None
         for entry in settings_of(source).carried:
             try:
                 refuse(refusals.of_entry(source, entry))
@@ -62,6 +65,8 @@ class Carrying:
                 continue
             matrices = (space.world_to_solve @ matrix for matrix in (world.rest, world.now, world.parent))
             poses.append(CarriedPose(carried, carried.carrier.points, *matrices))
+        if self.nodes is not None:
+            poses.append(CarriedPose(self.nodes, None, space.local_to_solve, np.eye(4), np.eye(4)))
         return poses
 
     def watch(self, objects, data):
@@ -104,10 +109,18 @@ class Carrying:
 
     def moved(self, af, samples, field, poses, strength=1.0):
         """[(carried object, what its carrier writes)] where the field takes them, so much of the way."""
-        return [(pose.carried, self.moved_one(af, samples, field, pose, strength)) for pose in poses]
+        shapes = []
+        for pose in poses:
+            try:
+                shapes.append((pose.carried, self.moved_one(af, samples, field, pose, strength)))
+            except FieldRefused as error:
+                self.warnings.append(error)
+        return shapes
 
     def moved_one(self, af, samples, field, pose, strength=1.0):
         carried = pose.carried
+        if carried is self.nodes:
+            return helper.rows_of(field, pose.rest, strength)
         attached = carried.attached
         if attached is None or attached[0] is not pose.points or not near(attached[1], pose.rest):
             attachment = af.Attachment(samples, transform(pose.rest, pose.points))
@@ -137,11 +150,16 @@ class Carrying:
                 masks.lend(source, item)
             except (UserError, RuntimeError) as error:
                 self.leave(carried, error)
+        if self.nodes is not None:
+            uid = self.nodes.uid
+            self.before[uid] = before.get(uid) or (self.nodes, self.nodes.read())
 
     def show(self, shapes):
         """Puts what `moved` made onto the objects; one that cannot take it is named and left out."""
         source = self.source.get()
         for carried, shape in shapes:
+            if carried is self.nodes:
+                carried.write(shape)
             if carried not in self.objects:
                 continue
             try:
@@ -163,11 +181,16 @@ class Carrying:
             if carried.reference.find() is not None and carried.reference.uid in self.before:
                 shape = carried.carrier.snapshot(*carried.item_and_entry(source))
                 self.before[carried.reference.uid] = carried, shape
+        if self.nodes is not None and self.nodes.reference.find() is not None:
+            self.before[self.nodes.uid] = self.nodes, self.nodes.read()
 
     def take_away(self):
         """Gives all what they had before."""
         source = self.source.find()
         for carried, before in self.before.values():
+            if isinstance(carried, helper.Follower):
+                carried.write(before)
+                continue
             item = carried.reference.find()
             entry = None if source is None else find(source, item)
             if item is not None and entry is not None and item.mode != "EDIT":
@@ -177,6 +200,8 @@ class Carrying:
     def forget(self, settings):
         """Those that a list no longer has were given back already."""
         listed = {entry.item.session_uid for entry in settings.carried if entry.item is not None}
+        if self.nodes is not None:
+            listed.add(self.nodes.uid)
         self.before = {uid: before for uid, before in self.before.items() if uid in listed}
 
     def leave(self, carried, error):

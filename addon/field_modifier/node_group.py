@@ -45,10 +45,7 @@ def build(name, normals):
     strength = graph.node("ShaderNodeMath", inputs["Factor"], inputs["Mask"], operation="MULTIPLY").outputs[0]
     vector = source.vectors(OFFSETS)
     offset = graph.node("ShaderNodeVectorMath", into={"Vector": vector, "Scale": strength}, operation="SCALE")
-    acts = graph.node(  # elsewhere the points stay bit for bit
-        "FunctionNodeCompare", into={"A": strength, "Epsilon": 0.0}, data_type="FLOAT", operation="NOT_EQUAL"
-    )
-    result = graph.set_position(inputs["Geometry"], acts.outputs[0], offset.outputs[0])
+    result = graph.set_position(inputs["Geometry"], graph.acts(strength), offset.outputs[0])
     if normals:
         result = turn_normals(graph, result, source.vectors(TURNS), strength, normals)
     graph.node("NodeGroupOutput", result)
@@ -103,6 +100,13 @@ class Graph:
             self.group.links.new(value, socket)
         else:
             socket.default_value = value
+
+    def acts(self, strength):
+        """Whether a strength is not 0; elsewhere the points stay bit for bit."""
+        into = {"A": strength, "Epsilon": 0.0}
+        return self.node("FunctionNodeCompare", into=into, data_type="FLOAT", operation="NOT_EQUAL").outputs[
+            0
+        ]
 
     def set_position(self, geometry, selection, offset):
         into = {"Geometry": geometry, "Selection": selection, "Offset": offset}

@@ -11,6 +11,7 @@ from ..blender import mesh_arrays, modifier_stack
 from ..blender.object_references import settings_of
 from ..core.geometry.spaces import space_of
 from ..field_modifier import motion
+from ..field_nodes import helper
 from ..handles import empties, movers
 from ..handles.empties import matrix_of
 from ..solver import secondary_motion
@@ -113,7 +114,7 @@ def layout_of(source, kind, scene):
     if kind == "STYLIZE":
         further += (style.region, style.region_material, style.use_handles)
     further += tuple((e.item.session_uid if e.item else 0, e.way) for e in settings.carried)
-    further += (secondary_motion.layout_of(source, scene),)
+    further += (secondary_motion.layout_of(source, scene), helper.of(source) is not None)
     used = uses_handles(settings, kind)
     return (held if used else [], used and empties.kept_rest(source), further, stack_of(source))
 

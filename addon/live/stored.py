@@ -10,6 +10,7 @@ import hashlib
 from ..blender import modifier_stack
 from ..blender.object_references import settings_of
 from ..field_modifier import motion
+from ..field_nodes import helper
 from ..names import SHAPE_OF
 
 UNSETTLED = "?"  # the mark of a shape that is on its way to another
@@ -50,14 +51,15 @@ def mark(source):
 
 
 def put_mark(source, key):
-    modifier = modifier_stack.find(source)
-    if modifier is None or mark(source) == key:
-        return
-    mesh = motion.carrier(source, modifier)
-    if key:
-        mesh[SHAPE_OF] = key
-    else:
-        del mesh[SHAPE_OF]
+    modifier, nodes = modifier_stack.find(source), helper.of(source)
+    meshes = [motion.carrier(source, modifier)] if modifier is not None else []
+    for mesh in [*meshes, *([nodes.data] if nodes is not None else [])]:
+        if mesh.get(SHAPE_OF, "") == key:
+            continue
+        if key:
+            mesh[SHAPE_OF] = key
+        else:
+            del mesh[SHAPE_OF]
 
 
 def hold(source, pose):
@@ -80,7 +82,9 @@ def wanted(source, pose):
 
 def recall(source, pose):
     """Has the source show that shape, bit for bit, where it does or did before; whether it does."""
-    key = wanted(source, pose)
+    key, nodes = wanted(source, pose), helper.of(source)
+    if nodes is not None and nodes.data.get(SHAPE_OF) != key:
+        return False
     if mark(source) != key:
         shape, modifier = shapes.get(key), modifier_stack.find(source)
         if shape is None or modifier is None:

@@ -12,10 +12,24 @@ from ..carried.world_matrices import array
 from ..core.errors import UserError
 from ..core.geometry import rotations
 from ..core.geometry.spaces import Space
+from ..core.poses import Pose
 from ..core.runtime import native
 from ..field_modifier import motion
+from ..live import sessions
 
 solved = {}  # session_uid of a source → the Pose of its last solve, until the file is left
+
+
+def solved_pose(context, source):
+    """The Pose of the source's field: of its live shape at rest, or its last solve; UserError without one."""
+    session = sessions.live.get(source.session_uid)
+    if session is not None:
+        sessions.update(context, wait=sessions.WAIT, refined=True)
+        to_solve = session.reader.surface.space.local_to_solve
+        return Pose(session.solver.field, session.solver.samples, to_solve)
+    if source.session_uid not in solved:
+        raise UserError("Deform {name} first, or make it live: its field is needed", source)
+    return solved[source.session_uid]
 
 
 def apply(context, source, pose, strength):

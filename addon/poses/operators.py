@@ -8,8 +8,6 @@ from ..blender.property_definitions import number, path_text, text
 from ..blender.source_operator import ReportingOperator, SourceOperator
 from ..core import poses
 from ..core.errors import UserError
-from ..core.poses import Pose
-from ..live import sessions
 from . import applying
 
 SUFFIX = ".arappose"
@@ -62,16 +60,7 @@ class ARAPFIELDS_OT_save_pose(OfSource, bpy.types.Operator):
     pose: text("Name", "Name of the pose", default="Pose")
 
     def change(self, context, source):
-        session = sessions.live.get(source.session_uid)
-        if session is not None:
-            sessions.update(context, wait=sessions.WAIT, refined=True)
-            to_solve = session.reader.surface.space.local_to_solve
-            pose = Pose(session.solver.field, session.solver.samples, to_solve)
-        else:
-            pose = applying.solved.get(source.session_uid)
-        if pose is None:
-            raise UserError("Deform {name} first, or make it live: its field is saved", source)
-        keep(context, self.pose, poses.to_bytes(pose))
+        keep(context, self.pose, poses.to_bytes(applying.solved_pose(context, source)))
         return translated("{name} kept", name=self.pose)
 
     def invoke(self, context, event):

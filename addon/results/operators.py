@@ -11,6 +11,7 @@ from ..core.errors import UserError
 from ..core.runtime.jobs import Item
 from ..core.settings.parameters import EXTRACTION
 from ..field_modifier import motion
+from ..field_nodes import helper
 from ..jobs.job_operator import JobOperator
 from ..properties.choices import extraction, surface
 from ..surface.source_surface import read_surface
@@ -65,6 +66,7 @@ class ARAPFIELDS_OT_remove_field(FieldOperator, bpy.types.Operator):
             self.report({"WARNING"}, translated(error))
         motion.remove(source)
         carried_objects.give_back_all(source)
+        helper.clear(source)
 
 
 class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):

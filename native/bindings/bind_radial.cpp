@@ -7,6 +7,7 @@
 #include "bindings/reports.h"
 #include "bindings/styles.h"
 #include "core/one_at_a_time.h"
+#include "fields/radial_field.h"
 #include "options/stylize.h"
 #include "solve/radial/radial_solver.h"
 
@@ -15,6 +16,7 @@ namespace {
 
 /// What Python holds: its methods may be called from any thread, and wait without the GIL.
 using Live = OneAtATime<RadialSolver>;
+using FieldArray = py::array_t<double>;
 
 /// call(solver, progress) when the solver is free.
 template <class Call>
@@ -151,6 +153,26 @@ void set_style(Live& live, const std::optional<NormalsArgument>& normals, double
   });
 }
 
+py::typing::Dict<py::str, FieldArray> arrays_of(const RadialField& field) {
+  const RadialBasis& basis = field.basis();
+  const Index count = basis.center_count();
+  py::typing::Dict<py::str, FieldArray> arrays;
+  arrays["centers"] = basis.centers, arrays["radii"] = basis.radii;
+  arrays["coefficients"] = RowMatrix<double>(field.coefficients().topRows(count));
+  arrays["affine"] = RowMatrix<double>(field.coefficients().bottomRows(4));
+  if (basis.embedding) {
+    const InteriorEmbedding& embedding = *basis.embedding;
+    arrays["embedded"] = basis.embedded, arrays["nodes"] = embedding.nodes;
+    arrays["values"] = embedding.values, arrays["slopes"] = embedding.slopes;
+    arrays["width"] = Vector::Constant(1, embedding.width);
+  }
+  if (field.influence()) {
+    arrays["places"] = field.influence()->places(), arrays["reaches"] = field.influence()->reaches();
+    if (field.influence()->embedding()) arrays["embedded_places"] = field.influence()->embedded();
+  }
+  return arrays;
+}
+
 }  // namespace
 
 void bind_radial(py::module_& module) {
@@ -158,7 +180,14 @@ void bind_radial(py::module_& module) {
       module, "RadialField",
       "A deformation as a sum of compactly supported radial functions and an affine map.")
       .def_property_readonly(
-          "centers", [](const RadialField& f) { return f.basis().center_count(); }, "Number of centers.");
+          "centers", [](const RadialField& f) { return f.basis().center_count(); }, "Number of centers.")
+      .def("arrays", &arrays_of, R"(
+Copies of all numbers that make the field, to evaluate it elsewhere; in the coordinates of the frame's cube.
+
+f(x) = Σ coefficients[m] φ(|x − centers[m]|² / radii[m]²) + affine[0] + x · affine[1:], φ(s) = (1 − s/6)₊⁶.
+Where distances are interior, |ψ(x) − embedded[m]|² joins the squared distance. ψ is the mean of
+values[i] + slopes[i].reshape(3, 3) · (x − nodes[i]), weighed by exp(−|x − nodes[i]|² / width²).
+Handles with a reach add their places and reaches, as `deform` confines what they move.)");
   py::class_<MotionState>(module, "MotionState", R"(
 Position, velocity and acceleration of a LiveDeformer: with the targets, all that its next step depends on.
 

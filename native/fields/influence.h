@@ -23,6 +23,7 @@ class Influence {
 
   const Points& places() const { return places_; }
   const Vector& reaches() const { return reaches_; }
+  const Points& embedded() const { return embedded_; }
   const std::shared_ptr<const InteriorEmbedding>& embedding() const { return embedding_; }
 
  private:

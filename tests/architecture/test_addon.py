@@ -15,6 +15,7 @@ ORDER = [
     "properties",
     "jobs",
     "field_modifier",
+    "field_nodes",
     "handles",
     "carried",
     "stiffness",

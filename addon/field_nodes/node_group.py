@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The node group "ARAP Field": it evaluates a radial field, whose numbers are rows of a helper mesh.
+
+f(x) = x + m(x) (affine part + Σ move · (1 + scale · s)₊⁶), with s the squared distance to a kernel, also in
+the embedding ψ where distances are interior. Sums run over rows by Repeat zones, as one function of a place.
+All is in the cube of the field, which is the helper's space, and rounds little: single precision is enough.
+"""
+
+from ..field_modifier.node_group import kept_group
+from ..names import FIELD_NODES
+from .rows import INSIDE, MAP, MOVE, SCALE, Nodes, Rows
+
+VERSION = 1
+STEP = 0.01  # of the cube's half side: apart by so much, places tell how an instance turns
+TURNS = 6  # steps towards the closest rotation: each about squares what is missing
+
+
+def find_or_make():
+    return kept_group(FIELD_NODES, str(VERSION), build)
+
+
+def build():
+    graph = Nodes("ARAP Field")
+    graph.group.is_modifier = True
+    graph.socket(
+        "Field", "INPUT", "NodeSocketObject", "What Field as Nodes made: the field's numbers and place"
+    )
+    graph.fading_inputs("How far each point goes; takes a vertex group or attribute")
+    graph.socket("Realize Instances", "INPUT", "NodeSocketBool", "Bend instances; else each moves as a whole")
+    graph.socket("Geometry", "OUTPUT", "NodeSocketGeometry")
+    graph.group.asset_mark()
+    about = graph.group.asset_data
+    about.description, about.license = "Moves any geometry by a field of ARAP Fields", "CC0"
+    about.author = about.copyright = "ARAP Fields"
+
+    inputs = graph.node("NodeGroupInput").outputs
+    space = graph.node("GeometryNodeObjectInfo", inputs["Field"], transform_space="RELATIVE").outputs[
+        "Transform"
+    ]
+    rows = graph.node("GeometryNodeObjectInfo", inputs["Field"]).outputs["Geometry"]
+    shift = displacement(graph, rows, space)
+    strength = graph.math("MULTIPLY", inputs["Factor"], inputs["Mask"])
+    strength = graph.math("MULTIPLY", strength, graph.exceeds(graph.size(rows), 0))
+    acts, faded = graph.acts(strength), graph.vector("SCALE", shift, strength)
+
+    before = graph.switch(
+        inputs["Realize Instances"],
+        inputs["Geometry"],
+        graph.node("GeometryNodeRealizeInstances", inputs["Geometry"]).outputs[0],
+    )
+    after = graph.set_position(before, acts, faded)
+    count = graph.size(before, "INSTANCES", "Instance Count")
+    turned = turn_instances(graph, before, count, after, acts, strength, shift, space)
+    after = graph.switch(graph.exceeds(count, 0), after, turned)
+    curves = graph.node("GeometryNodeSeparateComponents", before).outputs["Curve"]
+    has_handles = graph.node("GeometryNodeInputNamedAttribute", "handle_left", data_type="FLOAT_VECTOR")
+    has_handles = graph.sample(curves, has_handles.outputs["Exists"], 0, "BOOLEAN")
+    handles = move_handles(graph, curves, after, acts, strength, shift)
+    graph.node("NodeGroupOutput", graph.switch(has_handles, after, handles))
+    return graph.group
+
+
+def displacement(graph, rows, space):
+    """f(x) − x at the position of whatever evaluates it, in the coordinates of the modified object."""
+    position = graph.node("GeometryNodeInputPosition").outputs[0]
+    to_cube = graph.node("FunctionNodeInvertMatrix", space).outputs[0]
+    place = graph.node("FunctionNodeTransformPoint", position, to_cube).outputs[0]
+    affine, kernels, nodes, places = (Rows(graph, rows, part) for part in range(4))
+    inside = embedding(graph, nodes, place)
+
+    def square(row):
+        arm, way = (graph.vector("SUBTRACT", a, b) for a, b in ((place, row.position), (inside, row[INSIDE])))
+        square = graph.vector("DOT_PRODUCT", arm, arm)
+        return graph.math(
+            "MULTIPLY", row[SCALE], graph.math("ADD", square, graph.vector("DOT_PRODUCT", way, way))
+        )
+
+    def add_kernel(row, sums):
+        """(1 + n)³ as 1 + n (3 + n (3 + n)) is rounded once near 1, where a power would be six times."""
+        n = graph.math("MAXIMUM", square(row), -1.0)
+        cubed = graph.math("MULTIPLY_ADD", n, graph.math("ADD", n, 3.0), 3.0)
+        cubed = graph.math("MULTIPLY_ADD", n, cubed, 1.0)
+        return [graph.vector("MULTIPLY_ADD", row[MOVE], graph.math("MULTIPLY", cubed, cubed), sums[0])]
+
+    def leave(row, rest):
+        """What is left of 1 − m; 1 beyond the reach of the place."""
+        way = graph.math("SUBTRACT", graph.math("MULTIPLY", graph.math("SQRT", square(row)), 2.0), 1.0)
+        t = graph.node("ShaderNodeClamp", way).outputs[0]
+        sums = -20.0
+        for constant in (70.0, -84.0, 35.0):
+            sums = graph.math("MULTIPLY_ADD", t, sums, constant)
+        fourth = graph.math("MULTIPLY", graph.math("MULTIPLY", t, t), graph.math("MULTIPLY", t, t))
+        return [graph.math("MULTIPLY", rest[0], graph.math("MULTIPLY", fourth, sums))]
+
+    start = graph.node("FunctionNodeTransformPoint", place, affine.row(0)[MAP]).outputs[0]
+    (moved,) = kernels.repeat([("VECTOR", start)], add_kernel)
+    (rest,) = places.repeat([("FLOAT", graph.exceeds(places.count, 0))], leave)
+    moved = graph.vector("SCALE", moved, graph.math("SUBTRACT", 1.0, rest))
+    return graph.node("FunctionNodeTransformDirection", moved, space).outputs[0]
+
+
+def embedding(graph, nodes, place):
+    """ψ: planes about nodes, blended by their Gaussians; 0 where there are no nodes."""
+    near = graph.node("GeometryNodeProximity", nodes.rows, target_element="POINTS")
+    graph.put(near.inputs["Sample Position"], place)
+    near = graph.math("MULTIPLY", near.outputs["Distance"], near.outputs["Distance"])
+
+    def add(row, sums):
+        arm = graph.vector("SUBTRACT", place, row.position)
+        farther = graph.math("SUBTRACT", near, graph.vector("DOT_PRODUCT", arm, arm))
+        weight = graph.math("EXPONENT", graph.math("MULTIPLY", farther, row[SCALE]))
+        plane = graph.node("FunctionNodeTransformPoint", place, row[MAP]).outputs[0]
+        return [graph.vector("MULTIPLY_ADD", plane, weight, sums[0]), graph.math("ADD", weight, sums[1])]
+
+    planes, weights = nodes.repeat([("VECTOR", (0.0, 0.0, 0.0)), ("FLOAT", 0.0)], add)
+    return graph.vector("DIVIDE", planes, weights)
+
+
+def turn_instances(graph, before, count, after, acts, strength, shift, space):
+    """Turns instances by the rotation closest to f's slope, from differences of places beside each."""
+    position = graph.node("GeometryNodeInputPosition").outputs[0]
+    step = graph.node("FunctionNodeTransformDirection", (STEP, 0.0, 0.0), space).outputs[0]
+    step = graph.vector("LENGTH", step)
+    index = graph.node("GeometryNodeInputIndex").outputs[0]
+    number, axis = graph.math("MODULO", index, 6.0), graph.math("MODULO", index, 3.0)
+    side = graph.math("SUBTRACT", 1.0, graph.math("MULTIPLY", 2.0, graph.exceeds(number, 2)))
+    ahead = [graph.math("COMPARE", axis, float(k), 0.5) for k in range(3)]
+    ahead = graph.node("ShaderNodeCombineXYZ", *ahead).outputs[0]
+    of_instance = graph.math("FLOOR", graph.math("DIVIDE", index, 6.0))
+    start = graph.sample(before, position, of_instance, "FLOAT_VECTOR", domain="INSTANCE")
+    place = graph.vector("MULTIPLY_ADD", ahead, graph.math("MULTIPLY", side, step), start)
+    shifts = graph.moved_points(graph.math("MULTIPLY", count, 6.0), place, shift)
+
+    columns = []
+    for k in range(3):
+        first = graph.math("MULTIPLY_ADD", index, 6.0, float(k))
+        low = graph.math("ADD", first, 3.0)
+        difference = graph.vector("SUBTRACT", *(graph.shift_of(shifts, which) for which in (first, low)))
+        slope = graph.vector("SCALE", difference, graph.math("DIVIDE", 0.5, step))
+        columns.append(graph.vector("ADD", slope, tuple(float(k == i) for i in range(3))))
+
+    def nearer(_, columns):
+        """The mean of a matrix and its inverse transposed (Higham's iteration)."""
+        crossed = [
+            graph.vector("CROSS_PRODUCT", columns[(k + 1) % 3], columns[(k + 2) % 3]) for k in range(3)
+        ]
+        inverse = graph.math("DIVIDE", 1.0, graph.vector("DOT_PRODUCT", columns[0], crossed[0]))
+        sums = [graph.vector("MULTIPLY_ADD", crossed[k], inverse, columns[k]) for k in range(3)]
+        return [graph.vector("SCALE", total, 0.5) for total in sums]
+
+    columns = graph.repeat(TURNS, [("VECTOR", column) for column in columns], nearer)
+    entries = [
+        entry for column in columns for entry in (*graph.node("ShaderNodeSeparateXYZ", column).outputs, 0.0)
+    ]
+    matrix = graph.node("FunctionNodeCombineMatrix", *entries, 0.0, 0.0, 0.0, 1.0).outputs[0]
+    turn = graph.node("FunctionNodeSeparateTransform", matrix).outputs["Rotation"]
+    axis, angle = graph.node("FunctionNodeRotationToAxisAngle", turn).outputs
+    turn = graph.node(
+        "FunctionNodeAxisAngleToRotation", axis, graph.math("MULTIPLY", angle, strength)
+    ).outputs[0]
+    into = {"Selection": acts, "Rotation": turn, "Pivot Point": position, "Local Space": False}
+    return graph.node("GeometryNodeRotateInstances", after, into=into).outputs[0]
+
+
+def move_handles(graph, curves, after, acts, strength, shift):
+    """Puts the handles of Bézier curves where f takes them; automatic ones follow from the points."""
+    count, index = graph.size(curves, "CURVE"), graph.node("GeometryNodeInputIndex").outputs[0]
+    places = graph.node("GeometryNodeInputCurveHandlePositions").outputs
+    for side, place in zip(("LEFT", "RIGHT"), places, strict=True):
+        kinds = [
+            graph.node("GeometryNodeCurveHandleTypeSelection", handle_type=kind, mode={side}).outputs[0]
+            for kind in ("FREE", "ALIGN")
+        ]
+        kind = graph.node("FunctionNodeBooleanMath", *kinds, operation="OR").outputs[0]
+        kind = graph.node("FunctionNodeBooleanMath", kind, acts, operation="AND").outputs[0]
+        start = graph.sample(curves, place, index, "FLOAT_VECTOR")
+        shifts = graph.moved_points(count, start, shift)
+        there = graph.vector("MULTIPLY_ADD", graph.shift_of(shifts, index), strength, start)
+        node = graph.node("GeometryNodeSetCurveHandlePositions", after, kind, there, mode=side)
+        after = node.outputs[0]
+    return after
