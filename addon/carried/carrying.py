@@ -10,7 +10,6 @@ from ..core.errors import UserError, refuse
 from ..core.geometry.spaces import transform
 from ..field_modifier import masks, motion
 from ..field_nodes import helper
-from ..field_nodes.helper import FieldRefused
 from . import refusals
 from .carried_objects import CarriedObject, CarriedPose, find, give_back, is_carried_otherwise
 from .carriers import MeshCarrier
@@ -109,18 +108,13 @@ class Carrying:
 
     def moved(self, af, samples, field, poses, strength=1.0):
         """[(carried object, what its carrier writes)] where the field takes them, so much of the way."""
-        shapes = []
-        for pose in poses:
-            try:
-                shapes.append((pose.carried, self.moved_one(af, samples, field, pose, strength)))
-            except FieldRefused as error:
-                self.warnings.append(error)
-        return shapes
+        moved = [(pose.carried, self.moved_one(af, samples, field, pose, strength)) for pose in poses]
+        return [pair for pair in moved if pair[1] is not None]
 
     def moved_one(self, af, samples, field, pose, strength=1.0):
         carried = pose.carried
         if carried is self.nodes:
-            return helper.rows_of(field, pose.rest, strength)
+            return self.rows_of_nodes(field, pose.rest, strength)
         attached = carried.attached
         if attached is None or attached[0] is not pose.points or not near(attached[1], pose.rest):
             attachment = af.Attachment(samples, transform(pose.rest, pose.points))
@@ -132,6 +126,14 @@ class Carrying:
             rest = transform(pose.rest, pose.points)
             after = rest + strength * (after - rest)
         return carried.carrier.moved(pose.rest, pose.now, pose.parent, after)
+
+    def rows_of_nodes(self, field, local_to_solve, strength):
+        """None for a field that nodes cannot evaluate: they stay as they are."""
+        try:
+            return helper.rows_of(field, local_to_solve, strength)
+        except UserError as error:
+            self.warnings.append(error)
+            return None
 
     # Main thread: showing and taking back.
 

@@ -137,3 +137,20 @@ def test_few_samples_carry_few_centers(handles):
     field = af.deform(bar_samples(count=600), handles)
     assert field.report.flipped_share == 0.0
     assert af.distortion(field, bar_samples().points).flipped_share == 0.0
+
+
+def test_the_arrays_of_a_field_are_all_of_it(samples):
+    """The formula of `arrays`, in NumPy; the test in Blender evaluates interior distances as well."""
+    held = af.PointHandle([0.0, 0.0, 0.5], [0.0, 0.0, 0.8], reach=0.6)
+    field = af.LiveDeformer(samples, [held]).solve([[0.0, 0.0, 0.8]])
+    arrays = field.arrays()
+    cube = (samples.points[:300] - field.frame.center) / field.frame.scale
+    squares = ((cube[:, None] - arrays["centers"]) ** 2).sum(axis=2) / arrays["radii"] ** 2
+    moved = np.maximum(0, 1 - squares / 6) ** 6 @ arrays["coefficients"]
+    moved += arrays["affine"][0] + cube @ arrays["affine"][1:]
+    reaches = np.linalg.norm(cube[:, None] - arrays["places"], axis=2) / arrays["reaches"]
+    t = np.clip(2 * reaches - 1, 0, 1)
+    beyond = (t**4 * (35 - 84 * t + 70 * t**2 - 20 * t**3)).prod(axis=1, keepdims=True)
+    moved = cube + (1 - beyond) * (moved - cube)
+    expected = moved * field.frame.scale + field.frame.center
+    assert np.abs(field(samples.points[:300]) - expected).max() < 1e-12
