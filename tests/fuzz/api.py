@@ -19,6 +19,7 @@ LEFT_OUT = {  # public callables that the net does not call, and why
     "skin_weights": "seconds a call: tests/python/test_skin.py",
     "skin_correctives": "seconds a call: tests/python/test_skin.py",
     "Corrective.value": "of what skin_correctives returns",
+    "RadialField.arrays": "without arguments: tests/python/test_radial.py",
     "LiveDeformer.reset": "without arguments; it would undo what other calls have set up",
     "PointCacheReader.close": "without arguments, after a reader that the file of each case gives",
 }

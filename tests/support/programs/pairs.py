@@ -127,7 +127,10 @@ CLASSES = {
         lambda: af.deform(SAMPLES, pins(0.1), af.DeformOptions(iterations=2, width=8, layers=1)),
         FIELD,
     ),
-    "RadialField": (lambda: live().solve(pose(0.2)), FIELD),
+    "RadialField": (
+        lambda: live().solve(pose(0.2)),
+        {**FIELD, "arrays": lambda it: list(it.arrays().values())},
+    ),
     "MotionState": (lambda: live().motion_state, {}),
     "Attachment": (
         lambda: af.Attachment(SAMPLES, 1.3 * POINTS),
