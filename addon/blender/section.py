@@ -64,12 +64,12 @@ def with_zero(layout, group, parameter):
 
 
 def draw_settings(layout, group, *names):
-    """In a narrow sidebar a switch has the whole width for its name."""
+    """In a narrow sidebar switches have the whole width for their names."""
     for name in names:
-        row = layout.row()
-        if group.bl_rna.properties[name].type == "BOOLEAN" and characters() < NARROW:
-            row.use_property_split = False
-        row.prop(group, name)
+        column, prop = layout.column(align=True), group.bl_rna.properties[name]
+        if (prop.type == "BOOLEAN" or prop.is_enum_flag) and characters() < NARROW:
+            column.use_property_split = False
+        column.prop(group, name)
 
 
 def modifier_row(layout, modifier, icon, remove):
@@ -104,7 +104,7 @@ def job_button(layout, operator, icon):
     if job is not None and job.title == getattr(bpy.types, f"{group.upper()}_OT_{name}").title:
         progress_row(row, job)
         return
-    row.operator(operator, icon=icon)
+    row.operator(operator, icon=icon if characters() >= NARROW else "NONE")
     row.operator_menu_enum(operator, "scope", text="", icon="DOWNARROW_HLT")
 
 

@@ -33,7 +33,7 @@ class ARAPFIELDS_PT_source(Section, bpy.types.Panel):
         mesh = source.data
         counts = {"vertices": f"{len(mesh.vertices):,}", "faces": f"{len(mesh.polygons):,}"}
         text = f"{source.name}: {translated('{vertices} vertices, {faces} faces', **counts)}"
-        layout.label(text=text, icon="MESH_DATA", translate=False)
+        wrapped(layout, text, icon="MESH_DATA")
         reason = object_references.refusal(source) or mesh_arrays.refusal(source)
         if reason:
             wrapped(layout, translated(reason), icon="ERROR")

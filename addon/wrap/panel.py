@@ -3,7 +3,7 @@ import bpy
 
 from ..blender import modifier_stack
 from ..blender.object_references import in_scene
-from ..blender.section import Advanced, Section, job_button, note, presets, settings_column
+from ..blender.section import Advanced, Section, draw_settings, job_button, note, presets, settings_column
 from ..carried import rest_bones
 from ..core.settings.parameters import WRAP
 from ..field_modifier import inputs
@@ -54,7 +54,7 @@ class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
             layout.prop(wrap, "move_object")
         job_button(layout, Op.WRAP, "MOD_SHRINKWRAP")
         factor_slider(layout, source)
-        layout.column(align=True).prop(wrap, "transfer")
+        draw_settings(layout, wrap, "transfer")
         layout.operator(Op.TRANSFER, icon="MOD_DATA_TRANSFER")
         if rest_bones.fitted(source):
             layout.operator(Op.RESET_BONES, icon="BONE_DATA")

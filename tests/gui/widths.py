@@ -11,7 +11,7 @@ from support.blender import panels
 from addon.blender.section import Advanced
 from addon.names import CONTEXT
 
-MARGINS, LABELS = 23, 0.4  # pixels beside what a section shows; share of it that labels before values have
+MARGINS, LABELS = 47, 0.4  # pixels of tabs and edges; share of the rest that labels before values have
 ICON, PADDING = 20, 8  # pixels at a scale of 1
 
 
@@ -22,7 +22,8 @@ def checks(figures, folder):
     bar.surface = "FIT"
     bar.deform.field = bar.stylize.field = "neural"
     bar.deform.exact_handles = True
-    for language in {"en_US", "de_DE"} & {"en_US", *bpy.app.translations.locales}:
+    languages = {"en_US", "de_DE"} & {"en_US", *bpy.app.translations.locales}
+    for language in languages:
         interface.language = language
         yield 0.5
         figures[f"cut_{language}"] = cut()
@@ -35,8 +36,12 @@ def checks(figures, folder):
     stage.picture(folder, "light")
     bpy.ops.preferences.reset_default_theme()
     yield from narrower()
-    stage.picture(folder, "narrow")
-    figures["cut_narrow"] = cut(everyday=True)
+    for language in languages:
+        interface.language = language
+        yield 0.5
+        stage.picture(folder, f"narrow-{language}")
+        figures[f"cut_narrow_{language}"] = cut(everyday=True)
+    interface.language = "en_US"
 
 
 def narrower():
@@ -78,11 +83,11 @@ class Measured(panels.Layout):
         is_switch = prop.type == "BOOLEAN" and not options.get("icon")
         self.note(text, values - ICON if is_switch else LABELS * self.width - PADDING)
         for item in prop.enum_items if prop.type == "ENUM" and not options.get("expand") else ():
-            self.note(item.name, values - ICON)
+            self.note(item.name, values - (0 if prop.is_enum_flag else ICON))
 
     def operator(self, name, **options):
         given = super().operator(name, **options)
-        button = (self.texts.pop(), ICON if "icon" in options else 0)
+        button = (self.texts.pop(), ICON if options.get("icon", "NONE") != "NONE" else 0)
         if self.buttons is None:
             self.note(button[0], self.width - button[1] - PADDING)
         else:
@@ -102,7 +107,9 @@ class Measured(panels.Layout):
         return Measured(self.found, self.width, [])
 
     def column(self, **_):
-        return self
+        column = type(self)(self.found, self.width, self.buttons)
+        column.use_property_split = self.is_split
+        return column
 
     def menu(self, name, text=None, **options):
         super().menu(name)
