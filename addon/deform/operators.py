@@ -12,9 +12,7 @@ from ..core.runtime import native
 from ..core.settings.parameters import DEFORM
 from ..handles import empties, scaling
 from ..handles.native_handles import native_handles
-from ..live.sessions import end_for_job
 from ..properties.choices import result_properties
-from ..results.placement import destination
 from ..solver.contact import for_job, native_contact
 from .solve_job import SolveOperator, plan_solve_job
 
@@ -40,7 +38,6 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
         return empties.group_names(source)
 
     def plan(self, context, source, weights):
-        end_for_job(context, source, *destination(settings_of(source), self))
         context.view_layer.update()
         values = effective_values(DEFORM, settings_of(source).deform, self)
         af = native.library()

@@ -18,6 +18,7 @@ from ..core.poses import Pose
 from ..core.runtime import native
 from ..core.runtime.jobs import Item
 from ..jobs.job_operator import JobOperator
+from ..live.sessions import end_for_job
 from ..poses import applying
 from ..results import placement, visibility
 from ..results.placement import SolvedMesh, destination, placement_refusal
@@ -36,6 +37,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
     reason = placement.refusal(source, output, result)
     if reason is not None:
         raise reason
+    operator.end_live(context, source)
     exact = effective_value("surface", settings, operator) == "EXACT"
     extraction = {name: effective_value(name, settings, operator) for name in ("resolution", "refine_thin")}
     carrying, in_place = Carrying(context, source), placement.in_place(output, result)
@@ -96,10 +98,20 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
 class SolveOperator(JobOperator):
     """Mixin of the jobs that solve for a field: what they cannot place is refused before the work."""
 
+    ended_live = False  # whether live mode gave way to it
+
     @classmethod
     def refuses(cls, source):
         """Checked before the button is pressed; a script's own arguments are checked when it calls."""
         return placement_refusal(source) if has_window() else None
+
+    def keep_undo_true(self):
+        if self.ended_live:
+            bpy.ops.ed.undo_push(message="Live")
+
+    def end_live(self, context, source):
+        """For when nothing is refused any more."""
+        self.ended_live |= end_for_job(context, source, *destination(settings_of(source), self))
 
     def in_place(self, source):
         return placement.in_place(*destination(settings_of(source), self))

@@ -86,16 +86,22 @@ class JobOperator(ModalRun, Guided):
             yield from self.work_beside(context, job)
             while not job.done:
                 yield Pause.WORKER
-            return (yield from self.conclude(context, job))
+            result = yield from self.conclude(context, job)
         except JobCancelled:
             self.add_message("INFO", translated("{job} cancelled", job=translated(self.title)))
-            return {"CANCELLED"}
+            result = {"CANCELLED"}
         finally:
             self.clear_up(job)
+        if result == {"CANCELLED"}:
+            self.keep_undo_true()
+        return result
 
     def work_beside(self, context, job):
         """Coroutine of what the main thread does while the worker is at work."""
         yield from ()
+
+    def keep_undo_true(self):
+        """Stores a step where something changed though nothing came of it: Blender stores none."""
 
     def clear_up(self, job):
         """Removes what is not kept, however the job has ended."""

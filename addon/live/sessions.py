@@ -101,7 +101,8 @@ def end(context, source, keep=False):
 
 
 def end_for_job(context, source, output, result):
-    """Ends live mode before a solve that goes on from the same handles, and whose result goes there.
+    """Ends live mode before a solve that goes on from the same handles, and whose result goes there; whether
+    there was any.
 
     Where the result moves the same modifier, the live shape is seen until it comes, and stays if it never
     does; otherwise the source is what it was before live mode.
@@ -109,10 +110,11 @@ def end_for_job(context, source, output, result):
     session = live.get(source.session_uid)
     if session is None:
         settings_of(source).live_kind = ""  # what a file or an undone step says, with nothing behind it
-        return
+        return False
     stays = session.display.in_place and settings_of(source).result == result
     end(context, source, keep=stays and placement.keeps_mesh(output, result))
     context.view_layer.update()
+    return True
 
 
 def stop_all():

@@ -14,9 +14,7 @@ from ..core.settings.styles import STYLIZE
 from ..deform.solve_job import SolveOperator, plan_solve_job
 from ..handles import empties
 from ..handles.native_handles import native_handles
-from ..live.sessions import end_for_job
 from ..properties.choices import orientation, result_properties, style
-from ..results.placement import destination
 from ..solver import style_settings
 from ..solver.contact import for_job, native_contact
 
@@ -45,7 +43,6 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
         return style_settings.group_names(source, settings_of(source).stylize)
 
     def plan(self, context, source, of_groups):
-        end_for_job(context, source, *destination(settings_of(source), self))
         context.view_layer.update()
         settings = settings_of(source).stylize
         values = effective_values(STYLIZE, settings, self)

@@ -17,9 +17,8 @@ from ..core.geometry.spaces import space_of
 from ..core.runtime import native
 from ..core.settings.parameters import WRAP
 from ..deform.solve_job import SolveOperator, plan_solve_job
-from ..live.sessions import end_for_job
 from ..properties.choices import result_properties
-from ..results.placement import destination, holds_place
+from ..results.placement import holds_place
 from . import landmarks, transfer
 from .properties import carried_kinds, fit_rig, move_object
 
@@ -43,30 +42,27 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
         "move_object": move_object(options={"SKIP_SAVE"}),
         **result_properties(),
     }
+    below = ()  # rest_bones.BeforeArmatures of each source
 
     @classmethod
     def refuses(cls, source):
         """As the settings ask; a script may name another target."""
         return super().refuses(source) or (landmarks.refusal(source) if has_window() else None)
 
-    def coroutine(self, context):
+    def clear_up(self, job):
         """Where nothing came of it, the field's modifier stands again where it did."""
-        self.below = []
-        try:
-            return (yield from super().coroutine(context))
-        finally:
-            for below in self.below:
-                below.give_back()
+        for below in self.below:
+            below.give_back()
 
     def plan(self, context, source, weights):
         settings = settings_of(source)
-        end_for_job(context, source, *destination(settings, self))
         context.view_layer.update()
         values = effective_values(WRAP, settings.wrap, self)
         af = native.library()
         options = options_of("wrap", values)
         space = space_of(source.matrix_world, source.name)
         other = landmarks.target_of(source, self.onto)
+        self.end_live(context, source)
         fitting = below = None
         if (
             effective_value("fit_rig", settings.wrap, self)
@@ -75,7 +71,7 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
         ):
             before = landmarks.world_vertices_at_rest(context, source)
             fitting, below = rest_bones.Fitting(source, space), rest_bones.BeforeArmatures(source)
-            self.below.append(below)
+            self.below = (*self.below, below)
             pairs = landmarks.read(source, space, before, landmarks.world_vertices_at_rest(context, source))
         else:
             pairs = landmarks.read(source, space)

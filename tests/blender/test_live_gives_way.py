@@ -11,6 +11,7 @@ if IN_BLENDER:
     from support.blender.live import step
 
     from addon.core.runtime import jobs
+    from addon.core.runtime.coroutines import run_to_completion
     from addon.live import sessions
     from addon.pin_tool import drag
     from addon.results.placement import placement_refusal
@@ -68,6 +69,36 @@ def test_a_job_that_is_cancelled_leaves_the_live_shape():
     assert np.array_equal(scenes.world_points(bar), live) and not bar.arapfields.live_kind
     bpy.ops.arapfields.live()  # and goes on from there
     assert sessions.is_live(bar)
+
+
+def test_a_refused_press_leaves_live_mode():
+    bar, _ = lifted()
+    live, reach = scenes.world_points(bar), bar.arapfields.handles[0]
+    reach.reach = 0.3
+    for press, given, words in (
+        (bpy.ops.arapfields.stylize, {"style": "OBJECT"}, "Choose the object"),
+        (bpy.ops.arapfields.deform, {"field": "neural"}, "has a reach"),
+    ):
+        with pytest.raises(RuntimeError, match=words):
+            press(**given)
+        assert sessions.is_live(bar) and bar.arapfields.live_kind == "DEFORM"
+        assert np.array_equal(scenes.world_points(bar), live)
+
+
+def test_undo_after_a_cancelled_job_brings_live_mode_back():
+    bar, _ = lifted()
+    live = scenes.world_points(bar)
+    bpy.ops.ed.undo_push(message="live")
+    present = stages.Stage("job")
+    present.start(present.operator())
+    jobs.running().cancel()
+    assert run_to_completion(present.coroutine, lambda: jobs.running().join(0.05)) == {"CANCELLED"}
+    jobs.stop()
+    assert not sessions.live and not bar.arapfields.live_kind
+    bpy.ops.ed.undo()
+    step()
+    bar = bpy.data.objects["Bar"]
+    assert sessions.is_live(bar) and np.abs(scenes.world_points(bar) - live).max() < 1e-6
 
 
 def test_pins_are_dragged_again_after_deform():
