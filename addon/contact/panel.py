@@ -18,7 +18,7 @@ class ARAPFIELDS_PT_contact(Section, bpy.types.Panel):
         group, layout = settings.contact, self.layout.column()
         layout.enabled = group.use
         draw_settings(layout, group, "obstacle", "obstacles", "margin")
-        row = layout.row(heading="Ground")
+        row = layout.row(heading="Level Ground")
         row.prop(group, "use_ground", text="")
         height = row.row()
         height.enabled = group.use_ground

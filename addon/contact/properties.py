@@ -19,7 +19,7 @@ class ARAPFIELDS_PG_contact(bpy.types.PropertyGroup):
     margin: number(
         "Margin", "Distance that is kept from the obstacles", subtype="DISTANCE", min=0.0, soft_max=1.0
     )
-    use_ground: flag("Ground", "The surface does not go below a height of the world")
+    use_ground: flag("Level Ground", "The surface does not go below a height of the world")
     itself: flag(
         "Itself",
         "Parts of the shape do not pass each other. What touches or overlaps at rest is left as it is",

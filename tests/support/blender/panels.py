@@ -37,7 +37,7 @@ class Layout:
         return type("Arguments", (), dict.fromkeys(rna.properties.keys()))()
 
     def operator_menu_enum(self, name, prop, **options):
-        assert prop in self.operator(name).__class__.__dict__
+        assert prop in self.operator(name, **options).__class__.__dict__
 
     def menu(self, name, **options):
         assert hasattr(bpy.types, name), name
