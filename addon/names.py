@@ -16,6 +16,7 @@ FIELD_MODIFIER = "ARAP Fields"  # modifier that carries the motion, and its node
 SHAPE_OF = "arapfields_shape_of"  # custom property of the mesh that carries a live motion: what that is of
 OFFSETS = "ARAP Fields"  # point attribute of the motion: an offset in the object's coordinates
 TURNS = "ARAP Fields Turns"  # and how free custom normals turn: axis · angle
+CHANGES = "ARAP Fields: "  # how names of attributes begin that say what is added to one of a splat
 CACHE_MODIFIER = "ARAP Fields Cache"  # Blender's Mesh Cache modifier that plays a bake
 FIELD_GROUP = "arapfields_group"  # custom property of that modifier's node groups: which, and its version
 FIELD_NODES = "arapfields_nodes"  # custom property of the node group that evaluates a field: its version

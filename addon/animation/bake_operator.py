@@ -3,6 +3,7 @@
 
 import contextlib
 
+from ..blender import splat_layouts
 from ..blender.host import has_window
 from ..blender.language import translated
 from ..blender.object_references import settings_of
@@ -119,4 +120,6 @@ def effective_kind(source, operator=None):
 
 def refusal_of(source, kind):
     """Why there is nothing to bake of a source, as a UserError; None where there is."""
+    if splat_layouts.layout_of(source.data) is not None:
+        return UserError("{name} holds splats; they are not baked, but rendered live", source)
     return empties.require_handles(source) if kind == "DEFORM" else style_settings.refusal(source)

@@ -3,13 +3,13 @@
 
 import hashlib
 from bisect import bisect_left
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
 from ..core.errors import UserError, refuse
-from . import modifier_stack
+from . import modifier_stack, splat_layouts
 
 
 @dataclass(frozen=True)
@@ -19,6 +19,7 @@ class MeshArrays:
     vertices: np.ndarray  # (n, 3) float64
     triangles: np.ndarray  # (m, 3) int32
     has_free_normals: bool = False  # custom normals that do not turn by themselves
+    splats: splat_layouts.Splats | None = None  # where the vertices are those of splats
 
 
 def vectors(elements, name="vector"):
@@ -92,7 +93,13 @@ def refusal(source):
     """Why there is nothing to work on, as a UserError, as far as it is seen without reading; else None."""
     if source.modifiers or source.mode == "EDIT":
         return None
-    return nothing_in(source.name, len(source.data.vertices), len(source.data.polygons))
+    return nothing_in_splats(source.name, source.data)
+
+
+def nothing_in_splats(name, mesh):
+    """The UserError for a mesh without vertices, and for one that has neither faces nor splats."""
+    is_splats = splat_layouts.layout_of(mesh) is not None
+    return nothing_in(name, len(mesh.vertices), is_splats or len(mesh.polygons))
 
 
 def nothing_in(name, vertices, faces):
@@ -111,7 +118,7 @@ def read(context, source, in_place=False):
 def arrays_of(source, mesh):
     """What there is to work on of an object's evaluated mesh; UserError when there is nothing."""
     arrays = MeshArrays(positions(mesh), triangles(mesh), bool(modifier_stack.free_normals(mesh)))
-    refuse(nothing_in(source.name, len(arrays.vertices), len(arrays.triangles)))
+    refuse(nothing_in_splats(source.name, mesh))
     if not np.isfinite(arrays.vertices).all():
         broken = np.flatnonzero(~np.isfinite(arrays.vertices).all(axis=1))
         raise UserError(
@@ -120,6 +127,8 @@ def arrays_of(source, mesh):
             count=len(broken),
             first=broken[0],
         )
+    if splat_layouts.layout_of(mesh) is not None:
+        return replace(arrays, splats=splat_layouts.Splats(source.name, mesh, arrays.vertices))
     return arrays
 
 

@@ -10,6 +10,7 @@ import bpy
 
 from ..core.errors import UserError
 from ..names import FIELD_GROUP
+from . import splat_layouts
 from .evaluation import updated
 from .object_references import settings_of
 
@@ -51,6 +52,8 @@ def place(source):
     own = next((index for index, one in enumerate(stack) if is_field(one) or is_cache(one)), None)
     if own is not None:
         return own
+    if splat_layouts.layout_of(source.data) is not None:  # what comes after draws them
+        return 0
     if settings_of(source).under_rig:
         return next((index for index, one in enumerate(stack) if is_posing(source, one)), len(stack))
     return end(stack)

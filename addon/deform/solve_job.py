@@ -70,12 +70,13 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
             after = transform(inverse(moves), after)
             place = surface.space.solve_to_world @ moves @ surface.space.world_to_solve
         turns = surface.turns(field, before, moves) if placement.keeps_mesh(output, result) else None
+        changes = surface.splat_changes(field) if surface.in_place else None
         moved = carrying.moved(native.library(), points, field, carried)
         local = surface.space.to_local(after)
         if output == "WARP":
             local = surface.space.moved_to_local(after, before, surface.local)
         pose = Pose(field, points, surface.space.local_to_solve)
-        return SolvedMesh(local, topology, report, turns, moved, place), pose
+        return SolvedMesh(local, topology, report, turns, changes, moved, place), pose
 
     def apply(work_result):
         solved, pose = work_result

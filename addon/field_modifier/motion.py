@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..blender import mesh_arrays, modifier_stack
+from ..blender import mesh_arrays, modifier_stack, splat_layouts
 from ..blender.object_references import settings_of
 from ..blender.removal import remove_mesh_object, remove_node_modifier
 from ..core.errors import UserError
@@ -26,6 +26,7 @@ class Motion:
 
     offsets: np.ndarray | None
     turns: np.ndarray | None = None
+    changes: dict | None = None  # {attribute of splats: (n,) or (n, 3) what is added to it}
 
 
 def refusal(source):
@@ -46,13 +47,16 @@ def bind(context, source):
     cache_modifier.suspend(source)
     with modifier_stack.evaluated_mesh(context, source, in_place=True) as mesh:
         normals, count = modifier_stack.free_normals(mesh), len(mesh.vertices)
+        splats = splat_layouts.columns_of(mesh)
     on_mesh = lies_on_mesh(source)
+    if splats and not on_mesh:
+        raise UserError("{name}: its splats need data and a first modifier of their own", source)
     if not on_mesh:
         copied = modifier_stack.mesh_copy(context, source, in_place=True)
     if modifier is None:
-        modifier = add(source, normals)
+        modifier = add(source, normals, splats)
     else:
-        choose_group(modifier, normals)
+        choose_group(modifier, normals, splats)
     masks.take(source)
     if on_mesh:
         forget_helper(modifier)
@@ -69,18 +73,18 @@ def lies_on_mesh(source):
     return mesh.library is None and mesh.users == 1 and modifier_stack.keeps_vertices(source)
 
 
-def add(source, normals):
+def add(source, normals, splats):
     """A new field modifier at its place."""
     index = modifier_stack.place(source)
     modifier = source.modifiers.new(FIELD_MODIFIER, "NODES")
-    modifier.node_group = node_group.find_or_make(normals)
+    modifier.node_group = node_group.find_or_make(normals, splats)
     source.modifiers.move(source.modifiers.find(modifier.name), index)
     return source.modifiers[index]
 
 
-def choose_group(modifier, normals):
+def choose_group(modifier, normals, splats):
     """Exchanges the node group where the normals ask for another; what the user set stays."""
-    group = node_group.find_or_make(normals)
+    group = node_group.find_or_make(normals, splats)
     if modifier.node_group == group:
         return
     factor, mask = inputs.get(modifier, "Factor"), inputs.get(modifier, "Mask")
@@ -160,11 +164,12 @@ def write_to(mesh, motion):
         if attribute is None:
             attribute = mesh.attributes.new(name, "FLOAT_VECTOR", "POINT")
         mesh_arrays.put_vectors(attribute.data, vectors)
+    splat_layouts.put_changes(mesh, motion.changes or {})
     mesh.update_tag()
 
 
 def read_from(mesh):
-    return Motion(*(vectors(mesh, name) for name in (OFFSETS, TURNS)))
+    return Motion(*(vectors(mesh, name) for name in (OFFSETS, TURNS)), splat_layouts.changes_of(mesh))
 
 
 def vectors(mesh, name):

@@ -10,17 +10,23 @@ nearest place of the helper's surface instead.
 import bpy
 
 from ..blender.modifier_stack import FREE_NORMALS
-from ..names import FIELD_GROUP, FIELD_MODIFIER, OFFSETS, TURNS
+from ..names import CHANGES, FIELD_GROUP, FIELD_MODIFIER, OFFSETS, TURNS
 
 VERSION = 1
 VECTORS = {"data_type": "FLOAT_VECTOR", "domain": "POINT"}  # of nodes that sample points
 PLAIN = ""  # of the groups: the one that turns no normals; the others are named by the normals' domain
 
 
-def find_or_make(normals=PLAIN):
-    """The group for a mesh whose free custom normals lie on that domain (POINT, FACE, CORNER, or none)."""
+def find_or_make(normals=PLAIN, splats=None):
+    """The group for a mesh whose free custom normals lie on that domain (POINT, FACE, CORNER, or none).
+
+    `splats`: {attribute: its type} of splats, to which it adds what the motion changes.
+    """
     name = f"{FIELD_MODIFIER} {normals.title()} Normals" if normals else FIELD_MODIFIER
-    return kept_group(FIELD_GROUP, f"{VERSION} {normals}", lambda: build(name, normals))
+    mark = f"{VERSION} {normals}"
+    if splats:
+        name, mark = f"{FIELD_MODIFIER} Splats", f"{VERSION} {' '.join(splats)}"
+    return kept_group(FIELD_GROUP, mark, lambda: build(name, normals, splats or {}))
 
 
 def kept_group(key, mark, build):
@@ -33,7 +39,7 @@ def kept_group(key, mark, build):
     return group
 
 
-def build(name, normals):
+def build(name, normals, splats):
     graph = Graph(name)
     graph.fading_inputs("How far each point goes; takes a vertex group")
     helper = graph.socket("Offsets", "INPUT", "NodeSocketObject", "Mesh that carries the offsets, if any")
@@ -48,8 +54,27 @@ def build(name, normals):
     result = graph.set_position(inputs["Geometry"], graph.acts(strength), offset.outputs[0])
     if normals:
         result = turn_normals(graph, result, source.vectors(TURNS), strength, normals)
+    for attribute, kind in splats.items():
+        result = add_change(graph, result, attribute, kind, strength)
     graph.node("NodeGroupOutput", result)
     return graph.group
+
+
+def add_change(graph, geometry, attribute, kind, strength):
+    """Adds `strength` of its change to an attribute."""
+    own, change = (
+        graph.node("GeometryNodeInputNamedAttribute", name, data_type=kind).outputs[0]
+        for name in (attribute, CHANGES + attribute)
+    )
+    if kind == "FLOAT":
+        new = graph.node("ShaderNodeMath", strength, change, own, operation="MULTIPLY_ADD").outputs[0]
+    else:
+        part = graph.node(
+            "ShaderNodeVectorMath", into={"Vector": change, "Scale": strength}, operation="SCALE"
+        )
+        new = graph.node("ShaderNodeVectorMath", own, part.outputs[0], operation="ADD").outputs[0]
+    into = {"Geometry": geometry, "Name": attribute, "Value": new}
+    return graph.node("GeometryNodeStoreNamedAttribute", into=into, data_type=kind).outputs[0]
 
 
 def turn_normals(graph, geometry, turns, strength, domain):

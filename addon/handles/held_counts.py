@@ -71,7 +71,10 @@ def region_of(entry, weights):
 
 def points_inside(mesh, regions):
     """{the handle's key: points that it holds, -1 for a point or a pin}; on the worker."""
-    points = native.library().sample_mesh(mesh.vertices, mesh.triangles, count=COUNTED, seed=0).points
+    if mesh.splats is not None:
+        points = mesh.vertices
+    else:
+        points = native.library().sample_mesh(mesh.vertices, mesh.triangles, count=COUNTED, seed=0).points
     counts, holding = {}, Holding(mesh.vertices, points, list(regions.values()))
     for key, handle in regions.items():
         if handle.kind in ("POINT", "PIN"):  # both always hold something

@@ -42,7 +42,7 @@ class LiveModifier:
         """Moves the source's points to a session's shape; whether it could."""
         if source.mode in PAUSING:
             return False
-        motion.write(source, motion.Motion(shape.points - shape.rest, shape.turns))
+        motion.write(source, motion.Motion(shape.points - shape.rest, shape.turns, shape.changes))
         self.shown = shape
         return True
 

@@ -223,7 +223,7 @@ class Session:
         key = stored.UNSETTLED if shape.of is None else self.digest(shape.of)
         stored.put_mark(source, key)
         if shape.of is not None:
-            stored.shapes.keep(key, motion.Motion(shape.points - shape.rest, shape.turns))
+            stored.shapes.keep(key, motion.Motion(shape.points - shape.rest, shape.turns, shape.changes))
 
     def show_frame(self, context):
         """Shows a frame that is solved already, or one of secondary motion, which is waited for."""

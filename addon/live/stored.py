@@ -38,7 +38,7 @@ class Kept(dict):
 
 
 def arrays_of(shape):
-    return () if shape is None else (shape.offsets, shape.turns)
+    return () if shape is None else (shape.offsets, shape.turns, *(shape.changes or {}).values())
 
 
 shapes = Kept(arrays_of)  # {mark: Motion}

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from ..blender import modifier_stack
+from ..blender import modifier_stack, splat_layouts
 from ..blender.evaluation import depsgraph_of
 from ..blender.mesh_arrays import positions
 from ..blender.object_references import settings_of
@@ -37,6 +37,8 @@ def apply(context, source, pose, strength):
     reason = motion.refusal(source)
     if reason is None and settings_of(source).live_kind:
         reason = UserError("{name} is live; end live mode first", source)
+    if reason is None and splat_layouts.layout_of(source.data) is not None:
+        reason = UserError("{name} holds splats; poses are not applied to them", source)
     if reason is not None:
         raise reason
     with modifier_stack.evaluated_mesh(context, source, in_place=True) as mesh:

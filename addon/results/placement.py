@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..blender import mesh_arrays, modifier_stack
+from ..blender import mesh_arrays, modifier_stack, splat_layouts
 from ..blender.object_references import settings_of
 from ..blender.property_definitions import effective_value
 from ..core.errors import UserError, refuse
@@ -28,6 +28,7 @@ class SolvedMesh:
     topology: Topology | None  # of the implicit surface; None for the source's own mesh
     report: dict
     turns: np.ndarray | None = None  # (n, 3) axis · angle, for free custom normals
+    changes: dict | None = None  # of splats' attributes
     carried: list = field(default_factory=list)  # what Carrying.moved made
     place: np.ndarray | None = None  # (4, 4) world → world: how the object itself moves, if it does
 
@@ -68,7 +69,7 @@ def place_result(context, source, kind, output, result, moved, before):
     refuse(refusal(source, output, result))
     if keeps_mesh(output, result):
         motion.bind(context, source)
-        motion.write(source, motion.Motion(moved.vertices - before, moved.turns))
+        motion.write(source, motion.Motion(moved.vertices - before, moved.turns, moved.changes))
         source[REPORT] = json.dumps(moved.report)
         return source
     if moved.topology is None and len(source.data.vertices) != len(before):
@@ -127,6 +128,10 @@ def new_object(context, source, kind, output, moved, before):
 
 def refusal(source, output, result):
     """Why the source itself cannot take the result, as a UserError; None where it can."""
+    if not keeps_mesh(output, result) and splat_layouts.layout_of(source.data) is not None:
+        return UserError(
+            "{name} holds splats; choose Original Mesh as geometry, Modifier for the result", source
+        )
     if result == "NEW":
         return None
     if keeps_mesh(output, result):

@@ -27,6 +27,7 @@ class Shape:
     points: np.ndarray  # (n, 3)
     rest: np.ndarray | None  # (n, 3) where the source's own points are without the field; None for surfaces
     turns: np.ndarray | None = None  # (n, 3) axis · angle, for free custom normals
+    changes: dict | None = None  # of splats' attributes
     topology: Topology | None = None
     carried: list = field(default_factory=list)  # what Carrying.moved made
     of: Request | None = None  # whose own shape this is, from rest; None on the way there
@@ -148,14 +149,16 @@ class FrameSolver:
 
     def _shape(self, request, solved):
         surface, topology = self.sampled.setup.surface, self.sampled.topology
-        moved = self.solver.field if request.carried or surface.has_free_normals else None
+        needs_field = request.carried or surface.has_free_normals or surface.splats is not None
+        moved = self.solver.field if needs_field else None
         carried = self.carrying.moved(native.library(), self.sampled.samples, moved, request.carried)
         if topology is not None:
             return Shape(self.to_local(solved), None, topology=topology, carried=carried)
         turns = surface.turns(moved, self.rest) if surface.in_place else None
         # What does not move stays bit for bit.
         points = in_single(surface.space.moved_to_local(require_finite(solved), self.rest, self.points))
-        return Shape(points, self._single, turns, carried=carried)
+        changes = surface.splat_changes(moved) if surface.in_place else None
+        return Shape(points, self._single, turns, changes, carried=carried)
 
     def to_local(self, points):
         """(n, 3) from solve space to local coordinates, in single precision."""

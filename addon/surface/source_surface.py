@@ -8,6 +8,7 @@ import numpy as np
 
 from ..blender import mesh_arrays
 from ..blender.object_references import ObjectReference, settings_of
+from ..blender.splat_layouts import Splats
 from ..blender.vertex_groups import NearestVertices
 from ..core.errors import UserError
 from ..core.geometry import rotations
@@ -33,10 +34,22 @@ class SourceSurface:
     exact: bool  # whether the implicit surface is the triangles', or a fit of them
     stiffness: tuple  # (n,) factors of the vertices' stiffness, and of that against bending; None for 1
     solids: list  # (vertices, triangles) of what is sampled with it
+    splats: Splats | None = None  # the vertices' own
 
     @cached_property
     def _exact_surface(self):
         return native.library().MeshSdf(self.vertices, self.triangles)
+
+    @cached_property
+    def prepared(self):
+        """PreparedSplats; on the worker."""
+        return native.library().PreparedSplats(self.splats.made(native.library()))
+
+    def splat_changes(self, field):
+        """What a field adds to the splats' attributes, by their names; None: there are no splats."""
+        if self.splats is None:
+            return None
+        return self.splats.changes(self.prepared.moved(field, max_stretch=np.inf))
 
     def implicit(self, tracker, weight):
         """The implicit surface that was chosen; runs on the worker."""
@@ -45,6 +58,9 @@ class SourceSurface:
     def samples(self, tracker, count, seed, own_triangles):
         """Points spread evenly over the implicit surface, or over all of the mesh's own triangles."""
         af = native.library()
+        if self.splats is not None:
+            task = tracker.start("Sampling", 0.15)
+            return native.library().sample_splats(self.prepared.rest, count, task=task)
         if not own_triangles:
             sdf = self.implicit(tracker, 0.3)
             samples = af.sample_surface(sdf, count=count, seed=seed, task=tracker.start("Sampling", 0.15))
@@ -113,6 +129,13 @@ def checked_mesh(vertices, corners):
     return vertices, build_edges(corners)
 
 
+def in_world_shape(splats, space, source):
+    """Splats, if any; UserError where the object's scale stretches them."""
+    if splats is not None and not np.array_equal(space.local_to_solve, np.eye(4)):
+        raise UserError("{name}: its scale stretches splats; apply the scale, or make it uniform", source)
+    return splats
+
+
 def read_surface(context, source, in_place=False, *, exact=None, fit_operator=None, carrying=None):
     """All of a source that the worker needs; UserError when it cannot be worked on. Main thread.
 
@@ -136,4 +159,5 @@ def read_surface(context, source, in_place=False, *, exact=None, fit_operator=No
         exact=settings.surface == "EXACT" if exact is None else exact,
         stiffness=(None, None) if carrying is None else painted.read(context, source, in_place),
         solids=[] if carrying is None else carrying.solids(context, space),
+        splats=in_world_shape(mesh.splats, space, source),
     )

@@ -136,6 +136,7 @@ The first radial field prepares what it needs at the centers; those of the same 
 They are moved in single precision: errors are some 1e-5 of the size.)")
       .def(py::init<GaussianSplats>(), "splats"_a, "InvalidInput for splats that do not fit together.")
       .def("__len__", [](const PreparedSplats& self) { return self.rest().size(); })
+      .def_property_readonly("rest", &PreparedSplats::rest, "GaussianSplats at rest.")
       .def(
           "moved",
           [](const PreparedSplats& self, const DeformationField& field, const Kept& into, double max_stretch,

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Gaussian splats as importers leave them: posed live, their attributes by the modifier."""
+
+import numpy as np
+import pytest
+from support.blender.inside import IN_BLENDER
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.live import step
+
+    import arapfields as af
+    from addon.live import sessions
+
+pytestmark = pytest.mark.in_blender
+
+SINGLE = 2e-3  # of the size: the modifier has single precision, and live jets as well
+
+
+def given(count=800, harmonics=16):
+    """Flat splats on a bar from -1 to 1 along x."""
+    rng = np.random.default_rng(0)
+    x, angle = rng.uniform(-1, 1, count), rng.uniform(0, 2 * np.pi, count)
+    normals = np.column_stack([0 * x, np.cos(angle), np.sin(angle)])
+    turns = np.column_stack([1 + normals[:, 2] + 1e-9, -normals[:, 1], normals[:, 0], 0 * x])
+    turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+    scales = 0.03 * np.array([1.0, 0.7, 0.1]) * rng.uniform(0.9, 1.1, (count, 3))
+    colours = 0.25 * rng.normal(size=(count, harmonics, 3))
+    return af.GaussianSplats(
+        np.column_stack([x, 0.2 * normals[:, 1:]]), turns, scales, np.full(count, 0.9), colours
+    )
+
+
+def file_values(splats):
+    """As Blender's PLY import and KIRI's 3DGS Render name them: one number an attribute."""
+    colours = np.asarray(splats.harmonics)
+    rest = colours[:, 1:].swapaxes(1, 2).reshape(len(splats), -1)
+    columns = {f"rot_{k}": splats.rotations[:, k] for k in range(4)}
+    columns |= {f"scale_{k}": np.log(splats.scales[:, k]) for k in range(3)}
+    columns |= {f"f_dc_{k}": colours[:, 0, k] for k in range(3)}
+    columns |= {f"f_rest_{k}": rest[:, k] for k in range(rest.shape[1])}
+    return columns | {"opacity": np.log(splats.opacities / (1 - splats.opacities))}
+
+
+def vector_values(splats):
+    """As ReshotAI's add-on names them."""
+    q = splats.rotations
+    columns = {"quatxyz": q[:, :3], "quatw": q[:, 3], "rot_euler": np.zeros((len(q), 3))}
+    columns |= {"scale": splats.scales, "logscale": np.log(splats.scales), "opacity": splats.opacities}
+    return columns | {f"sh{k}": splats.harmonics[:, k] for k in range(splats.harmonics.shape[1])}
+
+
+def scan(splats, values, name="Scan"):
+    """An object of splats, held at its left end; its right end follows a handle. (scan, moving)"""
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(splats.centers.tolist(), [], [])
+    for key, column in values(splats).items():
+        kind, field = ("FLOAT", "value") if column.ndim == 1 else ("FLOAT_VECTOR", "vector")
+        mesh.attributes.new(key, kind, "POINT").data.foreach_set(field, np.asarray(column, "f4").ravel())
+    item = bpy.data.objects.new(name, mesh)
+    bpy.context.scene.collection.objects.link(item)
+    fixed = scenes.cube_empty((-0.9, 0, 0), (0.15, 0.4, 0.4), "Fixed")
+    moving = scenes.cube_empty((0.9, 0, 0), (0.15, 0.4, 0.4), "Moving")
+    bpy.context.view_layer.update()
+    scenes.activate(fixed, moving, item)
+    bpy.ops.arapfields.add_handle()
+    scenes.activate(item)
+    return item, moving
+
+
+def shown(item, values):
+    """What the evaluated object has of the attributes of a layout."""
+    bpy.context.view_layer.update()
+    mesh, result = item.evaluated_get(bpy.context.evaluated_depsgraph_get()).data, {}
+    for key, column in values(given()).items():
+        data = mesh.attributes[key].data
+        flat = np.empty(column.size, dtype=np.float32)
+        data.foreach_get("value" if column.ndim == 1 else "vector", flat)
+        result[key] = flat.reshape(column.shape)
+    return result
+
+
+def off(one, other):
+    return max(np.abs(one[key] - other[key]).max() for key in other if key != "rot_euler")
+
+
+@pytest.mark.parametrize("layout", ["file_values", "vector_values"])
+def test_a_scan_is_posed_live_and_comes_back(layout, tmp_path):
+    rest, values = given(), globals()[layout]
+    item, moving = scan(rest, values)
+    before = shown(item, values)
+    assert bpy.ops.arapfields.live() == {"FINISHED"}
+    moving.location.z += 0.5
+    moving.rotation_euler.y = -0.8
+    step(refined=True)
+    moved = sessions.live[item.session_uid].solver.field.apply_to(rest, max_stretch=np.inf)
+    posed = shown(item, values)
+    assert np.abs(scenes.world_points(item) - moved.centers).max() < SINGLE
+    assert off(posed, values(moved)) < SINGLE < 0.3 < off(posed, before)
+    if values is vector_values:
+        x, y, z = posed["rot_euler"].T  # Z Y X, as Blender's XYZ is: the turned x axis
+        axis = np.column_stack([np.cos(y) * np.cos(z), np.cos(y) * np.sin(z), -np.sin(y)])
+        w, i, j, k = np.asarray(moved.rotations).T
+        turned = np.column_stack([1 - 2 * (j * j + k * k), 2 * (i * j + w * k), 2 * (i * k - w * j)])
+        assert np.abs(axis - turned).max() < 5 * SINGLE and x.std() > 0.1
+    scenes.activate(item)
+    bpy.ops.arapfields.live_keep()
+    kept = shown(item, values)
+    assert off(kept, posed) == 0
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scan.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "scan.blend"))
+    item = bpy.data.objects["Scan"]
+    assert off(shown(item, values), posed) == 0
+    item.modifiers[0].show_viewport = False
+    assert off(shown(item, values), before) == 0
+    item.modifiers[0].show_viewport = True
+    scenes.activate(item)
+    bpy.ops.arapfields.remove_field()
+    assert off(shown(item, values), before) == 0 and not item.modifiers
+    assert not [one.name for one in item.data.attributes if one.name.startswith("ARAP")]
+
+
+def test_the_button_poses_a_scan_and_off_restores_it():
+    item, moving = scan(given(), file_values)
+    before = shown(item, file_values)
+    bpy.ops.arapfields.live()
+    moving.location.z += 0.4
+    step()
+    assert off(shown(item, file_values), before) > 0.05
+    scenes.activate(item)
+    bpy.ops.arapfields.live()
+    assert off(shown(item, file_values), before) == 0 and not item.modifiers
+    assert bpy.ops.arapfields.deform() == {"FINISHED"}
+    assert off(shown(item, file_values), before) > 0.05
+    assert item.modifiers[0].name == "ARAP Fields"
+
+
+def test_what_splats_lack_is_named():
+    item, _ = scan(given(60), file_values)
+    data = item.data
+    for call, arguments, word in (
+        (bpy.ops.arapfields.deform, {"result": "NEW"}, "choose Original Mesh as geometry"),
+        (bpy.ops.arapfields.bake, {}, "they are not baked"),
+    ):
+        with pytest.raises(RuntimeError, match=word):
+            call(**arguments)
+    data.attributes["scale_1"].data[3].value = np.nan
+    with pytest.raises(RuntimeError, match="scale_1 of its splats has NaN"):
+        bpy.ops.arapfields.deform()
+    data.attributes.remove(data.attributes["scale_1"])
+    with pytest.raises(RuntimeError, match="its splats have no scale_1"):
+        bpy.ops.arapfields.deform()
+    data.attributes.new("scale_1", "FLOAT", "POINT")
+    data.attributes.remove(data.attributes["f_rest_7"])
+    with pytest.raises(RuntimeError, match="its splats have no f_rest_7"):
+        bpy.ops.arapfields.deform()
+    item.scale.x = 2
+    data.attributes.new("f_rest_7", "FLOAT", "POINT")
+    data.attributes["rot_0"].data[2].value = 1.0
+    with pytest.raises(RuntimeError, match="its scale stretches splats"):
+        bpy.ops.arapfields.deform()
