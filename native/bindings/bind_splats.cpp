@@ -129,14 +129,19 @@ SurfaceSamples of what splats show: at most `count` centers of opaque splats, sp
 
 Normals are the shortest axes, turned outward (Hoppe et al. 1992). Parts with less than 1 % of the samples are
 left out. Raises InvalidInput and Cancelled.)");
-  py::class_<PreparedSplats>(module, "PreparedSplats", R"(
+  py::class_<PreparedSplats, std::shared_ptr<PreparedSplats>>(module, "PreparedSplats", R"(
 GaussianSplats that are moved again and again, as in a live session.
 
 The first radial field prepares what it needs at the centers; those of the same live session find it there.
 They are moved in single precision: errors are some 1e-5 of the size.)")
       .def(py::init<GaussianSplats>(), "splats"_a, "InvalidInput for splats that do not fit together.")
       .def("__len__", [](const PreparedSplats& self) { return self.rest().size(); })
-      .def_property_readonly("rest", &PreparedSplats::rest, "GaussianSplats at rest.")
+      .def_property_readonly(
+          "rest",
+          [](const std::shared_ptr<PreparedSplats>& self) {
+            return Kept(self, const_cast<GaussianSplats*>(&self->rest()));  // Python changes none
+          },
+          "GaussianSplats at rest.")
       .def(
           "moved",
           [](const PreparedSplats& self, const DeformationField& field, const Kept& into, double max_stretch,

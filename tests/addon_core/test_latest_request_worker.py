@@ -103,3 +103,13 @@ def test_a_newer_request_ends_the_better_results_of_the_one_before():
     assert seen[0] == ("a", 0) and len([1 for request, _ in seen if request == "a"]) <= 2
     assert seen[-3:] == [("b", 0), ("b", 1), ("b", 2)]
     worker.stop()
+
+
+def test_the_error_of_what_failed_first_is_told():
+    def fail(text):
+        raise ValueError(text)
+
+    worker = LatestRequestWorker(lambda request: fail("later"), prepare=lambda: fail("first"))
+    worker.request(1)
+    assert worker.wait(LIMIT) and worker.poll() == (None, "first")
+    worker.stop()

@@ -161,5 +161,5 @@ class LatestRequestWorker:
             if type(caught).__name__ != "Cancelled":
                 error = str(caught) or type(caught).__name__
         with self._changed:
-            self._error, self._working = error or self._error, False
+            self._error, self._working = self._error or error, False  # the first is the cause
             self._changed.notify_all()
