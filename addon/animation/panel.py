@@ -3,7 +3,7 @@ import bpy
 
 from ..blender import modifier_stack
 from ..blender.language import translated
-from ..blender.section import Section, job_button, modifier_row, note, wrapped
+from ..blender.section import Section, draw_settings, job_button, modifier_row, note, wrapped
 from ..names import Op
 from ..solver import frame_range
 from . import caches, played
@@ -16,17 +16,12 @@ class ARAPFIELDS_PT_animation(Section, bpy.types.Panel):
 
     def fill(self, context, source, settings):
         layout, bake = self.layout, settings.bake
-        layout.prop(bake, "format")
-        layout.prop(bake, "kind")
-        layout.prop(bake, "range")
+        draw_settings(layout, bake, "format", "kind", "range")
         if bake.range == "CUSTOM":
             column = layout.column(align=True)
             column.prop(bake, "start")
             column.prop(bake, "end")
-        layout.prop(bake, "step")
-        layout.prop(bake, "subframes")
-        if bake.format != "KEYS":
-            layout.prop(bake, "folder")
+        draw_settings(layout, bake, "step", "subframes", *(["folder"] if bake.format != "KEYS" else []))
         wrapped(layout, weight(context, source, bake))
         job_button(layout, Op.BAKE, "REC")
         modifier = modifier_stack.find_cache(source)

@@ -64,12 +64,41 @@ def with_zero(layout, group, parameter):
 
 
 def draw_settings(layout, group, *names):
-    """In a narrow sidebar switches have the whole width for their names."""
     for name in names:
-        column, prop = layout.column(align=True), group.bl_rna.properties[name]
-        if (prop.type == "BOOLEAN" or prop.is_enum_flag) and characters() < NARROW:
-            column.use_property_split = False
-        column.prop(group, name)
+        column, named = with_room(layout, group, name)
+        column.prop(group, name, **named)
+
+
+def with_room(layout, group, name):
+    """A column for a property, and what it is shown with: switches in a narrow sidebar, and long ones, have
+    the whole width; long names, and names of long choices, a line above."""
+    column, prop = layout.column(align=True), group.bl_rna.properties[name]
+    if prop.type == "BOOLEAN" or (prop.type == "ENUM" and prop.is_enum_flag):
+        column.use_property_split = characters() >= NARROW and not is_long(prop.name, VALUE)
+        return column, {}
+    choices = prop.enum_items if prop.type == "ENUM" else ()
+    if not is_long(prop.name, NAME) and not any(is_long(one.name, VALUE) for one in choices):
+        return column, {}
+    column.label(text=prop.name, text_ctxt=CONTEXT)
+    return column, {"text": ""}
+
+
+def switched(layout, group, switch, number):
+    """A switch, and beside it the number that counts while it is on."""
+    column, name = layout.column(align=True), group.bl_rna.properties[switch].name
+    above = is_long(name, NAME)
+    if above:
+        column.label(text=name, text_ctxt=CONTEXT)
+    row = column.row(heading="" if above else name)
+    row.prop(group, switch, text="")
+    beside = row.row()
+    beside.enabled = getattr(group, switch)
+    beside.prop(group, number, text="")
+
+
+def is_long(text, share):
+    """Whether a text has no room in that share of the sidebar."""
+    return len(bpy.app.translations.pgettext_iface(text, CONTEXT)) > share * characters()
 
 
 def modifier_row(layout, modifier, icon, remove):
@@ -83,11 +112,12 @@ def modifier_row(layout, modifier, icon, remove):
 
 def group_row(layout, group, name, source, further=""):
     """The choice of a vertex group of the source, and below it a number that counts where one is chosen."""
-    layout.prop_search(group, name, source, "vertex_groups")
+    column, named = with_room(layout, group, name)
+    column.prop_search(group, name, source, "vertex_groups", **named)
     if further:
-        row = layout.row()
+        row = layout.column()
         row.enabled = bool(getattr(group, name))
-        row.prop(group, further)
+        draw_settings(row, group, further)
 
 
 def note(layout, *reasons):
@@ -125,6 +155,7 @@ def presets(layout, name):
 
 MARGIN, CHARACTER = 80, 5.6  # pixels beside a label, and of a letter, at a scale of 1
 NARROW = 30  # letters
+NAME, VALUE = 0.385, 0.48  # shares of the letters: beside a value, and within it
 
 
 def characters():

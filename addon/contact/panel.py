@@ -2,7 +2,7 @@
 import bpy
 
 from ..blender.object_references import settings_of, source_of
-from ..blender.section import Section, draw_settings, note
+from ..blender.section import Section, draw_settings, note, switched
 from ..solver import contact
 
 
@@ -18,11 +18,7 @@ class ARAPFIELDS_PT_contact(Section, bpy.types.Panel):
         group, layout = settings.contact, self.layout.column()
         layout.enabled = group.use
         draw_settings(layout, group, "obstacle", "obstacles", "margin")
-        row = layout.row(heading="Level Ground")
-        row.prop(group, "use_ground", text="")
-        height = row.row()
-        height.enabled = group.use_ground
-        height.prop(group, "ground", text="")
+        switched(layout, group, "use_ground", "ground")
         draw_settings(layout, group, "itself")
         note(layout, contact.refusal(source))
 

@@ -4,7 +4,7 @@ import bpy
 from ..blender import icons
 from ..blender.language import translated
 from ..blender.object_references import source_of
-from ..blender.section import Section, draw_settings, note, wrapped
+from ..blender.section import Section, draw_settings, group_row, note, switched, wrapped
 from ..names import Op
 from . import empties, movers, scaling
 
@@ -92,11 +92,7 @@ class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
             wrapped(layout, hint, icon="INFO")
             return
         if all(entry.kind in empties.PINS for entry in settings.handles):
-            row = layout.row(heading="Keep the Rest")
-            row.prop(settings, "keep_rest", text="")
-            beyond = row.row()
-            beyond.enabled = settings.keep_rest
-            beyond.prop(settings, "keep_beyond", text="")
+            switched(layout, settings, "keep_rest", "keep_beyond")
         column = layout.column(align=True)
         column.operator(Op.SET_REST, icon="PINNED")
         column.operator(Op.RESET_HANDLE, icon="LOOP_BACK")
@@ -108,9 +104,9 @@ class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
             if entry.kind != "POINT":
                 draw_settings(layout, entry, "allow_scale")
             if entry.kind in ("GROUP", "BONE"):
-                layout.prop_search(entry, "group", source, "vertex_groups")
+                group_row(layout, entry, "group", source)
             if entry.group:
-                layout.prop(entry, "hold_from")
+                draw_settings(layout, entry, "hold_from")
             note(layout, scaling.ignored(source))
 
 

@@ -6,7 +6,7 @@ import bpy
 from ..blender import vertex_groups
 from ..blender.language import translated
 from ..blender.object_references import settings_of, source_of
-from ..blender.section import Section, note, settings_column
+from ..blender.section import Section, draw_settings, group_row, note, settings_column, switched
 from ..names import Op
 from ..solver import secondary_motion
 from . import sessions
@@ -49,13 +49,9 @@ class ARAPFIELDS_PT_secondary(Section, bpy.types.Panel):
         layout = self.layout.column()
         layout.enabled = group.use
         settings_column(layout, group, SECONDARY, advanced=False)
-        layout.prop_search(group, "group", source, "vertex_groups")
-        layout.prop(group, "start")
-        row = layout.row(heading="Ground")
-        row.prop(group, "use_ground", text="")
-        height = row.row()
-        height.enabled = group.use_ground
-        height.prop(group, "ground", text="")
+        group_row(layout, group, "group", source)
+        draw_settings(layout, group, "start")
+        switched(layout, group, "use_ground", "ground")
         note(layout, vertex_groups.missing(source, secondary_motion.group_names(source)))
 
 

@@ -2,7 +2,7 @@
 import bpy
 
 from ..blender.object_references import settings_of, source_of
-from ..blender.section import Advanced, Section, job_button, note, settings_column
+from ..blender.section import Advanced, Section, draw_settings, job_button, note, settings_column
 from ..core.settings.parameters import SKIN
 from ..names import Op
 from . import rig as rigs
@@ -25,7 +25,7 @@ class ARAPFIELDS_PT_skin(Section, bpy.types.Panel):
         if rig is not None:
             group = settings_of(rig).skin
             settings_column(layout, group, SKIN, advanced=False)
-            layout.prop(group, "groups")
+            draw_settings(layout, group, "groups")
         job_button(layout, Op.SKIN, "MOD_ARMATURE")
         note(layout, rigs.refusal(rig, meshes))
 

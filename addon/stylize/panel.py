@@ -3,7 +3,16 @@ import bpy
 
 from ..blender.icons import icon
 from ..blender.object_references import settings_of, source_of
-from ..blender.section import Advanced, Section, job_button, note, presets, settings_column
+from ..blender.section import (
+    Advanced,
+    Section,
+    draw_settings,
+    group_row,
+    job_button,
+    note,
+    presets,
+    settings_column,
+)
 from ..core.settings.styles import CUSTOM, STYLIZE
 from ..live.panel import live_buttons, playback_progress
 from ..names import Op
@@ -50,7 +59,7 @@ class ARAPFIELDS_PT_stylize(Section, bpy.types.Panel):
         label = next(label for identifier, label, _ in STYLE_ITEMS if identifier == style.style)
         layout.menu("ARAPFIELDS_MT_styles", text=label, **picture_of(style.style, style.style_object))
         if style.style in CUSTOM:
-            layout.prop(style, "style_object")
+            draw_settings(layout, style, "style_object")
         settings_column(layout, style, STYLIZE, advanced=False)
         reason = style_settings.refusal(source)
         live_buttons(layout, source, "STYLIZE", reason)
@@ -66,12 +75,11 @@ class ARAPFIELDS_PT_stylize_settings(Advanced, bpy.types.Panel):
     def fill(self, context, source, settings):
         layout, style = self.layout, settings.stylize
         if style.style not in CUSTOM:
-            layout.prop(style, "frame")
+            draw_settings(layout, style, "frame")
             if style.frame == "EMPTY":
-                layout.prop(style, "frame_object")
-        layout.prop_search(style, "region", source, "vertex_groups")
-        layout.prop(style, "region_material")
-        layout.prop(style, "use_handles")
+                draw_settings(layout, style, "frame_object")
+        group_row(layout, style, "region", source)
+        draw_settings(layout, style, "region_material", "use_handles")
         settings_column(layout, style, STYLIZE, advanced=True)
 
 

@@ -5,7 +5,7 @@ import bpy
 
 from ..blender import mesh_arrays, object_references
 from ..blender.language import translated
-from ..blender.section import Advanced, Section, job_button, presets, settings_column, wrapped
+from ..blender.section import Advanced, Section, draw_settings, job_button, presets, settings_column, wrapped
 from ..blender.user_preferences import fit_cache
 from ..core.runtime import native
 from ..core.settings.parameters import FIT
@@ -60,7 +60,7 @@ class ARAPFIELDS_PT_surface(Advanced, bpy.types.Panel):
         layout.prop(settings, "surface", expand=True)
         if settings.surface == "EXACT":
             return
-        layout.prop(settings.fit, "quality")
+        draw_settings(layout, settings.fit, "quality")
         job_button(layout, Op.FIT, "MOD_REMESH")
         settings_column(layout, settings.fit, FIT, advanced=True)
         if not settings.fit_key:

@@ -37,7 +37,7 @@ class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
 
     def fill(self, context, source, settings):
         layout, wrap = self.layout, settings.wrap
-        layout.prop(wrap, "onto")
+        draw_settings(layout, wrap, "onto")
         column = layout.column(align=True)
         column.operator(Op.SUGGEST_LANDMARKS, icon="LIGHT")
         column.operator(Op.CLICK_LANDMARKS, icon="PINNED")
@@ -49,9 +49,9 @@ class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
         column.operator(Op.MIRROR_LANDMARKS, text="", icon="MOD_MIRROR")
         settings_column(layout, wrap, WRAP, advanced=False)
         if rest_bones.armatures_of(source):
-            layout.prop(wrap, "fit_rig")
+            draw_settings(layout, wrap, "fit_rig")
         if not holds_place(source):
-            layout.prop(wrap, "move_object")
+            draw_settings(layout, wrap, "move_object")
         job_button(layout, Op.WRAP, "MOD_SHRINKWRAP")
         factor_slider(layout, source)
         draw_settings(layout, wrap, "transfer")

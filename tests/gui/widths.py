@@ -77,11 +77,12 @@ class Measured(panels.Layout):
     def prop(self, data, name, **options):
         super().prop(data, name, **options)
         text, prop = self.texts.pop(), data.bl_rna.properties.get(name)
-        if prop is None or options.get("icon_only") or not text.strip():
+        if prop is None or options.get("icon_only"):
             return
-        values = ((1 - LABELS) if self.is_split else 1) * self.width - PADDING
+        values = ((1 - LABELS) if self.is_split and text else 1) * self.width - PADDING
         is_switch = prop.type == "BOOLEAN" and not options.get("icon")
-        self.note(text, values - ICON if is_switch else LABELS * self.width - PADDING)
+        if text.strip():
+            self.note(text, values - ICON if is_switch else LABELS * self.width - PADDING)
         for item in prop.enum_items if prop.type == "ENUM" and not options.get("expand") else ():
             self.note(item.name, values - (0 if prop.is_enum_flag else ICON))
 

@@ -27,7 +27,7 @@ class Layout:
         self.texts.append(options["text"] if own else options.get("text", data.bl_rna.properties[name].name))
 
     def prop_search(self, data, name, source, collection, **options):
-        self.prop(data, name)
+        self.prop(data, name, **options)
         assert collection in source.bl_rna.properties
 
     def operator(self, name, **options):
