@@ -101,6 +101,18 @@ def wrap():
     assert np.mean(off) < 0.01 * size, np.mean(off) / size
 
 
+def splats():
+    """The head of the scan goes up, and its splats turn."""
+    import bpy
+
+    rest, now = seen("scan")
+    assert np.linalg.norm(now - rest, axis=1).max() > 0.2
+    scan = bpy.data.objects["scan"]
+    evaluated = scan.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    turned = [np.array([v.value for v in mesh.attributes["rot_0"].data]) for mesh in (scan.data, evaluated)]
+    assert np.allclose(turned[0], 1) and turned[1].min() < 0.99
+
+
 def stylize():
     rest, now = seen("Dog")
     assert len(rest) == len(now) and np.linalg.norm(now - rest, axis=1).max() > 0.05
@@ -113,7 +125,7 @@ def python():
     assert raised[:, 2].max() > 1.75
 
 
-CHECKS = {check.__name__: check for check in (pins, character, animate, walk, stylize, wrap, python)}
+CHECKS = {check.__name__: check for check in (pins, character, animate, walk, stylize, splats, wrap, python)}
 
 
 @pytest.mark.slow  # the scenes and a bake take some ten seconds each
