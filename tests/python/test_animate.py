@@ -18,8 +18,8 @@ from support.geometry.meshes import sphere
 from support.programs.cli import process, run
 
 import arapfields as af
-from arapfields.cli.animate import STEPS, TOLERANCE
 from arapfields.cli.files import read_mesh
+from arapfields.cli.frame_solver import STEPS, TOLERANCE
 
 FRAMES = 6
 SAME = {"samples": 400, "coarse_centers": 10, "fine_centers": 40}

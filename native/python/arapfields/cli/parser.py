@@ -223,17 +223,17 @@ def _animate(added):
         added,
         "animate",
         animate,
-        "a mesh under handles that move from frame to frame, as a point cache or USD",
+        "a mesh or splats under handles that move from frame to frame",
         "spot.obj --tracks walk.json -o walk.pc2",
         "spot.obj --tracks walk.npz -o walk.usdc --frames 1 48 --up-axis y",
         "spot.obj --tracks walk.json -o walk.pc2 --shard 2/8",
         "spot.obj --tracks walk.json -o walk.pc2 --secondary --damping 2",
+        "scan.ply --tracks walk.json -o walk.ply",
     )
-    parser.add_argument("input", help=MESH)
+    parser.add_argument("input", help=f"{MESH}; or splats")
     parser.add_argument("--tracks", required=True, metavar="FILE", help=".json or .npz, see docs/animate.md")
-    parser.add_argument(
-        "-o", "--output", required=True, metavar="FILE", help=".pc2, .mdd, or .usd, .usda, .usdc by usd-core"
-    )
+    kinds = ".pc2, .mdd, or .usd, .usda, .usdc by usd-core; for splats .ply, one a frame"
+    parser.add_argument("-o", "--output", required=True, metavar="FILE", help=kinds)
     parser.add_argument("--frames", nargs=2, type=int, metavar=("FIRST", "LAST"), help="these alone [all]")
     parser.add_argument(
         "--shard", type=shard, metavar="I/N", help="solve the part I of N; the last part writes the output"

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the verb animate solves: the fields of frames."""
+
+import hashlib
+
+import numpy as np
+
+import arapfields as af
+
+from .options import given_options
+from .touching import contact_key, contact_of
+
+STEPS, TOLERANCE = 300, 1e-6  # of a frame's solve, which starts from rest, where nothing else is said
+
+
+def frames_wanted(args, tracks):
+    """Indices of the frames to write."""
+    first, last = args.frames or (tracks.start, tracks.start + tracks.count - 1)
+    end = tracks.start + tracks.count - 1
+    if first > last:
+        raise af.InvalidInput(f"--frames: {first} to {last} holds no frame")
+    if first < tracks.start or last > end:
+        raise af.InvalidInput(f"--frames: {first} to {last}; {tracks.path} has {tracks.start} to {end}")
+    return list(range(first - tracks.start, last - tracks.start + 1))
+
+
+def secondary_motion(args):
+    """The options of --secondary; None where frames are to be solved each for itself."""
+    options = given_options(af.SecondaryMotionOptions, args)
+    given = [name for name in options.fields if getattr(args, f"option_{name}") is not None]
+    if given and not args.secondary:
+        raise af.InvalidInput(f"--{given[0].replace('_', '-')}: it is for --secondary")
+    if args.secondary and args.shard:
+        raise af.InvalidInput("--shard: with --secondary each frame follows from the one before")
+    return options if args.secondary else None
+
+
+def solve_limits(args):
+    """What a solve from rest may take: more than the options' own, which are for a drag."""
+    return {
+        "iterations": STEPS if args.option_iterations is None else 0,
+        "tolerance": TOLERANCE if args.option_tolerance is None else 0.0,
+    }
+
+
+class FrameSolver:
+    """Fields of frames: each from rest, a function of its own frame alone; or with secondary motion, each
+    from the one before, the tracks' first at rest."""
+
+    def __init__(self, samples, tracks, options, args):
+        self._samples, self._tracks, self._options = samples, tracks, options
+        self._limits, self._secondary = solve_limits(args), secondary_motion(args)
+        self._contact, self._contact_key = contact_of(args), contact_key(args)
+        points = self._samples.points
+        self._bounds = np.array([points.min(0), points.max(0)])
+        self._live = self._at = None  # the frame that was stepped to
+        self._digests = []
+
+    def _handles(self, index):
+        return self._tracks.handles(index, self._bounds)
+
+    def check(self, indices):
+        """InvalidInput names the first frame whose handles cannot be."""
+        for index in indices:
+            self._handles(index)
+
+    def description(self, index):
+        """Bytes that stand for all that the frames have in common; `index` is any frame's."""
+        options = {name: value for name, value in self._options.to_dict().items() if name != "threads"}
+        rest = [(type(h).__name__, np.asarray(h.rest).tolist(), h.weight) for h in self._handles(index)]
+        further = [] if self._secondary is None else [self._tracks.fps, self._secondary.to_dict()]
+        text = repr([af.__version__, options, self._limits, rest, *further, *self._contact_key])
+        return text.encode()
+
+    def key(self, index):
+        """Arrays that tell the frame's shape from others."""
+        if self._secondary is None:
+            return self._tracks.targets(index)
+        while len(self._digests) <= index:  # of a frame's targets, and of all before
+            targets = [
+                np.asarray(target, float).tobytes() for target in self._tracks.targets(len(self._digests))
+            ]
+            self._digests.append(hashlib.blake2b(b"".join([*self._digests[-1:], *targets])).digest())
+        return [np.frombuffer(self._digests[index], np.uint8)]
+
+    def field(self, index, task):
+        """Cancelled where the task is."""
+        if self._live is None:
+            settings = {"contact": self._contact, "task": task}
+            self._live = af.LiveDeformer(self._samples, self._handles(index), self._options, **settings)
+            self._live.set_secondary_motion(self._secondary)
+        if self._secondary is None or self._at is None or index < self._at:
+            self._live.reset()
+            self._at = index if self._secondary is None else 0
+            self._live.solve(self._targets(self._at), **self._limits)
+        while self._at < index and not task.cancelled:
+            self._at += 1
+            self._live.step(self._targets(self._at), 1.0 / self._tracks.fps)
+        if task.cancelled:
+            raise af.Cancelled("cancelled")
+        return self._live.field
+
+    def _targets(self, index):
+        return [handle.target for handle in self._handles(index)]
