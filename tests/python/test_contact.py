@@ -178,3 +178,21 @@ def test_what_cannot_be_is_named(samples):
         af.deform(samples, handles, af.DeformOptions(centers=50, exact_handles=True), contact=touch)
     with pytest.raises(af.InvalidInput, match="field='radial'"):
         af.deform(samples, handles, af.DeformOptions(field="neural"), contact=touch)
+
+
+def test_a_report_is_of_the_planes_found_last():
+    """A fuzz net's calls: the last search finds more planes, and the process ended in the report."""
+    rows = np.random.default_rng(2).normal(size=(60, 3))
+    samples = af.SurfaceSamples(rows, rows / np.linalg.norm(rows, axis=1, keepdims=True))
+    handle, up, few = af.Point(rows[0], rows[0] + 0.1), np.ones(3), {"iterations": 2, "tolerance": 0.1}
+    options = af.LiveOptions(samples=50, coarse_centers=5, fine_centers=5, iterations=2, threads=1)
+    live = af.LiveDeformer(samples, [handle], options)
+    live.set_secondary_motion(af.SecondaryMotionOptions(), up=up, ground=1e30)
+    live.step([rows[1]], 0.01)
+    live.set_style("cube", 0.5, sharpness=5.0, up=up)
+    live.set_symmetry("x")
+    live.set_contact(af.Contact(ground=-1.0))
+    live.solve([rows[1]], **few)
+    live.set_secondary_motion(af.SecondaryMotionOptions(), up=up, ground=-2.0)
+    live.set_handles([handle])
+    assert np.isfinite(live.solve([rows[1]], **few)(rows)).all()
