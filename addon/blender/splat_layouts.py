@@ -7,6 +7,7 @@ from ..core.errors import UserError
 from ..names import CHANGES
 
 FLOAT, VECTOR = "FLOAT", "FLOAT_VECTOR"
+WIDTHS, BLOCK = {FLOAT: 1, VECTOR: 3}, 16384
 LEAST = 1e-6  # opacity; and what is left to full opacity
 COUNTS = (16, 9, 4, 1)  # of spherical harmonics
 
@@ -32,12 +33,10 @@ class FileLayout:
         alpha = 1.0 / (1.0 + np.exp(-values[self.opacity]))
         return table[:, :4], np.exp(table[:, 4:7]), alpha, harmonics.swapaxes(1, 2)
 
-    def values(self, splats, columns):
-        """{attribute: values} of splats."""
+    def parts(self, splats, columns):
+        """Arrays (n, …) that have the columns' values side by side."""
         colours = splats.harmonics
-        rest = colours[:, 1:].swapaxes(1, 2).reshape(len(colours), -1)
-        table = np.concatenate([splats.rotations, np.log(splats.scales), colours[:, 0], rest], axis=1)
-        return dict(zip(columns, table.T, strict=True))
+        return splats.rotations, np.log(splats.scales), colours[:, 0], colours[:, 1:].swapaxes(1, 2)
 
 
 class VectorLayout:
@@ -57,17 +56,18 @@ class VectorLayout:
         turns = np.column_stack([values["quatxyz"], values["quatw"]])
         return turns, values["scale"], values[self.opacity], harmonics
 
-    def values(self, splats, columns):
-        w, x, y, z = turns = splats.rotations.T
+    def parts(self, splats, columns):
+        turns, colours = splats.rotations, splats.harmonics
+        w, x, y, z = turns.T
         angles = [
             np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
             np.arcsin(np.clip(2 * (w * y - z * x), -1, 1)),
             np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
         ]
-        own = {"quatw": turns[3], "quatxyz": turns[:3].T, "scale": splats.scales}
+        own = {"quatw": turns[:, 3:], "quatxyz": turns[:, :3], "scale": splats.scales}
         own |= {"logscale": np.log(splats.scales), "rot_euler": np.stack(angles, axis=1)}
-        own |= {f"sh{k}": splats.harmonics[:, k] for k in range(splats.harmonics.shape[1])}
-        return {name: own[name] for name in columns}
+        own |= {f"sh{k}": colours[:, k] for k in range(colours.shape[1])}
+        return [own[name] for name in columns]
 
 
 LAYOUTS = (FileLayout(), VectorLayout())
@@ -91,11 +91,13 @@ class Splats:
 
     def __init__(self, name, mesh, centers):
         self.layout, self.columns = layout_of(mesh), columns_of(mesh)
-        self.given = {
+        given = {
             key: read(name, mesh, key, kind)
             for key, kind in {**self.columns, self.layout.opacity: FLOAT}.items()
         }
-        turns, scales, alpha, colours = self.layout.arrays(self.given)
+        self.rest = by_column([given[key] for key in self.columns])
+        self.spare = None  # splats whose memory the next that are moved take
+        turns, scales, alpha, colours = self.layout.arrays(given)
         count = next((count for count in COUNTS if colours.shape[1] == count), None)
         if count is None:
             raise UserError(
@@ -112,17 +114,37 @@ class Splats:
         """The library's own splats."""
         return library.GaussianSplats(*self.arrays)
 
-    def changes(self, moved):
-        """{attribute: what is added to it} where the splats have moved, in single precision."""
-        values = self.layout.values(moved, self.columns)
-        return {key: (value - self.given[key]).astype(np.float32) for key, value in values.items()}
+    def changes(self, prepared, field):
+        """{attribute: what is added to it} where a field moves the splats."""
+        spare, self.spare = self.spare, None  # of whichever thread comes first
+        moved = prepared.moved(field, spare, max_stretch=np.inf)
+        changes, found, place = by_column(self.layout.parts(moved, self.columns)), {}, 0
+        changes -= self.rest
+        for key, kind in self.columns.items():
+            found[key] = changes[place] if kind == FLOAT else changes[place : place + 3].T
+            place += WIDTHS[kind]
+        self.spare = moved
+        return found
+
+
+def by_column(parts):
+    """(k, n) in single precision, of arrays (n, …); a block of rows after the other stays in the cache."""
+    count = len(parts[0])
+    result = np.empty((sum(part[:1].size for part in parts), count), dtype=np.float32)
+    for first in range(0, count, BLOCK):
+        place = 0
+        for part in parts:
+            rows = part[first : first + BLOCK].reshape(min(BLOCK, count - first), -1).T
+            result[place : place + len(rows), first : first + BLOCK] = rows
+            place += len(rows)
+    return result
 
 
 def read(name, mesh, key, kind):
     attribute = mesh.attributes.get(key)
     if attribute is None or (attribute.domain, attribute.data_type) != ("POINT", kind):
         raise UserError("{name}: its splats have no {attribute}", name=name, attribute=key)
-    width = 3 if kind == VECTOR else 1
+    width = WIDTHS[kind]
     flat = np.empty(width * len(attribute.data), dtype=np.float32)
     attribute.data.foreach_get("vector" if kind == VECTOR else "value", flat)
     if not np.isfinite(flat).all():

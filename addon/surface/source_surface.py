@@ -49,7 +49,7 @@ class SourceSurface:
         """What a field adds to the splats' attributes, by their names; None: there are no splats."""
         if self.splats is None:
             return None
-        return self.splats.changes(self.prepared.moved(field, max_stretch=np.inf))
+        return self.splats.changes(self.prepared, field)
 
     def implicit(self, tracker, weight):
         """The implicit surface that was chosen; runs on the worker."""
