@@ -132,7 +132,7 @@ def test_prepared_splats_move_as_others_do():
         again = prepared.moved(field, before, max_stretch=most)
         assert before is None or len(before) == 0  # its memory is the result's
         assert len(prepared) == len(rest) and abs(len(again) - len(moved)) <= 0.002 * len(moved)
-        assert np.abs(again.centers - moved.centers)[: len(rest)].max() < 0.05
+        assert np.abs(again.centers[: len(rest)] - moved.centers[: len(rest)]).max() < 0.05
         if most == np.inf:
             assert np.abs(again.centers - moved.centers).max() < PREPARED
             off = np.abs(covariances(again) - covariances(moved)).max((1, 2))
