@@ -9,11 +9,11 @@ namespace arapfields {
 namespace {
 
 /// A bone matters where it is at most so many times as far as the nearest, through the inside.
-constexpr float farthest_share = 6.0f;
+constexpr float farthest_share = 12.0f;
 /// The same for bones of the other side: a leg does not move the other.
 constexpr float side_share = 2.0f;
 /// Of the distances of bones, and of those of the other side, in squared sizes of the shape.
-constexpr double distance_weight = 2e-6, side_weight = 1e-5;
+constexpr double distance_weight = 2e-6, side_weight = 1e-4;
 
 }  // namespace
 

@@ -24,7 +24,8 @@ struct ARAPFIELDS_EXPORT Corrective {
 };
 
 /// At most options.correctives shape keys for weights (n, bones), those first that take most of what is left
-/// between the skin and the field. Throws InvalidInput as skin_weights does; Cancelled.
+/// between the skin and the field. On a symmetric rig twin bones have mirrored keys, and the other keys are
+/// even or odd. Throws InvalidInput as skin_weights does; Cancelled.
 ARAPFIELDS_EXPORT std::vector<Corrective> skin_correctives(
     const TriangleMesh& mesh, const std::vector<Bone>& bones, const RowMatrix<float>& weights,
     const SkinOptions& options, const Progress& progress = {}, const VertexWeights& painted = {});

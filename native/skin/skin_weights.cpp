@@ -17,7 +17,7 @@ constexpr std::uint64_t stream = 34;
 /// Poses of a round; each shows most what the round before was farthest from.
 constexpr int round_poses = 8;
 /// How often each joint turns at least.
-constexpr double least_activity = 0.5;
+constexpr double least_activity = 0.8;
 /// In sizes of the shape, closed pieces that stay rigid.
 constexpr double rigid_size = 0.12;
 /// The share of a piece's weights from which one bone has them all.

@@ -88,11 +88,19 @@ def test_no_leg_moves_the_other_and_both_sides_are_alike(legs, weights):
     low = V[:, 2] < KNEE
     assert weights[low & (V[:, 0] > 0)][:, 3:].max() < 0.01
     assert weights[low & (V[:, 0] < 0)][:, 1:3].max() < 0.01
-    away = np.abs(V[:, None] * [-1, 1, 1] - V).max(axis=2)
-    twin = away.argmin(axis=1)
+    paired, twin = twins(V)
+    assert np.abs(weights[paired] - weights[twin][:, OTHER]).max() < 1e-3
+
+
+OTHER, MIRRORED = [0, 3, 4, 1, 2], np.array([-1, 1, 1])
+
+
+def twins(V):
+    """Which vertices have one across x = 0, and which they are."""
+    away = np.abs(V[:, None] * MIRRORED - V).max(axis=2)
     paired = away.min(axis=1) < 1e-5
     assert paired.mean() > 0.9  # of a grid that is symmetric itself
-    assert np.abs(weights[paired] - weights[twin[paired]][:, [0, 3, 4, 1, 2]]).max() < 1e-3
+    return paired, away.argmin(axis=1)[paired]
 
 
 def test_unwelded_and_torn_meshes_get_the_same_weights(legs, weights):
@@ -129,10 +137,20 @@ def test_correctives_take_the_skin_closer(legs, weights):
     assert len(keys) == 16 and all(bones[key.bone].parent is not None for key in keys)
     assert all(abs(key.value(np.eye(3))) < 1e-12 and key.offsets.shape == V.shape for key in keys)
     poses = held_out(legs, bones)
+    local = [bone.box[:3, :3] / np.linalg.norm(bone.box[:3, :3], axis=0) for bone in bones]
+
+    def value(key, turns):
+        return key.value(local[key.bone].T @ turns[key.bone] @ local[key.bone])
+
+    paired, twin = twins(V)
+    flip, turns = np.diag(MIRRORED), poses[0][1]
+    mirrored = [flip @ turns[other] @ flip for other in OTHER]
+    for left, right in zip(keys[::2], keys[1::2], strict=True):  # each side has the other's
+        assert right.bone == OTHER[left.bone] and np.isclose(value(left, turns), value(right, mirrored))
+        assert np.allclose(left.offsets[paired], right.offsets[twin] * MIRRORED, atol=1e-6)
     squares = []
     for moved, turns, shape in poses:
-        local = [bone.box[:3, :3] / np.linalg.norm(bone.box[:3, :3], axis=0) for bone in bones]
-        values = [key.value(local[key.bone].T @ turns[key.bone] @ local[key.bone]) for key in keys]
+        values = [value(key, turns) for key in keys]
         corrected = V + sum(value * key.offsets for value, key in zip(values, keys, strict=True))
         squares.append(((af.skin(corrected, weights, moved) - shape) ** 2).sum(1).mean())
     assert np.sqrt(np.mean(squares)) / np.ptp(V[:, 2]) < 0.8 * error(V, weights, poses)
