@@ -84,9 +84,10 @@ class FrameSolver:
         self.contact_key = None
 
     def _native_handles(self, handles):
-        setup = self.sampled.setup
-        has_reach = setup.kind == "DEFORM"
-        return native_handles(native.library(), handles, setup.surface, self.sampled.samples, has_reach)
+        setup, af = self.sampled.setup, native.library()
+        held = native_handles(af, handles, setup.surface, self.sampled.samples, setup.kind == "DEFORM")
+        self.handle_count = len(held)
+        return held
 
     def apply_request(self, request):
         """Has the native solver know all of a request but where its handles are; returns that."""
@@ -107,7 +108,8 @@ class FrameSolver:
             self.solver.set_contact(native_contact(request.contact))
         if request.motion != self.motion:
             self._set_motion(request.motion)
-        return request.targets if request.handles else None
+        # The last, of what is far from all pins, is no handle where nothing is.
+        return request.targets[: self.handle_count] if request.handles else None
 
     def _set_motion(self, motion):
         self.motion = motion

@@ -29,3 +29,16 @@ def test_the_shape_moves_with_the_pin_in_the_same_picture():
     drag.SHAPE_WAIT = moment
     assert min(moved) > 0.02, moved
     dragged.cancel(bpy.context)
+
+
+def test_pins_that_leave_nothing_far_are_dragged_all_the_same():
+    """What keeps its place beyond all pins is no handle then."""
+    bar = scenes.bar()
+    for x in (0.9, -0.9):
+        dragged = drag.of_new_pin(bpy.context, bar, np.array([x, -0.25, 0.0]), 0.1)
+        dragged.move(bpy.context, (x, -0.25, 0.3))
+        dragged.end(bpy.context)
+        assert sessions.is_live(bar)
+        off = np.linalg.norm(scenes.world_points(bar) - (x, -0.25, 0.3), axis=1).min()
+        assert off < 0.2, off
+        bar.arapfields.keep_beyond = 10.0
