@@ -24,11 +24,20 @@ for s, side in ((1, "L"), (-1, "R")):
     BONES[f"Upper Arm.{side}"] = ("Chest", (s * 0.16, 0, 1.07), (s * 0.42, 0, 1.03))
     BONES[f"Forearm.{side}"] = (f"Upper Arm.{side}", (s * 0.42, 0, 1.03), (s * 0.72, 0, 0.98))
     BONES[f"Leg.{side}"] = ("Hips", (s * 0.12, 0, 0.56), (s * 0.13, 0, 0.05))
+JOINTS = {
+    name: bone for name, bone in BONES.items() if not name.startswith("Leg")
+}  # knees, ankles, wrists too
+for s, side in ((1, "L"), (-1, "R")):
+    JOINTS[f"Forearm.{side}"] = (f"Upper Arm.{side}", (s * 0.42, 0, 1.03), (s * 0.65, 0, 0.99))
+    JOINTS[f"Hand.{side}"] = (f"Forearm.{side}", (s * 0.65, 0, 0.99), (s * 0.80, 0, 0.97))
+    JOINTS[f"Thigh.{side}"] = ("Hips", (s * 0.11, 0, 0.58), (s * 0.125, 0, 0.32))
+    JOINTS[f"Shin.{side}"] = (f"Thigh.{side}", (s * 0.125, 0, 0.32), (s * 0.13, 0, 0.09))
+    JOINTS[f"Foot.{side}"] = (f"Shin.{side}", (s * 0.13, 0, 0.09), (s * 0.135, -0.18, 0.04))
 EYE, EYES = 0.075, [(side * 0.125, -0.235, 1.545) for side in (-1, 1)]
 
 
 @functools.cache
-def body():
+def body(cells=120):
     """The Shape: head, trunk, arms to the sides, legs; looks towards -y, 1.8 high."""
     middle = [
         Ellipsoid((0, 0.01, 1.52), (0.31, 0.29, 0.29)),
@@ -48,7 +57,7 @@ def body():
         Ellipsoid((0.135, -0.06, 0.06), (0.085, 0.15, 0.065), SHOES, 0.03),
     ]
     mouth = [Ellipsoid((0, -0.285, 1.345), (0.06, 0.04, 0.012), (0.35, 0.06, 0.05))]
-    return build([*middle, *mirrored(half)], 0.06, paint=mouth, base=SKIN, cells=120)
+    return build([*middle, *mirrored(half)], 0.06, paint=mouth, base=SKIN, cells=cells)
 
 
 def coloured(name, shape, roughness=0.45):
@@ -97,6 +106,18 @@ def cut(made, place, out):
     """Removes what lies out of a plane."""
     parts = [*made.verts, *made.edges, *made.faces]
     bmesh.ops.bisect_plane(made, geom=parts, plane_co=place, plane_no=out, clear_outer=True)
+
+
+def split(item):
+    """Each triangle gets corners of its own, and keeps how it is shaded."""
+    normals = [tuple(vertex.normal) for vertex in item.data.vertices]
+    corners = [normals[loop.vertex_index] for loop in item.data.loops]
+    made = bmesh.new()
+    made.from_mesh(item.data)
+    bmesh.ops.split_edges(made, edges=made.edges)
+    made.to_mesh(item.data)
+    made.free()
+    item.data.normals_split_custom_set(corners)
 
 
 def eye(place, side):

@@ -15,6 +15,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "blender_scripts")]
 
 import bpy  # noqa: E402
 import child  # noqa: E402
+import dressing  # noqa: E402
 import menagerie  # noqa: E402
 import scanned  # noqa: E402
 import stage  # noqa: E402
@@ -71,6 +72,19 @@ def character():
     made = child.build_scene()
     in_studio([made.body], azimuth=18, elevation=6, around=[(-0.95, 0, 1.9), (0.95, 0, 1.9)])
     chosen(made.body)
+
+
+def skin():
+    """A body whose triangles are not joined, eyes, a shirt, and an armature that moves none of them yet."""
+    body = child.coloured("Body", child.body(cells=72))
+    child.shirt(body)
+    child.split(body)
+    for place, side in zip(child.EYES, "RL", strict=True):
+        child.eye(place, side)
+    rig = dressing.rig(child.JOINTS)
+    rig.show_in_front = True
+    in_studio([body], azimuth=18, elevation=6, around=[(-0.95, 0, 1.9), (0.95, 0, 1.9)])
+    chosen(body)
 
 
 def animate():
@@ -142,7 +156,7 @@ def stylize():
     chosen(dog)
 
 
-SCENES = (pins, character, animate, walk, stylize, wrap)
+SCENES = (pins, character, skin, animate, walk, stylize, wrap)
 
 
 def comfortable():

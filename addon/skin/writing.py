@@ -68,7 +68,7 @@ def add_correctives(item, rig, shape, rows, correctives, names):
         key = item.shape_key_add(name=f"{CORRECTIVE}{number} {bone}", from_mix=False)
         basis = mesh_arrays.vectors(key.relative_key.data, "co").astype(np.float64)
         mesh_arrays.put_vectors(key.data, basis + offsets @ back.T, "co")
-        key.slider_min, key.slider_max = -10.0, 10.0
+        key.slider_min, key.slider_max = -1.0, 1.0  # no farther than in the poses that were seen
         drive(key, rig, bone, corrective.coefficients)
         count += 1
     return count

@@ -41,6 +41,11 @@ FIGURES = [
     Figure(
         "loop_character", "a character that waves, eyes, shirt and hair carried, moving", pages=WORKFLOWS[1:2]
     ),
+    Figure(
+        "loop_skin",
+        "weights of a body in pieces, beside Blender's automatic ones, and moving",
+        pages=("workflows/skin.md",),
+    ),
     Figure("loop_walk", "a walk without and with secondary motion, and moving", pages=("workflows/walk.md",)),
     Figure("loop_wrap", "a dog that takes the shape of a scan, and moving", pages=("workflows/wrap.md",)),
     Figure("loop_style", "a style's strength from none to all, moving"),

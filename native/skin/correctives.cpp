@@ -182,7 +182,8 @@ std::vector<Key> chosen_keys(const Skeleton& skeleton, const Eigen::MatrixXd& va
 }  // namespace
 
 double Corrective::value(const Mat3& rotation) const {
-  return features_of(rotation).dot(Eigen::Map<const Features>(coefficients.data()));
+  const double value = features_of(rotation).dot(Eigen::Map<const Features>(coefficients.data()));
+  return std::clamp(value, -1.0, 1.0);
 }
 
 std::vector<Corrective> skin_correctives(const TriangleMesh& mesh, const std::vector<Bone>& bones,

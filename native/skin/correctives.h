@@ -14,10 +14,10 @@ namespace arapfields {
 
 /// A shape key that takes the skin to the field's poses, driven by one joint. Its value is a polynomial of
 /// the joint's rotation in the bone's axes, the unit quaternion (w, x, y, z): Σ coefficients · (wx, wy, wz,
-/// xx, yy, zz, xy, xz, yz). It is the same for a quaternion and its negative, and 0 at rest.
+/// xx, yy, zz, xy, xz, yz), cut to −1 … 1. It is the same for a quaternion and its negative, and 0 at rest.
 struct ARAPFIELDS_EXPORT Corrective {
   Index bone;                          ///< among all bones
-  std::array<double, 9> coefficients;  ///< such that values of 1 are as large as they get
+  std::array<double, 9> coefficients;  ///< such that 1 is the largest value in the poses seen
   Points offsets;                      ///< (n,3) of the vertices at rest
 
   double value(const Mat3& rotation) const;

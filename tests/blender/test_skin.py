@@ -116,6 +116,11 @@ def test_correctives_are_keys_with_plain_drivers():
     turns = {f"{bone}_{side}": ((1, 0.3, 0.2), 0.5) for bone in ("Thigh", "Shin") for side in SIDES}
     posed(rig, **turns)
     assert max(abs(key.value) for key in keys) > 0.05
+    largest = []
+    for axis in np.eye(3):
+        posed(rig, **{name: (axis, 1.5) for name in turns})
+        largest += [abs(key.value) for key in keys]
+    assert max(largest) == 1  # no farther than in the poses seen
     bpy.ops.arapfields.skin(**QUICK)
     assert len(body.data.shape_keys.key_blocks) == 1
 

@@ -58,6 +58,15 @@ def character():
     assert len(__import__("bpy").data.objects["Body"].arapfields.carried) == 4
 
 
+def skin():
+    """Nobody's triangles part, and eyes stay as they are."""
+    rest, now = seen("Body")
+    _, first, same = np.unique(rest.round(5), axis=0, return_index=True, return_inverse=True)
+    assert np.abs(now - now[first[same.ravel()]]).max() < 1e-3 and np.abs(now - rest).max() > 0.3
+    eye_rest, eye = seen("Eye.L")
+    assert np.allclose(np.ptp(eye_rest, axis=0).max(), np.linalg.norm(np.ptp(eye, axis=0)) / 3**0.5, rtol=0.1)
+
+
 def animate():
     import bpy
 
@@ -125,7 +134,9 @@ def python():
     assert raised[:, 2].max() > 1.75
 
 
-CHECKS = {check.__name__: check for check in (pins, character, animate, walk, stylize, splats, wrap, python)}
+CHECKS = {
+    check.__name__: check for check in (pins, character, skin, animate, walk, stylize, splats, wrap, python)
+}
 
 
 @pytest.mark.slow  # the scenes and a bake take some ten seconds each

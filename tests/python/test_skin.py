@@ -136,6 +136,7 @@ def test_correctives_take_the_skin_closer(legs, weights):
     keys = af.skin_correctives(V, F, bones, weights, af.SkinOptions(correctives=16, samples=2000))
     assert len(keys) == 16 and all(bones[key.bone].parent is not None for key in keys)
     assert all(abs(key.value(np.eye(3))) < 1e-12 and key.offsets.shape == V.shape for key in keys)
+    assert max(abs(key.value(rotation(np.array([2.0, 1, 0])))) for key in keys) == 1  # no farther than seen
     poses = held_out(legs, bones)
     local = [bone.box[:3, :3] / np.linalg.norm(bone.box[:3, :3], axis=0) for bone in bones]
 
