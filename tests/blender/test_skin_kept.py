@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Skin to Armature: undo, files, cancel, and what it finds and leaves: other rigs, links, hidden meshes."""
+
+import numpy as np
+import pytest
+from support.blender.inside import IN_BLENDER
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.baking import cancelled_at
+    from support.blender.skins import person, shirt, weights_of
+    from support.blender.stages import Operator
+
+    from addon.skin.operators import ARAPFIELDS_OT_skin
+
+pytestmark = pytest.mark.in_blender
+
+
+def seen_of(body):
+    """All that skinning may change, as values."""
+    keys = body.data.shape_keys
+    return {
+        "groups": {
+            group.name: weights_of(body, [group.name]).round(6).tolist() for group in body.vertex_groups
+        },
+        "modifiers": [(m.name, m.type, m.object.name) for m in body.modifiers],
+        "parent": (body.parent and body.parent.name, [tuple(row) for row in body.matrix_parent_inverse]),
+        "keys": [(key.name, [tuple(p.co) for p in key.data]) for key in keys.key_blocks] if keys else [],
+        "drivers": [c.driver.expression for c in keys.animation_data.drivers] if keys else [],
+    }
+
+
+def test_undo_a_file_and_another_armature(tmp_path):
+    """Undone, done again, saved and read; an armature and a group that were there stay as they were."""
+    bpy.context.preferences.edit.use_global_undo = True
+    body, rig = person()
+    old = rig.copy()
+    old.data, old.name = rig.data.copy(), "Old"
+    bpy.context.collection.objects.link(old)
+    old.data.bones["Spine"].name = "Trunk"
+    body.modifiers.new("Before", "ARMATURE").object = old
+    body.vertex_groups.new(name="Trunk").add([1, 2, 3], 0.5, "REPLACE")
+    bones = [(bone.name, tuple(bone.head_local)) for bone in old.data.bones]
+    scenes.activate(body, rig)
+    bpy.ops.ed.undo_push(message="before")
+    before = seen_of(body)
+    bpy.ops.arapfields.skin(correctives=2, poses=8, samples=1000)
+    bpy.ops.ed.undo_push(message="after")
+    after = seen_of(body)
+    assert after["groups"]["Trunk"] == before["groups"]["Trunk"] and len(after["groups"]) == 6
+    assert after["modifiers"] == [("Before", "ARMATURE", "Old"), ("Armature", "ARMATURE", "Rig")]
+    assert len(after["keys"]) == 3 and after["parent"][0] == "Rig" and before["keys"] == []
+    for step, expected in ((bpy.ops.ed.undo, before), (bpy.ops.ed.redo, after)):
+        step()
+        assert seen_of(bpy.data.objects["Body"]) == expected
+    path = f"{tmp_path}/skinned.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    assert seen_of(bpy.data.objects["Body"]) == after
+    assert [(bone.name, tuple(bone.head_local)) for bone in bpy.data.armatures["Rig.001"].bones] == bones
+
+
+@pytest.mark.parametrize("stage", ["Posing", "Weights", "Correctives"])
+def test_a_cancel_at_any_stage_changes_nothing(stage):
+    body, rig = person()
+    scenes.activate(body, rig)
+    before = seen_of(body)
+    operator = Operator(ARAPFIELDS_OT_skin, poses=8, samples=1500, correctives=2)
+    operator.scope = "SELECTED"
+    assert cancelled_at(operator, stage) == {"CANCELLED"} and "cancelled" in operator.said[-1]
+    assert seen_of(body) == before and rig.data.pose_position == "POSE"
+
+
+def test_a_linked_armature_poses_meshes_and_hidden_meshes_of_its_collection_too(tmp_path):
+    body, rig = person()
+    path = f"{tmp_path}/rig.blend"
+    bpy.data.libraries.write(path, {rig})
+    bpy.data.objects.remove(rig)
+    with bpy.data.libraries.load(path, link=True) as (_, wanted):
+        wanted.objects = ["Rig"]
+    rig = wanted.objects[0]
+    bpy.context.collection.objects.link(rig)
+    other = shirt(body)
+    scenes.activate(other, body, rig)
+    other.hide_set(True)
+    other.hide_viewport = True
+    assert bpy.ops.arapfields.skin(poses=8, samples=1000) == {"FINISHED"}
+    assert body.parent == rig and len(body.vertex_groups) == 5 and not other.vertex_groups
+    assert bpy.ops.arapfields.skin(scope="COLLECTION", poses=8, samples=1000) == {"FINISHED"}
+    assert np.allclose(weights_of(other, list(body.vertex_groups.keys())).sum(axis=1), 1, atol=1e-5)
