@@ -7,7 +7,7 @@ from ..core.errors import UserError
 from ..names import CHANGES
 
 FLOAT, VECTOR = "FLOAT", "FLOAT_VECTOR"
-WIDTHS, BLOCK = {FLOAT: 1, VECTOR: 3}, 16384
+WIDTHS = {FLOAT: 1, VECTOR: 3}
 LEAST = 1e-6  # opacity; and what is left to full opacity
 COUNTS = (16, 9, 4, 1)  # of spherical harmonics
 
@@ -33,10 +33,13 @@ class FileLayout:
         alpha = 1.0 / (1.0 + np.exp(-values[self.opacity]))
         return table[:, :4], np.exp(table[:, 4:7]), alpha, harmonics.swapaxes(1, 2)
 
-    def parts(self, splats, columns):
-        """Arrays (n, …) that have the columns' values side by side."""
-        colours = splats.harmonics
-        return splats.rotations, np.log(splats.scales), colours[:, 0], colours[:, 1:].swapaxes(1, 2)
+    def rest(self, values):
+        """(k, n): the columns' values, less what `changes` adds to them."""
+        return by_column(*list(values.values())[:-1])
+
+    def changes(self, splats, rest, columns):
+        """{attribute: what is added to it} of splats that moved from there."""
+        return dict(zip(columns, splats.columns(rest), strict=True))
 
 
 class VectorLayout:
@@ -56,18 +59,25 @@ class VectorLayout:
         turns = np.column_stack([values["quatxyz"], values["quatw"]])
         return turns, values["scale"], values[self.opacity], harmonics
 
-    def parts(self, splats, columns):
-        turns, colours = splats.rotations, splats.harmonics
-        w, x, y, z = turns.T
+    def rest(self, values):
+        turns, _, _, colours = self.arrays(values)
+        others = {name: values[name].astype(np.float32) for name in ("scale", "rot_euler")}
+        return by_column(turns, values["logscale"], colours[:, 0], colours[:, 1:].swapaxes(1, 2)), others
+
+    def changes(self, splats, rest, columns):
+        rest, others = rest
+        changes, (w, x, y, z) = splats.columns(rest), splats.rotations.T
         angles = [
             np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
             np.arcsin(np.clip(2 * (w * y - z * x), -1, 1)),
             np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
         ]
-        own = {"quatw": turns[:, 3:], "quatxyz": turns[:, :3], "scale": splats.scales}
-        own |= {"logscale": np.log(splats.scales), "rot_euler": np.stack(angles, axis=1)}
-        own |= {f"sh{k}": colours[:, k] for k in range(colours.shape[1])}
-        return [own[name] for name in columns]
+        own = {"quatxyz": changes[:3].T, "quatw": changes[3], "logscale": changes[4:7].T}
+        own |= {"scale": splats.scales - others["scale"], "sh0": changes[7:10].T}
+        own["rot_euler"] = np.stack(angles, axis=1) - others["rot_euler"]
+        functions = (len(changes) - 10) // 3
+        own |= {f"sh{k + 1}": changes[10 + k :: functions].T for k in range(functions)}
+        return {name: own[name] for name in columns}
 
 
 LAYOUTS = (FileLayout(), VectorLayout())
@@ -95,7 +105,7 @@ class Splats:
             key: read(name, mesh, key, kind)
             for key, kind in {**self.columns, self.layout.opacity: FLOAT}.items()
         }
-        self.rest = by_column([given[key] for key in self.columns])
+        self.rest = self.layout.rest(given)
         self.spare = None  # splats whose memory the next that are moved take
         turns, scales, alpha, colours = self.layout.arrays(given)
         count = next((count for count in COUNTS if colours.shape[1] == count), None)
@@ -118,26 +128,14 @@ class Splats:
         """{attribute: what is added to it} where a field moves the splats."""
         spare, self.spare = self.spare, None  # of whichever thread comes first
         moved = prepared.moved(field, spare, max_stretch=np.inf)
-        changes, found, place = by_column(self.layout.parts(moved, self.columns)), {}, 0
-        changes -= self.rest
-        for key, kind in self.columns.items():
-            found[key] = changes[place] if kind == FLOAT else changes[place : place + 3].T
-            place += WIDTHS[kind]
+        changes = self.layout.changes(moved, self.rest, self.columns)
         self.spare = moved
-        return found
+        return changes
 
 
-def by_column(parts):
-    """(k, n) in single precision, of arrays (n, …); a block of rows after the other stays in the cache."""
-    count = len(parts[0])
-    result = np.empty((sum(part[:1].size for part in parts), count), dtype=np.float32)
-    for first in range(0, count, BLOCK):
-        place = 0
-        for part in parts:
-            rows = part[first : first + BLOCK].reshape(min(BLOCK, count - first), -1).T
-            result[place : place + len(rows), first : first + BLOCK] = rows
-            place += len(rows)
-    return result
+def by_column(*parts):
+    """(k, n) in single precision, of arrays (n, …)."""
+    return np.concatenate([part.reshape(len(part), -1).T for part in parts], dtype=np.float32)
 
 
 def read(name, mesh, key, kind):

@@ -6,6 +6,7 @@
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
 #include "bindings/files.h"
+#include "core/parallel.h"
 #include "io/splat_file.h"
 #include "splats/move_splats.h"
 #include "splats/sample_splats.h"
@@ -46,6 +47,23 @@ GaussianSplats make(const ArrayArgument& centers, const ArrayArgument& rotations
 using FloatArray = py::array_t<float>;
 /// What a call without the GIL holds on to, so that nobody takes its memory away (memory_of).
 using Kept = std::shared_ptr<GaussianSplats>;
+
+/// (7 + 3 k, n), as GaussianSplats::write_columns() has them.
+FloatArray columns_of(const Kept& splats, const std::optional<ArrayArgument>& minus) {
+  FloatArray result({Index{7 + splats->harmonics.cols()}, splats->size()});
+  std::optional<FloatArray> taken;
+  if (minus) {
+    taken = as_floats(*minus, "minus");
+    require(taken->ndim() == 2 && taken->shape(0) == result.shape(0) && taken->shape(1) == result.shape(1),
+            "minus", "another shape", "that of columns() without it is needed");
+  }
+  const float* less = taken ? taken->data() : nullptr;
+  float* out = result.mutable_data();
+  const py::gil_scoped_release unlocked;
+  const ThreadScope threads;
+  splats->write_columns(less, out);
+  return result;
+}
 
 /// The memory of splats that no call is at work on; they are empty afterwards. The GIL is held.
 GaussianSplats memory_of(const Kept& into) {
@@ -95,6 +113,10 @@ InvalidInput for other shapes and values.)")
             return result;
           },
           "(n, k, 3) colours of the real spherical harmonics.")
+      .def("columns", &columns_of, "minus"_a = py::none(), R"(
+(7 + 3k, n): one row for each of a file's properties rot_*, scale_* (logarithms), f_dc_* and f_rest_*, in this order.
+
+`minus`: an array of that shape that is taken away. InvalidInput for another shape.)")
       .def(
           "save",
           [](const Kept& self, const PathArgument& path, Task* task) {

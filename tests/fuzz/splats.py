@@ -16,6 +16,7 @@ def splat_calls(things):
     splats = af.GaussianSplats(*GIVEN)
     return {
         "GaussianSplats": lambda: (af.GaussianSplats, list(GIVEN)),
+        "GaussianSplats.columns": lambda: (splats.columns, [np.zeros((7 + 12, len(ROWS)))]),
         "GaussianSplats.save": lambda: (by_name(splats.save, "task"), ["/nonexistent/x", af.Task()]),
         "GaussianSplats.load": lambda: (by_name(af.GaussianSplats.load, "task"), ["/nonexistent", af.Task()]),
         "GaussianSplats.is_file": lambda: (af.GaussianSplats.is_file, ["/nonexistent"]),

@@ -6,7 +6,8 @@ from functools import cache
 import numpy as np
 import pytest
 from support.files import archives
-from support.geometry import cases, meshes
+from support.geometry import cases
+from support.geometry.scan import MESH, SIZE, splats
 from support.oracles.splat_render import axes, covariances, harmonics, psnr, render
 
 import arapfields as af
@@ -18,20 +19,6 @@ PREPARED = 2e-4  # of the size: jets in single precision
 DRAWN = 0.02  # a covariance of points that are drawn
 PSNR_SAME = 60.0  # dB: the same picture but for rounding
 FIELDS = ("centers", "rotations", "scales", "opacities", "harmonics")
-SIZE = np.array([0.8, 0.25, 0.2])
-MESH = (meshes.sphere(1.0, 4)[0] * SIZE, meshes.sphere(1.0, 4)[1])
-
-
-def splats(count=250, harmonics=16, width=0.05, seed=0):
-    """Flat splats of all colours on an ellipsoid."""
-    rng = np.random.default_rng(seed)
-    samples = af.sample_mesh(*MESH, count=count, seed=seed)
-    x, y, z = samples.normals.T  # the turns that take z to the normal
-    turns = np.column_stack([1 + z + 1e-9, -y, x, 0 * x])
-    scales = width * np.array([1.0, 0.7, 0.1]) * rng.uniform(0.9, 1.1, (count, 3))
-    colours = 0.25 * rng.normal(size=(count, harmonics, 3))
-    turns /= np.linalg.norm(turns, axis=1, keepdims=True)
-    return af.GaussianSplats(samples.points, turns, scales, rng.uniform(0.3, 0.95, count), colours)
 
 
 @cache
@@ -141,6 +128,8 @@ def test_prepared_splats_move_as_others_do():
     given = af.GaussianSplats(*[getattr(rest, name) for name in FIELDS])
     with pytest.raises(af.InvalidInput, match="max_stretch"):
         af.PreparedSplats(given).moved(field, max_stretch=0.5)
+    with pytest.raises(af.InvalidInput, match="max_stretch"):
+        field.apply_to(given, max_stretch=0.5)
 
 
 def test_samples_lie_where_splats_are_and_look_outward():
@@ -166,67 +155,6 @@ def test_samples_lie_where_splats_are_and_look_outward():
     handles = [cases.moved(held), cases.moved(turned, cases.turn([0, 1, 0], 70))]
     off = np.abs(af.deform(samples, handles)(MESH[0]) - exact(MESH[0])).max()
     assert off < 0.03 * 1.6, off
-
-
-def test_a_file_comes_back_and_keeps_what_it_has_besides(tmp_path):
-    for count in (1, 4, 9, 16):
-        given = splats(7, count)
-        given.save(tmp_path / "a.ply")
-        back = af.GaussianSplats.load(tmp_path / "a.ply")
-        for name in FIELDS:
-            assert np.array_equal(getattr(back, name), getattr(given, name)), name
-    text, rows = (tmp_path / "a.ply").read_bytes().split(b"end_header\n")
-    width = len(rows) // 7
-    more = b"".join(rows[i * width : (i + 1) * width] + bytes([i, 0, 0, 0, 0, 0, 0, 64, 9]) for i in range(7))
-    text += b"property double weight\nproperty uchar label\nend_header\n"
-    (tmp_path / "b.ply").write_bytes(text + more)
-    af.GaussianSplats.load(tmp_path / "b.ply").save(tmp_path / "c.ply")
-    assert (tmp_path / "c.ply").read_bytes() == text + more
-    assert af.GaussianSplats.is_file(tmp_path / "b.ply") and not af.GaussianSplats.is_file(
-        tmp_path / "no.ply"
-    )
-
-
-def test_what_cannot_be_read_is_named(tmp_path):
-    splats(5, 4).save(tmp_path / "a.ply")
-    good = (tmp_path / "a.ply").read_bytes()
-    bad = tmp_path / "bad.ply"
-    nan = np.array([np.nan], "<f4").tobytes()
-    for content, word in (
-        (good[:10], "no PLY"),
-        (good[:-3], "cut off"),
-        (good.replace(b"vertex 5", b"vertex 4000000000"), "cut off"),
-        (good.replace(b"vertex 5", b"vertex -5"), "no count"),
-        (good.replace(b"binary_little_endian", b"ascii"), "ascii"),
-        (good.replace(b"property float opacity\n", b""), "lacks properties"),
-        (good.replace(b"property float rot_1", b"property blob rot_1"), "unknown"),
-        (good.replace(b"float f_rest_3", b"float f_rest_2"), "lacks properties"),
-        (good.replace(b"end_header", b"element face 3\nend_header"), "elements face"),
-        (good[:-4] + nan, "splat 4 has NaN"),
-        (good[:-16] + bytes(16), "rotation of splat 4 is zero"),
-    ):
-        bad.write_bytes(content)
-        with pytest.raises(af.InvalidInput, match=f"bad.ply.*{word}"):
-            af.GaussianSplats.load(bad)
-    with pytest.raises(OSError):
-        af.GaussianSplats.load(tmp_path / "absent.ply")
-    with pytest.raises(OSError):
-        splats(5).save(tmp_path / "absent" / "a.ply")
-    given = [np.zeros((2, 3)), [[1, 0, 0, 0]] * 2, np.ones((2, 3)), [0.5, 0.5], np.zeros((2, 4, 3))]
-    for at, value, word in (
-        (0, np.zeros((2, 2)), "centers"),
-        (1, [[2, 0, 0, 0]] * 2, "rotations"),
-        (2, np.zeros((2, 3)), "scales"),
-        (3, [0.5, 1.5], "opacities"),
-        (3, [0.5], "opacities"),
-        (4, np.zeros((2, 5, 3)), "harmonics"),
-    ):
-        with pytest.raises(af.InvalidInput, match=word):
-            af.GaussianSplats(*given[:at], value, *given[at + 1 :])
-    with pytest.raises(af.InvalidInput, match="opaque"):
-        af.sample_splats(af.GaussianSplats(*given))
-    with pytest.raises(af.InvalidInput, match="max_stretch"):
-        bent().apply_to(splats(5), max_stretch=0.5)
 
 
 def test_the_command_line_bends_a_scan(tmp_path, capsys):

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Gaussian splats: their numbers, read, written and refused."""
+
+import numpy as np
+import pytest
+from support.geometry.scan import splats
+
+import arapfields as af
+
+EXACT = 1e-6
+FIELDS = ("centers", "rotations", "scales", "opacities", "harmonics")
+
+
+@pytest.mark.parametrize("functions", (1, 4, 9, 16))
+def test_columns_are_a_files_properties(functions):
+    given = splats(1300, functions)  # more than a block, and not a whole number of them
+    colours = given.harmonics
+    parts = [given.rotations, np.log(given.scales), colours[:, 0], colours[:, 1:].swapaxes(1, 2)]
+    expected = np.concatenate([part.reshape(len(given), -1).T for part in parts])
+    assert np.abs(given.columns() - expected).max() < EXACT
+    minus = np.random.default_rng(0).normal(size=expected.shape)
+    assert np.array_equal(given.columns(minus), given.columns() - minus.astype(np.float32))
+    with pytest.raises(af.InvalidInput, match="minus"):
+        given.columns(minus[1:])
+
+
+def test_a_file_comes_back_and_keeps_what_it_has_besides(tmp_path):
+    for count in (1, 4, 9, 16):
+        given = splats(7, count)
+        given.save(tmp_path / "a.ply")
+        back = af.GaussianSplats.load(tmp_path / "a.ply")
+        for name in FIELDS:
+            assert np.array_equal(getattr(back, name), getattr(given, name)), name
+    text, rows = (tmp_path / "a.ply").read_bytes().split(b"end_header\n")
+    width = len(rows) // 7
+    more = b"".join(rows[i * width : (i + 1) * width] + bytes([i, 0, 0, 0, 0, 0, 0, 64, 9]) for i in range(7))
+    text += b"property double weight\nproperty uchar label\nend_header\n"
+    (tmp_path / "b.ply").write_bytes(text + more)
+    af.GaussianSplats.load(tmp_path / "b.ply").save(tmp_path / "c.ply")
+    assert (tmp_path / "c.ply").read_bytes() == text + more
+    assert af.GaussianSplats.is_file(tmp_path / "b.ply") and not af.GaussianSplats.is_file(
+        tmp_path / "no.ply"
+    )
+
+
+def test_what_cannot_be_read_is_named(tmp_path):
+    splats(5, 4).save(tmp_path / "a.ply")
+    good = (tmp_path / "a.ply").read_bytes()
+    bad = tmp_path / "bad.ply"
+    nan = np.array([np.nan], "<f4").tobytes()
+    for content, word in (
+        (good[:10], "no PLY"),
+        (good[:-3], "cut off"),
+        (good.replace(b"vertex 5", b"vertex 4000000000"), "cut off"),
+        (good.replace(b"vertex 5", b"vertex -5"), "no count"),
+        (good.replace(b"binary_little_endian", b"ascii"), "ascii"),
+        (good.replace(b"property float opacity\n", b""), "lacks properties"),
+        (good.replace(b"property float rot_1", b"property blob rot_1"), "unknown"),
+        (good.replace(b"float f_rest_3", b"float f_rest_2"), "lacks properties"),
+        (good.replace(b"end_header", b"element face 3\nend_header"), "elements face"),
+        (good[:-4] + nan, "splat 4 has NaN"),
+        (good[:-16] + bytes(16), "rotation of splat 4 is zero"),
+    ):
+        bad.write_bytes(content)
+        with pytest.raises(af.InvalidInput, match=f"bad.ply.*{word}"):
+            af.GaussianSplats.load(bad)
+    with pytest.raises(OSError):
+        af.GaussianSplats.load(tmp_path / "absent.ply")
+    with pytest.raises(OSError):
+        splats(5).save(tmp_path / "absent" / "a.ply")
+    given = [np.zeros((2, 3)), [[1, 0, 0, 0]] * 2, np.ones((2, 3)), [0.5, 0.5], np.zeros((2, 4, 3))]
+    for at, value, word in (
+        (0, np.zeros((2, 2)), "centers"),
+        (1, [[2, 0, 0, 0]] * 2, "rotations"),
+        (2, np.zeros((2, 3)), "scales"),
+        (3, [0.5, 1.5], "opacities"),
+        (3, [0.5], "opacities"),
+        (4, np.zeros((2, 5, 3)), "harmonics"),
+    ):
+        with pytest.raises(af.InvalidInput, match=word):
+            af.GaussianSplats(*given[:at], value, *given[at + 1 :])
+    with pytest.raises(af.InvalidInput, match="opaque"):
+        af.sample_splats(af.GaussianSplats(*given))
