@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "energies/gauss.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <string>
 
+#include "core/decompositions.h"
 #include "core/errors.h"
 #include "energies/kernels.h"
 #include "energies/ranges.h"
@@ -33,15 +33,15 @@ Points different_normals(PointsIn normals) {
 }
 
 /// The solution of kernel·w = 1 from the eigenvectors above `cutoff`, refined twice.
-Vector truncated_solution(const Eigen::MatrixXd& kernel,
-                          const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>& eigen, double cutoff) {
-  const Vector& values = eigen.eigenvalues();
+Vector truncated_solution(const Eigen::MatrixXd& kernel, const SymmetricEigen<Vector, Eigen::MatrixXd>& eigen,
+                          double cutoff) {
+  const Vector& values = eigen.values;
   Vector inverse(values.size());
   for (Index i = 0; i < values.size(); ++i) inverse[i] = values[i] > cutoff ? 1.0 / values[i] : 0.0;
   Vector weights = Vector::Zero(values.size());
   for (int pass = 0; pass < 3; ++pass) {
     const Vector residual = Vector::Ones(values.size()) - kernel * weights;
-    weights += eigen.eigenvectors() * (inverse.asDiagonal() * (eigen.eigenvectors().transpose() * residual));
+    weights += eigen.vectors * (inverse.asDiagonal() * (eigen.vectors.transpose() * residual));
   }
   return weights;
 }
@@ -152,8 +152,8 @@ GaussPreference gauss_preference(PointsIn normals, double sharpness) {
   // exp(σ(n·m − 1)): the same system with every weight scaled by e^σ, whose diagonal is 1.
   const Eigen::MatrixXd kernel =
       (sharpness * ((result.normals * result.normals.transpose()).array() - 1.0)).exp().matrix();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(kernel);
-  const double largest = eigen.eigenvalues().maxCoeff();
+  const auto eigen = symmetric_eigen(kernel);
+  const double largest = eigen.values.maxCoeff();
   double best = INFINITY;
   for (double cutoff = 1e-4 * largest; cutoff > 1e-17 * largest && best > 1e-12; cutoff *= 0.1) {
     const Vector weights = truncated_solution(kernel, eigen, cutoff);

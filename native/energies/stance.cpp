@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "core/decompositions.h"
 #include "core/errors.h"
 
 namespace arapfields {
@@ -26,10 +27,9 @@ Lean lean_of(const Points& arms, const Points& displacements, const Vec3& up) {
   if (!(size > 0.0)) return {};
   const Mat3 inertia = (1.0 + Stance::thinnest) * size * Mat3::Identity() - spread;
   const Vec3 torque(moment(1, 2) - moment(2, 1), moment(2, 0) - moment(0, 2), moment(0, 1) - moment(1, 0));
-  const auto solver = inertia.ldlt();
-  Vec3 turn = solver.solve(torque);
+  Vec3 turn = solve_definite(inertia, torque);
   turn -= turn.dot(up) * up;
-  const Vec3 restoring = Stance::lean_weight * size * solver.solve(turn);
+  const Vec3 restoring = Stance::lean_weight * size * solve_definite(inertia, turn);
   Mat3 slope;  // of row vectors: a · slope = restoring × a
   slope << 0.0, restoring.z(), -restoring.y(), -restoring.z(), 0.0, restoring.x(), restoring.y(),
       -restoring.x(), 0.0;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fields/interior_embedding.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
+#include "core/decompositions.h"
 #include "core/parallel.h"
 #include "fields/interior_distance.h"
 #include "fields/interior_embedding_kernel.h"
@@ -39,12 +39,12 @@ Points leading_coordinates(const RowMatrix<double>& excess) {
   products.colwise() += 0.5 * mean;
   products.rowwise() += 0.5 * mean.transpose();
   products.array() -= 0.5 * mean.mean();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(products);
+  const auto eigen = symmetric_eigen(products);
   Points result = Points::Zero(excess.rows(), 3);
   for (int k = 0; k < 3; ++k) {
-    const double value = solver.eigenvalues()[count - 1 - k];
+    const double value = eigen.values[count - 1 - k];
     if (!(value > 1e-12)) continue;
-    Vector direction = solver.eigenvectors().col(count - 1 - k) / std::sqrt(value);
+    Vector direction = eigen.vectors.col(count - 1 - k) / std::sqrt(value);
     result.col(k) = -0.5 * (excess * direction).array() + 0.5 * mean.dot(direction);
   }
   return result;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "sampling/canonical_order.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "core/decompositions.h"
 #include "core/frame.h"
 #include "distance/morton.h"
 
@@ -21,8 +21,8 @@ std::vector<std::uint32_t> canonical_order(PointsIn points) {
   const Frame frame = Frame::balanced(points, Vector::Ones(n), {}, 1.0);
   Points placed = frame.to_cube(points);
   for (Index i = 0; i < n; ++i) placed.row(i) *= std::min(1.0, far / std::max(placed.row(i).norm(), 1e-300));
-  const Eigen::SelfAdjointEigenSolver<Mat3> axes(Mat3(placed.transpose() * placed));
-  placed = (placed * axes.eigenvectors()).eval();
+  const Mat3 axes = symmetric_eigen3(Mat3(placed.transpose() * placed)).vectors;
+  placed = (placed * axes).eval();
   for (int k = 0; k < 3; ++k)  // an axis points to where the shape reaches further out
     if (placed.col(k).array().cube().sum() < 0.0) placed.col(k) *= -1.0;
   return morton_order(placed);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "wrap/alignment.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "core/decompositions.h"
 #include "core/errors.h"
 #include "energies/alignment.h"
 #include "sampling/nearest_sample.h"
@@ -112,7 +112,7 @@ class IterativeClosestPoints {
 /// Columns: principal axes, right-handed.
 Mat3 principal_axes(PointsIn points) {
   const Points arms = points.rowwise() - points.colwise().mean();
-  Mat3 axes = Eigen::SelfAdjointEigenSolver<Mat3>(Mat3(arms.transpose() * arms)).eigenvectors();
+  Mat3 axes = symmetric_eigen3(Mat3(arms.transpose() * arms)).vectors;
   if (axes.determinant() < 0.0) axes.col(0) *= -1.0;
   return axes;
 }

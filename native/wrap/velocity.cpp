@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "wrap/velocity.h"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +9,7 @@
 
 #include "core/errors.h"
 #include "core/parallel.h"
+#include "energies/rotation.h"
 #include "fields/radial_evaluator.h"
 #include "tensors/dense.h"
 #include "wrap/parameters.h"
@@ -23,13 +23,6 @@ constexpr Index block_size = 16;
 
 using MatrixF = RowMatrix<float>;
 using RowMat3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
-Mat3 rotation_by_svd(const Mat3& matrix) {
-  const Eigen::JacobiSVD<Mat3> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Mat3 u = svd.matrixU();
-  if ((u * svd.matrixV().transpose()).determinant() < 0.0) u.col(2) *= -1.0;
-  return u * svd.matrixV().transpose();
-}
 
 /// What a block of 16 neighbouring points contributes to the normal equations, in terms of the basis
 /// functions whose support it meets.
@@ -76,7 +69,7 @@ struct PointBlock {
 
  private:
   void add_stiffness(Index p, const Mat3& jacobian, float rigidity, float viscosity, const MatrixF& slopes) {
-    const Eigen::Matrix3f missing = (rotation_by_svd(jacobian) - jacobian).cast<float>();
+    const Eigen::Matrix3f missing = (closest_rotation(jacobian) - jacobian).cast<float>();
     const MatrixF along = slopes * jacobian.cast<float>();
     right_hand_side.noalias() += rigidity * along * missing.transpose();
     for (int k = 0; k < 3; ++k) {

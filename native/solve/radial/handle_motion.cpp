@@ -3,6 +3,8 @@
 
 #include <Eigen/Geometry>
 
+#include "core/decompositions.h"
+
 namespace arapfields {
 namespace {
 
@@ -44,7 +46,7 @@ Twist twist_between(const Points& from, const Points& to, const Vector& weights,
     moment += weights[i] / total * arm.cross(ways.row(i).transpose() - mean);
   }
   inertia += (thinnest * inertia.trace() + smallest) * Mat3::Identity();
-  twist.turn = inertia.ldlt().solve(moment);
+  twist.turn = solve_definite(inertia, moment);
   twist.velocity = mean - twist.turn.cross(center);
   return twist;
 }
