@@ -52,6 +52,8 @@ REVEALED = {
     "field": "arapfields._native.DeformationField[arapfields.reports.SolveReport]",
     "field.report": "arapfields.reports.SolveReport",
     "field.report.energy": "float",
+    "task.progress": "float",
+    "af.__version__": "str",
     "field.report.preference": "float | None",
     "field.report.handles[0].error_mean": "float",
     "field.report.stopped_by": "Literal['iterations', 'time_budget', 'target_error', 'callback', 'diverged']",
@@ -94,6 +96,7 @@ WRONG = [
     ("af.stylize(samples, 'cubic')", "arg-type"),
     ("af.extract_surface(V)", "arg-type"),
     ("field.report.enery", "attr-defined"),
+    ("task.no_such_method()", "attr-defined"),
     ("field(V).shape.no", "attr-defined"),
     ("af.fit_sdf(V, object())", "arg-type"),
 ]

@@ -16,7 +16,7 @@ if IN_BLENDER:
 pytestmark = pytest.mark.in_blender
 
 QUICK = {"field": "radial", "samples": 2000}
-STOPPED = 5e-4  # how far apart solves end whose targets differ by rounding alone
+STOPPED = 5e-4  # of the size: how far apart solves end whose targets differ by rounding alone
 SAME = 1e-6  # of the size: single precision of matrices and positions
 
 
@@ -89,7 +89,7 @@ def test_a_bone_equals_a_constrained_empty_with_the_same_region():
     for (held, motion), (same_held, same_motion) in zip(*asked, strict=True):
         assert np.array_equal(held, same_held) and len(held) > 100
         assert np.abs(motion - same_motion).max() < SAME
-    assert np.abs(motions[0] - motions[1]).max() < STOPPED and moved.max() > 0.4
+    assert np.abs(motions[0] - motions[1]).max() < STOPPED * np.ptp(rest, axis=0).max() and moved.max() > 0.4
 
 
 def test_frames_in_any_order_give_the_same_poses():
