@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* What CPython's configure found out, as far as the public headers ask (tests/packaging): by the compiler's own words,
- * for every system that wheels are built for. */
+/* What CPython's configure found out, as far as the public headers ask (tests/packaging): by the compiler's
+ * own words, for every system that wheels are built for. */
 #ifndef Py_PYCONFIG_H
 #define Py_PYCONFIG_H
 #define SIZEOF_INT __SIZEOF_INT__
@@ -51,5 +51,6 @@ static_assert(sizeof(pthread_t) == SIZEOF_PTHREAD_T && sizeof(pid_t) == SIZEOF_P
 #endif
 #include <cstddef>
 #include <ctime>
-static_assert(alignof(std::max_align_t) == ALIGNOF_MAX_ALIGN_T && sizeof(time_t) == SIZEOF_TIME_T, "of configure");
+static_assert(alignof(std::max_align_t) == ALIGNOF_MAX_ALIGN_T && sizeof(time_t) == SIZEOF_TIME_T,
+              "of configure");
 #endif
