@@ -70,7 +70,8 @@ $(INSTALLED): $(VENV)/.ready $(SOURCES)
 	@mkdir -p $(BUILD)
 	@$(PIP) -v --no-build-isolation --no-deps $(INTO) -C build-dir=$(BUILD) \
 	  -C cmake.define.ARAPFIELDS_BACKEND=$(BACKEND) -C cmake.define.ARAPFIELDS_WERROR=ON . 2>&1 | tee build/build.log | \
-	  while read -r line; do case "$$line" in "["*/*"]"*) printf '\r  %s]' "$${line%%]*}";; esac; done \
+	  while read -r line; do case "$$line" in "["[1-9]*/*"]"*) line="$${line%%]*}"; done="$${line%/*}"; done="$${done#[}"; \
+	  left=$$((SECONDS * ($${line#*/} - done) / done)); printf '\r  %s], %d min %02d s left  ' "$$line" $$((left / 60)) $$((left % 60));; esac; done \
 	  || { tail -n 60 build/build.log; exit 1; }
 	@echo
 	@touch $@
