@@ -15,12 +15,16 @@ PYTEST := $(PY) -m pytest
 ALL_TESTS := $(PYTEST) -n logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 # BACKEND=eigen: the library without libtorch, as wheels and zips have it, in a folder of its own beside .venv's.
 BACKEND := torch
+TORCH := $(VENV)/.torch
+BLENDER := $(VENV)/.blender
 ifeq ($(BACKEND),eigen)
+LIBRARIES :=
 BUILD := build/eigen
 INSTALLED := $(BUILD)/.installed
 INTO := --target $(abspath $(BUILD)/site) --upgrade
 export PYTHONPATH := $(abspath $(BUILD)/site)
 else
+LIBRARIES := $(TORCH)
 BUILD := build/wheel
 INSTALLED := $(VENV)/.installed
 INTO := --force-reinstall
@@ -48,14 +52,24 @@ $(VENV)/.ready: requirements.txt
 	$(COMPILER)
 	@test -x $(PY) || $(PYTHON) -m venv $(VENV) > /dev/null || { rm -rf $(VENV); \
 	  echo "Python's venv module is needed (Debian: python3.11-venv)"; exit 1; }
-	@echo "Step 1 of 2: fetching libtorch, Blender as a module and the tools from PyPI into $(VENV). Large, once."
+	@echo "Fetching tools from PyPI into $(VENV), once."
 	@$(PIP) -q --upgrade "pip>=24"
-	@$(PIP) -r requirements.txt
+	@$(PIP) -q -r requirements.txt
+	@touch $@
+
+$(TORCH): native/tensors/torch/requirements.txt $(VENV)/.ready
+	@echo "Fetching libtorch into $(VENV): large, once."
+	@$(PIP) -r $<
+	@touch $@
+
+$(BLENDER): blender_scripts/requirements.txt $(VENV)/.ready
+	@echo "Fetching Blender as a Python module into $(VENV): large, once."
+	@$(PIP) -r $<
 	@$(PY) blender_scripts/system_libraries.py
 	@touch $@
 
 # What only testing and checking need.
-$(VENV)/.tools: tests/requirements.txt $(VENV)/.ready
+$(VENV)/.tools: tests/requirements.txt $(TORCH) $(BLENDER)
 	@$(PIP) -q -r tests/requirements.txt
 	@# Headers of Boost.Test alone are used; the wheel's numpy>=2 (for Boost.Python) would clash with bpy 4.5's.
 	@$(PIP) -q --no-deps cmeel-boost==1.90.0
@@ -64,9 +78,9 @@ $(VENV)/.tools: tests/requirements.txt $(VENV)/.ready
 setup: $(VENV)/.tools  ## .venv with all that building and testing needs
 
 # The wheel's build folder is kept, so a rebuild compiles only what changed.
-$(INSTALLED): $(VENV)/.ready $(SOURCES)
+$(INSTALLED): $(VENV)/.ready $(LIBRARIES) $(SOURCES)
 	$(COMPILER)
-	@echo "Step 2 of 2: compiling the native library. Some minutes the first time; all output: build/build.log"
+	@echo "Compiling the native library. Some minutes the first time; all output: build/build.log"
 	@mkdir -p $(BUILD)
 	@$(PIP) -v --no-build-isolation --no-deps $(INTO) -C build-dir=$(BUILD) \
 	  -C cmake.define.ARAPFIELDS_BACKEND=$(BACKEND) -C cmake.define.ARAPFIELDS_WERROR=ON . 2>&1 | tee build/build.log | \
@@ -83,10 +97,10 @@ $(NATIVE_TESTS): $(INSTALLED) $(VENV)/.tools $(shell find tests/native -type f)
 	$(VENV)/bin/cmake --build $(BUILD) --target native_tests
 	@touch $@
 
-examples: build $(VENV)/.tools  ## the scenes of the workflow pages: out/examples
+examples: build $(BLENDER)  ## the scenes of the workflow pages: out/examples
 	$(PY) blender_scripts/examples.py --output out/examples
 
-demo: build $(VENV)/.tools  ## pins, a hat carried, a style and a wrap on a dog: out/demo.png and out/demo.blend
+demo: build $(BLENDER)  ## pins, a hat carried, a style and a wrap on a dog: out/demo.png and out/demo.blend
 	$(PY) blender_scripts/demo.py --output out
 
 TESTS := tests
@@ -150,11 +164,16 @@ sanitize: setup  ## the native tests under the address and undefined-behaviour s
 git-clone:
 	@test . -ef "$$(git rev-parse --show-toplevel 2> /dev/null)" || $(call lacks,A clone made by git is needed: this word asks git for its files)
 
-format: git-clone setup  ## clang-format and ruff over our files
+# The versions stand in tests/requirements.txt.
+$(VENV)/.format: tests/requirements.txt $(VENV)/.ready
+	@grep -E '^(ruff|clang-format)==' $< | $(PIP) -q -r /dev/stdin
+	@touch $@
+
+format: git-clone $(VENV)/.format  ## clang-format and ruff over our files
 	git ls-files '*.h' '*.cpp' | xargs $(VENV)/bin/clang-format -i
 	$(VENV)/bin/ruff format -q . && $(VENV)/bin/ruff check -q --fix .
 
-lint: git-clone setup  ## the same, checking alone
+lint: git-clone $(VENV)/.format  ## the same, checking alone
 	git ls-files '*.h' '*.cpp' | xargs $(VENV)/bin/clang-format --dry-run --Werror
 	$(VENV)/bin/ruff format --check -q . && $(VENV)/bin/ruff check .
 
@@ -172,7 +191,7 @@ wheels: wheel-tools  ## for pip, in dist: a wheel for each Python; PLATFORM=linu
 workflows: git-clone setup  ## the continuous integration's steps for Linux, run here one by one in fresh clones: build/workflows
 	$(PY) tests/packaging/run_workflow.py .github/workflows/*.yml $(if $(KEEP),--keep $(KEEP))
 
-extension: wheels  ## for Blender: dist/arapfields-<version>-linux-x64.zip, of these wheels; PLATFORM as above
+extension: wheels $(BLENDER)  ## for Blender: dist/arapfields-<version>-linux-x64.zip, of these wheels; PLATFORM as above
 	$(PY) blender_scripts/build_extension.py $(PLATFORM) --output dist
 
 release: git-clone  ## all that is published, in dist: wheels, zips, index.json, source distribution, licences, checksums
