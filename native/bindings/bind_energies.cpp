@@ -215,14 +215,12 @@ void bind_testing(py::module_& module) {
   module.def(
       "body_energy",
       [](JetArray<Scalar> jets, const Points& rest, const Points& goal, const Vector& masses, double inertia,
-         const Vector& gravity, const Vector& up, double ground, double ground_stiffness) {
-        const Body<Scalar> body{
-            masses.cast<Scalar>(), rest.cast<Scalar>(), goal.cast<Scalar>(), inertia, gravity, up, ground,
-            ground_stiffness};
+         const Vector& gravity) {
+        const Body<Scalar> body{masses.cast<Scalar>(), rest.cast<Scalar>(), goal.cast<Scalar>(), inertia,
+                                gravity};
         return with_cotangents(jets, [&](auto view, auto out) { return body_energy(view, body, out).sum(); });
       },
-      "jets"_a.noconvert(), "rest"_a, "goal"_a, "masses"_a, "inertia"_a, "gravity"_a, "up"_a, "ground"_a,
-      "ground_stiffness"_a);
+      "jets"_a.noconvert(), "rest"_a, "goal"_a, "masses"_a, "inertia"_a, "gravity"_a);
   module.def(
       "fold_barrier",
       [](JetArray<Scalar> jets, double threshold, double weight, bool composed) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "energies/body.h"
 
-#include <algorithm>
 #include <string>
 
 #include "core/errors.h"
@@ -28,11 +27,6 @@ BodyEnergy body_energy(JetView<const Scalar> jets, const Body<Scalar>& body, Jet
       const Vec3 offset = place - body.goal.row(i).transpose().template cast<double>();
       energy.inertia += 0.5 * body.inertia * share * mass * offset.squaredNorm();
       slope += body.inertia * share * mass * offset;
-    }
-    if (body.ground_stiffness > 0.0) {
-      const double depth = std::max(0.0, body.ground - body.up.dot(place));
-      energy.ground += body.ground_stiffness * share * depth * depth;
-      slope -= 2.0 * body.ground_stiffness * share * depth * body.up;
     }
     if (cotangents.data != nullptr)
       Eigen::Map<Eigen::Vector3<Scalar>>(cotangents.at(0, i)) += slope.template cast<Scalar>();

@@ -5,8 +5,7 @@
 
 namespace arapfields {
 
-/// External forces on a body of mass m, at samples (n): the inertia of an implicit time step, gravity, and a
-/// penalty for passing the ground.
+/// External forces on a body of mass m, at samples (n): the inertia of an implicit time step, and gravity.
 template <class Scalar>
 struct Body {
   Eigen::VectorX<Scalar> masses;  ///< (n) none negative
@@ -14,16 +13,12 @@ struct Body {
   PointsOf<Scalar> goal;          ///< (n,3) positions that free motion would reach
   double inertia = 0.0;           ///< weight of the squared distance from there; 0: none
   Vec3 gravity = Vec3::Zero();    ///< force on a unit of mass
-  Vec3 up = Vec3::UnitZ();        ///< unit normal of the ground
-  double ground = 0.0;            ///< the ground's height along `up`
-  double ground_stiffness = 0.0;  ///< 0: no ground
 };
 
 struct BodyEnergy {
   double inertia = 0.0;  ///< ½ inertia · mean m ‖f − goal‖²
   double weight = 0.0;   ///< −mean m gravity·(f − rest)
-  double ground = 0.0;   ///< ground_stiffness · mean max(0, ground − up·f)²
-  double sum() const { return inertia + weight + ground; }
+  double sum() const { return inertia + weight; }
 };
 
 /// For jets of f at the samples; adds the cotangents of the sum on the value column (data may be null).

@@ -18,6 +18,13 @@ struct Obstacle {
   double margin = 0.0;
 };
 
+/// All that is below a height along `up`, in mesh coordinates.
+struct Ground {
+  double height = 0.0;
+  Vec3 up = Vec3::UnitZ();
+  bool operator==(const Ground&) const = default;
+};
+
 /// What a surface does not pass.
 struct Contact {
   std::vector<Obstacle> obstacles;

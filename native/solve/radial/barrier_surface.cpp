@@ -47,11 +47,11 @@ BarrierSurface::BarrierSurface(const Obstacle& obstacle, const Frame& frame)
       is_distance_(obstacle.function->gradient_bound() == 1.0),
       margin_(obstacle.margin / frame.scale) {}
 
-BarrierSurface BarrierSurface::ground(double height, const Vec3& up, const Frame& frame) {
+BarrierSurface BarrierSurface::ground(const Ground& ground, const Frame& frame) {
   BarrierSurface result;
   result.frame_ = frame;
-  result.up_ = up.normalized();
-  result.height_ = (height - frame.center.dot(result.up_)) / frame.scale;
+  result.up_ = ground.up.normalized();
+  result.height_ = (ground.height - frame.center.dot(result.up_)) / frame.scale;
   return result;
 }
 

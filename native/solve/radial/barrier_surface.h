@@ -10,7 +10,7 @@ namespace arapfields {
 class BarrierSurface {
  public:
   BarrierSurface(const Obstacle& obstacle, const Frame& frame);
-  static BarrierSurface ground(double height, const Vec3& up, const Frame& frame);
+  static BarrierSurface ground(const Ground& ground, const Frame& frame);
 
   struct Nearest {
     Vector distances;  ///< (n) negative inside; about true ones where the function is no distance

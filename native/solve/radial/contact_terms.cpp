@@ -40,13 +40,26 @@ void ContactTerms::set(const std::optional<Contact>& contact) {
     require(!problem_.blend, "contact", "beside exact handles", "it needs handles that give way");
   }
   contact_ = contact;
+  make_surfaces();
+}
+
+bool ContactTerms::set_further_ground(const std::optional<Ground>& ground) {
+  if (ground == further_ground_) return false;
+  further_ground_ = ground;
+  make_surfaces();
+  return true;
+}
+
+void ContactTerms::make_surfaces() {
   surfaces_.clear();
+  const Frame& frame = problem_.frame();
   if (contact_) {
-    for (const Obstacle& obstacle : contact_->obstacles) surfaces_.emplace_back(obstacle, problem_.frame());
+    for (const Obstacle& obstacle : contact_->obstacles) surfaces_.emplace_back(obstacle, frame);
     if (contact_->ground)
-      surfaces_.push_back(BarrierSurface::ground(*contact_->ground, contact_->up, problem_.frame()));
+      surfaces_.push_back(BarrierSurface::ground({*contact_->ground, contact_->up}, frame));
   }
-  if (samples_.empty() && contact_ && contact_->any()) {
+  if (further_ground_) surfaces_.push_back(BarrierSurface::ground(*further_ground_, frame));
+  if (samples_.empty() && (!surfaces_.empty() || (contact_ && contact_->itself))) {
     Random random(static_cast<std::uint64_t>(problem_.options.seed), 3);
     samples_ = stratified(problem_.shape->order, std::min(most_samples, problem_.samples.size()), random);
   }
@@ -241,7 +254,8 @@ double ContactTerms::touching() const {
 }
 
 std::string ContactTerms::name_of(Index surface) const {
-  if (surface < std::ssize(contact_->obstacles)) return "obstacles[" + std::to_string(surface) + "]";
+  if (contact_ && surface < std::ssize(contact_->obstacles))
+    return "obstacles[" + std::to_string(surface) + "]";
   return surface < std::ssize(surfaces_) ? "ground" : "itself";
 }
 

@@ -27,6 +27,8 @@ class ContactTerms {
   explicit ContactTerms(const RadialProblem& problem) : problem_(problem) {}
   /// Throws InvalidInput for what cannot be.
   void set(const std::optional<Contact>& contact);
+  /// A ground beside that of the contact; whether it is another one than before.
+  bool set_further_ground(const std::optional<Ground>& ground);
   const std::optional<Contact>& contact() const { return contact_; }
   bool any() const { return !surfaces_.empty() || self_; }
   bool itself() const { return self_.has_value(); }
@@ -62,6 +64,7 @@ class ContactTerms {
   static constexpr double stiffness = 5e4;
 
  private:
+  void make_surfaces();
   Vector add_planes(Index k, const std::vector<Index>& rows, PointsIn now);
   void add_own_planes(const RowMatrix<double>& coefficients, bool jumped);
   void gather_places();
@@ -70,6 +73,7 @@ class ContactTerms {
 
   const RadialProblem& problem_;
   std::optional<Contact> contact_;
+  std::optional<Ground> further_ground_;
   std::vector<BarrierSurface> surfaces_;
   Dependent<RadialEvaluator<double>, 1> evaluator_;
   Dependent<RadialEvaluator<float>, 1> slopes_;  // of the samples, for their normals

@@ -13,8 +13,6 @@
 namespace arapfields {
 namespace {
 
-/// Stiffness of the ground against the energy of the surface.
-constexpr double ground_stiffness = 1000.0;
 /// Velocities and accelerations half of which a step of 1/96 s takes, as the root of its length, by their
 /// mean ‖J‖² + λ‖D‖² against their mean square: waves shorter than a part is thick, which solves see last.
 constexpr double smoothed = 3e3, usual_step = 1.0 / 96.0;
@@ -64,14 +62,7 @@ template <class Scalar>
 std::optional<Body<Scalar>> SurfaceDynamics::inertia_terms(double inertia, PointsOf<Scalar> goal) {
   if (!has_mass()) return std::nullopt;
   Body<Scalar> body{masses().cast<Scalar>(), problem_.energy_points.cast<Scalar>(), std::move(goal), inertia};
-  const Frame& frame = problem_.frame();
-  body.up = motion_->up;
-  body.gravity = -mass() * motion_->options.gravity / frame.scale * body.up;
-  if (motion_->ground) {
-    const Points on_ground = (*motion_->ground * body.up).transpose();
-    body.ground = frame.to_cube(on_ground).row(0).dot(body.up);
-    body.ground_stiffness = ground_stiffness;
-  }
+  body.gravity = -mass() * motion_->options.gravity / problem_.frame().scale * motion_->up;
   return body;
 }
 template std::optional<Body<float>> SurfaceDynamics::inertia_terms<float>(double, PointsF);

@@ -205,7 +205,12 @@ void change_coordinates(RadialState& s, const Mat4& motion) {
 }  // namespace
 
 void RadialSolver::set_secondary_motion(const std::optional<SecondaryMotion>& motion) {
-  state_->dynamics.set(motion);
+  RadialState& s = *state_;
+  const ThreadScope threads(s.problem.options.threads);
+  s.dynamics.set(motion);
+  std::optional<Ground> ground;
+  if (s.dynamics.has_mass() && motion->ground) ground = Ground{*motion->ground, motion->up};
+  if (s.contact.set_further_ground(ground)) s.contact.begin(s.shape.coefficients);
 }
 
 MotionState RadialSolver::motion_state() const {

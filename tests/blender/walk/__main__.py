@@ -5,6 +5,7 @@ import argparse
 import collections
 import sys
 import time
+import traceback
 from pathlib import Path
 
 import bpy  # noqa: F401
@@ -16,7 +17,7 @@ def main():
     import addon
 
     from . import world
-    from .rule import Walk
+    from .rule import Broken, Walk
 
     parser = argparse.ArgumentParser(prog="python -m tests.blender.walk", description=__doc__)
     parser.add_argument("--steps", type=int, default=10000, help="of each seed [10000]")
@@ -33,6 +34,8 @@ def main():
             try:
                 taken += walk.step()
             except Exception as error:  # the rule is broken, or a step fails: on with another scene
+                if not isinstance(error, Broken):
+                    traceback.print_exc()
                 taken, walks = taken + 1, walks + 1
                 kinds[walk.said[-1].split(": ")[-1]] += 1
                 print(f"seed {seed}, step {taken}: {error!r}; after {'; '.join(walk.said[-8:])}", flush=True)

@@ -75,6 +75,9 @@ class Walk:
             if len(self.history) > 40:
                 del self.history[0]
                 self.position -= 1
+        strays = world.strays()
+        if strays:
+            raise Broken(f"no Empties of their own: {strays}")
         return True
 
     def at_end(self):

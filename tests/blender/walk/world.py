@@ -9,7 +9,7 @@ import numpy as np
 from support.blender import scenes
 
 from addon.blender import mesh_arrays, modifier_stack, user_preferences
-from addon.blender.object_references import settings_of
+from addon.blender.object_references import owner_of, settings_of
 from addon.core.runtime.coroutines import run_to_completion
 from addon.live import sessions
 from addon.results import placement
@@ -74,6 +74,16 @@ def sources():
     """The objects of the walk that are in the scene, by name; a walk may rename them."""
     items = bpy.context.view_layer.objects
     return [item for item in items if item.type == "MESH" and item.get("walks", item.name) in NAMES]
+
+
+def strays():
+    """Handles whose Empty is gone, or is not theirs."""
+    return [
+        (item.name, index, entry.empty and entry.empty.name)
+        for item in sources()
+        for index, entry in enumerate(settings_of(item).handles)
+        if entry.empty is None or owner_of(entry.empty) != item
+    ]
 
 
 def settle():
