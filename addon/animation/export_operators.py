@@ -14,7 +14,7 @@ from ..core.errors import UserError
 from ..core.runtime.jobs import Item
 from ..core.settings.choices import EXPORT_FORMATS
 from ..field_modifier import cache_modifier
-from ..names import Op
+from ..names import CONTEXT, Op
 from ..results import result_objects
 from . import caches, exporters, frames, played
 from .bake_operator import BakeOperator, arguments, effective_kind, refusal_of
@@ -156,6 +156,7 @@ class ARAPFIELDS_MT_export(bpy.types.Menu):
     """Write what the object does, frame by frame, to a file that other programs read"""
 
     bl_label = "Export Animation"
+    bl_translation_context = CONTEXT
 
     def draw(self, context):
         for kind, label in LABELS.items():
