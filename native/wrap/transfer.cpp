@@ -4,6 +4,8 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <cmath>
+#include <mutex>
+#include <optional>
 #include <utility>
 
 #include "core/errors.h"
@@ -12,6 +14,7 @@
 #include "distance/signed_distance.h"
 #include "distance/welded_vertices.h"
 #include "sampling/oriented_points.h"
+#include "wrap/carried_motion.h"
 
 namespace arapfields {
 namespace {
@@ -122,7 +125,8 @@ SurfacePlaces places_on(const TriangleMesh& mesh, PointsIn points, PointsIn norm
   return places;
 }
 
-WrappedMesh::WrappedMesh(const TriangleMesh& source, const DeformationField& field) : moved(source) {
+WrappedMesh::WrappedMesh(const TriangleMesh& source, const DeformationField& field)
+    : rest(source), moved(source) {
   validate(source);
   const Index count = source.vertices.rows();
   JetBlock<double> jets(count, JetOrder::first);
@@ -138,7 +142,7 @@ WrappedMesh::WrappedMesh(const TriangleMesh& source, const DeformationField& fie
 }
 
 WrappedMesh::WrappedMesh(const TriangleMesh& source, PointsIn positions)
-    : moved{positions, source.triangles}, jacobians(positions.rows(), Mat3::Zero()) {
+    : rest(source), moved{positions, source.triangles}, jacobians(positions.rows(), Mat3::Zero()) {
   validate(source);
   require(positions.rows() == source.vertices.rows(), "field",
           std::to_string(positions.rows()) + " moved vertices", "one for each of the source is needed");
@@ -151,10 +155,10 @@ WrappedMesh::WrappedMesh(const TriangleMesh& source, PointsIn positions)
     return columns;
   };
   for (Index t = 0; t < source.triangles.rows(); ++t) {
-    const TriangleEdges rest(source.vertices, source.triangles, t), now(positions, source.triangles, t);
-    const double area = rest.area.norm();
+    const TriangleEdges before(source.vertices, source.triangles, t), now(positions, source.triangles, t);
+    const double area = before.area.norm();
     if (!(area > 0.0 && now.area.norm() > 0.0)) continue;
-    const Mat3 gradient = basis(now) * basis(rest).inverse();
+    const Mat3 gradient = basis(now) * basis(before).inverse();
     if (!gradient.allFinite()) continue;
     for (int k = 0; k < 3; ++k) {
       const std::int32_t v = first[source.triangles(t, k)];
@@ -170,48 +174,56 @@ WrappedMesh::WrappedMesh(const TriangleMesh& source, PointsIn positions)
   for (std::size_t v = 0; v < areas.size(); ++v) jacobians[v] = jacobians[first[v]];
 }
 
+/// Prepared by the first call that needs it.
+struct Correspondence::Motion {
+  std::mutex mutex;
+  std::optional<CarriedMotion> carried;
+};
+
 Correspondence::Correspondence(const WrappedMesh& source, const TriangleMesh& target, Direction direction,
                                const Progress& progress)
-    : direction_(direction), jacobians_(source.jacobians) {
+    : motion_(std::make_shared<Motion>()) {
   validate(target);
   const bool forward = direction == Direction::to_target;
-  const TriangleMesh &giving = forward ? source.moved : target, &receiving = forward ? target : source.moved;
-  giving_ = giving.vertices.rows();
-  triangles_ = giving.triangles;
-  const WeldedVertices welded(receiving);
-  places_ = places_on(giving, receiving.vertices, welded.normals(welded.first, Eigen::all), progress);
-  if (!forward)
-    for (Mat3& jacobian : jacobians_) {
-      require(jacobian.determinant() != 0.0, "field", "the wrap flattens a vertex of the source",
-              "each must keep a volume about it for the way back");
-      jacobian = jacobian.inverse().eval();
-    }
+  giving_ = forward ? source.rest : target;
+  receiving_ = forward ? target : source.rest;
+  const TriangleMesh &on = forward ? source.moved : target, &points = forward ? target : source.moved;
+  const WeldedVertices welded(points);
+  places_ = places_on(on, points.vertices, welded.normals(welded.first, Eigen::all), progress);
+  jacobians_ = source.jacobians;
+  if (forward) {
+    jacobians_.resize(points.vertices.rows());
+    for (Index i = 0; i < points.vertices.rows(); ++i)
+      jacobians_[i] = places_.interpolated(giving_.triangles, i,
+                                           [&](Index v) -> const Mat3& { return source.jacobians[v]; });
+    return;
+  }
+  for (Mat3& jacobian : jacobians_) {
+    require(jacobian.determinant() != 0.0, "field", "the wrap flattens a vertex of the source",
+            "each must keep a volume about it for the way back");
+    jacobian = jacobian.inverse().eval();
+  }
 }
 
 RowMatrix<double> Correspondence::values(const RowMatrix<double>& given) const {
-  require(given.rows() == giving_, "values", std::to_string(given.rows()) + " rows",
-          "one for each of " + std::to_string(giving_) + " vertices is needed");
+  require(given.rows() == giving(), "values", std::to_string(given.rows()) + " rows",
+          "one for each of " + std::to_string(giving()) + " vertices is needed");
   RowMatrix<double> result(places_.shares.rows(), given.cols());
   parallel_for(0, result.rows(), 4096, [&](Index begin, Index end) {
-    for (Index i = begin; i < end; ++i) {
-      const auto corner = [&](int k) {
-        return places_.shares(i, k) * given.row(triangles_(places_.triangles[i], k));
-      };
-      result.row(i) = corner(0) + corner(1) + corner(2);
-    }
+    for (Index i = begin; i < end; ++i)
+      result.row(i) = places_.interpolated(giving_.triangles, i, [&](Index v) { return given.row(v); });
   });
   return result;
 }
 
 Points Correspondence::displacements(PointsIn given) const {
-  require(given.rows() == giving_, "displacements", std::to_string(given.rows()) + " rows",
-          "one for each of " + std::to_string(giving_) + " vertices is needed");
-  const auto turned = [&](PointsIn points) {
-    Points result(points.rows(), 3);
-    for (Index v = 0; v < points.rows(); ++v) result.row(v) = jacobians_[v] * points.row(v).transpose();
-    return result;
-  };
-  return direction_ == Direction::to_target ? Points(values(turned(given))) : turned(Points(values(given)));
+  require(given.rows() == giving(), "displacements", std::to_string(given.rows()) + " rows",
+          "one for each of " + std::to_string(giving()) + " vertices is needed");
+  {
+    const std::lock_guard lock(motion_->mutex);
+    if (!motion_->carried) motion_->carried.emplace(giving_, receiving_, places_, jacobians_);
+  }
+  return (*motion_->carried)(given);
 }
 
 }  // namespace arapfields

@@ -14,6 +14,7 @@ from arapfields.cli.wrapping import read_landmarks, write_landmarks
 
 SMALL = ["--centers", "50", "--stages", "2", "--iterations", "5", "--samples", "1000", "--quiet"]
 
+THERE_AND_BACK = 0.01  # in the largest motion: edges carry it, each by the mean Jacobian of its ends
 COARSE = 0.15  # of a key's length, off on average: what 66 vertices leave
 
 
@@ -131,4 +132,4 @@ def test_transfer_gives_the_scan_what_the_template_has(pair):
     back[back.index(pair / "fat.obj")] = pair / "keys" / "fat.ply"
     assert run("transfer", *meshes, *back) == 0
     again = trimesh.load(pair / "keys" / "fat.obj", process=False)
-    assert np.abs(again.vertices - 1.1 * v).max() < 1e-3
+    assert np.abs(again.vertices - 1.1 * v).max() < THERE_AND_BACK * np.abs(0.1 * v).max()

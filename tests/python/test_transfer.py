@@ -61,6 +61,27 @@ def test_keys_follow_a_known_map_onto_other_triangles(figure):
         assert away.mean() < INTERPOLATION * np.abs(told).max()
 
 
+def folded(v, f, motion):
+    """Triangles whose normal turns by more than a right angle."""
+    normal, moved = (np.cross(x[f[:, 1]] - x[f[:, 0]], x[f[:, 2]] - x[f[:, 0]]) for x in (v, v + motion))
+    return ((normal * moved).sum(axis=1) < 0).sum()
+
+
+def test_a_far_motion_folds_no_small_triangle(figure):
+    """The wrap's surface is uneven, so its Jacobians change from one triangle to the next."""
+    v, f = figure
+    uneven = np.random.default_rng(0).normal(size=v.shape)
+    wrapped = v + 0.01 * uneven
+    fine, faces = cases.figure(5)
+    key = 8 * key_at(v, v[0], 0.6)
+    assert folded(v, f, key) == 0
+    found = af.transfer(wrapped, (v, f), (fine, faces), {"displacements": key})["displacements"]
+    assert folded(fine, faces, found) == 0
+    told = 8 * key_at(fine, v[0], 0.6)
+    away = np.linalg.norm(found - told, axis=1)
+    assert away.mean() < INTERPOLATION * np.abs(told).max()
+
+
 def box_at(x):
     box = np.diag([0.4, 2.0, 2.0, 1.0])
     box[0, 3] = x

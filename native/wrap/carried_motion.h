@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Displacements of one mesh on another: differences along edges are carried, not places.
+#pragma once
+
+#include <Eigen/SparseCholesky>
+#include <vector>
+
+#include "core/task.h"
+#include "wrap/surface_places.h"
+
+namespace arapfields {
+
+/// Displacements u on a mesh whose differences along edges follow those of a giving mesh, turned and
+/// stretched: argmin Σ w ‖u_i − u_j − J (δ_i − δ_j)‖² + Σ a ‖u − J δ‖² / L², with cotangent weights w and
+/// areas a. Carrying differences keeps folds out, which J δ has where J changes within δ. One factor serves
+/// any number of δ. Source: Sumner and Popović 2004, "Deformation Transfer for Triangle Meshes", section 3.
+class CarriedMotion {
+ public:
+  /// `places` of the receiving vertices lie on the giving mesh, each in its own space; `jacobians` (n), at
+  /// the receiving vertices, lead from the second to the first. Throws Cancelled.
+  CarriedMotion(const TriangleMesh& giving, const TriangleMesh& receiving, const SurfacePlaces& places,
+                std::vector<Mat3> jacobians, const Progress& progress = {});
+
+  /// Displacements (m,3) of the giving vertices: (n,3) of the receiving ones.
+  Points operator()(PointsIn given) const;
+
+ private:
+  struct Edge {
+    std::int32_t begin;
+    std::int32_t end;
+    double weight;
+    Mat3 jacobian;
+    /// The edge on the giving mesh where the places there contradict it, else 0: then gradients are carried.
+    Vec3 back;
+  };
+  void add_edges();
+  std::vector<Mat3> gradients(PointsIn given) const;
+  /// Halves `kept` at triangles that fold where the giving mesh does not; whether there are any.
+  bool spare_folds(PointsIn given, const Points& moved, Vector& kept) const;
+
+  TriangleMesh giving_;
+  TriangleMesh receiving_;
+  SurfacePlaces places_;
+  std::vector<std::int32_t> first_;  // of each receiving vertex, the first at its position
+  std::vector<std::int32_t> giving_first_;
+  std::vector<Mat3> jacobians_;
+  std::vector<Edge> edges_;
+  std::vector<Eigen::Matrix<double, 3, 2>> slopes_;  // of giving triangles: differences to gradients
+  Vector giving_areas_;
+  Vector anchors_;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor_;
+};
+
+}  // namespace arapfields
