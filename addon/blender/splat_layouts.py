@@ -6,81 +6,112 @@ import numpy as np
 from ..core.errors import UserError
 from ..names import CHANGES
 
-FLOAT, VECTOR = "FLOAT", "FLOAT_VECTOR"
-WIDTHS = {FLOAT: 1, VECTOR: 3}
+FLOAT, VECTOR, COLOR, QUATERNION, FLOAT4 = "FLOAT", "FLOAT_VECTOR", "FLOAT_COLOR", "QUATERNION", "FLOAT4"
+# How many numbers elements of attributes have, and the property that has them.
+NUMBERS = {FLOAT: (1, "value"), VECTOR: (3, "vector"), COLOR: (4, "color")}
+NUMBERS |= {QUATERNION: (4, "value"), FLOAT4: (4, "vector")}
+KIND_OF = {(): FLOAT, (3,): VECTOR, (4,): COLOR}  # of what is added: a quaternion would be made a rotation
 LEAST = 1e-6  # opacity; and what is left to full opacity
 COUNTS = (16, 9, 4, 1)  # of spherical harmonics
+LOGARITHMS = "logarithms"  # of the scales, beside the attributes
 
 
 class FileLayout:
-    """The common file's own names: Blender's PLY import, and KIRI's 3DGS Render (vertices) that calls it."""
+    """The common file's own names: Blender's PLY import before 5.3, and KIRI's 3DGS Render (vertices)."""
 
     mark = "f_dc_0"
+    fixed = {f"f_dc_{k}": (FLOAT,) for k in range(3)} | {"opacity": (FLOAT,)}  # {attribute: its types}
 
     def columns(self, attributes):
         """{attribute: its type} that a motion changes."""
         rest = sum(name.startswith("f_rest_") for name, _ in attributes.items())
         names = [f"rot_{k}" for k in range(4)] + [f"scale_{k}" for k in range(3)]
-        names += [f"f_dc_{k}" for k in range(3)] + [f"f_rest_{k}" for k in range(rest)]
-        return dict.fromkeys(names, FLOAT)
+        return dict.fromkeys([*names, *(f"f_rest_{k}" for k in range(rest))], FLOAT)
 
-    opacity = "opacity"
-
-    def arrays(self, values):
+    def arrays(self, values, fixed):
         """Arguments of GaussianSplats but for the centers."""
-        table = np.stack(list(values.values())[:-1], axis=1)
-        harmonics = np.concatenate([table[:, 7:10, None], table[:, 10:].reshape(len(table), 3, -1)], axis=2)
-        alpha = 1.0 / (1.0 + np.exp(-values[self.opacity]))
-        return table[:, :4], np.exp(table[:, 4:7]), alpha, harmonics.swapaxes(1, 2)
+        *first, opacity = fixed.values()
+        table = np.stack(list(values.values()), axis=1)
+        rest = table[:, 7:].reshape(len(table), 3, -1)
+        colours = np.concatenate([np.stack(first, axis=1)[:, :, None], rest], axis=2).swapaxes(1, 2)
+        return table[:, :4], np.exp(table[:, 4:7]), 1.0 / (1.0 + np.exp(-opacity)), colours
 
-    def rest(self, values):
-        """(k, n): the columns' values, less what `changes` adds to them."""
-        return by_column(*list(values.values())[:-1])
+    def begin(self, rest):
+        """Adds to the values at rest what `streams` takes besides."""
 
-    def changes(self, splats, rest, columns):
-        """{attribute: what is added to it} of splats that moved from there."""
-        return dict(zip(columns, splats.columns(rest), strict=True))
+    def streams(self, values):
+        """Values, or what is added to them, as PreparedSplats.changes() takes them."""
+        return list(values.values())
+
+    def finish(self, rest, changes):
+        """Completes what is added to the values, after it was written to `streams`."""
 
 
-class VectorLayout:
+class VectorLayout(FileLayout):
     """ReshotAI's Gaussian Splatting: vectors, a quaternion in other letters (w, x, y and z), Euler angles."""
 
     mark = "quatxyz"
+    fixed = {"sh0": (VECTOR,), "opacity": (FLOAT,)}
 
     def columns(self, attributes):
         names = ["quatxyz", "scale", "logscale", "rot_euler"]
-        names += [f"sh{k}" for k in range(16) if f"sh{k}" in attributes]
+        names += [f"sh{k}" for k in range(1, 16) if f"sh{k}" in attributes]
         return {"quatw": FLOAT, **dict.fromkeys(names, VECTOR)}
 
-    opacity = "opacity"
-
-    def arrays(self, values):
-        harmonics = np.stack([value for name, value in values.items() if name.startswith("sh")], axis=1)
+    def arrays(self, values, fixed):
+        harmonics = np.stack([fixed["sh0"], *harmonics_of(values, "sh")], axis=1)
         turns = np.column_stack([values["quatxyz"], values["quatw"]])
-        return turns, values["scale"], values[self.opacity], harmonics
+        return turns, values["scale"], fixed["opacity"], harmonics
 
-    def rest(self, values):
-        turns, _, _, colours = self.arrays(values)
-        others = {name: values[name].astype(np.float32) for name in ("scale", "rot_euler")}
-        return by_column(turns, values["logscale"], colours[:, 0], colours[:, 1:].swapaxes(1, 2)), others
+    def streams(self, values):
+        shape = [*values["quatxyz"].T, values["quatw"], *values["logscale"].T]
+        return [*shape, *(one[:, c] for c in range(3) for one in harmonics_of(values, "sh"))]
 
-    def changes(self, splats, rest, columns):
-        rest, others = rest
-        changes, (w, x, y, z) = splats.columns(rest), splats.rotations.T
+    def finish(self, rest, changes):
+        changes["scale"][:] = np.exp(rest["logscale"] + changes["logscale"]) - rest["scale"]
+        (w, x, y), z = (rest["quatxyz"] + changes["quatxyz"]).T, rest["quatw"] + changes["quatw"]
         angles = [
             np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
             np.arcsin(np.clip(2 * (w * y - z * x), -1, 1)),
             np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
         ]
-        own = {"quatxyz": changes[:3].T, "quatw": changes[3], "logscale": changes[4:7].T}
-        own |= {"scale": splats.scales - others["scale"], "sh0": changes[7:10].T}
-        own["rot_euler"] = np.stack(angles, axis=1) - others["rot_euler"]
-        functions = (len(changes) - 10) // 3
-        own |= {f"sh{k + 1}": changes[10 + k :: functions].T for k in range(functions)}
-        return {name: own[name] for name in columns}
+        changes["rot_euler"][:] = np.stack(angles, axis=1) - rest["rot_euler"]
 
 
-LAYOUTS = (FileLayout(), VectorLayout())
+class OwnLayout(FileLayout):
+    """Blender's own, from 5.3 on, of point clouds that it draws as splats.
+
+    Not run there: names and types are those of its PLY import. Blender before 5.3 has no FLOAT4.
+    """
+
+    mark = "radiance:base"  # colours of the first harmonic, and opacity
+    fixed = {mark: (FLOAT4, COLOR)}
+
+    def columns(self, attributes):
+        names = ["scale", *(f"radiance:sh_{k}" for k in range(15) if f"radiance:sh_{k}" in attributes)]
+        return {"rotation": QUATERNION, **dict.fromkeys(names, VECTOR)}
+
+    def arrays(self, values, fixed):
+        base = fixed[self.mark]
+        harmonics = np.stack([base[:, :3], *harmonics_of(values, "radiance")], axis=1)
+        return values["rotation"], values["scale"], base[:, 3], harmonics
+
+    def begin(self, rest):
+        rest[LOGARITHMS] = np.log(rest["scale"])
+
+    def streams(self, values):
+        shape = [*values["rotation"].T, *values[LOGARITHMS].T]
+        return [*shape, *(one[:, c] for c in range(3) for one in harmonics_of(values, "radiance"))]
+
+    def finish(self, rest, changes):
+        changes["scale"][:] = rest["scale"] * np.expm1(changes.pop(LOGARITHMS))
+
+
+def harmonics_of(values, prefix):
+    return [value for name, value in values.items() if name.startswith(prefix)]
+
+
+LAYOUTS = (FileLayout(), VectorLayout(), OwnLayout())
 
 
 def layout_of(mesh):
@@ -100,14 +131,10 @@ class Splats:
     """What a mesh holds of splats, read on the main thread; the library's own are made later."""
 
     def __init__(self, name, mesh, centers):
-        self.layout, self.columns = layout_of(mesh), columns_of(mesh)
-        given = {
-            key: read(name, mesh, key, kind)
-            for key, kind in {**self.columns, self.layout.opacity: FLOAT}.items()
-        }
-        self.rest = self.layout.rest(given)
-        self.spare = None  # splats whose memory the next that are moved take
-        turns, scales, alpha, colours = self.layout.arrays(given)
+        self.layout, columns = layout_of(mesh), columns_of(mesh)
+        self.rest = {key: read(name, mesh, key, kind) for key, kind in columns.items()}
+        fixed = {key: read(name, mesh, key, *kinds) for key, kinds in self.layout.fixed.items()}
+        turns, scales, alpha, colours = self.layout.arrays(self.rest, fixed)
         count = next((count for count in COUNTS if colours.shape[1] == count), None)
         if count is None:
             raise UserError(
@@ -115,40 +142,38 @@ class Splats:
                 name=name,
                 count=colours.shape[1],
             )
+        if not (scales > 0).all():
+            raise UserError("{name}: a splat's scale is zero or negative", name=name)
         lengths = np.linalg.norm(turns, axis=1, keepdims=True)
         if not (lengths > 0).all():
             raise UserError("{name}: a splat's rotation is zero", name=name)
         self.arrays = centers, turns / lengths, scales, np.clip(alpha, LEAST, 1 - LEAST), colours
+        self.layout.begin(self.rest)
 
     def made(self, library):
         """The library's own splats."""
         return library.GaussianSplats(*self.arrays)
 
     def changes(self, prepared, field):
-        """{attribute: what is added to it} where a field moves the splats."""
-        spare, self.spare = self.spare, None  # of whichever thread comes first
-        moved = prepared.moved(field, spare, max_stretch=np.inf)
-        changes = self.layout.changes(moved, self.rest, self.columns)
-        self.spare = moved
-        return changes
+        """(n, 3) centers that a field moves, and {attribute: what is added to it}."""
+        changes = {key: np.empty_like(values) for key, values in self.rest.items()}
+        streams = self.layout.streams
+        centers = prepared.changes(field, streams(self.rest), streams(changes))
+        self.layout.finish(self.rest, changes)
+        return centers, changes
 
 
-def by_column(*parts):
-    """(k, n) in single precision, of arrays (n, …)."""
-    return np.concatenate([part.reshape(len(part), -1).T for part in parts], dtype=np.float32)
-
-
-def read(name, mesh, key, kind):
+def read(name, mesh, key, *kinds):
+    """(n,), (n, 3) or (n, 4) values of an attribute that has one of these types, in single precision."""
     attribute = mesh.attributes.get(key)
-    if attribute is None or (attribute.domain, attribute.data_type) != ("POINT", kind):
+    if attribute is None or attribute.domain != "POINT" or attribute.data_type not in kinds:
         raise UserError("{name}: its splats have no {attribute}", name=name, attribute=key)
-    width = WIDTHS[kind]
+    width, field = NUMBERS[attribute.data_type]
     flat = np.empty(width * len(attribute.data), dtype=np.float32)
-    attribute.data.foreach_get("vector" if kind == VECTOR else "value", flat)
+    attribute.data.foreach_get(field, flat)
     if not np.isfinite(flat).all():
         raise UserError("{name}: {attribute} of its splats has NaN or infinity", name=name, attribute=key)
-    values = flat.astype(np.float64)
-    return values.reshape(-1, 3) if kind == VECTOR else values
+    return flat if width == 1 else flat.reshape(-1, width)
 
 
 def put_changes(mesh, changes):
@@ -156,10 +181,13 @@ def put_changes(mesh, changes):
     for name in names_of_changes(mesh):
         if name.removeprefix(CHANGES) not in changes:
             mesh.attributes.remove(mesh.attributes[name])
+    kinds = {key: KIND_OF[values.shape[1:]] for key, values in changes.items()}
+    for key in [key for key in kinds if CHANGES + key not in mesh.attributes]:
+        mesh.attributes.new(CHANGES + key, kinds[key], "POINT")
+    there = dict(mesh.attributes.items())  # sought one by one, they take twice as long as they are written
     for key, values in changes.items():
-        kind, field = (VECTOR, "vector") if values.ndim == 2 else (FLOAT, "value")
-        attribute = mesh.attributes.get(CHANGES + key) or mesh.attributes.new(CHANGES + key, kind, "POINT")
-        attribute.data.foreach_set(field, np.ascontiguousarray(values, dtype=np.float32).ravel())
+        flat = np.ascontiguousarray(values, dtype=np.float32).ravel()
+        there[CHANGES + key].data.foreach_set(NUMBERS[kinds[key]][1], flat)
 
 
 def names_of_changes(mesh):
@@ -169,5 +197,6 @@ def names_of_changes(mesh):
 def changes_of(mesh):
     """{attribute: what is added to it}; None: nothing is."""
     kinds = {name: mesh.attributes[name].data_type for name in names_of_changes(mesh)}
-    found = {name.removeprefix(CHANGES): read(mesh.name, mesh, name, kind) for name, kind in kinds.items()}
-    return {key: values.astype(np.float32) for key, values in found.items()} or None
+    return {
+        key.removeprefix(CHANGES): read(mesh.name, mesh, key, kind) for key, kind in kinds.items()
+    } or None

@@ -70,7 +70,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
             after = transform(inverse(moves), after)
             place = surface.space.solve_to_world @ moves @ surface.space.world_to_solve
         turns = surface.turns(field, before, moves) if placement.keeps_mesh(output, result) else None
-        changes = surface.splat_changes(field) if surface.in_place else None
+        changes = surface.splat_changes(field)[1] if surface.in_place else None
         moved = carrying.moved(native.library(), points, field, carried)
         local = surface.space.to_local(after)
         if output == "WARP":

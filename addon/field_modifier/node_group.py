@@ -14,6 +14,7 @@ from ..names import CHANGES, FIELD_GROUP, FIELD_MODIFIER, OFFSETS, TURNS
 
 VERSION = 1
 VECTORS = {"data_type": "FLOAT_VECTOR", "domain": "POINT"}  # of nodes that sample points
+CHANGE_KINDS = {"QUATERNION": "FLOAT_COLOR"}  # of what is added to an attribute, where it is another
 PLAIN = ""  # of the groups: the one that turns no normals; the others are named by the normals' domain
 
 
@@ -63,11 +64,16 @@ def build(name, normals, splats):
 def add_change(graph, geometry, attribute, kind, strength):
     """Adds `strength` of its change to an attribute."""
     own, change = (
-        graph.node("GeometryNodeInputNamedAttribute", name, data_type=kind).outputs[0]
-        for name in (attribute, CHANGES + attribute)
+        graph.node("GeometryNodeInputNamedAttribute", name, data_type=data_type).outputs[0]
+        for name, data_type in ((attribute, kind), (CHANGES + attribute, CHANGE_KINDS.get(kind, kind)))
     )
-    if kind == "FLOAT":
-        new = graph.node("ShaderNodeMath", strength, change, own, operation="MULTIPLY_ADD").outputs[0]
+    if kind == "QUATERNION":
+        changes = graph.node("FunctionNodeSeparateColor", change).outputs
+        numbers = graph.node("FunctionNodeRotationToQuaternion", own).outputs
+        sums = [graph.scaled_sum(strength, *both) for both in zip(changes, numbers, strict=True)]
+        new = graph.node("FunctionNodeQuaternionToRotation", *sums).outputs[0]
+    elif kind == "FLOAT":
+        new = graph.scaled_sum(strength, change, own)
     else:
         part = graph.node(
             "ShaderNodeVectorMath", into={"Vector": change, "Scale": strength}, operation="SCALE"
@@ -125,6 +131,9 @@ class Graph:
             self.group.links.new(value, socket)
         else:
             socket.default_value = value
+
+    def scaled_sum(self, factor, change, number):
+        return self.node("ShaderNodeMath", factor, change, number, operation="MULTIPLY_ADD").outputs[0]
 
     def acts(self, strength):
         """Whether a strength is not 0; elsewhere the points stay bit for bit."""

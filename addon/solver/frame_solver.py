@@ -18,6 +18,7 @@ from .setup import at_samples
 REST_STEPS, FINE_TOLERANCE = 400, 1e-6  # of a solve from rest: until the energy falls no more
 STYLE = presets("live").get("STYLE")  # label, tip, and options for a style, which acts everywhere
 LEAST_RIGIDITY = 1e-3  # of a style
+TRACKED = 2000  # splats that are followed from step to step
 
 
 @dataclass(frozen=True)
@@ -79,9 +80,19 @@ class FrameSolver:
         options["interior"] = setup.kind == "DEFORM" or bool(handles)  # a style alone acts everywhere alike
         held = self._native_handles(handles)
         self.solver = af.LiveDeformer(self.sampled.samples, held, options_of("live", options, setup.machine))
-        self.solver.track(self.rest)
+        self._track()
         self.handles, self.energy, self.style_key, self.motion = handles, energy, None, None
         self.contact_key = None
+
+    @property
+    def moves_splats(self):
+        surface = self.sampled.setup.surface
+        return surface.splats is not None and surface.in_place
+
+    def _track(self):
+        """Of splats, which move with their axes and colours, a few are tracked, to tell how far they went."""
+        every = max(1, len(self.rest) // TRACKED) if self.moves_splats else 1
+        self.solver.track(self.rest[::every])
 
     def _native_handles(self, handles):
         setup, af = self.sampled.setup, native.library()
@@ -93,7 +104,7 @@ class FrameSolver:
         """Has the native solver know all of a request but where its handles are; returns that."""
         if request.points is not self.points and self.sampled.topology is None:
             self.set_points(request.points, self.sampled.setup.surface.space.to_solve(request.points))
-            self.solver.track(self.rest)
+            self._track()
         if request.energy != self.energy:
             self._make_solver(request.handles, request.energy)
         if request.handles is not self.handles:
@@ -143,7 +154,7 @@ class FrameSolver:
 
     def tracked_shape(self, request):
         """The request's shape as the solver tracks it, in single precision."""
-        return self._shape(request, self.solver.tracked())
+        return self._shape(request, None if self.moves_splats else self.solver.tracked())
 
     def exact_shape(self, request):
         """The request's shape by the field itself."""
@@ -157,9 +168,10 @@ class FrameSolver:
         if topology is not None:
             return Shape(self.to_local(solved), None, topology=topology, carried=carried)
         turns = surface.turns(moved, self.rest) if surface.in_place else None
+        centers, changes = surface.splat_changes(moved) if surface.in_place else (None, None)
+        solved = centers if solved is None else solved
         # What does not move stays bit for bit.
         points = in_single(surface.space.moved_to_local(require_finite(solved), self.rest, self.points))
-        changes = surface.splat_changes(moved) if surface.in_place else None
         return Shape(points, self._single, turns, changes, carried=carried)
 
     def to_local(self, points):

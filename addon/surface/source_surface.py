@@ -46,10 +46,8 @@ class SourceSurface:
         return native.library().PreparedSplats(self.splats.made(native.library()))
 
     def splat_changes(self, field):
-        """What a field adds to the splats' attributes, by their names; None: there are no splats."""
-        if self.splats is None:
-            return None
-        return self.splats.changes(self.prepared, field)
+        """(n, 3) splats' centers that a field moves, and {attribute: what is added to it}; or None, None."""
+        return (None, None) if self.splats is None else self.splats.changes(self.prepared, field)
 
     def implicit(self, tracker, weight):
         """The implicit surface that was chosen; runs on the worker."""

@@ -27,6 +27,7 @@ inline bool is_any(PyObject*) { return true; }
 ARAPFIELDS_PYTHON_TYPE(ArrayArgument, "arapfields.arrays.ArrayLike")
 ARAPFIELDS_PYTHON_TYPE(PointsArgument, "numpy.typing.NDArray[numpy.float64]")
 ARAPFIELDS_PYTHON_TYPE(ArraysArgument, "collections.abc.Iterable[arapfields.arrays.ArrayLike]")
+ARAPFIELDS_PYTHON_TYPE(ColumnsArgument, "collections.abc.Iterable[numpy.typing.NDArray[numpy.float32]]")
 ARAPFIELDS_PYTHON_TYPE(
     MeshesArgument,
     "collections.abc.Iterable[tuple[arapfields.arrays.ArrayLike, arapfields.arrays.ArrayLike]]")

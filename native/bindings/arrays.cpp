@@ -158,10 +158,6 @@ py::array_t<double> as_doubles(const py::handle& value, const std::string& argum
   return as_numbers<double>(as_array(value, argument, "fiu", "expected real numbers"), argument);
 }
 
-py::array_t<float> as_floats(const py::handle& value, const std::string& argument) {
-  return as_numbers<float>(as_array(value, argument, "fiu", "expected real numbers"), argument);
-}
-
 void for_each_item(const py::handle& value, const std::string& argument, const std::string& allowed,
                    double item_bytes,
                    const std::function<void(const py::object&, const std::string&)>& take) {

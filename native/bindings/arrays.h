@@ -39,7 +39,6 @@ Eigen::MatrixXd as_matrix(const py::handle& value, const std::string& argument);
 std::vector<Index> as_indices(const py::handle& value, const std::string& argument);
 /// Real numbers of any shape, contiguous.
 py::array_t<double> as_doubles(const py::handle& value, const std::string& argument);
-py::array_t<float> as_floats(const py::handle& value, const std::string& argument);
 
 std::string type_text(const py::handle& value);
 /// A str; InvalidInput for anything else.

@@ -48,21 +48,42 @@ using FloatArray = py::array_t<float>;
 /// What a call without the GIL holds on to, so that nobody takes its memory away (memory_of).
 using Kept = std::shared_ptr<GaussianSplats>;
 
-/// (7 + 3 k, n), as GaussianSplats::write_columns() has them.
-FloatArray columns_of(const Kept& splats, const std::optional<ArrayArgument>& minus) {
-  FloatArray result({Index{7 + splats->harmonics.cols()}, splats->size()});
-  std::optional<FloatArray> taken;
-  if (minus) {
-    taken = as_floats(*minus, "minus");
-    require(taken->ndim() == 2 && taken->shape(0) == result.shape(0) && taken->shape(1) == result.shape(1),
-            "minus", "another shape", "that of columns() without it is needed");
-  }
-  const float* less = taken ? taken->data() : nullptr;
-  float* out = result.mutable_data();
-  const py::gil_scoped_release unlocked;
-  const ThreadScope threads;
-  splats->write_columns(less, out);
-  return result;
+/// (n) single-precision numbers with any stride, and their place.
+std::pair<float*, Index> as_column(const py::object& given, const std::string& name, Index count,
+                                   bool written) {
+  const std::string needed = "(" + std::to_string(count) + ",) float32 numbers are needed";
+  require(py::isinstance<py::array>(given), name, "got " + type_text(given), needed);
+  auto array = py::reinterpret_borrow<py::array>(given);
+  require(array.dtype().is(py::dtype::of<float>()) && array.ndim() == 1 && array.shape(0) == count, name,
+          "another type or shape", needed);
+  require(array.strides(0) % Index{sizeof(float)} == 0, name, "unaligned", needed);
+  require(!written || array.writeable(), name, "it cannot be written to", needed);
+  return {static_cast<float*>(const_cast<void*>(array.data())), array.strides(0) / Index{sizeof(float)}};
+}
+
+PointsF changes_of(const PreparedSplats& self, const DeformationField& field, const ColumnsArgument& rest,
+                   const ColumnsArgument& changes, Task* task) {
+  std::vector<SplatColumn> columns;
+  const auto item_bytes = static_cast<double>(sizeof(SplatColumn));
+  for_each_item(rest, "rest", "a sequence of arrays is needed", item_bytes,
+                [&](const py::object& item, const std::string& name) {
+                  const auto [data, stride] = as_column(item, name, self.rest().size(), false);
+                  columns.push_back({data, stride, nullptr, 0});
+                });
+  const auto needed = static_cast<std::size_t>(4 + self.rest().harmonics.cols());
+  require(columns.size() == needed, "rest", std::to_string(columns.size()) + " arrays",
+          std::to_string(needed) + " are needed");
+  std::size_t written = 0;
+  for_each_item(changes, "changes", "a sequence of arrays is needed", item_bytes,
+                [&](const py::object& item, const std::string& name) {
+                  const auto [data, stride] = as_column(item, name, self.rest().size(), true);
+                  if (written < needed)
+                    columns[written].change = data, columns[written].change_stride = stride;
+                  ++written;
+                });
+  require(written == needed, "changes", std::to_string(written) + " arrays",
+          std::to_string(needed) + " are needed");
+  return run_long(task, [&](const Progress& progress) { return self.changes(field, columns, progress); });
 }
 
 /// The memory of splats that no call is at work on; they are empty afterwards. The GIL is held.
@@ -113,10 +134,6 @@ InvalidInput for other shapes and values.)")
             return result;
           },
           "(n, k, 3) colours of the real spherical harmonics.")
-      .def("columns", &columns_of, "minus"_a = py::none(), R"(
-(7 + 3k, n): one row for each of a file's properties rot_*, scale_* (logarithms), f_dc_* and f_rest_*, in this order.
-
-`minus`: an array of that shape that is taken away. InvalidInput for another shape.)")
       .def(
           "save",
           [](const Kept& self, const PathArgument& path, Task* task) {
@@ -177,7 +194,13 @@ They are moved in single precision: errors are some 1e-5 of the size.)")
           "task"_a = py::none(), R"(
 As field.apply_to(splats). May be called from any thread. Raises InvalidInput and Cancelled.
 
-`into`: splats of an earlier call that are no longer needed. The result takes their memory; they are empty then.)");
+`into`: splats of an earlier call that are no longer needed. The result takes their memory; they are empty then.)")
+      .def("changes", &changes_of, "field"_a, "rest"_a, "changes"_a, py::kw_only(), "task"_a = py::none(), R"(
+The centers (n, 3) of moved(field, max_stretch=math.inf); what else the motion changes goes to `changes`.
+
+`rest`: the splats' numbers at rest, 4 + 3k float32 arrays (n,) of any stride: rotations (w, x, y, z), logarithms of
+the scales, then all harmonics but the first, channel by channel. `changes`: as many arrays, which become what is
+added to each. May be called from any thread. Raises InvalidInput and Cancelled.)");
   auto field = py::reinterpret_borrow<py::class_<DeformationField, std::shared_ptr<DeformationField>>>(
       module.attr("DeformationField"));
   field.def(

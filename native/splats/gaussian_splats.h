@@ -26,10 +26,6 @@ struct ARAPFIELDS_EXPORT GaussianSplats {
   void append_copies(const std::vector<Index>& rows);
   /// Becomes as many splats as these with their opacities and other values; the rest is not set.
   void be_places_of(const GaussianSplats& other);
-  /// Writes (7 + 3 k, n) numbers, one quantity after the other as files name them: rotations, log_scales, the
-  /// first function's colours, then the other functions' channel by channel. Where `minus` (of that shape) is
-  /// given, it is taken away.
-  void write_columns(const float* minus, float* out) const;
   /// Throws InvalidInput that names what has another number of rows, or is not finite.
   void validate() const;
 };

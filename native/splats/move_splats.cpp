@@ -40,17 +40,31 @@ class SplatPlaces {
 
   GaussianSplats moved(const RadialField& field, const GaussianSplats& splats, double max_stretch,
                        const Progress& progress, GaussianSplats into) const {
-    const SplatJets<float> jets = [&](std::size_t g, JetView<float> out) {
-      (out.order == JetOrder::first ? first_ : second_)[g].evaluate(field.coefficients(), out);
-    };
-    return moved_groups(std::move(into), field, splats, groups_, jets, max_stretch, progress);
+    return moved_groups(std::move(into), field, splats, groups_, jets_of(field), max_stretch, progress);
+  }
+  PointsF changes(const RadialField& field, const GaussianSplats& splats,
+                  const std::vector<SplatColumn>& columns, const Progress& progress) const {
+    return changed_columns(field.frame(), splats, groups_, jets_of(field), columns, progress);
   }
 
  private:
+  SplatJets<float> jets_of(const RadialField& field) const {
+    return [&](std::size_t g, JetView<float> out) {
+      (out.order == JetOrder::first ? first_ : second_)[g].evaluate(field.coefficients(), out);
+    };
+  }
+
   RadialField field_;
   std::vector<SplatGroup> groups_;
   std::vector<RadialEvaluator<float>> first_, second_;
 };
+
+/// The field, where its places can be prepared; null for others.
+const RadialField* preparable(const DeformationField& field) {
+  const auto* radial =
+      typeid(field) == typeid(RadialField) ? dynamic_cast<const RadialField*>(&field) : nullptr;
+  return radial == nullptr || radial->influence() ? nullptr : radial;
+}
 
 }  // namespace
 
@@ -90,12 +104,24 @@ GaussianSplats PreparedSplats::moved(const DeformationField& field, double max_s
                                      const Progress& progress, GaussianSplats into) const {
   require_stretch(max_stretch);
   const ThreadScope threads;
-  const auto* radial =
-      typeid(field) == typeid(RadialField) ? dynamic_cast<const RadialField*>(&field) : nullptr;
-  if (radial == nullptr || radial->influence())
-    return moved_directly(field, state_->splats_, max_stretch, progress);
+  const RadialField* radial = preparable(field);
+  if (radial == nullptr) return moved_directly(field, state_->splats_, max_stretch, progress);
   return state_->places(*radial, progress.part(0.0, 0.5))
       ->moved(*radial, state_->splats_, max_stretch, progress.part(0.5, 1.0), std::move(into));
+}
+
+PointsF PreparedSplats::changes(const DeformationField& field, const std::vector<SplatColumn>& columns,
+                                const Progress& progress) const {
+  const GaussianSplats& splats = state_->splats_;
+  const Index needed = 4 + splats.harmonics.cols();
+  require(std::ssize(columns) == needed, "columns", std::to_string(columns.size()),
+          std::to_string(needed) + " are needed");
+  const ThreadScope threads;
+  if (const RadialField* radial = preparable(field))
+    return state_->places(*radial, progress.part(0.0, 0.5))
+        ->changes(*radial, splats, columns, progress.part(0.5, 1.0));
+  const auto groups = SplatGroup::of(splats, field.frame().scale);
+  return changed_columns(field.frame(), splats, groups, jets_of(field, splats, groups), columns, progress);
 }
 
 const GaussianSplats& PreparedSplats::rest() const { return state_->splats_; }

@@ -6,6 +6,7 @@
 #include "core/task.h"
 #include "fields/field.h"
 #include "splats/gaussian_splats.h"
+#include "splats/splat_column.h"
 
 namespace arapfields {
 
@@ -35,6 +36,11 @@ class ARAPFIELDS_EXPORT PreparedSplats {
   /// takes as long as their pose.
   GaussianSplats moved(const DeformationField& field, double max_stretch = default_max_stretch,
                        const Progress& progress = {}, GaussianSplats into = {}) const;
+  /// Where moved() has the centers (n,3) if it divides no splat. What else a motion changes is written to
+  /// `columns`: rotations (w, x, y, z), logarithms of the scales, then all harmonics but the first, channel
+  /// by channel, with the splats' own numbers at rest. Throws InvalidInput for another number of columns.
+  PointsF changes(const DeformationField& field, const std::vector<SplatColumn>& columns,
+                  const Progress& progress = {}) const;
   const GaussianSplats& rest() const;
 
  private:

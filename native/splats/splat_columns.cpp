@@ -1,45 +1,43 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <algorithm>
-
 #include "core/parallel.h"
-#include "splats/gaussian_splats.h"
+#include "splats/splat_motion.h"
+#include "splats/turn_kernel.h"
 
 namespace arapfields {
-namespace {
 
-constexpr Index block = 512;  // splats whose numbers stay in the nearest caches while they are turned about
-
-/// One quantity: a column of row-major numbers that has its place in the result.
-struct Column {
-  const float* first;
-  Index stride;
-};
-
-}  // namespace
-
-void GaussianSplats::write_columns(const float* minus, float* out) const {
-  std::vector<Column> columns;
-  const auto add = [&columns](const auto& rows, Index column) {
-    columns.push_back({rows.data() + column, rows.cols()});
-  };
-  for (Index k = 0; k < 4; ++k) add(rotations, k);
-  for (Index a = 0; a < 3; ++a) add(log_scales, a);
-  for (Index c = 0; c < 3; ++c) add(harmonics, c);
-  for (Index c = 0; c < 3; ++c)
-    for (Index k = 3 + c; k < harmonics.cols(); k += 3) add(harmonics, k);
-  parallel_for(0, size(), block, [&](Index from, Index to) {
-    for (Index begin = from; begin < to; begin += block) {
-      const Index end = std::min(begin + block, to);
-      for (std::size_t row = 0; row < columns.size(); ++row) {
-        const auto [first, stride] = columns[row];
-        const Index place = static_cast<Index>(row) * size();
-        if (minus == nullptr)
-          for (Index i = begin; i < end; ++i) out[place + i] = first[i * stride];
-        else
-          for (Index i = begin; i < end; ++i) out[place + i] = first[i * stride] - minus[place + i];
+template <class Scalar>
+PointsF changed_columns(const Frame& frame, const GaussianSplats& rest, const std::vector<SplatGroup>& groups,
+                        const SplatJets<Scalar>& jets, const std::vector<SplatColumn>& columns,
+                        const Progress& progress) {
+  PointsF centers(rest.size(), 3);
+  RowMatrix<float> jacobians(rest.size(), 9);
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    progress.report(static_cast<double>(g) / static_cast<double>(groups.size()));
+    const std::vector<Index>& rows = groups[g].rows;
+    JetBlock<Scalar> block(std::ssize(rows), JetOrder::first);
+    const JetView<Scalar> of_group = block.view();
+    jets(g, of_group);
+    parallel_for(0, of_group.count, 1024, [&](Index from, Index to) {
+      for (Index i = from; i < to; ++i) {
+        const Index row = rows[static_cast<std::size_t>(i)];
+        for (int a = 0; a < 3; ++a) {
+          centers(row, a) =
+              static_cast<float>(frame.scale * static_cast<double>(of_group.at(0, i)[a]) + frame.center[a]);
+          for (int k = 0; k < 3; ++k)
+            jacobians(row, 3 * k + a) = static_cast<float>(of_group.at(first_column(k), i)[a]);
+        }
       }
-    }
-  });
+    });
+  }
+  const SplatColumnBatch batch{jacobians.data(), columns.data(), static_cast<int>(rest.harmonics.cols() / 3),
+                               &harmonic_tables<float>()};
+  parallel_for(0, rest.size(), 1024,
+               [&](Index from, Index to) { ARAPFIELDS_DISPATCH(turn_columns(batch, from, to)); });
+  return centers;
 }
+template PointsF changed_columns(const Frame&, const GaussianSplats&, const std::vector<SplatGroup>&,
+                                 const SplatJets<float>&, const std::vector<SplatColumn>&, const Progress&);
+template PointsF changed_columns(const Frame&, const GaussianSplats&, const std::vector<SplatGroup>&,
+                                 const SplatJets<double>&, const std::vector<SplatColumn>&, const Progress&);
 
 }  // namespace arapfields

@@ -7,6 +7,7 @@
 #include "core/task.h"
 #include "fields/field.h"
 #include "splats/gaussian_splats.h"
+#include "splats/splat_column.h"
 
 namespace arapfields {
 
@@ -31,6 +32,13 @@ template <class Scalar>
 GaussianSplats moved_groups(GaussianSplats moved, const DeformationField& field, const GaussianSplats& rest,
                             const std::vector<SplatGroup>& groups, const SplatJets<Scalar>& jets,
                             double max_stretch, const Progress& progress);
+
+/// Centers (n,3) that are moved by a field with these jets, and what it adds to these columns
+/// (PreparedSplats::changes()); none is divided.
+template <class Scalar>
+PointsF changed_columns(const Frame& frame, const GaussianSplats& rest, const std::vector<SplatGroup>& groups,
+                        const SplatJets<Scalar>& jets, const std::vector<SplatColumn>& columns,
+                        const Progress& progress);
 
 /// Jets that the field is asked for.
 SplatJets<double> jets_of(const DeformationField& field, const GaussianSplats& rest,

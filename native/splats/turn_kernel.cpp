@@ -4,6 +4,7 @@
 #include "core/pack_exp.h"
 #include "core/pack_points.h"
 #include "energies/rotation_pack.h"
+#include "splats/turn_access.h"
 
 namespace arapfields::SIMD_LEVEL {
 namespace {
@@ -13,32 +14,6 @@ constexpr int sweeps = 12;
 constexpr float finest = -23.0f;
 template <class Scalar>
 constexpr Scalar orthogonal = sizeof(Scalar) == 4 ? Scalar(2e-7) : Scalar(1e-15);
-
-/// Entry k of each lane's row; lanes past the last repeat it.
-template <class Scalar>
-struct Rows {
-  std::int64_t at[lanes<Scalar>];
-  int valid;
-
-  Rows(const std::int64_t* rows, std::int64_t first, std::int64_t end)
-      : valid(static_cast<int>(end - first < lanes<Scalar> ? end - first : lanes<Scalar>)) {
-    for (int i = 0; i < lanes<Scalar>; ++i) at[i] = rows[first + (i < valid ? i : valid - 1)];
-  }
-  template <int columns>
-  void gather(const float* from, int stride, Pack<Scalar>* out) const {
-    Scalar split[columns][lanes<Scalar>];
-    for (int i = 0; i < lanes<Scalar>; ++i)
-      for (int c = 0; c < columns; ++c) split[c][i] = static_cast<Scalar>(from[stride * at[i] + c]);
-    for (int c = 0; c < columns; ++c) out[c] = load(split[c]);
-  }
-  template <int columns>
-  void scatter(const Pack<Scalar>* values, int stride, float* to) const {
-    Scalar split[columns][lanes<Scalar>];
-    for (int c = 0; c < columns; ++c) store(split[c], values[c]);
-    for (int i = 0; i < valid; ++i)
-      for (int c = 0; c < columns; ++c) to[stride * at[i] + c] = static_cast<float>(split[c][i]);
-  }
-};
 
 template <class Scalar>
 inline void axes_of(const Pack<Scalar> (&q)[4], Pack33<Scalar>& out) {
@@ -55,6 +30,47 @@ inline void axes_of(const Pack<Scalar> (&q)[4], Pack33<Scalar>& out) {
 template <class Scalar>
 inline Pack<Scalar> product(const Pack33<Scalar>& a, int p, int q) {
   return a[0][p] * a[0][q] + a[1][p] * a[1][q] + a[2][p] * a[2][q];
+}
+
+/// The rotation closest to J, by Newton's iteration for the polar decomposition (Higham 1986), which is
+/// several times as fast as closest_rotation(); that one takes what is flat, mirrored or far from rotations.
+template <class Scalar>
+inline void rotation_of(const Pack33<Scalar>& jacobian, Pack33<Scalar>& out) {
+  using P = Pack<Scalar>;
+  constexpr int most_steps = 8;
+  constexpr Scalar settled = sizeof(Scalar) == 4 ? Scalar(1e-7) : Scalar(1e-14);
+  const P zero = {}, one = broadcast(Scalar(1));
+  P x[3][3], wrong = zero;
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < 3; ++k) x[i][k] = jacobian[i][k];
+  for (int step = 0; step < most_steps; ++step) {
+    P cofactors[3][3];
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < 3; ++k) {
+        const int i1 = (i + 1) % 3, i2 = (i + 2) % 3, k1 = (k + 1) % 3, k2 = (k + 2) % 3;
+        cofactors[i][k] = x[i1][k1] * x[i2][k2] - x[i1][k2] * x[i2][k1];
+      }
+    const P determinant = x[0][0] * cofactors[0][0] + x[0][1] * cofactors[0][1] + x[0][2] * cofactors[0][2];
+    if (step == 0)
+      wrong = determinant > zero ? zero : one;  // in those, and for NaN, the limit is no rotation
+    const P half_inverse = Scalar(0.5) / determinant;
+    P change = zero;
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < 3; ++k) {
+        const P next = Scalar(0.5) * x[i][k] + half_inverse * cofactors[i][k], moved = next - x[i][k];
+        change += moved * moved;
+        x[i][k] = next;
+      }
+    if (sum_of_lanes<Scalar>(change < settled ? wrong : one) == 0) {
+      for (int i = 0; i < 3; ++i)
+        for (int k = 0; k < 3; ++k) out[i][k] = x[i][k];
+      return;
+    }
+  }
+  RotationPack<Scalar> closest;
+  closest_rotation<Scalar>(jacobian, closest);
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < 3; ++k) out[i][k] = closest.rotation[i][k];
 }
 
 /// The orthogonal axes σ_i u_i with Σ σ_i² u_i u_iᵀ = A Aᵀ, by Hestenes' one-sided Jacobi rotations. Columns
@@ -148,25 +164,25 @@ inline void turn_first_band(const Pack33<Scalar>& rotation, Pack<Scalar>* colour
   }
 }
 
-template <int functions, class Scalar>
-inline void turn_colours(const SplatBatch<Scalar>& batch, const Rows<Scalar>& from, const Rows<Scalar>& to,
+template <int functions, class Scalar, class Access>
+inline void turn_colours(const Access& access, const HarmonicTables<Scalar>& tables,
                          const Pack33<Scalar>& rotation) {
   using P = Pack<Scalar>;
   P colours[3 * functions];
-  from.template gather<3 * functions>(batch.harmonics, 3 * functions, colours);
+  access.template load_colours<functions>(colours);
   if constexpr (functions > 1) turn_first_band<Scalar>(rotation, colours + 3);
   if constexpr (functions > 4) {
     P turned[harmonic_directions][3];
     for (int d = 0; d < harmonic_directions; ++d)
       for (int k = 0; k < 3; ++k) {
-        const Scalar* direction = batch.tables->directions[d];
+        const Scalar* direction = tables.directions[d];
         turned[d][k] =
             rotation[0][k] * direction[0] + rotation[1][k] * direction[1] + rotation[2][k] * direction[2];
       }
-    turn_band<2, Scalar>(turned, batch.tables->second, colours + 12);
-    if constexpr (functions > 9) turn_band<3, Scalar>(turned, batch.tables->third, colours + 27);
+    turn_band<2, Scalar>(turned, tables.second, colours + 12);
+    if constexpr (functions > 9) turn_band<3, Scalar>(turned, tables.third, colours + 27);
   }
-  to.template scatter<3 * functions>(colours, 3 * functions, batch.moved_harmonics);
+  access.template store_colours<functions>(colours);
 }
 
 /// Asks for the memory of splats that come next: neighbours in space are far apart in a file.
@@ -180,20 +196,19 @@ inline void prefetch(const std::int64_t* rows, std::int64_t first, std::int64_t 
   }
 }
 
-template <class Scalar>
-inline void turn_lanes(const SplatBatch<Scalar>& batch, std::int64_t first, std::int64_t end) {
+/// Turns a pack of splats; `stretches`: |J u| for the axes u at rest.
+template <class Scalar, class Access>
+inline void turn_lanes(const Access& access, const Pack33<Scalar>& jacobian, int functions,
+                       const HarmonicTables<Scalar>& tables, Pack<Scalar> (&stretches)[3]) {
   using P = Pack<Scalar>;
-  const Rows<Scalar> from(batch.from, first, end), to(batch.to, first, end);
   const P zero = {};
-  Pack33<Scalar> jacobian, rest, columns;
-  load_jacobians(batch.jacobians, batch.count, first, from.valid, jacobian);
+  Pack33<Scalar> rest, columns;
   P quaternion[4], log_scales[3];
-  from.template gather<4>(batch.rotations, 4, quaternion);
-  from.template gather<3>(batch.log_scales, 3, log_scales);
+  access.load_shape(quaternion, log_scales);
   axes_of<Scalar>(quaternion, rest);
   P widest = log_scales[0] > log_scales[1] ? log_scales[0] : log_scales[1];
   widest = log_scales[2] > widest ? log_scales[2] : widest;
-  P stretches[3], apart[3];  // apart: what is added to a width's logarithm at the end
+  P apart[3];  // what is added to a width's logarithm at the end
   for (int a = 0; a < 3; ++a) {
     for (int i = 0; i < 3; ++i)
       columns[i][a] = jacobian[i][0] * rest[0][a] + jacobian[i][1] * rest[1][a] + jacobian[i][2] * rest[2][a];
@@ -203,13 +218,9 @@ inline void turn_lanes(const SplatBatch<Scalar>& batch, std::int64_t first, std:
     const P width = exponential<Scalar>(used);
     for (auto& row : columns) row[a] *= width;
   }
-  for (int i = 0; i < from.valid; ++i)
-    for (int a = 0; a < 3; ++a) batch.stretches[3 * (first + i) + a] = stretches[a][i];
   orthogonalise<Scalar>(columns);
-  RotationPack<Scalar> closest;
-  closest_rotation<Scalar>(jacobian, closest);
-  const Pack33<Scalar>& turn = closest.rotation;
-  Pack33<Scalar> axes;
+  Pack33<Scalar> turn, axes;
+  rotation_of<Scalar>(jacobian, turn);
   for (int a = 0; a < 3; ++a) {
     constexpr Scalar least = sizeof(Scalar) == 4 ? Scalar(1e-15) : Scalar(1e-30);
     const P length = square_root(product<Scalar>(columns, a, a));
@@ -228,17 +239,16 @@ inline void turn_lanes(const SplatBatch<Scalar>& batch, std::int64_t first, std:
   for (auto& row : axes) row[2] = determinant < zero ? -row[2] : row[2];
   P moved[4];
   quaternion_of<Scalar>(axes, quaternion, moved);
-  to.template scatter<4>(moved, 4, batch.moved_rotations);
-  to.template scatter<3>(log_scales, 3, batch.moved_log_scales);
-  switch (batch.functions) {
+  access.store_shape(moved, log_scales);
+  switch (functions) {
     case 1:
-      return turn_colours<1>(batch, from, to, turn);
+      return turn_colours<1>(access, tables, turn);
     case 4:
-      return turn_colours<4>(batch, from, to, turn);
+      return turn_colours<4>(access, tables, turn);
     case 9:
-      return turn_colours<9>(batch, from, to, turn);
+      return turn_colours<9>(access, tables, turn);
     default:
-      return turn_colours<16>(batch, from, to, turn);
+      return turn_colours<16>(access, tables, turn);
   }
 }
 
@@ -252,10 +262,28 @@ void turn_splats(const SplatBatch<Scalar>& batch, std::int64_t begin, std::int64
     prefetch(batch.from, next, last, batch.functions, batch.rotations, batch.log_scales, batch.harmonics);
     prefetch(batch.to, next, last, batch.functions, batch.moved_rotations, batch.moved_log_scales,
              batch.moved_harmonics);
-    turn_lanes(batch, first, end);
+    const RowAccess<Scalar> access(batch, first, end);
+    Pack33<Scalar> jacobian;
+    load_jacobians(batch.jacobians, batch.count, first, access.from.valid, jacobian);
+    Pack<Scalar> stretches[3];
+    turn_lanes(access, jacobian, batch.functions, *batch.tables, stretches);
+    for (int i = 0; i < access.from.valid; ++i)
+      for (int a = 0; a < 3; ++a) batch.stretches[3 * (first + i) + a] = stretches[a][i];
   }
 }
 template void turn_splats(const SplatBatch<float>&, std::int64_t, std::int64_t);
 template void turn_splats(const SplatBatch<double>&, std::int64_t, std::int64_t);
+
+void turn_columns(const SplatColumnBatch& batch, std::int64_t begin, std::int64_t end) {
+  for (std::int64_t first = begin; first < end; first += lanes<float>) {
+    const std::int64_t left = end - first;
+    const ColumnAccess access{batch, first, static_cast<int>(left < lanes<float> ? left : lanes<float>)};
+    if (first + 4 * lanes<float> < end) access.prefetch_ahead();
+    Pack33<float> jacobian;
+    access.load_jacobian(jacobian);
+    Pack<float> stretches[3];
+    turn_lanes(access, jacobian, batch.functions, *batch.tables, stretches);
+  }
+}
 
 }  // namespace arapfields::SIMD_LEVEL

@@ -6,6 +6,7 @@
 
 #include "core/simd.h"
 #include "splats/harmonics.h"
+#include "splats/splat_column.h"
 
 namespace arapfields {
 
@@ -28,8 +29,18 @@ struct SplatBatch {
   Scalar* stretches;  ///< (count, 3) |J u| for the axes u at rest
 };
 
+/// Splats of which all that a motion changes are columns, in the order of PreparedSplats::changes().
+struct SplatColumnBatch {
+  const float* jacobians;  ///< (n, 9): ∂_1 f, ∂_2 f, ∂_3 f
+  const SplatColumn* columns;
+  int functions;
+  const HarmonicTables<float>* tables;
+};
+
 // Covariances J Σ Jᵀ, and colours turned by the rotation closest to J, for splats begin to end − 1.
 ARAPFIELDS_DECLARE(template <class Scalar>
                    void turn_splats(const SplatBatch<Scalar>&, std::int64_t begin, std::int64_t end))
+// The same, as changes.
+ARAPFIELDS_DECLARE(void turn_columns(const SplatColumnBatch&, std::int64_t begin, std::int64_t end))
 
 }  // namespace arapfields

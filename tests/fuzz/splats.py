@@ -9,6 +9,7 @@ from .odd import ROWS, by_name
 
 PLAIN = (ROWS, np.tile([1.0, 0, 0, 0], (len(ROWS), 1)), np.full((len(ROWS), 3), 0.1))
 GIVEN = [*PLAIN, np.full(len(ROWS), 0.9), np.zeros((len(ROWS), 4, 3))]
+NUMBERS = (4 + 12, len(ROWS))  # that a motion changes
 
 
 def splat_calls(things):
@@ -16,7 +17,6 @@ def splat_calls(things):
     splats = af.GaussianSplats(*GIVEN)
     return {
         "GaussianSplats": lambda: (af.GaussianSplats, list(GIVEN)),
-        "GaussianSplats.columns": lambda: (splats.columns, [np.zeros((7 + 12, len(ROWS)))]),
         "GaussianSplats.save": lambda: (by_name(splats.save, "task"), ["/nonexistent/x", af.Task()]),
         "GaussianSplats.load": lambda: (by_name(af.GaussianSplats.load, "task"), ["/nonexistent", af.Task()]),
         "GaussianSplats.is_file": lambda: (af.GaussianSplats.is_file, ["/nonexistent"]),
@@ -28,6 +28,10 @@ def splat_calls(things):
         "PreparedSplats.moved": lambda: (
             by_name(af.PreparedSplats(splats).moved, "max_stretch", "task"),
             [things["field"], af.GaussianSplats(*GIVEN), 2.0, af.Task()],
+        ),
+        "PreparedSplats.changes": lambda: (
+            by_name(af.PreparedSplats(splats).changes, "task"),
+            [things["field"], [*np.ones(NUMBERS, "f4")], [*np.ones(NUMBERS, "f4")], af.Task()],
         ),
         "sample_splats": lambda: (by_name(af.sample_splats, "task"), [splats, 30, af.Task()]),
     }

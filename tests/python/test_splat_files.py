@@ -7,21 +7,7 @@ from support.geometry.scan import splats
 
 import arapfields as af
 
-EXACT = 1e-6
 FIELDS = ("centers", "rotations", "scales", "opacities", "harmonics")
-
-
-@pytest.mark.parametrize("functions", (1, 4, 9, 16))
-def test_columns_are_a_files_properties(functions):
-    given = splats(1300, functions)  # more than a block, and not a whole number of them
-    colours = given.harmonics
-    parts = [given.rotations, np.log(given.scales), colours[:, 0], colours[:, 1:].swapaxes(1, 2)]
-    expected = np.concatenate([part.reshape(len(given), -1).T for part in parts])
-    assert np.abs(given.columns() - expected).max() < EXACT
-    minus = np.random.default_rng(0).normal(size=expected.shape)
-    assert np.array_equal(given.columns(minus), given.columns() - minus.astype(np.float32))
-    with pytest.raises(af.InvalidInput, match="minus"):
-        given.columns(minus[1:])
 
 
 def test_a_file_comes_back_and_keeps_what_it_has_besides(tmp_path):

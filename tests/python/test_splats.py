@@ -22,13 +22,14 @@ FIELDS = ("centers", "rotations", "scales", "opacities", "harmonics")
 
 
 @cache
-def bent(degrees=70.0):
+def bent(degrees=70.0, reach=0.0):
     samples = af.sample_mesh(*MESH, count=4000)
     held, turned = (
         cases.box([-0.9, -0.4, -0.4], [-0.5, 0.4, 0.4]),
         cases.box([0.5, -0.4, -0.4], [0.9, 0.4, 0.4]),
     )
-    return af.deform(samples, [cases.moved(held), cases.moved(turned, cases.turn([0, 1, 0], degrees))])
+    handles = [cases.moved(held), cases.moved(turned, cases.turn([0, 1, 0], degrees), reach=reach)]
+    return af.deform(samples, handles)
 
 
 MOTION = cases.turn([1, 2, 3], 130, (0.2, 0.1, -0.3)) @ cases.shift([0.4, -0.2, 0.1])
@@ -130,6 +131,36 @@ def test_prepared_splats_move_as_others_do():
         af.PreparedSplats(given).moved(field, max_stretch=0.5)
     with pytest.raises(af.InvalidInput, match="max_stretch"):
         field.apply_to(given, max_stretch=0.5)
+
+
+def numbers(splats):
+    """(n, 4 + 3k) what a motion changes of splats, in the order of PreparedSplats.changes()."""
+    rest = splats.harmonics[:, 1:].swapaxes(1, 2).reshape(len(splats), -1)
+    return np.column_stack([splats.rotations, np.log(splats.scales), rest])
+
+
+@pytest.mark.parametrize("functions", (1, 4, 9, 16))
+def test_changes_are_what_a_motion_adds_to_each_number(functions):
+    rest = splats(1303, functions)  # not a whole number of packs
+    prepared, given = af.PreparedSplats(rest), numbers(rest)
+    rows, columns = np.full_like(given, np.nan), np.full_like(given.T, np.nan)
+    for field in (bent(), bent(30.0, reach=0.5)):
+        moved = prepared.moved(field, max_stretch=np.inf)
+        for changes in (rows.T, columns):  # numbers that lie apart, and side by side
+            centers = prepared.changes(field, list(np.ascontiguousarray(given.T)), list(changes))
+            assert np.array_equal(centers, moved.centers)
+            assert np.abs(given + changes.T - numbers(moved)).max() < SINGLE
+        assert np.array_equal(rows.T, columns)
+    for wrong, word in (
+        (given.T[1:], "rest"),
+        (given.T.astype(float), r"rest\[0\]"),
+        (given.T[:, 1:], r"rest\[0\]"),
+    ):
+        with pytest.raises(af.InvalidInput, match=word):
+            prepared.changes(field, list(wrong), list(columns[: len(wrong)]))
+    columns.flags.writeable = False
+    with pytest.raises(af.InvalidInput, match=r"changes\[0\]: it cannot be written to"):
+        prepared.changes(field, list(given.T), list(columns))
 
 
 def test_samples_lie_where_splats_are_and_look_outward():

@@ -25,6 +25,11 @@ SMALL = af.LiveOptions(samples=60, coarse_centers=4, fine_centers=12, iterations
 DOCUMENTED = (af.InvalidInput, af.Cancelled, OSError, AttributeError)
 
 
+def splat_changes(prepared):
+    rest, changes = np.ones((4 + 12, len(SPLATS)), np.float32), np.zeros((4 + 12, len(SPLATS)), np.float32)
+    return prepared.changes(MOVED, [*rest], [*changes]), changes
+
+
 def pose(x):
     return [[0, 0, -1.0], [x, 0, 1.0]]
 
@@ -151,7 +156,7 @@ CLASSES = {
     "DeformOptions": (af.DeformOptions, {"to_dict": lambda it: it.to_dict(), "set": assign("width", 32)}),
     "PreparedSplats": (
         lambda: af.PreparedSplats(SPLATS),
-        {"moved": lambda it: it.moved(MOVED).rotations, "__len__": len},
+        {"moved": lambda it: it.moved(MOVED).rotations, "changes": splat_changes, "__len__": len},
     ),
     "CurveField": (
         lambda: af.deform_curve(BALL[:40, :2], [af.CurveHandle([0])], af.CurveOptions(iterations=2)),
