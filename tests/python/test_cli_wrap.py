@@ -128,6 +128,9 @@ def test_transfer_gives_the_scan_what_the_template_has(pair):
         corners = np.einsum("nk,nkj->nj", places["shares"], cases.moved(v)[f[places["triangles"]]])
         assert np.abs(corners - scan.vertices).max() < 1e-4
         assert np.abs(values["weights"] - np.eye(len(v))[:, :5]).max() < 1e-3
+        assert run("transfer", *meshes, "--places", pair / "places.json", "--quiet") == 0
+        read = json.loads((pair / "places.json").read_text())
+        assert all(np.array_equal(read[name], places[name]) for name in ("triangles", "shares", "distances"))
     back = [*flags[:-4], "--back"]
     back[back.index(pair / "fat.obj")] = pair / "keys" / "fat.ply"
     assert run("transfer", *meshes, *back) == 0

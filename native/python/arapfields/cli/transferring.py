@@ -7,7 +7,7 @@ import numpy as np
 
 import arapfields as af
 
-from .._files import existing_file, write_arrays
+from .._files import existing_file, json_text, write_arrays
 from . import files, verbs
 from .flags import MESH
 from .running import Outputs, with_progress
@@ -42,7 +42,7 @@ def add_flags(parser):
     outputs.add_argument(
         "--places",
         metavar="FILE",
-        help=".npz: the triangle, its corners' shares, the distance of each vertex",
+        help=".npz or .json: the triangle, its corners' shares, the distance of each vertex",
     )
 
 
@@ -68,8 +68,11 @@ def run(args):
             for key in args.keys
         ]
         arrays = {
-            flag: outputs.check(path, (".npz",), flag)
-            for flag, path in (("--values-output", args.values_output), ("--places", args.places))
+            flag: outputs.check(path, suffixes, flag)
+            for flag, path, suffixes in (
+                ("--values-output", args.values_output, (".npz",)),
+                ("--places", args.places, (".npz", ".json")),
+            )
             if path
         }
         source, target = files.read_mesh(args.source), files.read_mesh(args.target)
@@ -93,7 +96,15 @@ def run(args):
             outputs.write(arrays["--values-output"], lambda path: write_arrays(path, **carried))
         if args.places:
             found = {name: getattr(places, name) for name in ("triangles", "shares", "distances")}
-            outputs.write(arrays["--places"], lambda path: write_arrays(path, **found))
+            as_json = arrays["--places"].suffix.lower() == ".json"
+            outputs.write(
+                arrays["--places"],
+                lambda path: (
+                    path.write_text(json_text(found) + "\n", encoding="utf-8")
+                    if as_json
+                    else write_arrays(path, **found)
+                ),
+            )
     written = [str(output) for _, output in keys] + [str(path) for path in arrays.values()]
     verbs.summary(args, "wrote " + ", ".join(written))
 
