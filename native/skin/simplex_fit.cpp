@@ -3,7 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <numeric>
+#include <limits>
 #include <vector>
 
 namespace arapfields {
@@ -53,6 +53,29 @@ FewBones non_negative(const BonePairs& h, const FewBones& g) {
   return w;
 }
 
+std::vector<Index> positive(const FewBones& w) {
+  std::vector<Index> result;
+  for (Index i = 0; i < w.size(); ++i)
+    if (w[i] > 0.0) result.push_back(i);
+  return result;
+}
+
+/// Which of the used weights costs least to go, when the others take its place: w_j² / (H⁻¹)_jj over the used
+/// (Hassibi, Stork 1993).
+Index cheapest(const BonePairs& h, const FewBones& w, const std::vector<Index>& used) {
+  BonePairs part = h(used, used);
+  part.diagonal().array() *= 1.0 + 1e-12;
+  const auto n = static_cast<Index>(used.size());
+  const BonePairs inverse = part.ldlt().solve(BonePairs::Identity(n, n));
+  Index best = used.front();
+  double least = std::numeric_limits<double>::infinity();
+  for (Index j = 0; j < n; ++j) {
+    const double loss = w[used[j]] * w[used[j]] / std::max(inverse(j, j), 1e-300);
+    if (loss < least) least = loss, best = used[j];
+  }
+  return best;
+}
+
 }  // namespace
 
 FewBones simplex_minimum(const BonePairs& h, const FewBones& g, int influences) {
@@ -62,16 +85,14 @@ FewBones simplex_minimum(const BonePairs& h, const FewBones& g, int influences) 
   BonePairs square = (h.array() + scale) / scale;
   FewBones right = (g.array() + scale) / scale;
   FewBones w = non_negative(square, right);
-  std::vector<Index> largest(k);
-  std::iota(largest.begin(), largest.end(), Index{0});
-  std::ranges::stable_sort(largest, std::ranges::greater(), [&](Index j) { return w[j]; });
-  if (k > influences && w[largest[influences]] > 0.0) {
-    for (Index j = influences; j < k; ++j) {  // bones that may not enter
-      square.row(largest[j]).setZero();
-      square.col(largest[j]).setZero();
-      square(largest[j], largest[j]) = 1.0;
-      right[largest[j]] = 0.0;
-    }
+  for (;;) {
+    const std::vector<Index> used = positive(w);
+    if (static_cast<int>(used.size()) <= influences) break;
+    const Index leaving = cheapest(square, w, used);  // a bone that may not enter again
+    square.row(leaving).setZero();
+    square.col(leaving).setZero();
+    square(leaving, leaving) = 1.0;
+    right[leaving] = 0.0;
     w = non_negative(square, right);
   }
   return w / w.sum();
