@@ -55,6 +55,7 @@ class ARAPFIELDS_TOOL_pin(bpy.types.WorkSpaceTool):
             layout.prop(settings.deform, "symmetry")
             if settings.handles:
                 layout.prop(settings, "keep_rest")
+                layout.prop(settings.contact, "use")
 
 
 def register():

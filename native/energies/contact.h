@@ -14,9 +14,20 @@ struct ContactPlane {
   Index second = -1;  ///< −1: none
   Vec3 normal;        ///< unit length
   double offset = 0.0;
-  double pressure = 0.0;  ///< multiplier, ≥ 0
-  double share = 0.0;     ///< of the surface's area
-  Index obstacle = 0;     ///< which obstacle's it is
+  double pressure = 0.0;       ///< multiplier, ≥ 0
+  double share = 0.0;          ///< of the surface's area
+  Index obstacle = 0;          ///< which obstacle's it is
+  double start = 0.0;          ///< the gap where it was found
+  Vec3 anchor = Vec3::Zero();  ///< where the place would be if it stuck
+  double grip = 0.0;           ///< friction that sliding meets, as `pressure`; 0: it slides freely
+
+  /// From the anchor along the plane.
+  template <class Scalar>
+  Vec3 slip(const Scalar* places) const {
+    const Vec3 way =
+        Eigen::Map<const Eigen::Vector3<Scalar>>(places + 3 * first).template cast<double>() - anchor;
+    return way - normal.dot(way) * normal;
+  }
 
   /// normal·(f_first − f_second) − offset at places (n,3).
   template <class Scalar>
@@ -33,8 +44,12 @@ struct ContactPlane {
   }
 };
 
+/// Ways along a plane, in cube units, below which friction holds a place as a spring does.
+constexpr double stuck = 2e-4;
+
 /// The augmented Lagrangian Σ share (max(0, pressure − stiffness·gap)² − pressure²)/(2 stiffness) of the
-/// planes at places (n,3) of the surface; adds its cotangents there (null: the value alone).
+/// planes, and friction Σ share·grip·|slip|, smooth below `stuck` (Li et al. 2020, Incremental potential
+/// contact), at places (n,3) of the surface; adds its cotangents there (null: the value alone).
 template <class Scalar>
 ARAPFIELDS_EXPORT_TO_TESTS double contact_energy(const std::vector<ContactPlane>& planes, double stiffness,
                                                  const Scalar* places, Scalar* cotangents);

@@ -16,6 +16,7 @@ namespace arapfields {
 struct Obstacle {
   std::shared_ptr<const ImplicitFunction> function;
   double margin = 0.0;
+  Mat4 placement = Mat4::Identity();  ///< of the function's space: turns, moves, and scales evenly
 };
 
 /// All that is below a height along `up`, in mesh coordinates.
@@ -30,7 +31,8 @@ struct Contact {
   std::vector<Obstacle> obstacles;
   std::optional<double> ground;  ///< height along `up`, in mesh coordinates; none: no ground
   Vec3 up = Vec3::UnitZ();
-  bool itself = false;  ///< its own parts, but for what touches or overlaps at rest
+  double friction = 0.5;  ///< Coulomb's coefficient at obstacles and the ground, in secondary motion alone
+  bool itself = false;    ///< its own parts, but for what touches or overlaps at rest
   bool any() const { return !obstacles.empty() || ground || itself; }
 };
 

@@ -215,7 +215,7 @@ def members(t):
         "save_grid": lambda: (af.save_grid, ["grid.npz", np.zeros((3, 3, 3)), np.zeros(3), 0.1]),
         "wrap": lambda: (by_name(af.wrap, "task"), wrapping([])),
         "suggest_landmarks": lambda: (by_name(af.suggest_landmarks, "task"), wrapping(4)),
-        "Obstacle": lambda: (af.Obstacle, [t["mesh_sdf"], 0.1]),
+        "Obstacle": lambda: (by_name(af.Obstacle, "placement"), [t["mesh_sdf"], 0.1, np.eye(4)]),
         "Contact": lambda: (
             by_name(af.Contact, "ground", "up"),
             [[af.Obstacle(t["mesh_sdf"])], 0.0, np.ones(3)],

@@ -11,10 +11,12 @@ BOOST_AUTO_TEST_SUITE(contact)
 BOOST_AUTO_TEST_CASE(cotangents_are_those_of_differences) {
   std::array<double, 9> places{0.1, -0.2, 0.3, 0.4, 0.2, -0.1, -0.3, 0.5, 0.2}, slopes{};
   const Vec3 normal = Vec3(0.3, -0.5, 0.8).normalized();
-  const std::vector<ContactPlane> planes{{0, -1, normal, 0.5, 0.0, 0.2, 0},
-                                         {1, -1, normal, 0.1, 7.0, 0.3, 0},
-                                         {2, 0, normal, 0.1, 1.0, 0.5, 1},
-                                         {2, -1, normal, -9.0, 0.5, 0.5, 1}};  // out of reach
+  std::vector<ContactPlane> planes{{0, -1, normal, 0.5, 0.0, 0.2, 0},
+                                   {1, -1, normal, 0.1, 7.0, 0.3, 0},
+                                   {2, 0, normal, 0.1, 1.0, 0.5, 1},
+                                   {2, -1, normal, -9.0, 0.5, 0.5, 1},  // out of reach
+                                   {0, -1, normal, 0.5, 0.0, 0.2, 0, 0.0, {0.1, -0.2, 0.2}, 3.0},
+                                   {1, -1, normal, 0.1, 0.0, 0.2, 0, 0.0, {0.4001, 0.2, -0.1}, 2.0}};
   contact_energy<double>(planes, 50.0, places.data(), slopes.data());
   for (std::size_t i = 0; i < places.size(); ++i) {
     const double step = 1e-6, here = places[i];

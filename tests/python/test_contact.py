@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 import trimesh
+from support.geometry import contact_cases
 from support.geometry.bar import LEFT, RIGHT, bar_samples, box, turned
 from support.geometry.characters import FOOT, HIP, LEG, trousers
 
@@ -51,7 +52,7 @@ def test_nothing_is_inside_an_obstacle(samples, function):
     moved, points = field(samples.points), bar_samples(5000, seed=1).points
     depth = -np.asarray(function(field(points)))
     if function is SHEET:
-        depth = -0.8 - field(points)[:, 2]
+        depth = np.where(field(points)[:, 0] > 0, -0.8 - field(points)[:, 2], 0)
     assert depth.max() < 1.5 * DEEPEST  # between the samples
     assert pressed.report.flipped_share == 0
     assert moved[:, 2].min() < -0.7
@@ -178,6 +179,48 @@ def test_what_cannot_be_is_named(samples):
         af.deform(samples, handles, af.DeformOptions(centers=50, exact_handles=True), contact=touch)
     with pytest.raises(af.InvalidInput, match="field='radial'"):
         af.deform(samples, handles, af.DeformOptions(field="neural"), contact=touch)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name", ["spot on box 0", "bunny on edge 0", "spot on sheet 0", "spot on moving plate 0"]
+)
+def test_no_vertex_of_many_is_deep(name):
+    from benchmarks import contact, shapes
+
+    (case,) = [case for case in contact_cases.family(str(shapes.data())) if case.name == name]
+    row, _ = contact.measure(case)
+    assert row["deep"] < 0.1 and row["flipped"] == 0
+
+
+def test_a_plate_that_moves_faster_than_it_is_thick_takes_the_shape_along(samples):
+    """The plate is 0.03 thick and rises by 0.2 a frame."""
+    swept = live(samples, af.Contact([af.Obstacle(PLATE, placement=turned(0, shift=(0, 0, -0.2)))]))
+    swept.set_handles([af.Cuboid(LEFT, LEFT)])
+    swept.solve()
+    for k in range(5):
+        rise = 0.2 * k - 0.2
+        swept.set_contact(af.Contact([af.Obstacle(PLATE, placement=turned(0, shift=(0, 0, rise)))]))
+        field = swept.solve(iterations=20)
+    points = field(samples.points)
+    over = points[:, 0] > 0.05
+    assert over.sum() > 4000 and points[over, 2].min() > -0.8 + rise - 2 * DEEPEST
+
+
+def test_friction_holds_what_slides(samples):
+    """A bar that lies on the ground, pushed by gravity along a slope."""
+    ways = []
+    for friction in (0.0, 0.5):
+        free = af.LiveOptions(samples=800, coarse_centers=30, fine_centers=150, handle_weight=1e-6)
+        contact = af.Contact(ground=-0.51, friction=friction)
+        resting = af.LiveDeformer(samples, [af.Cuboid(LEFT, LEFT)], free, contact=contact)
+        resting.set_secondary_motion(
+            af.SecondaryMotionOptions(gravity=30.0, damping=0.0), up=[-0.2, 0, np.sqrt(0.96)]
+        )
+        for _ in range(12):
+            field = resting.step(None, 1 / 24)
+        ways.append(field(samples.points)[:, 0].mean() - samples.points[:, 0].mean())
+    assert ways[0] > 0.3 and abs(ways[1]) < 0.4 * ways[0]
 
 
 def test_a_report_is_of_the_planes_found_last():

@@ -6,15 +6,19 @@
 
 #include "core/errors.h"
 #include "sampling/sample_choice.h"
+#include "solve/radial/handle_motion.h"
 
 namespace arapfields {
 namespace {
 
-/// A way that has come so near, in cube units, has met the surface; evaluations along a way.
+/// A way that has come so near, in cube units, has met the surface; evaluations along a way, of which one
+/// along a surface needs many.
 constexpr double met = 2e-4;
-constexpr int most_steps = 40;
+constexpr int most_steps = 150;
 /// Slopes of functions below this say nothing of distances.
 constexpr double least_slope = 1e-3;
+/// How far a placement may be from an even scale.
+constexpr double even = 1e-5;
 
 }  // namespace
 
@@ -24,6 +28,16 @@ void require_contact(const Contact& contact) {
     require(contact.obstacles[i].function != nullptr, name, "no function", "an implicit function is needed");
     require_not_negative(name + ".margin", contact.obstacles[i].margin);
   }
+  for (std::size_t i = 0; i < contact.obstacles.size(); ++i) {
+    const Mat4& place = contact.obstacles[i].placement;
+    const Mat3 linear = place.topLeftCorner<3, 3>();
+    const double size = std::cbrt(linear.determinant());
+    require(place.allFinite() && place.row(3) == Eigen::RowVector4d(0, 0, 0, 1) && size > 0.0 &&
+                (linear.transpose() * linear - size * size * Mat3::Identity()).norm() < even * size * size,
+            "obstacles[" + std::to_string(i) + "].placement", "no turn, shift and even scale",
+            "a (4, 4) matrix of these alone is needed");
+  }
+  require_not_negative("friction", contact.friction);
   require(!contact.ground || std::isfinite(*contact.ground), "ground", "NaN or infinite",
           "a finite height is needed");
   const double length = contact.up.stableNorm();
@@ -41,15 +55,43 @@ std::vector<std::string> notes_on(const ContactReport& report) {
 
 BarrierSurface::BarrierSurface(const Obstacle& obstacle, const Frame& frame)
     : function_(obstacle.function),
-      frame_(frame),
       own_(obstacle.function->frame()),
       sheet_(!obstacle.function->continuous()),
       is_distance_(obstacle.function->gradient_bound() == 1.0),
-      margin_(obstacle.margin / frame.scale) {}
+      margin_(obstacle.margin / frame.scale) {
+  Mat4 to_cube = Mat4::Identity(), from_own = Mat4::Identity();
+  to_cube.topLeftCorner<3, 3>() /= frame.scale;
+  to_cube.topRightCorner<3, 1>() = -frame.center / frame.scale;
+  from_own.topLeftCorner<3, 3>() *= own_.scale;
+  from_own.topRightCorner<3, 1>() = own_.center;
+  set_placement(to_cube * obstacle.placement * from_own);
+}
+
+void BarrierSurface::set_placement(const Mat4& placement) {
+  place_ = placement;
+  const Mat3 linear = placement.topLeftCorner<3, 3>();
+  unit_ = std::cbrt(linear.determinant());
+  turn_ = linear / unit_;
+  back_ = Mat4::Identity();
+  back_.topLeftCorner<3, 3>() = turn_.transpose() / unit_;
+  back_.topRightCorner<3, 1>() = -back_.topLeftCorner<3, 3>() * placement.topRightCorner<3, 1>();
+}
+
+void BarrierSurface::place_between(const Mat4& from, const Mat4& to, double share) {
+  const auto unscaled = [](Mat4 placement, double& scale) {
+    scale = std::cbrt(placement.topLeftCorner<3, 3>().determinant());
+    placement.topLeftCorner<3, 3>() /= scale;
+    return placement;
+  };
+  double first = 1.0, second = 1.0;
+  const Mat4 a = unscaled(from, first), b = unscaled(to, second);
+  Mat4 placement = motion_between(a, b, share);
+  placement.topLeftCorner<3, 3>() *= (1.0 - share) * first + share * second;
+  set_placement(placement);
+}
 
 BarrierSurface BarrierSurface::ground(const Ground& ground, const Frame& frame) {
   BarrierSurface result;
-  result.frame_ = frame;
   result.up_ = ground.up.normalized();
   result.height_ = (ground.height - frame.center.dot(result.up_)) / frame.scale;
   return result;
@@ -58,7 +100,8 @@ BarrierSurface BarrierSurface::ground(const Ground& ground, const Frame& frame) 
 /// The points in the function's cube. A fit says nothing beyond it: those points are brought to its border,
 /// `beyond` gets their distances to it and `outward` the directions.
 PointsF BarrierSurface::in_function(PointsIn points, Vector& beyond, Points* outward) const {
-  Points own = own_.to_cube(frame_.to_mesh(points));
+  const Points own =
+      (points * back_.topLeftCorner<3, 3>().transpose()).rowwise() + back_.topRightCorner<3, 1>().transpose();
   beyond = Vector::Zero(own.rows());
   if (is_distance_) return own.cast<float>();
   const Points inside = own.cwiseMax(-1.0).cwiseMin(1.0);
@@ -74,8 +117,7 @@ Vector BarrierSurface::distances(PointsIn points) const {
   const PointsF inside = in_function(points, beyond, nullptr);
   VectorF values(inside.rows());
   function_->evaluate(inside, values);
-  const double unit = own_.scale / frame_.scale;
-  return sheet_ ? Vector(unit * values.cast<double>().cwiseAbs()) : Vector(unit * values.cast<double>());
+  return sheet_ ? Vector(unit_ * values.cast<double>().cwiseAbs()) : Vector(unit_ * values.cast<double>());
 }
 
 BarrierSurface::Nearest BarrierSurface::nearest(PointsIn points) const {
@@ -89,7 +131,6 @@ BarrierSurface::Nearest BarrierSurface::nearest(PointsIn points) const {
   if (inside.rows() > 0) function_->evaluate(inside, values, slopes);
   result.distances.resize(inside.rows());
   result.normals.resize(inside.rows(), 3);
-  const double unit = own_.scale / frame_.scale;
   for (Index i = 0; i < inside.rows(); ++i) {
     Vec3 slope = slopes.row(i).transpose().cast<double>();
     double value = values[i];
@@ -100,8 +141,8 @@ BarrierSurface::Nearest BarrierSurface::nearest(PointsIn points) const {
       value = slope.norm();
     }
     const double side = sheet_ && value < 0.0 ? -1.0 : 1.0;
-    result.distances[i] = unit * side * value;
-    result.normals.row(i) = side * slope.normalized().transpose();
+    result.distances[i] = unit_ * side * value;
+    result.normals.row(i) = side * (turn_ * slope.normalized()).transpose();
   }
   return result;
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "solve/radial/handle_motion.h"
@@ -13,10 +14,14 @@ namespace {
 /// How far a target moves in one step, in cube units, and how many steps there are at most.
 constexpr double step_length = 0.15, step_length_itself = 0.06;
 constexpr Index most_steps = 24;
+/// The same of obstacles.
+constexpr double obstacle_step = 0.02;
 /// Quasi-Newton steps of each, and between two searches for planes.
 constexpr Index steps_on_the_way = 3, steps_between = 6;
 /// A surface may be so deep beyond a margin, in cube units.
 constexpr double deep = 5e-4;
+/// Depths, in cube units, that stiffer planes bring out; deeper ones are still on their way.
+constexpr double nearly = 0.01;
 /// Rounds beyond the iterations that were asked for, while something is deeper.
 constexpr Index more_rounds = 2;
 /// Handles farther from their targets against a force, in cube units, are held back.
@@ -65,6 +70,7 @@ void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Inde
               double tolerance, const Progress& progress) {
   s.precondition(0.0);
   Index left = iterations;
+  double before_it = std::numeric_limits<double>::infinity();
   for (Index k = 1; k <= steps; ++k) {
     const Points targets =
         s.handles.targets_between(before, static_cast<double>(k) / static_cast<double>(steps));
@@ -77,15 +83,31 @@ void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Inde
       left -= at_once;
       const double depth = s.contact.find(s.shape.coefficients);
       if (converged && depth < deep) break;
+      s.contact.harden(depth > deep && depth < nearly && depth > 0.5 * before_it);
+      before_it = depth;
       if (left <= 0 && (depth < deep || extra-- == 0)) break;
     }
   }
 }
 
+/// Takes obstacles that have moved to where they are now, and the surface along.
+void sweep(RadialState& s, double tolerance, const Progress& progress) {
+  const auto wanted = static_cast<Index>(std::ceil(s.contact.obstacle_way() / obstacle_step));
+  const Index parts = std::clamp<Index>(wanted, 1, most_steps);
+  if (parts > 1) s.precondition(0.0);
+  for (Index k = 1; k < parts; ++k) {
+    s.contact.move_obstacles(static_cast<double>(k) / static_cast<double>(parts));
+    if (s.contact.find(s.shape.coefficients) <= 0.0) continue;
+    s.objective(s.fast);
+    solve_round(s, steps_on_the_way, tolerance, progress);
+  }
+  s.contact.move_obstacles(1.0);
+}
+
 void back_to(RadialState& s, const RowMatrix<double>& coefficients) {
   s.shape.coefficients = coefficients;
   s.shape.jump();
-  if (s.contact.itself()) s.contact.begin(coefficients);
+  s.contact.begin(coefficients);
 }
 
 }  // namespace
@@ -99,9 +121,10 @@ void stiffen_contact(RadialState& s) {
 bool would_press(RadialState& s) {
   if (!s.contact.presses()) return false;
   const Points places = contact_places(s);
-  return std::any_of(
-      s.contact.found().planes.begin(), s.contact.found().planes.end(),
-      [&](const ContactPlane& p) { return p.pressed(p.gap(places.data()), ContactTerms::stiffness) > 0.0; });
+  return std::any_of(s.contact.found().planes.begin(), s.contact.found().planes.end(),
+                     [&](const ContactPlane& p) {
+                       return p.pressed(p.gap(places.data()), s.contact.found().stiffness) > 0.0;
+                     });
 }
 
 bool is_deep(RadialState& s) {
@@ -117,6 +140,7 @@ bool press_contact(RadialState& s) {
 
 void follow_in_contact(RadialState& s, Index iterations, double tolerance,
                        const std::function<void()>& freely, const Progress& progress) {
+  sweep(s, tolerance, progress);
   std::vector<Mat4> before = s.dynamics.motions;
   if (std::ssize(before) != s.handles.bound().count()) {
     before = motions_of(s.handles.bound());

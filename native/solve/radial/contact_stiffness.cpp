@@ -17,25 +17,38 @@ constexpr Index most_planes = 240;
 
 ContactStiffness::ContactStiffness(const RadialBasis& basis, const ContactSet& set, PointsIn places,
                                    const TallMatrix<float>& inverse_factor) {
-  std::vector<const ContactPlane*> pressing;
-  for (const ContactPlane& plane : set.planes)
-    if (plane.pressed(plane.gap(places.data()), ContactTerms::stiffness) > 0.0) pressing.push_back(&plane);
-  const Index all = std::ssize(pressing), count = std::min<Index>(all, most_planes);
+  struct Spring {
+    const ContactPlane* plane;
+    Vec3 along;
+    double stiffness;  // times the share
+  };
+  std::vector<Spring> springs;
+  for (const ContactPlane& plane : set.planes) {
+    if (plane.pressed(plane.gap(places.data()), set.stiffness) <= 0.0) continue;
+    springs.push_back({&plane, plane.normal, set.stiffness * plane.share});
+    if (plane.grip <= 0.0) continue;
+    const Vec3 first = plane.normal.unitOrthogonal();
+    for (const Vec3& along : {first, Vec3(plane.normal.cross(first))})
+      springs.push_back(
+          {&plane, along, plane.grip / std::max(stuck, plane.slip(places.data()).norm()) * plane.share});
+  }
+  const Index all = std::ssize(springs), count = std::min<Index>(all, most_planes);
   if (count == 0) return;
   std::vector<Index> first(static_cast<std::size_t>(count));
   normals_.resize(count, 3);
   Vector softness(count);
-  const auto pick = [&](Index i) { return pressing[static_cast<std::size_t>(i * all / count)]; };
+  const auto pick = [&](Index i) -> const Spring& {
+    return springs[static_cast<std::size_t>(i * all / count)];
+  };
   for (Index i = 0; i < count; ++i) {
-    first[static_cast<std::size_t>(i)] = pick(i)->first;
-    normals_.row(i) = pick(i)->normal.transpose();
-    softness[i] = 2.0 * static_cast<double>(count) /
-                  (static_cast<double>(all) * ContactTerms::stiffness * pick(i)->share);
+    first[static_cast<std::size_t>(i)] = pick(i).plane->first;
+    normals_.row(i) = pick(i).along.transpose();
+    softness[i] = 2.0 * static_cast<double>(count) / (static_cast<double>(all) * pick(i).stiffness);
   }
   RowMatrix<double> values = radial_rows(basis, rows_of(set.places, first), JetOrder::value);
   std::vector<Index> carrying, carriers;
   for (Index i = 0; i < count; ++i)
-    if (pick(i)->second >= 0) carrying.push_back(i), carriers.push_back(pick(i)->second);
+    if (pick(i).plane->second >= 0) carrying.push_back(i), carriers.push_back(pick(i).plane->second);
   if (!carriers.empty())
     values(carrying, Eigen::all) -= radial_rows(basis, rows_of(set.places, carriers), JetOrder::value);
   rows_.resize(count, basis.size());

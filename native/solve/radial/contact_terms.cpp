@@ -3,148 +3,183 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/errors.h"
-#include "core/random.h"
 #include "sampling/sample_choice.h"
+#include "solve/radial/handle_motion.h"
 
 namespace arapfields {
 namespace {
 
-/// Samples that are followed at most; they lie denser than any detail of a radial field.
-constexpr Index most_samples = 20000;
 /// What is nearer has a plane, in cube units.
 constexpr double near = 0.04, near_itself = 0.05;
 /// Gaps may be less than kept by so much where nothing presses.
 constexpr double slight = 2e-4;
 /// Of itself, nothing that is farther is looked at.
 constexpr double farthest = 0.12;
-/// The cosine above which two normals are of one side of a solid.
-constexpr double same_side = 0.3;
+/// The cosine below which a normal is not of the side that a way came through: of a sheet, and of a solid,
+/// where it is of the opposite side of a thin one and not of one that shares an edge.
+constexpr double same_side = 0.3, opposite = -0.5;
+/// The cosine of neighbours' normals below which an edge lies between them.
+constexpr double smooth = 0.9;
 /// Distance that is kept beyond each margin, in cube units: what solves leave of a depth is within.
 constexpr double kept = 1.5e-3;
 /// More from the shape itself, of which the samples of both sides say less.
 constexpr double kept_itself = 2.0 * kept;
-/// Factor on what a depth adds to a pressure: fewer rounds, and below 2 they converge.
-constexpr double relaxed = 1.8;
-/// Pressures grow by no deeper gaps, in cube units: a solve that has only begun says little of forces.
-constexpr double shallow = 0.01;
-/// Forces farther than this from a handle, in cube units, count less.
-constexpr double handle_reach = 0.2;
+/// Stiffness of planes at first.
+constexpr double softest = 5e4;
 
 }  // namespace
 
-void ContactTerms::set(const std::optional<Contact>& contact) {
+void ContactTerms::set(const std::optional<Contact>& contact, const RowMatrix<double>& coefficients) {
   if (contact) {
     require_contact(*contact);
     require(!problem_.blend, "contact", "beside exact handles", "it needs handles that give way");
   }
+  const bool goes_on = contact && contact_ && contact->itself == contact_->itself &&
+                       contact->obstacles.size() == contact_->obstacles.size() &&
+                       contact->ground.has_value() == contact_->ground.has_value();
   contact_ = contact;
-  make_surfaces();
+  if (goes_on) {
+    const std::vector<BarrierSurface> before = std::exchange(surfaces_, {});
+    gather_surfaces();
+    places_ = points_.at(coefficients);
+    for (Index k = 0; k < std::ssize(surfaces_); ++k) {
+      BarrierSurface& surface = surfaces_[static_cast<std::size_t>(k)];
+      if (surface.is_alike(before[static_cast<std::size_t>(k)]))
+        surface.set_placement(before[static_cast<std::size_t>(k)].placement());
+      see(k);
+      starts_.push_back(surface.placement());
+    }
+    return;
+  }
+  gather_surfaces();
+  self_.reset();
+  if (contact_ && contact_->itself) self_.emplace(problem_, points_.samples(), kept_itself);
+  begin(coefficients);
 }
 
 bool ContactTerms::set_further_ground(const std::optional<Ground>& ground) {
   if (ground == further_ground_) return false;
   further_ground_ = ground;
-  make_surfaces();
+  gather_surfaces();
   return true;
 }
 
-void ContactTerms::make_surfaces() {
+void ContactTerms::gather_surfaces() {
   surfaces_.clear();
-  const Frame& frame = problem_.frame();
   if (contact_) {
-    for (const Obstacle& obstacle : contact_->obstacles) surfaces_.emplace_back(obstacle, frame);
+    for (const Obstacle& obstacle : contact_->obstacles) surfaces_.emplace_back(obstacle, problem_.frame());
     if (contact_->ground)
-      surfaces_.push_back(BarrierSurface::ground({*contact_->ground, contact_->up}, frame));
+      surfaces_.push_back(BarrierSurface::ground({*contact_->ground, contact_->up}, problem_.frame()));
   }
-  if (further_ground_) surfaces_.push_back(BarrierSurface::ground(*further_ground_, frame));
-  if (samples_.empty() && (!surfaces_.empty() || (contact_ && contact_->itself))) {
-    Random random(static_cast<std::uint64_t>(problem_.options.seed), 3);
-    samples_ = stratified(problem_.shape->order, std::min(most_samples, problem_.samples.size()), random);
-  }
-  self_.reset();
-  if (contact_ && contact_->itself) self_.emplace(problem_, samples_, kept_itself);
-  begin(problem_.basis.identity());
-}
-
-Points ContactTerms::places_at(const RowMatrix<double>& coefficients) {
-  const RadialEvaluator<double>& evaluator = evaluator_.get({1}, [&] {
-    return RadialEvaluator<double>(problem_.basis, rows_of(problem_.surface(), samples_), JetOrder::value);
-  });
-  Points places(evaluator.size(), 3);
-  evaluator.evaluate(coefficients, {places.data(), places.rows(), JetOrder::value});
-  return places;
-}
-
-/// Which way the samples face, as long as the surface is stretched.
-Points ContactTerms::normals_at(const RowMatrix<double>& coefficients) {
-  const RadialEvaluator<float>& evaluator = slopes_.get({1}, [&] {
-    return RadialEvaluator<float>(problem_.basis, rows_of(problem_.surface(), samples_), JetOrder::first);
-  });
-  JetBlock<float> jets(evaluator.size(), JetOrder::first);
-  evaluator.evaluate(coefficients, jets.view());
-  Points normals = rows_of(problem_.samples.normals, samples_);
-  for (Index i = 0; i < normals.rows(); ++i) {
-    Mat3 slope;
-    for (int k = 0; k < 3; ++k)
-      slope.col(k) = Eigen::Map<const Eigen::Vector3f>(jets.view().at(first_column(k), i)).cast<double>();
-    const Vec3 rest = normals.row(i).transpose();
-    const Vec3 moved = rest[0] * slope.col(1).cross(slope.col(2)) +
-                       rest[1] * slope.col(2).cross(slope.col(0)) +
-                       rest[2] * slope.col(0).cross(slope.col(1));
-    normals.row(i) = moved.transpose();
-  }
-  return normals;
+  if (further_ground_) surfaces_.push_back(BarrierSurface::ground(*further_ground_, problem_.frame()));
+  ends_.clear();
+  for (const BarrierSurface& surface : surfaces_) ends_.push_back(surface.placement());
+  carried_.assign(surfaces_.size(), Mat4::Identity());
+  starts_.clear();
+  if (!surfaces_.empty() || (contact_ && contact_->itself)) points_.choose();
 }
 
 void ContactTerms::release() {
   found_.revision = 0;
   found_.planes.clear();
   found_.places.resize(0, 3);
+  found_.stiffness = softest;
   pressures_.setZero();
   deepest_ = deepest_outside_ = 0.0;
   touches_itself_ = false;
 }
 
-void ContactTerms::begin(const RowMatrix<double>& coefficients) {
+void ContactTerms::begin(const RowMatrix<double>& coefficients) { resume({}, coefficients); }
+
+ContactState ContactTerms::held() const {
+  ContactState state;
+  for (const BarrierSurface& surface : surfaces_) state.placements.push_back(surface.placement());
+  for (Index row = 0; row < std::min(pressures_.rows(), points_.sample_count()); ++row)
+    for (Index k = 0; k < pressures_.cols(); ++k)
+      if (pressures_(row, k) > 0.0) state.pressures.push_back({row, k, pressures_(row, k)});
+  return state;
+}
+
+void ContactTerms::resume(const ContactState& state, const RowMatrix<double>& coefficients) {
   if (!any()) return release();
-  places_ = places_at(coefficients);
-  if (self_) self_->begin(places_, [&] { return normals_at(coefficients); });
-  seen_ = places_;
-  const auto count = static_cast<Index>(surfaces_.size());
-  clear_.resize(seen_.rows(), count);
-  pressures_.resize(seen_.rows(), count + 1);
-  for (Index k = 0; k < count; ++k) clear_.col(k) = surfaces_[static_cast<std::size_t>(k)].distances(seen_);
+  points_.coarsen();
+  places_ = points_.at(coefficients);
+  if (self_) self_->begin(places_, [&] { return points_.normals_at(coefficients); });
+  const Index count = std::ssize(surfaces_);
+  const bool fits = std::ssize(state.placements) == count;
+  seen_.assign(surfaces_.size(), {});
+  clear_.resize(places_.rows(), count);
+  pressures_.resize(places_.rows(), count + 1);
+  for (Index k = 0; k < count; ++k) {
+    const auto which = static_cast<std::size_t>(k);
+    surfaces_[which].set_placement(fits ? state.placements[which] : ends_[which]);
+    see(k);
+  }
+  starts_ = fits ? state.placements : ends_;
+  carried_.assign(surfaces_.size(), Mat4::Identity());
   release();
+  for (const ContactState::Pressure& held : state.pressures)
+    if (held.row < pressures_.rows() && held.surface < pressures_.cols())
+      pressures_(held.row, held.surface) = held.pressure;
+}
+
+/// The ways from a surface start where the places are.
+void ContactTerms::see(Index k) {
+  seen_[static_cast<std::size_t>(k)] = places_;
+  clear_.col(k) = surfaces_[static_cast<std::size_t>(k)].distances(places_);
 }
 
 double ContactTerms::fastest(const RowMatrix<double>& rates) {
-  return std::sqrt(places_at(rates).rowwise().squaredNorm().maxCoeff());
+  return std::sqrt(points_.at(rates).rowwise().squaredNorm().maxCoeff());
+}
+
+/// Places that may have a plane.
+std::vector<Index> ContactTerms::near_rows() const {
+  std::vector<Index> rows;
+  for (Index i = 0; i < places_.rows(); ++i)
+    for (Index k = 0; k < clear_.cols(); ++k) {
+      const auto which = static_cast<std::size_t>(k);
+      const double way = (places_.row(i) - seen_[which].row(i)).norm();
+      if (clear_(i, k) - way < near + further_ + surfaces_[which].margin()) {
+        rows.push_back(i);
+        break;
+      }
+    }
+  return rows;
+}
+
+/// Adds the planes of obstacles and the ground for these places.
+void ContactTerms::find_outside(const std::vector<Index>& rows) {
+  const Points now = rows_of(places_, rows);
+  for (Index k = 0; k < clear_.cols(); ++k) {
+    const Vector distances = add_planes(k, rows, now);
+    for (Index i = 0; i < now.rows(); ++i) {
+      if (distances[i] <= 0.0) continue;  // it was last outside before
+      const Index row = rows[static_cast<std::size_t>(i)];
+      seen_[static_cast<std::size_t>(k)].row(row) = now.row(i);
+      clear_(row, k) = distances[i];
+    }
+  }
 }
 
 double ContactTerms::find(const RowMatrix<double>& coefficients, double further, bool jumped) {
   further_ = further;
-  places_ = places_at(coefficients);
-  std::vector<Index> rows;
-  for (Index i = 0; i < places_.rows(); ++i) {
-    const double way = (places_.row(i) - seen_.row(i)).norm();
-    for (Index k = 0; k < clear_.cols(); ++k)
-      if (clear_(i, k) - way < near + further_ + surfaces_[static_cast<std::size_t>(k)].margin()) {
-        rows.push_back(i);
-        break;
-      }
-  }
-  const Points now = rows_of(places_, rows);
+  grips_ = false;
+  places_ = points_.at(coefficients);
   found_.planes.clear();
   deepest_ = 0.0;
-  RowMatrix<double> distances(now.rows(), clear_.cols());
-  for (Index k = 0; k < clear_.cols(); ++k) distances.col(k) = add_planes(k, rows, now);
-  for (Index i = 0; i < now.rows(); ++i) {
-    if (distances.row(i).minCoeff() <= 0.0) continue;  // it was last outside before
-    const Index row = rows[static_cast<std::size_t>(i)];
-    seen_.row(row) = now.row(i);
-    clear_.row(row) = distances.row(i);
+  find_outside(near_rows());
+  const std::vector<Index> edges = at_edges();
+  const Index before = points_.size();
+  points_.refine(edges);
+  if (points_.size() > before) {
+    const Points finer = points_.at(coefficients).bottomRows(points_.size() - before);
+    places_.conservativeResize(points_.size(), Eigen::NoChange);
+    places_.bottomRows(finer.rows()) = finer;
+    follow_finer_since(before);
   }
   deepest_outside_ = deepest_;
   if (self_) add_own_planes(coefficients, jumped);
@@ -152,41 +187,88 @@ double ContactTerms::find(const RowMatrix<double>& coefficients, double further,
   return deepest_;
 }
 
-/// Adds the planes of one surface for samples (rows) that are `now` there. Returns their distances from it,
+/// New places were last seen outside where their samples were.
+void ContactTerms::follow_finer_since(Index before) {
+  clear_.conservativeResize(places_.rows(), Eigen::NoChange);
+  pressures_.conservativeResize(places_.rows(), Eigen::NoChange);
+  pressures_.bottomRows(places_.rows() - before).setZero();
+  std::vector<Index> rows;
+  for (Points& seen : seen_) seen.conservativeResize(places_.rows(), Eigen::NoChange);
+  for (Index row = before; row < places_.rows(); ++row) {
+    const Index sample = points_.sample_of(row);
+    clear_.row(row) = clear_.row(sample);
+    for (Points& seen : seen_) seen.row(row) = seen.row(sample);
+    rows.push_back(row);
+  }
+  find_outside(rows);
+}
+
+/// Samples between which and their neighbours an edge of an obstacle may poke through.
+std::vector<Index> ContactTerms::at_edges() {
+  std::vector<const ContactPlane*> of(static_cast<std::size_t>(points_.sample_count()));
+  std::vector<Index> edges;
+  const double reach = 2.0 * points_.spacing();
+  std::size_t first = 0;
+  while (first < found_.planes.size()) {  // those of one surface lie beside each other
+    std::fill(of.begin(), of.end(), nullptr);
+    const Index k = found_.planes[first].obstacle;
+    std::size_t last = first;
+    for (; last < found_.planes.size() && found_.planes[last].obstacle == k; ++last)
+      if (found_.planes[last].first < points_.sample_count())
+        of[static_cast<std::size_t>(found_.planes[last].first)] = &found_.planes[last];
+    for (; first < last && !surfaces_[static_cast<std::size_t>(k)].is_flat(); ++first) {
+      const ContactPlane& plane = found_.planes[first];
+      if (plane.first >= points_.sample_count() || plane.start > reach) continue;
+      for (const Index other : points_.neighbours(plane.first)) {
+        const ContactPlane* const beside = of[static_cast<std::size_t>(other)];
+        if (beside == nullptr || beside->normal.dot(plane.normal) > smooth) continue;
+        edges.push_back(plane.first);
+        break;
+      }
+    }
+    first = last;
+  }
+  return edges;
+}
+
+/// Adds the planes of one surface for places (rows) that are `now` there. Returns their distances from it,
 /// negative also beyond what they came through.
 Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsIn now) {
   const BarrierSurface& surface = surfaces_[static_cast<std::size_t>(k)];
+  const Points& seen = seen_[static_cast<std::size_t>(k)];
   BarrierSurface::Nearest nearest = surface.nearest(now);
-  std::vector<Index> moved;  // those that may have come through
+  std::vector<Index> moved_rows;  // those that may have come through
   for (Index i = 0; i < now.rows(); ++i) {
     const Index row = rows[static_cast<std::size_t>(i)];
-    const double way = (now.row(i) - seen_.row(row)).norm(), clear = clear_(row, k);
-    if (clear > 0.0 && way > clear + std::max(0.0, nearest.distances[i])) moved.push_back(i);
+    const double way = (now.row(i) - seen.row(row)).norm(), clear = clear_(row, k);
+    if (clear > 0.0 && way > clear + std::max(0.0, nearest.distances[i])) moved_rows.push_back(i);
   }
   std::vector<Index> starts;
-  for (const Index i : moved) starts.push_back(rows[static_cast<std::size_t>(i)]);
+  for (const Index i : moved_rows) starts.push_back(rows[static_cast<std::size_t>(i)]);
   const std::vector<BarrierSurface::Hit> hits =
-      surface.first_hits(rows_of(seen_, starts), rows_of(now, moved));
+      surface.first_hits(rows_of(seen, starts), rows_of(now, moved_rows));
   Vector offsets(now.rows());
   for (Index i = 0; i < now.rows(); ++i)
     offsets[i] = nearest.normals.row(i).dot(now.row(i)) - nearest.distances[i];
-  for (std::size_t m = 0; m < moved.size(); ++m) {
+  for (std::size_t m = 0; m < moved_rows.size(); ++m) {
     const BarrierSurface::Hit& hit = hits[m];
     if (hit.share > 1.0) continue;
-    const Index i = moved[m];
+    const Index i = moved_rows[m];
     const double beyond = hit.normal.dot(now.row(i).transpose() - hit.place);
     if (surface.is_sheet() && beyond < 0.0) {  // the side that it came from is the outer one
       nearest.normals.row(i) *= -1.0;
       nearest.distances[i] *= -1.0;
       offsets[i] *= -1.0;
     }
-    if (nearest.distances[i] < near + further_ && nearest.normals.row(i).dot(hit.normal) > same_side)
+    if (nearest.distances[i] < near + further_ &&
+        nearest.normals.row(i).dot(hit.normal) > (surface.is_sheet() ? same_side : opposite))
       continue;
     if (beyond > 0.0 && nearest.distances[i] > 0.0) continue;  // around it
     nearest.normals.row(i) = hit.normal.transpose();
     nearest.distances[i] = beyond;
     offsets[i] = hit.normal.dot(hit.place);
   }
+  const Points anchors = affine_image(now, carried_[static_cast<std::size_t>(k)]);
   for (Index i = 0; i < now.rows(); ++i) {
     const double margin = surface.margin() + kept, gap = nearest.distances[i] - margin;
     const Index row = rows[static_cast<std::size_t>(i)];
@@ -195,8 +277,15 @@ Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsI
       continue;
     }
     deepest_ = std::max(deepest_, -gap - kept);
-    found_.planes.push_back({row, -1, nearest.normals.row(i).transpose(), offsets[i] + margin,
-                             pressures_(row, k), 1.0 / static_cast<double>(samples_.size()), k});
+    ContactPlane& plane = found_.planes.emplace_back();
+    plane.first = row;
+    plane.normal = nearest.normals.row(i).transpose();
+    plane.offset = offsets[i] + margin;
+    plane.start = gap;
+    plane.pressure = pressures_(row, k);
+    plane.share = points_.share(row);
+    plane.obstacle = k;
+    plane.anchor = anchors.row(i).transpose();
   }
   return nearest.distances;
 }
@@ -207,77 +296,27 @@ void ContactTerms::add_own_planes(const RowMatrix<double>& coefficients, bool ju
   const Vector before = pressures_.col(own);
   touches_itself_ = false;
   pressures_.col(own).setZero();
-  const auto normals = [&] { return normals_at(coefficients); };
+  const auto normals = [&] { return points_.normals_at(coefficients); };
+  const Points samples = places_.topRows(points_.sample_count());
   for (const FacingPair& pair :
-       self_->find(places_, normals, std::min(near_itself + further_, farthest), jumped)) {
+       self_->find(samples, normals, std::min(near_itself + further_, farthest), jumped)) {
     pressures_(pair.first, own) = before[pair.first];
     deepest_ = std::max(deepest_, pair.least - kept - pair.gap);
     touches_itself_ = touches_itself_ || pair.gap < pair.least - slight;
-    found_.planes.push_back({pair.first, pair.second, pair.normal, pair.least, before[pair.first],
-                             1.0 / static_cast<double>(samples_.size()), own});
+    ContactPlane& plane = found_.planes.emplace_back();
+    plane.first = pair.first;
+    plane.second = pair.second;
+    plane.normal = pair.normal;
+    plane.offset = pair.least;
+    plane.pressure = before[pair.first];
+    plane.share = points_.share(pair.first);
+    plane.obstacle = own;
   }
 }
 
 bool ContactTerms::overlaps(const RowMatrix<double>& coefficients) {
-  return self_ && self_->overlaps(places_at(coefficients), normals_at(coefficients));
-}
-
-/// The places of the planes' samples, once each.
-void ContactTerms::gather_places() {
-  std::vector<Index>& used = found_.samples;
-  used.clear();
-  for (const ContactPlane& plane : found_.planes) {
-    used.push_back(plane.first);
-    if (plane.second >= 0) used.push_back(plane.second);
-  }
-  std::sort(used.begin(), used.end());
-  used.erase(std::unique(used.begin(), used.end()), used.end());
-  found_.places.resize(std::ssize(used), 3);
-  for (std::size_t i = 0; i < used.size(); ++i)
-    found_.places.row(static_cast<Index>(i)) =
-        problem_.surface().row(samples_[static_cast<std::size_t>(used[i])]);
-  const auto row_of = [&](Index sample) {
-    return std::lower_bound(used.begin(), used.end(), sample) - used.begin();
-  };
-  for (ContactPlane& plane : found_.planes) {
-    plane.first = row_of(plane.first);
-    if (plane.second >= 0) plane.second = row_of(plane.second);
-  }
-  found_.revision = found_.planes.empty() ? 0 : ++sets_;
-}
-
-double ContactTerms::touching() const {
-  double share = 0.0;
-  for (const ContactPlane& plane : found_.planes)
-    if (plane.pressure > 0.0) share += plane.share;
-  return share;
-}
-
-std::string ContactTerms::name_of(Index surface) const {
-  if (contact_ && surface < std::ssize(contact_->obstacles))
-    return "obstacles[" + std::to_string(surface) + "]";
-  return surface < std::ssize(surfaces_) ? "ground" : "itself";
-}
-
-Points ContactTerms::forces_at(const Vec3& place, const double* places) const {
-  Points forces = Points::Zero(pressures_.cols(), 3);
-  const auto nearness = [&](Index row) {
-    const double square = (Eigen::Map<const Vec3>(places + 3 * row) - place).squaredNorm();
-    return 1.0 / (square + handle_reach * handle_reach);
-  };
-  for (const ContactPlane& plane : found_.planes) {
-    const double share = nearness(plane.first) - (plane.second < 0 ? 0.0 : nearness(plane.second));
-    forces.row(plane.obstacle) += share * plane.share * plane.pressure * plane.normal.transpose();
-  }
-  return forces;
-}
-
-void ContactTerms::press(const double* places) {
-  for (ContactPlane& plane : found_.planes) {
-    const double gap = std::max(-shallow, plane.gap(places));
-    plane.pressure = plane.pressed(gap, gap < 0.0 ? relaxed * stiffness : stiffness);
-    pressures_(found_.samples[static_cast<std::size_t>(plane.first)], plane.obstacle) = plane.pressure;
-  }
+  return self_ && self_->overlaps(points_.at(coefficients).topRows(points_.sample_count()),
+                                  points_.normals_at(coefficients));
 }
 
 }  // namespace arapfields

@@ -5,28 +5,31 @@
 #include <vector>
 
 #include "energies/contact.h"
-#include "fields/radial_evaluator.h"
 #include "solve/radial/barrier_surface.h"
-#include "solve/radial/problem.h"
+#include "solve/radial/contact_points.h"
+#include "solve/radial/secondary_motion.h"
 #include "solve/radial/self_contact.h"
 
 namespace arapfields {
 
 /// The planes that places of a surface are kept beyond, until they are found anew.
 struct ContactSet {
-  std::vector<Index> samples;  ///< which of the samples that are followed
-  Points places;               ///< (n,3) theirs at rest
+  std::vector<Index> rows;  ///< which of the places that are followed
+  Points places;            ///< (n,3) theirs at rest
   std::vector<ContactPlane> planes;
-  Revision revision = 0;  ///< 0: no planes
+  Revision revision = 0;   ///< 0: no planes
+  double stiffness = 0.0;  ///< of energy a unit of area for a unit of squared depth, halved
 };
 
 /// Where a surface meets obstacles and itself, and how hard it presses there. What is beyond a plane is told
-/// by the way that each sample took since begin(): nothing that is thinner than a step is passed.
+/// by the way that each place took since begin(), relative to the obstacle: nothing that is thinner than a
+/// step is passed.
 class ContactTerms {
  public:
-  explicit ContactTerms(const RadialProblem& problem) : problem_(problem) {}
-  /// Throws InvalidInput for what cannot be.
-  void set(const std::optional<Contact>& contact);
+  explicit ContactTerms(const RadialProblem& problem) : problem_(problem), points_(problem) {}
+  /// Obstacles that only move or change stay where they were until move_obstacles(). Throws InvalidInput for
+  /// what cannot be.
+  void set(const std::optional<Contact>& contact, const RowMatrix<double>& coefficients);
   /// A ground beside that of the contact; whether it is another one than before.
   bool set_further_ground(const std::optional<Ground>& ground);
   const std::optional<Contact>& contact() const { return contact_; }
@@ -34,9 +37,19 @@ class ContactTerms {
   bool itself() const { return self_.has_value(); }
   bool only_itself() const { return self_ && surfaces_.empty(); }
 
-  /// The ways start here, without pressure.
+  /// The ways start here, without pressure, and obstacles are where they belong.
   void begin(const RowMatrix<double>& coefficients);
-  /// Follows the surface, and finds the planes near it. Returns how deep a sample is beyond a margin.
+  /// What the next step depends on; begins there with it.
+  ContactState held() const;
+  void resume(const ContactState& state, const RowMatrix<double>& coefficients);
+  /// The coordinates of the cube have moved rigidly.
+  void change_coordinates(const Mat4& motion);
+  /// Takes the obstacles a share of the way from where resume() had them.
+  void move_obstacles(double share);
+  /// The longest way left for a place of an obstacle's cube, in cube units.
+  double obstacle_way() const;
+
+  /// Follows the surface, and finds the planes near it. Returns how deep a place is beyond a margin.
   /// `further`: how much farther than usual, in cube units, what is near lies. `jumped`: the way here is not
   /// known, so that what the surface came through of itself is told by facing normals.
   double find(const RowMatrix<double>& coefficients, double further = 0.0, bool jumped = false);
@@ -44,6 +57,10 @@ class ContactTerms {
   double fastest(const RowMatrix<double>& rates);
   /// Pressures after a solve that left the places of found() there.
   void press(const double* places);
+  /// Friction holds what was found, as hard as it presses.
+  void grip();
+  /// The planes become as stiff as their pressures ask for, or `more`: where depths do not fall.
+  void harden(bool more);
   /// No planes: the surface is free.
   void release();
 
@@ -60,35 +77,38 @@ class ContactTerms {
   /// Whether a part is inside another one there, however deep.
   bool overlaps(const RowMatrix<double>& coefficients);
   double touching() const;
-  /// Of energy a unit of area for a unit of squared depth, halved.
-  static constexpr double stiffness = 5e4;
 
  private:
-  void make_surfaces();
+  void gather_surfaces();
+  void see(Index k);
+  void carry(Index k, const Mat4& motion);
+  std::vector<Index> near_rows() const;
+  void find_outside(const std::vector<Index>& rows);
   Vector add_planes(Index k, const std::vector<Index>& rows, PointsIn now);
+  std::vector<Index> at_edges();
+  void follow_finer_since(Index before);
   void add_own_planes(const RowMatrix<double>& coefficients, bool jumped);
   void gather_places();
-  Points normals_at(const RowMatrix<double>& coefficients);
-  Points places_at(const RowMatrix<double>& coefficients);
 
   const RadialProblem& problem_;
   std::optional<Contact> contact_;
   std::optional<Ground> further_ground_;
   std::vector<BarrierSurface> surfaces_;
-  Dependent<RadialEvaluator<double>, 1> evaluator_;
-  Dependent<RadialEvaluator<float>, 1> slopes_;  // of the samples, for their normals
-  std::vector<Index> samples_;                   // rows of the problem's samples that are followed
-  Points places_;                                // theirs at the last look
+  std::vector<Mat4> starts_, ends_;  // placements that they move between
+  std::vector<Mat4> carried_;        // their last moves
+  ContactPoints points_;
+  Points places_;  // at the last look
   std::optional<SelfContact> self_;
-  Points seen_;                  // where they were last known outside
-  RowMatrix<double> clear_;      // (samples, surfaces) no surface nearer to there
-  RowMatrix<double> pressures_;  // (samples, surfaces and the shape itself)
+  std::vector<Points> seen_;     // of each surface: where places were last known outside, carried with it
+  RowMatrix<double> clear_;      // (places, surfaces) no surface nearer to there
+  RowMatrix<double> pressures_;  // (places, surfaces and the shape itself)
   ContactSet found_;
   Revision sets_ = 0;  // that were found
   double deepest_ = 0.0;
   double deepest_outside_ = 0.0;
   double further_ = 0.0;
   bool touches_itself_ = false;
+  bool grips_ = false;  // what was found last
 };
 
 }  // namespace arapfields

@@ -19,6 +19,8 @@ constexpr int steps_at_once = 10;
 /// A deformation has converged where these steps gain less than this share of the energy. Thin parts under
 /// many held samples would go on for hundreds of steps, for a ten-thousandth.
 constexpr double least_gain = 1e-3;
+/// Factor on it where handles are held back: they would slide on for long.
+constexpr double less_where_held = 10.0;
 /// A deformation with `worth_a_first` centers starts from one with half of them, `most_first` at most.
 constexpr int worth_a_first = 600, most_first = 500, first_steps = 20;
 /// The solve that a stylization starts from.
@@ -102,8 +104,10 @@ LoopResult run(RadialSolver& live, const TrainingOptions& how, const Progress& p
       result.stopped_by = StopReason::observer;
       break;
     }
-    const bool gains = live.report().iterations >= at_once && before - value >= bounds.least_gain * value;
-    if (!gains && !live.report().contact.unsettled) break;
+    const ContactReport& contact = live.report().contact;
+    const double least = (contact.held.empty() ? 1.0 : less_where_held) * bounds.least_gain;
+    const bool gains = live.report().iterations >= at_once && before - value >= least * value;
+    if (!gains && !contact.unsettled) break;
     before = value;
     if (how.time_budget > 0.0 && result.seconds > how.time_budget) {
       result.stopped_by = StopReason::time_budget;

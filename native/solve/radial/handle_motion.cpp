@@ -24,6 +24,17 @@ Mat3 linear_between(const Mat3& a, const Mat3& b, double share) {
 
 }  // namespace
 
+Mat4 motion_between(const Mat4& from, const Mat4& to, double share) {
+  Mat4 result = (1.0 - share) * from + share * to;
+  result.topLeftCorner<3, 3>() = linear_between(from.topLeftCorner<3, 3>(), to.topLeftCorner<3, 3>(), share);
+  return result;
+}
+
+Points affine_image(PointsIn points, const Mat4& motion) {
+  return (points * motion.topLeftCorner<3, 3>().transpose()).rowwise() +
+         motion.topRightCorner<3, 1>().transpose();
+}
+
 RowMatrix<double> Twist::of(const RowMatrix<double>& coefficients, Index centers) const {
   Mat3 cross;
   cross << 0.0, -turn.z(), turn.y(), turn.z(), 0.0, -turn.x(), -turn.y(), turn.x(), 0.0;

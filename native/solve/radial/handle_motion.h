@@ -19,6 +19,12 @@ struct Twist {
 /// The twist that brings points (n,3) nearest to others in `seconds`, by the weights (n).
 Twist twist_between(const Points& from, const Points& to, const Vector& weights, double seconds);
 
+/// A share of the way from one affine motion to another: rotations by slerp, all else along lines.
+Mat4 motion_between(const Mat4& from, const Mat4& to, double share);
+
+/// Points (n,3) after an affine motion.
+Points affine_image(PointsIn points, const Mat4& motion);
+
 std::vector<Mat4> motions_of(const BoundHandles& handles);
 
 /// Targets of some rows of the handles' pairs (ascending) at a share of the way from earlier motions of the

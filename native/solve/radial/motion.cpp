@@ -84,8 +84,11 @@ void TimeIntegrator::integrate(const Progress& progress) {
     const auto share = [&](double within) {
       return (static_cast<double>(k) + within) / static_cast<double>(steps_);
     };
-    if (state_.contact.any())
+    if (state_.contact.any()) {
+      state_.contact.move_obstacles(share(1.0));
       state_.contact.find(state_.shape.coefficients, 2.0 * h_ * state_.contact.fastest(body_.velocities));
+      state_.contact.grip();
+    }
     const auto integrated = [&](const TimeScheme& scheme) {
       if (state_.contact.any()) state_.objective(state_.fast);
       objective.set_targets(state_.handles.targets_between(before_, share(scheme.w)));
@@ -200,6 +203,7 @@ void change_coordinates(RadialState& s, const Mat4& motion) {
   for (RowMatrix<double>* rates : {&s.dynamics.velocities, &s.dynamics.accelerations})
     if (rates->size() > 0) *rates *= transposed;
   for (Mat4& handle : s.dynamics.motions) handle = m * handle;
+  s.contact.change_coordinates(m);
 }
 
 }  // namespace
@@ -217,7 +221,7 @@ MotionState RadialSolver::motion_state() const {
   const RadialState& s = *state_;
   RowMatrix<double> velocities = s.dynamics.velocities;
   if (velocities.size() == 0) velocities.setZero(s.problem.basis.size(), 3);
-  return {s.shape.coefficients, velocities, s.dynamics.accelerations, s.dynamics.motions};
+  return {s.shape.coefficients, velocities, s.dynamics.accelerations, s.dynamics.motions, s.contact.held()};
 }
 
 void RadialSolver::set_motion_state(const MotionState& state) {
@@ -237,6 +241,7 @@ void RadialSolver::set_motion_state(const MotionState& state) {
   s.dynamics.velocities = state.velocities;
   s.dynamics.accelerations = state.accelerations;
   s.dynamics.motions = state.motions;
+  s.contact.resume(state.contact, s.shape.coefficients);
   s.invalidate_history();
 }
 
@@ -257,6 +262,7 @@ std::shared_ptr<RadialField> RadialSolver::step(const std::vector<Handle>& moved
     set_targets(moved);
     change_coordinates(s, coordinates);
     const ThreadScope threads(s.problem.solve_threads());
+    if (s.contact.any()) s.contact.resume(s.contact.held(), s.shape.coefficients);
     TimeIntegrator(s, seconds).integrate(progress);
   } catch (...) {
     set_targets(handles_before);

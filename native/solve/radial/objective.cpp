@@ -116,9 +116,8 @@ RadialTerms RadialObjective<Scalar>::evaluate(JetView<const Scalar> jets, const 
         fold_barrier<Scalar>(jets, problem_.options.surface.barrier_threshold, barrier(), jet_cotangents);
   if (body_) terms.body = body_energy<Scalar>(jets, *body_, jet_cotangents);
   if (contact_.size() > 0)
-    terms.contact =
-        contact_energy<Scalar>(planes_->planes, ContactTerms::stiffness, u.data() + contact_offset(),
-                               out != nullptr ? out + contact_offset() : nullptr);
+    terms.contact = contact_energy<Scalar>(planes_->planes, planes_->stiffness, u.data() + contact_offset(),
+                                           out != nullptr ? out + contact_offset() : nullptr);
   terms.external =
       external_energies<Scalar>(hooks_.energies, problem_.energy_points, jets, hooks_.weight, jet_cotangents);
   return terms;

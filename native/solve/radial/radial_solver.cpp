@@ -160,8 +160,7 @@ void RadialSolver::set_symmetry(SymmetryPlane symmetry, const Progress& progress
 
 void RadialSolver::set_contact(const std::optional<Contact>& contact) {
   const ThreadScope threads(state_->problem.options.threads);
-  state_->contact.set(contact);
-  if (contact) state_->contact.begin(state_->shape.coefficients);
+  state_->contact.set(contact, state_->shape.coefficients);
 }
 
 void RadialSolver::set_targets(const std::vector<Handle>& moved) { state_->handles.set_targets(moved); }

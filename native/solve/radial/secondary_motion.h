@@ -17,12 +17,23 @@ struct SecondaryMotion {
   std::optional<double> ground = {};  ///< height along `up`, in mesh coordinates; none: no ground
 };
 
+/// How a surface presses on obstacles, and where these are.
+struct ContactState {
+  std::vector<Mat4> placements;  ///< of the functions' cubes, in the surface's
+  struct Pressure {
+    Index row, surface;
+    double pressure;
+  };
+  std::vector<Pressure> pressures;  ///< of what touches
+};
+
 /// Where a body is and how it moves: all that the next step depends on beside its handles' targets.
 struct MotionState {
   RowMatrix<double> coefficients;   ///< (size,3) of the radial basis
   RowMatrix<double> velocities;     ///< (size,3) of these, a second
   RowMatrix<double> accelerations;  ///< (size,3), a second²; empty: not known
   std::vector<Mat4> motions;        ///< of the handles, in cube coordinates; empty: not known
+  ContactState contact = {};
 };
 
 }  // namespace arapfields

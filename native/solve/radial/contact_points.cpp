@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "solve/radial/contact_points.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/decompositions.h"
+#include "core/random.h"
+#include "sampling/sample_choice.h"
+
+namespace arapfields {
+namespace {
+
+/// Samples that are followed at most; they lie denser than any detail of a radial field.
+constexpr Index most_samples = 20000;
+/// Finer places at most: of the edges that touch, more would say nothing new.
+constexpr Index most_finer = 12000;
+/// Finer places lie so many times as dense, and a sample stands for places up to so many spacings away.
+constexpr double finer_density = 12.0, reach = 2.2;
+/// Cosine of the normals of neighbours on one side.
+constexpr double same_side = 0.5;
+/// Neighbours that a surface of second degree is fitted to, at least.
+constexpr Index least_fitted = 5;
+
+}  // namespace
+
+void ContactPoints::choose() {
+  if (!samples_.empty()) return;
+  Random random(static_cast<std::uint64_t>(problem_.options.seed), 3);
+  samples_ = stratified(problem_.shape->order, std::min(most_samples, problem_.samples.size()), random);
+  rest_ = rows_of(problem_.surface(), samples_);
+  const double wide = 0.05;  // a cell holds about a square of the surface
+  const PointGrid coarse(rest_, wide);
+  spacing_ = wide * std::sqrt(static_cast<double>(coarse.size()) / static_cast<double>(rest_.rows()));
+  near_.resize(samples_.size());
+  is_fine_.assign(samples_.size(), false);
+}
+
+Index ContactPoints::sample_of(Index row) const {
+  return row < sample_count() ? row : parents_[static_cast<std::size_t>(row - sample_count())];
+}
+
+double ContactPoints::share(Index row) const {
+  const double whole = 1.0 / static_cast<double>(sample_count());
+  return row < sample_count() ? whole : 0.5 * whole;
+}
+
+Points ContactPoints::rest(const std::vector<Index>& rows) const { return rows_of(rest_, rows); }
+
+const std::vector<Index>& ContactPoints::neighbours(Index sample) {
+  const Index n = sample_count();
+  if (!grid_) {
+    grid_ = std::make_unique<PointGrid>(rest_.topRows(n), 2.0 * reach * spacing_);
+    cells_.resize(static_cast<std::size_t>(n));
+    for (Index c = 0; c < grid_->size(); ++c)
+      for (const Index i : grid_->rows(c)) cells_[static_cast<std::size_t>(i)] = c;
+  }
+  std::vector<Index>& found = near_[static_cast<std::size_t>(sample)];
+  if (!found.empty()) return found;
+  const Points& normals = problem_.samples.normals;
+  const bool faces = normals.rows() == problem_.samples.size();
+  const auto normal = [&](Index i) { return normals.row(samples_[static_cast<std::size_t>(i)]); };
+  const double square = 4.0 * reach * reach * spacing_ * spacing_;
+  found.push_back(sample);
+  grid_->near(cells_[static_cast<std::size_t>(sample)], [&](Index cell) {
+    for (const Index i : grid_->rows(cell))
+      if (i != sample && (rest_.row(i) - rest_.row(sample)).squaredNorm() < square &&
+          (!faces || normal(i).dot(normal(sample)) > same_side))
+        found.push_back(i);
+  });
+  return found;
+}
+
+/// Places on a spiral in the tangent plane that are nearer to this sample than to others, brought to the
+/// surface of second degree through its neighbours.
+Points ContactPoints::finer(Index sample) {
+  const Vec3 at = rest_.row(sample).transpose();
+  const Vec3 normal =
+      problem_.samples.normals.row(samples_[static_cast<std::size_t>(sample)]).transpose().normalized();
+  const Vec3 first = normal.unitOrthogonal(), second = normal.cross(first);
+  const std::vector<Index>& around = neighbours(sample);
+  Mat3 gram = Mat3::Zero();
+  Vec3 right = Vec3::Zero();
+  RowMatrix<double> flat(static_cast<Index>(around.size()), 2);
+  for (std::size_t k = 0; k < around.size(); ++k) {
+    const Vec3 arm = rest_.row(around[k]).transpose() - at;
+    const double a = arm.dot(first), b = arm.dot(second);
+    flat.row(static_cast<Index>(k)) << a, b;
+    const Vec3 terms(a * a, a * b, b * b);
+    gram += terms * terms.transpose();
+    right += arm.dot(normal) * terms;
+  }
+  Vec3 bend = Vec3::Zero();
+  if (std::ssize(around) > least_fitted) {
+    gram.diagonal().array() += 1e-3 * gram.trace();
+    bend = solve_definite(gram, right);
+  }
+  std::vector<Vec3> places;
+  const double density = finer_density / (spacing_ * spacing_);
+  const auto count = static_cast<int>(std::numbers::pi * reach * reach * finer_density);
+  const double golden = std::numbers::pi * (3.0 - std::sqrt(5.0));
+  for (int k = 1; k < count; ++k) {
+    const double radius = std::sqrt(static_cast<double>(k) / (std::numbers::pi * density));
+    const double a = radius * std::cos(golden * k), b = radius * std::sin(golden * k);
+    bool nearest = true;
+    for (Index j = 1; j < flat.rows() && nearest; ++j)
+      nearest = (flat.row(j) - Eigen::RowVector2d(a, b)).squaredNorm() > radius * radius;
+    if (nearest)
+      places.push_back(at + a * first + b * second +
+                       (bend[0] * a * a + bend[1] * a * b + bend[2] * b * b) * normal);
+  }
+  Points result(static_cast<Index>(places.size()), 3);
+  for (std::size_t k = 0; k < places.size(); ++k) result.row(static_cast<Index>(k)) = places[k].transpose();
+  return result;
+}
+
+void ContactPoints::refine(const std::vector<Index>& samples) {
+  if (problem_.samples.normals.rows() != problem_.samples.size()) return;
+  for (const Index sample : samples) {
+    if (is_fine_[static_cast<std::size_t>(sample)] || std::ssize(parents_) > most_finer) continue;
+    is_fine_[static_cast<std::size_t>(sample)] = true;
+    const Points more = finer(sample);
+    ++finer_places_;
+    const Index before = rest_.rows();
+    rest_.conservativeResize(before + more.rows(), Eigen::NoChange);
+    rest_.bottomRows(more.rows()) = more;
+    parents_.insert(parents_.end(), static_cast<std::size_t>(more.rows()), sample);
+  }
+}
+
+void ContactPoints::coarsen() {
+  if (parents_.empty()) return;
+  parents_.clear();
+  ++finer_places_;
+  is_fine_.assign(samples_.size(), false);
+  rest_.conservativeResize(sample_count(), Eigen::NoChange);
+}
+
+Points ContactPoints::at(const RowMatrix<double>& coefficients) {
+  const Index n = sample_count(), m = size() - n;
+  Points places(n + m, 3);
+  const auto fill = [&](Dependent<RadialEvaluator<double>, 1>& made, Revision of, Index first, Index count) {
+    const RadialEvaluator<double>& evaluator = made.get({of}, [&] {
+      return RadialEvaluator<double>(problem_.basis, rest_.middleRows(first, count), JetOrder::value);
+    });
+    evaluator.evaluate(coefficients, {places.data() + 3 * first, count, JetOrder::value});
+  };
+  fill(evaluator_, 1, 0, n);
+  if (m > 0) fill(finer_, finer_places_, n, m);
+  return places;
+}
+
+Points ContactPoints::normals_at(const RowMatrix<double>& coefficients) {
+  const RadialEvaluator<float>& evaluator = slopes_.get({1}, [&] {
+    return RadialEvaluator<float>(problem_.basis, rest_.topRows(sample_count()), JetOrder::first);
+  });
+  JetBlock<float> jets(evaluator.size(), JetOrder::first);
+  evaluator.evaluate(coefficients, jets.view());
+  Points normals = rows_of(problem_.samples.normals, samples_);
+  for (Index i = 0; i < normals.rows(); ++i) {
+    Mat3 slope;
+    for (int k = 0; k < 3; ++k)
+      slope.col(k) = Eigen::Map<const Eigen::Vector3f>(jets.view().at(first_column(k), i)).cast<double>();
+    const Vec3 rest = normals.row(i).transpose();
+    const Vec3 moved = rest[0] * slope.col(1).cross(slope.col(2)) +
+                       rest[1] * slope.col(2).cross(slope.col(0)) +
+                       rest[2] * slope.col(0).cross(slope.col(1));
+    normals.row(i) = moved.transpose();
+  }
+  return normals;
+}
+
+}  // namespace arapfields

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "fields/radial_evaluator.h"
+#include "sampling/point_grid.h"
+#include "solve/radial/problem.h"
+
+namespace arapfields {
+
+/// The places of a surface that are followed: samples, and finer places around those that meet an edge, which
+/// would poke through between them.
+class ContactPoints {
+ public:
+  explicit ContactPoints(const RadialProblem& problem) : problem_(problem) {}
+  /// Chooses the samples, once.
+  void choose();
+  bool empty() const { return samples_.empty(); }
+  /// Rows of the problem's samples that are followed.
+  const std::vector<Index>& samples() const { return samples_; }
+  /// Of samples and finer places, in this order.
+  Index size() const { return rest_.rows(); }
+  Index sample_count() const { return static_cast<Index>(samples_.size()); }
+  /// The sample that a place belongs to.
+  Index sample_of(Index row) const;
+  /// The area that a place stands for, as a share of the whole.
+  double share(Index row) const;
+  Points rest(const std::vector<Index>& rows) const;
+  /// About the distance of a sample to what it stands for.
+  double spacing() const { return spacing_; }
+  /// Samples near one at rest, on the same side.
+  const std::vector<Index>& neighbours(Index sample);
+  /// Adds finer places around samples that have none yet.
+  void refine(const std::vector<Index>& samples);
+  /// The samples alone.
+  void coarsen();
+
+  Points at(const RowMatrix<double>& coefficients);
+  /// Which way the samples face, as long as the surface is stretched.
+  Points normals_at(const RowMatrix<double>& coefficients);
+
+ private:
+  Points finer(Index sample);
+
+  const RadialProblem& problem_;
+  std::vector<Index> samples_;
+  std::vector<Index> parents_;  // of the finer places
+  std::vector<bool> is_fine_;   // samples
+  Points rest_;
+  double spacing_ = 0.0;
+  std::unique_ptr<PointGrid> grid_;  // of the samples
+  std::vector<Index> cells_;         // of each
+  std::vector<std::vector<Index>> near_;
+  Revision finer_places_ = 0;
+  Dependent<RadialEvaluator<double>, 1> evaluator_;
+  Dependent<RadialEvaluator<double>, 1> finer_;
+  Dependent<RadialEvaluator<float>, 1> slopes_;  // of the samples
+};
+
+}  // namespace arapfields

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How hard a surface presses on the planes that were found, and obstacles that move.
+#include <algorithm>
+
+#include "solve/radial/contact_terms.h"
+#include "solve/radial/handle_motion.h"
+
+namespace arapfields {
+namespace {
+
+/// Factor on what a depth adds to a pressure: fewer rounds, and below 2 they converge.
+constexpr double relaxed = 1.8;
+/// Of stiffness, where depths do not fall.
+constexpr double harder = 4.0, hardest = 3e6;
+/// So far, in cube units, from a plane its mean pressure vanishes: a softer plane keeps what left it away.
+constexpr double hover = 2e-3;
+/// Pressures grow by no deeper gaps, in cube units: a solve that has only begun says little of forces.
+constexpr double shallow = 0.01;
+/// Forces farther than this from a handle, in cube units, count less.
+constexpr double handle_reach = 0.2;
+
+}  // namespace
+
+void ContactTerms::carry(Index k, const Mat4& motion) {
+  const auto which = static_cast<std::size_t>(k);
+  carried_[which] = motion;
+  seen_[which] = affine_image(seen_[which], motion);
+}
+
+void ContactTerms::change_coordinates(const Mat4& motion) {
+  for (std::size_t k = 0; k < starts_.size(); ++k) {
+    starts_[k] = motion * starts_[k];
+    surfaces_[k].set_placement(starts_[k]);
+  }
+}
+
+void ContactTerms::move_obstacles(double share) {
+  for (Index k = 0; k < std::ssize(starts_); ++k) {
+    const auto which = static_cast<std::size_t>(k);
+    carried_[which].setIdentity();
+    if (surfaces_[which].placement() == ends_[which]) continue;
+    const Mat4 before = surfaces_[which].placement();
+    if (share < 1.0)
+      surfaces_[which].place_between(starts_[which], ends_[which], share);
+    else
+      surfaces_[which].set_placement(ends_[which]);
+    carry(k, surfaces_[which].placement() * before.inverse());
+  }
+}
+
+double ContactTerms::obstacle_way() const {
+  double way = 0.0;
+  for (std::size_t k = 0; k < starts_.size(); ++k)
+    way = std::max(way, (ends_[k] - surfaces_[k].placement()).topRows<3>().colwise().norm().sum());
+  return way;
+}
+
+/// The places of the planes, once each.
+void ContactTerms::gather_places() {
+  std::vector<Index>& used = found_.rows;
+  used.clear();
+  for (const ContactPlane& plane : found_.planes) {
+    used.push_back(plane.first);
+    if (plane.second >= 0) used.push_back(plane.second);
+  }
+  std::sort(used.begin(), used.end());
+  used.erase(std::unique(used.begin(), used.end()), used.end());
+  found_.places = points_.rest(used);
+  const auto row_of = [&](Index row) {
+    return std::lower_bound(used.begin(), used.end(), row) - used.begin();
+  };
+  for (ContactPlane& plane : found_.planes) {
+    plane.first = row_of(plane.first);
+    if (plane.second >= 0) plane.second = row_of(plane.second);
+  }
+  found_.revision = found_.planes.empty() ? 0 : ++sets_;
+}
+
+double ContactTerms::touching() const {
+  double share = 0.0;
+  for (const ContactPlane& plane : found_.planes)
+    if (plane.pressure > 0.0) share += plane.share;
+  return share;
+}
+
+std::string ContactTerms::name_of(Index surface) const {
+  if (contact_ && surface < std::ssize(contact_->obstacles))
+    return "obstacles[" + std::to_string(surface) + "]";
+  return surface < std::ssize(surfaces_) ? "ground" : "itself";
+}
+
+Points ContactTerms::forces_at(const Vec3& place, const double* places) const {
+  Points forces = Points::Zero(pressures_.cols(), 3);
+  const auto nearness = [&](Index row) {
+    const double square = (Eigen::Map<const Vec3>(places + 3 * row) - place).squaredNorm();
+    return 1.0 / (square + handle_reach * handle_reach);
+  };
+  for (const ContactPlane& plane : found_.planes) {
+    const double share = nearness(plane.first) - (plane.second < 0 ? 0.0 : nearness(plane.second));
+    forces.row(plane.obstacle) += share * plane.share * plane.pressure * plane.normal.transpose();
+  }
+  return forces;
+}
+
+void ContactTerms::press(const double* places) {
+  for (ContactPlane& plane : found_.planes) {
+    const double gap = std::max(-shallow, plane.gap(places));
+    plane.pressure = plane.pressed(gap, gap < 0.0 ? relaxed * found_.stiffness : found_.stiffness);
+    pressures_(found_.rows[static_cast<std::size_t>(plane.first)], plane.obstacle) = plane.pressure;
+  }
+  if (grips_) grip();
+}
+
+void ContactTerms::grip() {
+  grips_ = true;
+  const double coefficient = contact_ ? contact_->friction : Contact().friction;
+  for (ContactPlane& plane : found_.planes)
+    if (plane.second < 0) plane.grip = coefficient * plane.pressure;
+}
+
+void ContactTerms::harden(bool more) {
+  double sum = 0.0, share = 0.0;
+  for (const ContactPlane& plane : found_.planes) {
+    sum += plane.share * plane.pressure;
+    if (plane.pressure > 0.0) share += plane.share;
+  }
+  const double fitting = share > 0.0 ? sum / share / hover : 0.0;
+  const double wanted = std::max({found_.stiffness, fitting, more ? harder * found_.stiffness : 0.0});
+  found_.stiffness = std::min(wanted, hardest);
+}
+
+}  // namespace arapfields
