@@ -30,6 +30,30 @@ constexpr double kept_itself = 2.0 * kept;
 /// Stiffness of planes at first.
 constexpr double softest = 5e4;
 
+/// Places that came through a surface (rows of `now`) are beyond the side that they came from.
+void go_back(const BarrierSurface& surface, PointsIn now, const std::vector<Index>& moved_rows,
+             const std::vector<BarrierSurface::Hit>& hits, double reach, BarrierSurface::Nearest& nearest,
+             Vector& offsets) {
+  for (std::size_t m = 0; m < moved_rows.size(); ++m) {
+    const BarrierSurface::Hit& hit = hits[m];
+    if (hit.share > 1.0) continue;
+    const Index i = moved_rows[m];
+    const double beyond = hit.normal.dot(now.row(i).transpose() - hit.place);
+    if (surface.is_sheet() && beyond < 0.0) {  // the side that it came from is the outer one
+      nearest.normals.row(i) *= -1.0;
+      nearest.distances[i] *= -1.0;
+      offsets[i] *= -1.0;
+    }
+    if (nearest.distances[i] < reach &&
+        nearest.normals.row(i).dot(hit.normal) > (surface.is_sheet() ? same_side : opposite))
+      continue;
+    if (beyond > 0.0 && nearest.distances[i] > 0.0) continue;  // around it
+    nearest.normals.row(i) = hit.normal.transpose();
+    nearest.distances[i] = beyond;
+    offsets[i] = hit.normal.dot(hit.place);
+  }
+}
+
 }  // namespace
 
 void ContactTerms::set(const std::optional<Contact>& contact, const RowMatrix<double>& coefficients) {
@@ -250,24 +274,7 @@ Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsI
   Vector offsets(now.rows());
   for (Index i = 0; i < now.rows(); ++i)
     offsets[i] = nearest.normals.row(i).dot(now.row(i)) - nearest.distances[i];
-  for (std::size_t m = 0; m < moved_rows.size(); ++m) {
-    const BarrierSurface::Hit& hit = hits[m];
-    if (hit.share > 1.0) continue;
-    const Index i = moved_rows[m];
-    const double beyond = hit.normal.dot(now.row(i).transpose() - hit.place);
-    if (surface.is_sheet() && beyond < 0.0) {  // the side that it came from is the outer one
-      nearest.normals.row(i) *= -1.0;
-      nearest.distances[i] *= -1.0;
-      offsets[i] *= -1.0;
-    }
-    if (nearest.distances[i] < near + further_ &&
-        nearest.normals.row(i).dot(hit.normal) > (surface.is_sheet() ? same_side : opposite))
-      continue;
-    if (beyond > 0.0 && nearest.distances[i] > 0.0) continue;  // around it
-    nearest.normals.row(i) = hit.normal.transpose();
-    nearest.distances[i] = beyond;
-    offsets[i] = hit.normal.dot(hit.place);
-  }
+  go_back(surface, now, moved_rows, hits, near + further_, nearest, offsets);
   const Points anchors = affine_image(now, carried_[static_cast<std::size_t>(k)]);
   for (Index i = 0; i < now.rows(); ++i) {
     const double margin = surface.margin() + kept, gap = nearest.distances[i] - margin;

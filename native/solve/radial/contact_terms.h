@@ -94,8 +94,9 @@ class ContactTerms {
   std::optional<Contact> contact_;
   std::optional<Ground> further_ground_;
   std::vector<BarrierSurface> surfaces_;
-  std::vector<Mat4> starts_, ends_;  // placements that they move between
-  std::vector<Mat4> carried_;        // their last moves
+  std::vector<Mat4> starts_;   // placements that they move from
+  std::vector<Mat4> ends_;     // and to
+  std::vector<Mat4> carried_;  // their last moves
   ContactPoints points_;
   Points places_;  // at the last look
   std::optional<SelfContact> self_;

@@ -21,7 +21,8 @@ struct SecondaryMotion {
 struct ContactState {
   std::vector<Mat4> placements;  ///< of the functions' cubes, in the surface's
   struct Pressure {
-    Index row, surface;
+    Index row;
+    Index surface;
     double pressure;
   };
   std::vector<Pressure> pressures;  ///< of what touches
