@@ -12,7 +12,7 @@ import bpy
 
 from ..blender import timers
 from ..blender.language import translated
-from ..blender.object_references import settings_of
+from ..blender.object_references import in_scene, settings_of
 from ..blender.redraw import redraw
 from ..core.errors import UserError
 from ..core.runtime import jobs
@@ -158,11 +158,16 @@ def warn(session):
 
 
 def end_with_error(uid, session, error):
-    live.pop(uid, None)
-    session.stop()
+    """Also ends one whose source was deleted, which stays as it is: an undone step brings back both."""
+    source = session.source.find()
+    if session.display.in_place and source is not None and not in_scene(source):
+        live.part_with(uid)
+    else:
+        live.pop(uid, None)
+        session.stop()
+        take_away(session)
     text = translated("{error}; live mode ended", error=translated(error))
     jobs.add_message("ERROR", f"{session.source.name}: {text}")
-    take_away(session)
 
 
 def take_away(session):

@@ -9,6 +9,7 @@ if IN_BLENDER:
     import bpy
     from support.blender import scenes
     from support.blender.live import step
+    from support.blender.pins import pin
     from support.blender.scenes import delete
 
     from addon.live import sessions
@@ -28,8 +29,26 @@ def test_live_ends_when_its_source_or_its_object_is_deleted(which):
     moving.location.z += 0.4
     step()
     assert not sessions.live and "Bar_live" not in bpy.data.objects
-    assert not bar.hide_render and not bar.arapfields.results and not bar.modifiers
-    assert "ARAP Fields" not in bar.data.attributes
+    assert not bar.hide_render and not bar.arapfields.results
+    if which != "source":  # which stays as it was, until that is undone
+        assert not bar.modifiers and "ARAP Fields" not in bar.data.attributes
+
+
+def test_a_deleted_source_comes_back_live_and_as_it_was():
+    """Its pins keep it in the file, so that an undone step takes it as it is there."""
+    bpy.context.preferences.edit.use_global_undo = True
+    bar = scenes.bar()
+    pin(bar, (1.0, 0.0, 0.25), target=(1.0, 0.0, 0.4))
+    bpy.ops.ed.undo_push(message="pin")
+    shown = scenes.world_points(bar)
+    delete(bar)
+    bpy.ops.ed.undo_push(message="deleted")
+    step()
+    assert not sessions.live
+    bpy.ops.ed.undo()
+    step()
+    bar = bpy.data.objects["Bar"]
+    assert sessions.is_live(bar) and np.array_equal(scenes.world_points(bar), shown)
 
 
 def test_edits_of_a_live_source_are_followed():
