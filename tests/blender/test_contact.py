@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 from support.blender.inside import IN_BLENDER
 
+from arapfields import backend
+
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
@@ -36,6 +38,7 @@ def lowest(bar):
     ].min()
 
 
+@pytest.mark.xfail(backend() == "eigen", reason="a ground beside itself does not settle with every rounding")
 def test_a_live_shape_stays_outside_as_its_obstacle_comes_and_goes():
     bar, block, low = pressed()
     size = max(bar.dimensions)
