@@ -109,24 +109,23 @@ def median(m):
 
 
 def table_rows(start):
-    """Cells of the rows of docs/performance.md whose first cell begins so."""
-    lines = (DOCS / "performance.md").read_text().splitlines()
-    return [
-        [cell.strip() for cell in line.strip("| ").split("|")]
-        for line in lines
-        if line.startswith(f"| {start}")
-    ]
+    """Cells of the rows of docs/performance.md whose first cell, or the last one above it, begins so."""
+    found, first = [], ""
+    for line in (DOCS / "performance.md").read_text().splitlines():
+        cells = [cell.strip() for cell in line.split("|")[1:-1]] or [""]
+        first = cells[0] or (first if line else "")
+        found += [cells] if first.startswith(start) else []
+    return found
 
 
 def faster():
-    (row,) = table_rows("energy and gradient, N = 1000, 4x256, against iarap")
+    (row,) = table_rows("N = 1000")
     return f"{float(row[-1]):.3g} times faster a step"
 
 
 def fingers():
     """Of the neighbours of a finger that is bent, by field."""
-    rows = [row for row in table_rows("hand, middle forward 20 degrees") if "straight" not in row[1]]
-    shares = [float(cell.split()[0]) for row in rows for cell in (row[4], row[6])]
+    shares = [float(row[i]) for row in table_rows("middle forward 20 degrees") for i in (4, 6)]
     return f"{min(shares):.1f} to {max(shares):.1f} %"
 
 

@@ -78,7 +78,7 @@ def energy_row(samples, count):
         (3 * iarap.arap_energy(network, batch, BENDING / 3).mean()).backward()
 
     return {
-        "what": f"energy and gradient, N = {count}, 4x256, against iarap",
+        "what": f"energy and gradient, 4x256, against iarap: N = {count}",
         **paired(ours.run, theirs, rounds=5 if count < 4000 else 3),
     }
 

@@ -62,7 +62,7 @@ def compare_rows(name, resolution=96):
     shared = {"vertices": len(vertices)}
     return [
         {
-            "what": f"{label(name)}: live solver",
+            "what": f"{label(name)}: live",
             **shared,
             "setup_cpu_s": round(our_setup.cpu, 3),
             "steps": live.report.iterations,
@@ -71,7 +71,7 @@ def compare_rows(name, resolution=96):
             "volume_ratio": round(volume(ours, triangles) / whole, 3),
         },
         {
-            "what": f"{label(name)}: libigl, ARAP of the mesh",
+            "what": f"{label(name)}: libigl",
             **shared,
             "setup_cpu_s": round(setup.cpu, 3),
             "steps": iterations,
@@ -107,23 +107,20 @@ def cost_row(centers, count):
     }
 
 
-def finger_row(finger, motion, degrees, interior=True, field=None):
+def finger_row(finger, motion, degrees, field=None):
     (palm, middle), surface_samples = placements("hand"), samples("hand")
     box, pivot = (middle, drag("hand")[3]) if finger == "middle" else hand()["index"]
     box = box if finger == "middle" else cases.box(*box)
     pair = [cases.moved(palm), cases.moved(box, cases.turn(hand()[motion], degrees, pivot))]
     if field is None:
-        live = af.LiveDeformer(surface_samples, pair, af.LiveOptions(interior=interior))
+        live = af.LiveDeformer(surface_samples, pair)
         field = live.solve(iterations=100, tolerance=1e-5)
-        energy, name = (
-            live.report.energy,
-            f"radial, {'interior ways' if interior else 'straight distances'}",
-        )
+        energy, name = live.report.energy, "radial"
     else:
         trained = af.deform(surface_samples, pair, af.DeformOptions(iterations=300))
         energy, name, field = trained.report.energy, field, trained
     row = {
-        "what": f"{label('hand')}, {finger} {motion} {abs(degrees)} degrees",
+        "what": f"{label('hand')}, % of its length: {finger} {motion} {abs(degrees)} degrees",
         "field": name,
         "energy": round(energy, 4),
     }
@@ -131,7 +128,7 @@ def finger_row(finger, motion, degrees, interior=True, field=None):
         near = np.argsort(np.linalg.norm(surface_samples.points - place, axis=1))[:20]
         points = surface_samples.points[near]
         share = np.linalg.norm(field(points) - points, axis=1).max() / hand()["length"]
-        row[tip] = "moved" if tip == finger else f"{100 * share:.1f} %"
+        row[tip] = "moved" if tip == finger else round(100 * share, 1)
     return row
 
 
@@ -146,7 +143,6 @@ def run():
         ("middle", "forward", 50),
         ("index", "forward", 50),
     ):
-        for interior in (True, False):
-            rows.append(finger_row(finger, motion, degrees, interior))
+        rows.append(finger_row(finger, motion, degrees))
         rows.append(finger_row(finger, motion, degrees, field="neural, 300 iterations"))
     return rows

@@ -8,6 +8,7 @@ import ast
 import html
 import json
 import math
+import re
 import sys
 from pathlib import Path
 
@@ -55,9 +56,6 @@ HEADINGS = {
     "rest_to_70_s": "rest to 70°, s",
     "of_neural": "energy over the network's",
     "of_its_time": "time over the network's",
-    "strength": "strength, updates a second",
-    "sharpness": "sharpness, updates a second",
-    "orientation": "orientation, updates a second",
     "tracked_ms": "tracked points, ms",
     "anew_ms": "points anew, ms",
     "mesh_energy": "energy of the mesh",
@@ -65,10 +63,7 @@ HEADINGS = {
     "handle_added_cpu_s": "handle added, processor s",
     "step_cpu_ms": "step, processor ms",
     "uniformity": "non-uniformity (1 is ideal)",
-}
-HEADINGS |= {
     "by": "",
-    "handle_error_percent": "handle error, % of the size",
     "folded_percent": "folded, %",
     "mean_angle": "mean angle to the style, degrees",
     "within_10_percent": "area within 10°, %",
@@ -102,10 +97,25 @@ def table(rows):
     """A Markdown table with the columns that its rows have, in the order of their first use."""
     columns = list(dict.fromkeys(key for row in rows for key in row))
     columns = [name for name in columns if shown(name, columns)]
-    lines = ["| " + " | ".join(HEADINGS.get(name, name.replace("_", " ")) for name in columns) + " |"]
-    lines.append("|" + "|".join("---:" if is_number(rows, name) else "---" for name in columns) + "|")
-    lines += ["| " + " | ".join(text(row.get(name, "")) for name in columns) + " |" for row in rows]
-    return "\n".join(lines)
+    header = [HEADINGS.get(name, name.replace("_", " ")) for name in columns]
+    lines = "|" + "|".join("---:" if is_number(rows, name) else "---" for name in columns) + "|"
+    cells = [[text(row.get(name, "")) for name in columns] for row in rows]
+    return drawn(header, lines, cells)
+
+
+def drawn(header, lines, cells):
+    """A Markdown table of cells; what the first column repeats stands once, in its heading or first row."""
+    first = [row[0] for row in cells]
+    parts = [first[0][: part.end()] for part in re.finditer(": |, ", first[0])] if len(set(first)) > 1 else []
+    shared = max((part for part in parts if all(one.startswith(part) for one in first)), key=len, default="")
+    header = [shared.rstrip(" :,") or header[0], *header[1:]]
+    cells = [
+        ["" if row and value == first[row - 1] else value.removeprefix(shared), *cells[row][1:]]
+        for row, value in enumerate(first)
+    ]
+    return "\n".join(
+        ["| " + " | ".join(header) + " |", lines, *("| " + " | ".join(row) + " |" for row in cells)]
+    )
 
 
 def is_number(rows, name):
@@ -180,8 +190,9 @@ def page(results, machine):
     named = ", ".join(f"{key} {value}" for key, value in machine.items())
     blocks = [f"Measured on: {named}.", ""]
     if bars(results):
-        blocks += [f"![How many times faster than the competitor, row by row](images/{PLOT.name})", ""]
         blocks += [
+            f"![How many times faster than the competitor, row by row](images/{PLOT.name})",
+            "",
             "*Times faster than what each section compares with, on a logarithmic scale; grey is slower.*",
             "",
         ]
@@ -212,8 +223,7 @@ def peers_page(text, kept):
         size = f", {alike[0]['vertices']:,} vertices" if "vertices" in alike[0] else ""
         blocks += [f"### {kind[0].upper()}{kind[1:]}{size}", "", table([peers_row(row) for row in alike]), ""]
     before, rest = text.split(BEGIN)
-    joined = "\n".join(blocks)
-    return f"{before}{BEGIN}\n{joined}{END}{rest.split(END)[1]}"
+    return f"{before}{BEGIN}\n" + "\n".join(blocks) + END + rest.split(END)[1]
 
 
 def main():
@@ -226,8 +236,7 @@ def main():
         kept = {"machine": machine, "rows": peers}
         PEERS.with_suffix(".json").write_text(json.dumps(kept, indent=1) + "\n")
         PEERS.write_text(peers_page(PEERS.read_text(), kept))
-    results = {module: rows for module, rows in results.items() if rows}
-    if not results:
+    if not (results := {module: rows for module, rows in results.items() if rows}):
         return
     before, rest = PAGE.read_text().split(BEGIN)
     after = rest.split(END)[1]
