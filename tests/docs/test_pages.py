@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The documentation is true: its code runs, links and pictures exist, the site builds without a warning."""
 
-import ast
 import json
 import re
 import subprocess
@@ -64,30 +63,16 @@ def test_messages_of_the_troubleshooting_page_are_in_the_code():
     assert not missing
 
 
-def literal(node):
-    """The text of a message, its gaps as '…'."""
-    if isinstance(node, ast.Constant):
-        return re.sub(r"\{\w+\}", "…", str(node.value))
-    if isinstance(node, ast.JoinedStr):
-        return "".join(literal(part) if isinstance(part, ast.Constant) else "…" for part in node.values)
-    return literal(node.args[0]) if isinstance(node, ast.Call) and node.args else ""
-
-
-def messages_of_the_extension():
-    """What its code raises as a UserError."""
-    for path in sorted((pages.ROOT / "addon").rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "UserError" and node.args:
-                yield literal(node.args[0])
-
-
 def test_the_troubleshooting_page_has_every_message_of_the_extension():
+    sys.path.insert(0, str(pages.ROOT / "docs" / "hooks"))
+    import messages
+
     page = (pages.ROOT / "docs" / "troubleshooting.md").read_text()
-    found = {message: re.findall(r"[^…:,(;]{6,}", message) for message in messages_of_the_extension()}
-    missing = [
-        message for message, parts in found.items() if parts and max(parts, key=len).strip(" .") not in page
-    ]
-    assert len(found) > 50 and not missing
+    filled, found = messages.filled(page), messages.of_the_extension()
+    explained = sum(messages.stands_in(message, page) for message in found)
+    assert len(found) > 130 and 40 < explained < len(found)
+    assert not [message for message in found if not messages.stands_in(message, filled)]
+    assert filled.count("\n- `") == page.count("\n- `") + len(found) - explained
 
 
 def test_the_tables_of_options_are_filled():
