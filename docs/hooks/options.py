@@ -2,24 +2,31 @@
 """Tables of options, written while the site is built from the one table that everything else comes from.
 
 A page says where: `<!-- settings: deform -->` for what Blender's panel shows of an operation,
+`<!-- shown: contact/properties.py -->` for what it shows of the add-on's own settings in that file,
 `<!-- flags: fit -->` for the command line's flags.
 """
 
+import ast
 import importlib.util
 import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-MARK = re.compile(r"<!-- (settings|flags): (\w+) -->")
+ADDON = ROOT / "addon"
+MARK = re.compile(r"<!-- (settings|flags|shown): ([\w/]+)(?:\.py)? -->")
 
 
 def resolved(path=None):
     """The table native/options/options.toml, or another like it."""
-    place = ROOT / "native" / "options" / "table.py"
-    spec = importlib.util.spec_from_file_location("arapfields_options_table", place)
+    module = loaded(ROOT / "native" / "options" / "table.py")
+    return module.resolved(path or module.TABLE)
+
+
+def loaded(place):
+    spec = importlib.util.spec_from_file_location(f"arapfields_{place.stem}", place)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    return module.resolved(path or module.TABLE)
+    return module
 
 
 def on_page_markdown(markdown, **_):
@@ -28,7 +35,11 @@ def on_page_markdown(markdown, **_):
 
 def filled(markdown, table):
     makers = {"settings": settings, "flags": flags}
-    return MARK.sub(lambda found: makers[found[1]](table[found[2]]), markdown)
+
+    def made(found):
+        return shown(found[2]) if found[1] == "shown" else makers[found[1]](table[found[2]])
+
+    return MARK.sub(made, markdown)
 
 
 def settings(block):
@@ -38,7 +49,9 @@ def settings(block):
     for name in (*block["panel"], *block["advanced"]):
         option = options[name]
         shown = f"*{option['label']}*" if name in block["advanced"] else option["label"]
-        rows.append(row(shown, f"`{name}`", *facts(option)))
+        default, allowed, effect = facts(option)
+        effect += f" *{option['zero'][0]}* stands for 0." if option["zero"] else ""
+        rows.append(row(shown, f"`{name}`", default, allowed, effect))
     return "\n".join(rows)
 
 
@@ -48,6 +61,65 @@ def flags(block):
     for option in (*block["options"], *block["further"]):
         rows.append(row(f"`--{option['name'].replace('_', '-')}`", *facts(option)))
     return "\n".join(rows)
+
+
+def shown(file):
+    """What the panel shows of the settings that a file of the add-on declares."""
+    tree = ast.parse((ADDON / f"{file}.py").read_text(encoding="utf-8"))
+    drawn = "".join(
+        path.read_text(encoding="utf-8")
+        for kind in ("panel", "tool", "preferences")
+        for path in ADDON.rglob(f"{kind}.py")
+    )
+    choices, names, rows = loaded(ADDON / "core" / "settings" / "choices.py"), {}, {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef) and isinstance(node.body[-1], ast.Return):
+            names[node.name] = node.body[-1].value
+        elif isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+            names[node.targets[0].id] = node.value
+    for name, call in declarations(tree):
+        label, effect = words(call, names, choices)
+        if (
+            effect
+            and f'"{name}"' in drawn
+            and not name.startswith("active_")
+            and "HIDDEN" not in ast.dump(call)
+        ):
+            rows.setdefault(name, row(label, f"`{name}`", f"{effect}."))
+    return "\n".join(["| setting | in scripts | effect |", "|---|---|---|", *rows.values()])
+
+
+def declarations(tree):
+    """(name, call) of what may declare a property: annotations, entries of dicts, arguments, constants."""
+    for node in ast.walk(tree):
+        pairs = []
+        if isinstance(node, ast.AnnAssign):
+            pairs = [(getattr(node.target, "id", None), node.annotation)]
+        elif isinstance(node, ast.Assign):
+            pairs = [(getattr(node.targets[0], "id", None), node.value)]
+        elif isinstance(node, ast.Dict):
+            pairs = [
+                (getattr(key, "value", None), value)
+                for key, value in zip(node.keys, node.values, strict=True)
+            ]
+        elif isinstance(node, ast.keyword):
+            pairs = [(node.arg, node.value)]
+        yield from ((name, call) for name, call in pairs if name and isinstance(call, ast.Call))
+
+
+def words(call, names, choices):
+    """(label, effect) of a property's declaration, its choices included; empty where it is none."""
+    if len(call.args) < 2 and isinstance(names.get(getattr(call.func, "id", "")), ast.Call):
+        call = names[call.func.id]  # a function of the same file that makes it
+    if not call.args or getattr(call.args[0], "id", "").startswith("ARAPFIELDS"):
+        return "", ""
+    given = [names.get(getattr(each, "id", ""), each) for each in call.args]
+    texts = [each.value for each in given if isinstance(each, ast.Constant) and isinstance(each.value, str)]
+    label, effect = texts[:2] if len(texts) > 1 else ("", "")
+    items = [item for each in call.args for item in getattr(choices, getattr(each, "id", ""), ())]
+    for number, (key, *rest) in enumerate(items):
+        effect += f"{';' if number else ':'} *{rest[0]}* (`{key}`), {lower(rest[1])}"
+    return label, effect
 
 
 def facts(option):

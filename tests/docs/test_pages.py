@@ -85,6 +85,23 @@ def test_the_tables_of_options_are_filled():
     assert sum(text.count("| flag | default |") for text in filled) > 5
 
 
+def test_a_search_finds_each_setting_by_its_label_in_blender():
+    sys.path.insert(0, str(pages.ROOT / "docs" / "hooks"))
+    import options
+
+    table, labels = options.resolved(), set()
+    guide = "".join(
+        options.filled(page.read_text(), table) for page in pages.PAGES if page.parent.name == "guide"
+    )
+    for block in table.values():
+        labels |= {o["label"] for o in (*block["options"], *block["further"]) if o["name"] in block["panel"]}
+    for path in pages.ROOT.glob("addon/**/*.py"):
+        if "propert" in path.stem or path.parent.name == "properties" or path.stem == "preferences":
+            file = str(path.relative_to(pages.ROOT / "addon").with_suffix(""))
+            labels |= {line.split(" | ")[0].strip("| ") for line in options.shown(file).splitlines()[2:]}
+    assert len(labels) > 60 and not [label for label in labels if label not in guide]
+
+
 def test_the_diagram_is_that_of_the_code():
     sys.path.insert(0, str(pages.ROOT / "docs" / "hooks"))
     import diagram
