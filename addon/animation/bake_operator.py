@@ -3,11 +3,11 @@
 
 import contextlib
 
-from ..blender import splat_layouts
 from ..blender.host import has_window
 from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..blender.property_definitions import effective_value, flag
+from ..blender.splat_layouts import holds_splats
 from ..core.errors import UserError
 from ..handles import empties
 from ..jobs.job_operator import JobOperator, with_progress
@@ -120,6 +120,9 @@ def effective_kind(source, operator=None):
 
 def refusal_of(source, kind):
     """Why there is nothing to bake of a source, as a UserError; None where there is."""
-    if splat_layouts.layout_of(source.data) is not None:
-        return UserError("{name} holds splats; they are not baked, but rendered live", source)
+    if holds_splats(source):
+        return UserError(
+            "{name} holds splats; render them live, or write a PLY a frame by arapfields animate",
+            source,
+        )
     return empties.require_handles(source) if kind == "DEFORM" else style_settings.refusal(source)

@@ -5,6 +5,7 @@ from ..blender import modifier_stack
 from ..blender.language import translated
 from ..blender.object_references import owner_of
 from ..blender.source_operator import SourceOperator
+from ..blender.splat_layouts import holds_splats
 from ..carried import carried_objects
 from ..core.errors import UserError
 from ..field_modifier import inputs
@@ -55,6 +56,8 @@ def require_free(source, item):
         raise UserError("{name} is linked from another file; make it local to carry it", item)
     if not hasattr(item.data, "attributes") and item.type not in ("CURVE", "FONT", "SURFACE"):
         raise UserError("{name} has no geometry that nodes could move", item)
+    if holds_splats(item):
+        raise UserError("{name} holds splats, which only handles of its own turn as well", item)
     if carried_objects.find(source, item) is not None:
         raise UserError("{name} moves with {other} already", item, other=source.name)
 

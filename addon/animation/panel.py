@@ -3,6 +3,7 @@ import bpy
 
 from ..blender import modifier_stack
 from ..blender.language import translated
+from ..blender.point_data import points_of
 from ..blender.section import Section, draw_settings, job_button, modifier_row, note, wrapped
 from ..names import Op
 from ..solver import frame_range
@@ -37,7 +38,7 @@ def weight(context, source, bake):
     """What the frames would weigh, as far as it is known before they are read."""
     first, last = (bake.start, bake.end) if bake.range == "CUSTOM" else frame_range.scene_range(context.scene)
     count = max(0, (last - first) * bake.subframes // bake.step + 1)
-    size = caches.size_text(caches.keys_weight(len(source.data.vertices), count - 1))
+    size = caches.size_text(caches.keys_weight(len(points_of(source.data)), count - 1))
     if bake.range == "HANDLES":
         return translated("{size} for the scene's frames", size=size)
     return translated("{count} samples, {size}", count=count, size=size)

@@ -8,6 +8,7 @@ import bpy
 
 from ..blender import mesh_arrays, modifier_stack
 from ..blender.object_references import settings_of
+from ..blender.point_data import points_of
 from ..core.errors import UserError
 from ..core.runtime import native
 
@@ -41,7 +42,7 @@ def problem(source, look_closely=False):
             source,
             path=path,
         )
-    if record.get("count") not in (None, len(source.data.vertices)):
+    if record.get("count") not in (None, len(points_of(source.data))):
         return changed(source)
     return closely(source, path, record) if look_closely else None
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..core.errors import UserError, refuse
 from . import modifier_stack, splat_layouts
+from .point_data import face_count, points_of
 
 
 @dataclass(frozen=True)
@@ -34,21 +35,23 @@ def put_vectors(elements, values, name="vector"):
 
 
 def position_vectors(mesh):
-    """The collection that holds a mesh's positions, and their name in it."""
+    """The collection that holds the positions of a mesh or point cloud, and their name in it."""
     attribute = mesh.attributes.get("position")
-    return (mesh.vertices, "co") if attribute is None else (attribute.data, "vector")
+    return (points_of(mesh), "co") if attribute is None else (attribute.data, "vector")
 
 
 def positions(mesh):
-    """(n, 3) vertex positions of a mesh, as float64."""
+    """(n, 3) positions of a mesh's vertices or a point cloud's points, as float64."""
     return vectors(*position_vectors(mesh)).astype(np.float64)
 
 
 def fingerprint(mesh):
     """Equal for a mesh whose own vertices and faces are where they were; modifiers and shape keys aside."""
     digest = hashlib.blake2b(positions(mesh).tobytes(), digest_size=16)
-    digest.update(corner_vertices(mesh).tobytes())
-    return digest.digest(), len(mesh.polygons)
+    faces = face_count(mesh)
+    if faces:
+        digest.update(corner_vertices(mesh).tobytes())
+    return digest.digest(), faces
 
 
 def set_positions(mesh, points):
@@ -78,7 +81,7 @@ def triangles_of(mesh, face):
 
 def triangles(mesh):
     """(m, 3) corners of the mesh's triangles, its larger faces split as Blender draws them."""
-    if not len(mesh.loops):  # nor is there an attribute of corners then
+    if not face_count(mesh):  # nor is there an attribute of corners then
         return np.empty((0, 3), dtype=np.int32)
     mesh.calc_loop_triangles()
     corners = corner_vertices(mesh)
@@ -99,7 +102,7 @@ def refusal(source):
 def nothing_in_splats(name, mesh):
     """The UserError for a mesh without vertices, and for one that has neither faces nor splats."""
     is_splats = splat_layouts.layout_of(mesh) is not None
-    return nothing_in(name, len(mesh.vertices), is_splats or len(mesh.polygons))
+    return nothing_in(name, len(points_of(mesh)), is_splats or face_count(mesh))
 
 
 def nothing_in(name, vertices, faces):

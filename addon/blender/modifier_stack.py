@@ -10,9 +10,9 @@ import bpy
 
 from ..core.errors import UserError
 from ..names import FIELD_GROUP
-from . import splat_layouts
 from .evaluation import updated
 from .object_references import settings_of
+from .splat_layouts import holds_splats
 
 STAGE = "arapfields_stage"  # custom property of the scene that holds the copy
 FREE_NORMALS = "custom_normal"  # attribute of custom normals; free ones are vectors, Blender 4.5 and later
@@ -52,7 +52,7 @@ def place(source):
     own = next((index for index, one in enumerate(stack) if is_field(one) or is_cache(one)), None)
     if own is not None:
         return own
-    if splat_layouts.layout_of(source.data) is not None:  # what comes after draws them
+    if holds_splats(source):  # what comes after draws them
         return 0
     if settings_of(source).under_rig:
         return next((index for index, one in enumerate(stack) if is_posing(source, one)), len(stack))
@@ -167,8 +167,11 @@ def moved_mesh(context, source):
 
 @contextmanager
 def mesh_of(context, source, kept):
-    """The mesh as these of its modifiers make it, for as long as the block runs."""
+    """The mesh or point cloud as these of its modifiers make it, for as long as the block runs."""
     with evaluated(context, source, kept) as (item, depsgraph):
+        if source.type == "POINTCLOUD":
+            yield item.data
+            return
         mesh = item.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
         if mesh is None:
             raise UserError("{name}: Blender gives no mesh for it", source)

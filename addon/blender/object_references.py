@@ -5,6 +5,7 @@ import bpy
 
 from ..core.errors import UserError
 from ..names import PROPERTY
+from .splat_layouts import holds_splats
 
 
 class ObjectReference:
@@ -61,31 +62,36 @@ def lists(source, item):
     return any(entry.item == item for entry in settings_of(source).results)
 
 
-def source_of(context):
-    """The mesh object that the panel and the operators work on, or None.
+def is_source(item):
+    """Whether an object is of a kind that is worked on: a mesh, or a point cloud of splats."""
+    return item.type == "MESH" or holds_splats(item)
 
-    The active object when it is a mesh; the owner of the active handle or result.
+
+def source_of(context):
+    """The object that the panel and the operators work on, or None.
+
+    The active object when it is a source; the owner of the active handle or result.
     """
     active = context.view_layer.objects.active if context.view_layer else None
     if active is None:
         return None
     owner = owner_of(active)
     if active.type == "EMPTY" and owner is None:
-        meshes = [item for item in context.selected_objects if item.type == "MESH"]
-        return meshes[0] if len(meshes) == 1 else None
+        chosen = [item for item in context.selected_objects if is_source(item)]
+        return chosen[0] if len(chosen) == 1 else None
     if active.type == "ARMATURE":
         return posed_by(active, context)
-    if active.type not in ("EMPTY", "MESH"):
+    if active.type != "EMPTY" and not is_source(active):
         return None
     return owner or active
 
 
 def posed_by(rig, context):
     """The mesh object that an armature stands for: the one selected with it, else the first that it moves."""
-    selected = [item for item in context.selected_objects if item.type == "MESH"]
+    selected = [item for item in context.selected_objects if is_source(item)]
     if selected:
         return selected[0] if len(selected) == 1 else None
-    meshes = [item for item in context.view_layer.objects if item.type == "MESH"]
+    meshes = [item for item in context.view_layer.objects if is_source(item)]
     held = [item for item in meshes if any(entry.rig == rig for entry in settings_of(item).handles)]
     posed = [m for m in meshes if any(s.type == "ARMATURE" and s.object == rig for s in m.modifiers)]
     return next(iter(held), posed[0] if len(posed) == 1 else None)
@@ -95,7 +101,7 @@ def refusal(item, in_edit_mode=False):
     """Why an object cannot be worked on, as a UserError; None where it can."""
     if item is None:
         return UserError("Select a mesh object")
-    if item.type != "MESH":
+    if not is_source(item):
         return UserError("{name} is not a mesh object", item)
     if item.override_library is not None:
         return UserError("{name} is a library override; make it local first", item)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Gaussian splats as importers leave them: meshes of points alone, with these attributes on them."""
+"""Gaussian splats as importers leave them: point clouds, or meshes of points alone, with these attributes."""
 
 import numpy as np
 
 from ..core.errors import UserError
 from ..names import CHANGES
+from .point_data import face_count
 
 FLOAT, VECTOR, COLOR, QUATERNION, FLOAT4 = "FLOAT", "FLOAT_VECTOR", "FLOAT_COLOR", "QUATERNION", "FLOAT4"
 # How many numbers elements of attributes have, and the property that has them.
@@ -115,10 +116,15 @@ LAYOUTS = (FileLayout(), VectorLayout(), OwnLayout())
 
 
 def layout_of(mesh):
-    """The layout of a mesh that holds splats, or None."""
-    if len(mesh.polygons):
+    """The layout of a mesh or point cloud that holds splats, or None."""
+    if face_count(mesh):
         return None
     return next((layout for layout in LAYOUTS if layout.mark in mesh.attributes), None)
+
+
+def holds_splats(item):
+    """Whether an object is a mesh or a point cloud of splats."""
+    return item.type in ("MESH", "POINTCLOUD") and layout_of(item.data) is not None
 
 
 def columns_of(mesh):

@@ -3,6 +3,7 @@
 
 from ..blender.modifier_stack import handle_rigs
 from ..blender.object_references import in_scene, settings_of
+from ..blender.splat_layouts import holds_splats
 from ..core.errors import UserError
 from .world_matrices import constrained_to
 
@@ -34,6 +35,8 @@ def of_item(source, item):
     settings = settings_of(item)
     if len(settings.handles):
         return UserError("{name} has handles of its own; it is not carried", item)
+    if holds_splats(item):
+        return UserError("{name} holds splats, which only handles of its own turn as well", item)
     if settings.handle_of == source and any(e.empty == item for e in settings_of(source).handles):
         return UserError("{name} is a handle of {source} itself", item, source=source.name)
     rigs = handle_rigs(source)

@@ -6,6 +6,7 @@ import sys
 import bpy
 
 from ..animation.object_bake import kind_of
+from ..blender.object_references import is_source
 from ..core.errors import UserError
 from ..core.runtime import jobs
 from ..handles import empties
@@ -59,7 +60,7 @@ def run_bake(options, _):
 
 def animated(options):
     """Every object with handles, or with a style that has keyframes."""
-    meshes = [item for item in bpy.context.view_layer.objects if item.type == "MESH"]
+    meshes = [item for item in bpy.context.view_layer.objects if is_source(item)]
     meshes = [item for item in meshes if empties.used(item) or kind_of(item, "AUTO") == "STYLIZE"]
     if not meshes:
         raise UserError(f"{options.input}: no object has handles, or a style with keyframes")

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import bpy
 
+from ..blender.object_references import is_source
 from ..core.errors import UserError
 from .export_check import is_whole
 from .parser import FORMATS
@@ -65,7 +66,7 @@ def read(path):
     except RuntimeError as error:
         reason = str(error).removeprefix("Error: ").strip()
         raise UserError(f"{path}: Blender cannot read it ({reason})") from error
-    if not any(item.type == "MESH" for item in bpy.data.objects):
+    if not any(is_source(item) for item in bpy.data.objects):
         raise UserError(f"{path}: holds no mesh, or is damaged")
 
 

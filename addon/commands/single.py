@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..blender.object_references import settings_of
+from ..blender.object_references import is_source, settings_of
 from ..core.errors import UserError
 from ..core.runtime import jobs, native
 from ..core.runtime.threads import start_thread
@@ -60,7 +60,7 @@ def run_single(options, _):
 
 def objects_to_solve(options):
     """The objects to work on."""
-    meshes = [item for item in bpy.context.view_layer.objects if item.type == "MESH"]
+    meshes = [item for item in bpy.context.view_layer.objects if is_source(item)]
     meshes = [item for item in meshes if not settings_of(item).made_from]
     if options.objects:
         by_name = {item.name: item for item in meshes}

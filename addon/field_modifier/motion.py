@@ -12,6 +12,7 @@ import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack, splat_layouts
 from ..blender.object_references import settings_of
+from ..blender.point_data import points_of
 from ..blender.removal import remove_mesh_object, remove_node_modifier
 from ..core.errors import UserError
 from ..names import FIELD_MODIFIER, HELPER_SUFFIX, OFFSETS, TURNS
@@ -46,7 +47,7 @@ def bind(context, source):
     copied = None
     cache_modifier.suspend(source)
     with modifier_stack.evaluated_mesh(context, source, in_place=True) as mesh:
-        normals, count = modifier_stack.free_normals(mesh), len(mesh.vertices)
+        normals, count = modifier_stack.free_normals(mesh), len(points_of(mesh))
         splats = splat_layouts.columns_of(mesh)
     on_mesh = lies_on_mesh(source)
     if splats and not on_mesh:
@@ -63,7 +64,7 @@ def bind(context, source):
     else:
         take_helper(source, modifier, copied)
     mesh = carrier(source, modifier)
-    if len(mesh.vertices) != count:
+    if len(points_of(mesh)) != count:
         raise UserError("{name} changed while it was worked on; run again", source)
     return modifier
 
@@ -108,7 +109,7 @@ def take_helper(source, modifier, mesh):
     if helper is None or users_of(helper) > 1 or helper.library is not None:  # a copied object shares it
         inputs.put(modifier, "Offsets", bpy.data.objects.new(mesh.name, mesh))
         return
-    old, count = helper.data, len(mesh.vertices)
+    old, count = helper.data, len(points_of(mesh))
     motion = read_from(old)
     helper.data = mesh
     bpy.data.meshes.remove(old)
@@ -146,7 +147,7 @@ def write(source, motion):
         raise UserError("The modifier of {name} was removed", source)
     written.add(source.session_uid)
     mesh = carrier(source, modifier)
-    if len(mesh.vertices) != len(motion.offsets):
+    if len(points_of(mesh)) != len(motion.offsets):
         raise UserError("{name} changed while it was worked on; run again", source)
     write_to(mesh, motion)
 
@@ -172,6 +173,14 @@ def read_from(mesh):
     return Motion(*(vectors(mesh, name) for name in (OFFSETS, TURNS)), splat_layouts.changes_of(mesh))
 
 
+def shown_points(source):
+    """(n, 3) the points of an object's own data, with its offsets where the field is on; single precision."""
+    points = mesh_arrays.vectors(*mesh_arrays.position_vectors(source.data))
+    modifier = modifier_stack.find(source)
+    offsets = vectors(source.data, OFFSETS) if modifier is not None and modifier.show_viewport else None
+    return points if offsets is None else points + offsets
+
+
 def vectors(mesh, name):
     attribute = mesh.attributes.get(name)
     if attribute is None or attribute.data_type != "FLOAT_VECTOR" or attribute.domain != "POINT":
@@ -192,7 +201,7 @@ def restore(source, motion):
         remove(source)
     elif modifier is not None:
         mesh = carrier(source, modifier)
-        fits = motion.offsets is not None and len(motion.offsets) == len(mesh.vertices)
+        fits = motion.offsets is not None and len(motion.offsets) == len(points_of(mesh))
         write_to(mesh, motion if fits else Motion(None))
 
 

@@ -7,6 +7,7 @@ from mathutils import Matrix, Vector
 
 from ..blender import mesh_arrays, modifier_stack, vertex_groups
 from ..blender.object_references import in_scene, settings_of
+from ..blender.point_data import selection_of
 from ..blender.property_definitions import from_single_precision
 from ..blender.selection import choose_row
 from ..core.errors import UserError, refuse
@@ -162,7 +163,7 @@ def can_place(source, kind, place):
     """Whether the source has what such a handle is made around, as far as that is known at once."""
     if source is None or (kind == "GROUP" and not source.vertex_groups):
         return False
-    return place != "SELECTION" or source.mode != "EDIT" or source.data.total_vert_sel > 0
+    return place != "SELECTION" or source.mode != "EDIT" or getattr(source.data, "total_vert_sel", 1) > 0
 
 
 def new_empty(context, source, kind, group, place):
@@ -189,8 +190,7 @@ def selection_box(source, size):
     if source.mode == "EDIT":
         source.update_from_editmode()
     mesh = source.data
-    chosen = np.empty(len(mesh.vertices), dtype=bool)
-    mesh.vertices.foreach_get("select", chosen)
+    chosen = selection_of(mesh)
     if not chosen.any():
         raise UserError("{name} has no selected vertices", source)
     points = mesh_arrays.positions(mesh)[chosen]

@@ -9,6 +9,7 @@ import bpy
 from ..blender import mesh_arrays, timers, vertex_groups
 from ..blender.host import has_window
 from ..blender.object_references import ObjectReference, settings_of
+from ..blender.point_data import points_of
 from ..blender.redraw import redraw
 from ..core.errors import UserError
 from ..core.geometry.handles import Handle
@@ -27,7 +28,7 @@ pending = {}  # session_uid of the source → the coroutine that counts
 def count_inside(context, source):
     """Stores each handle's count with it."""
     coroutine = counting(context, source)
-    if not has_window() or len(source.data.vertices) < LARGE:
+    if not has_window() or len(points_of(source.data)) < LARGE:
         run_to_completion(coroutine)
         return
     for entry in empties.used(source):

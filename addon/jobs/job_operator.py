@@ -6,7 +6,7 @@ import types
 from ..blender import mesh_arrays, vertex_groups
 from ..blender.guide import Guided
 from ..blender.language import translated
-from ..blender.object_references import ObjectReference, owner_of, refusal, source_of
+from ..blender.object_references import ObjectReference, is_source, owner_of, refusal, source_of
 from ..blender.property_definitions import choice
 from ..core.errors import UserError
 from ..core.runtime import jobs, native
@@ -47,8 +47,7 @@ class JobOperator(ModalRun, Guided):
         within = context.selected_objects
         if self.scope == "COLLECTION":
             within = [item for home in active.users_collection for item in home.all_objects]
-        meshes = [item for item in within if item.type == "MESH"]
-        owners = dict.fromkeys(owner_of(item) or item for item in meshes)
+        owners = dict.fromkeys(owner_of(item) or item for item in within if is_source(item))
         refusals = {item: refusal(item) for item in owners}
         self.failures += [translated(reason) for reason in refusals.values() if reason]
         return [item for item, reason in refusals.items() if not reason]

@@ -4,6 +4,7 @@ import bpy
 from ..blender import modifier_stack
 from ..blender.language import translated
 from ..blender.object_references import settings_of, source_of
+from ..blender.point_data import shape_keys_of
 from ..blender.section import Section, progress_row, wrapped
 from ..core.runtime import jobs
 
@@ -32,7 +33,7 @@ def remarks(source):
         yield translated("Read with its modifiers applied ({count})", count=len(shown))
     if after:
         yield translated("Read before {names}", names=", ".join(after))
-    if source.data.shape_keys:
+    if shape_keys_of(source.data):
         yield translated("Read with its shape keys as they are set")
 
 

@@ -36,7 +36,7 @@ class Updates(NamedTuple):
         shapes = [update.id.original for update in depsgraph.updates if update.is_updated_geometry]
         return cls(
             items,
-            {item.session_uid for item in shapes if isinstance(item, bpy.types.Mesh)},
+            {item.session_uid for item in shapes if isinstance(item, bpy.types.Mesh | bpy.types.PointCloud)},
             {item.session_uid for item in shapes if isinstance(item, bpy.types.Object)},
             {item.session_uid for item in items if not isinstance(item, bpy.types.Object)},
         )

@@ -5,6 +5,7 @@ import numpy as np
 
 from ..blender.host import has_window
 from ..blender.object_references import settings_of
+from ..blender.point_data import points_of
 from ..blender.user_preferences import machine_options
 from ..core.errors import UserError
 from ..core.runtime.threads import start_thread
@@ -25,7 +26,7 @@ class SolverPrefetch:
     def prepare(self, context, source):
         """Sets a solver up for deforming the source in place, on a thread; main thread."""
         settings = settings_of(source)
-        if self._uid == source.session_uid or len(source.data.vertices) > LARGEST:
+        if self._uid == source.session_uid or len(points_of(source.data)) > LARGEST:
             return
         if not placement.in_place(settings.output, settings.result):
             return

@@ -9,6 +9,7 @@ import hashlib
 
 from ..blender import modifier_stack
 from ..blender.object_references import settings_of
+from ..blender.point_data import points_of
 from ..field_modifier import motion
 from ..field_nodes import helper
 from ..names import SHAPE_OF
@@ -89,7 +90,7 @@ def recall(source, pose):
         shape, modifier = shapes.get(key), modifier_stack.find(source)
         if shape is None or modifier is None:
             return False
-        count = len(motion.carrier(source, modifier).vertices)
+        count = len(points_of(motion.carrier(source, modifier)))
         if settings_of(source).carried or (shape.offsets is not None and len(shape.offsets) != count):
             return False
         motion.restore(source, shape)

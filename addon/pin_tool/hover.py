@@ -8,11 +8,14 @@ from bpy_extras import view3d_utils
 
 from ..blender import mesh_arrays
 from ..blender.object_references import ObjectReference
+from ..blender.splat_layouts import holds_splats
 from ..core.geometry.spaces import inverse, transform
+from ..field_modifier import motion
 from ..handles.empties import matrix_of
 from . import pins, screen
 
 REACH = 14  # pixels within which a handle is met, at a scale of 1
+SPLAT_REACH = 6  # pixels within which a splat is met, at a scale of 1
 RING, RING_REACH = (
     46,
     7,
@@ -21,7 +24,7 @@ RING, RING_REACH = (
 
 @dataclass(frozen=True)
 class Target:
-    """`kind` is HANDLE, RING, SURFACE, or REFUSED for a mesh that cannot be pinned."""
+    """`kind` is HANDLE, RING, SURFACE, or REFUSED for an object that cannot be pinned."""
 
     kind: str
     source: ObjectReference
@@ -105,7 +108,10 @@ def surface(context, view, lights):
     """The Target of the first surface along the line of sight; None where that is no mesh to pin."""
     depsgraph = context.evaluated_depsgraph_get()
     met, location, normal, face, item, matrix = context.scene.ray_cast(depsgraph, *view.ray())
-    if not met or not pins.is_mesh(item.original) or matrix != item.original.matrix_world:
+    splat = splat_under(context, view)
+    if splat is not None and (not met or (splat.location - np.array(location)) @ view.towards > 0):
+        return splat
+    if not met or not pins.is_own(item.original) or matrix != item.original.matrix_world:
         return None
     source, location = item.original, np.array(location)
     if pins.refusal(source) is not None:
@@ -122,6 +128,35 @@ def surface(context, view, lights):
         face_count=len(mesh.polygons),
         lit=lit(mesh, matrix_of(source), location, radius) if lights else None,
     )
+
+
+def splat_under(context, view):
+    """The Target of the splat under the cursor that is nearest to the viewer, or None."""
+    best, towards = None, np.array(view.towards)
+    for source in context.visible_objects:
+        if not holds_splats(source) or not pins.is_own(source):
+            continue
+        points, world = motion.shown_points(source), matrix_of(source)
+        index = screen.foremost(
+            view.perspective @ world,
+            view.size,
+            points,
+            towards @ world[:3, :3],
+            view.pixel,
+            SPLAT_REACH * view.scale,
+        )
+        location = None if index < 0 else transform(world, points[index : index + 1])[0]
+        if location is None or (best is not None and (location - best[1]) @ towards <= 0):
+            continue
+        best = source, location
+    if best is None:
+        return None
+    source, location = best
+    if pins.refusal(source) is not None:
+        return Target("REFUSED", ObjectReference(source), location=location)
+    radius = context.scene.arapfields.pin_radius * screen.pixel_size(view.perspective, view.size, location)
+    where = {"location": location, "normal": towards, "radius": radius, "lit": np.empty((0, 3, 3))}
+    return Target("SURFACE", ObjectReference(source), **where)
 
 
 def lit(mesh, world, location, radius):

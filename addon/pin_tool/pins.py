@@ -39,16 +39,16 @@ def refusal(item):
     return error
 
 
-def is_mesh(item):
-    """Whether it is a mesh of the user's own, no result of ours."""
-    return item is not None and item.type == "MESH" and owner_of(item) is None
+def is_own(item):
+    """Whether it is a source of the user's own, no result of ours."""
+    return object_references.is_source(item) and owner_of(item) is None
 
 
 def handles_in_view(context):
     """[(source, entry)] of all handles that are seen."""
     handles = []
     for source in context.view_layer.objects:
-        if source.type == "MESH" and settings_of(source).handles:
+        if settings_of(source).handles and object_references.is_source(source):
             entries = [entry for entry in empties.used(source) if entry.kind != "BONE"]
             handles += [(source, entry) for entry in entries if entry.empty.visible_get()]
     return handles

@@ -10,7 +10,7 @@ import numpy as np
 from mathutils import Vector
 from mathutils.geometry import barycentric_transform, closest_point_on_tri
 
-from ..blender import mesh_arrays, modifier_stack
+from ..blender import mesh_arrays, modifier_stack, point_data
 from ..core.geometry.rotations import best_rotation
 from ..core.geometry.spaces import transform
 from ..handles.empties import matrix_of
@@ -29,7 +29,7 @@ class Place:
 
 
 def find(context, source, location, radius, face=None, face_count=None):
-    """The Place at a location on the shown surface, (3,) in world space.
+    """The Place at a location on the shown surface, or of the splat nearest to it, (3,) in world space.
 
     `face` is that of the shown mesh, which has `face_count` of them: where the mesh before the field has as
     many, the place is looked for in that face alone.
@@ -37,16 +37,18 @@ def find(context, source, location, radius, face=None, face_count=None):
     world = matrix_of(source)
     with modifier_stack.moved_mesh(context, source) as mesh:
         now = transform(world, mesh_arrays.positions(mesh))
-        known = face is not None and face_count == len(mesh.polygons)
         rest = now
         if modifier_stack.find(source) is not None:
             with modifier_stack.evaluated_mesh(context, source, in_place=True) as still:
                 rest = transform(world, mesh_arrays.positions(still))
-        if known:
-            chosen = mesh_arrays.triangles_of(mesh, face)
+        faces = point_data.face_count(mesh)
+        if not faces:
+            nearest = int(((now - location) ** 2).sum(axis=1).argmin())
+            at_rest, moved = rest[nearest], now[nearest]
         else:
-            chosen = near(now, mesh_arrays.triangles(mesh), location)
-        at_rest, moved = map_back(now, rest, chosen, location)
+            known = face is not None and face_count == faces
+            chosen = mesh_arrays.triangles_of(mesh, face) if known else mesh_arrays.triangles(mesh)
+            at_rest, moved = map_back(now, rest, chosen if known else near(now, chosen, location), location)
         about = around(rest, at_rest, radius)
         weights = group_weights(source, mesh, about)
     size = float(np.linalg.norm(np.ptp(rest, axis=0)) / np.cbrt(abs(np.linalg.det(world[:3, :3])) or 1.0))

@@ -33,6 +33,19 @@ def nearest(places, pixel, reach):
     return best if away[best] <= reach else -1
 
 
+def foremost(perspective, size, points, towards, pixel, reach):
+    """Index of the point nearest to the viewer of those within `reach` of a pixel, or -1.
+
+    `perspective` is from the points' space to clip space, `towards` (3,) the way to the viewer in the former.
+    """
+    rows, size = np.asarray(perspective, dtype=np.float32)[[0, 1, 3]], np.asarray(size, dtype=np.float32)
+    clip = points @ rows[:, :3].T + rows[:, 3]
+    depth = clip[:, 2:]
+    away = (clip[:, :2] - depth * (2 * np.asarray(pixel, dtype=np.float32) / size - 1)) * (size / 2)
+    met = np.flatnonzero(((away**2).sum(axis=1) <= (reach * depth[:, 0]) ** 2) & (depth[:, 0] > 0))
+    return int(met[(points[met] @ towards).argmax()]) if len(met) else -1
+
+
 def turn_between(center, before, after):
     """The angle (radians, counter-clockwise, -π to π) about a pixel from one pixel to another."""
     a, b = np.subtract(before, center), np.subtract(after, center)

@@ -3,10 +3,11 @@
 
 import numpy as np
 
-from ..blender import modifier_stack, splat_layouts
+from ..blender import modifier_stack
 from ..blender.evaluation import depsgraph_of
 from ..blender.mesh_arrays import positions
 from ..blender.object_references import settings_of
+from ..blender.splat_layouts import holds_splats
 from ..carried.carrying import Carrying
 from ..carried.world_matrices import array
 from ..core.errors import UserError
@@ -37,7 +38,7 @@ def apply(context, source, pose, strength):
     reason = motion.refusal(source)
     if reason is None and settings_of(source).live_kind:
         reason = UserError("{name} is live; end live mode first", source)
-    if reason is None and splat_layouts.layout_of(source.data) is not None:
+    if reason is None and holds_splats(source):
         reason = UserError("{name} holds splats; poses are not applied to them", source)
     if reason is not None:
         raise reason

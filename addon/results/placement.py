@@ -8,9 +8,10 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..blender import mesh_arrays, modifier_stack, splat_layouts
+from ..blender import mesh_arrays, modifier_stack
 from ..blender.object_references import settings_of
 from ..blender.property_definitions import effective_value
+from ..blender.splat_layouts import holds_splats
 from ..core.errors import UserError, refuse
 from ..core.geometry.edges import Topology
 from ..core.geometry.spaces import space_of
@@ -128,7 +129,7 @@ def new_object(context, source, kind, output, moved, before):
 
 def refusal(source, output, result):
     """Why the source itself cannot take the result, as a UserError; None where it can."""
-    if not keeps_mesh(output, result) and splat_layouts.layout_of(source.data) is not None:
+    if not keeps_mesh(output, result) and holds_splats(source):
         return UserError(
             "{name} holds splats; choose Original Mesh as geometry, Modifier for the result", source
         )

@@ -8,6 +8,7 @@ import numpy as np
 from ..blender import mesh_arrays, modifier_stack, user_preferences, vertex_groups
 from ..blender.evaluation import depsgraph_of
 from ..blender.object_references import ObjectReference, settings_of
+from ..blender.point_data import shape_keys_of
 from ..blender.property_definitions import from_single_precision
 from ..carried.carrying import Carrying, Reshaped
 from ..core.errors import UserError
@@ -135,4 +136,4 @@ def uses_handles(settings, kind):
 
 def has_motion_before(source):
     """Whether the points at the field's place may move without an edit of the mesh."""
-    return bool(modifier_stack.shown_before(source, in_place=True)) or source.data.shape_keys is not None
+    return bool(modifier_stack.shown_before(source, in_place=True) or shape_keys_of(source.data))

@@ -5,6 +5,7 @@ import bpy
 
 from ..blender import mesh_arrays, object_references
 from ..blender.language import translated
+from ..blender.point_data import face_count, points_of
 from ..blender.section import Advanced, Section, draw_settings, job_button, presets, settings_column, wrapped
 from ..blender.user_preferences import fit_cache
 from ..core.runtime import native
@@ -31,7 +32,7 @@ class ARAPFIELDS_PT_source(Section, bpy.types.Panel):
             layout.label(text="Select a mesh object", icon="INFO")
             return
         mesh = source.data
-        counts = {"vertices": f"{len(mesh.vertices):,}", "faces": f"{len(mesh.polygons):,}"}
+        counts = {"vertices": f"{len(points_of(mesh)):,}", "faces": f"{face_count(mesh):,}"}
         text = f"{source.name}: {translated('{vertices} vertices, {faces} faces', **counts)}"
         wrapped(layout, text, icon="MESH_DATA")
         reason = object_references.refusal(source) or mesh_arrays.refusal(source)

@@ -9,7 +9,7 @@ from mathutils import Matrix
 
 from ..blender import mesh_arrays
 from ..blender.object_references import ObjectReference, in_scene, settings_of
-from ..core.errors import UserError
+from ..core.errors import UserError, refuse
 from ..core.geometry.spaces import inverse, transform
 from ..handles.empties import make_empty, matrix_of
 from ..handles.palette import free_colour
@@ -33,6 +33,7 @@ def target_of(source, name=""):
 def read_target(context, target, space):
     """(n, 3) vertices and (m, 3) triangles of the target as it is shown, in solve space."""
     mesh = mesh_arrays.read(context, target)
+    refuse(mesh_arrays.nothing_in(target.name, len(mesh.vertices), len(mesh.triangles)))
     to_solve = space.world_to_solve @ matrix_of(target)
     mirrored = np.linalg.det(to_solve[:3, :3]) < 0
     return transform(to_solve, mesh.vertices), mesh.triangles[:, ::-1] if mirrored else mesh.triangles

@@ -9,9 +9,12 @@ if IN_BLENDER:
     import bpy
     from support.blender import scenes
     from support.blender.live import step
+    from support.blender.pins import pin
 
     import arapfields as af
+    from addon.field_modifier import motion
     from addon.live import sessions
+    from addon.pin_tool import screen
 
 pytestmark = pytest.mark.in_blender
 
@@ -51,15 +54,35 @@ def vector_values(splats):
     return columns | {f"sh{k}": splats.harmonics[:, k] for k in range(splats.harmonics.shape[1])}
 
 
-def scan(splats, values, name="Scan"):
+def own_values(splats):
+    """As Blender's own PLY import names them from 5.3 on, where colours are FLOAT4."""
+    base = np.column_stack([splats.harmonics[:, 0], splats.opacities])
+    columns = {"rotation": splats.rotations, "scale": splats.scales, "radiance:base": base}
+    return columns | {f"radiance:sh_{k - 1}": splats.harmonics[:, k] for k in range(1, 16)}
+
+
+def kind_of(key, column):
+    """(type of an attribute, name of its values)"""
+    if column.ndim == 1:
+        return "FLOAT", "value"
+    return {"rotation": ("QUATERNION", "value"), "radiance:base": ("FLOAT_COLOR", "color")}.get(
+        key, ("FLOAT_VECTOR", "vector")
+    )
+
+
+def scan(splats, values, data="MESH"):
     """An object of splats, held at its left end; its right end follows a handle. (scan, moving)"""
-    mesh = bpy.data.meshes.new(name)
+    mesh = bpy.data.meshes.new("Scan")
     mesh.from_pydata(splats.centers.tolist(), [], [])
     for key, column in values(splats).items():
-        kind, field = ("FLOAT", "value") if column.ndim == 1 else ("FLOAT_VECTOR", "vector")
+        kind, field = kind_of(key, column)
         mesh.attributes.new(key, kind, "POINT").data.foreach_set(field, np.asarray(column, "f4").ravel())
-    item = bpy.data.objects.new(name, mesh)
+    item = bpy.data.objects.new("Scan", mesh)
     bpy.context.scene.collection.objects.link(item)
+    if data == "POINTCLOUD":
+        scenes.activate(item)
+        bpy.ops.object.convert(target="POINTCLOUD")
+        item = bpy.context.object
     fixed = scenes.cube_empty((-0.9, 0, 0), (0.15, 0.4, 0.4), "Fixed")
     moving = scenes.cube_empty((0.9, 0, 0), (0.15, 0.4, 0.4), "Moving")
     bpy.context.view_layer.update()
@@ -76,19 +99,36 @@ def shown(item, values):
     for key, column in values(given()).items():
         data = mesh.attributes[key].data
         flat = np.empty(column.size, dtype=np.float32)
-        data.foreach_get("value" if column.ndim == 1 else "vector", flat)
+        data.foreach_get(kind_of(key, column)[1], flat)
         result[key] = flat.reshape(column.shape)
     return result
+
+
+def places(item):
+    """(n, 3) centers as shown; the object stands at the origin."""
+    mesh = item.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    flat = np.empty(3 * len(given().centers), dtype=np.float32)
+    mesh.attributes["position"].data.foreach_get("vector", flat)
+    return flat.reshape(-1, 3)
 
 
 def off(one, other):
     return max(np.abs(one[key] - other[key]).max() for key in other if key != "rot_euler")
 
 
-@pytest.mark.parametrize("layout", ["file_values", "vector_values"])
-def test_a_scan_is_posed_live_and_comes_back(layout, tmp_path):
+@pytest.mark.parametrize(
+    ("layout", "data"),
+    [
+        ("file_values", "MESH"),
+        ("vector_values", "MESH"),
+        ("own_values", "MESH"),
+        ("own_values", "POINTCLOUD"),
+    ],
+)
+def test_a_scan_is_posed_live_and_comes_back(layout, data, tmp_path):
     rest, values = given(), globals()[layout]
-    item, moving = scan(rest, values)
+    item, moving = scan(rest, values, data)
+    assert item.type == data
     before = shown(item, values)
     assert bpy.ops.arapfields.live() == {"FINISHED"}
     moving.location.z += 0.5
@@ -96,7 +136,7 @@ def test_a_scan_is_posed_live_and_comes_back(layout, tmp_path):
     step(refined=True)
     moved = sessions.live[item.session_uid].solver.field.apply_to(rest, max_stretch=np.inf)
     posed = shown(item, values)
-    assert np.abs(scenes.world_points(item) - moved.centers).max() < SINGLE
+    assert np.abs(places(item) - moved.centers).max() < SINGLE
     assert off(posed, values(moved)) < SINGLE < 0.3 < off(posed, before)
     if values is vector_values:
         x, y, z = posed["rot_euler"].T  # Z Y X, as Blender's XYZ is: the turned x axis
@@ -122,7 +162,7 @@ def test_a_scan_is_posed_live_and_comes_back(layout, tmp_path):
 
 
 def test_the_button_poses_a_scan_and_off_restores_it():
-    item, moving = scan(given(), file_values)
+    item, moving = scan(given(), file_values, "POINTCLOUD")
     before = shown(item, file_values)
     bpy.ops.arapfields.live()
     moving.location.z += 0.4
@@ -136,15 +176,50 @@ def test_the_button_poses_a_scan_and_off_restores_it():
     assert item.modifiers[0].name == "ARAP Fields"
 
 
+def test_the_splat_nearest_to_the_viewer_is_pinned_and_dragged():
+    item = scan(given(), file_values, "POINTCLOUD")[0]
+    for entry in list(item.arapfields.handles):
+        bpy.data.objects.remove(entry.empty)
+    item.arapfields.handles.clear()
+    rest = places(item)
+    perspective = np.array([[2, 0, 0, 0], [0, 0, 2, 0], [0, 1, 0, 2.9], [0, 1, 0, 3]])
+    spot = screen.project(perspective, (400, 400), rest[7:8])[0]
+    pixels = screen.project(perspective, (400, 400), rest)
+    met = screen.foremost(perspective, (400, 400), rest, (0, -1, 0), spot, 20)
+    near = np.linalg.norm(pixels - spot, axis=1) <= 20
+    assert near[met] and rest[met, 1] == rest[near, 1].min() < rest[near, 1].max()
+    assert screen.foremost(perspective, (400, 400), rest, (0, -1, 0), (5, 5), 20) == -1
+    held, end = rest[rest[:, 0].argmin()], rest[rest[:, 0].argmax()]
+    pin(item, held)
+    pin(item, end + 0.01, target=end + np.array([0.0, 0.0, 0.5]))
+    assert np.abs(motion.shown_points(item) - places(item)).max() < 1e-6
+    way = np.linalg.norm(places(item) - rest, axis=1)
+    assert way[rest[:, 0].argmax()] > 0.4 and way[rest[:, 0].argmin()] < 0.02
+
+
 def test_what_splats_lack_is_named():
     item, _ = scan(given(60), file_values)
     data = item.data
     for call, arguments, word in (
         (bpy.ops.arapfields.deform, {"result": "NEW"}, "choose Original Mesh as geometry"),
-        (bpy.ops.arapfields.bake, {}, "they are not baked"),
+        (bpy.ops.arapfields.bake, {}, "write a PLY a frame by arapfields animate"),
     ):
         with pytest.raises(RuntimeError, match=word):
             call(**arguments)
+    body, _, _ = scenes.bar_with_handles()
+    other = item.copy()
+    other.arapfields.handles.clear()
+    bpy.context.scene.collection.objects.link(other)
+    scenes.activate(other, body)
+    with pytest.raises(RuntimeError, match="only handles of its own turn as well"):
+        bpy.ops.arapfields.carry()
+    bpy.ops.arapfields.deform()
+    with pytest.raises(RuntimeError, match="only handles of its own turn as well"):
+        bpy.ops.arapfields.field_as_nodes()
+    with pytest.raises(RuntimeError, match="the mesh has no faces"):
+        bpy.ops.arapfields.wrap(onto=other.name)
+    bpy.data.objects.remove(other)
+    scenes.activate(item)
     data.attributes["scale_1"].data[3].value = np.nan
     with pytest.raises(RuntimeError, match="scale_1 of its splats has NaN"):
         bpy.ops.arapfields.deform()
