@@ -25,7 +25,7 @@ class FileLayout:
 
     def columns(self, attributes):
         """{attribute: its type} that a motion changes."""
-        rest = sum(name.startswith("f_rest_") for name, _ in attributes.items())
+        rest = sum(name.startswith("f_rest_") for name, _ in attributes.items()) // 3 * 3
         names = [f"rot_{k}" for k in range(4)] + [f"scale_{k}" for k in range(3)]
         return dict.fromkeys([*names, *(f"f_rest_{k}" for k in range(rest))], FLOAT)
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <cmath>
+#include <cstdint>
 #include <utility>
+#include <vector>
 
 #include "bindings/arguments.h"
 #include "bindings/arrays.h"
@@ -48,7 +50,7 @@ using FloatArray = py::array_t<float>;
 /// What a call without the GIL holds on to, so that nobody takes its memory away (memory_of).
 using Kept = std::shared_ptr<GaussianSplats>;
 
-/// (n) single-precision numbers with any stride, and their place.
+/// The place and the stride of (n) single-precision numbers.
 std::pair<float*, Index> as_column(const py::object& given, const std::string& name, Index count,
                                    bool written) {
   const std::string needed = "(" + std::to_string(count) + ",) float32 numbers are needed";
@@ -56,7 +58,9 @@ std::pair<float*, Index> as_column(const py::object& given, const std::string& n
   auto array = py::reinterpret_borrow<py::array>(given);
   require(array.dtype().is(py::dtype::of<float>()) && array.ndim() == 1 && array.shape(0) == count, name,
           "another type or shape", needed);
-  require(array.strides(0) % Index{sizeof(float)} == 0, name, "unaligned", needed);
+  const auto place = reinterpret_cast<std::uintptr_t>(array.data());
+  require(array.strides(0) % Index{sizeof(float)} == 0 && place % alignof(float) == 0, name, "unaligned",
+          needed);
   require(!written || array.writeable(), name, "it cannot be written to", needed);
   return {static_cast<float*>(const_cast<void*>(array.data())), array.strides(0) / Index{sizeof(float)}};
 }
@@ -64,10 +68,12 @@ std::pair<float*, Index> as_column(const py::object& given, const std::string& n
 PointsF changes_of(const PreparedSplats& self, const DeformationField& field, const ColumnsArgument& rest,
                    const ColumnsArgument& changes, Task* task) {
   std::vector<SplatColumn> columns;
+  std::vector<py::object> held;  // an iterable may make its arrays on the way
   const auto item_bytes = static_cast<double>(sizeof(SplatColumn));
   for_each_item(rest, "rest", "a sequence of arrays is needed", item_bytes,
                 [&](const py::object& item, const std::string& name) {
                   const auto [data, stride] = as_column(item, name, self.rest().size(), false);
+                  held.push_back(item);
                   columns.push_back({data, stride, nullptr, 0});
                 });
   const auto needed = static_cast<std::size_t>(4 + self.rest().harmonics.cols());
@@ -77,6 +83,7 @@ PointsF changes_of(const PreparedSplats& self, const DeformationField& field, co
   for_each_item(changes, "changes", "a sequence of arrays is needed", item_bytes,
                 [&](const py::object& item, const std::string& name) {
                   const auto [data, stride] = as_column(item, name, self.rest().size(), true);
+                  held.push_back(item);
                   if (written < needed)
                     columns[written].change = data, columns[written].change_stride = stride;
                   ++written;
@@ -163,7 +170,7 @@ file, for one that is damaged or laid out otherwise.)")
         return run_long(task,
                         [&](const Progress& progress) { return sample_splats(*splats, count, progress); });
       },
-      "splats"_a, "count"_a = 20000, py::kw_only(), "task"_a = py::none(), R"(
+      "splats"_a.none(false), "count"_a = 20000, py::kw_only(), "task"_a = py::none(), R"(
 SurfaceSamples of what splats show: at most `count` centers of opaque splats, spread evenly.
 
 Normals are the shortest axes, turned outward (Hoppe et al. 1992). Parts with less than 1 % of the samples are
@@ -173,7 +180,11 @@ GaussianSplats that are moved again and again, as in a live session.
 
 The first radial field prepares what it needs at the centers; those of the same live session find it there.
 They are moved in single precision: errors are some 1e-5 of the size.)")
-      .def(py::init<GaussianSplats>(), "splats"_a, "InvalidInput for splats that do not fit together.")
+      .def(py::init([](const Kept& splats) {
+             const py::gil_scoped_release others_run;
+             return std::make_shared<PreparedSplats>(*splats);
+           }),
+           "splats"_a.none(false), "InvalidInput for splats that do not fit together.")
       .def("__len__", [](const PreparedSplats& self) { return self.rest().size(); })
       .def_property_readonly(
           "rest",
@@ -210,7 +221,7 @@ added to each. May be called from any thread. Raises InvalidInput and Cancelled.
           return move_splats(self, *splats, max_stretch, progress);
         });
       },
-      "splats"_a, py::kw_only(), "max_stretch"_a = default_max_stretch, "task"_a = py::none(), R"(
+      "splats"_a.none(false), py::kw_only(), "max_stretch"_a = default_max_stretch, "task"_a = py::none(), R"(
 GaussianSplats moved by the field: f(μ), J Σ Jᵀ, and colours turned by the rotation closest to J.
 
 Gaussians that the field stretches by more than `max_stretch` along an axis, or bends, are divided first; the new

@@ -231,7 +231,11 @@ def test_what_splats_lack_is_named():
     with pytest.raises(RuntimeError, match="its splats have no f_rest_7"):
         bpy.ops.arapfields.deform()
     item.scale.x = 2
+    data.attributes.remove(data.attributes["f_rest_44"])
     data.attributes.new("f_rest_7", "FLOAT", "POINT")
+    with pytest.raises(RuntimeError, match="its splats have 15 colours"):
+        bpy.ops.arapfields.deform()
+    data.attributes.new("f_rest_44", "FLOAT", "POINT")
     data.attributes["rot_0"].data[2].value = 1.0
     with pytest.raises(RuntimeError, match="its scale stretches splats"):
         bpy.ops.arapfields.deform()

@@ -147,7 +147,8 @@ def test_changes_are_what_a_motion_adds_to_each_number(functions):
     for field in (bent(), bent(30.0, reach=0.5)):
         moved = prepared.moved(field, max_stretch=np.inf)
         for changes in (rows.T, columns):  # numbers that lie apart, and side by side
-            centers = prepared.changes(field, list(np.ascontiguousarray(given.T)), list(changes))
+            made = (column.copy() for column in given.T)  # which nothing else holds
+            centers = prepared.changes(field, made, list(changes))
             assert np.array_equal(centers, moved.centers)
             assert np.abs(given + changes.T - numbers(moved)).max() < SINGLE
         assert np.array_equal(rows.T, columns)
@@ -158,6 +159,9 @@ def test_changes_are_what_a_motion_adds_to_each_number(functions):
     ):
         with pytest.raises(af.InvalidInput, match=word):
             prepared.changes(field, list(wrong), list(columns[: len(wrong)]))
+    for call in (af.PreparedSplats, field.apply_to, af.sample_splats):
+        with pytest.raises(TypeError):
+            call(None)
     columns.flags.writeable = False
     with pytest.raises(af.InvalidInput, match=r"changes\[0\]: it cannot be written to"):
         prepared.changes(field, list(given.T), list(columns))
