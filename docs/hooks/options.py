@@ -116,7 +116,8 @@ def words(call, names, choices):
     given = [names.get(getattr(each, "id", ""), each) for each in call.args]
     texts = [each.value for each in given if isinstance(each, ast.Constant) and isinstance(each.value, str)]
     label, effect = texts[:2] if len(texts) > 1 else ("", "")
-    items = [item for each in call.args for item in getattr(choices, getattr(each, "id", ""), ())]
+    used = [getattr(choices, getattr(part, "id", ""), ()) for each in given for part in ast.walk(each)]
+    items = [item for table in used if isinstance(table, tuple) for item in table]
     for number, (key, *rest) in enumerate(items):
         effect += f"{';' if number else ':'} *{rest[0]}* (`{key}`), {lower(rest[1])}"
     return label, effect
