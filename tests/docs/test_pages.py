@@ -102,6 +102,16 @@ def test_a_search_finds_each_setting_by_its_label_in_blender():
     assert len(labels) > 60 and not [label for label in labels if label not in guide]
 
 
+def test_the_list_of_headers_is_filled():
+    sys.path.insert(0, str(pages.ROOT / "docs" / "hooks"))
+    import headers
+
+    page = headers.on_page_markdown((pages.ROOT / "docs" / "cpp.md").read_text())
+    public = list((pages.ROOT / "native" / "include" / "arapfields").glob("*.h"))
+    assert len(public) > 15 and all(f"`arapfields/{path.name}`: " in page for path in public)
+    assert all(f"`{name}`" in page for name in ("deform", "RadialSolver", "Correspondence", "load_splats"))
+
+
 def test_the_diagram_is_that_of_the_code():
     sys.path.insert(0, str(pages.ROOT / "docs" / "hooks"))
     import diagram
