@@ -7,6 +7,7 @@ from ..blender import mesh_arrays, object_references
 from ..blender.language import translated
 from ..blender.point_data import face_count, points_of
 from ..blender.section import Advanced, Section, draw_settings, job_button, presets, settings_column, wrapped
+from ..blender.splat_layouts import holds_splats
 from ..blender.user_preferences import fit_cache
 from ..core.runtime import native
 from ..core.settings.parameters import FIT
@@ -33,8 +34,11 @@ class ARAPFIELDS_PT_source(Section, bpy.types.Panel):
             return
         mesh = source.data
         counts = {"vertices": f"{len(points_of(mesh)):,}", "faces": f"{face_count(mesh):,}"}
-        text = f"{source.name}: {translated('{vertices} vertices, {faces} faces', **counts)}"
-        wrapped(layout, text, icon="MESH_DATA")
+        if holds_splats(source):
+            text = translated("{count} splats", count=counts["vertices"])
+        else:
+            text = translated("{vertices} vertices, {faces} faces", **counts)
+        wrapped(layout, f"{source.name}: {text}", icon="MESH_DATA")
         reason = object_references.refusal(source) or mesh_arrays.refusal(source)
         if reason:
             wrapped(layout, translated(reason), icon="ERROR")
