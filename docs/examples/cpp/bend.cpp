@@ -25,7 +25,7 @@ int main(int argc, char** argv) try {
   if (argc != 3) throw af::InvalidInput("arguments", std::to_string(argc - 1), "IN.obj OUT.obj is needed");
   af::TriangleMesh mesh = read_obj(argv[1]);
 
-  af::Handle held, turned;  // boxes at rest, and where they shall be
+  af::Handle held, turned;  // boxes at rest, and where they go
   held.rest = held.target = slab(mesh, 0.0, 1.0 / 3);
   turned.rest = slab(mesh, 2.0 / 3, 1.0);
   const Eigen::AngleAxisd turn(std::numbers::pi / 3, af::Vec3::UnitX());
