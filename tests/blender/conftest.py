@@ -74,6 +74,25 @@ def blender(tmp_path_factory):
 
 
 @pytest.fixture
+def command(blender, tmp_path_factory):
+    """command(*arguments, check=True, largest=None): the extension's command line in the worker.
+
+    `largest` limits the bytes of a file. The answer is as that of subprocess.run.
+    """
+    answer = tmp_path_factory.mktemp("command") / "answer.json"
+
+    def run(*arguments, check=True, largest=None):
+        words = [str(word) for word in arguments]
+        order = {"arguments": words, "largest": largest, "answer": answer}
+        blender.call(str(ROOT / "tests/support/blender/commanded.py"), "command", order)
+        done = subprocess.CompletedProcess(words, *json.loads(answer.read_text()))
+        assert not check or done.returncode == 0, done
+        return done
+
+    return run
+
+
+@pytest.fixture
 def user_folder(tmp_path):
     return isolated(tmp_path)
 

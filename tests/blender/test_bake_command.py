@@ -7,40 +7,39 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.blender.inside import require_bpy
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
+def save_scene(folder):
+    """In the worker: scene.blend with a bar that bends from frame 1 to 5."""
+    import bpy
+    from support.blender import baking
+
+    baking.saved_animation("Bar", Path(folder))
+    bpy.context.scene.frame_end = 5
+    bpy.ops.wm.save_mainfile()
+
+
 @pytest.fixture
-def scene(tmp_path, user_folder):
-    """(folder with scene.blend: a bar that bends from frame 1 to 5, run(*arguments))."""
-    require_bpy()
+def scene(blender, tmp_path):
+    """A folder with that file."""
     folder = tmp_path / "scene"
     folder.mkdir()
-    make = f"""
-import sys; sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / "tests")!r}]
-import addon, bpy; bpy.ops.wm.read_homefile(use_empty=True); addon.register()
-from pathlib import Path
-from support.blender import baking
-baking.saved_animation("Bar", Path({str(folder)!r}))
-bpy.context.scene.frame_end = 5
-bpy.ops.wm.save_mainfile()
-"""
-    subprocess.run([sys.executable, "-c", make], env=user_folder, check=True, capture_output=True)
-
-    def run(*arguments, check=True):
-        call = [sys.executable, str(ROOT / "blender_scripts/bake.py"), "-i", str(folder / "scene.blend")]
-        done = subprocess.run([*call, *map(str, arguments)], env=user_folder, capture_output=True, text=True)
-        assert not check or done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
-        return done
-
-    return folder, run
+    blender.call(__file__, "save_scene", {"folder": folder})
+    return folder
 
 
 @pytest.mark.slow
-def test_parts_in_any_order_make_the_cache_that_one_process_makes(scene):
-    folder, run = scene
+def test_parts_in_any_order_make_the_cache_that_one_process_makes(scene, user_folder):
+    folder = scene
+
+    def run(*arguments):
+        call = [sys.executable, str(ROOT / "blender_scripts/bake.py"), "-i", str(folder / "scene.blend")]
+        done = subprocess.run([*call, *map(str, arguments)], env=user_folder, capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+        return done
+
     run("-o", folder / "baked.blend")
     whole = (folder / "cache/Bar.pc2").read_bytes()
     assert len(whole) == 32 + 5 * 12 * 386 and (folder / "baked.blend").exists()
@@ -61,9 +60,10 @@ def test_parts_in_any_order_make_the_cache_that_one_process_makes(scene):
     assert [path.name for path in shared.iterdir()] == ["Bar.pc2"]
 
 
-def test_an_export_and_what_cannot_be_baked(scene):
-    folder, run = scene
-    run("-o", folder / "bar.usdc", "--frames", "2-4")
+def test_an_export_and_what_cannot_be_baked(scene, command):
+    folder = scene
+    bake = ["bake", "-i", folder / "scene.blend"]
+    command(*bake, "-o", folder / "bar.usdc", "--frames", "2-4")
     assert (folder / "bar.usdc").read_bytes()[:8] == b"PXR-USDC"
     for arguments, text in (
         (["-o", folder / "bar.obj"], "unknown extension"),
@@ -72,6 +72,6 @@ def test_an_export_and_what_cannot_be_baked(scene):
         (["--folder", folder / "gone/too"], "no such folder"),
         (["-o", folder / "bar.abc", "--shard", "1/2"], "an exported file has no parts"),
     ):
-        done = run(*arguments, check=False)
+        done = command(*bake, *arguments, check=False)
         assert done.returncode in (1, 2) and text in done.stderr, (arguments, done.stderr)
     assert np.all([not path.name.startswith(".") for path in folder.iterdir()])

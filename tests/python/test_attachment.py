@@ -20,7 +20,7 @@ def length(samples):
 
 @pytest.fixture(scope="module")
 def body():
-    return af.sample_surface(trousers(), 6000, seed=0)
+    return af.sample_surface(trousers(), 5000, seed=0)
 
 
 @pytest.fixture(scope="module")
@@ -130,21 +130,21 @@ def test_a_dress_that_lies_on_the_legs_does_not_tear(body, striding):
     assert (after / before / asked[edges[:, 0] // 160]).max() < 1.6
 
 
-@pytest.mark.parametrize("distance", [0.01, 0.03, 0.05])
-def test_a_shirt_keeps_its_distance_to_the_skin(body, distance):
+def test_a_shirt_keeps_its_distance_to_the_skin(body):
     """The trunk bent by 45 degrees: distances change by 3 % at most on average, and never their sign."""
     top = box([-1, -1, 1.1], [1, 1, 2])
     handles = [moved(box([-1, -1, -1], [1, 1, HIP])), moved(top, turn([1, 0, 0], 45, (0, 0, 0.9)))]
     field = af.deform(body, handles)
     surface, triangles = af.extract_surface(trousers(), 128)
-    normals = trousers_normals(surface)
+    posed = field(surface)
     trunk = (surface[:, 2] > 0.75) & (surface[:, 2] < 1.15)
-    shirt = surface[trunk] + distance * normals[trunk]
-    before = af.signed_distance(surface, triangles, shirt)
-    carried = af.Attachment(body, shirt).positions(field)
-    after = af.signed_distance(field(surface), triangles, carried)
-    assert after.min() > 0
-    assert np.abs(after / before - 1).mean() < 0.03
+    normals = trousers_normals(surface[trunk])
+    for distance in (0.01, 0.03, 0.05):
+        shirt = surface[trunk] + distance * normals
+        before = af.signed_distance(surface, triangles, shirt)
+        after = af.signed_distance(posed, triangles, af.Attachment(body, shirt).positions(field))
+        assert after.min() > 0, distance
+        assert np.abs(after / before - 1).mean() < 0.03, distance
 
 
 def trousers_normals(points):

@@ -35,8 +35,8 @@ def check_same_vertices(ours, theirs):
 @pytest.mark.parametrize("name", ["bunny"])
 def test_equals_scikit_image_on_a_coarse_grid(data_dir, name):
     sdf = published(data_dir, name)
-    V, F = af.extract_surface(sdf, 64)
-    check_same_vertices(V, dense_surface(sdf, 64))
+    V, F = af.extract_surface(sdf, 40)
+    check_same_vertices(V, dense_surface(sdf, 40))
     check_closed(V, F)
 
 

@@ -24,9 +24,9 @@ LEANING, LOST_OF_LEANING = "triangular pyramid", 0.09
 QUICK = ["cube", "octahedron", "icosahedron", "square pyramid", "plane pair"]
 
 
-def styled(name, style, **options):
+def styled(name, style, count=20000, **options):
     shape = menagerie.load(name)
-    samples = af.sample_mesh(shape.vertices, shape.triangles, count=20000, seed=0)
+    samples = af.sample_mesh(shape.vertices, shape.triangles, count=count, seed=0)
     field = af.stylize(samples, style, af.StylizeOptions(field="radial", **options))
     return shape.vertices, field(shape.vertices), shape.triangles, field.report
 
@@ -61,7 +61,7 @@ def test_the_measures_measure():
 
 @pytest.mark.parametrize("style", QUICK)
 def test_a_dog_stands(style):
-    looks_right(*styled("dog", style), style)
+    looks_right(*styled("dog", style, count=4000), style)
 
 
 @pytest.mark.slow

@@ -130,7 +130,7 @@ def test_extraction_stops_and_names_bad_input(bunny):
     watcher = threading.Thread(target=watch)
     watcher.start()
     with pytest.raises(af.Cancelled):
-        af.extract_deformed(sdf, field, 256, task=task)
+        af.extract_deformed(sdf, field, 96, task=task)
     watcher.join()
     assert seen == sorted(seen)
 
