@@ -6,6 +6,7 @@ import tempfile
 
 import pytest
 from support.blender.inside import IN_BLENDER
+from support.files.full_disk import files_of_at_most
 
 if IN_BLENDER:
     import bpy
@@ -17,8 +18,6 @@ pytestmark = pytest.mark.in_blender
 
 
 def test_whatever_goes_wrong_is_named_and_the_last_good_cache_stays():
-    import resource
-
     _, folder = saved_animation()
     bpy.ops.arapfields.bake(start=1, end=3)
     path = folder / "cache/Bar.pc2"
@@ -32,12 +31,8 @@ def test_whatever_goes_wrong_is_named_and_the_last_good_cache_stays():
     fails("The last frame, 3, comes before the first, 7", start=7, end=3)
     fails("no such folder", start=1, end=2, filepath="//gone/too/Bar.pc2")
     fails("needs the extension .mdd", start=1, end=2, format="MDD", filepath="//cache/Bar.pc2")
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)  # stands for a full disk
-    resource.setrlimit(resource.RLIMIT_FSIZE, (9000, hard))
-    try:
+    with files_of_at_most(9000):
         fails("Bar.pc2", start=1, end=5)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     operator = stepped(format="PC2", start=1, end=5, folder="//cache")
     assert cancelled_at(operator, "frame 3") == {"CANCELLED"}
     assert path.read_bytes() == good and os.listdir(path.parent) == ["Bar.pc2"]

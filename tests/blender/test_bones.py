@@ -15,7 +15,7 @@ if IN_BLENDER:
 
 pytestmark = pytest.mark.in_blender
 
-QUICK = {"field": "radial", "samples": 2000}
+QUICK = {"field": "radial", "samples": 1000}
 STOPPED = 5e-4  # of the size: how far apart solves end whose targets differ by rounding alone
 SAME = 1e-6  # of the size: single precision of matrices and positions
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Alembic, USD and glTF with what the object does, read back by another Blender, by usd-core and by hand."""
 
+import contextlib
 import json
 import shutil
 import struct
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 from pxr import UsdGeom
 from support.blender.inside import IN_BLENDER
+from support.files.full_disk import files_of_at_most
 
 if IN_BLENDER:
     import bpy
@@ -161,30 +163,28 @@ def test_usd_is_what_its_own_library_reads():
         assert np.abs(world - points).max() <= EXACT * np.ptp(points, axis=0).max(), frame
 
 
+@contextlib.contextmanager
+def little_room():
+    usage, shutil.disk_usage = shutil.disk_usage, lambda _: types.SimpleNamespace(free=10_000)
+    try:
+        yield
+    finally:
+        shutil.disk_usage = usage
+
+
 @pytest.mark.parametrize("kind", ["ABC", "USD", "GLTF"])
 def test_an_export_that_fails_is_named_and_changes_nothing(kind):
-    import resource
-
     bar, folder = scene_to_export()
     bpy.ops.arapfields.bake()
     path = folder / f"Bar{dict(ABC='.abc', USD='.usdc', GLTF='.glb')[kind]}"
     path.write_bytes(b"before")
     before = state(bar)
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)  # stands for a full disk
-    for name in (
-        ("no room", "a limit") if kind != "ABC" else ("no room",)
-    ):  # the latter ends Alembic's Blender
-        usage, free = shutil.disk_usage, types.SimpleNamespace(free=10_000)
-        if name == "no room":
-            shutil.disk_usage = lambda _, free=free: free
-        else:
-            resource.setrlimit(resource.RLIMIT_FSIZE, (3000, hard))
-        try:
-            with pytest.raises(RuntimeError, match=path.name):
-                bpy.ops.arapfields.export_animation(format=kind, filepath=str(path))
-        finally:
-            shutil.disk_usage = usage
-            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    full = {"no room": little_room()}
+    if kind != "ABC":  # Alembic's Blender ends there
+        full["a limit"] = files_of_at_most(3000)
+    for name, disk in full.items():
+        with disk, pytest.raises(RuntimeError, match=path.name):
+            bpy.ops.arapfields.export_animation(format=kind, filepath=str(path))
         assert path.read_bytes() == b"before"
         for one, other in zip(state(bar), before, strict=True):
             assert one == other, (name, one, other)

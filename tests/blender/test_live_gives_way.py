@@ -38,7 +38,7 @@ def test_deform_takes_the_live_pose(target):
     bar, rest = lifted(target)
     assert placement_refusal(bar) is None
     live = scenes.world_points(bar if target != "NEW" else bpy.data.objects["Bar_live"])
-    assert bpy.ops.arapfields.deform() == {"FINISHED"}
+    assert bpy.ops.arapfields.deform(samples=2000) == {"FINISHED"}
     bpy.context.view_layer.update()
     assert not sessions.live and not bar.arapfields.live_kind
     result = bpy.data.objects["Bar_deformed"] if target == "NEW" else bar
@@ -111,7 +111,7 @@ def test_pins_are_dragged_again_after_deform():
     live = scenes.world_points(bar)
     bpy.ops.ed.undo_push(message="drag")
     scenes.activate(bar)
-    assert bpy.ops.arapfields.deform() == {"FINISHED"}
+    assert bpy.ops.arapfields.deform(samples=2000) == {"FINISHED"}
     bpy.ops.ed.undo_push(message="deform")
     assert not sessions.live and np.abs(scenes.world_points(bar) - live).max() < 0.1
     empty = bar.arapfields.handles[0].empty

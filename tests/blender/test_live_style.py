@@ -8,7 +8,7 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
-    from support.blender.live import few_samples, step
+    from support.blender.live import step
     from support.blender.scenes import FIT
 
     from addon.core.runtime import jobs
@@ -18,25 +18,24 @@ pytestmark = pytest.mark.in_blender
 
 
 def test_a_style_follows_its_sliders_without_handles():
-    with few_samples():
-        bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
-        ball = bpy.context.object
-        assert bpy.ops.arapfields.live(kind="STYLIZE") == {"FINISHED"}
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
+    ball = bpy.context.object
+    assert bpy.ops.arapfields.live(kind="STYLIZE") == {"FINISHED"}
 
-        def corners():
-            points = scenes.world_points(ball)
-            points = points - points.mean(axis=0)
-            return np.linalg.norm(points, axis=1).max() / np.abs(points).max()
+    def corners():
+        points = scenes.world_points(ball)
+        points = points - points.mean(axis=0)
+        return np.linalg.norm(points, axis=1).max() / np.abs(points).max()
 
-        step(refined=True)
-        cube = corners()
-        assert cube > 1.25
-        ball.arapfields.stylize.strength = 0.0
-        step(refined=True)
-        assert abs(corners() - 1) < 0.05
-        ball.arapfields.stylize.strength, ball.arapfields.stylize.style = 1.0, "OCTAHEDRON"
-        step(refined=True)
-        assert corners() < cube - 0.1
+    step(refined=True)
+    cube = corners()
+    assert cube > 1.25
+    ball.arapfields.stylize.strength = 0.0
+    step(refined=True)
+    assert abs(corners() - 1) < 0.05
+    ball.arapfields.stylize.strength, ball.arapfields.stylize.style = 1.0, "OCTAHEDRON"
+    step(refined=True)
+    assert corners() < cube - 0.1
 
 
 def test_handles_and_a_style_together():
@@ -66,51 +65,49 @@ def test_the_implicit_surface_follows_too():
 
 
 def test_a_live_style_follows_stiffness_rigidity_and_the_fold_barrier():
-    with few_samples():
-        bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
-        ball = bpy.context.object
-        style = ball.arapfields.stylize
-        style.keep_stance = 0.0  # it holds a ball so well that the barrier has nothing to do
-        bpy.ops.arapfields.live(kind="STYLIZE")
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
+    ball = bpy.context.object
+    style = ball.arapfields.stylize
+    style.keep_stance = 0.0  # it holds a ball so well that the barrier has nothing to do
+    bpy.ops.arapfields.live(kind="STYLIZE")
 
-        def report():
-            for _ in range(2):  # the first look sets the solver up anew
-                step(refined=True)
-            return sessions.live[ball.session_uid].solver.report
+    def report():
+        for _ in range(2):  # the first look sets the solver up anew
+            step(refined=True)
+        return sessions.live[ball.session_uid].solver.report
 
-        usual = report()
-        style.rigidity = 50.0
-        assert report()["stretch"] < 0.2 * usual["stretch"]
-        style.rigidity, style.bending = 1.0, 500.0
-        assert report()["bend"] < 0.1 * usual["bend"]
-        style.bending, style.barrier = 0.1, 0.0
-        assert report()["min_determinant"] < usual["min_determinant"]
+    usual = report()
+    style.rigidity = 50.0
+    assert report()["stretch"] < 0.2 * usual["stretch"]
+    style.rigidity, style.bending = 1.0, 500.0
+    assert report()["bend"] < 0.1 * usual["bend"]
+    style.bending, style.barrier = 0.1, 0.0
+    assert report()["min_determinant"] < usual["min_determinant"]
 
 
 def test_live_waits_while_the_object_of_a_style_is_still_to_be_chosen():
     """What was shown stays until it is, and then follows it."""
-    with few_samples():
-        bpy.ops.mesh.primitive_cube_add(size=1, location=(5, 0, 0), rotation=(0.5, 0.3, 0))
-        cube = bpy.context.object
-        bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
-        ball = bpy.context.object
-        bpy.ops.arapfields.live(kind="STYLIZE")
+    bpy.ops.mesh.primitive_cube_add(size=1, location=(5, 0, 0), rotation=(0.5, 0.3, 0))
+    cube = bpy.context.object
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
+    ball = bpy.context.object
+    bpy.ops.arapfields.live(kind="STYLIZE")
+    step(refined=True)
+    shown, style = scenes.world_points(ball), ball.arapfields.stylize
+    for choose in (
+        lambda: setattr(style, "style", "OBJECT"),
+        lambda: setattr(style, "style_object", None),
+        lambda: setattr(style, "strength", 0.5),
+    ):
+        choose()
         step(refined=True)
-        shown, style = scenes.world_points(ball), ball.arapfields.stylize
-        for choose in (
-            lambda: setattr(style, "style", "OBJECT"),
-            lambda: setattr(style, "style_object", None),
-            lambda: setattr(style, "strength", 0.5),
-        ):
-            choose()
-            step(refined=True)
-            assert sessions.is_live(ball, "STYLIZE") and not jobs.messages()
-            assert np.array_equal(scenes.world_points(ball), shown)
-        style.strength, style.style_object = 1.0, cube
-        step(refined=True)
-        assert sessions.is_live(ball) and np.abs(scenes.world_points(ball) - shown).max() > 0.05
+        assert sessions.is_live(ball, "STYLIZE") and not jobs.messages()
+        assert np.array_equal(scenes.world_points(ball), shown)
+    style.strength, style.style_object = 1.0, cube
+    step(refined=True)
+    assert sessions.is_live(ball) and np.abs(scenes.world_points(ball) - shown).max() > 0.05
+    bpy.ops.arapfields.live(kind="STYLIZE")
+    style.style, style.frame, style.frame_object = "CUBE", "EMPTY", None
+    with pytest.raises(RuntimeError, match="Choose the object"):  # there is nothing to go on from
         bpy.ops.arapfields.live(kind="STYLIZE")
-        style.style, style.frame, style.frame_object = "CUBE", "EMPTY", None
-        with pytest.raises(RuntimeError, match="Choose the object"):  # there is nothing to go on from
-            bpy.ops.arapfields.live(kind="STYLIZE")
-        assert not sessions.is_live(ball)
+    assert not sessions.is_live(ball)

@@ -13,13 +13,16 @@ import numpy as np
 import pytest
 import trimesh
 from support.files.caches import names
+from support.files.full_disk import files_of_at_most
 from support.geometry.bar import LEFT, RIGHT, turned
 from support.geometry.meshes import sphere
 from support.programs.cli import process, run
 
 import arapfields as af
+from arapfields._files import whole_file
 from arapfields.cli.files import read_mesh
 from arapfields.cli.frame_solver import STEPS, TOLERANCE
+from arapfields.cli.usd import write_usd
 
 FRAMES = 6
 SAME = {"samples": 400, "coarse_centers": 10, "fine_centers": 40}
@@ -199,27 +202,18 @@ def test_what_was_there_stays_where_the_disk_is_full(place, monkeypatch, capsys)
     assert (place / "x.pc2").read_bytes() == before
 
 
-FULL = """
-import resource, signal, sys
-import numpy as np
-from arapfields._files import whole_file
-from arapfields.cli.usd import write_usd
-resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
-signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-frames = np.random.default_rng(0).normal(size=(20, 5000, 3))
-try:
-    with whole_file(sys.argv[1]) as partial:
-        write_usd(partial, np.array([[0, 1, 2]]), frames, fps=24, start=1, up="z")
-except OSError as error:
-    print(error)
-"""
-
-
 def test_a_disk_that_is_full_for_usd_is_named(tmp_path):
     pytest.importorskip("pxr.Usd", reason="usd-core is not installed")
-    (tmp_path / "x.usdc").write_text("before")
-    done = subprocess.run([sys.executable, "-c", FULL, tmp_path / "x.usdc"], capture_output=True, text=True)
-    assert "the disk may be full" in done.stdout and str(tmp_path / "x.usdc") in done.stdout, done
+    path = tmp_path / "x.usdc"
+    path.write_text("before")
+    moves = np.random.default_rng(0).normal(size=(20, 5000, 3))
+    with (
+        pytest.raises(OSError, match="the disk may be full") as error,
+        files_of_at_most(100_000),
+        whole_file(path) as partial,
+    ):
+        write_usd(partial, np.array([[0, 1, 2]]), moves, fps=24, start=1, up="z")
+    assert str(path) in str(error.value)
     assert (tmp_path / "x.usdc").read_text() == "before" and names(tmp_path) == ["x.usdc"]
 
 

@@ -96,27 +96,26 @@ refused(lambda: af.sample_curve(np.broadcast_to(0.0, (2_000_000_000, 2)), 10), "
 """)
 
 
-@pytest.mark.parametrize(
-    "call, words",
-    [
-        ("af.fit_sdf(TETRAHEDRON, FACES, af.FitOptions(near_points=10**9))", ["near_points", "memory"]),
-        ("af.fit_sdf(TETRAHEDRON, FACES, af.FitOptions(uniform_points=10**9))", ["uniform_points", "memory"]),
-        ("af.fit_sdf(TETRAHEDRON, FACES, af.FitOptions(width=8192, layers=64))", ["width", "memory"]),
-        ("af.sample_mesh(TETRAHEDRON, FACES, 10**9)", ["count", "memory"]),
-        ("af.sample_mesh(TETRAHEDRON, FACES, 2**62)", ["count", "memory"]),
-        ("af.sample_surface(things['sdf'], 10**8)", ["count", "memory"]),
-        ("af.sample_curve(ROWS[:, :2], 10**9)", ["count", "memory"]),
-        ("af.sdf_grid(things['sdf'], 2048)", ["resolution", "memory"]),
-        ("af.deform_curve(ROWS[:, :2], [af.CurveHandle([0])], af.CurveOptions(spacing=0.01))", ["spacing"]),
-        (
-            "af.deform_curve(np.random.default_rng(0).normal(size=(20000, 2)), [af.CurveHandle([0])],"
-            " af.CurveOptions(spacing=0.02))",
-            ["spacing", "memory"],
-        ),
-    ],
-)
-def test_sizes_that_memory_cannot_hold_are_named(call, words):
-    run(f"refused(lambda: {call}, *{words!r})")
+SIZES = [
+    ("af.fit_sdf(TETRAHEDRON, FACES, af.FitOptions(near_points=10**9))", ["near_points", "memory"]),
+    ("af.fit_sdf(TETRAHEDRON, FACES, af.FitOptions(uniform_points=10**9))", ["uniform_points", "memory"]),
+    ("af.fit_sdf(TETRAHEDRON, FACES, af.FitOptions(width=8192, layers=64))", ["width", "memory"]),
+    ("af.sample_mesh(TETRAHEDRON, FACES, 10**9)", ["count", "memory"]),
+    ("af.sample_mesh(TETRAHEDRON, FACES, 2**62)", ["count", "memory"]),
+    ("af.sample_surface(things['sdf'], 10**8)", ["count", "memory"]),
+    ("af.sample_curve(ROWS[:, :2], 10**9)", ["count", "memory"]),
+    ("af.sdf_grid(things['sdf'], 2048)", ["resolution", "memory"]),
+    ("af.deform_curve(ROWS[:, :2], [af.CurveHandle([0])], af.CurveOptions(spacing=0.01))", ["spacing"]),
+    (
+        "af.deform_curve(np.random.default_rng(0).normal(size=(20000, 2)), [af.CurveHandle([0])],"
+        " af.CurveOptions(spacing=0.02))",
+        ["spacing", "memory"],
+    ),
+]
+
+
+def test_sizes_that_memory_cannot_hold_are_named():
+    run("\n".join(f"refused(lambda: {call}, *{words!r})" for call, words in SIZES))
 
 
 def test_a_curve_hears_cancel():

@@ -11,12 +11,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.blender.inside import require_bpy
 from support.files import archives
+from support.files.full_disk import files_of_at_most
 from support.programs.cli import HELD_AND_SHIFTED, SMALL_FIT, SMALL_SOLVE, process, run, write_octahedron
 
 import arapfields as af
 from arapfields._files import whole_file, write_text
 from arapfields._native import OutputFile
+from arapfields.grids import save_grid
 
 LIMIT = 1000  # bytes that a file may have where the disk is full
 
@@ -143,43 +146,30 @@ def test_what_a_killed_process_left_is_removed_and_no_other(tmp_path):
             running.wait()
 
 
-def small_disk():
-    import resource
-
-    resource.setrlimit(resource.RLIMIT_FSIZE, (LIMIT, LIMIT))
-
-
 @pytest.mark.parametrize("kind", ["sdf", "radial", "npz", "vdb", "text"])
 def test_a_full_disk_is_named_and_changes_nothing(kind, examples, tmp_path):
     if kind == "vdb":
-        pytest.importorskip("bpy", reason="PyPI's bpy brings openvdb")
+        require_bpy()  # which brings openvdb
     suffix = {"npz": ".npz", "vdb": ".vdb"}.get(kind, ".x")
-    code = f"""
-import sys; sys.path.insert(0, {str(archives.Path(archives.__file__).parents[2])!r})
-import numpy as np, arapfields as af
-from support.files import archives
-from arapfields import _files, grids
-kind, example, places = sys.argv[1], sys.argv[2], sys.argv[3:]
-grid = np.random.default_rng(0).normal(size=(20, 20, 20)).astype(np.float32), np.zeros(3), 0.1
-if kind == "vdb": grids.openvdb_module()
-calls = {{"npz": lambda p: af.save_grid(p, *grid), "text": lambda p: _files.write_text(p, "x" * 10000)}}
-call = calls.get("npz" if kind == "vdb" else kind) or archives.load(example).save
-import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({LIMIT}, {LIMIT}))
-for place in places:
-    try: call(place)
-    except OSError as error: print(error.filename)
-"""
+    grid = np.random.default_rng(0).normal(size=(20, 20, 20)).astype(np.float32), np.zeros(3), 0.1
+    if kind in examples:
+        call = archives.load(examples[kind]).save
+    else:
+
+        def call(path):
+            return write_text(path, "x" * 10000) if kind == "text" else save_grid(path, *grid)
+
     old, new = tmp_path / f"old{suffix}", tmp_path / f"new{suffix}"
     old.write_bytes(b"before")
-    example = str(examples.get(kind, ""))
-    command = [sys.executable, "-c", code, kind, example, str(old), str(new)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0 and done.stdout.split() == [str(old), str(new)], done
+    for place in (old, new):
+        with pytest.raises(OSError) as error, files_of_at_most(LIMIT):
+            call(place)
+        assert error.value.filename == str(place)
     assert names(tmp_path) == [old.name] and old.read_bytes() == b"before"
 
 
 @pytest.mark.parametrize("verb", ["fit", "sample", "deform", "grid", "extract", "report"])
-def test_verbs_on_a_full_disk(verb, examples, tmp_path):
+def test_verbs_on_a_full_disk(verb, examples, tmp_path, monkeypatch, capsys):
     write_octahedron(tmp_path / "mesh.obj")
     sdf = str(examples["sdf"])
     arguments = {
@@ -201,12 +191,11 @@ def test_verbs_on_a_full_disk(verb, examples, tmp_path):
     }[verb]
     if verb == "report":
         arguments += ["--iterations", "400"]
-    command, environment = process(*arguments)
-    done = subprocess.run(
-        command, env=environment, cwd=tmp_path, preexec_fn=small_disk, capture_output=True, text=True
-    )
-    assert done.returncode in (1, 2), done
-    assert done.stderr.count("\n") == 1 and "out." in done.stderr and "Traceback" not in done.stderr, done
+    monkeypatch.chdir(tmp_path)
+    with files_of_at_most(LIMIT):
+        assert run(*arguments) in (1, 2)
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "out." in said and "Traceback" not in said, said
     assert names(tmp_path) == ["mesh.obj"]
 
 

@@ -5,13 +5,13 @@ import errno
 import os
 import re
 import struct
-import subprocess
 import sys
 from collections import namedtuple
 
 import numpy as np
 import pytest
 from support.files.caches import FRAMES, POINTS, names, random_motion, write
+from support.files.full_disk import files_of_at_most
 
 import arapfields as af
 from arapfields import point_cache
@@ -117,25 +117,16 @@ def test_a_disk_too_small_shows_before_the_first_frame(motion, tmp_path, monkeyp
     assert (tmp_path / "x.pc2").read_bytes() == before and names(tmp_path) == ["x.pc2"]
 
 
-GROWS = """
-import resource, signal, sys
-import numpy as np
-from arapfields.point_cache import PointCacheWriter
-resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
-signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-try:
-    with PointCacheWriter(sys.argv[1], 1000, 100) as cache:
-        for _ in range(100):
-            cache.write(np.ones((1000, 3)))
-except OSError as error:
-    print(error.errno, error.filename)
-"""
-
-
 def test_a_disk_that_fills_meanwhile_is_named(motion, tmp_path):
     """A limit on a file's size stands for the full disk: the system refuses in the middle of a frame."""
     path = write(tmp_path / "x.pc2", motion)
     before = path.read_bytes()
-    said = subprocess.run([sys.executable, "-c", GROWS, path], capture_output=True, text=True, check=True)
-    assert said.stdout.split() == [str(errno.EFBIG), str(path)]
+    with (
+        pytest.raises(OSError) as error,
+        files_of_at_most(300_000),
+        PointCacheWriter(path, 1000, 100) as cache,
+    ):
+        for _ in range(100):
+            cache.write(np.ones((1000, 3)))
+    assert (error.value.errno, error.value.filename) == (errno.EFBIG, str(path))
     assert path.read_bytes() == before and names(tmp_path) == ["x.pc2"]

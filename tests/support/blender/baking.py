@@ -18,7 +18,7 @@ from addon.solver.setup import sampled
 from addon.solver.source_reader import SourceReader
 
 EXACT = 1e-6  # single precision of positions of size one
-RUN = {"field": "radial", "samples": 1500, "iterations": 15}
+RUN = {"field": "radial", "samples": 1000, "iterations": 15}
 
 
 def animated(name="Bar"):

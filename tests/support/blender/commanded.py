@@ -1,23 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run in the Blender worker: a verb of the extension's command line, as `blender --command arapfields` does."""
+"""In the Blender worker: a verb of the extension's command line, as by `blender --command arapfields`."""
 
 import contextlib
 import io
 import json
 from pathlib import Path
 
-
-@contextlib.contextmanager
-def files_of_at_most(size):
-    """No file gets larger, in bytes; stands for a full disk."""
-    import resource
-
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size or before[0], before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+from support.files.full_disk import files_of_at_most
 
 
 def command(arguments, largest, answer):

@@ -5,7 +5,7 @@ import bmesh
 import bpy
 import numpy as np
 
-QUICK = {"iterations": 40, "samples": 2000, "batch": 100, "width": 32, "layers": 2}
+QUICK = {"iterations": 40, "samples": 1000, "batch": 100, "width": 32, "layers": 2}
 
 NEW = QUICK | {"result": "NEW"}
 

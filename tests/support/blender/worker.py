@@ -15,6 +15,8 @@ from pathlib import Path
 
 import bpy
 
+SAMPLES = 1500  # a quarter of a live solver's own: these tests do not ask how well it solves
+
 
 @functools.cache
 def load(path):
@@ -26,7 +28,9 @@ def load(path):
 
 def run(order):
     import addon
+    from addon.solver import setup
 
+    setup.SAMPLES = SAMPLES
     bpy.ops.wm.read_factory_settings(use_empty=True)
     addon.register()
     try:
