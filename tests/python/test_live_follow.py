@@ -97,7 +97,7 @@ def test_a_solve_after_a_cancelled_step_has_no_inertia(samples):
 
 def test_a_drag_comes_back_as_it_went(data_dir):
     """Measurements that are updated from solve to solve stay those of the coefficients."""
-    samples = cases.published_samples(data_dir / "neural_sdf" / "bunny.pt")
+    samples = cases.published_samples(data_dir / "neural_sdf" / "bunny.pt", 3000)
     held, moved = cases.bunny_handles()
     rests = [af.Cuboid(handle.rest, handle.rest) for handle in (held, moved)]
     live, fresh = af.LiveDeformer(samples, rests), af.LiveDeformer(samples, rests)

@@ -23,7 +23,7 @@ def bar_mesh():
 
 @pytest.fixture(scope="module")
 def samples():
-    return af.sample_mesh(*bar_mesh(), 4000, seed=1)
+    return af.sample_mesh(*bar_mesh(), 2000, seed=1)
 
 
 def bend(degrees=60):

@@ -8,7 +8,7 @@ from support.tolerances import ON_SURFACE
 
 import arapfields as af
 
-COUNT = 20000
+COUNT = 6000
 CELLS = 6  # a side: 216 cells
 
 

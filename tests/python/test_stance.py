@@ -102,7 +102,7 @@ def test_the_ground_is_what_lies_lowest():
             testing.Stance(rest, up)
 
 
-def stool(count=4000, seed=0):
+def stool(count=2000, seed=0):
     """Samples of an ellipsoidal body on three slanting legs."""
     rng = np.random.default_rng(seed)
     unit = rng.normal(size=(count, 3))
