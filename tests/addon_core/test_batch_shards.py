@@ -82,7 +82,7 @@ def test_what_another_batch_leaves_undone_is_done(many, capsys):
     code = (
         f"import sys, time; sys.path.insert(0, {str(ROOT)!r})\n"
         "from addon.commands.record import Record\n"
-        "record = Record(sys.argv[1]); print(record.claim('slow00.ply'), flush=True); time.sleep(3)\n"
+        "record = Record(sys.argv[1]); print(record.claim('slow00.ply'), flush=True); time.sleep(2)\n"
     )
     other = subprocess.Popen([sys.executable, "-c", code, many / "out"], stdout=subprocess.PIPE, text=True)
     assert other.stdout.readline() == "True\n"

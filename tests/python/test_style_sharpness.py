@@ -70,7 +70,7 @@ def test_no_sharpness_means_this_one(name):
     assert np.abs(af.gauss_preference(preferred, preferred) - 1).max() < GAUSS_WEIGHTS
 
 
-def ball(count=3000):
+def ball(count=1000):
     return af.sample_mesh(*meshes.sphere(0.7), count=count, seed=0)
 
 

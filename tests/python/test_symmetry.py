@@ -14,7 +14,7 @@ EXACT = 1e-6  # of the size: what is asked for; rounding is far below
 
 @pytest.fixture(scope="module")
 def body():
-    return af.sample_surface(trousers(), 6000, seed=0)
+    return af.sample_surface(trousers(), 5000, seed=0)
 
 
 def leg(side, degrees):
@@ -45,8 +45,8 @@ def test_one_leg_moves_both(body, space, centers):
 
 def test_symmetric_handles_cost_no_more_than_without(body, space):
     handles = [TRUNK, leg(1, 40), leg(-1, 40)]
-    free = af.deform(body, handles)
-    tied = af.deform(body, handles, af.DeformOptions(symmetry="x"))
+    free = af.deform(body, handles, af.DeformOptions(centers=300))
+    tied = af.deform(body, handles, af.DeformOptions(centers=300, symmetry="x"))
     assert asymmetry(tied, space) < EXACT < asymmetry(free, space)
     assert tied.report.loss[-1][1] < 1.01 * free.report.loss[-1][1]
 

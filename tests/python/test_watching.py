@@ -13,7 +13,7 @@ HANDLES = [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, turned(30) @ RIGHT)]
 
 @pytest.mark.parametrize("field", ["neural", "radial"])
 def test_a_watched_solve_shows_the_shape_and_ends_the_same(field):
-    samples = bar_samples()
+    samples = bar_samples(2000)
     options = af.DeformOptions(field=field, **SMALL)
     alone = af.deform(samples, HANDLES, options)
     task = af.Task()
@@ -31,7 +31,7 @@ def test_a_watched_solve_shows_the_shape_and_ends_the_same(field):
 @pytest.mark.parametrize("options", [SMALL | {"field": "neural"}, {}])
 def test_the_first_shape_there_is_is_shown(options):
     """However long is to be waited between two looks."""
-    samples, task = bar_samples(), af.Task()
+    samples, task = bar_samples(2000), af.Task()
     task.watch(samples.points[:50], seconds=1000.0)
     af.deform(samples, HANDLES, af.DeformOptions(**options), task=task)
     assert task.looks == 1

@@ -47,7 +47,7 @@ sys.exit(0 if good else 1)
 """
 
     def command(self, verb, arguments):
-        return [sys.executable, "-c", self.code, verb, *arguments]
+        return [sys.executable, "-I", "-S", "-c", self.code, verb, *arguments]
 
     def environment(self, jobs):
         return dict(os.environ)
