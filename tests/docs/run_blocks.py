@@ -17,6 +17,9 @@ import arapfields as af
 LIMITS = {
     "iterations": 12,
     "width": 64,
+    "samples": 2000,
+    "centers": 100,
+    "poses": 16,
     "near_points": 20000,
     "uniform_points": 5000,
     "time_budget": 3.0,
@@ -27,6 +30,7 @@ TAKE_OPTIONS = {  # as their third argument
     "deform": "DeformOptions",
     "stylize": "StylizeOptions",
     "train_inverse": "InverseTrainingOptions",
+    "skin_weights": "SkinOptions",
 }
 
 
