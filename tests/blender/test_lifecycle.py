@@ -25,7 +25,7 @@ if IN_BLENDER:
 
 pytestmark = pytest.mark.in_blender
 
-ROUNDS = 6
+ROUNDS = 3
 STATES = ["idle", "live", "job", "counting", "drag", "prefetch"]
 
 
