@@ -13,12 +13,16 @@ if IN_BLENDER:
 
     from addon.core.runtime import jobs
     from addon.live import sessions
+    from addon.solver import setup
 
 pytestmark = pytest.mark.in_blender
 
+FEW = 600  # samples, of a ball
+
 
 def test_a_style_follows_its_sliders_without_handles():
-    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
+    setup.SAMPLES = FEW
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
     ball = bpy.context.object
     assert bpy.ops.arapfields.live(kind="STYLIZE") == {"FINISHED"}
 
@@ -65,7 +69,8 @@ def test_the_implicit_surface_follows_too():
 
 
 def test_a_live_style_follows_stiffness_rigidity_and_the_fold_barrier():
-    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
+    setup.SAMPLES = FEW
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
     ball = bpy.context.object
     style = ball.arapfields.stylize
     style.keep_stance = 0.0  # it holds a ball so well that the barrier has nothing to do
@@ -87,6 +92,7 @@ def test_a_live_style_follows_stiffness_rigidity_and_the_fold_barrier():
 
 def test_live_waits_while_the_object_of_a_style_is_still_to_be_chosen():
     """What was shown stays until it is, and then follows it."""
+    setup.SAMPLES = FEW
     bpy.ops.mesh.primitive_cube_add(size=1, location=(5, 0, 0), rotation=(0.5, 0.3, 0))
     cube = bpy.context.object
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)

@@ -7,16 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.blender.inside import require_bpy
 
 ROOT = Path(__file__).resolve().parents[2]
-MAKE = """
-import sys; sys.path[:0] = [{root!r}, {root!r} + "/tests"]
-import addon, bpy; bpy.ops.wm.read_homefile(use_empty=True); addon.register()
-from support.blender.skins import person
-body, rig = person()
-bpy.ops.wm.save_as_mainfile(filepath={path!r})
-"""
 # Without the extension: what is seen in some poses, and what the glTF exporter makes of them.
 PLAY = """
 import bpy, numpy as np, sys
@@ -58,7 +50,16 @@ if "{gltf}":
 """
 
 
-def blender(text, environment, *arguments):
+def save_person(path):
+    """In the worker."""
+    import bpy
+    from support.blender.skins import person
+
+    person()
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+
+
+def run_blender(text, environment, *arguments):
     done = subprocess.run(
         [sys.executable, "-c", text, *map(str, arguments)], env=environment, capture_output=True, text=True
     )
@@ -66,16 +67,14 @@ def blender(text, environment, *arguments):
 
 
 @pytest.fixture
-def skinned(tmp_path, user_folder):
+def skinned(blender, command, tmp_path):
     """A .blend that the command has skinned."""
-    require_bpy()
     source, target = tmp_path / "body.blend", tmp_path / "skinned.blend"
-    blender(MAKE.format(root=str(ROOT), path=str(source)), user_folder)
-    call = [sys.executable, str(ROOT / "blender_scripts/skin.py"), "-i", source, "-o", target, "--quiet"]
-    flags = ["--poses", "8", "--samples", "1000", "--correctives", "3"]
-    done = subprocess.run([*call, *flags], env=user_folder, capture_output=True, text=True)
-    assert done.returncode == 0 and "bones move Body" in done.stdout, done.stderr
-    named = subprocess.run([*call, "--armature", "X"], env=user_folder, capture_output=True, text=True)
+    blender.call(__file__, "save_person", {"path": source})
+    call = ["skin", "-i", source, "-o", target, "--quiet"]
+    done = command(*call, "--poses", 8, "--samples", 1000, "--correctives", 3)
+    assert "bones move Body" in done.stdout
+    named = command(*call, "--armature", "X", check=False)
     assert named.returncode == 2 and "--armature names one of: Rig" in named.stderr
     return target
 
@@ -105,8 +104,8 @@ def test_it_plays_bit_for_bit_without_the_extension_and_as_gltf(skinned, user_fo
     """The glTF by an independent reader, skinned in NumPy."""
     register = f"import sys; sys.path[:0] = [{str(ROOT)!r}]\nimport addon\naddon.register()\n"
     beside = PLAY.format(gltf="").replace("assert not hasattr", "assert hasattr")
-    blender(register + beside, user_folder, skinned, tmp_path / "with")
-    blender(PLAY.format(gltf="yes"), user_folder, skinned, tmp_path / "play")
+    run_blender(register + beside, user_folder, skinned, tmp_path / "with")
+    run_blender(PLAY.format(gltf="yes"), user_folder, skinned, tmp_path / "play")
     with np.load(tmp_path / "play.npz") as played, np.load(tmp_path / "with.npz") as other:
         seen = played["seen"]
         assert seen.tobytes() == other["seen"].tobytes() and np.abs(played["keys"]).max() > 0.05

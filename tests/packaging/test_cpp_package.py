@@ -42,7 +42,7 @@ def prefix(tmp_path_factory):
 def build_example(folder, *definitions, python=sys.executable, target="bend"):
     """Configures and compiles a copy of the example in `folder`; the program's path.
 
-    `python` is one whose cmeel-eigen has Eigen. The library does the work: the program itself is not optimised.
+    `python` is one whose cmeel-eigen has Eigen. The library does the work, so the program is not optimised.
     """
     shutil.copytree(EXAMPLE, folder / "source")
     ninja = ["-G", "Ninja", f"-DCMAKE_MAKE_PROGRAM={cached('CMAKE_MAKE_PROGRAM')}"]
