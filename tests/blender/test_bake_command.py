@@ -7,15 +7,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.blender.inside import IN_BLENDER
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import baking
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def save_scene(folder):
     """In the worker: scene.blend with a bar that bends from frame 1 to 5."""
-    import bpy
-    from support.blender import baking
-
     baking.saved_animation("Bar", Path(folder))
     bpy.context.scene.frame_end = 5
     bpy.ops.wm.save_mainfile()

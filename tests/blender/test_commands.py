@@ -10,8 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.blender.inside import require_bpy
+from support.blender.inside import IN_BLENDER, require_bpy
 from support.geometry import meshes
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
 
 ROOT = Path(__file__).resolve().parents[2]
 QUICK = ["--iterations", "20", "--samples", "1000", "--batch", "100", "--width", "16", "--layers", "1"]
@@ -145,9 +149,6 @@ def test_deform_a_file_under_handles(script, tmp_path):
 
 def save_bars(path):
     """In the worker: a bar with a handle that is moved, and another bar."""
-    import bpy
-    from support.blender import scenes
-
     _, _, moving = scenes.bar_with_handles()
     moving.location.z += 0.3
     scenes.bar("Other").location.y = 5
@@ -155,8 +156,6 @@ def save_bars(path):
 
 
 def check_bars(path):
-    import bpy
-
     bpy.ops.wm.open_mainfile(filepath=path)
     assert sorted(bpy.data.objects.keys()) == ["Bar", "Bar_deformed", "Fixed", "Moving", "Other"]
 

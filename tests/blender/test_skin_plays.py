@@ -7,6 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.blender.inside import IN_BLENDER
+
+if IN_BLENDER:
+    import bpy
+    from support.blender.skins import person
 
 ROOT = Path(__file__).resolve().parents[2]
 # Without the extension: what is seen in some poses, and what the glTF exporter makes of them.
@@ -52,9 +57,6 @@ if "{gltf}":
 
 def save_person(path):
     """In the worker."""
-    import bpy
-    from support.blender.skins import person
-
     person()
     bpy.ops.wm.save_as_mainfile(filepath=path)
 
