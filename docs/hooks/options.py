@@ -3,7 +3,7 @@
 
 A page says where: `<!-- settings: deform -->` for what Blender's panel shows of an operation,
 `<!-- shown: contact/properties.py -->` for what it shows of the add-on's own settings in that file,
-`<!-- flags: fit -->` for the command line's flags.
+`<!-- flags: fit -->` for the command line's flags, `<!-- buttons: addon -->` for all operators.
 """
 
 import ast
@@ -13,7 +13,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 ADDON = ROOT / "addon"
-MARK = re.compile(r"<!-- (settings|flags|shown): ([\w/]+)(?:\.py)? -->")
+MARK = re.compile(r"<!-- (settings|flags|shown|buttons): ([\w/]+)(?:\.py)? -->")
 
 
 def resolved(path=None):
@@ -37,6 +37,8 @@ def filled(markdown, table):
     makers = {"settings": settings, "flags": flags}
 
     def made(found):
+        if found[1] == "buttons":
+            return buttons()
         return shown(found[2]) if found[1] == "shown" else makers[found[1]](table[found[2]])
 
     return MARK.sub(made, markdown)
@@ -87,6 +89,23 @@ def shown(file):
         ):
             rows.setdefault(name, row(label, f"`{name}`", f"{effect}."))
     return "\n".join(["| setting | in scripts | effect |", "|---|---|---|", *rows.values()])
+
+
+def buttons():
+    """The add-on's operators, by their labels, with their tooltips."""
+    rows = []
+    for path in ADDON.rglob("*.py"):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if not isinstance(node, ast.ClassDef) or not node.name.startswith("ARAPFIELDS_OT_"):
+                continue
+            named = {
+                ast.unparse(each.targets[0]): each.value for each in node.body if isinstance(each, ast.Assign)
+            }
+            label, tip = getattr(named.get("bl_label"), "value", ""), ast.get_docstring(node) or ""
+            call = f"`{node.name.removeprefix('ARAPFIELDS_OT_')}`"
+            if label and "INTERNAL" not in ast.dump(node):
+                rows.append(row(label, call, " ".join(tip.split()) + "."))
+    return "\n".join(["| button | `bpy.ops.arapfields.` | effect |", "|---|---|---|", *sorted(rows)])
 
 
 def declarations(tree):

@@ -99,7 +99,9 @@ def test_a_search_finds_each_setting_by_its_label_in_blender():
         if "propert" in path.stem or path.parent.name == "properties" or path.stem == "preferences":
             file = str(path.relative_to(pages.ROOT / "addon").with_suffix(""))
             labels |= {line.split(" | ")[0].strip("| ") for line in options.shown(file).splitlines()[2:]}
-    assert len(labels) > 60 and not [label for label in labels if label not in guide]
+    buttons = re.findall(r"^\| (.*?) \| `(\w+)` \| \w", options.buttons(), re.M)
+    assert len(labels) > 60 and len(buttons) > 40
+    assert not [label for label in (*labels, *dict(buttons)) if label not in guide]
 
 
 def test_the_list_of_headers_is_filled():
