@@ -105,7 +105,7 @@ def buttons():
             call = f"`{node.name.removeprefix('ARAPFIELDS_OT_')}`"
             if label and "INTERNAL" not in ast.dump(node):
                 rows.append(row(label, call, " ".join(tip.split()) + "."))
-    return "\n".join(["| button | `bpy.ops.arapfields.` | effect |", "|---|---|---|", *sorted(rows)])
+    return "\n".join(["| button | in scripts | effect |", "|---|---|---|", *sorted(rows)])
 
 
 def declarations(tree):
