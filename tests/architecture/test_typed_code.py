@@ -141,7 +141,7 @@ def checked(tmp_path_factory):
         files[name].write_text(text)
     # Packages without types (bpy, matplotlib) are taken as they come.
     command = [sys.executable, "-m", "mypy", "--strict", "--no-error-summary", "--ignore-missing-imports"]
-    command += ["--cache-dir", str(folder / "cache"), *map(str, files.values())]
+    command += ["--cache-dir", str(ROOT / "build" / "mypy"), *map(str, files.values())]
     environment = {k: v for k, v in os.environ.items() if k not in ("MYPYPATH", "PYTHONPATH")}
     done = subprocess.run(command, capture_output=True, text=True, cwd=folder, env=environment)
     assert done.returncode == 1 and not done.stderr, done.stdout + done.stderr  # what is wrong is found

@@ -31,7 +31,7 @@ int main(int argc, char** argv) try {
   const Eigen::AngleAxisd turn(std::numbers::pi / 3, af::Vec3::UnitX());
   turned.target = (Eigen::Affine3d(turn) * Eigen::Affine3d(turned.rest)).matrix();
 
-  const af::SurfaceSamples samples = af::sample_mesh(mesh.vertices, mesh.triangles, 20000, 0);
+  const af::SurfaceSamples samples = af::sample_mesh(mesh.vertices, mesh.triangles, 5000, 0);
   af::DeformOptions options;
   options.field = af::FieldKind::radial;
   const af::Solution bent = af::deform(samples, {held, turned}, options);
