@@ -13,6 +13,7 @@ if IN_BLENDER:
 
     from addon.live import sessions
     from addon.pin_tool import drag
+    from addon.solver import setup
 
 pytestmark = pytest.mark.in_blender
 
@@ -20,6 +21,7 @@ ROUNDS = 2
 
 
 def test_rounds_of_undo_and_redo_are_exact():
+    setup.SAMPLES = 500
     scenes.bar()
     bpy.context.preferences.edit.use_global_undo = True
     states = []

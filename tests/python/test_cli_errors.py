@@ -4,11 +4,18 @@
 import json
 import signal
 import subprocess
-import time
 from pathlib import Path
 
 import pytest
-from support.programs.cli import HELD_AND_SHIFTED, SMALL_SOLVE, bad_meshes, process, run, write_octahedron
+from support.programs.cli import (
+    HELD_AND_SHIFTED,
+    SMALL_SOLVE,
+    bad_meshes,
+    process,
+    run,
+    wait_until_at_work,
+    write_octahedron,
+)
 
 VERBS = {
     "fit": ["--output", "out.safetensors"],
@@ -154,7 +161,7 @@ def test_interrupt_cancels_and_leaves_nothing(folder):
     command, environment = process("deform", "mesh.obj", *arguments)
     running = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
     try:
-        time.sleep(4.0)
+        wait_until_at_work(running)
         assert running.poll() is None, running.stderr.read()
         running.send_signal(signal.SIGINT)
         _, printed = running.communicate(timeout=30)

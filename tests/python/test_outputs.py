@@ -6,7 +6,6 @@ import re
 import stat
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,15 @@ import pytest
 from support.blender.inside import require_bpy
 from support.files import archives
 from support.files.full_disk import files_of_at_most
-from support.programs.cli import HELD_AND_SHIFTED, SMALL_FIT, SMALL_SOLVE, process, run, write_octahedron
+from support.programs.cli import (
+    HELD_AND_SHIFTED,
+    SMALL_FIT,
+    SMALL_SOLVE,
+    process,
+    run,
+    wait_until_at_work,
+    write_octahedron,
+)
 
 import arapfields as af
 from arapfields._files import whole_file, write_text
@@ -222,7 +229,7 @@ def test_a_killed_verb_leaves_nothing_that_stays(tmp_path):
         10**6,
     )
     running = subprocess.Popen(command, env=environment)
-    time.sleep(3.0)
+    wait_until_at_work(running)
     running.kill()
     running.wait()
     write_text(tmp_path / "o.obj", "x")

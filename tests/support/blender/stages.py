@@ -13,6 +13,7 @@ from addon.core.runtime import jobs
 from addon.core.runtime.coroutines import Pause
 from addon.deform.operators import ARAPFIELDS_OT_deform
 from addon.live import sessions
+from addon.solver import setup
 
 LIFT = 0.4  # of the moving handle, in the height of the world
 WAIT = 30  # seconds for a live shape
@@ -69,6 +70,7 @@ class Stage:
         self.name = name
 
     def begin(self):
+        setup.SAMPLES = 500
         bar, _, moving = scenes.bar_with_handles()
         for name, value in scenes.QUICK.items():
             setattr(bar.arapfields.deform, name, value)

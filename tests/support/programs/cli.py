@@ -3,6 +3,7 @@
 
 import os
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,14 @@ def process(*arguments):
     places = [str(Path(arapfields.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
     command = [sys.executable, "-m", "arapfields", *(str(argument) for argument in arguments)]
     return command, {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, places))}
+
+
+def wait_until_at_work(running):
+    """Sleeps until a process has loaded the library and gone on for a while."""
+    maps = Path(f"/proc/{running.pid}/maps")  # Linux alone has it
+    while maps.exists() and "_native" not in maps.read_text() and running.poll() is None:
+        time.sleep(0.05)
+    time.sleep(1.5 if maps.exists() else 3.0)
 
 
 def write_octahedron(path, quads=False):
