@@ -1,20 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Gaussian splats as importers leave them: posed live, their attributes by the modifier."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
+    from mathutils import Matrix
     from support.blender import scenes
     from support.blender.live import step
     from support.blender.pins import pin
 
     import arapfields as af
+    from addon.core.geometry.spaces import transform
     from addon.field_modifier import motion
     from addon.live import sessions
-    from addon.pin_tool import screen
+    from addon.pin_tool import hover, screen
 
 pytestmark = pytest.mark.in_blender
 
@@ -63,11 +67,8 @@ def own_values(splats):
 
 def kind_of(key, column):
     """(type of an attribute, name of its values)"""
-    if column.ndim == 1:
-        return "FLOAT", "value"
-    return {"rotation": ("QUATERNION", "value"), "radiance:base": ("FLOAT_COLOR", "color")}.get(
-        key, ("FLOAT_VECTOR", "vector")
-    )
+    plain = ("FLOAT", "value") if column.ndim == 1 else ("FLOAT_VECTOR", "vector")
+    return {"rotation": ("QUATERNION", "value"), "radiance:base": ("FLOAT_COLOR", "color")}.get(key, plain)
 
 
 def scan(splats, values, data="MESH"):
@@ -181,14 +182,22 @@ def test_the_splat_nearest_to_the_viewer_is_pinned_and_dragged():
     for entry in list(item.arapfields.handles):
         bpy.data.objects.remove(entry.empty)
     item.arapfields.handles.clear()
+    item.matrix_world = Matrix.Translation((0, 0, 0.3)) @ Matrix.Rotation(0.1, 4, "Z")
+    bpy.context.view_layer.update()
     rest = places(item)
-    perspective = np.array([[2, 0, 0, 0], [0, 0, 2, 0], [0, 1, 0, 2.9], [0, 1, 0, 3]])
-    spot = screen.project(perspective, (400, 400), rest[7:8])[0]
-    pixels = screen.project(perspective, (400, 400), rest)
-    met = screen.foremost(perspective, (400, 400), rest, (0, -1, 0), spot, 20)
-    near = np.linalg.norm(pixels - spot, axis=1) <= 20
-    assert near[met] and rest[met, 1] == rest[near, 1].min() < rest[near, 1].max()
-    assert screen.foremost(perspective, (400, 400), rest, (0, -1, 0), (5, 5), 20) == -1
+    seen = transform(np.array(item.matrix_world), rest)
+    perspective, size = np.array([[2, 0, 0, 0], [0, 0, 2, 0], [0, 1, 0, 2.9], [0, 1, 0, 3]]), (400, 400)
+    pixels = screen.project(perspective, size, seen)
+    view = SimpleNamespace(perspective=perspective, size=size, scale=3.0, towards=(0, -1, 0), pixel=pixels[7])
+    met = hover.splat_under(bpy.context, view)
+    near = np.linalg.norm(pixels - view.pixel, axis=1) <= hover.SPLAT_REACH * view.scale
+    front = seen[near][seen[near, 1].argmin()]
+    assert met.kind == "SURFACE" and met.source.get() == item and np.ptp(seen[near, 1]) > 0.3
+    assert np.abs(met.location - front).max() < 1e-6
+    view.pixel = (5, 5)
+    assert hover.splat_under(bpy.context, view) is None
+    item.matrix_world = Matrix()
+    bpy.context.view_layer.update()
     held, end = rest[rest[:, 0].argmin()], rest[rest[:, 0].argmax()]
     pin(item, held)
     pin(item, end + 0.01, target=end + np.array([0.0, 0.0, 0.5]))
