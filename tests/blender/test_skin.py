@@ -15,7 +15,7 @@ if IN_BLENDER:
 
 pytestmark = pytest.mark.in_blender
 
-QUICK = {"poses": 16, "samples": 1500}
+QUICK = {"poses": 8, "samples": 800}
 
 
 def posed(rig, **turns):

@@ -79,7 +79,7 @@ def test_strength_means_the_same_for_all_styles():
     samples = ball()
 
     def closed(style, **options):
-        how = af.StylizeOptions(field="radial", iterations=60, strength=0.5, **options)
+        how = af.StylizeOptions(field="radial", iterations=40, strength=0.5, **options)
         sharpness = options.get("sharpness", 0.0)
         preferred = af.preferred_normals(style)
         before = af.gauss_preference(samples.normals, preferred, sharpness=sharpness).mean()

@@ -9,7 +9,7 @@ from support.geometry.characters import Capsules
 
 import arapfields as af
 
-SMALL = {"centers": 50, "stages": 3, "iterations": 10, "samples": 1500}
+SMALL = {"centers": 50, "stages": 3, "iterations": 6, "samples": 1000}
 
 
 def bar_and_target():
