@@ -64,7 +64,7 @@ def soup_of(item):
     return soup
 
 
-def scan_of(parts, noise=0.004, resolution=96, lost=0.03):
+def scan_of(parts, noise=0.004, resolution=64, lost=0.03):
     """Loose, noisy triangles with holes of a body of capsules."""
     shape = Capsules(parts, af.Frame([0, 0, 1.0], 1.25))
     vertices, triangles = af.extract_surface(shape, resolution=resolution)[:2]
