@@ -11,7 +11,7 @@ MOST_OVER_SOFT = 1.2
 
 
 def test_the_price_of_a_bar():
-    samples = cases.bar_samples(8000)
+    samples = cases.bar_samples(3000)
     energies = [
         af.deform(samples, cases.bar_handles(), af.DeformOptions(exact_handles=exact, centers=300)).report
         for exact in (False, True)

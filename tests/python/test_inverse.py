@@ -185,7 +185,7 @@ class Turtle(af.ImplicitFunction):
 def test_every_point_of_a_styled_turtle_comes_back(style):
     """Where thin parts lie close together, the nearest image is not of the nearest part."""
     rest, triangles = af.extract_surface(Turtle(), 72)
-    samples = af.sample_mesh(rest, triangles, 2000)
+    samples = af.sample_mesh(rest, triangles, 1200)
     field = af.stylize(samples, style, af.StylizeOptions(field="radial", strength=0.3))
     images = field(rest)
     found = field.inverse(images)
