@@ -151,9 +151,9 @@ def run():
     rows = []
     settings = {
         "radial": (dict(field="radial"), (8, 16, 32)),
-        "neural 4x256": ({}, (40, 60, 80, 120)),
-        "neural 4x128": (dict(width=128), (40, 60, 80, 120)),
-        "neural 4x256, Adam": (dict(optimizer="adam"), (80, 120, 160, 240)),
+        "neural 4x256": (dict(field="neural"), (40, 60, 80, 120)),
+        "neural 4x128": (dict(field="neural", width=128), (40, 60, 80, 120)),
+        "neural 4x256, Adam": (dict(field="neural", optimizer="adam"), (80, 120, 160, 240)),
     }
     for name, (options, counts) in settings.items():
 

@@ -58,15 +58,15 @@ def drag_row(name, neural, rounds=3, **options):
 
 
 def neural_field(name):
-    return af.deform(samples(name), handles(name, FULL), af.DeformOptions(iterations=NEURAL_ITERATIONS))
+    options = af.DeformOptions(field="neural", iterations=NEURAL_ITERATIONS)
+    return af.deform(samples(name), handles(name, FULL), options)
 
 
 def polish_row(name, neural, iterations=NEURAL_ITERATIONS // 3):
     """A network that starts from the radial field, against one that starts from rest."""
     with Clock() as clock:
-        field = af.deform(
-            samples(name), handles(name, FULL), af.DeformOptions(start="radial", iterations=iterations)
-        )
+        options = af.DeformOptions(field="neural", start="radial", iterations=iterations)
+        field = af.deform(samples(name), handles(name, FULL), options)
     return {
         "what": f"{label(name)}: neural polish of the radial field, {iterations} iterations",
         "energy": round(field.report.energy, 4),

@@ -117,7 +117,7 @@ def finger_row(finger, motion, degrees, field=None):
         field = live.solve(iterations=100, tolerance=1e-5)
         energy, name = live.report.energy, "radial"
     else:
-        trained = af.deform(surface_samples, pair, af.DeformOptions(iterations=300))
+        trained = af.deform(surface_samples, pair, af.DeformOptions(field="neural", iterations=300))
         energy, name, field = trained.report.energy, field, trained
     row = {
         "what": f"{label('hand')}, % of its length: {finger} {motion} {abs(degrees)} degrees",

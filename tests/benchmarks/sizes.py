@@ -44,7 +44,8 @@ def measured(prepare, work):
 def run():
     shapes.layers("bunny")  # if it has to be fitted, then now
     bunny = "shapes.samples('bunny', 30000)"
-    solve = "af.deform(samples, shapes.handles('bunny', shapes.FULL), af.DeformOptions(iterations=5, {}))"
+    options = "af.DeformOptions(field='neural', iterations=5, {})"
+    solve = f"af.deform(samples, shapes.handles('bunny', shapes.FULL), {options})"
     warm = solve.format("batch=8")
     rows = []
     for count in SAMPLES:

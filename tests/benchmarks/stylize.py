@@ -19,8 +19,8 @@ def good(field):
 def run():
     samples = shapes.samples("spot")
     settings = {
-        "neural 4x256": ({}, (60, 80, 100, 140, 200, 300)),
-        "neural 4x128": (dict(width=128), (60, 80, 100, 140, 200, 300)),
+        "neural 4x256": (dict(field="neural"), (60, 80, 100, 140, 200, 300)),
+        "neural 4x128": (dict(field="neural", width=128), (60, 80, 100, 140, 200, 300)),
         "radial": (dict(field="radial"), (10, 20, 40)),
     }
     rows = []
