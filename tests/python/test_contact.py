@@ -13,6 +13,7 @@ from arapfields.__main__ import main
 
 QUICK = af.LiveOptions(samples=800, coarse_centers=30, fine_centers=150)
 DEEPEST = 0.004  # 0.1 % of the bar's length
+ALIKE = 0.04  # 1 % of it: what is left where a solve ends a little earlier
 DOWN = turned(0, shift=(0, 0, -0.9))
 DEEP = [LEFT, DOWN @ RIGHT]
 
@@ -45,14 +46,14 @@ def live(samples, contact=None):
     return af.LiveDeformer(samples, [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)], QUICK, contact=contact)
 
 
-UNSETTLED = pytest.mark.xfail(af.backend() == "eigen", reason="sheets do not settle with every rounding yet")
-
-
-@pytest.mark.parametrize("function", [BALL, BLOCK, PLATE, pytest.param(SHEET, marks=UNSETTLED), Plane()])
+@pytest.mark.parametrize("function", [BALL, BLOCK, PLATE, SHEET, Plane()])
 def test_nothing_is_inside_an_obstacle(samples, function):
     pressed = live(samples, af.Contact([af.Obstacle(function)]))
     field = pressed.solve(DEEP, iterations=60, tolerance=1e-4)
     moved, points = field(samples.points), bar_samples(5000, seed=1).points
+    rounded = live(samples, af.Contact([af.Obstacle(function)]))
+    other = rounded.solve([LEFT, turned(0, shift=(0, 0, 1e-9)) @ DEEP[1]], iterations=60, tolerance=1e-4)
+    assert np.abs(other(samples.points) - moved).max() < ALIKE
     depth = -np.asarray(function(field(points)))
     if function is SHEET:
         depth = np.where(field(points)[:, 0] > 0, -0.8 - field(points)[:, 2], 0)
@@ -196,23 +197,25 @@ def test_no_vertex_of_many_is_deep(name):
     assert row["deep"] < 0.1 and row["flipped"] == 0
 
 
-@UNSETTLED
 def test_a_plate_that_moves_faster_than_it_is_thick_takes_the_shape_along(samples):
     """The plate is 0.03 thick and rises by 0.2 a frame."""
-    swept = live(samples, af.Contact([af.Obstacle(PLATE, placement=turned(0, shift=(0, 0, -0.2)))]))
-    swept.set_handles([af.Cuboid(LEFT, LEFT)])
-    swept.solve()
-    for k in range(5):
-        rise = 0.2 * k - 0.2
-        swept.set_contact(af.Contact([af.Obstacle(PLATE, placement=turned(0, shift=(0, 0, rise)))]))
-        field = swept.solve(iterations=20)
-    points = field(samples.points)
-    over = points[:, 0] > 0.05
-    assert over.sum() > 4000 and points[over, 2].min() > -0.8 + rise - 2 * DEEPEST
+    ends = []
+    for rounding in (0.0, 1e-12):
+        swept = live(samples, af.Contact([af.Obstacle(PLATE, placement=turned(0, shift=(0, 0, -0.2)))]))
+        swept.set_handles([af.Cuboid(LEFT, LEFT)])
+        swept.solve()
+        for k in range(5):
+            rise = 0.2 * k - 0.2 + rounding
+            swept.set_contact(af.Contact([af.Obstacle(PLATE, placement=turned(0, shift=(0, 0, rise)))]))
+            field = swept.solve(iterations=20)
+        ends.append(field(samples.points))
+    over = ends[0][:, 0] > 0.05
+    assert over.sum() > 4000 and ends[0][over, 2].min() > -0.8 + rise - 2 * DEEPEST
+    assert np.abs(ends[1] - ends[0]).max() < ALIKE and swept.report.energy < 0.01
 
 
 def test_friction_holds_what_slides(samples):
-    """A bar that lies on the ground, pushed by gravity along a slope."""
+    """A bar falls by 0.01 onto the ground, a slope of 0.2, which holds it with a coefficient of 0.5."""
     ways = []
     for friction in (0.0, 0.5):
         free = af.LiveOptions(samples=800, coarse_centers=30, fine_centers=150, handle_weight=1e-6)
@@ -224,7 +227,7 @@ def test_friction_holds_what_slides(samples):
         for _ in range(12):
             field = resting.step(None, 1 / 24)
         ways.append(field(samples.points)[:, 0].mean() - samples.points[:, 0].mean())
-    assert ways[0] > 0.3 and abs(ways[1]) < 0.4 * ways[0]
+    assert ways[0] > 0.6 and abs(ways[1]) < 0.03
 
 
 def test_a_report_is_of_the_planes_found_last():

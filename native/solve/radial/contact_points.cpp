@@ -20,6 +20,8 @@ constexpr Index most_finer = 12000;
 constexpr double finer_density = 12.0, reach = 2.2;
 /// Cosine of the normals of neighbours on one side.
 constexpr double same_side = 0.5;
+/// How far beyond a sharp edge of the shape, in spacings, a finer place may lie.
+constexpr double over_edge = 0.05;
 /// Neighbours that a surface of second degree is fitted to, at least.
 constexpr Index least_fitted = 5;
 
@@ -76,8 +78,10 @@ const std::vector<Index>& ContactPoints::neighbours(Index sample) {
 /// surface of second degree through its neighbours.
 Points ContactPoints::finer(Index sample) {
   const Vec3 at = rest_.row(sample).transpose();
-  const Vec3 normal =
-      problem_.samples.normals.row(samples_[static_cast<std::size_t>(sample)]).transpose().normalized();
+  const auto normal_at = [&](Index i) -> Vec3 {
+    return problem_.samples.normals.row(samples_[static_cast<std::size_t>(i)]).transpose().normalized();
+  };
+  const Vec3 normal = normal_at(sample);
   const Vec3 first = normal.unitOrthogonal(), second = normal.cross(first);
   const std::vector<Index>& around = neighbours(sample);
   Mat3 gram = Mat3::Zero();
@@ -96,6 +100,19 @@ Points ContactPoints::finer(Index sample) {
     gram.diagonal().array() += 1e-3 * gram.trace();
     bend = solve_definite(gram, right);
   }
+  std::vector<Index> sides;  // nearby ones of another side
+  grid_->near(cells_[static_cast<std::size_t>(sample)], [&](Index cell) {
+    for (const Index i : grid_->rows(cell))
+      if ((rest_.row(i) - rest_.row(sample)).norm() < 2.0 * reach * spacing_ &&
+          normal.dot(normal_at(i)) <= same_side)
+        sides.push_back(i);
+  });
+  const auto off_the_surface = [&](const Vec3& place) {  // past a sharp edge of it
+    return std::any_of(sides.begin(), sides.end(), [&](Index i) {
+      const Vec3 arm = place - rest_.row(i).transpose();
+      return arm.norm() < reach * spacing_ && arm.dot(normal_at(i)) > over_edge * spacing_;
+    });
+  };
   std::vector<Vec3> places;
   const double density = finer_density / (spacing_ * spacing_);
   const auto count = static_cast<int>(std::numbers::pi * reach * reach * finer_density);
@@ -106,9 +123,9 @@ Points ContactPoints::finer(Index sample) {
     bool nearest = true;
     for (Index j = 1; j < flat.rows() && nearest; ++j)
       nearest = (flat.row(j) - Eigen::RowVector2d(a, b)).squaredNorm() > radius * radius;
-    if (nearest)
-      places.push_back(at + a * first + b * second +
-                       (bend[0] * a * a + bend[1] * a * b + bend[2] * b * b) * normal);
+    const Vec3 place =
+        at + a * first + b * second + (bend[0] * a * a + bend[1] * a * b + bend[2] * b * b) * normal;
+    if (nearest && !off_the_surface(place)) places.push_back(place);
   }
   Points result(static_cast<Index>(places.size()), 3);
   for (std::size_t k = 0; k < places.size(); ++k) result.row(static_cast<Index>(k)) = places[k].transpose();

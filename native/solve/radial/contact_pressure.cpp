@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // How hard a surface presses on the planes that were found, and obstacles that move.
 #include <algorithm>
+#include <cmath>
 
 #include "solve/radial/contact_terms.h"
 #include "solve/radial/handle_motion.h"
@@ -8,14 +9,12 @@
 namespace arapfields {
 namespace {
 
-/// Factor on what a depth adds to a pressure: fewer rounds, and below 2 they converge.
-constexpr double relaxed = 1.8;
+/// Pressures grow by no deeper gaps, in cube units: a solve that has only begun says little of forces.
+constexpr double shallow = 0.01;
 /// Of stiffness, where depths do not fall.
 constexpr double harder = 4.0, hardest = 3e6;
 /// So far, in cube units, from a plane its mean pressure vanishes: a softer plane keeps what left it away.
 constexpr double hover = 2e-3;
-/// Pressures grow by no deeper gaps, in cube units: a solve that has only begun says little of forces.
-constexpr double shallow = 0.01;
 /// Forces farther than this from a handle, in cube units, count less.
 constexpr double handle_reach = 0.2;
 
@@ -102,13 +101,18 @@ Points ContactTerms::forces_at(const Vec3& place, const double* places) const {
   return forces;
 }
 
-void ContactTerms::press(const double* places) {
+double ContactTerms::press(const double* places, const Vector& shares) {
+  double change = 0.0, most = 0.0;
   for (ContactPlane& plane : found_.planes) {
+    const double before = plane.pressure;
     const double gap = std::max(-shallow, plane.gap(places));
-    plane.pressure = plane.pressed(gap, gap < 0.0 ? relaxed * found_.stiffness : found_.stiffness);
+    plane.pressure = shares[plane.obstacle] * plane.pressed(gap, found_.stiffness);
     pressures_(found_.rows[static_cast<std::size_t>(plane.first)], plane.obstacle) = plane.pressure;
+    change += plane.share * std::abs(plane.pressure - before);
+    most += plane.share * std::max(plane.pressure, before);
   }
   if (grips_) grip();
+  return most > 0.0 ? change / most : 0.0;
 }
 
 void ContactTerms::grip() {

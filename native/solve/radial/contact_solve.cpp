@@ -20,10 +20,16 @@ constexpr double obstacle_step = 0.02;
 constexpr Index steps_on_the_way = 3, steps_between = 6;
 /// A surface may be so deep beyond a margin, in cube units.
 constexpr double deep = 5e-4;
-/// Depths, in cube units, that stiffer planes bring out; deeper ones are still on their way.
+/// Pushes at the end, while something is deeper, but not so deep that it is still on its way.
+constexpr int most_pushes = 6;
 constexpr double nearly = 0.01;
 /// Rounds beyond the iterations that were asked for, while something is deeper.
-constexpr Index more_rounds = 2;
+constexpr Index more_rounds = 4;
+/// Planes become stiffer where a round leaves more than this share of a depth.
+constexpr double still_comes_out = 0.8;
+/// A round that ends so deep, in cube units, is taken back by halves, so many times at most.
+constexpr double too_deep = 0.03;
+constexpr int most_halves = 4;
 /// Handles farther from their targets against a force, in cube units, are held back.
 constexpr double held_back = 0.02;
 /// What single precision cannot see of an energy.
@@ -34,12 +40,44 @@ Points contact_places(RadialState& s) {
   return s.fast.objective.latest()->contact_values(u).cast<double>();
 }
 
-/// Descends, and updates the pressures. Whether the descent converged.
+/// Finds the planes near the surface, and brings it beyond them as long as it is deep.
+double find_and_push(RadialState& s, int pushes, double from) {
+  double depth = s.contact.find(s.shape.coefficients);
+  s.objective(s.fast);
+  for (int push = 0; push < pushes && depth > deep && depth < from; ++push) {
+    const RowMatrix<double> before = s.shape.coefficients;
+    push_out(s);
+    const double next = s.contact.find(s.shape.coefficients);
+    const bool worse = next >= depth;
+    if (worse) {
+      s.shape.coefficients = before;
+      ++s.shape.revision;
+      s.contact.find(s.shape.coefficients);
+    }
+    s.objective(s.fast);
+    if (worse) break;
+    depth = next;
+  }
+  return depth;
+}
+
+/// Descends, and updates the pressures. Whether the descent converged. Goes back where that meets what was
+/// not near before.
 bool solve_round(RadialState& s, Index iterations, double tolerance, const Progress& progress) {
   stiffen_contact(s);
+  const RowMatrix<double> before = s.shape.coefficients;
+  const double allowed = std::max(too_deep, s.contact.deepest());
   const bool converged = s.descend(s.fast, {iterations, tolerance, floor}, progress).converged;
-  press_contact(s);
-  return converged;
+  press_as_answered(s);
+  double depth = s.contact.find(s.shape.coefficients);
+  bool back = false;
+  for (int half = 0; half < most_halves && depth > allowed; ++half) {
+    back = true;
+    s.shape.coefficients = 0.5 * (s.shape.coefficients + before);
+    ++s.shape.revision;
+    depth = s.contact.find(s.shape.coefficients);
+  }
+  return converged && !back;
 }
 
 /// How the surface touches, and which handles are kept from their targets.
@@ -71,37 +109,40 @@ void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Inde
   s.precondition(0.0);
   Index left = iterations;
   double before_it = std::numeric_limits<double>::infinity();
+  s.contact.find(s.shape.coefficients);
   for (Index k = 1; k <= steps; ++k) {
     const Points targets =
         s.handles.targets_between(before, static_cast<double>(k) / static_cast<double>(steps));
     for (Index extra = more_rounds;;) {
-      s.contact.find(s.shape.coefficients);
       s.objective(s.fast).set_targets(targets);
       const Index at_once = k < steps ? steps_on_the_way : std::clamp<Index>(left, 2, steps_between);
       const bool converged = solve_round(s, at_once, tolerance, progress);
       if (k < steps) break;
       left -= at_once;
-      const double depth = s.contact.find(s.shape.coefficients);
+      const double depth = s.contact.deepest();
       if (converged && depth < deep) break;
-      s.contact.harden(depth > deep && depth < nearly && depth > 0.5 * before_it);
+      s.contact.harden(depth > deep && depth < nearly && depth > still_comes_out * before_it);
       before_it = depth;
       if (left <= 0 && (depth < deep || extra-- == 0)) break;
     }
   }
+  find_and_push(s, most_pushes, nearly);
 }
 
 /// Takes obstacles that have moved to where they are now, and the surface along.
 void sweep(RadialState& s, double tolerance, const Progress& progress) {
+  if (s.contact.obstacle_way() == 0.0) return;
   const auto wanted = static_cast<Index>(std::ceil(s.contact.obstacle_way() / obstacle_step));
   const Index parts = std::clamp<Index>(wanted, 1, most_steps);
-  if (parts > 1) s.precondition(0.0);
-  for (Index k = 1; k < parts; ++k) {
-    s.contact.move_obstacles(static_cast<double>(k) / static_cast<double>(parts));
-    if (s.contact.find(s.shape.coefficients) <= 0.0) continue;
-    s.objective(s.fast);
-    solve_round(s, steps_on_the_way, tolerance, progress);
+  s.precondition(0.0);
+  for (Index k = 1; k <= parts; ++k) {
+    if (k < parts)
+      s.contact.move_obstacles(static_cast<double>(k) / static_cast<double>(parts));
+    else
+      s.contact.move_obstacles(1.0);
+    find_and_push(s, 1, too_deep);
+    if (k < parts && s.contact.presses()) solve_round(s, steps_on_the_way, tolerance, progress);
   }
-  s.contact.move_obstacles(1.0);
 }
 
 void back_to(RadialState& s, const RowMatrix<double>& coefficients) {
@@ -133,9 +174,9 @@ bool is_deep(RadialState& s) {
                      [&](const ContactPlane& p) { return p.gap(places.data()) < -3.0 * deep; });
 }
 
-bool press_contact(RadialState& s) {
-  if (s.contact.presses()) s.contact.press(contact_places(s).data());
-  return s.contact.touching() > 0.0;
+double press_contact(RadialState& s) {
+  if (!s.contact.presses()) return 0.0;
+  return s.contact.press(contact_places(s).data(), Vector::Ones(s.contact.surface_count()));
 }
 
 void follow_in_contact(RadialState& s, Index iterations, double tolerance,
@@ -146,13 +187,18 @@ void follow_in_contact(RadialState& s, Index iterations, double tolerance,
     before = motions_of(s.handles.bound());
     if (s.shape.coefficients == s.problem.basis.identity()) before.assign(before.size(), Mat4::Identity());
   }
+  const bool pressed = s.contact.presses();
+  s.contact.find(s.shape.coefficients);
+  if (s.contact.deepest_outside() > too_deep) {
+    back_to(s, s.problem.basis.identity());  // what was not followed here is followed from rest
+    before.assign(before.size(), Mat4::Identity());
+  }
   const Points from = s.handles.targets_between(before, 0.0);
   const double way = (s.handles.targets_between(before, 1.0) - from).rowwise().norm().maxCoeff();
   const double length = s.contact.itself() ? step_length_itself : step_length;
   RowMatrix<double> start;  // where parts were pushed apart that a free solve let overlap
   const bool leaps = s.contact.only_itself() && way > length;  // the way back may be another one
-  if (leaps ||
-      (!s.contact.presses() && s.contact.find(s.shape.coefficients) <= 0.0 && !s.contact.touches_itself())) {
+  if (leaps || (!pressed && s.contact.deepest() <= 0.0 && !s.contact.touches_itself())) {
     s.contact.release();
     start = s.shape.coefficients;
     freely();

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "fields/radial_evaluator.h"
-#include "sampling/sample_choice.h"
 #include "tensors/dense.h"
 
 namespace arapfields {
@@ -34,44 +32,26 @@ ContactStiffness::ContactStiffness(const RadialBasis& basis, const ContactSet& s
   }
   const Index all = std::ssize(springs), count = std::min<Index>(all, most_planes);
   if (count == 0) return;
-  std::vector<Index> first(static_cast<std::size_t>(count));
-  normals_.resize(count, 3);
+  std::vector<const ContactPlane*> planes;
+  RowMatrix<double> along(count, 3);
   Vector softness(count);
-  const auto pick = [&](Index i) -> const Spring& {
-    return springs[static_cast<std::size_t>(i * all / count)];
-  };
   for (Index i = 0; i < count; ++i) {
-    first[static_cast<std::size_t>(i)] = pick(i).plane->first;
-    normals_.row(i) = pick(i).along.transpose();
-    softness[i] = 2.0 * static_cast<double>(count) / (static_cast<double>(all) * pick(i).stiffness);
+    const Spring& spring = springs[static_cast<std::size_t>(i * all / count)];
+    planes.push_back(spring.plane);
+    along.row(i) = spring.along.transpose();
+    softness[i] = 2.0 * static_cast<double>(count) / (static_cast<double>(all) * spring.stiffness);
   }
-  RowMatrix<double> values = radial_rows(basis, rows_of(set.places, first), JetOrder::value);
-  std::vector<Index> carrying, carriers;
-  for (Index i = 0; i < count; ++i)
-    if (pick(i).plane->second >= 0) carrying.push_back(i), carriers.push_back(pick(i).plane->second);
-  if (!carriers.empty())
-    values(carrying, Eigen::all) -= radial_rows(basis, rows_of(set.places, carriers), JetOrder::value);
-  rows_.resize(count, basis.size());
-  for (Index i = 0; i < count; i += 3) {
-    const Index some = std::min<Index>(3, count - i);
-    PointsF columns = PointsF::Zero(basis.size(), 3);
-    columns.leftCols(some) = values.middleRows(i, some).transpose().cast<float>();
-    rows_.middleRows(i, some) = inverse_factor.times(columns).leftCols(some).transpose();
-  }
-  RowMatrix<float> products(count, count);
-  lower_gram<float>(Transpose::no, rows_, 0.0f, products);
-  RowMatrix<double> matrix = products.cast<double>().cwiseProduct(normals_ * normals_.transpose());
+  rows_.add(basis, set, planes, along, inverse_factor);
+  RowMatrix<double> matrix = rows_.compliance();
   matrix.diagonal() += softness;
   factor_ = cholesky<double>(matrix);
 }
 
 void ContactStiffness::apply(PointsF& y) const {
-  if (rows_.rows() == 0) return;
-  const PointsF along = rows_ * y;
-  Vector pull = along.cast<double>().cwiseProduct(normals_).rowwise().sum();
-  pull = factor_.triangularView<Eigen::Lower>().solve(pull);
+  if (rows_.size() == 0) return;
+  Vector pull = factor_.triangularView<Eigen::Lower>().solve(rows_.along(y));
   pull = factor_.transpose().triangularView<Eigen::Upper>().solve(pull);
-  y -= rows_.transpose() * (pull.asDiagonal() * normals_).cast<float>();
+  y -= rows_.pull(pull);
 }
 
 }  // namespace arapfields

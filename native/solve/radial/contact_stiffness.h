@@ -1,12 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <vector>
-
-#include "core/tall_product.h"
-#include "energies/contact.h"
-#include "fields/radial_basis.h"
-#include "solve/radial/contact_terms.h"
+#include "solve/radial/contact_rows.h"
 
 namespace arapfields {
 
@@ -21,9 +16,8 @@ class ContactStiffness {
   void apply(PointsF& y) const;
 
  private:
-  RowMatrix<float> rows_;      // (planes, size) L⁻¹ b of each plane's basis values b
-  RowMatrix<double> normals_;  // (planes, 3)
-  RowMatrix<double> factor_;   // Cholesky factor of 2/(stiffness·share) + rows·rowsᵀ ∘ normals·normalsᵀ
+  ContactRows rows_;
+  RowMatrix<double> factor_;  // Cholesky factor of 2/(stiffness·share) + their compliance
 };
 
 }  // namespace arapfields

@@ -27,6 +27,9 @@ constexpr double smooth = 0.9;
 constexpr double kept = 1.5e-3;
 /// More from the shape itself, of which the samples of both sides say less.
 constexpr double kept_itself = 2.0 * kept;
+/// What distances may be off by, in cube units: a straight way through a sheet is just as long as both
+/// together.
+constexpr double unsure = 1e-4;
 /// Stiffness of planes at first.
 constexpr double softest = 5e4;
 
@@ -265,7 +268,7 @@ Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsI
   for (Index i = 0; i < now.rows(); ++i) {
     const Index row = rows[static_cast<std::size_t>(i)];
     const double way = (now.row(i) - seen.row(row)).norm(), clear = clear_(row, k);
-    if (clear > 0.0 && way > clear + std::max(0.0, nearest.distances[i])) moved_rows.push_back(i);
+    if (clear > 0.0 && way > clear + std::max(0.0, nearest.distances[i]) - unsure) moved_rows.push_back(i);
   }
   std::vector<Index> starts;
   for (const Index i : moved_rows) starts.push_back(rows[static_cast<std::size_t>(i)]);

@@ -55,8 +55,11 @@ class ContactTerms {
   double find(const RowMatrix<double>& coefficients, double further = 0.0, bool jumped = false);
   /// The largest speed of a sample, where coefficients change at these rates.
   double fastest(const RowMatrix<double>& rates);
-  /// Pressures after a solve that left the places of found() there.
-  void press(const double* places);
+  /// Pressures after a solve that left the places of found() there, times a share of each surface. Returns
+  /// how much of them has changed, 0 to 1.
+  double press(const double* places, const Vector& shares);
+  /// Obstacles, the ground and the shape itself.
+  Index surface_count() const { return pressures_.cols(); }
   /// Friction holds what was found, as hard as it presses.
   void grip();
   /// The planes become as stiff as their pressures ask for, or `more`: where depths do not fall.

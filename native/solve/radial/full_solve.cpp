@@ -19,6 +19,8 @@ constexpr int steps_at_once = 10;
 /// A deformation has converged where these steps gain less than this share of the energy. Thin parts under
 /// many held samples would go on for hundreds of steps, for a ten-thousandth.
 constexpr double least_gain = 1e-3;
+/// It goes on while these steps bring what is deep in an obstacle out to less than this share.
+constexpr double still_comes_out = 0.8;
 /// Factor on it where handles are held back: they would slide on for long.
 constexpr double less_where_held = 10.0;
 /// A deformation with `worth_a_first` centers starts from one with half of them, `most_first` at most.
@@ -78,7 +80,7 @@ LoopResult run(RadialSolver& live, const TrainingOptions& how, const Progress& p
   LoopResult result;
   Iteration iteration;
   bool ended = false;
-  double before = std::numeric_limits<double>::infinity();
+  double before = std::numeric_limits<double>::infinity(), deepest = before;
   RadialHooks steps{hooks.energies, 1.0 / rigidity, {}};
   if (hooks.observer)
     steps.observer = [&](const std::vector<LossTerm>& terms) {
@@ -107,8 +109,9 @@ LoopResult run(RadialSolver& live, const TrainingOptions& how, const Progress& p
     const ContactReport& contact = live.report().contact;
     const double least = (contact.held.empty() ? 1.0 : less_where_held) * bounds.least_gain;
     const bool gains = live.report().iterations >= at_once && before - value >= least * value;
-    if (!gains && !contact.unsettled) break;
+    if (!gains && !(contact.unsettled && contact.deepest < still_comes_out * deepest)) break;
     before = value;
+    deepest = contact.deepest;
     if (how.time_budget > 0.0 && result.seconds > how.time_budget) {
       result.stopped_by = StopReason::time_budget;
       break;

@@ -29,8 +29,11 @@ constexpr Index first_iterations = 4;
 /// Largest correction of a step that was not solved to its end, as a share of the step.
 constexpr double most_left = 0.1;
 
-/// Solves of a step at most, beside the first, while what touches is deep.
+/// Solves of a step at most, beside the first, while what touches is deep, or while more than this share of
+/// the pressures changes: those of the step before hold the impulse of a fall, which would throw a body up
+/// again.
 constexpr Index contact_rounds = 8;
+constexpr double unsettled = 0.2;
 
 /// Limits of a frame in seconds.
 constexpr double shortest_frame = 1e-5, longest_frame = 10.0;
@@ -133,7 +136,8 @@ bool TimeIntegrator::integrate_step(const TimeScheme& scheme, const Progress& pr
                   share * state_.report.kinetic + motion_floor},
                  progress);
   for (Index round = 0; scheme == TimeScheme::backward_euler() && round < contact_rounds; ++round) {
-    if (!press_contact(state_) || !is_deep(state_)) break;
+    const bool settled = press_contact(state_) < unsettled;
+    if (settled && !is_deep(state_)) break;
     stiffen_contact(state_);
     state_.descend(
         state_.fast,
@@ -141,7 +145,7 @@ bool TimeIntegrator::integrate_step(const TimeScheme& scheme, const Progress& pr
         progress);
   }
   // A surface that touches ends its steps on the planes, at the cost of energy.
-  const bool pressed = scheme == TimeScheme::backward_euler() ? press_contact(state_) : would_press(state_);
+  const bool pressed = scheme != TimeScheme::backward_euler() && would_press(state_);
   if ((pressed || !state_.report.converged) && scheme != TimeScheme::backward_euler()) {
     coefficients = q;
     state_.set_measurements(state_.fast, u);

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How hard planes press, and the least motion that brings a surface out, by the quasi-Newton model.
+#include <algorithm>
+#include <cmath>
+
+#include "sampling/sample_choice.h"
+#include "solve/radial/contact_rows.h"
+#include "solve/radial/contact_solve.h"
+
+namespace arapfields {
+namespace {
+
+/// The cosine of normals of one group.
+constexpr double alike = 0.9;
+/// Planes that a search for a way out takes in at once, how often, and how far apart they are, in cube units.
+constexpr Index planes_at_once = 60;
+constexpr int searches = 5;
+constexpr double apart = 0.02;
+/// A way out is at most so many times as long as the deepest place is deep.
+constexpr double farther = 3.0;
+/// What may be left of a gap, in cube units.
+constexpr double slight = 1e-4;
+
+/// Of the planes whose gaps are below zero the deepest, apart from each other.
+std::vector<Index> deepest_of(const Vector& gaps, const ContactSet& set) {
+  std::vector<Index> order;
+  for (Index i = 0; i < gaps.size(); ++i)
+    if (gaps[i] < -slight) order.push_back(i);
+  std::sort(order.begin(), order.end(), [&](Index a, Index b) { return gaps[a] < gaps[b]; });
+  std::vector<Index> chosen;
+  for (const Index i : order) {
+    const auto place = [&](Index k) { return set.places.row(set.planes[static_cast<std::size_t>(k)].first); };
+    const bool free = std::none_of(chosen.begin(), chosen.end(), [&](Index k) {
+      return (place(i) - place(k)).squaredNorm() < apart * apart &&
+             set.planes[static_cast<std::size_t>(i)].normal.dot(
+                 set.planes[static_cast<std::size_t>(k)].normal) > alike;
+    });
+    if (free) chosen.push_back(i);
+    if (std::ssize(chosen) == planes_at_once) break;
+  }
+  return chosen;
+}
+
+Vector gaps_of(const ContactSet& set, const Points& places) {
+  Vector gaps(std::ssize(set.planes));
+  for (Index i = 0; i < gaps.size(); ++i)
+    gaps[i] = set.planes[static_cast<std::size_t>(i)].gap(places.data());
+  return gaps;
+}
+
+}  // namespace
+
+void press_as_answered(RadialState& s) {
+  if (!s.contact.presses()) return;
+  const RadialObjective<float>& objective = *s.fast.objective.latest();
+  const TallMatrix<float>& inverse_factor = s.preconditioner.inverse_factor.latest();
+  const VectorF& u = s.measurements(s.fast);
+  const Points places = objective.contact_values(u).cast<double>();
+  // What all other forces and those of each surface do, in the norm of the quasi-Newton model.
+  VectorF cotangents;
+  objective.value(u, &cotangents);
+  const Index size = 3 * places.rows();
+  cotangents.tail(size).setZero();
+  const auto half = [&] {
+    const PointsF result = inverse_factor.times(objective.pull_back(cotangents).cast<float>());
+    return Vector(Eigen::Map<const VectorF>(result.data(), result.size()).cast<double>());
+  };
+  const Vector others = half();
+  cotangents.setZero();
+  const Index count = s.contact.surface_count();
+  RowMatrix<double> each(count, others.size());
+  for (Index k = 0; k < count; ++k) {
+    cotangents.tail(size).setZero();
+    for (const ContactPlane& plane : s.contact.found().planes) {
+      if (plane.obstacle != k) continue;
+      const Eigen::Vector3f force =
+          (plane.share * plane.pressed(plane.gap(places.data()), s.contact.found().stiffness) * plane.normal)
+              .cast<float>();
+      cotangents.segment<3>(cotangents.size() - size + 3 * plane.first) += force;
+      if (plane.second >= 0) cotangents.segment<3>(cotangents.size() - size + 3 * plane.second) -= force;
+    }
+    each.row(k) = half().transpose();
+  }
+  const RowMatrix<double> products = each * each.transpose();
+  const Vector answer = each * others;
+  Vector shares = Vector::Zero(count);
+  for (int sweep = 0; sweep < 20; ++sweep)
+    for (Index k = 0; k < count; ++k) {
+      const double left = answer[k] - products.row(k).dot(shares) + products(k, k) * shares[k];
+      shares[k] = products(k, k) > 0.0 ? std::clamp(left / products(k, k), 0.0, 1.0) : 0.0;
+    }
+  s.contact.press(places.data(), shares);
+}
+
+void push_out(RadialState& s) {
+  if (!s.contact.presses()) return;
+  const RadialObjective<float>& objective = *s.fast.objective.latest();
+  const TallMatrix<float>& inverse_factor = s.preconditioner.inverse_factor.latest();
+  const ContactSet& set = s.contact.found();
+  VectorF u = s.measurements(s.fast);
+  const Points before = objective.contact_values(u).cast<double>();
+  const Vector gaps = gaps_of(set, before);
+  const double longest = farther * -gaps.minCoeff();
+  Vector left = gaps;
+  ContactRows rows;
+  std::vector<Index> taken;
+  RowMatrix<double> step;
+  for (int search = 0; search < searches; ++search) {
+    const std::vector<Index> more = deepest_of(left, set);
+    if (more.empty()) break;
+    std::vector<const ContactPlane*> planes;
+    RowMatrix<double> along(std::ssize(more), 3);
+    for (const Index i : more) {
+      planes.push_back(&set.planes[static_cast<std::size_t>(i)]);
+      along.row(std::ssize(planes) - 1) = planes.back()->normal.transpose();
+    }
+    rows.add(s.problem.basis, set, planes, along, inverse_factor);
+    taken.insert(taken.end(), more.begin(), more.end());
+    const Vector forces = complementary(rows.compliance(), entries_of(gaps, taken));
+    RowMatrix<double> next = inverse_factor.transpose_times(rows.pull(forces)).cast<double>();
+    if (s.problem.mirror) s.problem.mirror->symmetrise(next);
+    objective.measure_contact(s.shape.coefficients + next, u);
+    const Points places = objective.contact_values(u).cast<double>();
+    if ((places - before).rowwise().norm().maxCoeff() > longest) break;  // planes that contradict each other
+    step = std::move(next);
+    left = gaps_of(set, places);
+  }
+  if (step.size() == 0) return;
+  s.shape.coefficients += step;
+  ++s.shape.revision;
+}
+
+}  // namespace arapfields
