@@ -10,9 +10,11 @@ from arapfields import backend
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
+    from support.blender.panels import Layout
     from support.blender.stacks import local_points
 
     from addon.live import sessions
+    from addon.pin_tool.tool import ARAPFIELDS_TOOL_pin
     from addon.solver import contact, setup
 
 pytestmark = pytest.mark.in_blender
@@ -84,3 +86,15 @@ def test_what_cannot_be_an_obstacle_is_said():
     group.obstacle = empty
     with pytest.raises(RuntimeError, match="Empty: the mesh is empty"):
         bpy.ops.arapfields.deform()
+
+
+def test_the_pin_tool_has_the_switch_where_there_are_handles():
+    bar = scenes.bar()
+    scenes.activate(bar)
+    shown = []
+    ARAPFIELDS_TOOL_pin.draw_settings(bpy.context, Layout(shown), None)
+    assert "Contact" not in shown
+    bar = scenes.bar_with_handles()[0]
+    scenes.activate(bar)
+    ARAPFIELDS_TOOL_pin.draw_settings(bpy.context, Layout(shown), None)
+    assert shown.count("Contact") == 1
