@@ -22,7 +22,7 @@ pytestmark = pytest.mark.in_blender
 
 def pressed():
     """A live bar of which one end goes down, and a block below it."""
-    setup.SAMPLES = 6000  # a live solver's own: fewer leave gaps for a corner to pass
+    setup.SAMPLES = 3000  # a live solver's own: fewer leave gaps for a corner to pass
     bar, _, moving = scenes.bar_with_handles()
     low = (bar.matrix_world @ bar.data.vertices[0].co).z
     for vertex in bar.data.vertices:
