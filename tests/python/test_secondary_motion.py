@@ -20,7 +20,7 @@ TIP = np.array([[2.0, 0.0, 0.0]])
 ENERGY_RISE, ALIKE, FINER_ALIKE = 0.01, 0.05, 0.06
 DECAY = 0.15  # of a rate against what was asked for: energy falls in turns, as it is kinetic or not
 SUNK = 8e-3  # below the ground: a fifth of a per cent of the length
-LEFT_OF_3 = 2.4  # s; after these a damping of 3 leaves less than solves in single precision can tell
+SEEN = 1e-5  # of the energy at the start, a 300th of the amplitude: single precision tells steps apart so far
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +62,8 @@ def period_of(times, heights):
 
 def decay_of(times, energies):
     """How fast swings die down, 1/s: half the rate at which the total energy falls."""
-    return -0.5 * np.polyfit(times[1:], np.log(energies), 1)[0]
+    seen = np.flatnonzero(energies > SEEN * energies[0])
+    return -0.5 * np.polyfit(times[1 + seen], np.log(energies[seen]), 1)[0]
 
 
 def test_without_strength_steps_are_solves_bit_for_bit(samples):
@@ -78,8 +79,7 @@ def test_without_strength_steps_are_solves_bit_for_bit(samples):
 @pytest.mark.parametrize(("rate", "seconds"), [(24, 3.0), (240, 1.0)])
 def test_the_total_energy_does_not_rise(samples, rate, seconds):
     live = released(samples)
-    start = live.report.value
-    _, _, energies = swung(live, seconds, rate)
+    start, (_, _, energies) = live.report.value, swung(live, seconds, rate)
     assert energies.max() <= (1 + ENERGY_RISE) * start
     assert energies[-1] > 0.75 * start  # nor does the scheme eat it
 
@@ -95,9 +95,9 @@ def test_frame_rates_change_neither_period_nor_decay(samples):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("damping", "seconds"), [(0.0, 3.0), (2.0, 3.0), (3.0, LEFT_OF_3)])
-def test_periods_hold_from_360_to_1500_centers_and_from_24_to_240_frames_a_second(damping, seconds):
-    speeds = []
+@pytest.mark.parametrize("damping", [0.0, 2.0, 3.0])
+def test_periods_hold_from_360_to_1500_centers_and_from_24_to_240_frames_a_second(damping):
+    seconds, speeds = 2.4, []
     for fine, coarse, rate in ((300, 60, 24), (300, 60, 240), (1250, 250, 60)):
         size = {"samples": 6000, "fine_centers": fine, "coarse_centers": coarse}
         live = released(bar_samples(12000), further={"damping": damping}, **size)
