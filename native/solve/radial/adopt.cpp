@@ -76,7 +76,7 @@ void RadialSolver::adopt(const DeformationField& field) {
     square = next;
   }
   s.dynamics.zero_velocity(motions_of(s.handles.bound()));
-  s.contact.begin(coefficients);
+  s.contact.begin(s.problem.basis.identity());  // the other field may have passed a sheet
 }
 
 Index RadialSolver::add_fold_samples(double barrier) {
