@@ -8,7 +8,7 @@ from support.geometry import cases
 
 import arapfields as af
 
-SETTINGS = dict(iterations=40, width=96, layers=3, batch=200, threads=1, device="cpu")
+SETTINGS = dict(iterations=80, width=96, layers=3, batch=200, threads=1, device="cpu")
 
 
 @pytest.mark.parametrize("extra", [{}, dict(exact_handles=True)], ids=str)
