@@ -3,6 +3,7 @@
 #include <boost/test/unit_test.hpp>
 
 #include "energies/contact.h"
+#include "solve/radial/contact_rows.h"
 
 using namespace arapfields;
 
@@ -28,6 +29,24 @@ BOOST_AUTO_TEST_CASE(cotangents_are_those_of_differences) {
     BOOST_TEST(std::abs((more - less) / (2.0 * step) - slopes[i]) < 1e-6);
   }
   BOOST_TEST(slopes[0] != 0.0);
+}
+
+BOOST_AUTO_TEST_CASE(forces_are_complementary_to_gaps) {
+  constexpr double ridge = 1e-4;  // that is added, as a share of the largest diagonal entry
+  std::srand(0);
+  for (const Index n : {1, 5, 40})
+    for (const Index rank : {n, (n + 1) / 2}) {  // also dependent planes, which some motion satisfies
+      const RowMatrix<double> factor = RowMatrix<double>::Random(n, rank);
+      const RowMatrix<double> m = factor * factor.transpose();
+      Vector q = Vector::Random(n);
+      if (rank < n) q = q.cwiseAbs() - 0.5 * factor.rowwise().sum();
+      const Vector forces = solve_complementarity(m, q);
+      const Vector gaps = m * forces + ridge * m.diagonal().maxCoeff() * forces + q;
+      const double size = 1.0 + forces.cwiseAbs().maxCoeff();
+      BOOST_TEST(forces.minCoeff() >= 0.0);
+      BOOST_TEST(gaps.minCoeff() > -1e-9 * size);
+      BOOST_TEST(forces.cwiseProduct(gaps).cwiseAbs().maxCoeff() < 1e-9 * size * size);
+    }
 }
 
 BOOST_AUTO_TEST_SUITE_END()

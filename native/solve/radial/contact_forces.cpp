@@ -10,6 +10,8 @@
 namespace arapfields {
 namespace {
 
+/// Sweeps that scale the pressures of several surfaces.
+constexpr int scalings = 20;
 /// The cosine of normals of one group.
 constexpr double alike = 0.9;
 /// Planes that a search for a way out takes in at once, how often, and how far apart they are, in cube units.
@@ -50,7 +52,7 @@ Vector gaps_of(const ContactSet& set, const Points& places) {
 
 }  // namespace
 
-void press_as_answered(RadialState& s) {
+void press_balanced(RadialState& s) {
   if (!s.contact.presses()) return;
   const RadialObjective<float>& objective = *s.fast.objective.latest();
   const TallMatrix<float>& inverse_factor = s.preconditioner.inverse_factor.latest();
@@ -84,7 +86,7 @@ void press_as_answered(RadialState& s) {
   const RowMatrix<double> products = each * each.transpose();
   const Vector answer = each * others;
   Vector shares = Vector::Zero(count);
-  for (int sweep = 0; sweep < 20; ++sweep)
+  for (int sweep = 0; sweep < scalings; ++sweep)
     for (Index k = 0; k < count; ++k) {
       const double left = answer[k] - products.row(k).dot(shares) + products(k, k) * shares[k];
       shares[k] = products(k, k) > 0.0 ? std::clamp(left / products(k, k), 0.0, 1.0) : 0.0;
@@ -116,7 +118,7 @@ void push_out(RadialState& s) {
     }
     rows.add(s.problem.basis, set, planes, along, inverse_factor);
     taken.insert(taken.end(), more.begin(), more.end());
-    const Vector forces = complementary(rows.compliance(), entries_of(gaps, taken));
+    const Vector forces = solve_complementarity(rows.compliance(), entries_of(gaps, taken));
     RowMatrix<double> next = inverse_factor.transpose_times(rows.pull(forces)).cast<double>();
     if (s.problem.mirror) s.problem.mirror->symmetrise(next);
     objective.measure_contact(s.shape.coefficients + next, u);

@@ -59,7 +59,7 @@ PointsF ContactRows::pull(const Vector& forces) const {
 
 /// The primal–dual active set method (Hintermüller, Ito & Kunisch 2002), and projected Gauss–Seidel sweeps
 /// where that does not end.
-Vector complementary(const RowMatrix<double>& lower, const Vector& q) {
+Vector solve_complementarity(const RowMatrix<double>& lower, const Vector& q) {
   const Index n = q.size();
   RowMatrix<double> m = lower.selfadjointView<Eigen::Lower>();
   m.diagonal().array() += std::max(evenly * m.diagonal().maxCoeff(), 1e-30);

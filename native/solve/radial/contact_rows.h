@@ -28,7 +28,9 @@ struct ContactRows {
   PointsF pull(const Vector& forces) const;
 };
 
-/// λ ≥ 0 with w = M λ + q ≥ 0 and λ·w = 0, for the lower triangle of a symmetric, positive semidefinite M.
-ARAPFIELDS_EXPORT_TO_TESTS Vector complementary(const RowMatrix<double>& lower, const Vector& q);
+/// The linear complementarity problem: λ ≥ 0 with w = M λ + q ≥ 0 and λ·w = 0, for the lower triangle of a
+/// symmetric, positive semidefinite M, to which a ten-thousandth of its largest diagonal entry is added.
+/// Where no motion satisfies all planes, λ is what a bounded number of sweeps reach.
+ARAPFIELDS_EXPORT_TO_TESTS Vector solve_complementarity(const RowMatrix<double>& lower, const Vector& q);
 
 }  // namespace arapfields

@@ -68,7 +68,7 @@ bool solve_round(RadialState& s, Index iterations, double tolerance, const Progr
   const RowMatrix<double> before = s.shape.coefficients;
   const double allowed = std::max(too_deep, s.contact.deepest());
   const bool converged = s.descend(s.fast, {iterations, tolerance, floor}, progress).converged;
-  press_as_answered(s);
+  press_balanced(s);
   double depth = s.contact.find(s.shape.coefficients);
   bool back = false;
   for (int half = 0; half < most_halves && depth > allowed; ++half) {
@@ -136,10 +136,7 @@ void sweep(RadialState& s, double tolerance, const Progress& progress) {
   const Index parts = std::clamp<Index>(wanted, 1, most_steps);
   s.precondition(0.0);
   for (Index k = 1; k <= parts; ++k) {
-    if (k < parts)
-      s.contact.move_obstacles(static_cast<double>(k) / static_cast<double>(parts));
-    else
-      s.contact.move_obstacles(1.0);
+    s.contact.move_obstacles(static_cast<double>(k) / static_cast<double>(parts));
     find_and_push(s, 1, too_deep);
     if (k < parts && s.contact.presses()) solve_round(s, steps_on_the_way, tolerance, progress);
   }

@@ -18,10 +18,10 @@ void follow_in_contact(RadialState& state, Index iterations, double tolerance,
 void push_out(RadialState& state);
 /// The preconditioner feels the planes that press on the current shape.
 void stiffen_contact(RadialState& state);
-/// The planes press on with what they press with now, but with no more than all other forces answer: what a
-/// descent that has not ended leaves of a depth says little.
-void press_as_answered(RadialState& state);
-/// The planes press on with what they press with now. Returns how much of that has changed, 0 to 1.
+/// Updates the pressures by the depths, scaled for each surface to what balances all other forces: before a
+/// descent has ended, depths say little about forces.
+void press_balanced(RadialState& state);
+/// Updates the pressures by the depths. Returns how much of them has changed, 0 to 1.
 double press_contact(RadialState& state);
 bool would_press(RadialState& state);
 /// Whether a place is deeper than solves leave it.

@@ -145,8 +145,7 @@ bool TimeIntegrator::integrate_step(const TimeScheme& scheme, const Progress& pr
         progress);
   }
   // A surface that touches ends its steps on the planes, at the cost of energy.
-  const bool pressed = scheme != TimeScheme::backward_euler() && would_press(state_);
-  if ((pressed || !state_.report.converged) && scheme != TimeScheme::backward_euler()) {
+  if (scheme != TimeScheme::backward_euler() && (would_press(state_) || !state_.report.converged)) {
     coefficients = q;
     state_.set_measurements(state_.fast, u);
     return false;
