@@ -5,9 +5,8 @@ from ..blender import modifier_stack
 from ..blender.language import translated
 from ..blender.object_references import owner_of
 from ..blender.source_operator import SourceOperator
-from ..blender.splat_layouts import holds_splats
-from ..carried import carried_objects
-from ..core.errors import UserError
+from ..carried import carried_objects, refusals
+from ..core.errors import UserError, refuse
 from ..field_modifier import inputs
 from ..field_nodes import helper, node_group
 from ..live import sessions
@@ -56,8 +55,7 @@ def require_free(source, item):
         raise UserError("{name} is linked from another file; make it local to carry it", item)
     if not hasattr(item.data, "attributes") and item.type not in ("CURVE", "FONT", "SURFACE"):
         raise UserError("{name} has no geometry that nodes could move", item)
-    if holds_splats(item):
-        raise UserError("{name} holds splats, which only handles of its own turn as well", item)
+    refuse(refusals.of_splats(item))
     if carried_objects.find(source, item) is not None:
         raise UserError("{name} moves with {other} already", item, other=source.name)
 

@@ -35,8 +35,8 @@ def of_item(source, item):
     settings = settings_of(item)
     if len(settings.handles):
         return UserError("{name} has handles of its own; it is not carried", item)
-    if holds_splats(item):
-        return UserError("{name} holds splats, which only handles of its own turn as well", item)
+    if reason := of_splats(item):
+        return reason
     if settings.handle_of == source and any(e.empty == item for e in settings_of(source).handles):
         return UserError("{name} is a handle of {source} itself", item, source=source.name)
     rigs = handle_rigs(source)
@@ -45,6 +45,15 @@ def of_item(source, item):
     if constrained_to(item, rigs):
         return UserError("{name} follows the armature by a constraint; it is not carried", item)
     return moves_anyway(source, item)
+
+
+def of_splats(item):
+    """Why splats do not move by the field of another object, as a UserError; None for other geometry."""
+    return (
+        UserError("{name} holds splats; only handles of its own turn them", item)
+        if holds_splats(item)
+        else None
+    )
 
 
 def moves_anyway(source, item):

@@ -46,9 +46,11 @@ def find(context, source, location, radius, face=None, face_count=None):
             nearest = int(((now - location) ** 2).sum(axis=1).argmin())
             at_rest, moved = rest[nearest], now[nearest]
         else:
-            known = face is not None and face_count == faces
-            chosen = mesh_arrays.triangles_of(mesh, face) if known else mesh_arrays.triangles(mesh)
-            at_rest, moved = map_back(now, rest, chosen if known else near(now, chosen, location), location)
+            if face is not None and face_count == faces:
+                chosen = mesh_arrays.triangles_of(mesh, face)
+            else:
+                chosen = near(now, mesh_arrays.triangles(mesh), location)
+            at_rest, moved = map_back(now, rest, chosen, location)
         about = around(rest, at_rest, radius)
         weights = group_weights(source, mesh, about)
     size = float(np.linalg.norm(np.ptp(rest, axis=0)) / np.cbrt(abs(np.linalg.det(world[:3, :3])) or 1.0))

@@ -220,10 +220,10 @@ def test_what_splats_lack_is_named():
     other.arapfields.handles.clear()
     bpy.context.scene.collection.objects.link(other)
     scenes.activate(other, body)
-    with pytest.raises(RuntimeError, match="only handles of its own turn as well"):
+    with pytest.raises(RuntimeError, match="only handles of its own turn them"):
         bpy.ops.arapfields.carry()
     bpy.ops.arapfields.deform()
-    with pytest.raises(RuntimeError, match="only handles of its own turn as well"):
+    with pytest.raises(RuntimeError, match="only handles of its own turn them"):
         bpy.ops.arapfields.field_as_nodes()
     with pytest.raises(RuntimeError, match="the mesh has no faces"):
         bpy.ops.arapfields.wrap(onto=other.name)
