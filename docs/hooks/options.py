@@ -34,14 +34,13 @@ def on_page_markdown(markdown, **_):
 
 
 def filled(markdown, table):
-    makers = {"settings": settings, "flags": flags}
-
-    def made(found):
-        if found[1] == "buttons":
-            return buttons()
-        return shown(found[2]) if found[1] == "shown" else makers[found[1]](table[found[2]])
-
-    return MARK.sub(made, markdown)
+    makers = {
+        "settings": lambda name: settings(table[name]),
+        "flags": lambda name: flags(table[name]),
+        "shown": shown,
+        "buttons": lambda _: buttons(),
+    }
+    return MARK.sub(lambda found: makers[found[1]](found[2]), markdown)
 
 
 def settings(block):
