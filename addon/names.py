@@ -61,6 +61,8 @@ class Op(StrEnum):
     REMOVE_LANDMARK = "arapfields.remove_landmark"
     CARRY = "arapfields.carry"
     RELEASE = "arapfields.release"
+    ADD_OBSTACLE = "arapfields.add_obstacle"
+    REMOVE_OBSTACLE = "arapfields.remove_obstacle"
     STIFFNESS_PRESET = "arapfields.stiffness_preset"
     SAVE_POSE = "arapfields.save_pose"
     APPLY_POSE = "arapfields.apply_pose"

@@ -23,6 +23,7 @@ SETTINGS = {  # class of properties → page
     "ARAPFIELDS_PG_stiffness": "characters",
     "ARAPFIELDS_PG_secondary": "motion",
     "ARAPFIELDS_PG_contact": "motion",
+    "ARAPFIELDS_PG_obstacle": "motion",
     "ARAPFIELDS_PG_bake": "animation",
     "ARAPFIELDS_PG_object": "results",
 }

@@ -3,28 +3,37 @@
 
 import bpy
 
-from ..blender.property_definitions import flag, number, pointer
+from ..blender.property_definitions import collection, flag, integer, number, pointer
+
+
+class ARAPFIELDS_PG_obstacle(bpy.types.PropertyGroup):
+    # `name`, which every entry has, is the object's when it was added: it tells what was deleted
+    item: pointer(
+        bpy.types.Object,
+        "Object",
+        "Mesh object that the surface stays outside of, as it is shown",
+        poll=lambda _, item: item.type == "MESH",
+    )
+    group: pointer(
+        bpy.types.Collection,
+        "Collection",
+        "In the object's place, a collection of whose visible meshes the surface stays outside",
+    )
+    margin: number("Margin", "Distance that is kept from it", subtype="DISTANCE", min=0.0, soft_max=1.0)
 
 
 class ARAPFIELDS_PG_contact(bpy.types.PropertyGroup):
     use: flag(
         "Contact", "The surface does not pass obstacles, the ground or itself, wherever its handles pull it"
     )
-    obstacle: pointer(
-        bpy.types.Object, "Obstacle", "Mesh object that the surface stays outside of, as it is shown"
-    )
-    obstacles: pointer(
-        bpy.types.Collection, "Obstacles", "Collection of whose visible meshes the surface stays outside"
-    )
-    margin: number(
-        "Margin", "Distance that is kept from the obstacles", subtype="DISTANCE", min=0.0, soft_max=1.0
-    )
+    obstacle_list: collection(ARAPFIELDS_PG_obstacle, "Obstacles", "What is in the way")
+    active_obstacle: integer("Active Obstacle", "Row chosen in the list of obstacles")
     use_ground: flag("Level Ground", "The surface does not go below a height of the world")
+    ground: number("Ground Height", "Height of the ground in the world", subtype="DISTANCE")
     itself: flag(
         "Itself",
         "Parts of the shape do not pass each other. What touches or overlaps at rest is left as it is",
     )
-    ground: number("Ground Height", "Height of the ground in the world", subtype="DISTANCE")
 
 
-CLASSES = [ARAPFIELDS_PG_contact]
+CLASSES = [ARAPFIELDS_PG_obstacle, ARAPFIELDS_PG_contact]

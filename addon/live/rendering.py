@@ -6,9 +6,11 @@ import contextlib
 import bpy
 
 from ..blender.language import translated
+from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..core.runtime import jobs
 from ..handles import empties, movers
+from ..solver.contact import obstacles_of
 from ..solver.source_reader import SourceChanged
 from .playback import scene_frame
 from .sessions import WAIT, end_with_error, live
@@ -42,11 +44,15 @@ def show_frame():
 
 
 def warn_of_hidden(source, session, depsgraph):
-    """Says once which handles a render does not see, and so cannot follow."""
+    """Says once which handles and obstacles a render does not see, and so cannot follow."""
     visible = {item.original.session_uid for item in depsgraph.ids}
     used = empties.used(source)
     hidden = [movers.name_of(e) for e in used if movers.mover_of(e).session_uid not in visible]
-    if hidden and session.reader.handles:
+    if not session.reader.handles:
+        hidden = []
+    if settings_of(source).contact.use:
+        hidden += [item.name for item, _ in obstacles_of(source) if item.session_uid not in visible]
+    if hidden:
         text = translated(
             "{names} is hidden in renders, which therefore do not follow it", names=", ".join(hidden)
         )

@@ -4,59 +4,106 @@
 import hashlib
 from typing import NamedTuple
 
+import bpy
 import numpy as np
 
 from ..blender import mesh_arrays
 from ..blender.evaluation import depsgraph_of
-from ..blender.object_references import settings_of
+from ..blender.object_references import in_scene, settings_of
 from ..blender.property_definitions import from_single_precision
 from ..core.errors import UserError
 from ..core.geometry.spaces import space_of, transform
 from ..core.runtime import native
+
+DIGITS = 5  # of an uneven scale: what turns in single precision stays the same solid
+
+
+class Solid(NamedTuple):
+    """An obstacle. Where two have the same `key`, they are equal but for where they lie."""
+
+    key: str
+    vertices: np.ndarray  # (n, 3) in a space of its own
+    triangles: np.ndarray  # (m, 3)
+    placement: np.ndarray  # (4, 4) from there into solve space: it turns, moves and scales evenly
+    margin: float
 
 
 class ContactTerm(NamedTuple):
     """In solve space; where two have the same `key`, they are equal."""
 
     key: str
-    solids: tuple  # ((n, 3) vertices, (m, 3) triangles)
-    margin: float
+    solids: tuple  # of Solid
     ground: float | None  # height along `up`
     up: tuple  # (3,)
     itself: bool
 
-    def made(self):
-        """The library's Contact; on a worker."""
-        af = native.library()
-        obstacles = [af.Obstacle(af.MeshSdf(*solid), self.margin) for solid in self.solids]
+    def made(self, known=None):
+        """The library's Contact; on a worker. `known`: {key of a solid: its distance}, brought up to date, so
+        that what only moves is the same obstacle."""
+        af, known = native.library(), {} if known is None else known
+        distances = {
+            solid.key: known.get(solid.key) or af.MeshSdf(solid.vertices, solid.triangles)
+            for solid in self.solids
+        }
+        known.clear()
+        known.update(distances)
+        obstacles = [
+            af.Obstacle(distances[solid.key], solid.margin, placement=solid.placement)
+            for solid in self.solids
+        ]
         return af.Contact(obstacles, ground=self.ground, up=self.up, itself=self.itself)
 
 
-def native_contact(term):
-    return None if term is None else term.made()
+def native_contact(term, known=None):
+    return None if term is None else term.made(known)
 
 
-def obstacles_of(source, group):
-    """The objects that are in the way: the one that is chosen, and the visible meshes of the collection."""
-    found = [group.obstacle] if group.obstacle is not None else []
-    if group.obstacles is not None:
-        found += [item for item in group.obstacles.all_objects if item.type == "MESH" and item.visible_get()]
-    carried = [entry.item for entry in settings_of(source).carried]
-    return [item for item in dict.fromkeys(found) if item != source and item not in carried]
+def obstacles_of(source):
+    """[(object, margin)] of what the list has in the way of a source: each object once."""
+    carried, found = {entry.item for entry in settings_of(source).carried}, {}
+    for entry in settings_of(source).contact.obstacle_list:
+        listed = entry.group.all_objects if entry.group is not None else [entry.item]
+        for item in listed:
+            acts = item is not None and item.type == "MESH" and item != source and item not in carried
+            if acts and is_shown(item):
+                found.setdefault(item, from_single_precision(entry.margin))
+    return list(found.items())
+
+
+def is_shown(item):
+    """Whether an object is seen in the viewport, whatever a local view shows."""
+    layer, space = bpy.context.view_layer, bpy.context.space_data
+    if item.visible_get(view_layer=layer):
+        return True
+    in_local_view = getattr(space, "local_view", None) is not None
+    return in_local_view and not (item.hide_viewport or item.hide_get(view_layer=layer))
+
+
+def entry_refusal(source, entry):
+    """Why a row of the list is not in the way, or cannot be, as a UserError; else None."""
+    if entry.group is not None:
+        return None
+    if entry.item is None or not in_scene(entry.item):
+        return UserError("{name} is in no scene any more", entry) if entry.name else None
+    if entry.item == source:
+        return UserError("{name} cannot be its own obstacle", source)
+    if entry.item.type != "MESH":
+        return UserError("{name} is no mesh; a mesh object is needed as an obstacle", entry.item)
+    if entry.item in {carried.item for carried in settings_of(source).carried}:
+        return UserError("{name} is carried, so that it is no obstacle", entry.item)
+    if not is_shown(entry.item):
+        return UserError("{name} is hidden, so that it is not in the way", entry.item)
+    return None
 
 
 def refusal(source):
-    """The UserError of obstacles that cannot be, as far as it is seen without reading; else None."""
+    """The UserError of a contact with nothing, as far as it is seen without reading; else None."""
     group = settings_of(source).contact
-    if not group.use:
+    if not group.use or group.use_ground or group.itself or obstacles_of(source):
         return None
-    if group.obstacle is not None and group.obstacle.type != "MESH":
-        return UserError("{name} is no mesh; a mesh object is needed as an obstacle", group.obstacle)
-    if group.obstacle == source:
-        return UserError("{name} cannot be its own obstacle", source)
-    if not (group.use_ground or group.itself or obstacles_of(source, group)):
-        return UserError("{name}: Contact has neither an obstacle nor a ground, nor itself", source)
-    return None
+    reasons = [entry_refusal(source, entry) for entry in group.obstacle_list]
+    nothing = UserError("{name}: Contact has neither an obstacle nor a ground, nor itself", source)
+    return next(filter(None, reasons), nothing)
 
 
 def contact_of(source, settings, space, depsgraph):
@@ -64,34 +111,49 @@ def contact_of(source, settings, space, depsgraph):
     group = settings.contact
     if not group.use:
         return None
-    reason = refusal(source)
-    if reason is not None:
-        raise reason
     world = space.solve_to_world
     scale = float(np.cbrt(abs(np.linalg.det(world[:3, :3]))))
-    margin, ground = (from_single_precision(value) for value in (group.margin, group.ground))
-    height = (ground - world[2, 3]) / scale if group.use_ground else None
+    height = (from_single_precision(group.ground) - world[2, 3]) / scale if group.use_ground else None
     up = tuple((world[2, :3] / scale).tolist())
-    solids = tuple(read(item, space, depsgraph) for item in obstacles_of(source, group))
-    hashed = hashlib.sha1(repr((margin / scale, height, up, group.itself)).encode())
-    for part in (array for solid in solids for array in solid):
-        hashed.update(np.ascontiguousarray(part).tobytes())
-    return ContactTerm(hashed.hexdigest(), solids, margin / scale, height, up, group.itself)
+    found = [read(item, margin / scale, space, depsgraph) for item, margin in obstacles_of(source)]
+    solids = tuple(solid for solid in found if solid is not None)
+    if not solids and height is None and not group.itself:
+        return None
+    parts = [(solid.key, solid.margin, solid.placement.tolist()) for solid in solids]
+    key = hashlib.sha1(repr((parts, height, up, group.itself)).encode()).hexdigest()
+    return ContactTerm(key, solids, height, up, group.itself)
 
 
 def for_job(context, source):
-    """The same for a solve of its own."""
+    """The same for a solve of its own; UserError where nothing is in the way."""
+    reason = refusal(source)
+    if reason is not None:
+        raise reason
     space = space_of(source.matrix_world, source.name)
     return contact_of(source, settings_of(source), space, depsgraph_of(context))
 
 
-def read(item, space, depsgraph):
-    """(vertices, triangles) of an obstacle as it is shown, in solve space."""
+def read(item, margin, space, depsgraph):
+    """The Solid of an obstacle as it is shown; None where its scale leaves nothing of it."""
     seen = item.evaluated_get(depsgraph)
     mesh = seen.to_mesh()
     try:
         arrays = mesh_arrays.arrays_of(item, mesh)
     finally:
         seen.to_mesh_clear()
-    to_solve = space.world_to_solve @ np.asarray(seen.matrix_world, dtype=np.float64)
-    return transform(to_solve, arrays.vertices), arrays.triangles
+    world = np.asarray(seen.matrix_world, dtype=np.float64)
+    vertices, triangles = arrays.vertices, arrays.triangles
+    try:
+        own = space_of(world, item.name)
+        vertices = transform(np.round(own.local_to_solve, DIGITS), vertices)
+        placement = space.world_to_solve @ own.solve_to_world
+    except UserError:  # flat: a sheet
+        vertices, placement = transform(space.world_to_solve @ world, vertices), np.eye(4)
+        if np.ptp(vertices, axis=0).max() == 0.0:
+            return None
+    if np.linalg.det(placement[:3, :3]) < 0.0:
+        placement[:3, :3] *= -1.0
+        vertices, triangles = -vertices, triangles[:, ::-1]
+    hashed = hashlib.sha1(np.ascontiguousarray(vertices).tobytes())
+    hashed.update(np.ascontiguousarray(triangles).tobytes())
+    return Solid(hashed.hexdigest(), vertices, triangles, placement, margin)

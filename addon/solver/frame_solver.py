@@ -82,7 +82,7 @@ class FrameSolver:
         self.solver = af.LiveDeformer(self.sampled.samples, held, options_of("live", options, setup.machine))
         self._track()
         self.handles, self.energy, self.style_key, self.motion = handles, energy, None, None
-        self.contact_key = None
+        self.contact_key, self.distances = None, {}  # of obstacles, by key
 
     @property
     def moves_splats(self):
@@ -116,7 +116,7 @@ class FrameSolver:
             self.solver.set_style(directions, strength, sharpness=sharpness, weights=weights, up=up)
         if request.contact_key != self.contact_key:
             self.contact_key = request.contact_key
-            self.solver.set_contact(native_contact(request.contact))
+            self.solver.set_contact(native_contact(request.contact, self.distances))
         if request.motion != self.motion:
             self._set_motion(request.motion)
         # The last, of what is far from all pins, is no handle where nothing is.
@@ -148,6 +148,7 @@ class FrameSolver:
 
     def solve_from_rest(self, request, task=None):
         """The request's own shape, whatever was solved before it: the same bits on any thread."""
+        self.apply_request(request)  # before it is at rest: obstacles then begin where they are
         self.solver.reset()
         self.follow(request, iterations=REST_STEPS, tolerance=FINE_TOLERANCE, task=task)
         return replace(self.exact_shape(request), of=request)

@@ -10,9 +10,12 @@ from arapfields import backend
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
+    from support.blender.baking import at, cache_file, solved
+    from support.blender.live import step
     from support.blender.panels import Layout
     from support.blender.stacks import local_points
 
+    from addon.core.runtime import jobs
     from addon.live import sessions
     from addon.pin_tool.tool import ARAPFIELDS_TOOL_pin
     from addon.solver import contact, setup
@@ -56,7 +59,8 @@ def test_a_live_shape_stays_outside_as_its_obstacle_comes_and_goes():
     assert abs(lowest(bar) - free) < 1e-3 * size
     bpy.ops.arapfields.live(kind="DEFORM")
     bar.arapfields.contact.use, bar.arapfields.contact.use_ground = True, False
-    bar.arapfields.contact.obstacle = block
+    scenes.activate(block, bar)
+    bpy.ops.arapfields.add_obstacle()
     bpy.ops.arapfields.deform()
     sdf_top = low - 0.2
     inside = local_points(bar)
@@ -73,19 +77,122 @@ def test_what_cannot_be_an_obstacle_is_said():
     assert "neither" in str(contact.refusal(bar))
     group.itself = True
     assert contact.refusal(bar) is None and contact.for_job(bpy.context, bar).made().itself
-    group.itself, group.obstacle = False, bar
-    assert "its own" in str(contact.refusal(bar))
-    group.obstacle = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
-    assert "no mesh" in str(contact.refusal(bar))
-    group.obstacle = block
-    assert contact.refusal(bar) is None
-    bpy.data.objects.remove(block)
-    assert "neither" in str(contact.refusal(bar))
+    group.itself = False
+    bpy.ops.arapfields.add_obstacle()  # nothing else is selected
+    entry = group.obstacle_list[0]
+    lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
+    bpy.context.collection.objects.link(lamp)
     empty = bpy.data.objects.new("Empty", bpy.data.meshes.new("Empty"))
     bpy.context.collection.objects.link(empty)
-    group.obstacle = empty
+    bpy.context.view_layer.update()
+    for item, said in ((bar, "its own"), (lamp, "no mesh")):
+        entry.item = item
+        assert said in str(contact.entry_refusal(bar, entry)) and said in str(contact.refusal(bar))
+    entry.item, entry.name = block, block.name
+    assert contact.refusal(bar) is None
+    block.hide_set(True)
+    assert "hidden" in str(contact.refusal(bar)) and not contact.obstacles_of(bar)
+    block.hide_set(False)
+    bar.arapfields.carried.add().item = block
+    assert "carried" in str(contact.refusal(bar))
+    bar.arapfields.carried.clear()
+    block.name = "Renamed"
+    assert contact.obstacles_of(bar) == [(block, 0.0)]
+    bpy.data.objects.remove(block)
+    assert "Cube is in no scene" in str(contact.refusal(bar))
+    with pytest.raises(RuntimeError, match="in no scene"):
+        bpy.ops.arapfields.deform()
+    entry.item = empty
     with pytest.raises(RuntimeError, match="Empty: the mesh is empty"):
         bpy.ops.arapfields.deform()
+    assert bpy.ops.arapfields.remove_obstacle() == {"FINISHED"} and not group.obstacle_list
+    assert not bpy.ops.arapfields.remove_obstacle.poll()
+
+
+def solids(bar):
+    return contact.for_job(bpy.context, bar).solids
+
+
+def test_obstacles_are_read_as_they_are_shown():
+    """With modifiers, scales, mirrors, and a collection's visible meshes; what moves stays the same solid."""
+    bar, block, _ = pressed()
+    scenes.activate(block, bar)
+    bpy.ops.arapfields.add_obstacle()
+    bpy.ops.arapfields.add_obstacle()
+    group = bar.arapfields.contact
+    assert group.use and [entry.item for entry in group.obstacle_list] == [block]
+    group.obstacle_list[0].margin = 0.125
+    bar.location, bar.scale = (1, 2, 3), (2, 2, 2)
+    known, keys, functions = {}, set(), []
+    for scale, turn in (((1, 2, 3), 0.0), ((1, 2, 3), 1.0), ((-1, 2, 3), 0.4)):
+        block.scale, block.rotation_euler = scale, (0.3, turn, 0.2)
+        bpy.context.view_layer.update()
+        (solid,) = solids(bar)
+        linear = solid.placement[:3, :3]
+        assert np.allclose(linear @ linear.T, np.cbrt(6) ** 2 * np.eye(3) / 4, atol=1e-4)
+        assert np.linalg.det(linear) > 0 and solid.margin == 0.0625
+        world = np.array(bar.matrix_world) @ solid.placement
+        seen = solid.vertices @ world[:3, :3].T + world[:3, 3]
+        assert np.allclose(seen, scenes.world_points(block), atol=1e-4)
+        a, b, c = (solid.vertices[solid.triangles[:, k]] for k in range(3))
+        assert np.einsum("ij,ij->", a, np.cross(b, c)) > 0  # the triangles face outwards
+        contact.for_job(bpy.context, bar).made(known)
+        keys.add(solid.key)
+        functions += known.values()
+    assert functions[0] is functions[1] and len(keys) == 2
+    block.modifiers.new("Bevel", "BEVEL").width = 0.1
+    bpy.context.view_layer.update()
+    assert len(solids(bar)[0].vertices) > 8
+    together = bpy.data.collections.new("Room")
+    bpy.context.scene.collection.children.link(together)
+    for item in (bpy.data.objects.new(name, block.data) for name in "ab"):
+        together.objects.link(item)
+    together.objects["b"].hide_viewport = True
+    together.objects.link(bar)
+    entry = group.obstacle_list.add()
+    entry.group, entry.margin = together, 0.5
+    bpy.context.view_layer.update()
+    assert [(item.name, margin) for item, margin in contact.obstacles_of(bar)] == [
+        (block.name, 0.125),
+        (together.objects["a"].name, 0.5),
+    ]
+    block.scale = (0, 0, 0)
+    bpy.context.view_layer.update()
+    assert len(solids(bar)) == 1
+    bpy.ops.ed.undo_push()
+    bpy.ops.arapfields.remove_obstacle()
+    bpy.ops.ed.undo_push()
+    bpy.ops.ed.undo()
+    assert len(bpy.data.objects["Bar"].arapfields.contact.obstacle_list) == 2
+
+
+def test_an_animated_obstacle_is_the_same_in_playback_bake_and_render():
+    bar, block, _ = pressed()
+    bpy.data.objects["Moving"].location.z += 0.8
+    scenes.activate(block, bar)
+    bpy.ops.arapfields.add_obstacle()
+    for frame, rise in ((1, 0.0), (3, 0.4)):
+        block.location.z += rise
+        block.keyframe_insert("location", frame=frame)
+    bpy.context.scene.frame_set(1)
+    wanted = [solved(bar, frame) for frame in (1, 2, 3)]
+    assert abs(wanted[2] - wanted[0]).max() > 0.02
+    path = cache_file()
+    assert bpy.ops.arapfields.bake(start=1, end=3, filepath=path) == {"FINISHED"}
+    for frame, shape in zip((1, 2, 3), wanted, strict=True):
+        assert abs(at(bar, frame) - shape).max() < 1e-6
+    bpy.ops.arapfields.remove_bake()
+    assert bpy.ops.arapfields.live(kind="DEFORM") == {"FINISHED"}
+    for frame in (3, 1, 2):
+        bpy.context.scene.frame_set(frame)
+        step(refined=True)
+        assert abs(local_points(bar) - wanted[frame - 1]).max() < 1e-6
+    scenes.camera(8)
+    block.hide_render = True
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 2, 3
+    bpy.context.scene.render.filepath = cache_file()
+    bpy.ops.render.render(animation=True)
+    assert any("hidden in renders" in text for _, text in jobs.messages())
 
 
 def test_the_pin_tool_has_the_switch_where_there_are_handles():

@@ -147,7 +147,7 @@ void ContactPoints::refine(const std::vector<Index>& samples) {
 }
 
 void ContactPoints::coarsen() {
-  if (parents_.empty()) return;
+  if (std::find(is_fine_.begin(), is_fine_.end(), true) == is_fine_.end()) return;
   parents_.clear();
   ++finer_places_;
   is_fine_.assign(samples_.size(), false);

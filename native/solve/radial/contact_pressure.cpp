@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How hard a surface presses on the planes that were found, and obstacles that move.
+// How hard a surface presses on the planes that were found, obstacles that move, and what a next step needs.
 #include <algorithm>
 #include <cmath>
 
@@ -18,7 +18,34 @@ constexpr double hover = 2e-3;
 /// Forces farther than this from a handle, in cube units, count less.
 constexpr double handle_reach = 0.2;
 
+/// How much a force at a row of `places` (n,3) counts at a place; 0 for no row.
+double nearness(const double* places, Index row, const Vec3& place) {
+  if (row < 0) return 0.0;
+  const double square = (Eigen::Map<const Vec3>(places + 3 * row) - place).squaredNorm();
+  return 1.0 / (square + handle_reach * handle_reach);
+}
+
+/// Notes where samples that may be inside a surface were last seen outside of it.
+void note_inside(Index k, const Points& places, const Points& seen, const Vector& clear,
+                 ContactState& state) {
+  for (Index row = 0; row < places.rows(); ++row)
+    if (clear[row] > 0.0 && (places.row(row) - seen.row(row)).norm() >= clear[row])
+      state.inside.push_back({row, k, seen.row(row).transpose(), clear[row]});
+}
+
 }  // namespace
+
+ContactState ContactTerms::held() const {
+  ContactState state;
+  for (const BarrierSurface& surface : surfaces_) state.placements.push_back(surface.placement());
+  for (Index row = 0; row < std::min(pressures_.rows(), points_.sample_count()); ++row)
+    for (Index k = 0; k < pressures_.cols(); ++k)
+      if (pressures_(row, k) > 0.0) state.pressures.push_back({row, k, pressures_(row, k)});
+  const Points places = places_.topRows(std::min(places_.rows(), points_.sample_count()));
+  for (Index k = 0; k < std::ssize(surfaces_); ++k)
+    note_inside(k, places, seen_[static_cast<std::size_t>(k)], clear_.col(k), state);
+  return state;
+}
 
 void ContactTerms::carry(Index k, const Mat4& motion) {
   const auto which = static_cast<std::size_t>(k);
@@ -30,7 +57,9 @@ void ContactTerms::change_coordinates(const Mat4& motion) {
   for (std::size_t k = 0; k < starts_.size(); ++k) {
     starts_[k] = motion * starts_[k];
     surfaces_[k].set_placement(starts_[k]);
+    seen_[k] = affine_image(seen_[k], motion);
   }
+  places_ = affine_image(places_, motion);
 }
 
 void ContactTerms::move_obstacles(double share) {
@@ -90,12 +119,8 @@ std::string ContactTerms::name_of(Index surface) const {
 
 Points ContactTerms::forces_at(const Vec3& place, const double* places) const {
   Points forces = Points::Zero(pressures_.cols(), 3);
-  const auto nearness = [&](Index row) {
-    const double square = (Eigen::Map<const Vec3>(places + 3 * row) - place).squaredNorm();
-    return 1.0 / (square + handle_reach * handle_reach);
-  };
   for (const ContactPlane& plane : found_.planes) {
-    const double share = nearness(plane.first) - (plane.second < 0 ? 0.0 : nearness(plane.second));
+    const double share = nearness(places, plane.first, place) - nearness(places, plane.second, place);
     forces.row(plane.obstacle) += share * plane.share * plane.pressure * plane.normal.transpose();
   }
   return forces;

@@ -57,6 +57,14 @@ void go_back(const BarrierSurface& surface, PointsIn now, const std::vector<Inde
   }
 }
 
+void recall_inside(const ContactState& state, std::vector<Points>& seen, RowMatrix<double>& clear) {
+  for (const ContactState::Inside& held : state.inside)
+    if (held.row < clear.rows() && held.surface < clear.cols()) {
+      seen[static_cast<std::size_t>(held.surface)].row(held.row) = held.seen.transpose();
+      clear(held.row, held.surface) = held.clear;
+    }
+}
+
 }  // namespace
 
 void ContactTerms::set(const std::optional<Contact>& contact, const RowMatrix<double>& coefficients) {
@@ -75,8 +83,9 @@ void ContactTerms::set(const std::optional<Contact>& contact, const RowMatrix<do
     for (Index k = 0; k < std::ssize(surfaces_); ++k) {
       BarrierSurface& surface = surfaces_[static_cast<std::size_t>(k)];
       if (surface.is_alike(before[static_cast<std::size_t>(k)]))
-        surface.set_placement(before[static_cast<std::size_t>(k)].placement());
-      see(k);
+        surface.set_placement(before[static_cast<std::size_t>(k)].placement());  // the ways go on
+      else
+        see(k);
       starts_.push_back(surface.placement());
     }
     return;
@@ -121,15 +130,6 @@ void ContactTerms::release() {
 
 void ContactTerms::begin(const RowMatrix<double>& coefficients) { resume({}, coefficients); }
 
-ContactState ContactTerms::held() const {
-  ContactState state;
-  for (const BarrierSurface& surface : surfaces_) state.placements.push_back(surface.placement());
-  for (Index row = 0; row < std::min(pressures_.rows(), points_.sample_count()); ++row)
-    for (Index k = 0; k < pressures_.cols(); ++k)
-      if (pressures_(row, k) > 0.0) state.pressures.push_back({row, k, pressures_(row, k)});
-  return state;
-}
-
 void ContactTerms::resume(const ContactState& state, const RowMatrix<double>& coefficients) {
   if (!any()) return release();
   points_.coarsen();
@@ -145,6 +145,7 @@ void ContactTerms::resume(const ContactState& state, const RowMatrix<double>& co
     surfaces_[which].set_placement(fits ? state.placements[which] : ends_[which]);
     see(k);
   }
+  if (fits) recall_inside(state, seen_, clear_);
   starts_ = fits ? state.placements : ends_;
   carried_.assign(surfaces_.size(), Mat4::Identity());
   release();

@@ -206,7 +206,7 @@ const RadialReport& RadialSolver::report() const {
 void RadialSolver::reset() {
   RadialState& s = *state_;
   s.shape.coefficients = s.problem.basis.identity();
-  s.shape.jump();
+  s.invalidate_history();
   s.contact.begin(s.shape.coefficients);
   std::vector<Handle> at_rest = handles();
   for (Handle& handle : at_rest) {

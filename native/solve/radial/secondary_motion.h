@@ -26,6 +26,13 @@ struct ContactState {
     double pressure;
   };
   std::vector<Pressure> pressures;  ///< of what touches
+  struct Inside {
+    Index row;
+    Index surface;
+    Vec3 seen;
+    double clear;  ///< distance there
+  };
+  std::vector<Inside> inside;  ///< where what may be inside was last seen outside
 };
 
 /// Where a body is and how it moves: all that the next step depends on beside its handles' targets.
