@@ -15,7 +15,7 @@ from .deform import first_result
 from .field_modifier import copies, motion
 from .handles import held_counts, left_behind, row_selection
 from .jobs.display import display
-from .live import recovery, rendering, sessions, stored
+from .live import recovery, rendering, sessions, stored, touching
 from .live.prefetch import prefetch
 from .pin_tool import drawing as pin_drawing
 from .pin_tool import tool
@@ -116,7 +116,7 @@ HANDLERS = {  # of bpy.app.handlers
 }
 DRAWINGS = (  # over every 3D viewport
     *((previews.draw, "POST_VIEW"), (handle_boxes.draw, "POST_VIEW"), (pin_drawing.draw, "POST_VIEW")),
-    (landmark_drawing.draw, "POST_PIXEL"),
+    *((touching.draw, "POST_VIEW"), (landmark_drawing.draw, "POST_PIXEL")),
 )
 PARTS = (  # what begins with the extension, and how it ends
     (icons.load, icons.clear),

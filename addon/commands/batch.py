@@ -178,7 +178,9 @@ def flags(settings):
     arguments = []
     for name, value in settings.items():
         flag = "--" + name.replace("_", "-")
-        if isinstance(value, bool):
+        if isinstance(value, list):
+            arguments += [part for one in value for part in (flag, one)]
+        elif isinstance(value, bool):
             arguments.append(flag if value else f"--no-{flag[2:]}")
         else:
             arguments += [flag, str(value.resolve() if isinstance(value, Path) else value)]

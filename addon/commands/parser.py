@@ -9,6 +9,7 @@ from pathlib import Path, PurePath
 from ..core.settings.choices import BAKE_FORMATS, LIVE_KINDS, ORIENTATIONS, OUTPUTS, SKIN_GROUPS, SURFACES
 from ..core.settings.parameters import DEFORM, EXTRACTION, QUALITIES, SKIN
 from ..core.settings.styles import STYLES, STYLIZE
+from .contact_flags import NAMES, add_contact_flags
 
 FORMATS = ("ply", "obj", "stl", "blend")
 PARAMETERS = {"deform": DEFORM, "stylize": STYLIZE}
@@ -55,7 +56,7 @@ def refuse_foreign(options):
 
 def solve_settings(options):
     """What was given of the solve, by name: the same settings, the same result."""
-    names = [*(p.name for p in PARAMETERS[options.solve_verb]), *FLAGS[options.solve_verb], *SHARED]
+    names = [*(p.name for p in PARAMETERS[options.solve_verb]), *FLAGS[options.solve_verb], *SHARED, *NAMES]
     return {name: getattr(options, name) for name in names if getattr(options, name) is not None}
 
 
@@ -154,6 +155,7 @@ def add_batch(verbs):
 
 def add_solve_flags(one, verbs):
     """Flags of the solves; each defaults to None: to the object's own setting."""
+    add_contact_flags(one)
     group = one.add_argument_group("solve")
     if "stylize" in verbs:
         names = ", ".join(name for name, _ in STYLES)
@@ -162,9 +164,8 @@ def add_solve_flags(one, verbs):
             "--frame", choices=lower(ORIENTATIONS[:3]), help="whose axes the style stands along"
         )
     if "deform" in verbs:
-        group.add_argument(
-            "--handles", type=Path, metavar="FILE", help="handles as JSON, in the file's space"
-        )
+        text = "handles as JSON, in the file's space"
+        group.add_argument("--handles", type=Path, metavar="FILE", help=text)
     if "stylize" not in verbs:
         one.set_defaults(style=None, frame=None)
     group.add_argument("--result", choices=lower(OUTPUTS), help="the mesh itself moved, or a new one")

@@ -19,7 +19,7 @@ from ..core.runtime.threads import start_thread
 from ..core.settings.styles import style_identifier
 from ..handles import empties, naming
 from ..names import REPORT
-from . import files
+from . import contact_flags, files, touching
 from .parser import solve_settings
 
 CALLS = {"deform": bpy.ops.arapfields.deform, "stylize": bpy.ops.arapfields.stylize}
@@ -38,6 +38,7 @@ def run_single(options, _):
     for place in (options.output, options.report):
         if place:
             files.check_place(place)
+    touching.set_contact(sources, options)
     if options.handles:
         for source in sources:
             add_handles(source, options.handles)
@@ -61,7 +62,8 @@ def run_single(options, _):
 def objects_to_solve(options):
     """The objects to work on."""
     meshes = [item for item in bpy.context.view_layer.objects if is_source(item)]
-    meshes = [item for item in meshes if not settings_of(item).made_from]
+    obstacles = touching.named(options)
+    meshes = [item for item in meshes if not settings_of(item).made_from and item.name not in obstacles]
     if options.objects:
         by_name = {item.name: item for item in meshes}
         unknown = [name for name in options.objects if name not in by_name]
@@ -110,7 +112,8 @@ def solve(source, options):
     """({"object", "status", "message", …}, (source, result) or None) of one object."""
     call = CALLS[options.solve_verb]
     given = solve_settings(options)
-    given.pop("handles", None)
+    for name in ("handles", *contact_flags.NAMES):
+        given.pop(name, None)
     given |= {name: given[name].upper() for name in UPPER if name in given}
     if "style" in given:
         given["style"] = style_identifier(given["style"])

@@ -7,6 +7,7 @@ from ..blender.language import translated
 from ..blender.object_references import owner_of, settings_of
 from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError
+from .obstacles import add
 
 
 class ObstacleOperator(SourceOperator):
@@ -36,17 +37,6 @@ class ARAPFIELDS_OT_add_obstacle(ObstacleOperator, bpy.types.Operator):
                 add(source, item)
         group.use = True
         return translated("{name}: {count} obstacles", name=source.name, count=len(group.obstacle_list))
-
-
-def add(source, item, margin=0.0):
-    """Puts an object, or an empty row, on a source's list; returns the entry."""
-    group = settings_of(source).contact
-    entry = group.obstacle_list.add()
-    group.active_obstacle = len(group.obstacle_list) - 1
-    entry.margin = margin
-    if item is not None:
-        entry.name, entry.item = item.name, item
-    return entry
 
 
 class ARAPFIELDS_OT_remove_obstacle(ObstacleOperator, bpy.types.Operator):

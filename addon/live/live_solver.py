@@ -48,6 +48,7 @@ class LiveSolver:
         setup, carrying = self._reader.setup, self._reader.carrying
         ready = prefetch.take(setup)
         self.frame_solver = ready.reuse(setup, carrying) if ready else FrameSolver(sampled(setup), carrying)
+        self.frame_solver.shows_touch = True
 
     def begin_at_rest(self):
         """Has the next step of secondary motion begin at rest."""

@@ -47,6 +47,7 @@ class Session:
         is_still = keeps_shape or animation_range(source, kind) is None
         self.playback = Playback(self.solver, scene_frame(context.scene) if is_still else None)
         self.requested = None  # the newest Request
+        self.touching = None  # (k, 3) where the shape that is shown touches, in local coordinates
         self.is_restored = earlier is not None  # whether the file may have the shape of the request at hand
         self.is_held = False  # whether its shape counts as that, whatever it is
         self.is_quiet = False  # whether nothing is shown, until a handle moves
@@ -213,6 +214,7 @@ class Session:
         source = self.source.get()
         is_shown = self.display.show(source, shape)
         if is_shown:
+            self.touching = shape.touching
             self.carrying.show(shape.carried)
             if self.display.in_place:
                 self.note(source, shape)

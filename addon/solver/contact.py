@@ -12,7 +12,7 @@ from ..blender.evaluation import depsgraph_of
 from ..blender.object_references import in_scene, settings_of
 from ..blender.property_definitions import from_single_precision
 from ..core.errors import UserError
-from ..core.geometry.spaces import space_of, transform
+from ..core.geometry.spaces import inverse, space_of, transform
 from ..core.runtime import native
 
 DIGITS = 5  # of an uneven scale: what turns in single precision stays the same solid
@@ -52,6 +52,17 @@ class ContactTerm(NamedTuple):
             for solid in self.solids
         ]
         return af.Contact(obstacles, ground=self.ground, up=self.up, itself=self.itself)
+
+    def touched(self, known, points, near):
+        """(n,) whether points in solve space are that near to a margin; `known` as made() left it."""
+        result = np.zeros(len(points), dtype=bool)
+        if self.ground is not None:
+            result |= points @ np.array(self.up) < self.ground + near
+        for solid in self.solids:
+            scale = np.cbrt(np.linalg.det(solid.placement[:3, :3]))
+            there = transform(inverse(solid.placement), points)
+            result |= scale * np.asarray(known[solid.key](there)) < solid.margin + near
+        return result
 
 
 def native_contact(term, known=None):

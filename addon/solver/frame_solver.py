@@ -19,6 +19,10 @@ REST_STEPS, FINE_TOLERANCE = 400, 1e-6  # of a solve from rest: until the energy
 STYLE = presets("live").get("STYLE")  # label, tip, and options for a style, which acts everywhere
 LEAST_RIGIDITY = 1e-3  # of a style
 TRACKED = 2000  # splats that are followed from step to step
+TOUCHED, TOUCH = (
+    1000,
+    5e-3,
+)  # points that are looked at for a touch; what is that near, in cube units, touches
 
 
 @dataclass(frozen=True)
@@ -29,6 +33,7 @@ class Shape:
     rest: np.ndarray | None  # (n, 3) where the source's own points are without the field; None for surfaces
     turns: np.ndarray | None = None  # (n, 3) axis · angle, for free custom normals
     changes: dict | None = None  # of splats' attributes
+    touching: np.ndarray | None = None  # (k, 3) where it touches, of a part of the points
     topology: Topology | None = None
     carried: list = field(default_factory=list)  # what Carrying.moved made
     of: Request | None = None  # whose own shape this is, from rest; None on the way there
@@ -50,6 +55,8 @@ class FrameSolver:
         else:
             self.rest = sampled.rest
         self._make_solver(handles, setup.energy if energy is None else energy)
+
+    shows_touch = False  # whether shapes say where they touch
 
     def clone(self):
         """The same with a native solver of its own, for another thread."""
@@ -171,9 +178,18 @@ class FrameSolver:
         turns = surface.turns(moved, self.rest) if surface.in_place else None
         centers, changes = surface.splat_changes(moved) if surface.in_place else (None, None)
         solved = centers if solved is None else solved
+        touching = self._touching(request, solved) if self.shows_touch else None
         # What does not move stays bit for bit.
         points = in_single(surface.space.moved_to_local(require_finite(solved), self.rest, self.points))
-        return Shape(points, self._single, turns, changes, carried=carried)
+        return Shape(points, self._single, turns, changes, touching, carried=carried)
+
+    def _touching(self, request, solved):
+        """(k, 3) where a part of the points touches what the request's contact has, in local coordinates."""
+        if request.contact is None:
+            return None
+        some = np.asarray(solved[:: max(1, len(solved) // TOUCHED)], dtype=np.float64)
+        near = TOUCH * self.sampled.samples.frame.scale
+        return self.to_local(some[request.contact.touched(self.distances, some, near)])
 
     def to_local(self, points):
         """(n, 3) from solve space to local coordinates, in single precision."""

@@ -16,7 +16,7 @@ if IN_BLENDER:
     from support.blender.stacks import local_points
 
     from addon.core.runtime import jobs
-    from addon.live import sessions
+    from addon.live import sessions, touching
     from addon.pin_tool.tool import ARAPFIELDS_TOOL_pin
     from addon.solver import contact, setup
 
@@ -54,9 +54,11 @@ def test_a_live_shape_stays_outside_as_its_obstacle_comes_and_goes():
     bar.arapfields.contact.ground = low - 0.2
     bpy.context.view_layer.update()
     assert lowest(bar) > low - 0.2 - 2e-3 * size > free
+    tinted = touching.places()
+    assert len(tinted) > 3 and abs(tinted[:, 2] - low + 0.2).max() < 0.02 * size
     bar.arapfields.contact.use = False
     bpy.context.view_layer.update()
-    assert abs(lowest(bar) - free) < 1e-3 * size
+    assert abs(lowest(bar) - free) < 1e-3 * size and not len(touching.places())
     bpy.ops.arapfields.live(kind="DEFORM")
     bar.arapfields.contact.use, bar.arapfields.contact.use_ground = True, False
     scenes.activate(block, bar)

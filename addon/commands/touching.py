@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Obstacles that flags name, beside what the objects of a .blend say themselves."""
+
+import math
+from pathlib import Path
+
+import bpy
+
+from ..blender.object_references import settings_of
+from ..contact.obstacles import add
+from ..core.errors import UserError
+from .files import READ
+
+
+def parts(text):
+    """(name, margin); a name may have a colon."""
+    name, colon, margin = text.rpartition(":")
+    try:
+        value = float(margin)
+    except ValueError:
+        return text, 0.0
+    if not colon or text in bpy.data.objects:
+        return text, 0.0
+    if not 0.0 <= value < math.inf:
+        raise UserError(f"--obstacle: {text}: the margin is negative, or no number")
+    return name, value
+
+
+def named(options):
+    """The names of the obstacles, which are not worked on themselves."""
+    return {parts(text)[0] for text in getattr(options, "obstacle", None) or ()}
+
+
+def set_contact(sources, options):
+    """Gives the sources what the flags ask for; each obstacle of a file is read once."""
+    obstacles = [(found(name, options), margin) for name, margin in map(parts, options.obstacle or ())]
+    for source in sources:
+        group = settings_of(source).contact
+        for item, margin in obstacles:
+            add(source, item, margin)
+        if options.ground is not None:
+            group.use_ground, group.ground = True, options.ground
+        if options.itself is not None:
+            group.itself = options.itself
+        group.use |= bool(obstacles) or options.ground is not None or bool(options.itself)
+
+
+def found(name, options):
+    """The object of that name, or the mesh of that file."""
+    item, path = bpy.data.objects.get(name), Path(name)
+    if item is None:
+        if path.suffix.lower() not in READ or not path.is_file():
+            raise UserError(f"--obstacle: {name}: no object of {options.input}, and no mesh file")
+        before = set(bpy.data.objects)
+        READ[path.suffix.lower()](str(path))
+        item = next(iter(set(bpy.data.objects) - before), None)
+        bpy.context.view_layer.update()
+    if item is None or item.type != "MESH":
+        raise UserError(f"--obstacle: {name}: is no mesh")
+    return item
