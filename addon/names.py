@@ -32,6 +32,7 @@ PLAYED_GROUP = "arapfields_played"  # custom property of the node group that pla
 PLAYED_SUFFIX = "_played"  # of the mesh that has baked points of hair, point clouds and Grease Pencil
 ROWS = "ARAP Fields Rows"  # point attribute: which of these points each is
 FIELD_SUFFIX = "_field"  # of the mesh whose vertices are the numbers of a field
+COPY_OF = "arapfields_copy_of"  # custom property of what was copied for a target: the carried object's name
 HELPER_SUFFIX = "_offsets"  # of the mesh that carries offsets where the source cannot
 
 

@@ -15,6 +15,7 @@ from ..core.runtime import native
 from ..core.settings.choices import TRANSFERRED
 from ..handles.empties import matrix_of
 from ..results.placement import single_user
+from . import garments, rigs
 from .given import Given
 
 LEAST_WEIGHT = 1e-4  # what is below is no member of a group
@@ -63,7 +64,7 @@ class Transfer:
 
     def __init__(self, context, source, target):
         refuse(refusal(source, target))
-        self.source, self.target = source, target
+        self.context, self.source, self.target = context, source, target
         self.given = Given(context, source)
         to_target = np.linalg.inv(matrix_of(target)) @ matrix_of(source)
         self.moved = transform(to_target, self.given.moved)  # in the target's coordinates, as keys are
@@ -88,8 +89,12 @@ class Transfer:
             "EDGES": self.edges,
             "UV_MAPS": self.uv_maps,
             "ARMATURE": self.armature,
+            "CARRIED": self.carried,
         }
-        return {label: steps[kind]() for kind, label, _ in TRANSFERRED if kind in kinds}
+        done = {label: steps[kind]() for kind, label, _ in TRANSFERRED if kind in kinds}
+        if "KEYS" in kinds and has_keys(self.source):
+            rigs.copy_drivers(self.source, self.target)
+        return done
 
     def keys(self):
         given = self.source.data.shape_keys
@@ -122,7 +127,6 @@ class Transfer:
             key.relative_key = made[block.relative_key.name]
             for name in ("slider_min", "slider_max", "value", "mute", "vertex_group", "interpolation"):
                 setattr(key, name, getattr(block, name))
-        copy_drivers(given, self.target.data.shape_keys)
         return len(blocks)
 
     def key_named(self, name):
@@ -207,31 +211,19 @@ class Transfer:
             if modifier is None or modifier.type != "ARMATURE":
                 modifier = self.target.modifiers.new(given.name, "ARMATURE")
             if modifier.object is None or modifier.object == given.object:
-                modifier.object = copied_rig(given.object, self.target)
+                modifier.object = rigs.copied(given.object, self.target)
             for name in ("use_deform_preserve_volume", "use_vertex_groups", "use_bone_envelopes"):
                 setattr(modifier, name, getattr(given, name))
             done += 1
         return done
 
-
-def copied_rig(rig, target):
-    """A copy at the same place, in the target's collections."""
-    copied = rig.copy()
-    copied.data = rig.data.copy()
-    copied.name = f"{rig.name} {target.name}"
-    for home in target.users_collection:
-        home.objects.link(copied)
-    return copied
-
-
-def copy_drivers(given, keys):
-    """The same drivers on the keys of the same names."""
-    if given.animation_data is None:
-        return
-    for curve in given.animation_data.drivers:
-        if keys.animation_data is not None and keys.animation_data.drivers.find(curve.data_path):
-            keys.driver_remove(curve.data_path)
-        keys.animation_data_create().drivers.from_existing(src_driver=curve)
+    def carried(self):
+        own = self.own, mesh_arrays.triangles(self.target.data)
+        done, notes = garments.copies(
+            self.context, self.source, self.target, self.given, own, rigs.pairs(self.source, self.target)
+        )
+        self.notes += notes
+        return done
 
 
 def message(target, counts, notes):

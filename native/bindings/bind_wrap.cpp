@@ -4,6 +4,7 @@
 #include "bindings/bind.h"
 #include "bindings/python_function.h"
 #include "bindings/reports.h"
+#include "wrap/sequence.h"
 #include "wrap/suggestion.h"
 #include "wrap/transfer.h"
 #include "wrap/wrap.h"
@@ -28,12 +29,8 @@ std::vector<Landmark> as_landmarks(const LandmarksArgument& argument) {
   return landmarks;
 }
 
-WrapResult wrap_samples(const SurfaceSamples& samples, const FunctionArgument& target,
-                        const LandmarksArgument& landmarks, WrapOptions options, Task* task) {
-  const std::shared_ptr<const ImplicitFunction> function = as_function(target, "target");
-  const std::vector<Landmark> pairs = as_landmarks(landmarks);
-  const WrapSolution solution = run_long(
-      task, [&](const Progress& progress) { return wrap(samples, *function, pairs, options, progress); });
+/// The field with a WrapReport attached.
+py::object with_report(const WrapSolution& solution) {
   py::object field = py::cast(solution.field);
   const WrapReport& r = solution.report;
   attach_report(
@@ -45,6 +42,14 @@ WrapResult wrap_samples(const SurfaceSamples& samples, const FunctionArgument& t
                   "scale"_a = r.scale, "iterations"_a = r.iterations, "seconds"_a = r.seconds,
                   "notes"_a = py::tuple(py::cast(r.warnings)), **field_measures(r.arap, r.distortion)));
   return field;
+}
+
+WrapResult wrap_samples(const SurfaceSamples& samples, const FunctionArgument& target,
+                        const LandmarksArgument& landmarks, WrapOptions options, Task* task) {
+  const std::shared_ptr<const ImplicitFunction> function = as_function(target, "target");
+  const std::vector<Landmark> pairs = as_landmarks(landmarks);
+  return with_report(run_long(
+      task, [&](const Progress& progress) { return wrap(samples, *function, pairs, options, progress); }));
 }
 
 py::array_t<double> suggest(const SurfaceSamples& samples, const FunctionArgument& target, int count,
@@ -163,10 +168,33 @@ Carries what a mesh has over to the mesh that it was wrapped onto, or back.
 arguments as for Correspondence. Source: Sumner and Popović 2004. Raises InvalidInput and Cancelled.)");
 }
 
+void bind_sequence(py::module_& module) {
+  py::class_<WrapSequence>(module, "WrapSequence", R"(
+A surface that was wrapped onto the first frame of a scanned sequence, and follows the others.
+
+Each frame starts from where the last one left the surface. Rigidity is measured from the first frame, so that
+nothing drifts.)")
+      .def(py::init<const SurfaceSamples&, const DeformationField&, const WrapOptions&>(), "samples"_a,
+           "field"_a, py::arg_v("options", WrapOptions(), "WrapOptions()"), R"(
+field: the DeformationField of `wrap` from these samples onto the first frame. options: as for `wrap`; stages,
+alignment and landmarks play no part. Raises InvalidInput.)")
+      .def(
+          "next",
+          [](WrapSequence& self, const FunctionArgument& target, Task* task) -> WrapResult {
+            const std::shared_ptr<const ImplicitFunction> function = as_function(target, "target");
+            return with_report(
+                run_long(task, [&](const Progress& progress) { return self.next(*function, progress); }));
+          },
+          "target"_a, py::kw_only(), "task"_a = py::none(), R"(
+The DeformationField from rest onto the next frame, an ImplicitFunction as `wrap` takes it. field.report is a
+WrapReport. Raises InvalidInput and Cancelled; then the sequence is as it was.)");
+}
+
 }  // namespace
 
 void bind_wrap(py::module_& module) {
   bind_transfer(module);
+  bind_sequence(module);
   module.def("wrap", &wrap_samples, "samples"_a, "target"_a, "landmarks"_a = py::tuple(),
              py::arg_v("options", WrapOptions(), "WrapOptions()"), py::kw_only(), "task"_a = py::none(), R"(
 The DeformationField that lays a surface onto the zero surface of `target`, as rigidly as possible.

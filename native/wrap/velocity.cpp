@@ -61,17 +61,18 @@ struct PointBlock {
       values.col(p).tail<3>() = stiffness.points.row(i).transpose().cast<float>();
       forms.row(p) = correspondences.forms.row(i).cast<float>();
       right_hand_side.noalias() += values.col(p) * correspondences.right_hand_sides.row(i).cast<float>();
-      add_stiffness(p, Eigen::Map<const RowMat3>(&stiffness.jacobians(i, 0)),
+      const Mat3 jacobian = Eigen::Map<const RowMat3>(&stiffness.jacobians(i, 0));
+      add_stiffness(p, closest_rotation(jacobian) - jacobian,
+                    stiffness.at_rest ? slopes : MatrixF(slopes * jacobian.cast<float>()),
                     static_cast<float>(stiffness.rigidity[i]), static_cast<float>(stiffness.viscosity[i]),
                     slopes);
     }
   }
 
  private:
-  void add_stiffness(Index p, const Mat3& jacobian, float rigidity, float viscosity, const MatrixF& slopes) {
-    const Eigen::Matrix3f missing = (closest_rotation(jacobian) - jacobian).cast<float>();
-    const MatrixF along = slopes * jacobian.cast<float>();
-    right_hand_side.noalias() += rigidity * along * missing.transpose();
+  void add_stiffness(Index p, const Mat3& missing, const MatrixF& along, float rigidity, float viscosity,
+                     const MatrixF& slopes) {
+    right_hand_side.noalias() += rigidity * along * missing.cast<float>().transpose();
     for (int k = 0; k < 3; ++k) {
       gradients.col(k * block_size + p) = std::sqrt(rigidity) * along.col(k);
       gradients.col((3 + k) * block_size + p) = std::sqrt(viscosity) * slopes.col(k);

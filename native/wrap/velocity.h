@@ -14,6 +14,7 @@ struct StiffnessTerms {
   Vector rigidity;              ///< (n) weights of ‖∇v J − (R − J)‖², R the rotation closest to J
   Vector viscosity;             ///< (n) weights of ‖∇v‖²
   double ridge = 0.0;           ///< weight of the squared coefficients
+  bool at_rest = false;         ///< points are those at rest and v is a change of the motion: ‖∇v − (R − J)‖²
 };
 
 /// Landmarks (k,3), their displacements onto their targets, and the weight of the mean squared difference.

@@ -14,6 +14,7 @@
 #include "wrap/alignment.h"
 #include "wrap/flow.h"
 #include "wrap/landmark_check.h"
+#include "wrap/measure.h"
 #include "wrap/parameters.h"
 
 namespace arapfields {
@@ -34,37 +35,6 @@ std::shared_ptr<ComposedField> field_of(std::vector<FieldStep> steps, const Simi
   field->set_frame(frame);
   field->set_rest_points(samples.points.topRows(std::min(samples.size(), kept_rest_points)));
   return field;
-}
-
-/// Measures the flow without the alignment: `field` maps the aligned cube to itself.
-void measure(const ComposedField& field, const SurfaceSamples& samples, const WrapTarget& target,
-             WrapReport& report) {
-  Random random(0);
-  const std::vector<Index> rows = stratified(morton_order(samples.points), measured_samples, random);
-  const Points points = rows_of(samples.points, rows);
-  JetBlock<double> jets(points.rows(), JetOrder::first);
-  field.evaluate(points, jets.view());
-  report.distortion = distortion<double>(std::as_const(jets).view());
-  const Points moved = Eigen::Map<const Points>(jets.view().data, points.rows(), 3);
-  RowMatrix<double> jacobians(points.rows(), 9);
-  for (Index i = 0; i < points.rows(); ++i)
-    for (int k = 0; k < 3; ++k)
-      for (int l = 0; l < 3; ++l) jacobians(i, 3 * l + k) = jets.view().at(first_column(k), i)[l];
-  Vector growth;
-  const Points normals = moved_normals(jacobians, rows_of(samples.normals, rows), growth);
-  const SurfaceDistances to = surface_distances(target.tree, target.points, target.normals, target.spacing,
-                                                moved, normals, growth, target.interior);
-  const OrientedPoints tree(moved, normals);
-  const SurfaceDistances from =
-      surface_distances(tree, moved, normals, mean_spacing(moved), target.points, target.normals, {}, {});
-  report.to_target_mean = to.mean / target.diagonal;
-  report.to_target_95 = to.quantile_95 / target.diagonal;
-  report.from_target_mean = from.mean / target.diagonal;
-  report.from_target_95 = from.quantile_95 / target.diagonal;
-  const Points some = rows_of(points, random_subset(points.rows(), energy_samples, random));
-  JetBlock<double> second(some.rows(), JetOrder::second);
-  field.evaluate(some, second.view());
-  report.arap = arap_energy<double>(std::as_const(second).view(), 1.0, 0.0, {});
 }
 
 WrapSource source_of(const SurfaceSamples& samples, const std::vector<Landmark>& landmarks) {
@@ -121,7 +91,7 @@ WrapSolution wrap(const SurfaceSamples& samples, const ImplicitFunction& functio
   // Result and report.
   progress.report(0.95, "measuring the result");
   solution.field = field_of(flow.steps(), placement, samples);
-  measure(ComposedField(flow.steps()), samples, target, report);
+  measure(ComposedField(flow.steps()), samples.points, samples.normals, target, report);
   report.diagonal = mesh_target.diagonal;
   report.scale = placement.scale / samples.frame.scale;
   report.matched_share = flow.matched_share();

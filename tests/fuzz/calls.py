@@ -215,6 +215,8 @@ def members(t):
         "save_grid": lambda: (af.save_grid, ["grid.npz", np.zeros((3, 3, 3)), np.zeros(3), 0.1]),
         "wrap": lambda: (by_name(af.wrap, "task"), wrapping([])),
         "suggest_landmarks": lambda: (by_name(af.suggest_landmarks, "task"), wrapping(4)),
+        "WrapSequence": lambda: (af.WrapSequence, [t["samples"], t["wrapped"], af.WrapOptions(**WRAP)]),
+        "WrapSequence.next": lambda: (by_name(t["sequence"].next, "task"), [t["mesh_sdf"], af.Task()]),
         "Obstacle": lambda: (by_name(af.Obstacle, "placement"), [t["mesh_sdf"], 0.1, np.eye(4)]),
         "Contact": lambda: (
             by_name(af.Contact, "ground", "up"),
@@ -223,16 +225,13 @@ def members(t):
         "LiveDeformer.set_contact": lambda: (t["live"].set_contact, [af.Contact(ground=-1.0)]),
         "Correspondence": lambda: (
             by_name(af.Correspondence, "back"),
-            [TETRAHEDRON, t["mesh"], t["mesh"], False],
+            [TETRAHEDRON, *[t["mesh"]] * 2, False],
         ),
         "Correspondence.values": lambda: (t["places"].values, [TETRAHEDRON]),
         "Correspondence.displacements": lambda: (t["places"].displacements, [TETRAHEDRON]),
         "transfer": lambda: (af.transfer, [TETRAHEDRON, t["mesh"], t["mesh"], {"values": TETRAHEDRON}]),
         "PointCacheReader": lambda: (af.PointCacheReader, ["/nonexistent"]),
-        "PointCacheWriter": lambda: (
-            by_name(writer, "start", "step"),
-            ["/nonexistent/x.pc2", 4, 2, 1.0, 1.0],
-        ),
+        "PointCacheWriter": lambda: (by_name(writer, "start", "step"), ["/none/x.pc2", 4, 2, 1.0, 1.0]),
         "PointCacheWriter.write": lambda: (lambda *given: with_writer("write", *given), [TETRAHEDRON]),
         "PointCacheWriter.finish": lambda: (lambda: with_writer("finish"), []),
         "PointCacheWriter.commit": lambda: (lambda: with_writer("commit"), []),

@@ -13,7 +13,7 @@ TETRAHEDRON = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 TINY = {"width": 8, "layers": 1, "octaves": 2, "threads": 1}
 PLAIN = ("style_names", "backend", "simd_level", "thread_count", "device_report")
-WRAP = {"centers": 20, "stages": 1, "iterations": 2, "samples": 50}
+WRAP = {"centers": 20, "stages": 1, "iterations": 2}
 CIRCLE = np.stack([np.cos(np.linspace(0, 6, 50)), np.sin(np.linspace(0, 6, 50))], axis=1)
 
 
@@ -76,6 +76,7 @@ def make_things():
     rng = np.random.default_rng(0)
     layers = [rng.normal(size=(b, a)) / a**0.5 for a, b in ((12, 8), (8, 1))]
     curve = af.sample_curve(CIRCLE, 40)
+    wrapped = af.wrap(samples, af.MeshSdf(TETRAHEDRON, FACES), [], af.WrapOptions(**WRAP))
     return {
         "samples": samples,
         "handles": handles,
@@ -93,6 +94,8 @@ def make_things():
         "frame": field.frame,
         "mesh": (TETRAHEDRON, FACES),
         "mesh_sdf": af.MeshSdf(TETRAHEDRON, FACES),
+        "wrapped": wrapped,
+        "sequence": af.WrapSequence(samples, wrapped, af.WrapOptions(**WRAP)),
         "places": af.Correspondence(TETRAHEDRON, (TETRAHEDRON, FACES), (TETRAHEDRON, FACES)),
         "style": af.ObjectStyle(TETRAHEDRON, FACES),
         "attachment": af.Attachment(samples, ROWS[:5]),

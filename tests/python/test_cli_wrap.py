@@ -64,6 +64,29 @@ def test_landmarks_are_suggested(pair):
         assert np.array_equal(read_landmarks(again), pairs)
 
 
+def test_frames_of_a_motion_go_into_a_point_cache(pair, capsys):
+    frames, cache = pair / "frames", pair / "motion.pc2"
+    frames.mkdir()
+    v, f = cases.figure(2)
+    for number in (10, 9, 11):  # by number, not by letter
+        shape = cases.bend(v, 0.05 * (number - 9))
+        trimesh.Trimesh(shape, f, process=False).export(frames / f"scan{number}.ply")
+    flags = ["--sequence", "--alignment", "none", *SMALL]
+    assert run("wrap", pair / "template.obj", frames, "-o", cache, *flags) == 0
+    with af.PointCacheReader(cache) as reader:
+        found = [reader[k] for k in range(3)]
+    for k in range(3):
+        away = np.abs(af.MeshSdf(cases.bend(v, 0.05 * k), f)(found[k].astype(float)))
+        assert away.mean() < 0.01 * np.linalg.norm(np.ptp(v, axis=0))
+    for wrong, text in (
+        ([pair / "scan.ply", "-o", cache], "no folder of frames"),
+        ([frames, "-o", pair / "out"], "--output"),
+        ([frames, "-o", cache, "--suggest", pair / "x.json"], "--suggest: has no meaning"),
+    ):
+        assert run("wrap", pair / "template.obj", *wrong, *flags) == 2
+        assert text in " ".join(capsys.readouterr().err.split())
+
+
 def test_a_folder_is_done_once_and_a_bad_file_stops_no_other(pair, capsys):
     scans, out = pair / "scans", pair / "out"
     scans.mkdir()

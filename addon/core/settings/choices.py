@@ -133,4 +133,5 @@ TRANSFERRED = (
         "UV Maps",
         "Replaces maps of these names; faces across a seam show a strip beyond it, and maps overlap there",
     ),
+    ("CARRIED", "Carried Objects", "A copy of each object that it carries, at its distance from the target"),
 )

@@ -46,6 +46,8 @@ def live():
 
 MOVED = live().solve(pose(0.2))
 STATE = live().motion_state
+COARSE = af.WrapOptions(centers=10, stages=1, iterations=1, threads=1)
+WRAPPED = af.wrap(SAMPLES, af.MeshSdf(*TETRAHEDRON), [], COARSE)
 
 
 class Ball(af.ImplicitFunction):
@@ -147,6 +149,10 @@ CLASSES = {
             "values": lambda it: it.values(TETRAHEDRON[0]),
             "displacements": lambda it: it.displacements(TETRAHEDRON[0]),
         },
+    ),
+    "WrapSequence": (
+        lambda: af.WrapSequence(SAMPLES, WRAPPED, COARSE),
+        {"next": lambda it: it.next(af.MeshSdf(*TETRAHEDRON))},
     ),
     "ObjectStyle": (
         lambda: af.ObjectStyle(*TETRAHEDRON),

@@ -9,7 +9,7 @@ import numpy as np
 import arapfields as af
 
 from .._files import existing_file
-from . import files, sources, verbs, wrap_folder
+from . import files, sources, verbs, wrap_folder, wrap_sequence
 from .flags import SOURCE, report_flag, sdf_flag, stiffness_flags
 from .handles import triple
 from .options import add_option_flags, given, given_options, shard
@@ -22,6 +22,7 @@ EXAMPLES = (
     "template.obj scan.ply -o wrapped.obj",
     "shirt.obj body.obj -o worn.obj --landmark 0,0,1.4 0,0.02,1.5 --landmark 0.3,0,1.3 0.35,0,1.4",
     "template.obj scans -o wrapped --shard 2/8",
+    "template.obj frames -o motion.pc2 --sequence",
     "template.obj scan.ply --suggest pairs.json",
     "template.obj scan.safetensors --save-field wrap.safetensors --landmarks pairs.json",
 )
@@ -36,7 +37,11 @@ def add_flags(parser):
         "-o",
         "--output",
         metavar="FILE",
-        help="the input mesh with its vertices moved; a folder where the target is one",
+        help="the input mesh with its vertices moved; a folder where the target is one; a point cache of a "
+        "sequence, .pc2 or .mdd",
+    )
+    parser.add_argument(
+        "--sequence", action="store_true", help="the folder's files are the frames of one motion, by number"
     )
     parser.add_argument("--shard", type=shard, metavar="I/N", help="the part I of N of a folder alone")
     outputs.add_argument("--save-field", metavar="FILE", help=".safetensors with the deformation field")
@@ -65,6 +70,9 @@ def add_flags(parser):
 
 def run(args):
     options = given_options(af.WrapOptions, args)
+    if args.sequence:
+        wrap_sequence.run(args, options, given_pairs(args))
+        return
     if Path(args.target).is_dir():
         wrap_folder.run(args, options)
         return
@@ -85,7 +93,7 @@ def run(args):
         report = verbs.report_place(outputs, args)
         if report is not None and not places.keys() - {"--suggest"}:
             raise af.InvalidInput("--report: give --output or --save-field, of which it tells")
-        pairs = (read_landmarks(args.landmarks) if args.landmarks else []) + (args.landmark or [])
+        pairs = given_pairs(args)
         source = sources.Source(args)
         if source.mesh is None and "--output" in places:
             raise af.InvalidInput(f"--output: {source.path} holds no mesh to move; use --save-field")
@@ -116,6 +124,11 @@ def run(args):
             verbs.write_report(outputs, report, field.report)
     written = "wrote " + ", ".join(str(path) for path in places.values())
     verbs.summary(args, written, field.report if field is not None else None)
+
+
+def given_pairs(args):
+    """Pairs of landmarks, from the file and the flags."""
+    return (read_landmarks(args.landmarks) if args.landmarks else []) + (args.landmark or [])
 
 
 def read_landmarks(path):

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a body carries, laid onto the body that it was wrapped onto, at its distance from the skin."""
+
+import numpy as np
+
+REACH = 0.05  # of the diagonal: distance from the skin beyond which the wrap alone says where things go
+ROUNDS, SMOOTHINGS = 3, 5
+NEIGHBOURS = 30  # vertices of the body whose growth is that of a thing carried as a whole
+LEAST = 0.5  # of the wanted distance: what is nearer is pushed out without regard to its neighbours
+
+
+class Body:
+    """`wrapped`: (rest, moved, triangles) of what carries, `onto`: (vertices, triangles); in the world."""
+
+    def __init__(self, af, wrapped, onto):
+        self.af, (self.rest, self.moved, self.triangles) = af, wrapped
+        self.diagonal = float(np.linalg.norm(np.ptp(onto[0], axis=0)))
+        self.own, self.other = af.MeshSdf(self.rest, self.triangles), af.MeshSdf(*onto)
+        areas = [vertex_areas(shape, self.triangles) for shape in (self.rest, self.moved)]
+        self.scale = np.sqrt(areas[1] / np.maximum(areas[0], 1e-30))  # of each vertex of the one that carries
+
+    def placed(self, rest, now):
+        """How a thing as a whole grows, and its way (3,): `rest` and `now` (3,) are its middle."""
+        near = np.linalg.norm(self.rest - rest, axis=1)
+        scale = float(np.median(self.scale[np.argsort(near)[:NEIGHBOURS]]))
+        wanted, there = float(self.own(rest[None])[0]) * scale, now[None]
+        share = np.exp(-((wanted / (REACH * self.diagonal)) ** 2))
+        return scale, share * (wanted - float(self.other(there)[0])) * self.other.gradient(there)[0]
+
+    def wanted(self, rest, triangles):
+        """(n,) signed distances from the other body that the vertices of a carried mesh are to have."""
+        body = self.rest, self.triangles
+        scale = self.af.Correspondence(self.rest, body, (rest, triangles)).values(self.scale)
+        return self.own(rest) * scale
+
+    def fit(self, rest, moved, triangles):
+        """(n, 3) vertices of a carried mesh, from where it is at rest and where the wrap's field takes it."""
+        wanted, shape = self.wanted(rest, triangles), np.array(moved, float)
+        near = np.exp(-((wanted / (REACH * self.diagonal)) ** 2))
+        edges = np.unique(np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+        for _ in range(ROUNDS):
+            push = (near * (wanted - self.other(shape)))[:, None] * self.other.gradient(shape)
+            for _ in range(SMOOTHINGS):
+                push = smoothed(push, edges)
+            shape += push
+        for _ in range(ROUNDS):
+            self.push_out(shape, np.arange(len(shape))[:, None], LEAST * wanted)
+            self.push_out(shape, triangles, LEAST * wanted[triangles].mean(axis=1))
+        return shape
+
+    def push_out(self, shape, groups, least):
+        """Moves groups (m, k) of vertices so far out that their middles are `least` (m,) from the body."""
+        outside = np.flatnonzero(least > 0)
+        middles = shape[groups[outside]].mean(axis=1)
+        lack = least[outside] - self.other(middles)
+        short = np.flatnonzero(lack > 0)
+        push = lack[short, None] * self.other.gradient(middles[short])
+        moves, counts = np.zeros_like(shape), np.zeros(len(shape))
+        for corner in groups[outside[short]].T:
+            np.add.at(moves, corner, push)
+            np.add.at(counts, corner, 1)
+        shape += moves / np.maximum(counts, 1)[:, None]
+
+
+def smoothed(values, edges):
+    """Each vertex's (n, k) value and the mean of its neighbours', half of both."""
+    sums, counts = np.zeros_like(values), np.zeros(len(values))
+    for here, there in (edges.T, edges.T[::-1]):
+        np.add.at(sums, here, values[there])
+        np.add.at(counts, here, 1)
+    return np.where(counts[:, None] > 0, 0.5 * (values + sums / np.maximum(counts, 1)[:, None]), values)
+
+
+def vertex_areas(vertices, triangles):
+    """(n,) the area about each vertex."""
+    corners = vertices[triangles]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return np.bincount(triangles.ravel(), np.repeat(areas, 3), minlength=len(vertices)) / 6

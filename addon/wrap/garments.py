@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a wrapped object carries, fitted to the target: clothes and props, at their distance from it."""
+
+import numpy as np
+from mathutils import Matrix
+
+from ..blender import mesh_arrays, modifier_stack
+from ..blender.evaluation import depsgraph_of
+from ..blender.object_references import in_scene, settings_of
+from ..carried.carried_objects import carrier_class
+from ..carried.transforms import TransformCarrier
+from ..carried.world_matrices import array, world_matrices
+from ..core.errors import UserError
+from ..core.geometry import fitting
+from ..core.geometry.spaces import inverse, transform
+from ..core.runtime import native
+from ..field_modifier import motion
+from ..handles.empties import matrix_of
+from ..names import COPY_OF
+
+
+def copies(context, source, target, given, own, rigs):
+    """(count, notes): a copy for the target of each object that the source carries.
+
+    `given`: what the source has. `own`: the target's vertices and triangles. `rigs`: armatures of the source,
+    and what the target has for them.
+    """
+    world, there = matrix_of(source), matrix_of(target)
+    body = fitting.Body(
+        native.library(),
+        (transform(world, given.rest), transform(world, given.moved), given.triangles),
+        (transform(there, own[0]), own[1]),
+    )
+    done, notes = 0, []
+    for entry in settings_of(source).carried:
+        item = entry.item
+        if not in_scene(item) or item == target or item.type == "ARMATURE":
+            continue
+        try:
+            shape, matrix = None, array(item.matrix_world)
+            if issubclass(carrier_class(item, entry.way), TransformCarrier):
+                matrix = placed(context, source, item, entry, body)
+            elif item.type == "MESH":
+                shape = fitted(context, item, body)
+            else:
+                raise UserError("{name} is not copied: it is no mesh", item)
+        except UserError as error:
+            notes.append(str(error))
+            continue
+        put(copy_of(item, target), target, matrix, shape, rigs)
+        done += 1
+    return done, notes
+
+
+def placed(context, source, item, entry, body):
+    """(4, 4) matrix of what is carried as a whole: it grows as the body does there, about its middle."""
+    depsgraph = depsgraph_of(context)
+    basis = TransformCarrier(context, item).basis(item, entry, depsgraph)
+    world = world_matrices(item, modifier_stack.handle_rigs(source), depsgraph, basis)
+    middle = np.array(item.bound_box).mean(axis=0)[None]
+    rest, now = (transform(matrix, middle)[0] for matrix in (world.rest, world.now))
+    scale, way = body.placed(rest, now)
+    grown = np.eye(4)
+    grown[:3, :3] *= scale
+    grown[:3, 3] = now + way - scale * now
+    return grown @ world.now
+
+
+def fitted(context, item, body):
+    """(n, 3) vertices of a carried mesh in the world, and (k, n, 3) those of its keys, or None."""
+    if not modifier_stack.keeps_vertices(item):
+        raise UserError("Modifiers of {name} change its vertices; it is not copied", item)
+    world = matrix_of(item)
+    with modifier_stack.evaluated_mesh(context, item, in_place=True) as mesh:
+        rest, triangles = transform(world, mesh_arrays.positions(mesh)), mesh_arrays.triangles(mesh)
+    if modifier_stack.find(item) is None:
+        raise UserError("The field does not move {name}; wrap again", item)
+    with modifier_stack.moved_mesh(context, item) as mesh:
+        moved = transform(world, mesh_arrays.positions(mesh))
+    shape = body.fit(rest, moved, triangles)
+    keys = item.data.shape_keys
+    if keys is None:
+        return shape, None
+    points = [transform(world, mesh_arrays.vectors(block.data, "co")) - rest for block in keys.key_blocks]
+    same = native.library().Correspondence(shape, (rest, triangles), (shape, triangles))
+    return shape, shape + same.displacements(np.array(points))
+
+
+def copy_of(item, target):
+    """The copy that an earlier transfer made, or a new one."""
+    for child in target.children:
+        if child.get(COPY_OF) == item.name:
+            return child
+    copied = item.copy()
+    if item.data is not None:
+        copied.data = item.data.copy()
+    copied.name, copied[COPY_OF] = f"{item.name} {target.name}", item.name
+    settings_of(copied).carried_by = None
+    motion.discard(copied)
+    for home in target.users_collection:
+        home.objects.link(copied)
+    return copied
+
+
+def put(copied, target, matrix, shape, rigs):
+    """Where it belongs, as a child of the target, posed by the target's armatures."""
+    copied.parent, copied.parent_type = target, "OBJECT"
+    copied.matrix_parent_inverse = target.matrix_world.inverted()
+    copied.delta_location, copied.delta_rotation_euler, copied.delta_scale = (0,) * 3, (0,) * 3, (1,) * 3
+    copied.matrix_world = Matrix(matrix.tolist())
+    for modifier in copied.modifiers:
+        if modifier.type == "ARMATURE" and modifier.object in rigs:
+            modifier.object = rigs[modifier.object]
+    if shape is None:
+        return
+    back = inverse(matrix)
+    mesh_arrays.set_positions(copied.data, transform(back, shape[0]))
+    if shape[1] is not None:
+        for block, points in zip(copied.data.shape_keys.key_blocks, shape[1], strict=True):
+            mesh_arrays.put_vectors(block.data, transform(back, points), "co")

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Armatures that a target has of its own, and drivers that read them."""
+
+
+def pairs(source, target):
+    """{armature of the source: that of the target}."""
+    both = [(given, target.modifiers.get(given.name)) for given in source.modifiers]
+    return {
+        given.object: there.object
+        for given, there in both
+        if there is not None and given.type == there.type == "ARMATURE" and there.object is not None
+    }
+
+
+def copied(rig, target):
+    """A copy at the same place, in the target's collections."""
+    own = rig.copy()
+    own.data = rig.data.copy()
+    own.name = f"{rig.name} {target.name}"
+    for home in target.users_collection:
+        home.objects.link(own)
+    return own
+
+
+def copy_drivers(source, target):
+    """The same drivers on the keys of the same names; what they read of the source, they read of its twin."""
+    given, keys = source.data.shape_keys, target.data.shape_keys
+    if given.animation_data is None:
+        return
+    own = {source: target, source.data: target.data, given: keys, **pairs(source, target)}
+    for curve in given.animation_data.drivers:
+        if keys.animation_data is not None and keys.animation_data.drivers.find(curve.data_path):
+            keys.driver_remove(curve.data_path)
+        made = keys.animation_data_create().drivers.from_existing(src_driver=curve)
+        for variable in made.driver.variables:
+            for read in variable.targets:
+                if own.get(read.id) is not None:
+                    read.id = own[read.id]

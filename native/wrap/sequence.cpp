@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "wrap/sequence.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/errors.h"
+#include "core/parallel.h"
+#include "core/stopwatch.h"
+#include "distance/morton.h"
+#include "sampling/sample_choice.h"
+#include "solve/setup.h"
+#include "solve/warnings.h"
+#include "wrap/measure.h"
+#include "wrap/parameters.h"
+#include "wrap/velocity.h"
+
+namespace arapfields {
+namespace {
+
+using namespace wrap_parameters;
+
+/// Draws points (n,3) back to where they were, those most that hardly moved: a change that noise explains is
+/// none. `closeness` is the weight of correspondences beside which it stands.
+void hold(const WrapTarget& target, const SurfacePoints& now, PointsIn last, double normal_weight,
+          double closeness, CorrespondenceTerms& pull) {
+  const std::vector<Index> nearest = target.tree.nearest(now.points, now.normals, normal_weight);
+  double off = 0.0;  // the mean distance along normals
+  for (Index i = 0; i < now.points.rows(); ++i)
+    off += now.area_weights[i] *
+           std::abs((target.points.row(nearest[i]) - now.points.row(i)).dot(now.normals.row(i)));
+  if (!(off > 0.0)) return;
+  for (Index i = 0; i < now.points.rows(); ++i) {
+    const Eigen::RowVector3d back = last.row(i) - now.points.row(i);
+    const double share = std::pow(1.0 + back.squaredNorm() / std::pow(held_distance * off, 2), -2);
+    const double weight = held_weight * closeness * share * now.area_weights[i];
+    pull.forms.row(i).head<3>().array() += weight;
+    pull.right_hand_sides.row(i) += weight * back;
+  }
+}
+
+}  // namespace
+
+WrapSequence::WrapSequence(const SurfaceSamples& samples, const DeformationField& first,
+                           const WrapOptions& options)
+    : options_(options), frame_(samples.frame) {
+  options.validate();
+  require_samples(samples);
+  require(samples.normals.rows() == samples.size(), "samples", "they have no normals",
+          "a sequence needs one a sample");
+  const auto* composed = dynamic_cast<const ComposedField*>(&first);
+  require(composed != nullptr, "field", "it is no field of wrap", "the wrap of the first frame is needed");
+  require(first.frame() == frame_, "field", "it was found for other samples",
+          "the samples of the first frame's wrap are needed");
+  first_ = composed->steps();
+  kept_ = first.rest_points();
+  Random random(static_cast<std::uint64_t>(options.seed));
+  const std::vector<Index> rows = stratified(morton_order(samples.points), sequence_samples, random);
+  const MovedSurface surface(first, rows_of(samples.points, rows), rows_of(samples.normals, rows));
+  points_ = surface.points;
+  normals_ = surface.normals;
+  areas_ = surface.growth / surface.growth.sum();
+  weights_ = samples.weights.size() > 0 ? entries_of(samples.weights, rows) : Vector::Ones(points_.rows());
+  const auto centers = static_cast<Index>(sequence_centers * options.centers);
+  basis_ = radial_basis(points_, {{std::min(sequence_coarse_centers, centers), sequence_coarse_radius},
+                                  {centers, sequence_fine_radius}});
+  basis_.set_embedding(interior_embedding(points_, normals_));
+  coefficients_ = basis_.identity();
+}
+
+WrapSolution WrapSequence::next(const ImplicitFunction& function, const Progress& progress) {
+  const std::lock_guard lock(one_at_a_time_);
+  const Stopwatch watch;
+  const ThreadScope threads(options_.threads);
+  const WrapTarget mesh_target = wrap_target(
+      function, target_samples, static_cast<std::uint64_t>(options_.seed), progress.part(0.0, 0.2));
+  const WrapTarget target =
+      mesh_target.transformed_back({.scale = frame_.scale, .translation = frame_.center});
+  const WrapTarget some = target.subsample(flow_target_samples);
+  const double unit = 1.0 / (target.diagonal * target.diagonal);
+  const double closeness = sequence_closeness * options_.closeness * unit;
+  WrapSolution solution;
+  WrapReport& report = solution.report;
+
+  RowMatrix<double> coefficients = coefficients_;
+  const Points last = RadialField(basis_, coefficients_).at(points_);
+  const int rounds = options_.iterations;
+  for (int round = 0; round < rounds; ++round) {
+    const Progress part = progress.part(0.2 + 0.7 * round / rounds, 0.2 + 0.7 * (round + 1) / rounds);
+    const MovedSurface now(RadialField(basis_, coefficients), points_, normals_);
+    Vector areas = areas_.cwiseProduct(now.growth);
+    areas /= areas.sum();
+    const SurfacePoints surface{now.points, now.normals, areas};
+    CorrespondenceTerms pull(some, surface,
+                             {.weight = closeness,
+                              .coverage = coverage * options_.coverage,
+                              .normals = options_.normal_weight,
+                              .tangential = tangential_weight.last,
+                              .unoriented = 0.0});
+    report.matched_share = pull.matched_share;
+    if (round >= rounds - held_rounds)
+      hold(some, surface, last, options_.normal_weight, closeness * (1.0 + coverage * options_.coverage),
+           pull);
+    const StiffnessTerms stiffness{.points = points_,
+                                   .jacobians = now.jacobians,
+                                   .rigidity = areas_.cwiseProduct(weights_),
+                                   .viscosity = sequence_viscosity * options_.bending * areas_,
+                                   .ridge = ridge * unit,
+                                   .at_rest = true};
+    const RowMatrix<double> change = solve_velocity(basis_, stiffness, pull, {}, part);
+    coefficients += change;
+    ++report.iterations;
+  }
+
+  auto moved = std::make_shared<RadialField>(basis_, coefficients);
+  progress.report(0.9, "measuring the result");
+  measure(*moved, points_, normals_, target, report);
+  report.diagonal = mesh_target.diagonal;
+  for (std::string& warning : warnings_on(report.distortion, std::nullopt, {}))
+    report.warnings.push_back(std::move(warning));
+  std::vector<FieldStep> steps = first_;
+  steps.push_back({moved, 1});
+  solution.field = std::make_shared<ComposedField>(std::move(steps));
+  solution.field->set_frame(frame_);
+  solution.field->set_rest_points(kept_);
+  report.seconds = watch.seconds();
+  progress.report(1.0, "done");
+  coefficients_ = std::move(coefficients);
+  return solution;
+}
+
+}  // namespace arapfields

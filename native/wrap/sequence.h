@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A surface that was wrapped onto the first frame of a scanned sequence, and follows the others.
+#pragma once
+
+#include <mutex>
+#include <vector>
+
+#include "fields/composed_field.h"
+#include "mesh/surface_samples.h"
+#include "wrap/wrap.h"
+
+namespace arapfields {
+
+/// Follows the frames of a sequence, each from where the last one left the surface. Rigidity is measured from
+/// the first frame, so that nothing drifts, and what moves less than the frames' noise is held. The first
+/// field with one more after it is each frame's.
+class ARAPFIELDS_EXPORT WrapSequence {
+ public:
+  /// `first` is the field that wrap found for the first frame, from these samples. Throws InvalidInput for
+  /// bad options and samples, and for another kind of field.
+  WrapSequence(const SurfaceSamples& samples, const DeformationField& first, const WrapOptions& options);
+
+  /// Wraps onto the next frame: a function in the coordinates of the first. Throws InvalidInput that names
+  /// `target` where there is no surface; Cancelled, with the sequence as it was. Any thread may call.
+  WrapSolution next(const ImplicitFunction& target, const Progress& progress = {});
+
+ private:
+  std::mutex one_at_a_time_;
+  WrapOptions options_;
+  std::vector<FieldStep> first_;
+  Frame frame_;
+  Points kept_;              // rest points of the fields
+  Points points_, normals_;  // (n,3) the surface in the first frame
+  Vector areas_, weights_;   // (n) shares of its area; factors of stiffness
+  RadialBasis basis_;
+  RowMatrix<double> coefficients_;
+};
+
+}  // namespace arapfields
