@@ -74,8 +74,8 @@ constexpr int regularization_retries = 4;
 /// Weight of the mean squared distance between corresponding points, times the option closeness, and of the
 /// change's ‖∇v‖², times the option bending; that of ‖∇v − (R − J)‖² is 1.
 constexpr double sequence_closeness = 150.0, sequence_viscosity = 0.05;
-/// Samples of the surface; fine centers, a share of the option centers, and coarse ones; the radii of both, in
-/// multiples of their spacing.
+/// Samples of the surface; fine centers, a share of the option centers, and coarse ones; the radii of both,
+/// in multiples of their spacing.
 constexpr Index sequence_samples = 4000, sequence_coarse_centers = 60;
 constexpr double sequence_centers = 0.5, sequence_coarse_radius = 3.0, sequence_fine_radius = 4.0;
 /// Points are held in the last rounds: the weight beside that of correspondences, and the way at which it is
