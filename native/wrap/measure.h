@@ -8,7 +8,8 @@ namespace arapfields {
 
 /// A surface where a field takes it.
 struct MovedSurface {
-  Points points, normals;       ///< (n,3), the normals of length 1
+  Points points;                ///< (n,3)
+  Points normals;               ///< (n,3), of length 1
   RowMatrix<double> jacobians;  ///< (n,9), row-major
   Vector growth;                ///< (n) factors of the area
   Distortion distortion;

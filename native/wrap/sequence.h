@@ -29,9 +29,11 @@ class ARAPFIELDS_EXPORT WrapSequence {
   WrapOptions options_;
   std::vector<FieldStep> first_;
   Frame frame_;
-  Points kept_;              // rest points of the fields
-  Points points_, normals_;  // (n,3) the surface in the first frame
-  Vector areas_, weights_;   // (n) shares of its area; factors of stiffness
+  Points kept_;     // rest points of the fields
+  Points points_;   // (n,3) the surface in the first frame
+  Points normals_;  // (n,3)
+  Vector areas_;    // (n) shares of its area
+  Vector weights_;  // (n) factors of its stiffness
   RadialBasis basis_;
   RowMatrix<double> coefficients_;
 };

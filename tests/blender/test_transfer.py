@@ -10,6 +10,7 @@ if IN_BLENDER:
     from support.blender import scenes
     from support.blender.wraps import rigged_bar
 
+    import arapfields as af
     from addon.blender import mesh_arrays
     from addon.field_modifier import motion
 
@@ -144,3 +145,34 @@ def test_what_cannot_take_anything_is_named_and_kept():
     with pytest.raises(RuntimeError, match="Wrap Bar first"):
         bpy.ops.arapfields.transfer()
     assert scenes.everything(target) == kept
+
+
+def test_drivers_and_what_is_carried_go_to_the_target():
+    item, target, rest = wrapped_bar()
+    (rig,) = (m.object for m in item.modifiers if m.type == "ARMATURE")
+    keys = item.data.shape_keys
+    driver = keys.key_blocks["Belly"].driver_add("value").driver
+    driver.expression = "0 * var"
+    driver.variables.new().targets[0].id = rig
+    shell = bpy.data.meshes.new("Shell")
+    outside = rest * (1 + 0.1 / np.linalg.norm(rest, axis=1, keepdims=True))
+    shell.from_pydata(outside.tolist(), [], [list(face.vertices) for face in item.data.polygons])
+    worn = bpy.data.objects.new("Shell", shell)
+    bpy.context.collection.objects.link(worn)
+    entry = item.arapfields.carried.add()
+    entry.item, entry.way = worn, "FOLLOW"
+    motion.bind(bpy.context, worn)
+    motion.write(worn, motion.Motion(outside @ TURN.T + [3, 0, 1] - outside))
+    bpy.context.view_layer.update()
+    assert bpy.ops.arapfields.transfer(transfer={"KEYS", "ARMATURE", "CARRIED"}) == {"FINISHED"}
+    (mine,) = (m.object for m in target.modifiers if m.type == "ARMATURE")
+    copied = target.data.shape_keys.animation_data.drivers
+    (read,) = (v.targets[0].id for curve in copied for v in curve.driver.variables)
+    assert read == mine != rig
+    (own,) = target.children
+    places = np.array([own.matrix_world @ v.co for v in own.data.vertices])
+    away = af.MeshSdf(mesh_arrays.positions(target.data), mesh_arrays.triangles(target.data))(places)
+    before = af.MeshSdf(rest, mesh_arrays.triangles(item.data))(outside)
+    assert np.abs(away - 1.4 * before).max() < 0.15 * 1.4 * before.max()  # smoothed at edges
+    assert away.min() > 0 and not own.modifiers
+    assert bpy.ops.arapfields.transfer() == {"FINISHED"} and len(target.children) == 1

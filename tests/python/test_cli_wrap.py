@@ -100,14 +100,15 @@ def test_a_folder_is_done_once_and_a_bad_file_stops_no_other(pair, capsys):
     assert "1 of 3 failed: c.ply" in " ".join(said.err.split())
     (scans / "c.ply").unlink()
     times = {path: path.stat().st_mtime_ns for path in out.iterdir()}
-    assert sorted(path.name for path in times) == ["a.json", "a.obj", "b.json", "b.obj"]
+    assert sorted(path.name for path in times) == ["a.json", "a.obj", "b.json", "b.obj", "sheet.html"]
     lines = [line for line in said.out.splitlines() if "size off" in line]
     shares = [float(line.split(": ")[1].split("%")[0]) for line in lines]
     assert len(shares) == 2 and shares == sorted(shares, reverse=True)
     assert run(*call) == 0 and {path: path.stat().st_mtime_ns for path in out.iterdir()} == times
     assert run(*call, "--seed", "3", "--shard", "2/2") == 0
     anew = {path.name for path in times if path.stat().st_mtime_ns != times[path]}
-    assert anew == {"b.json", "b.obj"}
+    assert anew == {"b.json", "b.obj", "sheet.html"}
+    assert (out / "sheet.html").read_text().count("<figure>") == 2
     assert run(*call, "--landmark", "0,0,0", "0,0,0") == 2
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import arapfields as af
 
 from .._files import existing_file, json_text
-from . import files, sources
+from . import contact_sheet, files, sources
 from .options import given
 from .running import Outputs, with_progress
 
@@ -55,8 +55,31 @@ def run(args, options):
         for name in sorted(done, key=lambda name: -off(done[name])):
             notes = "; ".join(done[name]["notes"])
             print(f"{name}: {off(done[name]):.2%} of the target's size off{notes and '; ' + notes}")
+    if done:
+        write_sheet(output, everything, template.suffix.lower())
     if failed:
         raise af.InvalidInput(f"{len(failed)} of {len(done) + len(failed)} failed: {'; '.join(failed)}")
+
+
+def write_sheet(output, everything, suffix):
+    """sheet.html: pictures of all that is done by now, here and by other parts, the worst first."""
+    rows = []
+    for path in everything:
+        place = output / f"{path.stem}{suffix}"
+        try:
+            report = json.loads(place.with_suffix(".json").read_text(encoding="utf-8"))
+            target = files.read_mesh(path) if files.is_mesh(path) else None
+            figures = f"{off(report):.2%} of the target's size off; {'; '.join(report['notes'])}"
+            rows.append((off(report), (path.name, figures.rstrip("; "), files.read_mesh(place), target)))
+        except (OSError, ValueError, KeyError, TypeError):
+            continue  # not there yet, or not of this program
+    rows.sort(key=lambda row: -row[0])
+    page, place = contact_sheet.page([row for _, row in rows]), output / "sheet.html"
+    if place.is_file() and place.read_bytes() == page.encode():
+        return
+    with Outputs() as outputs:
+        outputs.check(place, (".html",), "--output")
+        outputs.write(place, lambda path: path.write_bytes(page.encode()))
 
 
 def off(report):

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A page of small pictures of many wraps with their figures, the worst first."""
+
+import base64
+import html
+import struct
+import zlib
+
+import numpy as np
+
+from .._native import sample_mesh
+
+SIDE, POINTS = 160, 150_000  # pixels of a picture's side; points drawn on a surface
+VIEW = np.array([[0.8, 0.0, -0.6], [-0.21, 0.94, -0.28], [0.56, 0.35, 0.75]])  # right, up, to the eye
+LIGHT = np.array([-0.4, 0.5, 0.77])  # in the picture's axes
+WRAPPED, TARGET = (217, 140, 77), (140, 153, 166)  # colours
+
+
+def page(rows):
+    """HTML of rows (name, figures, wrapped mesh, target mesh or None), in this order."""
+    cells = []
+    for name, figures, wrapped, target in rows:
+        middle = (wrapped[0].max(axis=0) + wrapped[0].min(axis=0)) / 2
+        half = 0.55 * float(np.linalg.norm(np.ptp(wrapped[0], axis=0)))
+        both = (target, TARGET), (wrapped, WRAPPED)
+        shown = [picture(mesh, colour, middle, half) for mesh, colour in both if mesh is not None]
+        data = base64.b64encode(png(np.concatenate(shown, axis=1))).decode()
+        text = html.escape(name), html.escape(figures)
+        cells.append(
+            f'<figure><img src="data:image/png;base64,{data}" alt="{text[0]}: target, wrapped">'
+            f"<figcaption><b>{text[0]}</b><br>{text[1]}</figcaption></figure>"
+        )
+    style = "figure{display:inline-block;margin:8px;font:14px sans-serif;max-width:320px;vertical-align:top}"
+    return (
+        f"<!doctype html><meta charset=utf-8><title>Wraps</title><style>{style}</style>\n"
+        + "\n".join(cells)
+        + "\n"
+    )
+
+
+def picture(mesh, colour, middle, half):
+    """(SIDE, SIDE, 3) bytes: a surface seen along VIEW, y up, within `half` of the middle."""
+    samples = sample_mesh(*mesh, POINTS)
+    points = (samples.points - middle) @ VIEW.T / half
+    shade = np.clip(samples.normals @ VIEW.T @ LIGHT, 0, 1) * 0.75 + 0.25
+    at = np.round((points[:, :2] * [1, -1] + 1) * (SIDE - 1) / 2).astype(int)
+    inside = ((at >= 0) & (at < SIDE)).all(axis=1)
+    order = np.flatnonzero(inside)[np.argsort(points[inside, 2])]  # the nearest is drawn last
+    image = np.full((SIDE, SIDE, 3), 255.0)
+    image[at[order, 1], at[order, 0]] = shade[order, None] * colour
+    return image.astype(np.uint8)
+
+
+def png(pixels):
+    """A PNG file's bytes of (height, width, 3) bytes."""
+    height, width = pixels.shape[:2]
+    rows = b"".join(b"\0" + row.tobytes() for row in pixels)
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    return (
+        b"\x89PNG\r\n\x1a\n"
+        + chunk(b"IHDR", header)
+        + chunk(b"IDAT", zlib.compress(rows, 9))
+        + chunk(b"IEND", b"")
+    )
