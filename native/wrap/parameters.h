@@ -69,26 +69,6 @@ constexpr double ridge = 1e-5;
 constexpr double regularization = 1e-9, regularization_growth = 100.0;
 constexpr int regularization_retries = 4;
 
-// Frames of a sequence. Tuned: on scans of a body that moves one arm, with and without noise.
-
-/// Weight of the mean squared distance between corresponding points, times the option closeness, beside 1 for
-/// ‖∇v − (R − J)‖².
-constexpr double sequence_closeness = 150.0;
-/// Weight of the change's ‖∇v‖², times the option bending.
-constexpr double sequence_viscosity = 0.05;
-/// Samples of the surface.
-constexpr Index sequence_samples = 4000;
-/// Coarse centers, and fine ones as a share of the option centers; radii in multiples of their spacing.
-constexpr Index sequence_coarse_centers = 60;
-constexpr double sequence_centers = 0.5;
-constexpr double sequence_coarse_radius = 3.0;
-constexpr double sequence_fine_radius = 4.0;
-/// Points are held in the last rounds: the weight beside that of correspondences, and the way at which it is
-/// a quarter, in mean distances of the surface to the frame.
-constexpr int held_rounds = 2;
-constexpr double held_weight = 10.0;
-constexpr double held_distance = 2.5;
-
 // Samples of both surfaces.
 
 /// Samples of the target for the report and, of these, those that the flow uses.

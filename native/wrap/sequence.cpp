@@ -21,6 +21,26 @@ namespace {
 
 using namespace wrap_parameters;
 
+// Tuned: on scans of a body that moves one arm, with and without noise.
+
+/// Weight of the mean squared distance between corresponding points, times the option closeness, beside 1 for
+/// ‖∇v − (R − J)‖².
+constexpr double sequence_closeness = 150.0;
+/// Weight of the change's ‖∇v‖², times the option bending.
+constexpr double sequence_viscosity = 0.05;
+/// Samples of the surface.
+constexpr Index sequence_samples = 4000;
+/// Coarse centers, and fine ones as a share of the option centers; radii in multiples of their spacing.
+constexpr Index sequence_coarse_centers = 60;
+constexpr double sequence_centers = 0.5;
+constexpr double sequence_coarse_radius = 3.0;
+constexpr double sequence_fine_radius = 4.0;
+/// Points are held in the last rounds: the weight beside that of correspondences, and the way at which it is
+/// a quarter, in mean distances of the surface to the frame.
+constexpr int held_rounds = 2;
+constexpr double held_weight = 10.0;
+constexpr double held_distance = 2.5;
+
 /// Draws points (n,3) back to where they were, those most that hardly moved: a change that noise explains is
 /// none. `closeness` is the weight of correspondences beside which it stands.
 void hold(const WrapTarget& target, const SurfacePoints& now, PointsIn last, double normal_weight,
