@@ -14,7 +14,7 @@ sys.path[:0] = [str(ROOT / "blender_scripts"), str(ROOT / "cmake/wheel")]
 
 from extension import archive, check, guide  # noqa: E402
 from extension.blender import extension_tool  # noqa: E402
-from platforms import PLATFORMS, PYTHONS  # noqa: E402
+from platforms import PLATFORMS  # noqa: E402
 
 
 def arguments():
@@ -27,9 +27,9 @@ def arguments():
 
 
 def own_wheels(platform, folder, version):
-    """The wheel of each Python, as build_wheels.py made them."""
-    tags = ["cp{0}{1}-cp{0}{1}".format(*python) for python in PYTHONS]
-    wheels = [folder / f"arapfields-{version}-{tag}-{platform.tag}.whl" for tag in tags]
+    """The wheels for all Pythons, as build_wheels.py made them."""
+    names = map(platform.wheel_tags, platform.wheels)
+    wheels = [folder / f"arapfields-{version}-{name}.whl" for name in names]
     missing = [wheel.name for wheel in wheels if not wheel.exists()]
     if missing:
         raise RuntimeError(f"{folder} lacks {', '.join(missing)} (make wheels PLATFORM={platform.name})")

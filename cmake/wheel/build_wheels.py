@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds the wheels of `arapfields`: for each platform, one for each of Blender's Pythons, on Linux.
+"""Builds the wheels of `arapfields` for each platform and each of Blender's Pythons, on Linux.
 
 python cmake/wheel/build_wheels.py linux-x64 windows-x64 --output dist
 """
@@ -58,11 +58,11 @@ def build_wheels(platform, output):
     options = [f"build-dir={build}", "install.strip=false", f"build.targets={';'.join(targets)}"]
     options += [f"cmake.define.{name}={value}" for name, value in settings(platform, build).items()]
     made = []
-    for version in PYTHONS:
-        python = "cp{}{}".format(*version)
+    for pythons in platform.wheels:
+        tags = ["cp{0}{1}-cp{0}{1}-{2}".format(*version, platform.tag) for version in pythons]
         own = [
-            f"wheel.tags={python}-{python}-{platform.tag}",
-            f"install.components=python;{module_name(version)}",
+            f"wheel.tags={';'.join(tags)}",
+            f"install.components={';'.join(['python', *map(module_name, pythons)])}",
         ]
         given = [part for option in [*options, *own] for part in ("-C", option)]
         pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "wheel", "-v"]
@@ -71,7 +71,7 @@ def build_wheels(platform, output):
             done = subprocess.run(command, stdout=log, stderr=log, env=environment())
         if done.returncode:
             raise RuntimeError("\n".join((build / "build.log").read_text().splitlines()[-60:]))
-        made += output.glob(f"arapfields-*-{python}-{python}-{platform.tag}.whl")
+        made += output.glob(f"arapfields-*-{platform.wheel_tags(pythons)}.whl")
     for wheel in made:
         pack(wheel)
     if said := check_wheel.problems(made):

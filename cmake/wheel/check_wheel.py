@@ -45,10 +45,14 @@ class Wheel:
         self.path, self.problems = Path(path), []
         python, _, tag = self.path.stem.split("-")[-3:]
         (self.platform,) = [one for one in PLATFORMS.values() if one.tag == tag]
-        self.python = (int(python[2]), int(python[3:]))
+        pythons = [(int(one[2]), int(one[3:])) for one in python.split(".")]
+        self.modules = {f"_native{self.platform.module_suffix(one)}": one for one in pythons}
         with zipfile.ZipFile(self.path) as archive:
             self.files = {name: archive.read(name) for name in archive.namelist()}
-        self.headers = declared(python_headers.at_hand(self.python) or python_headers.fetch(self.python))
+        self.headers = {
+            name: declared(python_headers.at_hand(version) or python_headers.fetch(version))
+            for name, version in self.modules.items()
+        }
         self.natives = {
             Path(name).name: lief.parse(list(data))
             for name, data in self.files.items()
@@ -62,8 +66,8 @@ class Wheel:
 
     def check(self):
         """The problems."""
-        module = f"_native{self.platform.module_suffix(self.python)}"
-        wanted = [*PARTS, module, *(["libarapfields.so"] if self.platform.system == "linux" else [])]
+        library = ["libarapfields.so"] if self.platform.system == "linux" else []
+        wanted = [*PARTS, *self.modules, *library]
         for name in wanted:
             if f"arapfields/{name}" not in self.files:
                 self.complain(f"lacks {name}")
@@ -114,11 +118,11 @@ class Wheel:
                 self.check_symbol(name, symbol.name)
 
     def check_symbol(self, name, symbol):
-        if symbol not in self.exported and symbol not in self.headers:
+        if symbol not in self.exported and symbol not in self.headers.get(name, {}):
             self.complain(f"{name} asks for {symbol}, which nobody has")
 
     def check_pe(self, name, image):
-        python = "python{}{}.dll".format(*self.python)
+        python = "python{}{}.dll".format(*self.modules.get(name, ("", "")))
         self.check_image(
             name, image.header.machine, [one.name for one in image.imports if one.name != python]
         )

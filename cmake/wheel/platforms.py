@@ -30,6 +30,16 @@ class Platform:
     def system(self):
         return self.name.partition("-")[0]
 
+    @property
+    def wheels(self):
+        """The Pythons of each wheel: one serves all where the library is a file of its own."""
+        return [PYTHONS] if self.system == "linux" else [[version] for version in PYTHONS]
+
+    def wheel_tags(self, pythons):
+        """The end of a wheel's name."""
+        served = ".".join(map("cp{0[0]}{0[1]}".format, pythons))
+        return f"{served}-{served}-{self.tag}"
+
     def module_suffix(self, version):
         return self.suffix.format("{}{}".format(*version))
 

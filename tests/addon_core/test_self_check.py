@@ -42,11 +42,11 @@ def test_what_should_have_been_refused():
 
 def test_a_zip_without_a_wheel_for_this_python_says_which_it_has(tmp_path, monkeypatch):
     """Blender unpacks the wheels for its own Python and system alone."""
-    for python in ("cp311", "cp313"):
+    for python in ("cp311", "cp313.cp314"):
         (tmp_path / f"arapfields-0.1.0-{python}-{python}-win_arm64.whl").touch()
     monkeypatch.setattr(native, "WHEELS", tmp_path)
     said = str(native._missing(ModuleNotFoundError(name="arapfields")))
-    assert platform.machine() in said and "(it has: 3.11, 3.13, win_arm64)" in said
+    assert platform.machine() in said and "(it has: 3.11, 3.13, 3.14, win_arm64)" in said
     monkeypatch.setattr(native, "WHEELS", tmp_path / "none")
     assert "not part of this installation" in str(native._missing(ModuleNotFoundError(name="arapfields")))
 

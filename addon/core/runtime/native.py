@@ -85,7 +85,8 @@ def _missing(error):
     served = sorted(path.stem.split("-")[2:] for path in WHEELS.glob("arapfields-*.whl"))
     if error.name == "arapfields" and served:  # Blender unpacks those for its Python and system alone
         here = f"{sys.version_info.major}.{sys.version_info.minor}, {platform.system()} {platform.machine()}"
-        which = ", ".join([*(f"{python[2]}.{python[3:]}" for python, _, _ in served), served[0][2]])
+        pythons = [python for tags, *_ in served for python in tags.split(".")]
+        which = ", ".join([*(f"{python[2]}.{python[3:]}" for python in pythons), served[0][-1]])
         return UserError(
             "This build has no module for Python {here} (it has: {which}). Take a build for this Blender",
             here=here,
