@@ -58,16 +58,14 @@ class Wheel:
             for name, data in self.files.items()
             if name.endswith((".so", ".dll", ".pyd", ".dylib"))
         }
-        libraries = [one for name, one in self.natives.items() if name == "libarapfields.so"]
-        self.exported = {symbol.name for one in libraries for symbol in one.dynamic_symbols if symbol.shndx}
+        self.exported = exported(self.natives.get(self.platform.library))
 
     def complain(self, said):
         self.problems.append(f"{self.path.name}: {said}")
 
     def check(self):
         """The problems."""
-        library = ["libarapfields.so"] if self.platform.system == "linux" else []
-        wanted = [*PARTS, *self.modules, *library]
+        wanted = [*PARTS, *self.modules, *filter(None, [self.platform.library])]
         for name in wanted:
             if f"arapfields/{name}" not in self.files:
                 self.complain(f"lacks {name}")
@@ -127,7 +125,7 @@ class Wheel:
             name, image.header.machine, [one.name for one in image.imports if one.name != python]
         )
         for library in image.imports:
-            for entry in library.entries if library.name == python else []:
+            for entry in library.entries if library.name in (python, self.platform.library) else []:
                 self.check_symbol(name, entry.name)
 
     def check_macho(self, name, image):
@@ -144,6 +142,13 @@ class Wheel:
             image.has_code_signature or self.platform.name == "macos-arm64"
         ):  # Intel's asks for none
             self.complain(f"{name} {said}")
+
+
+def exported(library):
+    """The names of a library's symbols for others."""
+    if isinstance(library, lief.PE.Binary):
+        return {entry.name for entry in library.get_export().entries}
+    return {symbol.name for symbol in library.dynamic_symbols if symbol.shndx} if library else set()
 
 
 def system_symbols(processor):

@@ -18,13 +18,17 @@ ONE_MODULE = {"ARAPFIELDS_ONE_MODULE": "ON"}
 
 @dataclass(frozen=True)
 class Platform:
-    """One of Blender's platforms; `compiler` is GCC's for it, or "zig", which calls it `target`."""
+    """One of Blender's platforms; `compiler` is GCC's for it, or "zig", which calls it `target`.
+
+    `library` is the library's file; where there is none, it lies inside each Python's module.
+    """
 
     name: str
     tag: str
     suffix: str  # of the bindings' module, after cp311's digits
     compiler: str
     target: str
+    library: str = ""
 
     @property
     def system(self):
@@ -32,8 +36,8 @@ class Platform:
 
     @property
     def wheels(self):
-        """The Pythons of each wheel: one serves all where the library is a file of its own."""
-        return [PYTHONS] if self.system == "linux" else [[version] for version in PYTHONS]
+        """The Pythons of each wheel: one serves all where the library has a file of its own."""
+        return [PYTHONS] if self.library else [[version] for version in PYTHONS]
 
     def wheel_tags(self, pythons):
         """The end of a wheel's name."""
@@ -53,6 +57,7 @@ PLATFORMS = {
             ".cpython-{}-x86_64-linux-gnu.so",
             "g++",
             "x86_64-linux-gnu",
+            "libarapfields.so",
         ),
         Platform(
             "linux-arm64",
@@ -60,6 +65,7 @@ PLATFORMS = {
             ".cpython-{}-aarch64-linux-gnu.so",
             "aarch64-linux-gnu-g++",
             "aarch64-linux-gnu",
+            "libarapfields.so",
         ),
         Platform(
             "windows-x64",
@@ -67,6 +73,7 @@ PLATFORMS = {
             ".cp{}-win_amd64.pyd",
             "x86_64-w64-mingw32-g++-posix",
             "x86_64-windows-gnu",
+            "libarapfields.dll",
         ),
         Platform("windows-arm64", "win_arm64", ".cp{}-win_arm64.pyd", "zig", "aarch64-windows-gnu"),
         Platform(
@@ -132,8 +139,8 @@ def linux(platform, work):
 
 def windows(platform, work):
     if platform.compiler != "zig":
-        flags = {"CMAKE_MODULE_LINKER_FLAGS": "-static -s"}
-        return ONE_MODULE | flags | {"CMAKE_TOOLCHAIN_FILE": ROOT / "cmake/mingw-w64.cmake"}
+        flags = {f"CMAKE_{kind}_LINKER_FLAGS": "-static -s" for kind in ("MODULE", "SHARED")}
+        return flags | {"CMAKE_TOOLCHAIN_FILE": ROOT / "cmake/mingw-w64.cmake"}
     return ONE_MODULE | cross("Windows", "arm64")
 
 

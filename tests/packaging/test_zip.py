@@ -17,12 +17,12 @@ import python_headers  # noqa: E402
 from extension import archive, check  # noqa: E402
 from platforms import PLATFORMS, PYTHONS, declared  # noqa: E402
 
-LINUX, WINDOWS = PLATFORMS["linux-x64"], PLATFORMS["windows-x64"]
+LINUX, MACS = PLATFORMS["linux-x64"], PLATFORMS["macos-arm64"]
 
 
 @pytest.fixture
 def wheels(tmp_path):
-    paths = [tmp_path / f"arapfields-0.1.0-{WINDOWS.wheel_tags(pythons)}.whl" for pythons in WINDOWS.wheels]
+    paths = [tmp_path / f"arapfields-0.1.0-{MACS.wheel_tags(pythons)}.whl" for pythons in MACS.wheels]
     for path in paths:
         with zipfile.ZipFile(path, "w") as wheel:
             wheel.writestr("arapfields/options.json", path.name)
@@ -61,8 +61,8 @@ def test_what_is_refused(wheels, tmp_path, monkeypatch):
     with pytest.raises(RuntimeError, match=r"another arapfields.*cp313"):
         check.check_zip(path, wheels)
     wheels[2].unlink()
-    with pytest.raises(RuntimeError, match=r"lacks arapfields-0.1.0-cp314-cp314-win.*PLATFORM=windows-x64"):
-        build_extension.own_wheels(WINDOWS, tmp_path, "0.1.0")
+    with pytest.raises(RuntimeError, match=r"lacks arapfields-0.1.0-cp314-cp314-mac.*PLATFORM=macos-arm64"):
+        build_extension.own_wheels(MACS, tmp_path, "0.1.0")
     with pytest.raises(
         RuntimeError, match=r"lacks arapfields-0.1.0-cp311\.cp313\.cp314-cp311.*PLATFORM=linux-x64"
     ):

@@ -219,7 +219,8 @@ def test_foreign_files_and_places(examples, tmp_path):
         for path in (3, None, "", "a\0b", b"a\0b", object()):
             with pytest.raises(af.InvalidInput, match="path"):
                 kind.load(path)
-    odd = os.fsencode(tmp_path) + b"/\xff.safetensors"
+    name = "ÿ.safetensors".encode("latin-1" if os.name == "posix" else "utf-8")  # Windows' are Unicode
+    odd = os.path.join(os.fsencode(tmp_path), name)
     sdf = af.NeuralSdf.load(examples["sdf"])
     sdf.save(odd)
     assert af.NeuralSdf.load(odd).frame == sdf.frame
