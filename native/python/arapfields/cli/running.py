@@ -14,6 +14,14 @@ from .._native import InvalidInput, OutputFile, Task
 POLL = 0.1  # seconds between looks at a task
 
 
+def place(path):
+    """Where a path leads, behind links where the file system follows them: Wine's fails for long ones."""
+    try:
+        return os.path.realpath(path)
+    except OSError:
+        return os.path.abspath(path)
+
+
 @contextlib.contextmanager
 def uninterrupted():
     """Ctrl-C during the block takes effect at its end."""
@@ -106,7 +114,7 @@ class Outputs:
                 f"{flag}: {path} cannot be made; the directory {path.parent} cannot be written to"
             )
         OutputFile(path).discard()  # regular files alone
-        other = self._promised.setdefault(os.path.realpath(path), flag)
+        other = self._promised.setdefault(place(path), flag)
         if other != flag:
             raise InvalidInput(f"{flag}: {path} is {other}'s file too; each output needs one of its own")
         return path

@@ -25,7 +25,7 @@ def run(args, options):
         not args.output
         or output.suffix
         or output.is_file()
-        or output.resolve() == Path(args.target).resolve()
+        or (output.is_dir() and output.samefile(args.target))
     ):
         raise af.InvalidInput("--output: another folder is needed where the target is one")
     everything = sorted(p for p in Path(args.target).iterdir() if p.suffix.lower() in sources.SOURCES)
