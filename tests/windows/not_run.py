@@ -31,6 +31,9 @@ PYTHON = {
     "test_outputs.py::test_two_outputs_need_two_files": LINKS,
     "test_cli.py::test_a_bar_is_drawn_on_a_terminal_alone": "Windows has no pseudo-terminals for Python",
     "test_point_cache.py::test_a_folder_that_goes_while_it_is_written_to_is_named": OPEN,
+    "test_threads.py::test_no_thread_of_another_s_is_started": PROC,
+    "test_threads.py::test_after_a_call_torch_still_uses_its_threads": PROC,
+    "test_threads.py::test_threads_that_the_system_refuses_are_done_without": LIMITS,
     "test_jets.py::test_jets_and_parameter_gradients_equal_autograd": BACKWARD,
     "test_invertible.py::test_jets_and_pull_back_equal_autograd": BACKWARD,
 }
