@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The Blenders that a batch starts, one a file, and what became of each."""
 
+import contextlib
 import json
 import os
 import signal
@@ -77,7 +78,8 @@ class Children:
 
 def end(process):
     """Asks a child to stop, which leaves no partial files; one that does not listen is killed."""
-    process.send_signal(signal.CTRL_BREAK_EVENT if WINDOWS else signal.SIGINT)
+    with contextlib.suppress(OSError, SystemError):  # Windows sends it through a console alone
+        process.send_signal(signal.CTRL_BREAK_EVENT if WINDOWS else signal.SIGINT)
     try:
         process.wait(5.0)
     except subprocess.TimeoutExpired:

@@ -236,7 +236,7 @@ def seconds(text):
 def pattern(text):
     """Of names within the folder."""
     path = PurePath(text)
-    if not path.parts or path.is_absolute() or ".." in path.parts:
+    if not path.parts or path.anchor or ".." in path.parts:
         raise argparse.ArgumentTypeError(f"{text!r} is not a pattern of names within the folder")
     return text
 

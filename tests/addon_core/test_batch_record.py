@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a batch notes beside other batches, damaged notes, and children whose parent is killed."""
 
+import os
 import subprocess
 import sys
 import time
@@ -27,7 +28,8 @@ def test_notes_of_any_content_are_read(text, tmp_path):
 
 def test_names_of_any_length_and_letters_are_noted(tmp_path):
     record = Record(tmp_path)
-    for name in ("é" * 123 + ".ply", "sub/" + "x" * 250 + ".ply", "a\udcff.ply", "sub/deep/a.obj"):
+    odd = ["a\udcff.ply"] if os.name == "posix" else []  # Windows' names are Unicode
+    for name in ("é" * 123 + ".ply", "sub/" + "x" * 250 + ".ply", "sub/deep/a.obj", *odd):
         record.note(name, status="done")
         assert Record(tmp_path).entry(name)["status"] == "done"
         assert record.claim(name)

@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """pytest's plugin in the Windows Python: leaves out what not_run.py lists, keeps outcomes as they come."""
 
+import ctypes
 import json
 import os
+import sys
 
 import pytest
 
 from .not_run import NOT_RUN
+
+STATUS = pytest.StashKey()
 
 
 def pytest_collection_modifyitems(items):
@@ -36,3 +40,16 @@ def pytest_collectreport(report):
     if report.outcome != "passed":
         why = report.longrepr[2] if isinstance(report.longrepr, tuple) else str(report.longrepr or "")
         keep(report.nodeid, report.outcome, why)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session, exitstatus):
+    session.config.stash[STATUS] = int(exitstatus)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure(config):
+    """Ends the process at once: under Wine it would wait for ever for libtorch's libraries to leave."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    ctypes.windll.kernel32.TerminateProcess(ctypes.c_void_p(-1), config.stash.get(STATUS, 1))

@@ -2,6 +2,7 @@
 """Locks between processes, on single bytes of an open file. They end with the process, however it ends."""
 
 import contextlib
+import errno
 import os
 import sys
 import time
@@ -26,9 +27,11 @@ def lock(file, byte=0, wait=True):
         try:
             msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
             return
-        except PermissionError:
-            if not wait:
+        except OSError as error:
+            if error.errno not in (0, errno.EACCES):  # 0: Wine gives no reason
                 raise
+            if not wait:
+                raise PermissionError(errno.EACCES, "another process has the lock") from error
         time.sleep(PAUSE)
 
 
