@@ -61,7 +61,7 @@ class BakePass:
                 if all(bake.error is not None for bake in self.bakes):
                     break
             for bake in self.bakes:
-                bake.attempt(bake.finish)
+                bake.attempt(bake.finish, task)
         except BaseException:
             self.discard()
             raise

@@ -15,7 +15,7 @@ from ..solver import style_settings
 from . import frames, object_bake
 from .bake_job import BakePass
 
-SETTINGS = ("format", "kind", "range", "step", "subframes")
+SETTINGS = ("format", "kind", "range", "step", "subframes", "loop")
 
 
 class BakeOperator(JobOperator):

@@ -18,6 +18,7 @@ from ..solver.frame_solver import FrameSolver
 from ..solver.setup import sampled
 from ..solver.simulation import Simulation
 from ..solver.source_reader import SourceChanged, SourceReader
+from . import loops
 from .caches import CacheFile, ShapeKeys, cache_beside, keys_weight, plain, size_text
 from .carried_bake import CarriedBake
 from .parts import SharedCache
@@ -44,7 +45,7 @@ class ObjectBake:
     `part`: (i, n) where n processes share the frames.
     """
 
-    def __init__(self, context, source, kind, frames, path=None, modifier_path="", part=None):
+    def __init__(self, context, source, kind, frames, path=None, modifier_path="", part=None, loop=False):
         settings, fps = settings_of(source), secondary_motion.frame_rate(context.scene)
         self.in_place = placement.in_place(settings.output, settings.result) and path is not None
         self.reader = SourceReader(context, source, kind, self.in_place)
@@ -54,6 +55,7 @@ class ObjectBake:
         self.simulation = (
             Simulation(settings.secondary.start, fps) if secondary_motion.is_used(source) else None
         )
+        self.looped = [] if loop and self.simulation is not None else None  # frames that are solved at last
         if path is None:
             self.store = ShapeKeys()
         elif part is None:
@@ -95,13 +97,19 @@ class ObjectBake:
         if isinstance(self.store, SharedCache):
             self.store.add_request(self.solver, request)
             return
+        if self.looped is not None:
+            self.looped += [(frame, request, is_baked)] if frame >= self.frames.start else []
+            return
         if self.simulation is not None:
             shape = self.simulation.shape(self.solver, frame, request)
         elif is_baked:
             shape = self.solver.solve_from_rest(request)
         if is_baked:
-            self.carried.add(shape.carried)
-            self.store.add(shape.points)
+            self.keep(shape)
+
+    def keep(self, shape):
+        self.carried.add(shape.carried)
+        self.store.add(shape.points)
 
     def attempt(self, call, *given):
         """Does a part of the work; what goes wrong ends this object's bake alone."""
@@ -116,7 +124,9 @@ class ObjectBake:
         if self.error is not None:
             self.discard()
 
-    def finish(self):
+    def finish(self, task):
+        if self.looped is not None:
+            loops.solve(self.solver, self.simulation, self.looped, self.keep, task)
         self.carried.finish()
         self.store.finish()
 

@@ -72,7 +72,7 @@ class ARAPFIELDS_OT_bake(BakeOperator, bpy.types.Operator):
 
         def make(source, kind, frames):
             paths = self.paths(source, active, values)
-            bake = ObjectBake(context, source, kind, frames, *paths, part=part)
+            bake = ObjectBake(context, source, kind, frames, *paths, part=part, loop=values["loop"])
             self.warn_of_weight(bake)
             return bake
 

@@ -22,7 +22,9 @@ class ARAPFIELDS_PT_animation(Section, bpy.types.Panel):
             column = layout.column(align=True)
             column.prop(bake, "start")
             column.prop(bake, "end")
-        draw_settings(layout, bake, "step", "subframes", *(["folder"] if bake.format != "KEYS" else []))
+        loops = ["loop"] if settings.secondary.use else []
+        folders = ["folder"] if bake.format != "KEYS" else []
+        draw_settings(layout, bake, "step", "subframes", *loops, *folders)
         wrapped(layout, weight(context, source, bake))
         job_button(layout, Op.BAKE, "REC")
         modifier = modifier_stack.find_cache(source)

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..blender.property_definitions import choice, integer, path_text, text
+from ..blender.property_definitions import choice, flag, integer, path_text, text
 from ..core.settings.choices import BAKE_FORMATS, BAKE_KINDS, BAKE_RANGES
 
 FOLDER = "//cache"
@@ -24,6 +24,11 @@ def settings(**extra):
             default=1,
             min=1,
             max=100,
+            **extra,
+        ),
+        "loop": flag(
+            "Loop",
+            "Secondary motion is baked so that the last frame leads to the first, as its handles do",
             **extra,
         ),
     }

@@ -33,9 +33,8 @@ def draw():
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     shader.uniform_float("color", COLOUR)
     gpu.state.blend_set("ALPHA")
-    gpu.state.depth_test_set("LESS_EQUAL")
+    gpu.state.depth_test_set("NONE")  # what it touches hides it
     gpu.state.point_size_set(SIZE)
     batch_for_shader(shader, "POINTS", {"pos": found.astype(np.float32).tolist()}).draw(shader)
     gpu.state.point_size_set(1.0)
-    gpu.state.depth_test_set("NONE")
     gpu.state.blend_set("NONE")

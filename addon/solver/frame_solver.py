@@ -19,10 +19,8 @@ REST_STEPS, FINE_TOLERANCE = 400, 1e-6  # of a solve from rest: until the energy
 STYLE = presets("live").get("STYLE")  # label, tip, and options for a style, which acts everywhere
 LEAST_RIGIDITY = 1e-3  # of a style
 TRACKED = 2000  # splats that are followed from step to step
-TOUCHED, TOUCH = (
-    1000,
-    5e-3,
-)  # points that are looked at for a touch; what is that near, in cube units, touches
+TOUCHED = 2000  # points that are looked at for a touch
+TOUCH = 5e-3  # what is that near, in cube units, touches
 
 
 @dataclass(frozen=True)

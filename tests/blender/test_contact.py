@@ -5,8 +5,6 @@ import numpy as np
 import pytest
 from support.blender.inside import IN_BLENDER
 
-from arapfields import backend
-
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
@@ -44,7 +42,6 @@ def lowest(bar):
     ].min()
 
 
-@pytest.mark.xfail(backend() == "eigen", reason="one vertex on a rim stays .9 % deep in a block after deform")
 def test_a_live_shape_stays_outside_as_its_obstacle_comes_and_goes():
     bar, block, low = pressed()
     size = max(bar.dimensions)

@@ -125,3 +125,24 @@ def test_soft_parts_grounds_and_refusals():
         bpy.ops.arapfields.bake(kind="DEFORM", filepath=path, part=(1, 2))
     ours.use = False
     bpy.ops.arapfields.live(kind="DEFORM")
+
+
+def test_a_baked_loop_closes_or_is_refused():
+    bar = nodding(12)
+    held = bpy.data.objects["Fixed"]
+    scenes.activate(bar)
+    with pytest.raises(RuntimeError, match="does not come back"):
+        bpy.ops.arapfields.bake(
+            kind="DEFORM", start=1, end=12, loop=True, filepath=tempfile.mkdtemp() + "/no.pc2"
+        )
+    held.location.z = 0.0
+    held.keyframe_insert("location", frame=12)
+    path = f"{tempfile.mkdtemp()}/loop.pc2"
+    assert bpy.ops.arapfields.bake(kind="DEFORM", start=1, end=12, loop=True, filepath=path) == {"FINISHED"}
+    shapes = []
+    for frame in range(1, 13):
+        bpy.context.scene.frame_set(frame)
+        shapes.append(local_points(bar))
+    size = np.ptp(shapes[0], axis=0).max()
+    assert np.abs(shapes[-1] - shapes[0]).max() < 1e-6 * size
+    assert np.abs(shapes[6] - shapes[0]).max() > 0.1  # and it moves meanwhile

@@ -176,12 +176,10 @@ def _figures():
         foot = (feet[1][0], 0.08, shift([0, -0.2, rise - 0.08]))
         yield _posed(f"feet onto steps {k}", "figure", [trunk, feet[0], foot], steps)
     for k, drop in enumerate((0.24, 0.3)):
-        chair = [_block([-0.3, -0.12, 0.2], [0.3, 0.5, 0.24]), _block([-0.3, 0.2, 0.24], [0.3, 0.24, 1.0])]
-        down = shift([0, 0, -drop])
-        knees = [((side * 0.11, 0, 0.3), 0.07, shift([0, -0.26, 0.03])) for side in (-1, 1)]
-        ahead = [(center, radius, shift([0, -0.26, 0])) for center, radius, _ in feet]
-        upper = [((0, 0, 0.7), 0.16, down)]
-        yield _posed(f"sitting on a chair {k}", "figure", [*upper, *ahead, *knees], chair)
+        chair = [_block([-0.3, 0.09, 0.24], [0.3, 0.6, 0.28]), _block([-0.3, 0.44, 0.28], [0.3, 0.48, 1.0])]
+        upper = ((0, 0, 0.7), 0.16, shift([0, 0.24, -drop]))
+        knees = [((side * 0.11, 0, 0.3), 0.07, shift([0, -0.03, 0])) for side in (-1, 1)]
+        yield _posed(f"sitting on a chair {k}", "figure", [upper, *feet, *knees], chair)
     for k, angle in enumerate((75, 100)):
         arm = ((0.6, 0, 0.9), 0.08, turn([0, 1, 0], angle, (0.12, 0, 0.9)))
         yield _posed(f"arm onto trunk {k}", "figure", [trunk, *feet, arm], itself=True)
