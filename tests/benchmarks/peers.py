@@ -13,14 +13,15 @@ import numpy as np
 import arapfields as af
 
 from . import shapes
-from .peer import gauss_build, theirs, yardstick
+from .peer import elastic_brush, gauss_build, registration, theirs, weights, yardstick
 from .peer.problems import awkward, of_figures
 from .peer.theirs import Refused
 
-# For each training of implicit-arap, whose 2,000 patches a step take 27 s of a processor, and its patches on
-# the surface and in space. PEERS_MINUTES=0 is its own settings.
+# Of the processor, for each training of implicit-arap; 0 is its own settings. Its own 1,000 steps run to the
+# end, each with as many of its 1,000 patches on the surface and as many in space as the time allows.
 MINUTES = float(os.environ.get("PEERS_MINUTES", "20"))
-PATCHES = (70, 20)
+PATCHES_A_MINUTE = 7.5
+LEAST_PATCHES = 60, 10  # on the surface each point of a handle has one
 LAMBDAS = (1.0, 4.0, 16.0)  # of gaussStylization; its own example has 4
 CUBE = np.vstack([np.eye(3), -np.eye(3)])
 METHODS = {"Laplacian Deform": "laplacian", "Lattice": "lattice", "Surface Deform": "surface"}  # Blender's
@@ -76,7 +77,8 @@ def cage_of(problem):
 
 def methods(problem, checkout):
     """(name, call): the moved vertices, processor seconds and what is to be told of the settings."""
-    patient = ("--patches", *PATCHES, "--minutes", MINUTES) if MINUTES else ()
+    patches = [max(least, round(PATCHES_A_MINUTE * MINUTES / 2)) for least in LEAST_PATCHES]
+    patient = ("--patches", *patches, "--minutes", MINUTES) if MINUTES else ()
 
     def implicit():
         found = theirs.implicit_arap(problem, checkout, *patient)
@@ -93,6 +95,11 @@ def methods(problem, checkout):
         yield (
             f"Blender, {label}",
             lambda method=method, cage=cage: (*theirs.blender(problem, method, cage), ""),
+        )
+    if len(problem.moved) == 1:
+        yield (
+            "Blender, Elastic Deform's formula",
+            lambda: (*clocked(lambda: elastic_brush.stroke(problem)), ""),
         )
     yield "implicit-arap", implicit
 
@@ -212,7 +219,7 @@ def awkward_rows(checkout):
 
 def run():
     arap, style = (theirs.folder() / name for name in theirs.CODES)
-    quick = [*style_rows(style), *awkward_rows(style)]
+    quick = [*style_rows(style), *awkward_rows(style), *weights.rows(), *registration.rows()]
     rows = [row for problem in of_figures().values() for row in constraint_rows(problem, arap)]
     rows += quick
     rows += [{"code": path.name, "commit": theirs.commit(path)} for path in (arap, style)]

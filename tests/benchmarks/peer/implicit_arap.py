@@ -92,15 +92,15 @@ class Log:
     """Where its trainer logs to: the losses by step. Ends the training when the time is over."""
 
     def __init__(self, folder, minutes):
-        self.dir, self.losses, self.begin = str(folder), [], time.perf_counter()
+        self.dir, self.losses, self.begin = str(folder), [], time.process_time()
         self.end = self.begin + 60 * minutes if minutes else float("inf")
 
     def log(self, losses):
         self.losses.append([float(loss) for loss in losses.values()])
-        if time.perf_counter() > self.end:
+        if time.process_time() > self.end:
             raise Spent
         if len(self.losses) % 25 == 1:
-            took = time.perf_counter() - self.begin
+            took = time.process_time() - self.begin
             print(f"step {len(self.losses)} after {took:.0f} s: {self.losses[-1]}", flush=True)
 
 
@@ -110,7 +110,7 @@ def main():
         parser.add_argument(name, type=Path)
     parser.add_argument("--steps", type=int, help="else its own")
     parser.add_argument("--patches", type=int, nargs=2, help="on the surface and in space; else its own")
-    parser.add_argument("--minutes", type=float, help="after which it is stopped")
+    parser.add_argument("--minutes", type=float, help="of the processor, after which it is stopped")
     given = parser.parse_args()
     torch.set_num_threads(1)  # threads that wait for one another would count as its work
     problem = dict(np.load(given.problem))

@@ -85,7 +85,6 @@ def implicit_arap(problem: Problem, checkout, *options):
     """Its result, a dictionary of arrays; where it was trained on the same problem before, that one."""
     KEPT.mkdir(parents=True, exist_ok=True)
     names = ("given.npz", "implicit-arap.npz", "implicit-arap.key")
-    names = ("given.npz", "implicit-arap.npz", "implicit-arap.key")
     given, result, key = (KEPT / f"{problem.shape}-{name}" for name in names)
     arrays, wanted = given_to_implicit_arap(problem), hashlib.sha256()
     for name, array in arrays.items():
