@@ -29,29 +29,28 @@ class OneLineParser(argparse.ArgumentParser):
 
 def parse(arguments):
     """The parsed arguments; `solve` holds what was given of a solve's settings."""
-    options = parser().parse_args(arguments)
-    verb = options.verb
-    if verb == "batch":
+    root = parser()
+    options = root.parse_args(arguments)
+    options.solve_verb = options.verb
+    if options.verb == "batch":
         verbs = [name for name, given in (("stylize", options.style), ("deform", options.deform)) if given]
         if len(verbs) != 1:
-            parser().error("batch: say what to do, either --style NAME or --deform")
+            root.error("batch: say what to do, either --style NAME or --deform")
         (options.solve_verb,) = verbs
-        refuse_foreign(options)
-    else:
-        options.solve_verb = verb
+        refuse_foreign(options, root.error)
     if options.handles and options.solve_verb != "deform":
-        parser().error("--handles belongs to --deform")
+        root.error("--handles belongs to --deform")
     return options
 
 
-def refuse_foreign(options):
-    """A flag of the other verb would be ignored silently."""
+def refuse_foreign(options, error):
+    """Calls `error` with a sentence where a flag belongs to the verb that the batch does not do."""
     other = "deform" if options.solve_verb == "stylize" else "stylize"
     known = {p.name for p in PARAMETERS[options.solve_verb]}
     foreign = [p.name for p in PARAMETERS[other] if p.name not in known]
     for name in [*foreign, *FLAGS[other]]:
         if getattr(options, name, None) is not None:
-            parser().error(f"--{name.replace('_', '-')} has no meaning for {options.solve_verb}")
+            error(f"--{name.replace('_', '-')} has no meaning for {options.solve_verb}")
 
 
 def solve_settings(options):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What moves a handle, an Empty or a bone, and where it is."""
+"""The Empty or the bone that moves a handle, and its place."""
 
 import numpy as np
 
@@ -67,5 +67,5 @@ def put_user_settings(entry, values):
 
 
 def key_of(entry):
-    """Tells a source's handles apart, also when they are renamed or others are removed."""
+    """A key of a source's handle. It stays when the handle is renamed, or others are removed."""
     return mover_of(entry).session_uid, entry.bone

@@ -12,7 +12,7 @@ ICONS = {"INFO": "CHECKMARK", "WARNING": "ERROR", "ERROR": "CANCEL"}
 
 
 def draw_progress(layout, job):
-    """The running job: how far, what, how long, and the way out."""
+    """The running job: its progress bar with Cancel, its message, and its times."""
     box = layout.box()
     progress_row(box.row(align=True), job)
     wrapped(box, job.message)
@@ -38,7 +38,7 @@ def remarks(source):
 
 
 class ARAPFIELDS_PT_status(Section, bpy.types.Panel):
-    """Last: what comes and goes moves nothing above it."""
+    """The job that runs, remarks and messages. It is the last panel, so that none moves when it changes."""
 
     bl_label = "Status"
     bl_order = 12
@@ -46,8 +46,8 @@ class ARAPFIELDS_PT_status(Section, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context):
-        said = jobs.running() is not None or bool(jobs.messages())
-        return super().poll(context) and (said or any(remarks(source_of(context))))
+        of_jobs = jobs.running() is not None or bool(jobs.messages())
+        return super().poll(context) and (of_jobs or any(remarks(source_of(context))))
 
     def fill(self, context, source, settings):
         layout = self.layout

@@ -8,9 +8,9 @@
 
 namespace arapfields {
 
-/// Splats of a binary PLY file with the properties x, y, z, f_dc_*, f_rest_*, opacity, scale_*, rot_*; other
-/// properties are kept. Throws FileError for what cannot be read, and InvalidInput that begins with the
-/// file's name for what is damaged or laid out otherwise, and Cancelled.
+/// Splats of a binary PLY file with the properties x, y, z, f_dc_*, f_rest_*, opacity, scale_* and rot_*.
+/// Other properties are kept. Throws FileError where the file cannot be read, InvalidInput that begins with
+/// its name where it is damaged or has another layout, and Cancelled.
 ARAPFIELDS_EXPORT GaussianSplats load_splats(const std::string& path, const Progress& progress = {});
 /// Writes such a file, in whole or not at all.
 ARAPFIELDS_EXPORT void save_splats(const std::string& path, const GaussianSplats& splats,

@@ -7,18 +7,20 @@ namespace arapfields {
 
 class Tensor;
 
-/// The layer steps that are not matrix products, on tensors: kernels (jet_kernels.h) for those in main
-/// memory, compositions of tensor operations elsewhere. `activations` and `jets` are (columns·n, width);
-/// slope (n, width).
+// The steps of a layer that are not matrix products, on tensors: by the kernels of jet_kernels.h in main
+// memory, by tensor operations on a device. `activations` and `jets` are (columns·n, width), `slope` is
+// (n, width).
+
+/// Softplus of this sharpness, and the number of columns: a value and its derivatives.
 struct LayerStep {
   double sharpness = 30.0;
   int columns = 1;
 };
 
-/// `slope` may be undefined: then nothing is kept. `jets` is not used with one column.
+/// Adds the bias and applies softplus. An undefined `slope` is not kept; one column does not use `jets`.
 void activate_layer(const LayerStep& step, Tensor& activations, Tensor& slope, Tensor& jets,
                     const Tensor& bias);
-/// `partial` may be undefined; otherwise it is added to the result.
+/// The cotangents of activate_layer's inputs. A defined `partial` is added to them.
 void activate_layer_back(const LayerStep& step, Tensor& activations, const Tensor& slope,
                          const Tensor& partial, Tensor& cotangents, Tensor& bias_gradient);
 /// One layer's part in the second derivatives (adjoint_kernels.h). `adjoints` (outputs·n, width), or

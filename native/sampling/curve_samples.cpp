@@ -2,6 +2,7 @@
 #include "sampling/curve_samples.h"
 
 #include <cmath>
+#include <string>
 #include <vector>
 
 #include "core/errors.h"
@@ -18,30 +19,28 @@ CurveSamples sample_curve(Points2In vertices, Index count, bool closed) {
   require_memory("count", 4.0 * sizeof(double) * static_cast<double>(count));
 
   const Index edges = closed ? vertices.rows() : vertices.rows() - 1;
-  std::vector<double> ends(edges);
-  double length = 0.0, twice_area = 0.0;
+  std::vector<double> arc_lengths(edges);  // from the first vertex to each edge's end
+  double length = 0.0, twice_area = 0.0;   // the area by the shoelace formula, above 0 counterclockwise
   for (Index e = 0; e < edges; ++e) {
     const Vec2 a = vertices.row(e), b = vertices.row((e + 1) % vertices.rows());
     length += (b - a).norm();
     twice_area += a.x() * b.y() - a.y() * b.x();
-    ends[e] = length;
+    arc_lengths[e] = length;
   }
   require(length > 0, "vertices", "all are the same point", "a curve has a length");
   require(std::isfinite(length), "vertices", "their distances are too large for floating point",
           "the curve's length must be finite");
-  const double side =
-      closed && twice_area < 0 ? -1.0 : 1.0;  // clockwise curves have their inside to the right
+  const double outward = closed && twice_area < 0 ? -1.0 : 1.0;
 
   CurveSamples samples{Points2(count, 2), Points2(count, 2)};
   Index e = 0;
   for (Index s = 0; s < count; ++s) {
-    const double at = length * (static_cast<double>(s) + 0.5) / static_cast<double>(count);
-    while (e + 1 < edges && ends[e] < at) ++e;
+    const double arc_length = length * (static_cast<double>(s) + 0.5) / static_cast<double>(count);
+    while (e + 1 < edges && arc_lengths[e] < arc_length) ++e;
     const Vec2 a = vertices.row(e), b = vertices.row((e + 1) % vertices.rows());
-    const double edge = (b - a).norm();
-    const Vec2 direction = (b - a) / edge;
-    samples.points.row(s) = b - (ends[e] - at) * direction;
-    samples.normals.row(s) = side * Vec2(direction.y(), -direction.x());
+    const Vec2 direction = (b - a).normalized();
+    samples.points.row(s) = b - (arc_lengths[e] - arc_length) * direction;
+    samples.normals.row(s) = outward * Vec2(direction.y(), -direction.x());
   }
   return samples;
 }
