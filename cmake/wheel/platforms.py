@@ -73,6 +73,7 @@ PLATFORMS = {
             ".cp{}-win_amd64.pyd",
             "x86_64-w64-mingw32-g++-posix",
             "x86_64-windows-gnu",
+            "libarapfields.dll",
         ),
         Platform("windows-arm64", "win_arm64", ".cp{}-win_arm64.pyd", "zig", "aarch64-windows-gnu"),
         Platform(
@@ -138,8 +139,8 @@ def linux(platform, work):
 
 def windows(platform, work):
     if platform.compiler != "zig":
-        flags = {"CMAKE_MODULE_LINKER_FLAGS": "-static -s"}
-        return ONE_MODULE | flags | {"CMAKE_TOOLCHAIN_FILE": ROOT / "cmake/mingw-w64.cmake"}
+        flags = {f"CMAKE_{kind}_LINKER_FLAGS": "-static -s" for kind in ("MODULE", "SHARED")}
+        return flags | {"CMAKE_TOOLCHAIN_FILE": ROOT / "cmake/mingw-w64.cmake"}
     return ONE_MODULE | cross("Windows", "arm64")
 
 

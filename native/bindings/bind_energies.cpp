@@ -298,7 +298,7 @@ InvalidInput for a broken, an open or a flat mesh.)")
             Points d = as_points(directions, "directions");
             return run_long([&] { return style.normals(d, smoothing); });
           },
-          "directions"_a, py::kw_only(), "smoothing"_a = ObjectStyle::usual_smoothing,
+          "directions"_a, py::kw_only(), "smoothing"_a = double{ObjectStyle::usual_smoothing},
           R"(
 The preferred unit normals (n, 3) for directions (n, 3).
 
