@@ -95,7 +95,7 @@ def main():
     parser.add_argument("files", nargs="*", type=Path, help="files of tests instead of all")
     given = parser.parse_intermixed_args()
     folder = environment.python(given.python)
-    (wheel,) = given.dist.glob(f"arapfields-*cp{given.python.replace('.', '')}-*win_amd64.whl")
+    (wheel,) = given.dist.glob(f"arapfields-*cp{given.python.replace('.', '')}*win_amd64.whl")
     environment.install(wheel, folder)
     reports = WORK / f"reports-{given.python}"
     reports.mkdir(exist_ok=True)
