@@ -184,7 +184,7 @@ wheel-tools: $(VENV)/.ready
 	$(COMPILER)
 	@$(PIP) -q -r cmake/wheel/requirements.txt
 
-wheels: wheel-tools  ## for pip, in dist: a wheel for each Python; PLATFORM=linux-arm64, windows-x64, windows-arm64, macos-arm64, macos-x64 or all
+wheels: wheel-tools  ## for pip, in dist: wheels for Blender's Pythons; PLATFORM=linux-arm64, windows-x64, windows-arm64, macos-arm64, macos-x64 or all
 	$(PY) cmake/wheel/build_wheels.py $(PLATFORM) --output dist
 
 # KEEP="NAME …" hands variables of this shell on to the steps, such as a compiler's cache.
