@@ -4,13 +4,12 @@
 Each is the solid that its preferred normals bound, within a ball where they leave it open.
 """
 
-import struct
-import zlib
 from pathlib import Path
 
 import numpy as np
 
 import arapfields as af
+from arapfields.cli.contact_sheet import png
 
 FOLDER = Path(__file__).resolve().parents[1] / "addon" / "icons"
 SIZE, FINER = 64, 4
@@ -65,23 +64,6 @@ def picture(normals):
     )
     whole[..., :3] /= np.maximum(whole[..., 3:], 1e-6)
     return np.round(255 * np.clip(whole, 0, 1)).astype(np.uint8)
-
-
-def png(pixels):
-    """The bytes of a PNG file."""
-    height, width, _ = pixels.shape
-    rows = b"".join(b"\0" + row.tobytes() for row in pixels)
-
-    def chunk(kind, data):
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    head = struct.pack(">IIBBBBB", width, height, 8, 6, 0, 0, 0)
-    return (
-        b"\x89PNG\r\n\x1a\n"
-        + chunk(b"IHDR", head)
-        + chunk(b"IDAT", zlib.compress(rows, 9))
-        + chunk(b"IEND", b"")
-    )
 
 
 def main():

@@ -52,14 +52,14 @@ def picture(mesh, colour, middle, half):
 
 
 def png(pixels):
-    """A PNG file's bytes of (height, width, 3) bytes."""
-    height, width = pixels.shape[:2]
+    """A PNG file's bytes of (height, width, 3 or 4) bytes: colours, and how opaque they are."""
+    height, width, channels = pixels.shape
     rows = b"".join(b"\0" + row.tobytes() for row in pixels)
 
     def chunk(kind, data):
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
-    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    header = struct.pack(">IIBBBBB", width, height, 8, {3: 2, 4: 6}[channels], 0, 0, 0)
     return (
         b"\x89PNG\r\n\x1a\n"
         + chunk(b"IHDR", header)
