@@ -115,7 +115,7 @@ def test_unwelded_and_torn_meshes_get_the_same_weights(legs, weights):
 def test_loose_parts_take_what_lies_below_and_small_closed_ones_one_motion(legs, weights):
     V, F = legs
     samples = af.sample_mesh(V, F, 2000)
-    points, normals = samples.frame.to_mesh(samples.points), np.asarray(samples.normals)
+    points, normals = np.asarray(samples.points), np.asarray(samples.normals)
     high = points[:, 2] > HIP
     patch = points[high][:30] + 0.02 * normals[high][:30]
     cube = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * 0.05 + [LEG, 0.08, 0.1]
