@@ -16,7 +16,7 @@ constexpr Index most_nodes = 4000;
 /// Within so many spacings nodes count as neighbours.
 constexpr double neighbour_spacings = 2.5;
 /// In sizes of the shape, how closely bones are mirrored.
-constexpr double symmetric_bones = 1e-3;
+constexpr double symmetric_bones = 5e-3;
 
 const SurfaceSamples& checked(const SurfaceSamples& samples) {
   require_samples(samples);
