@@ -150,3 +150,37 @@ def build_scene():
     made.hair = dressing.strands(made.body, scalp, every=5, length=0.14, droop=2.0, steps=6, radius=0.011)
     made.hair.data.materials.append(stage.material("Hair", (0.10, 0.04, 0.015), roughness=0.5))
     return made
+
+
+def near(points, place, radii):
+    """A weight of each point: 1 at the place, less away from it."""
+    return np.exp(-(((points - place) / radii) ** 2).sum(axis=1))[:, None]
+
+
+def add_keys(item):
+    """Shape keys of the body: a long nose, pointed ears."""
+    rest = np.array([vertex.co for vertex in item.data.vertices])
+    nose = near(rest, (0, -0.31, 1.45), 0.055) * (0, -0.26, 0.03)
+    ears = sum(
+        near(rest, (side * 0.32, 0.03, 1.52), (0.05, 0.06, 0.08)) * (side * 0.18, 0.04, 0.12)
+        for side in (-1, 1)
+    )
+    item.shape_key_add(name="Basis")
+    for name, way in (("Nose", nose), ("Ears", ears)):
+        key = item.shape_key_add(name=name, from_mix=False)
+        key.data.foreach_set("co", (rest + way).astype(np.float32).ravel())
+
+
+def rigged():
+    """[body, shirt, eyes] that one rig poses by weights of their own; the body has keys."""
+    whole, bones = coloured("Child", body(cells=100)), dressing.rig(BONES)
+    shirt(whole).modifiers.clear()
+    items = [whole, bpy.data.objects["Shirt"]]
+    items += [eye(place, side) for place, side in zip(EYES, "RL", strict=True)]
+    for item in items:
+        item.data.transform(item.matrix_basis)
+        item.matrix_basis.identity()
+        dressing.weigh(item, BONES)
+        item.modifiers.new("Armature", "ARMATURE").object = bones
+    add_keys(whole)
+    return items

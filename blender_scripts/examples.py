@@ -16,6 +16,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "blender_scripts")]
 import bpy  # noqa: E402
 import child  # noqa: E402
 import dressing  # noqa: E402
+import grown  # noqa: E402
 import menagerie  # noqa: E402
 import scanned  # noqa: E402
 import stage  # noqa: E402
@@ -149,6 +150,14 @@ def wrap():
     chosen(dog)
 
 
+def transfer():
+    """A child with a rig, keys, eyes and a shirt, and a grown-up that has a mesh alone; landmarks on both."""
+    body, other = grown.beside_child(APART)
+    in_studio([body, other], azimuth=24, elevation=6, around=[(-0.9, 0, 1.9), (APART + 1.05, 0, 2.3)])
+    stage.brighten(0.75)
+    chosen(body)
+
+
 def stylize():
     """A dog to be turned towards a solid."""
     dog = figure("Dog", "dog", 0)
@@ -156,7 +165,7 @@ def stylize():
     chosen(dog)
 
 
-SCENES = (pins, character, skin, animate, walk, stylize, wrap)
+SCENES = (pins, character, skin, animate, walk, stylize, wrap, transfer)
 
 
 def comfortable():

@@ -38,6 +38,7 @@ OF_PAGES = [
     "examples.py",
     "child.py",
     "dressing.py",
+    "grown.py",
     "scanned.py",
     "walking.py",
 ]  # of figures that run a page's script

@@ -48,6 +48,11 @@ FIGURES = [
     ),
     Figure("loop_walk", "a walk without and with secondary motion, and moving", pages=("workflows/walk.md",)),
     Figure("loop_wrap", "a dog that takes the shape of a scan, and moving", pages=("workflows/wrap.md",)),
+    Figure(
+        "loop_transfer",
+        "a child's keys, weights, eyes and shirt on a grown-up, and moving",
+        pages=("workflows/transfer.md",),
+    ),
     Figure("loop_style", "a style's strength from none to all, moving"),
     Figure("loop_splats", "a scan of Gaussian splats, posed with and without its covariances, and moving"),
     Figure("published", "the published bunny by three methods", published=True, timed=True),

@@ -6,45 +6,20 @@ import json
 import bpy
 import child
 import dressing
+import grown
 import numpy as np
 import stage
 from mathutils import Matrix, Vector
-from shapes import Cone, Ellipsoid, build, mirrored, tube
 
 from .workflows import extension
 
 SPACING = 1.75
 BONE = (0.02, 0.12, 0.55)
-PAIRS = (  # crown, nose, hands, feet: on the child, and on the scan
-    ((0, 0.02, 1.81), (0, 0.01, 2.24)),
-    ((0, -0.335, 1.45), (0, -0.255, 1.99)),
-    *(((s * 0.82, 0, 0.97), (s * 0.82, -0.06, 1.05)) for s in (-1, 1)),
-    *(((s * 0.13, -0.2, 0.04), (s * 0.19, -0.24, 0.04)) for s in (-1, 1)),
-)
-
-
-def grown():
-    """A grown-up of the child's parts: longer legs, a smaller head, arms that hang."""
-    middle = [
-        Ellipsoid((0, 0.01, 2.03), (0.185, 0.215, 0.225)),
-        Ellipsoid((0, -0.22, 1.99), (0.03, 0.045, 0.035), blend=0.03),
-        Cone((0, 0.02, 1.62), (0, 0.02, 1.88), 0.08, 0.08, blend=0.05),
-        *tube([(0, 0, 1.12), (0, 0, 1.3), (0, 0, 1.58)], [0.19, 0.2, 0.17]),
-        *tube([(0, 0, 0.95), (0, 0, 1.05)], [0.2, 0.2], blend=0.06),
-    ]
-    half = [
-        *tube([(0.14, 0.01, 1.57), (0.48, 0, 1.33), (0.72, -0.05, 1.12)], [0.095, 0.075, 0.06], blend=0.07),
-        Ellipsoid((0.78, -0.06, 1.06), (0.065, 0.05, 0.08), blend=0.04),
-        Ellipsoid((0.18, 0.03, 2.02), (0.03, 0.05, 0.06), blend=0.03),
-        *tube([(0.12, 0, 0.9), (0.17, -0.02, 0.5), (0.19, 0.02, 0.14)], [0.135, 0.11, 0.085], blend=0.06),
-        Ellipsoid((0.19, -0.07, 0.065), (0.085, 0.19, 0.065), blend=0.03),
-    ]
-    return build([*middle, *mirrored(half)], 0.05, cells=110)
 
 
 def scan():
     """Its triangles, loose, noisy, with holes."""
-    shape, rng = grown(), np.random.default_rng(0)
+    shape, rng = grown.body(), np.random.default_rng(0)
     kept = shape.triangles[rng.random(len(shape.triangles)) > 0.04]
     corners = (shape.vertices[kept] + rng.normal(0, 0.002, (len(kept), 1, 3))).reshape(-1, 3)
     mesh = bpy.data.meshes.new("Scan")
@@ -106,7 +81,7 @@ def render(output):
     bpy.context.view_layer.objects.active = body
     body.select_set(True)
     bpy.context.view_layer.update()
-    for rest, there in PAIRS:
+    for rest, there in grown.PAIRS:
         bpy.ops.arapfields.add_landmark(rest=rest, on_target=there)
     shown = as_seen("Template", body, rig, 0)
     bpy.context.view_layer.objects.active = body

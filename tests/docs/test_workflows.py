@@ -111,6 +111,23 @@ def wrap():
     assert np.mean(off) < 0.01 * size, np.mean(off) / size
 
 
+def transfer():
+    """The grown-up has all of the child but its place, and raises its arm and its nose."""
+    import bpy
+
+    child, grown = bpy.data.objects["Child"], bpy.data.objects["Grown-up"]
+    rest, now = seen("Grown-up")
+    off, size = np.linalg.norm(now - rest, axis=1), np.ptp(rest[:, 2])
+    hand, nose = rest[:, 0] > 0.75, (rest[:, 1] < -0.25) & (rest[:, 2] > 1.9)
+    assert (now - rest)[hand, 2].min() > 0.2 * size and off[nose].max() > 0.05 * size
+    assert grown.data.shape_keys.key_blocks.keys() == child.data.shape_keys.key_blocks.keys()
+    assert {bone.name for bone in bpy.data.objects["Rig Grown-up"].data.bones} <= set(
+        grown.vertex_groups.keys()
+    )
+    assert {"Shirt Grown-up", "Eye.L Grown-up", "Eye.R Grown-up"} <= {item.name for item in grown.children}
+    assert np.abs(seen("Child")[0][:, 2]).max() < 1.9  # the child is back
+
+
 def splats():
     """The head of the scan goes up, and its splats turn."""
     import bpy
@@ -136,7 +153,8 @@ def python():
 
 
 CHECKS = {
-    check.__name__: check for check in (pins, character, skin, animate, walk, stylize, splats, wrap, python)
+    check.__name__: check
+    for check in (pins, character, skin, animate, walk, stylize, splats, wrap, transfer, python)
 }
 
 
