@@ -121,8 +121,9 @@ void resolve(EvaluationCounter& function, const TricubicSurrogate& model, const 
   const auto touched = static_cast<std::size_t>(ambiguous.back().line - ambiguous.front().line + 1);
   while (!pieces.empty()) {
     require(pieces.size() <= std::max(fewest_pieces, most_pieces_a_line * touched), "sdf",
-            "its values vary like noise, or stay within rounding of 0: over " +
-                std::to_string(most_pieces_a_line) + " places on each line may be zeros",
+            std::string("its values vary like noise, or stay within rounding of 0: over ")
+                .append(std::to_string(most_pieces_a_line))
+                .append(" places on each line may be zeros"),
             "a function with a zero surface inside the cube [-1, 1]^3 is needed");
     const auto count = static_cast<Index>(pieces.size());
     std::vector<Roots> roots(pieces.size());

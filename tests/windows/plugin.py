@@ -2,6 +2,7 @@
 """pytest's plugin in the Windows Python: leaves out what not_run.py lists, keeps outcomes as they come."""
 
 import ctypes
+import faulthandler
 import json
 import os
 import sys
@@ -11,6 +12,7 @@ import pytest
 from .not_run import NOT_RUN
 
 STATUS = pytest.StashKey()
+SECONDS = 600  # of a test; then the process says where it stands, and ends
 
 
 def pytest_collection_modifyitems(items):
@@ -28,6 +30,7 @@ def keep(name, outcome, why):
 
 def pytest_runtest_logstart(nodeid):
     keep(nodeid, "begun", "the process ended in it")
+    faulthandler.dump_traceback_later(SECONDS, exit=True, file=sys.__stderr__)
 
 
 def pytest_runtest_logreport(report):
