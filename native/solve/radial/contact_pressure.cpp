@@ -38,10 +38,10 @@ void note_inside(Index k, const Points& places, const Points& seen, const Vector
 ContactState ContactTerms::held() const {
   ContactState state;
   for (const BarrierSurface& surface : surfaces_) state.placements.push_back(surface.placement());
-  for (Index row = 0; row < std::min(pressures_.rows(), points_.sample_count()); ++row)
+  for (Index row = 0; row < std::min<Index>(pressures_.rows(), points_.sample_count()); ++row)
     for (Index k = 0; k < pressures_.cols(); ++k)
       if (pressures_(row, k) > 0.0) state.pressures.push_back({row, k, pressures_(row, k)});
-  const Points places = places_.topRows(std::min(places_.rows(), points_.sample_count()));
+  const Points places = places_.topRows(std::min<Index>(places_.rows(), points_.sample_count()));
   for (Index k = 0; k < std::ssize(surfaces_); ++k)
     note_inside(k, places, seen_[static_cast<std::size_t>(k)], clear_.col(k), state);
   return state;
