@@ -29,6 +29,7 @@ HANDLES = {  # of animate.blend: place and half-extents
     "Head": ((0, -0.72, 1.40), (0.28, 0.36, 0.30)),
     "Tail": ((0, 1.27, 0.82), (0.16, 0.26, 0.18)),
 }
+BALL = 0.4  # radius of the obstacle in contact.blend
 APART = 1.7  # the scan from the dog, along x
 LAST = 48  # frame; the motion repeats after it
 
@@ -165,7 +166,24 @@ def stylize():
     chosen(dog)
 
 
-SCENES = (pins, character, skin, animate, walk, stylize, wrap, transfer)
+def contact():
+    """A soft bar above a ball, held at both ends."""
+    bar = figure("Bar", "slender_bar", 0)
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=BALL, location=(0, 0, BALL))
+    ball = bpy.context.object
+    ball.name = "Ball"
+    ball.data.polygons.foreach_set("use_smooth", [True] * len(ball.data.polygons))
+    ball.data.materials.append(stage.material("Ball", (0.10, 0.30, 0.55), roughness=0.3))
+    bar.location.z = 2 * BALL + 0.02
+    held(
+        bar,
+        {name: ((0.74 * side, 0, 0.94), (0.09, 0.14, 0.14)) for name, side in (("Left", -1), ("Right", 1))},
+    )
+    in_studio([bar, ball], azimuth=22, elevation=11, around=[(-0.95, 0, 1.05), (0.95, 0, 1.05)])
+    chosen(bar)
+
+
+SCENES = (pins, character, skin, animate, walk, stylize, wrap, transfer, contact)
 
 
 def comfortable():

@@ -53,6 +53,11 @@ FIGURES = [
         "a child's keys, weights, eyes and shirt on a grown-up, and moving",
         pages=("workflows/transfer.md",),
     ),
+    Figure(
+        "loop_contact",
+        "a bar pulled over a ball, without and with contact, and moving",
+        pages=("workflows/contact.md",),
+    ),
     Figure("loop_style", "a style's strength from none to all, moving"),
     Figure("loop_splats", "a scan of Gaussian splats, posed with and without its covariances, and moving"),
     Figure("published", "the published bunny by three methods", published=True, timed=True),

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Carried objects of other files, overridden, hidden or lost while live, and what a mask says of them."""
 
-import tempfile
-
 import numpy as np
 import pytest
 from support.blender.inside import IN_BLENDER
@@ -22,25 +20,9 @@ pytestmark = pytest.mark.in_blender
 CLOSE = 1e-5  # single precision of positions of size one
 
 
-def from_another_file(*kinds):
-    """The objects of these kinds, linked from a file of their own, in the scene."""
-    items = [rider(kind) for kind in kinds]
-    names = [item.name for item in items]
-    path = f"{tempfile.mkdtemp()}/other.blend"
-    bpy.data.libraries.write(path, set(items))
-    for item in items:
-        bpy.data.objects.remove(item)
-    with bpy.data.libraries.load(path, link=True) as (_, into):
-        into.objects = names
-    for item in into.objects:
-        bpy.context.collection.objects.link(item)
-    bpy.context.view_layer.update()
-    return into.objects
-
-
 def test_what_is_linked_is_named_and_the_rest_goes_on():
     bar, moving = body()
-    linked = from_another_file("MESH")[0]
+    linked = scenes.from_another_file(rider("MESH"))[0]
     scenes.activate(linked, bar)
     with pytest.raises(RuntimeError, match="Patch is linked from another file; make it local to carry it"):
         bpy.ops.arapfields.carry()
@@ -67,7 +49,7 @@ def test_what_is_linked_is_named_and_the_rest_goes_on():
 def test_library_overrides_are_carried_or_named(kind):
     """What moves as a whole, a mesh and bones need none of the linked data; other points lie there."""
     bar, moving = body()
-    linked = from_another_file(kind)[0]
+    linked = scenes.from_another_file(rider(kind))[0]
     item = linked.override_create(remap_local_usages=True)
     if item.name not in bpy.context.collection.objects:
         bpy.context.collection.objects.link(item)

@@ -166,6 +166,24 @@ def test_obstacles_are_read_as_they_are_shown():
     assert len(bpy.data.objects["Bar"].arapfields.contact.obstacle_list) == 2
 
 
+def test_an_obstacle_linked_from_another_file_is_one_as_any():
+    bar, block, _ = pressed()
+    block.scale, block.rotation_euler = (1, 2, 3), (0.3, 1.0, 0.2)
+    scenes.activate(block, bar)
+    bpy.ops.arapfields.add_obstacle()
+    (wanted,) = solids(bar)
+    bpy.ops.arapfields.remove_obstacle()
+    (linked,) = scenes.from_another_file(block)
+    assert linked.library is not None
+    scenes.activate(linked, bar)
+    bpy.ops.arapfields.add_obstacle()
+    assert contact.refusal(bar) is None
+    (solid,) = solids(bar)
+    assert solid.key == wanted.key and np.allclose(solid.placement, wanted.placement, atol=1e-6)
+    bpy.data.libraries.remove(linked.library)
+    assert f"{bar.arapfields.contact.obstacle_list[0].name} is in no scene" in str(contact.refusal(bar))
+
+
 def test_an_animated_obstacle_is_the_same_in_playback_bake_and_render():
     bar, block, _ = pressed()
     bpy.data.objects["Moving"].location.z += 0.8

@@ -145,6 +145,18 @@ def stylize():
     assert len(rest) == len(now) and np.linalg.norm(now - rest, axis=1).max() > 0.05
 
 
+def contact():
+    """The ends are down, and nothing of the bar lies in the ball."""
+    import bpy
+
+    bar, ball = bpy.data.objects["Bar"], bpy.data.objects["Ball"]
+    rest, now = seen("Bar")
+    ends, radius = np.abs(rest[:, 0]) > 0.75, ball.dimensions.z / 2
+    away = np.linalg.norm(now + np.array(bar.location - ball.location), axis=1)
+    assert (rest - now)[ends, 2].min() > 0.3
+    assert away.min() > 0.99 * radius, away.min() / radius  # a ball of facets, .001 of the bar's length
+
+
 def python():
     import trimesh
 
@@ -154,7 +166,7 @@ def python():
 
 CHECKS = {
     check.__name__: check
-    for check in (pins, character, skin, animate, walk, stylize, splats, wrap, transfer, python)
+    for check in (pins, character, skin, animate, walk, stylize, splats, wrap, transfer, contact, python)
 }
 
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Scenes for tests inside Blender: small, textured, with everything on the mesh that must survive."""
 
+import tempfile
+
 import bmesh
 import bpy
 import numpy as np
@@ -53,6 +55,20 @@ def bar_with_handles(name="Bar"):
     bpy.ops.arapfields.add_handle()
     activate(item)
     return item, fixed, moving
+
+
+def from_another_file(*items):
+    """The objects, moved to a file of their own and linked from there into the scene."""
+    names, path = [item.name for item in items], f"{tempfile.mkdtemp()}/other.blend"
+    bpy.data.libraries.write(path, set(items))
+    for item in items:
+        bpy.data.objects.remove(item)
+    with bpy.data.libraries.load(path, link=True) as (_, into):
+        into.objects = names
+    for item in into.objects:
+        bpy.context.collection.objects.link(item)
+    bpy.context.view_layer.update()
+    return into.objects
 
 
 def camera(size=48):
