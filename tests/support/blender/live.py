@@ -5,7 +5,7 @@ import bpy
 
 from addon.live import sessions
 
-WAIT = 30  # seconds for a shape to follow
+WAIT = 300  # seconds for a shape to follow on a busy machine
 
 
 def step(refined=False):

@@ -16,7 +16,7 @@ from addon.live import sessions
 from addon.solver import setup
 
 LIFT = 0.4  # of the moving handle, in the height of the world
-WAIT = 30  # seconds for a live shape
+WAIT = 300  # seconds for a live shape on a busy machine
 ENDS_WORK = {"undone", "redone", "reloaded"}  # whatever works on the file, as before_undo and before_load say
 
 
