@@ -11,6 +11,7 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     import bpy
     from support.blender import scenes, stages
+    from support.blender.live import WAIT
     from support.blender.stages import again, source, stray
 
     from addon.core.runtime import jobs
@@ -61,11 +62,11 @@ def test_undone_past_live_and_back_leaves_nothing_astray(target):
         bpy.ops.ed.undo_push(message="live")
         for _ in range(3):
             bpy.ops.ed.undo()
-            sessions.update(bpy.context, wait=stages.WAIT)
+            sessions.update(bpy.context, wait=WAIT)
             assert not sessions.live and not stray() and source().visible_get()
             assert not source().modifiers and not source().arapfields.live_kind
             bpy.ops.ed.redo()
-            sessions.update(bpy.context, wait=stages.WAIT)
+            sessions.update(bpy.context, wait=WAIT)
             assert source().visible_get() and not source().hide_render
             assert stray() == [str(uid) for uid in sessions.live]
             assert bool(sessions.live) == bool(source().arapfields.live_kind)

@@ -45,9 +45,10 @@ def test(folder, name, files, reports):
         said += done.stdout
         log.write_text(said, encoding="utf-8")
         found = outcomes(kept)
-        if done.returncode in (0, 1, 5) and "begun" not in [outcome for outcome, _ in found.values()][-1:]:
+        name_of_last, (outcome, _) = list(found.items())[-1] if found else (files[0], ("", ""))
+        if done.returncode in (0, 1, 5) and outcome != "begun":
             return found
-        last = list(found)[-1].partition("::")[0] if found else files[0]
+        last = name_of_last.partition("::")[0]
         if last not in files:
             return found | {name: ("failed", f"status {done.returncode}: {done.stdout[-400:]}")}
         files = files[files.index(last) + 1 :]

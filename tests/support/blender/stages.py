@@ -6,6 +6,7 @@ import tempfile
 
 import bpy
 from support.blender import scenes
+from support.blender.live import WAIT
 
 from addon import lifecycle
 from addon.animation.operators import ARAPFIELDS_OT_bake
@@ -16,7 +17,6 @@ from addon.live import sessions
 from addon.solver import setup
 
 LIFT = 0.4  # of the moving handle, in the height of the world
-WAIT = 300  # seconds for a live shape on a busy machine
 ENDS_WORK = {"undone", "redone", "reloaded"}  # whatever works on the file, as before_undo and before_load say
 
 
