@@ -3,6 +3,7 @@
 
 import bpy
 import numpy as np
+from dressing import seen_mesh
 
 from .common import stack
 from .looping import film
@@ -12,10 +13,8 @@ from .workflows import followed, in_examples, snapshot
 def depth():
     """How deep the bar's deepest vertex lies in the ball, as a share of the ball's radius."""
     bar, ball = bpy.data.objects["Bar"], bpy.data.objects["Ball"]
-    seen = bar.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    away = [(bar.matrix_world @ vertex.co - ball.location).length for vertex in seen.vertices]
-    radius = ball.dimensions.z / 2
-    return round(max(0.0, 1 - float(np.min(away)) / radius), 4)
+    away = np.linalg.norm(seen_mesh(bar)[0] - ball.location, axis=1)
+    return round(max(0.0, 1 - float(away.min()) / (ball.dimensions.z / 2)), 4)
 
 
 def loop(output):
