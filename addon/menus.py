@@ -31,6 +31,7 @@ class ARAPFIELDS_MT_object(bpy.types.Menu):
         icon = "PAUSE" if sessions.is_live(source, "STYLIZE") else "PLAY"
         layout.operator(Op.LIVE, text="Live Stylize", icon=icon).kind = "STYLIZE"
         layout.operator(Op.WRAP, icon="MOD_SHRINKWRAP")
+        layout.operator(Op.WRAP_SEQUENCE, icon="REC")
         layout.operator(Op.CLICK_LANDMARKS, icon="PINNED")
         layout.operator(Op.SKIN, icon="MOD_ARMATURE")
         layout.operator(Op.LIVE_KEEP, icon="CHECKMARK")

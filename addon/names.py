@@ -52,6 +52,7 @@ class Op(StrEnum):
     STYLIZE = "arapfields.stylize"
     SET_STYLE = "arapfields.set_style"
     WRAP = "arapfields.wrap"
+    WRAP_SEQUENCE = "arapfields.wrap_sequence"
     SKIN = "arapfields.skin"
     TRANSFER = "arapfields.transfer"
     ADD_LANDMARK = "arapfields.add_landmark"

@@ -46,18 +46,18 @@ class BakePass:
 
     def work(self, tracker):
         """On the worker."""
-        task, count = tracker.start("Solving", 1.0), len(self.played)
-        baked = set(self.frames)
+        count, baked = len(self.played), set(self.frames)
         try:
             for bake in self.bakes:
                 bake.attempt(bake.prepare)
             for number, frame in enumerate(self.played):
+                text = translated("frame {frame}", frame=f"{frame:g}")
+                task = tracker.start(text, 1 / (count - number))
                 requests = self.feed.take(task)
-                task.report(number / count, translated("frame {frame}", frame=f"{frame:g}"))
                 for bake, request in zip(self.bakes, requests, strict=True):
                     if task.cancelled:
                         raise JobCancelled
-                    bake.attempt(bake.add, frame, request, frame in baked)
+                    bake.attempt(bake.add, frame, request, frame in baked, task)
                 if all(bake.error is not None for bake in self.bakes):
                     break
             for bake in self.bakes:

@@ -12,6 +12,7 @@ from ..core.errors import UserError
 from ..handles import empties
 from ..jobs.job_operator import JobOperator, with_progress
 from ..solver import style_settings
+from ..wrap import landmarks
 from . import frames, object_bake
 from .bake_job import BakePass
 
@@ -31,6 +32,7 @@ class BakeOperator(JobOperator):
         return refusal_of(source, effective_kind(source))
 
     frames_pass = None  # BakePass, where frames are solved
+    used = SETTINGS
 
     def invoke(self, context, event):
         taken = []
@@ -64,17 +66,21 @@ class BakeOperator(JobOperator):
     def values(self, source):
         """The settings by name; `start` and `end` where they were given or the range is one's own."""
         group = settings_of(source).bake
-        values = {name: effective_value(name, group, self) for name in SETTINGS}
+        values = {name: effective_value(name, group, self) for name in self.used}
         for name in ("start", "end"):
             given = self.properties.is_property_set(name)
             if given or values["range"] == "CUSTOM":
                 values[name] = effective_value(name, group, self)
         return values
 
+    def choose(self, context, sources, values):
+        """The Frames to bake."""
+        return frames.choose(context, sources, values)
+
     def begin(self, context, job, sources, values, bakes_of):
         """Coroutine: reads the sources, (object, kind), each made an ObjectBake by `bakes_of(source, kind,
         frames)`; the job's items."""
-        chosen, bakes = frames.choose(context, sources, values), []
+        chosen, bakes = self.choose(context, sources, values), []
         for source, kind in sources:
             reason = refusal_of(source, kind)
             try:
@@ -125,4 +131,6 @@ def refusal_of(source, kind):
             "{name} holds splats; render them live, or write a PLY a frame by arapfields animate",
             source,
         )
+    if kind == "WRAP":
+        return None if settings_of(source).wrap.frames else landmarks.refusal(source)
     return empties.require_handles(source) if kind == "DEFORM" else style_settings.refusal(source)

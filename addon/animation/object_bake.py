@@ -90,7 +90,7 @@ class ObjectBake:
         self.carried.prepare()
         self.store.open(self.solver)
 
-    def add(self, frame, request, is_baked=True):
+    def add(self, frame, request, is_baked=True, task=None):
         """Solves one frame and puts it where it goes; one that is not baked may only lead to others."""
         if isinstance(request, Exception):
             raise request
@@ -103,7 +103,7 @@ class ObjectBake:
         if self.simulation is not None:
             shape = self.simulation.shape(self.solver, frame, request)
         elif is_baked:
-            shape = self.solver.solve_from_rest(request)
+            shape = self.solver.solve_from_rest(request, task)
         if is_baked:
             self.keep(shape)
 

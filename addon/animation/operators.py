@@ -11,35 +11,22 @@ from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError
 from ..field_modifier import cache_modifier
 from . import caches, carried_bake
-from .bake_operator import BakeOperator, effective_kind
+from .bake_operator import BakeOperator, effective_kind, refusal_of
 from .object_bake import ObjectBake
 from .properties import folder, settings
+from .wrap_bake import WrapBake, frames_of, scans_in
 
 
-class ARAPFIELDS_OT_bake(BakeOperator, bpy.types.Operator):
-    """Solve the frames of an animation and keep them, so that they play anywhere, without this extension"""
-
-    bl_label = "Bake Animation"
-    bl_options = {"UNDO"}
-    title = "Bake"
-    guide = "animation"
+class CacheOperator(BakeOperator):
+    """Mixin of operators that keep the frames: in caches, or shape keys."""
 
     __annotations__ = {
-        **settings(options={"SKIP_SAVE"}),
         "folder": folder(options={"SKIP_SAVE"}),
         "filepath": path_text(
             "File",
             "Where one object's cache goes; empty for a file with its name in the folder",
             "FILE",
             options={"SKIP_SAVE"},
-        ),
-        "part": bpy.props.IntVectorProperty(
-            name="Part",
-            description="I of N, where N processes share the frames; 0 of 0 for one that solves all at once",
-            size=2,
-            default=(0, 0),
-            min=0,
-            options={"HIDDEN", "SKIP_SAVE"},
         ),
     }
 
@@ -61,18 +48,14 @@ class ARAPFIELDS_OT_bake(BakeOperator, bpy.types.Operator):
 
     def plan_frames(self, context, job):
         active = source_of(context)
-        sources = [(source, effective_kind(source, self)) for source in self.sources(context)]
+        sources = [(source, self.kind_of(source)) for source in self.sources(context)]
         if self.filepath and len(sources) > 1:
             raise UserError("One file cannot take several objects; choose a folder")
-        values, part = self.values(active), tuple(self.part) if any(self.part) else None
-        if part is not None and (values["format"] == "KEYS" or not 1 <= part[0] <= part[1]):
-            raise UserError(
-                "Part {i} of {n}: caches alone have parts, from 1 of N to N of N", i=part[0], n=part[1]
-            )
+        values = self.values(active)
 
         def make(source, kind, frames):
             paths = self.paths(source, active, values)
-            bake = ObjectBake(context, source, kind, frames, *paths, part=part, loop=values["loop"])
+            bake = self.bake_of(context, source, kind, frames, paths, values)
             self.warn_of_weight(bake)
             return bake
 
@@ -86,6 +69,70 @@ class ARAPFIELDS_OT_bake(BakeOperator, bpy.types.Operator):
                 "Shape keys of {size} in the .blend and in memory; a cache would take neither", size=size
             )
             self.warnings.append(f"{bake.name}: {line}")
+
+
+class ARAPFIELDS_OT_bake(CacheOperator, bpy.types.Operator):
+    """Solve the frames of an animation and keep them, so that they play anywhere, without this extension"""
+
+    bl_label = "Bake Animation"
+    bl_options = {"UNDO"}
+    title = "Bake"
+    guide = "animation"
+
+    __annotations__ = {
+        **settings(options={"SKIP_SAVE"}),
+        "part": bpy.props.IntVectorProperty(
+            name="Part",
+            description="I of N, where N processes share the frames; 0 of 0 for one that solves all at once",
+            size=2,
+            default=(0, 0),
+            min=0,
+            options={"HIDDEN", "SKIP_SAVE"},
+        ),
+    }
+
+    def kind_of(self, source):
+        return effective_kind(source, self)
+
+    def bake_of(self, context, source, kind, frames, paths, values):
+        part = tuple(self.part) if any(self.part) else None
+        if part is not None and (values["format"] == "KEYS" or not 1 <= part[0] <= part[1]):
+            raise UserError(
+                "Part {i} of {n}: caches alone have parts, from 1 of N to N of N", i=part[0], n=part[1]
+            )
+        return ObjectBake(context, source, kind, frames, *paths, part=part, loop=values["loop"])
+
+
+class ARAPFIELDS_OT_wrap_sequence(CacheOperator, bpy.types.Operator):
+    """Wrap the object onto each frame of a scan, each from the last; kept as Bake and Export says"""
+
+    bl_label = "Wrap Sequence"
+    bl_options = {"UNDO"}
+    title = "Wrap Sequence"
+    guide = "wrap"
+    used = ("format", "range", "step", "subframes")
+    scans = None  # {frame: ObjectReference} of a collection
+
+    __annotations__ = {
+        name: one for name, one in settings(options={"SKIP_SAVE"}).items() if name not in ("kind", "loop")
+    }
+
+    @classmethod
+    def refuses(cls, source):
+        return refusal_of(source, "WRAP")
+
+    def kind_of(self, source):
+        return "WRAP"
+
+    def choose(self, context, sources, values):
+        collection = settings_of(source_of(context)).wrap.frames
+        if collection is None:
+            return super().choose(context, sources, values)
+        self.scans = scans_in(collection, context.scene, [source for source, _ in sources], values)
+        return frames_of(self.scans)
+
+    def bake_of(self, context, source, kind, frames, paths, values):
+        return WrapBake(context, source, frames, self.scans, *paths)
 
 
 class ARAPFIELDS_OT_remove_bake(SourceOperator, bpy.types.Operator):
@@ -107,4 +154,4 @@ class ARAPFIELDS_OT_remove_bake(SourceOperator, bpy.types.Operator):
                 carried_bake.remove(entry.item)
 
 
-CLASSES = [ARAPFIELDS_OT_bake, ARAPFIELDS_OT_remove_bake]
+CLASSES = [ARAPFIELDS_OT_bake, ARAPFIELDS_OT_wrap_sequence, ARAPFIELDS_OT_remove_bake]

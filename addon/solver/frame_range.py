@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which frames the animation of a source's handles and style spans."""
+"""Which frames the animation of a source's handles, style or target spans."""
 
 from ..blender.object_references import settings_of
 from ..handles import empties, movers
 
 
 def animation_range(source, kind):
-    """(first, last) frame of all that moves the handles, the style or the source; None where nothing does."""
+    """(first, last) frame of all that moves the handles, the style, the target or the source; None where
+    nothing does."""
     ranges = [span for item in involved(source, kind) for span in ranges_of(item)]
     return (min(first for first, _ in ranges), max(last for _, last in ranges)) if ranges else None
 
@@ -21,8 +22,10 @@ def scene_range(scene):
 def involved(source, kind):
     """The objects, and what they hang on, whose animation a source's shape follows; each once."""
     style = settings_of(source).stylize
-    used = [source]
-    if kind == "DEFORM" or style.use_handles:
+    used, onto = [source], settings_of(source).wrap.onto
+    if kind == "WRAP" and onto is not None:
+        used.append(onto)
+    if kind == "DEFORM" or (kind == "STYLIZE" and style.use_handles):
         used += [movers.mover_of(entry) for entry in empties.used(source)]
     if kind == "STYLIZE":
         used += [item for item in (style.frame_object, style.style_object) if item is not None]
@@ -54,15 +57,15 @@ def drivers(item):
 
 def ranges_of(item):
     """(first, last) of each action and strip that moves an object."""
-    data = item.animation_data
-    if data is None:
-        return
-    if data.action is not None:
-        yield tuple(data.action.frame_range)
-    for track in data.nla_tracks:
-        for strip in track.strips:
-            if not track.mute and not strip.mute:
-                yield strip.frame_start, strip.frame_end
+    for data in [one.animation_data for one in (item, getattr(item.data, "shape_keys", None)) if one]:
+        if data is None:
+            continue
+        if data.action is not None:
+            yield tuple(data.action.frame_range)
+        for track in data.nla_tracks:
+            for strip in track.strips:
+                if not track.mute and not strip.mute:
+                    yield strip.frame_start, strip.frame_end
 
 
 def has_keys(item, path):

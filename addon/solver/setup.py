@@ -47,11 +47,11 @@ class SampledSource:
     topology: Topology | None = None
 
 
-def sampled(setup):
+def sampled(setup, count=SAMPLES, seed=0):
     """The SampledSource of a setup; on a worker."""
     surface, tracker = setup.surface, ProgressTracker(native.library().Task)
     moves_points = setup.cells is None
-    samples = surface.samples(tracker, SAMPLES, 0, own_triangles=surface.exact and moves_points)
+    samples = surface.samples(tracker, count, seed, own_triangles=surface.exact and moves_points)
     weights = [at_samples(setup, values, samples) for values in (setup.region, setup.masses)]
     if moves_points:
         return SampledSource(setup, samples, *weights)

@@ -131,7 +131,7 @@ def style_term(settings, space, where):
 
 
 def uses_handles(settings, kind):
-    return kind == "DEFORM" or settings.stylize.use_handles
+    return kind == "DEFORM" or (kind == "STYLIZE" and settings.stylize.use_handles)
 
 
 def has_motion_before(source):

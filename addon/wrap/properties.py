@@ -66,6 +66,12 @@ class ARAPFIELDS_PG_wrap(bpy.types.PropertyGroup):
             "Mesh object that this one is wrapped onto; it may be open and broken, as scans are",
             poll=is_target,
         ),
+        "frames": pointer(
+            bpy.types.Collection,
+            "Frames",
+            "Collection of scans for Wrap Sequence, one a frame, in the order of their names; empty where "
+            "the target moves",
+        ),
         "landmarks": collection(ARAPFIELDS_PG_landmark, "Landmarks", "Pairs of places that belong together"),
         "active_landmark": integer(
             "Active Landmark", "Row chosen in the list of landmarks", update=row_chosen

@@ -10,7 +10,6 @@ from support.blender import scenes
 from support.blender.stacks import local_points
 
 import addon.animation.operators as bake
-from addon.animation.bake_operator import BakeOperator
 from addon.core.runtime import jobs
 from addon.core.runtime.coroutines import Pause, run_to_completion
 from addon.solver.frame_solver import FrameSolver
@@ -31,14 +30,12 @@ def animated(name="Bar"):
     return bar
 
 
-def stepped(**given):
-    """The bake operator as a window runs it, to be stepped by hand; a plain object has its arguments."""
+def stepped(kind=bake.ARAPFIELDS_OT_bake, **given):
+    """An operator that bakes as a window runs it, to be stepped by hand; a plain object has its arguments."""
 
-    class Operator(BakeOperator):
-        title, in_window, scope, filepath = "Bake", False, "ACTIVE", given.pop("filepath", "")
-        plan_frames = bake.ARAPFIELDS_OT_bake.plan_frames
-        paths = bake.ARAPFIELDS_OT_bake.paths
-        warn_of_weight = bake.ARAPFIELDS_OT_bake.warn_of_weight
+    class Operator(bake.CacheOperator):
+        title, in_window, scope, filepath = kind.title, False, "ACTIVE", given.pop("filepath", "")
+        kind_of, bake_of, choose, used = kind.kind_of, kind.bake_of, kind.choose, kind.used
         part = (0, 0)
         properties = types.SimpleNamespace(is_property_set=lambda name: name in given)
 

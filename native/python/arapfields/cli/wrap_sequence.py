@@ -20,9 +20,12 @@ def frames_of(folder):
     paths = [path for path in Path(folder).iterdir() if path.suffix.lower() in sources.SOURCES]
     if not paths:
         raise af.InvalidInput(f"{folder}: holds no mesh")
-    return sorted(
-        paths, key=lambda path: [int(p) if p.isdigit() else p for p in re.split(r"(\d+)", path.stem)]
-    )
+    return sorted(paths, key=lambda path: by_numbers(path.stem))
+
+
+def by_numbers(name):
+    """What names are ordered by: scan 2 comes before scan 10."""
+    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
 
 
 def run(args, options, pairs):

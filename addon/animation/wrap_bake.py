@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A template that follows a scanned motion: wrapped onto each frame of its target, each from the last."""
+
+import math
+import re
+from types import SimpleNamespace
+
+from ..blender.evaluation import depsgraph_of
+from ..blender.language import translated
+from ..blender.native_options import options_of
+from ..blender.object_references import ObjectReference, owner_of, settings_of
+from ..blender.property_definitions import effective_values
+from ..core.errors import UserError
+from ..core.geometry.spaces import space_of
+from ..core.runtime import native
+from ..core.settings.parameters import WRAP
+from ..deform.solve_job import describe
+from ..solver.frame_solver import FrameSolver
+from ..solver.request import Request
+from ..solver.setup import sampled
+from ..wrap import landmarks
+from .caches import plain
+from .frames import Frames
+from .object_bake import ObjectBake
+
+
+def scans_in(collection, scene, sources, values):
+    """{frame: ObjectReference} of a collection's meshes, in the order of their names.
+
+    The last number in a name is its frame, where at least half of these frames are there; else the scene's
+    first frame is that of the first mesh. `values` may have the first and the last frame, `start` and `end`.
+    """
+    native.library()
+    from arapfields.cli.wrap_sequence import by_numbers
+
+    meshes = [one for one in collection.all_objects if one.type == "MESH" and one not in sources]
+    meshes = [mesh for mesh in meshes if owner_of(mesh) not in sources]
+    meshes.sort(key=lambda mesh: by_numbers(mesh.name))
+    numbers = [int(number) for mesh in meshes for number in re.findall(r"\d+", mesh.name)[-1:]]
+    if len(set(numbers)) < len(meshes) or (numbers and frames_of(numbers).count > 2 * len(meshes)):
+        numbers = range(scene.frame_start, scene.frame_start + len(meshes))
+    first, last = values.get("start", -math.inf), values.get("end", math.inf)
+    pairs = zip(numbers, meshes, strict=True)
+    scans = {frame: ObjectReference(mesh) for frame, mesh in pairs if first <= frame <= last}
+    if not scans:
+        raise UserError("{name} has no mesh for these frames", collection)
+    return scans
+
+
+def frames_of(numbers):
+    """The Frames that reach all of these whole numbers."""
+    numbers = sorted(numbers)
+    step = math.gcd(*(number - numbers[0] for number in numbers)) or 1
+    return Frames(float(numbers[0]), float(step), (numbers[-1] - numbers[0]) // step + 1)
+
+
+class WrapSolver(FrameSolver):
+    """A request has a scan's vertices and triangles as targets, landmarks as handles. A shape begins at the
+    one before."""
+
+    def __init__(self, sampled_source, carrying, options):
+        self.options, self.sequence, self.report = options, None, None
+        super().__init__(sampled_source, carrying)
+
+    def _make_solver(self, handles, energy):
+        """A wrap has none before its first frame."""
+
+    def solve_from_rest(self, request, task=None):
+        af, samples = native.library(), self.sampled.samples
+        scan = af.MeshSdf(*request.targets)
+        if self.sequence is None:
+            field = af.wrap(samples, scan, request.handles, self.options, task=task)
+            self.sequence = af.WrapSequence(samples, field, self.options)
+        else:
+            field = self.sequence.next(scan, task=task)
+        self.solver, self.report = SimpleNamespace(field=field), field.report
+        return self.exact_shape(request)
+
+
+class WrapBake(ObjectBake):
+    """`scans`: {frame: ObjectReference}; None where the source's own target changes from frame to frame."""
+
+    def __init__(self, context, source, frames, scans, *paths):
+        super().__init__(context, source, "WRAP", frames, *paths)
+        self.scans, self.simulation = scans, None
+        self.reader.moves_by_itself = True  # scans take memory: few are read ahead
+        self.marks = landmarks.Marks(source)
+        self.values = effective_values(WRAP, settings_of(source).wrap)
+        self.options = options_of("wrap", self.values)
+        self.last, self.worst, self.left_out = None, (-1.0, 0.0, None), {}
+
+    def request(self, context):
+        try:
+            source, frame = self.reference.get(), context.scene.frame_current
+            space = space_of(source.matrix_world, source.name)
+            scan = landmarks.target_of(source) if self.scans is None else self.scan_at(frame)
+            self.reader.carrying.expect_motion()
+            self.reader.refresh_carried(context)
+            carried = self.reader.carrying.poses(space, depsgraph_of(context))
+            mesh = landmarks.read_target(context, scan, space)
+            pairs = landmarks.read(source, space)
+            return Request([*mesh], None, self.reader.points, pairs, {}, carried, None)
+        except (UserError, ValueError) as error:
+            return error
+
+    def scan_at(self, frame):
+        scan = self.scans[frame].find() if frame in self.scans else None
+        if scan is None:
+            raise UserError("There is no mesh")
+        return scan
+
+    def prepare(self):
+        setup = sampled(self.reader.setup, self.values["samples"], self.values["seed"])
+        self.solver = WrapSolver(setup, self.reader.carrying, self.options)
+        self.carried.prepare()
+        self.store.open(self.solver)
+
+    def add(self, frame, request, is_baked=True, task=None):
+        """A frame that cannot be followed is named, and has the shape before it."""
+        try:
+            if isinstance(request, Exception):
+                raise request
+            shape = self.solver.solve_from_rest(request, task)
+            if self.last is None:
+                notes = [self.marks.numbered(note) for note in self.solver.report.notes]
+                self.carried.warnings += [UserError("note: {text}", text=note) for note in notes]
+                self.marks.left_out = self.solver.report.left_out
+            report, self.last = self.solver.report, shape
+            off = max(report.to_target_mean, report.from_target_mean)
+            self.worst = max(self.worst, (off, frame, report), key=lambda one: one[0])
+        except (UserError, ValueError, native.library().Diverged) as error:
+            if self.last is None:
+                raise UserError("Frame {frame}: {error}", frame=plain(frame), error=error) from error
+            self.left_out.setdefault(translated(error), []).append(str(plain(frame)))
+        self.keep(self.last)
+
+    def finish(self, task):
+        for reason, frames in self.left_out.items():
+            named = {"frames": ", ".join(frames), "reason": reason}
+            self.carried.warnings.append(
+                UserError("Frame {frames}: {reason}; the shape before stays", **named)
+            )
+        super().finish(task)
+
+    def place(self, context, job):
+        line = yield from super().place(context, job)
+        self.marks.put()
+        _, frame, report = self.worst
+        worst = {"frame": plain(frame), "figures": describe("", report.to_dict(), 1.0)}
+        return f"{line}; {translated('at worst, in frame {frame}: {figures}', **worst)}"

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A template that follows a scanned motion inside Blender: scans in a collection, or a target that moves."""
+
+import numpy as np
+import pytest
+from support.blender.inside import IN_BLENDER
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.baking import at, cache_file, cancelled_at, stepped
+    from support.blender.wraps import SMALL
+    from support.geometry import wrap_cases as cases
+
+    import arapfields as af
+    from addon.animation.operators import ARAPFIELDS_OT_wrap_sequence
+    from addon.core.runtime import jobs
+
+pytestmark = pytest.mark.in_blender
+
+OFF = 0.01  # of the diagonal, on average: few centers and samples
+RATES = (0.0, 0.1, 0.2, 0.3)  # at which the scan is bent in frames 2, 4, 6 and 8
+
+
+def link(name, vertices, faces, collection=None):
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(vertices.tolist(), [], faces.tolist())
+    item = bpy.data.objects.new(name, mesh)
+    (collection or bpy.context.collection).objects.link(item)
+    return item
+
+
+def template():
+    """A coarse figure that lies elsewhere, scaled unevenly, with a material."""
+    item = link("Template", *cases.figure(2))
+    item.location, item.scale = (0.1, 0, 0), (1.1, 1, 1)
+    item.data.materials.append(bpy.data.materials.new("Skin"))
+    for name, value in SMALL.items():
+        setattr(item.arapfields.wrap, name, value)
+    scenes.activate(item)
+    return item
+
+
+def bent(rate):
+    return cases.bend(cases.figure(3)[0], rate)
+
+
+def scans(missing=(), empty=()):
+    """A template whose frames are scans in a collection, which a layer does not show."""
+    item, faces = template(), cases.figure(3)[1]
+    item.arapfields.wrap.frames = home = bpy.data.collections.new("Scans")
+    bpy.context.scene.collection.children.link(home)
+    bpy.context.view_layer.layer_collection.children["Scans"].exclude = True
+    for number, rate in zip((2, 4, 6, 8), RATES, strict=True):
+        if number in empty:
+            link(f"scan_{number}", np.empty((0, 3)), np.empty((0, 3), int), home)
+        elif number not in missing:
+            link(f"scan_{number}", bent(rate), faces, home)
+    return item
+
+
+def off(item, frame, rate):
+    """Mean distance of an object at a frame from the scan that is bent so, in diagonals of that."""
+    at(item, frame)
+    away = af.MeshSdf(bent(rate), cases.figure(3)[1])(scenes.world_points(item))
+    return np.abs(away).mean() / np.linalg.norm(np.ptp(bent(rate), axis=0))
+
+
+def test_a_template_follows_a_collection_and_names_what_is_missing():
+    item = scans(missing=(4,), empty=(6,))
+    path = cache_file()
+    bpy.context.scene.frame_set(3)
+    assert bpy.ops.arapfields.wrap_sequence(filepath=path) == {"FINISHED"}
+    assert bpy.context.scene.frame_current == 3
+    assert [m.type for m in item.modifiers] == ["MESH_CACHE"]
+    assert off(item, 2, 0.0) < OFF and off(item, 8, 0.3) < OFF
+    assert np.array_equal(at(item, 4), at(item, 2)) and np.array_equal(at(item, 6), at(item, 2))
+    said = dict(reversed(pair) for pair in jobs.messages())
+    assert "Template: Frame 4: There is no mesh; the shape before stays" in said, said
+    assert "Template: Frame 6: scan_6: the mesh is empty; the shape before stays" in said, said
+    assert any("4 frames of 66 points baked" in text and "at worst, in frame" in text for text in said), said
+    assert bpy.ops.arapfields.remove_bake() == {"FINISHED"} and not item.modifiers
+
+
+def test_a_target_that_changes_is_followed_into_shape_keys():
+    item, target = template(), link("Scan", *cases.figure(3))
+    item.arapfields.wrap.onto = target
+    target.shape_key_add(name="Basis")
+    key = target.shape_key_add(name="Bent")
+    for point, place in zip(key.data, bent(0.3), strict=True):
+        point.co = place
+    for frame, value in ((1, 0.0), (3, 1.0)):
+        key.value = value
+        key.keyframe_insert("value", frame=frame)
+    before = at(item, 1)
+    assert bpy.ops.arapfields.wrap_sequence(format="KEYS", range="HANDLES") == {"FINISHED"}
+    baked = bpy.data.objects["Template_baked"]
+    assert [k.name for k in baked.data.shape_keys.key_blocks[1:]] == ["frame 1", "frame 2", "frame 3"]
+    assert off(baked, 1, 0.0) < OFF and off(baked, 3, 0.3) < OFF
+    assert np.array_equal(at(item, 1), before) and baked.data.materials[0].name == "Skin"
+
+
+def test_a_cancelled_sequence_leaves_nothing():
+    item = scans()
+    kept = scenes.everything(item)
+    operator = stepped(ARAPFIELDS_OT_wrap_sequence, filepath=cache_file())
+    assert cancelled_at(operator, "frame 4") == {"CANCELLED"}
+    assert operator.said == "Wrap Sequence cancelled"
+    assert scenes.everything(item) == kept and not item.modifiers
+
+
+def test_what_has_no_frames_is_refused():
+    item = template()
+    with pytest.raises(RuntimeError, match="Choose the object to wrap Template onto"):
+        bpy.ops.arapfields.wrap_sequence(format="KEYS")
+    item.arapfields.wrap.frames = home = bpy.data.collections.new("Scans")
+    with pytest.raises(RuntimeError, match="Scans has no mesh for these frames"):
+        bpy.ops.arapfields.wrap_sequence(format="KEYS")
+    link("scan_1", np.empty((0, 3)), np.empty((0, 3), int), home)
+    with pytest.raises(RuntimeError, match="Frame 1: scan_1: the mesh is empty"):
+        bpy.ops.arapfields.wrap_sequence(format="KEYS")
+
+
+def test_names_without_numbers_are_in_order():
+    item = template()
+    item.arapfields.wrap.frames = home = bpy.data.collections.new("Scans")
+    for name, rate in (("Scan.001", 0.2), ("Scan", 0.0)):
+        link(name, bent(rate), cases.figure(3)[1], home)
+    bpy.context.scene.frame_start = 10
+    path = cache_file()
+    assert bpy.ops.arapfields.wrap_sequence(filepath=path) == {"FINISHED"}
+    assert off(item, 10, 0.0) < OFF and off(item, 11, 0.2) < OFF
