@@ -52,6 +52,7 @@ class Op(StrEnum):
     STYLIZE = "arapfields.stylize"
     SET_STYLE = "arapfields.set_style"
     WRAP = "arapfields.wrap"
+    WRAP_SHEET = "arapfields.wrap_sheet"
     WRAP_SEQUENCE = "arapfields.wrap_sequence"
     SKIN = "arapfields.skin"
     TRANSFER = "arapfields.transfer"

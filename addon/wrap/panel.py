@@ -58,6 +58,7 @@ class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
         layout.operator(Op.TRANSFER, icon="MOD_DATA_TRANSFER")
         if rest_bones.fitted(source):
             layout.operator(Op.RESET_BONES, icon="BONE_DATA")
+        job_button(layout, Op.WRAP_SHEET, "IMAGE_DATA")
         draw_settings(layout, wrap, "frames")
         job_button(layout, Op.WRAP_SEQUENCE, "REC")
         note(layout, landmarks.refusal(source), placement_refusal(source))

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A template that follows a scanned motion inside Blender: scans in a collection, or a target that moves."""
+"""Many wraps inside Blender: a template that follows a scanned motion, and pages of pictures."""
+
+import tempfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +12,7 @@ if IN_BLENDER:
     import bpy
     from support.blender import scenes
     from support.blender.baking import at, cache_file, cancelled_at, stepped
-    from support.blender.wraps import SMALL
+    from support.blender.wraps import SMALL, bar_and_target
     from support.geometry import wrap_cases as cases
 
     import arapfields as af
@@ -130,3 +133,23 @@ def test_names_without_numbers_are_in_order():
     path = cache_file()
     assert bpy.ops.arapfields.wrap_sequence(filepath=path) == {"FINISHED"}
     assert off(item, 10, 0.0) < OFF and off(item, 11, 0.2) < OFF
+
+
+def test_a_page_shows_what_is_wrapped_the_worst_first():
+    item, target = bar_and_target()
+    other, plain = scenes.bar("Loose"), scenes.bar("Plain")
+    other.arapfields.wrap.onto = target
+    for one, closeness in ((item, 1.0), (other, 0.01)):
+        scenes.activate(one)
+        assert bpy.ops.arapfields.wrap(closeness=closeness, **SMALL) == {"FINISHED"}
+    scenes.activate(plain, item, other)
+    with pytest.raises(RuntimeError, match="Save the"):
+        bpy.ops.arapfields.wrap_sheet()
+    path = Path(tempfile.mkdtemp()) / "wraps.html"
+    assert bpy.ops.arapfields.wrap_sheet(filepath=str(path), scope="SELECTED") == {"FINISHED"}
+    page = path.read_text()
+    assert 0 < page.index("<b>Loose, Scan</b>") < page.index("<b>Bar, Scan</b>") and "Plain" not in page
+    assert page.count("of the target's size off".replace("'", "&#x27;")) == page.count("<img") == 2
+    assert any(text.startswith("Wrap Plain first") for _, text in jobs.messages()), jobs.messages()
+    with pytest.raises(RuntimeError, match="gone"):
+        bpy.ops.arapfields.wrap_sheet(filepath=str(path / "gone.html"))

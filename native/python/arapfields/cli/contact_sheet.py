@@ -16,20 +16,22 @@ LIGHT = np.array([-0.4, 0.5, 0.77])  # in the picture's axes
 WRAPPED, TARGET = (217, 140, 77), (140, 153, 166)  # colours
 
 
-def page(rows):
-    """HTML of rows (name, figures, wrapped mesh, target mesh or None), in this order."""
-    cells = []
-    for name, figures, wrapped, target in rows:
-        middle = (wrapped[0].max(axis=0) + wrapped[0].min(axis=0)) / 2
-        half = 0.55 * float(np.linalg.norm(np.ptp(wrapped[0], axis=0)))
-        both = (target, TARGET), (wrapped, WRAPPED)
-        shown = [picture(mesh, colour, middle, half) for mesh, colour in both if mesh is not None]
-        data = base64.b64encode(png(np.concatenate(shown, axis=1))).decode()
-        text = html.escape(name), html.escape(figures)
-        cells.append(
-            f'<figure><img src="data:image/png;base64,{data}" alt="{text[0]}: target, wrapped">'
-            f"<figcaption><b>{text[0]}</b><br>{text[1]}</figcaption></figure>"
-        )
+def cell(name, figures, wrapped, target):
+    """HTML of one wrap: a picture of its target, if there is a mesh, and of the wrapped mesh; y is up."""
+    middle = (wrapped[0].max(axis=0) + wrapped[0].min(axis=0)) / 2
+    half = 0.55 * float(np.linalg.norm(np.ptp(wrapped[0], axis=0)))
+    both = (target, TARGET), (wrapped, WRAPPED)
+    shown = [picture(mesh, colour, middle, half) for mesh, colour in both if mesh is not None]
+    data = base64.b64encode(png(np.concatenate(shown, axis=1))).decode()
+    text = html.escape(name), html.escape(figures)
+    return (
+        f'<figure><img src="data:image/png;base64,{data}" alt="{text[0]}: target, wrapped">'
+        f"<figcaption><b>{text[0]}</b><br>{text[1]}</figcaption></figure>"
+    )
+
+
+def page(cells):
+    """HTML of these cells, in this order."""
     style = "figure{display:inline-block;margin:8px;font:14px sans-serif;max-width:320px;vertical-align:top}"
     return (
         f"<!doctype html><meta charset=utf-8><title>Wraps</title><style>{style}</style>\n"

@@ -70,7 +70,8 @@ def write_sheet(output, everything, suffix):
             report = json.loads(place.with_suffix(".json").read_text(encoding="utf-8"))
             target = files.read_mesh(path) if files.is_mesh(path) else None
             figures = f"{off(report):.2%} of the target's size off; {'; '.join(report['notes'])}"
-            rows.append((off(report), (path.name, figures.rstrip("; "), files.read_mesh(place), target)))
+            wrapped = files.read_mesh(place)
+            rows.append((off(report), contact_sheet.cell(path.name, figures.rstrip("; "), wrapped, target)))
         except (OSError, ValueError, KeyError, TypeError):
             continue  # not there yet, or not of this program
     rows.sort(key=lambda row: -row[0])

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A page of small pictures of wrapped objects with their figures, the worst first."""
+
+import json
+from pathlib import Path
+
+import bpy
+
+from ..blender import mesh_arrays
+from ..blender.property_definitions import path_text
+from ..core.errors import UserError
+from ..core.geometry.spaces import transform
+from ..core.runtime import native
+from ..core.runtime.jobs import Item
+from ..deform.solve_job import describe
+from ..handles.empties import matrix_of
+from ..jobs.job_operator import JobOperator
+from ..names import REPORT
+from . import landmarks, transfer
+
+
+def report_of(source):
+    """What the wrap that the object shows has reached; UserError where it shows none."""
+    report = json.loads(source.get(REPORT, "{}"))
+    if transfer.not_wrapped(source) or "to_target_mean" not in report:
+        raise UserError("Wrap {name} first, with Modifier as its result", source)
+    return report
+
+
+def upright(context, item):
+    """(vertices, triangles) of an object as shown in the world, with y up."""
+    mesh = mesh_arrays.read(context, item)
+    return transform(matrix_of(item), mesh.vertices)[:, [0, 2, 1]] * [1, 1, -1], mesh.triangles
+
+
+class ARAPFIELDS_OT_wrap_sheet(JobOperator, bpy.types.Operator):
+    """Write a page of small pictures of what is wrapped, each with its figures, the worst first"""
+
+    bl_label = "Contact Sheet"
+    title = "Contact Sheet"
+    guide = "wrap"
+
+    filepath: path_text(
+        "File", "Where the page goes, as .html", "FILE", default="//wraps.html", options={"SKIP_SAVE"}
+    )
+
+    @classmethod
+    def refuses(cls, source):
+        return transfer.not_wrapped(source)
+
+    def prepare(self, context, job):
+        self.cells = []
+        return (yield from super().prepare(context, job))
+
+    def plan(self, context, source, weights):
+        if self.filepath.startswith("//") and not bpy.data.filepath:
+            raise UserError("Save the .blend first: the page lies beside it")
+        report = report_of(source)
+        target = landmarks.target_of(source)
+        meshes = upright(context, source), upright(context, target)
+        name, figures = f"{source.name}, {target.name}", describe("", report, 1.0)
+        off = max(report["to_target_mean"], report["from_target_mean"])
+
+        def work(tracker):
+            native.library()
+            from arapfields.cli import contact_sheet
+
+            tracker.start("Drawing", 1.0)
+            return contact_sheet.cell(name, figures, *meshes)
+
+        def apply(cell):
+            self.cells.append((off, cell))
+            return figures
+
+        return Item(source.name, work, apply)
+
+    def conclude(self, context, job):
+        result = yield from super().conclude(context, job)
+        if self.cells:
+            from arapfields.cli import contact_sheet
+
+            path = Path(bpy.path.abspath(self.filepath))
+            page = contact_sheet.page(cell for _, cell in sorted(self.cells, key=lambda one: -one[0]))
+            try:
+                path.write_text(page, encoding="utf-8")
+            except OSError as error:
+                self.add_message("ERROR", str(error))
+                return {"CANCELLED"}
+            self.add_message("INFO", str(path))
+        return result
+
+
+CLASSES = [ARAPFIELDS_OT_wrap_sheet]
