@@ -6,7 +6,7 @@ from pathlib import Path
 
 import bpy
 
-from ..blender import mesh_arrays
+from ..blender import mesh_arrays, modifier_stack
 from ..blender.property_definitions import path_text
 from ..core.errors import UserError
 from ..core.geometry.spaces import transform
@@ -29,7 +29,8 @@ def report_of(source):
 
 def upright(context, item):
     """(vertices, triangles) of an object as shown in the world, with y up."""
-    mesh = mesh_arrays.read(context, item)
+    with modifier_stack.mesh_of(context, item, list(item.modifiers)) as mesh:
+        mesh = mesh_arrays.arrays_of(item, mesh)
     return transform(matrix_of(item), mesh.vertices)[:, [0, 2, 1]] * [1, 1, -1], mesh.triangles
 
 

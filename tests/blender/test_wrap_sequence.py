@@ -18,6 +18,7 @@ if IN_BLENDER:
     import arapfields as af
     from addon.animation.operators import ARAPFIELDS_OT_wrap_sequence
     from addon.core.runtime import jobs
+    from arapfields.cli import contact_sheet
 
 pytestmark = pytest.mark.in_blender
 
@@ -145,8 +146,12 @@ def test_a_page_shows_what_is_wrapped_the_worst_first():
     scenes.activate(plain, item, other)
     with pytest.raises(RuntimeError, match="Save the"):
         bpy.ops.arapfields.wrap_sheet()
-    path = Path(tempfile.mkdtemp()) / "wraps.html"
+    path, drawn, cell = Path(tempfile.mkdtemp()) / "wraps.html", [], contact_sheet.cell
+    contact_sheet.cell = lambda *given: drawn.append(given[2:]) or cell(*given)
     assert bpy.ops.arapfields.wrap_sheet(filepath=str(path), scope="SELECTED") == {"FINISHED"}
+    contact_sheet.cell = cell
+    for wrapped, there in drawn:
+        assert np.abs(af.MeshSdf(*there)(wrapped[0])).mean() < 0.02
     page = path.read_text()
     assert 0 < page.index("<b>Loose, Scan</b>") < page.index("<b>Bar, Scan</b>") and "Plain" not in page
     assert page.count("of the target's size off".replace("'", "&#x27;")) == page.count("<img") == 2
