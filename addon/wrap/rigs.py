@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Armatures that a target has of its own, and drivers that read them."""
 
+from ..blender.object_references import settings_of
+
 
 def pairs(source, target):
     """{armature of the source: that of the target}."""
@@ -17,6 +19,7 @@ def copied(rig, target):
     own = rig.copy()
     own.data = rig.data.copy()
     own.name = f"{rig.name} {target.name}"
+    settings_of(own).rest_bones = ""  # its bones were nowhere else
     for home in target.users_collection:
         home.objects.link(own)
     return own

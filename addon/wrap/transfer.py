@@ -207,6 +207,9 @@ class Transfer:
         for given in self.source.modifiers:
             if given.type != "ARMATURE" or given.object is None:
                 continue
+            if not settings_of(given.object).rest_bones:
+                self.notes.append(translated("the bones of {rig} are not fitted", rig=given.object.name))
+                continue
             modifier = self.target.modifiers.get(given.name)
             if modifier is None or modifier.type != "ARMATURE":
                 modifier = self.target.modifiers.new(given.name, "ARMATURE")

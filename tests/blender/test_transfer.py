@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a wrapped object has, handed on to its target inside Blender."""
 
+import json
+
 import numpy as np
 import pytest
 from support.blender.inside import IN_BLENDER
@@ -12,6 +14,7 @@ if IN_BLENDER:
 
     import arapfields as af
     from addon.blender import mesh_arrays
+    from addon.carried import rest_bones
     from addon.field_modifier import motion
 
 pytestmark = pytest.mark.in_blender
@@ -22,7 +25,8 @@ TURN = np.array([[0.0, -1.4, 0.0], [1.4, 0.0, 0.0], [0.0, 0.0, 1.4]])
 
 def wrapped_bar():
     """A decorated, rigged bar, turned and scaled onto a copy of its mesh whose vertices come in reverse."""
-    item, _ = rigged_bar()
+    item, rig = rigged_bar()
+    rig.arapfields.rest_bones = json.dumps(rest_bones.rest_of(rig))
     mesh = item.data
     rest = mesh_arrays.positions(mesh)
     colour = mesh.attributes.new("Paint", "FLOAT_COLOR", "CORNER")
@@ -82,6 +86,7 @@ def test_all_that_an_object_has_comes_along():
     (rig,) = (m.object for m in item.modifiers if m.type == "ARMATURE")
     assert modifier.object != rig and modifier.object.data != rig.data
     assert [bone.name for bone in modifier.object.data.bones] == [bone.name for bone in rig.data.bones]
+    assert rest_bones.fitted(item) == [rig] and not rest_bones.fitted(target)  # nothing to reset there
 
     def counts():
         return len(target.vertex_groups), len(target.data.shape_keys.key_blocks), len(bpy.data.objects)
@@ -129,6 +134,13 @@ def test_only_what_is_chosen_and_no_locked_group():
     assert target.data.shape_keys is None and not target.modifiers
     assert [round(g.weight, 3) for g in target.data.vertices[0].groups if g.group == 0] == [0.5]
     assert not [v for v in target.data.vertices if v.index and 0 in [g.group for g in v.groups]]
+
+
+def test_a_rig_whose_bones_were_reset_is_left_out():
+    _, target, _ = wrapped_bar()
+    assert bpy.ops.arapfields.reset_bones() == {"FINISHED"}
+    assert bpy.ops.arapfields.transfer(transfer={"ARMATURE"}) == {"FINISHED"}
+    assert not target.modifiers and len(bpy.data.armatures) == 1
 
 
 def test_what_cannot_take_anything_is_named_and_kept():
