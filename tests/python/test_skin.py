@@ -50,10 +50,10 @@ def motions(bones, turns):
     return result
 
 
-def held_out(legs, bones, count=5):
+def held_out(legs, bones, count=5, seed=5):
     """Poses that no fit has seen, with the field's shapes: pairs (motions, vertices)."""
     random, poses = np.random.default_rng(7), []
-    samples = af.sample_mesh(*legs, 2000, seed=5)
+    samples = af.sample_mesh(*legs, 2000, seed=seed)
     live = af.LiveDeformer(samples, af.bone_handles(samples, bones))
     for _ in range(count):
         turns = [rotation(random.uniform(-ANGLE, ANGLE, 3) / 2 * (bone.parent is not None)) for bone in bones]
@@ -138,10 +138,9 @@ def test_correctives_take_the_skin_closer(legs, weights):
     assert all(abs(key.value(np.eye(3))) < 1e-12 and key.offsets.shape == V.shape for key in keys)
     assert max(abs(key.value(rotation(np.array([2.0, 1, 0])))) for key in keys) == 1  # no farther than seen
     poses = held_out(legs, bones)
-    local = [bone.box[:3, :3] / np.linalg.norm(bone.box[:3, :3], axis=0) for bone in bones]
 
     def value(key, turns):
-        return key.value(local[key.bone].T @ turns[key.bone] @ local[key.bone])
+        return key_value(bones, key, turns)
 
     paired, twin = twins(V)
     flip, turns = np.diag(MIRRORED), poses[0][1]
@@ -149,12 +148,32 @@ def test_correctives_take_the_skin_closer(legs, weights):
     for left, right in zip(keys[::2], keys[1::2], strict=True):  # each side has the other's
         assert right.bone == OTHER[left.bone] and np.isclose(value(left, turns), value(right, mirrored))
         assert np.allclose(left.offsets[paired], right.offsets[twin] * MIRRORED, atol=1e-6)
+    assert corrected_error(V, weights, bones, keys, poses) < 0.8 * error(V, weights, poses)
+
+
+def key_value(bones, key, turns):
+    axes = bones[key.bone].box[:3, :3] / np.linalg.norm(bones[key.bone].box[:3, :3], axis=0)
+    return key.value(axes.T @ turns[key.bone] @ axes)
+
+
+def corrected_error(V, weights, bones, keys, poses):
     squares = []
     for moved, turns, shape in poses:
-        values = [value(key, turns) for key in keys]
-        corrected = V + sum(value * key.offsets for value, key in zip(values, keys, strict=True))
+        corrected = V + sum(key_value(bones, key, turns) * key.offsets for key in keys)
         squares.append(((af.skin(corrected, weights, moved) - shape) ** 2).sum(1).mean())
-    assert np.sqrt(np.mean(squares)) / np.ptp(V[:, 2]) < 0.8 * error(V, weights, poses)
+    return np.sqrt(np.mean(squares)) / np.ptp(V[:, 2])
+
+
+def test_all_keys_of_all_joints_do_not_fit_the_examples_alone(legs):
+    """Of a rig without symmetry. Measured 2026-11: 0.14 of the weights' error; 72 examples gave 0.26."""
+    bones = [af.Bone((0, 0, HIP), (0.05, 0, HIP + 0.5))]
+    for x in (LEG, -LEG):
+        ends = np.linspace((x, 0, HIP), (x, 0, FOOT), 6)
+        bones += [af.Bone(ends[k], ends[k + 1], len(bones) - 1 + k if k else 0) for k in range(5)]
+    weights = af.skin_weights(legs, bones, FEW)
+    keys = af.skin_correctives(*legs, bones, weights, af.SkinOptions(correctives=90, samples=2000))
+    poses = held_out(legs, bones, seed=0)
+    assert corrected_error(legs[0], weights, bones, keys, poses) < 0.2 * error(legs[0], weights, poses)
 
 
 def test_skinning_blends_motions_and_dual_quaternions_keep_rigid_ones():

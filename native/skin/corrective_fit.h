@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "core/task.h"
+#include "options/skin.h"
+#include "skin/mirror.h"
+#include "skin/rig_shape.h"
+
+namespace arapfields {
+
+/// Products of the entries of a joint's unit quaternion (w, x, y, z): wx, wy, wz, xx, yy, zz, xy, xz, yz.
+constexpr int joint_features = 9;
+using JointFeatures = Eigen::Matrix<double, joint_features, 1>;
+using FeaturePairs = Eigen::Matrix<double, joint_features, joint_features>;
+
+JointFeatures joint_features_of(const Mat3& rotation);
+
+/// A rig's symmetry as poses and keys see it. Without one, nothing is mirrored.
+struct Reflection {
+  Reflection(const RigShape& rig, PointsIn points);
+
+  bool exists() const { return !maps.empty(); }
+  Index twin(Index joint) const { return exists() ? mirror.bones[joint] : joint; }
+  /// The mirrored polynomial, of the mirrored joint.
+  JointFeatures polynomial(Index joint, const JointFeatures& coefficients) const {
+    return maps[twin(joint)].transpose() * coefficients;
+  }
+
+  Mirror mirror;
+  Vec3 signs;
+  std::vector<FeaturePairs> maps;  ///< features of a joint → its twin's in the mirrored pose
+};
+
+/// Ridge regression of what is left between skin and field on the joints' features, over example poses. Each
+/// vertex has the joints near it alone.
+class CorrectiveFit {
+ public:
+  /// Vertices (n,3) that the same joints matter to.
+  struct Region {
+    std::vector<Index> joints;
+    std::vector<Index> vertices;
+    bool mirrored;  ///< mirrored poses count too
+  };
+
+  /// Weights (n, bones); throws Cancelled.
+  CorrectiveFit(const RigShape& rig, PointsIn vertices, const RowMatrix<float>& weights,
+                const SkinOptions& options, const Progress& progress);
+
+  /// (columns, 3 · vertices of the region, step by step) on polynomials (the region's features, columns).
+  Eigen::MatrixXd slopes(const Region& region, const Eigen::MatrixXd& polynomials, Index step = 1) const;
+
+  Reflection reflection;
+  std::vector<Region> regions;
+  Eigen::MatrixXd values;  ///< features (poses, joints · 9); mirrored poses follow
+
+ private:
+  void find_regions(const Skeleton& skeleton, const RowMatrix<float>& weights);
+  Eigen::MatrixXd right(const Region& region, Index vertex) const;
+
+  std::vector<Index> region_of_;        // of each vertex; −1 for none
+  std::vector<Eigen::MatrixXf> right_;  // of each vertex, features times offsets over the poses
+  Eigen::MatrixXd square_;
+  Eigen::MatrixXd mirrored_square_;
+};
+
+}  // namespace arapfields
