@@ -13,6 +13,7 @@
 #include "distance/is_closed.h"
 #include "distance/signed_distance.h"
 #include "distance/welded_vertices.h"
+#include "mesh/sample_mesh.h"
 #include "sampling/oriented_points.h"
 #include "wrap/carried_motion.h"
 
@@ -22,6 +23,16 @@ namespace {
 /// Shares of the diagonal of the mesh's bounding box: the distance that a turn by one radian counts as, and
 /// how far a place that faces the right way may lie. Wraps come much nearer; normals of scans may be wrong.
 constexpr double turn_share = 0.1, thin_share = 0.01;
+
+// Affine fits about vertices. Tuned: on keys of shapes with a known map, by the map itself and by wraps.
+
+/// Points on the surface; the radius of their weights exp(−d²/r²), a share of the diagonal; where these end.
+constexpr Index fit_points = 3000;
+constexpr double fit_radius = 0.06, fit_end = 2.2;
+/// Weight of the triangles' J, in squares of the radius: it counts where points lie in a plane.
+constexpr double fit_ridge = 0.003;
+/// Deviation from the triangles' J, as a share of a point's way, at which it counts a quarter: lips part.
+constexpr double fit_trust = 0.5;
 
 /// Edges of a triangle from its first corner, and its normal times twice its area.
 struct TriangleEdges {
@@ -82,6 +93,55 @@ class Surroundings {
   std::vector<std::vector<std::int32_t>> about_;
 };
 
+/// Replaces Jacobians of the vertices by those of affine fits of the surface about each.
+void fit_surroundings(const TriangleMesh& rest, PointsIn moved, std::vector<Mat3>& jacobians) {
+  const AreaSampler sampler(rest.vertices, rest.triangles);
+  Random random(0);
+  Points before(fit_points, 3), after(fit_points, 3);
+  for (Index i = 0; i < fit_points; ++i) {
+    const AreaSampler::Draw draw = sampler.draw(random);
+    before.row(i) = draw.point;
+    after.row(i).setZero();
+    for (int k = 0; k < 3; ++k) after.row(i) += draw.corners[k] * moved.row(rest.triangles(draw.triangle, k));
+  }
+  const double diagonal = (rest.vertices.colwise().maxCoeff() - rest.vertices.colwise().minCoeff()).norm();
+  const double square = std::pow(fit_radius * diagonal, 2);
+  parallel_for(0, rest.vertices.rows(), 64, [&](Index begin, Index end) {
+    for (Index v = begin; v < end; ++v) {
+      const Eigen::RowVector3d here = rest.vertices.row(v), there = moved.row(v);
+      const double trust = fit_trust * fit_trust * jacobians[v].squaredNorm() / 3.0;
+      double sum = 0.0;
+      Vec3 way = Vec3::Zero(), gone = Vec3::Zero();
+      Mat3 ways = Mat3::Zero(), both = Mat3::Zero();
+      for (Index i = 0; i < fit_points; ++i) {
+        const Vec3 x = (before.row(i) - here).transpose();
+        const double distance = x.squaredNorm();
+        if (distance > fit_end * fit_end * square) continue;
+        const Vec3 y = (after.row(i) - there).transpose();
+        const double off = (y - jacobians[v] * x).squaredNorm() / (trust * distance + 1e-300);
+        const double weight = std::exp(-distance / square) / ((1.0 + off) * (1.0 + off));
+        sum += weight;
+        way += weight * x;
+        gone += weight * y;
+        ways += weight * x * x.transpose();
+        both += weight * y * x.transpose();
+      }
+      if (!(sum > 0.0)) continue;
+      const double ridge = fit_ridge * square;
+      ways += ridge * sum * Mat3::Identity() - way * way.transpose() / sum;
+      both += ridge * sum * jacobians[v] - gone * way.transpose() / sum;
+      const Mat3 fitted = both * ways.inverse();
+      if (fitted.allFinite() && fitted.determinant() * jacobians[v].determinant() > 0.0)
+        jacobians[v] = fitted;
+    }
+  });
+}
+
+Points moved_by(const DeformationField& field, const TriangleMesh& mesh) {
+  validate(mesh);
+  return field.at(mesh.vertices);
+}
+
 }  // namespace
 
 SurfacePlaces places_on(const TriangleMesh& mesh, PointsIn points, PointsIn normals,
@@ -126,20 +186,7 @@ SurfacePlaces places_on(const TriangleMesh& mesh, PointsIn points, PointsIn norm
 }
 
 WrappedMesh::WrappedMesh(const TriangleMesh& source, const DeformationField& field)
-    : rest(source), moved(source) {
-  validate(source);
-  const Index count = source.vertices.rows();
-  JetBlock<double> jets(count, JetOrder::first);
-  field.evaluate(field.frame().to_cube(source.vertices), jets.view());
-  jacobians.resize(count);
-  Points values(count, 3);
-  const JetView<const double> view = std::as_const(jets).view();
-  for (Index v = 0; v < count; ++v) {
-    values.row(v) = Eigen::Map<const Eigen::RowVector3d>(view.at(0, v));
-    for (int k = 0; k < 3; ++k) jacobians[v].col(k) = Eigen::Map<const Vec3>(view.at(first_column(k), v));
-  }
-  moved.vertices = field.frame().to_mesh(values);
-}
+    : WrappedMesh(source, moved_by(field, source)) {}
 
 WrappedMesh::WrappedMesh(const TriangleMesh& source, PointsIn positions)
     : rest(source), moved{positions, source.triangles}, jacobians(positions.rows(), Mat3::Zero()) {
@@ -172,6 +219,7 @@ WrappedMesh::WrappedMesh(const TriangleMesh& source, PointsIn positions)
     else if (first[v] == static_cast<std::int32_t>(v))
       jacobians[v].setIdentity();
   for (std::size_t v = 0; v < areas.size(); ++v) jacobians[v] = jacobians[first[v]];
+  fit_surroundings(source, positions, jacobians);
 }
 
 /// Prepared by the first call that needs it.

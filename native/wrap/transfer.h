@@ -18,7 +18,8 @@ struct ARAPFIELDS_EXPORT WrappedMesh {
   /// Throws InvalidInput as validate() does.
   WrappedMesh(const TriangleMesh& source, const DeformationField& field);
   /// The Jacobians are those of the triangles; across the surface the scale is the square root of the area's.
-  /// Source: Sumner and Popović 2004, "Deformation Transfer for Triangle Meshes", section 3.
+  /// Source: Sumner and Popović 2004, "Deformation Transfer for Triangle Meshes", section 3. An affine fit of
+  /// the surface about each vertex then says more: its curves and its other side tell how it grows across.
   WrappedMesh(const TriangleMesh& source, PointsIn moved);
 
   TriangleMesh rest;

@@ -10,6 +10,8 @@ import arapfields as af
 ROUNDING = 1e-12
 # Of a key on a mesh of other triangles, in its largest motion: what linear interpolation leaves.
 INTERPOLATION = 0.03
+# The same of the worst vertex; what triangles tell of the growth across them is .3 off.
+ACROSS = 0.1
 TURN = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
 
 
@@ -59,6 +61,18 @@ def test_keys_follow_a_known_map_onto_other_triangles(figure):
         by_mesh = af.transfer(field(v), (v, f), target, {"displacements": key_at(v, center)})
         away = np.linalg.norm(by_mesh["displacements"] - told, axis=1)
         assert away.mean() < INTERPOLATION * np.abs(told).max()
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_how_a_shape_grows_across_its_surface_is_told_by_its_curves(figure, axis):
+    v, f = figure
+    fine, faces = cases.figure(5)
+    grown = np.where(np.arange(3) == axis, 1.6, 1.0)
+    for center in v[[0, len(v) // 3, v[:, axis].argmax()]]:
+        given, told = (key_at(points, center) for points in (v, fine))
+        found = af.transfer(v * grown, (v, f), (fine * grown, faces), {"displacements": given})
+        away = np.linalg.norm(found["displacements"] - told * grown, axis=1)
+        assert away.max() < ACROSS * np.linalg.norm(told * grown, axis=1).max()
 
 
 def folded(v, f, motion):
