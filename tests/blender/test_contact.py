@@ -36,7 +36,7 @@ def pressed():
 
 
 def lowest(bar):
-    sessions.update(bpy.context, wait=600)
+    sessions.update(bpy.context, wait=600, refined=True)
     return (local_points(bar) @ np.array(bar.matrix_world)[:3, :3].T + np.array(bar.matrix_world)[:3, 3])[
         :, 2
     ].min()

@@ -66,6 +66,42 @@ def test_nothing_is_inside_an_obstacle(samples, function):
         assert "handles[1] is held back by obstacles[0]" in " ".join(pressed.report.notes)
 
 
+def test_a_bar_on_a_ball_comes_to_rest_however_far_its_ends_go_down():
+    """The energy grows with the way; a solve that did not end would hover above the ball."""
+    mesh = trimesh.creation.box((1.9, 0.2, 0.2)).subdivide().subdivide().subdivide().subdivide()
+    bar, ball = (
+        af.sample_mesh(mesh.vertices, mesh.faces, 8000),
+        solid(trimesh.creation.icosphere(4, 0.4), [0, 0, -0.52]),
+    )
+    ends = [box([side * 0.74, 0, 0], [0.09, 0.2, 0.2]) for side in (-1, 1)]
+    shares = []
+    for drop in np.linspace(0.08, 0.16, 6):
+        down = turned(0, shift=(0, 0, -drop))
+        handles = [af.Cuboid(end, down @ end) for end in ends]
+        field = af.deform(
+            bar, handles, af.DeformOptions(centers=200), contact=af.Contact([af.Obstacle(ball)])
+        )
+        assert abs(np.asarray(ball(field(bar.points))).min()) < DEEPEST
+        shares.append(field.report.energy / drop**2)
+    assert (np.diff(shares) > 0).all()
+
+
+@pytest.mark.parametrize("itself", [False, True])
+@pytest.mark.parametrize("kind", ["cuboid", "pin above", "pin beside"])
+def test_a_handle_that_is_pulled_into_the_ground_gives_way(samples, kind, itself):
+    """The ground is 0.1 below the bar, whose end is pulled down by 0.9. What is squashed has an energy over 0.1."""
+    ends = [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, DEEP[1])]
+    if kind != "cuboid":
+        place = np.array([3.8, 0, 0.5] if kind == "pin above" else [3.8, -0.5, 0])
+        ends[1] = af.Point(place, place - [0, 0, 0.9])
+    pressed = af.LiveDeformer(samples, ends, QUICK, contact=af.Contact(ground=-0.6, itself=itself))
+    field = pressed.solve(iterations=60)
+    assert pressed.report.energy < 0.01 and pressed.report.flipped_share == 0
+    assert -0.6 - DEEPEST < field(samples.points)[:, 2].min() < -0.6 + 2 * DEEPEST
+    (held,) = pressed.report.contact.held
+    assert held.handle == 1 and held.by == "ground" and held.distance == pytest.approx(0.8, abs=0.05)
+
+
 def test_what_touches_nothing_is_as_without(samples):
     far = af.Contact([af.Obstacle(BALL)], ground=-5.0, itself=True)
     up = [LEFT, turned(20, shift=(0, 0, 0.3)) @ RIGHT]

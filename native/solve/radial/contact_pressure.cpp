@@ -104,6 +104,11 @@ void ContactTerms::gather_places() {
   found_.revision = found_.planes.empty() ? 0 : ++sets_;
 }
 
+Index ContactTerms::sample_of(Index place) const {
+  const Index row = found_.rows[static_cast<std::size_t>(place)];
+  return points_.samples()[static_cast<std::size_t>(points_.sample_of(row))];
+}
+
 double ContactTerms::touching() const {
   double share = 0.0;
   for (const ContactPlane& plane : found_.planes)

@@ -35,11 +35,6 @@ constexpr double held_back = 0.02;
 /// What single precision cannot see of an energy.
 constexpr double floor = 1e-10;
 
-Points contact_places(RadialState& s) {
-  const VectorF& u = s.measurements(s.fast);
-  return s.fast.objective.latest()->contact_values(u).cast<double>();
-}
-
 /// Finds the planes near the surface, and brings it beyond them as long as it is deep.
 double find_and_push(RadialState& s, int pushes, double from) {
   double depth = s.contact.find(s.shape.coefficients);
@@ -69,7 +64,8 @@ bool solve_round(RadialState& s, Index iterations, double tolerance, const Progr
   const double allowed = std::max(too_deep, s.contact.deepest());
   const bool converged = s.descend(s.fast, {iterations, tolerance, floor}, progress).converged;
   press_balanced(s);
-  double depth = s.contact.find(s.shape.coefficients);
+  const double way = s.contact.fastest(s.shape.coefficients - before);
+  double depth = s.contact.find(s.shape.coefficients, way);
   bool back = false;
   for (int half = 0; half < most_halves && depth > allowed; ++half) {
     back = true;
@@ -90,6 +86,8 @@ void report_contact(RadialState& s) {
   const Points values = objective.handle_values(s.measurements(s.fast)).cast<double>();
   const Points& targets = s.handles.pairs().targets;
   const Index own = s.handles.any() ? s.handles.own_count() : 0;
+  std::vector<Mat4> motions = motions_of(s.handles.bound());
+  const std::vector<Index> surfaces = hold_back(s, motions);
   for (Index first = 0, last = 0; first < own; first = last) {
     const Index handle = s.handles.handle_of(first);
     while (last < own && s.handles.handle_of(last) == handle) ++last;
@@ -99,7 +97,10 @@ void report_contact(RadialState& s) {
     const Vec3 middle = values.middleRows(first, last - first).colwise().mean();
     const Vector along = s.contact.forces_at(middle, places.data()) * left.colwise().mean().transpose();
     Index by = 0;
-    if (along.minCoeff(&by) < 0.0) report.held.push_back({handle, s.contact.name_of(by), scale * distance});
+    const bool pressed = along.minCoeff(&by) < 0.0;
+    const Index back = surfaces[static_cast<std::size_t>(handle)];
+    if (back >= 0 || pressed)
+      report.held.push_back({handle, s.contact.name_of(back >= 0 ? back : by), scale * distance});
   }
 }
 
@@ -111,10 +112,13 @@ void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Inde
   double before_it = std::numeric_limits<double>::infinity();
   s.contact.find(s.shape.coefficients);
   for (Index k = 1; k <= steps; ++k) {
-    const Points targets =
-        s.handles.targets_between(before, static_cast<double>(k) / static_cast<double>(steps));
+    const std::vector<Mat4> wanted =
+        motions_between(s.handles.bound(), before, static_cast<double>(k) / static_cast<double>(steps));
     for (Index extra = more_rounds;;) {
-      s.objective(s.fast).set_targets(targets);
+      std::vector<Mat4> motions = wanted;
+      RadialObjective<float>& objective = s.objective(s.fast);
+      hold_back(s, motions);
+      objective.set_targets(s.handles.targets_at(motions));
       const Index at_once = k < steps ? steps_on_the_way : std::clamp<Index>(left, 2, steps_between);
       const bool converged = solve_round(s, at_once, tolerance, progress);
       if (k < steps) break;
@@ -149,6 +153,11 @@ void back_to(RadialState& s, const RowMatrix<double>& coefficients) {
 }
 
 }  // namespace
+
+Points contact_places(RadialState& s) {
+  const VectorF& u = s.measurements(s.fast);
+  return s.fast.objective.latest()->contact_values(u).cast<double>();
+}
 
 void stiffen_contact(RadialState& s) {
   if (!s.contact.presses()) return;
@@ -190,8 +199,8 @@ void follow_in_contact(RadialState& s, Index iterations, double tolerance,
     back_to(s, s.problem.basis.identity());  // what was not followed here is followed from rest
     before.assign(before.size(), Mat4::Identity());
   }
-  const Points from = s.handles.targets_between(before, 0.0);
-  const double way = (s.handles.targets_between(before, 1.0) - from).rowwise().norm().maxCoeff();
+  const Points from = s.handles.targets_at(motions_between(s.handles.bound(), before, 0.0));
+  const double way = (s.handles.pairs().targets - from).rowwise().norm().maxCoeff();
   const double length = s.contact.itself() ? step_length_itself : step_length;
   RowMatrix<double> start;  // where parts were pushed apart that a free solve let overlap
   const bool leaps = s.contact.only_itself() && way > length;  // the way back may be another one

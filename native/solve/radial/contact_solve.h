@@ -13,6 +13,11 @@ namespace arapfields {
 void follow_in_contact(RadialState& state, Index iterations, double tolerance,
                        const std::function<void()>& freely, const Progress& progress);
 
+/// Where the places of the planes that were found are now.
+Points contact_places(RadialState& state);
+/// Takes motions of the handles back, each by the least translation after which all that the handle holds is
+/// beyond the planes that were found. Returns which surface asks for the most of it; −1: none.
+std::vector<Index> hold_back(RadialState& state, std::vector<Mat4>& motions);
 /// The least motion, in the norm of the quasi-Newton model, that brings the surface beyond the planes that
 /// were found.
 void push_out(RadialState& state);

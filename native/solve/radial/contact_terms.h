@@ -68,6 +68,8 @@ class ContactTerms {
   void release();
 
   const ContactSet& found() const { return found_; }
+  /// Which of the problem's samples a found place is of.
+  Index sample_of(Index place) const;
   bool presses() const { return !found_.planes.empty(); }
   /// Forces of each surface, (surfaces, 3), on what is at a place: nearer ones count more.
   Points forces_at(const Vec3& place, const double* places) const;

@@ -68,22 +68,30 @@ std::vector<Mat4> motions_of(const BoundHandles& handles) {
   return motions;
 }
 
-Points targets_between(const BoundHandles& handles, const std::vector<Mat4>& before, double share,
-                       const std::vector<Index>& rows) {
-  Points targets(static_cast<Index>(rows.size()), 3);
-  Index row = 0;
+std::vector<Mat4> motions_between(const BoundHandles& handles, const std::vector<Mat4>& before,
+                                  double share) {
+  std::vector<Mat4> motions;
   for (Index i = 0; i < handles.count(); ++i) {
     const Index begin = handles.begin(i), end = handles.begin(i + 1);
     const Vec3 pivot = handles.sources().middleRows(begin, end - begin).colwise().mean();
     const Mat4 &a = before[static_cast<std::size_t>(i)], &b = handles.motion(i);
-    const Mat3 linear = linear_between(a.topLeftCorner<3, 3>(), b.topLeftCorner<3, 3>(), share);
     const Vec3 from = a.topLeftCorner<3, 3>() * pivot + a.topRightCorner<3, 1>();
     const Vec3 to = b.topLeftCorner<3, 3>() * pivot + b.topRightCorner<3, 1>();
-    const Vec3 middle = (1.0 - share) * from + share * to;
-    for (; row < targets.rows() && rows[static_cast<std::size_t>(row)] < end; ++row) {
-      const Vec3 source = handles.sources().row(rows[static_cast<std::size_t>(row)]);
-      targets.row(row) = middle + linear * (source - pivot);
-    }
+    Mat4& motion = motions.emplace_back(Mat4::Identity());
+    motion.topLeftCorner<3, 3>() = linear_between(a.topLeftCorner<3, 3>(), b.topLeftCorner<3, 3>(), share);
+    motion.topRightCorner<3, 1>() = (1.0 - share) * from + share * to - motion.topLeftCorner<3, 3>() * pivot;
+  }
+  return motions;
+}
+
+Points targets_of(const BoundHandles& handles, const std::vector<Mat4>& motions,
+                  const std::vector<Index>& rows) {
+  Points targets(static_cast<Index>(rows.size()), 3);
+  Index row = 0;
+  for (Index i = 0; i < handles.count(); ++i) {
+    const Mat4& motion = motions[static_cast<std::size_t>(i)];
+    for (; row < targets.rows() && rows[static_cast<std::size_t>(row)] < handles.begin(i + 1); ++row)
+      targets.row(row) = affine_image(handles.sources().row(rows[static_cast<std::size_t>(row)]), motion);
   }
   return targets;
 }

@@ -27,9 +27,12 @@ Points affine_image(PointsIn points, const Mat4& motion);
 
 std::vector<Mat4> motions_of(const BoundHandles& handles);
 
-/// Targets of some rows of the handles' pairs (ascending) at a share of the way from earlier motions of the
-/// handles to the current ones: rotations by slerp, all else along lines.
-Points targets_between(const BoundHandles& handles, const std::vector<Mat4>& before, double share,
-                       const std::vector<Index>& rows);
+/// At a share of the way from earlier motions of the handles to the current ones: about the middle of each
+/// handle, rotations by slerp, all else along lines.
+std::vector<Mat4> motions_between(const BoundHandles& handles, const std::vector<Mat4>& before, double share);
+
+/// Where motions of the handles take some rows of their pairs (ascending).
+Points targets_of(const BoundHandles& handles, const std::vector<Mat4>& motions,
+                  const std::vector<Index>& rows);
 
 }  // namespace arapfields

@@ -148,10 +148,10 @@ std::shared_ptr<const Influence> HandleTerms::reaches() const {
                                            problem_.basis.embedding);
 }
 
-Points HandleTerms::targets_between(const std::vector<Mat4>& before, double share) const {
+Points HandleTerms::targets_at(const std::vector<Mat4>& motions) const {
   if (!any()) return pairs_.targets;
   Points own(own_count() + held_.rows(), 3);
-  own << arapfields::targets_between(bound_, before, share, rows_), held_;
+  own << targets_of(bound_, motions, rows_), held_;
   return with_reflections(std::move(own));
 }
 

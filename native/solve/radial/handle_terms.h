@@ -29,8 +29,8 @@ class HandleTerms {
   Index own_count() const { return any() ? static_cast<Index>(rows_.size()) : pairs_.sources.rows(); }
   /// Which handle each of its own pairs is of.
   Index handle_of(Index pair) const;
-  /// The pairs' targets at a share of the way from earlier motions of the handles to the current ones.
-  Points targets_between(const std::vector<Mat4>& before, double share) const;
+  /// The pairs' targets where the handles have moved so.
+  Points targets_at(const std::vector<Mat4>& motions) const;
   /// How far the motion reaches; null: everywhere.
   const std::shared_ptr<const Influence>& influence() const { return influence_; }
   /// Values of the basis functions (pairs, size) at the pairs' sources.

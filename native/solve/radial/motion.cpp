@@ -68,8 +68,10 @@ TimeIntegrator::TimeIntegrator(RadialState& state, double seconds)
     : state_(state), body_(state.dynamics), before_(body_.motions) {
   const HandleTerms& handles = state.handles;
   if (std::ssize(before_) != handles.bound().count()) before_ = motions_of(handles.bound());
-  carried_ = twist_between(handles.targets_between(before_, 0.0), handles.targets_between(before_, 1.0),
-                           handles.pairs().weights, seconds);
+  const auto targets = [&](double share) {
+    return handles.targets_at(motions_between(handles.bound(), before_, share));
+  };
+  carried_ = twist_between(targets(0.0), targets(1.0), handles.pairs().weights, seconds);
   const SecondaryMotionOptions& options = body_.motion()->options;
   steps_ = std::max<Index>(1, static_cast<Index>(std::ceil(seconds / options.longest_step - 1e-9)));
   h_ = seconds / static_cast<double>(steps_);
@@ -94,7 +96,9 @@ void TimeIntegrator::integrate(const Progress& progress) {
     }
     const auto integrated = [&](const TimeScheme& scheme) {
       if (state_.contact.any()) state_.objective(state_.fast);
-      objective.set_targets(state_.handles.targets_between(before_, share(scheme.w)));
+      std::vector<Mat4> motions = motions_between(state_.handles.bound(), before_, share(scheme.w));
+      hold_back(state_, motions);
+      objective.set_targets(state_.handles.targets_at(motions));
       return integrate_step(scheme, progress.part(share(0.0), share(1.0)));
     };
     const bool touches = state_.contact.touching() > 0.0;

@@ -108,7 +108,7 @@ QuasiNewtonReport RadialState::descend(RadialPrecision<Scalar>& precision, const
                                        const Progress& progress) {
   QuasiNewton& optimizer = history.optimizer.get(
       {problem.energy_revision, hooks_revision, style.revision(), preconditioner.revision,
-       dynamics.revision(), shape.jumps, dynamics.has_mass() ? contact.found().revision : 0},
+       dynamics.revision(), shape.jumps, contact.found().revision},
       [] { return QuasiNewton(); });
   Eigen::VectorX<Scalar> u = precision.u.take(measured_revisions());
   ++shape.revision;  // at once: cancelled between two steps, the coefficients have gone on

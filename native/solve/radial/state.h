@@ -89,6 +89,7 @@ struct RadialState {
   StiffnessTerms stiffness;
   SurfaceDynamics dynamics;
   ContactTerms contact;
+  Dependent<Vector, 1> pin_widths;  ///< of the shape at point handles
   RadialHooks hooks;
   Revision hooks_revision = 0;
   RadialPreconditioner preconditioner;

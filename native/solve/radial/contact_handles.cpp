@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Handles give way: what they hold stays beyond the planes that were found, as it is, and is not squashed.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "fields/radial_evaluator.h"
+#include "sampling/sample_choice.h"
+#include "solve/radial/contact_solve.h"
+#include "solve/radial/handle_motion.h"
+
+namespace arapfields {
+namespace {
+
+/// Sweeps over the planes of a handle, and the change, in cube units, below which these end.
+constexpr int sweeps = 200;
+constexpr double settled = 1e-6;
+/// What lies under a point handle, in widths of the shape there: no farther from it at rest, nor aside of it
+/// as seen along a plane's normal.
+constexpr double under = 1.5, aside = 0.35;
+/// Searches for the thickest part of the shape beside a point handle, which may lie at an edge.
+constexpr int thicker = 3;
+
+/// A translation moves a part along `normal` by `depth` or more.
+struct Bound {
+  Vec3 normal;
+  double depth;
+  Index surface;
+};
+
+/// The least translation within the bounds, and the surface that asks for the most of it, by the method of
+/// Hildreth (1957).
+std::pair<Vec3, Index> least_translation(const std::vector<Bound>& bounds) {
+  Vec3 way = Vec3::Zero();
+  std::vector<double> pushes(bounds.size(), 0.0);
+  double change = settled;
+  for (int sweep = 0; sweep < sweeps && change >= settled; ++sweep) {
+    change = 0.0;
+    for (std::size_t k = 0; k < bounds.size(); ++k) {
+      const double next = std::max(0.0, pushes[k] + bounds[k].depth - bounds[k].normal.dot(way));
+      way += (next - pushes[k]) * bounds[k].normal;
+      change = std::max(change, std::abs(next - pushes[k]));
+      pushes[k] = next;
+    }
+  }
+  const auto most = std::max_element(pushes.begin(), pushes.end());
+  return {way, most == pushes.end() || *most == 0.0
+                   ? -1
+                   : bounds[static_cast<std::size_t>(most - pushes.begin())].surface};
+}
+
+/// The handle that holds each of the problem's samples; −1: none.
+std::vector<Index> holders(const RadialState& s) {
+  const BoundHandles& handles = s.handles.bound();
+  std::vector<Index> result(static_cast<std::size_t>(s.problem.samples.size()), -1);
+  for (Index i = 0; i < handles.count(); ++i)
+    for (Index pair = handles.begin(i); pair < handles.begin(i + 1); ++pair)
+      if (const Index sample = handles.members()[static_cast<std::size_t>(pair)]; sample >= 0)
+        result[static_cast<std::size_t>(sample)] = i;
+  return result;
+}
+
+/// A handle at one point, beneath which the shape keeps its width.
+struct Pin {
+  Index handle;
+  Vec3 rest, now, target;
+  double width;
+};
+
+/// Twice the thickness of what is no farther than that from each of the points.
+Vector widths_at(const RadialProblem& problem, const Points& points) {
+  const Vector thickness = problem.shape->thickness->at(problem.surface());
+  Vector widths = 2.0 * problem.shape->thickness->at(points);
+  for (Index k = 0; k < points.rows(); ++k) {
+    const Vector squares = (problem.surface().rowwise() - points.row(k)).rowwise().squaredNorm();
+    for (int search = 0; search < thicker; ++search) {
+      const double square = widths[k] * widths[k];
+      for (Index i = 0; i < squares.size(); ++i)
+        if (squares[i] < square) widths[k] = std::max(widths[k], 2.0 * thickness[i]);
+    }
+  }
+  return widths;
+}
+
+std::vector<Pin> pins(RadialState& s, const std::vector<Mat4>& motions) {
+  const BoundHandles& handles = s.handles.bound();
+  std::vector<Index> rows, of;
+  for (Index i = 0; i < handles.count(); ++i)
+    if (handles.handle(i).kind == Handle::Kind::point) rows.push_back(handles.begin(i)), of.push_back(i);
+  if (rows.empty()) return {};
+  const Points rest = rows_of(handles.sources(), rows);
+  const Points now = radial_rows(s.problem.basis, rest, JetOrder::value) * s.shape.coefficients;
+  const Vector& widths = s.pin_widths.get({s.handles.revision()}, [&] { return widths_at(s.problem, rest); });
+  std::vector<Pin> result;
+  for (std::size_t k = 0; k < of.size(); ++k) {
+    const auto row = static_cast<Index>(k);
+    const Mat4& motion = motions[static_cast<std::size_t>(of[k])];
+    result.push_back(
+        {of[k], rest.row(row), now.row(row), affine_image(rest.row(row), motion).row(0), widths[row]});
+  }
+  return result;
+}
+
+/// How far a pin's target lies beyond a plane for what is under it to keep its length; −∞: not under it.
+double beyond(const Pin& pin, const ContactPlane& plane, const Vec3& rest, const Vec3& now) {
+  const double length = (rest - pin.rest).norm();
+  const Vec3 arm = now - pin.now;
+  const double along = plane.normal.dot(arm);
+  if (length > under * pin.width || (arm - along * plane.normal).norm() > aside * pin.width)
+    return -std::numeric_limits<double>::infinity();
+  const double longer = arm.norm() > 0.0 ? length / arm.norm() : 1.0;
+  return plane.offset - plane.normal.dot(pin.target) - longer * along;
+}
+
+}  // namespace
+
+std::vector<Index> hold_back(RadialState& s, std::vector<Mat4>& motions) {
+  std::vector<Index> by(motions.size(), -1);
+  const ContactSet& set = s.contact.found();
+  if (motions.empty() || set.planes.empty()) return by;
+  const std::vector<Index> holder = holders(s);
+  const auto holder_of = [&](Index place) {
+    return place < 0 ? -1 : holder[static_cast<std::size_t>(s.contact.sample_of(place))];
+  };
+  const auto target = [&](Index place, Index handle) -> Vec3 {
+    return affine_image(set.places.row(place), motions[static_cast<std::size_t>(handle)]).row(0);
+  };
+  std::vector<std::vector<Bound>> bounds(motions.size());
+  const std::vector<Pin> points = pins(s, motions);
+  const Points places = points.empty() ? Points() : contact_places(s);
+  for (const ContactPlane& plane : set.planes) {
+    if (plane.second < 0)
+      for (const Pin& pin : points)
+        if (const double depth = beyond(pin, plane, set.places.row(plane.first), places.row(plane.first));
+            depth > -pin.width)
+          bounds[static_cast<std::size_t>(pin.handle)].push_back({plane.normal, depth, plane.obstacle});
+    const Index first = holder_of(plane.first), second = holder_of(plane.second);
+    if (first < 0 || first == second || (plane.second >= 0 && second < 0)) continue;
+    const Vec3 other = second < 0 ? Vec3(Vec3::Zero()) : target(plane.second, second);
+    const double depth = plane.offset - plane.normal.dot(target(plane.first, first) - other);
+    const double each = second < 0 ? depth : 0.5 * depth;  // both go back
+    bounds[static_cast<std::size_t>(first)].push_back({plane.normal, each, plane.obstacle});
+    if (second >= 0)
+      bounds[static_cast<std::size_t>(second)].push_back({-plane.normal, each, plane.obstacle});
+  }
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    const auto [way, surface] = least_translation(bounds[i]);
+    motions[i].topRightCorner<3, 1>() += way;
+    by[i] = surface;
+  }
+  return by;
+}
+
+}  // namespace arapfields
