@@ -26,8 +26,10 @@ struct ContactPlane {
   Vec3 slip(const Scalar* places) const {
     const Vec3 way =
         Eigen::Map<const Eigen::Vector3<Scalar>>(places + 3 * first).template cast<double>() - anchor;
-    return way - normal.dot(way) * normal;
+    return along(way);
   }
+  /// The part of a way along the plane.
+  Vec3 along(const Vec3& way) const { return way - normal.dot(way) * normal; }
 
   /// normal·(f_first − f_second) − offset at places (n,3).
   template <class Scalar>

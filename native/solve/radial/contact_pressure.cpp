@@ -40,7 +40,10 @@ ContactState ContactTerms::held() const {
   for (const BarrierSurface& surface : surfaces_) state.placements.push_back(surface.placement());
   for (Index row = 0; row < std::min<Index>(pressures_.rows(), points_.sample_count()); ++row)
     for (Index k = 0; k < pressures_.cols(); ++k)
-      if (pressures_(row, k) > 0.0) state.pressures.push_back({row, k, pressures_(row, k)});
+      if (pressures_(row, k) > 0.0) {
+        const Points& of = k < std::ssize(anchors_) ? anchors_[static_cast<std::size_t>(k)] : places_;
+        state.pressures.push_back({row, k, pressures_(row, k), of.row(row).transpose()});
+      }
   const Points places = places_.topRows(std::min<Index>(places_.rows(), points_.sample_count()));
   for (Index k = 0; k < std::ssize(surfaces_); ++k)
     note_inside(k, places, seen_[static_cast<std::size_t>(k)], clear_.col(k), state);
@@ -51,6 +54,7 @@ void ContactTerms::carry(Index k, const Mat4& motion) {
   const auto which = static_cast<std::size_t>(k);
   carried_[which] = motion;
   seen_[which] = affine_image(seen_[which], motion);
+  anchors_[which] = affine_image(anchors_[which], motion);
 }
 
 void ContactTerms::change_coordinates(const Mat4& motion) {
@@ -58,6 +62,7 @@ void ContactTerms::change_coordinates(const Mat4& motion) {
     starts_[k] = motion * starts_[k];
     surfaces_[k].set_placement(starts_[k]);
     seen_[k] = affine_image(seen_[k], motion);
+    anchors_[k] = affine_image(anchors_[k], motion);
   }
   places_ = affine_image(places_, motion);
 }

@@ -138,6 +138,7 @@ void ContactTerms::resume(const ContactState& state, const RowMatrix<double>& co
   const Index count = std::ssize(surfaces_);
   const bool fits = std::ssize(state.placements) == count;
   seen_.assign(surfaces_.size(), {});
+  anchors_.assign(surfaces_.size(), {});
   clear_.resize(places_.rows(), count);
   pressures_.resize(places_.rows(), count + 1);
   for (Index k = 0; k < count; ++k) {
@@ -150,13 +151,16 @@ void ContactTerms::resume(const ContactState& state, const RowMatrix<double>& co
   carried_.assign(surfaces_.size(), Mat4::Identity());
   release();
   for (const ContactState::Pressure& held : state.pressures)
-    if (held.row < pressures_.rows() && held.surface < pressures_.cols())
+    if (held.row < pressures_.rows() && held.surface < pressures_.cols()) {
       pressures_(held.row, held.surface) = held.pressure;
+      if (held.surface < count)
+        anchors_[static_cast<std::size_t>(held.surface)].row(held.row) = held.anchor.transpose();
+    }
 }
 
 /// The ways from a surface start where the places are.
 void ContactTerms::see(Index k) {
-  seen_[static_cast<std::size_t>(k)] = places_;
+  seen_[static_cast<std::size_t>(k)] = anchors_[static_cast<std::size_t>(k)] = places_;
   clear_.col(k) = surfaces_[static_cast<std::size_t>(k)].distances(places_);
 }
 
@@ -222,6 +226,7 @@ void ContactTerms::follow_finer_since(Index before) {
   pressures_.bottomRows(places_.rows() - before).setZero();
   std::vector<Index> rows;
   for (Points& seen : seen_) seen.conservativeResize(places_.rows(), Eigen::NoChange);
+  for (Points& anchors : anchors_) anchors.conservativeResize(places_.rows(), Eigen::NoChange);
   for (Index row = before; row < places_.rows(); ++row) {
     const Index sample = points_.sample_of(row);
     clear_.row(row) = clear_.row(sample);
@@ -279,7 +284,7 @@ Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsI
   for (Index i = 0; i < now.rows(); ++i)
     offsets[i] = nearest.normals.row(i).dot(now.row(i)) - nearest.distances[i];
   go_back(surface, now, moved_rows, hits, near + further_, nearest, offsets);
-  const Points anchors = affine_image(now, carried_[static_cast<std::size_t>(k)]);
+  const Points carried = affine_image(now, carried_[static_cast<std::size_t>(k)]);
   for (Index i = 0; i < now.rows(); ++i) {
     const double margin = surface.margin() + kept, gap = nearest.distances[i] - margin;
     const Index row = rows[static_cast<std::size_t>(i)];
@@ -296,7 +301,13 @@ Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsI
     plane.pressure = pressures_(row, k);
     plane.share = points_.share(row);
     plane.obstacle = k;
-    plane.anchor = anchors.row(i).transpose();
+    plane.anchor = carried.row(i).transpose();
+    auto anchor = anchors_[static_cast<std::size_t>(k)].row(row);
+    if (plane.pressure > 0.0) {  // it slides where it is farther from its anchor than friction lets it be
+      const Vec3 slip = plane.along(plane.anchor - anchor.transpose());
+      plane.anchor -= std::min(1.0, stuck / slip.norm()) * slip;
+    }
+    anchor = plane.anchor.transpose();
   }
   return nearest.distances;
 }

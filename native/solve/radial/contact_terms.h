@@ -68,8 +68,7 @@ class ContactTerms {
   void release();
 
   const ContactSet& found() const { return found_; }
-  /// Which of the problem's samples a found place is of.
-  Index sample_of(Index place) const;
+  Index sample_of(Index place) const;  ///< of the problem's, that a found place is of
   bool presses() const { return !found_.planes.empty(); }
   /// Forces of each surface, (surfaces, 3), on what is at a place: nearer ones count more.
   Points forces_at(const Vec3& place, const double* places) const;
@@ -105,7 +104,8 @@ class ContactTerms {
   ContactPoints points_;
   Points places_;  // at the last look
   std::optional<SelfContact> self_;
-  std::vector<Points> seen_;     // of each surface: where places were last known outside, carried with it
+  // Of each surface, carried with it: where places were last known outside, and where friction holds them.
+  std::vector<Points> seen_, anchors_;
   RowMatrix<double> clear_;      // (places, surfaces) no surface nearer to there
   RowMatrix<double> pressures_;  // (places, surfaces and the shape itself)
   ContactSet found_;

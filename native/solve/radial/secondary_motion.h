@@ -24,6 +24,7 @@ struct ContactState {
     Index row;
     Index surface;
     double pressure;
+    Vec3 anchor;  ///< where friction holds it
   };
   std::vector<Pressure> pressures;  ///< of what touches
   struct Inside {
