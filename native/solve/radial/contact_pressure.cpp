@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How hard a surface presses on the planes that were found, obstacles that move, and what a next step needs.
+// How hard a surface presses on the planes that were found.
 #include <algorithm>
 #include <cmath>
 
 #include "solve/radial/contact_terms.h"
-#include "solve/radial/handle_motion.h"
 
 namespace arapfields {
 namespace {
@@ -25,68 +24,7 @@ double nearness(const double* places, Index row, const Vec3& place) {
   return 1.0 / (square + handle_reach * handle_reach);
 }
 
-/// Notes where samples that may be inside a surface were last seen outside of it.
-void note_inside(Index k, const Points& places, const Points& seen, const Vector& clear,
-                 ContactState& state) {
-  for (Index row = 0; row < places.rows(); ++row)
-    if (clear[row] > 0.0 && (places.row(row) - seen.row(row)).norm() >= clear[row])
-      state.inside.push_back({row, k, seen.row(row).transpose(), clear[row]});
-}
-
 }  // namespace
-
-ContactState ContactTerms::held() const {
-  ContactState state;
-  for (const BarrierSurface& surface : surfaces_) state.placements.push_back(surface.placement());
-  for (Index row = 0; row < std::min<Index>(pressures_.rows(), points_.sample_count()); ++row)
-    for (Index k = 0; k < pressures_.cols(); ++k)
-      if (pressures_(row, k) > 0.0) {
-        const Points& of = k < std::ssize(anchors_) ? anchors_[static_cast<std::size_t>(k)] : places_;
-        state.pressures.push_back({row, k, pressures_(row, k), of.row(row).transpose()});
-      }
-  const Points places = places_.topRows(std::min<Index>(places_.rows(), points_.sample_count()));
-  for (Index k = 0; k < std::ssize(surfaces_); ++k)
-    note_inside(k, places, seen_[static_cast<std::size_t>(k)], clear_.col(k), state);
-  return state;
-}
-
-void ContactTerms::carry(Index k, const Mat4& motion) {
-  const auto which = static_cast<std::size_t>(k);
-  carried_[which] = motion;
-  seen_[which] = affine_image(seen_[which], motion);
-  anchors_[which] = affine_image(anchors_[which], motion);
-}
-
-void ContactTerms::change_coordinates(const Mat4& motion) {
-  for (std::size_t k = 0; k < starts_.size(); ++k) {
-    starts_[k] = motion * starts_[k];
-    surfaces_[k].set_placement(starts_[k]);
-    seen_[k] = affine_image(seen_[k], motion);
-    anchors_[k] = affine_image(anchors_[k], motion);
-  }
-  places_ = affine_image(places_, motion);
-}
-
-void ContactTerms::move_obstacles(double share) {
-  for (Index k = 0; k < std::ssize(starts_); ++k) {
-    const auto which = static_cast<std::size_t>(k);
-    carried_[which].setIdentity();
-    if (surfaces_[which].placement() == ends_[which]) continue;
-    const Mat4 before = surfaces_[which].placement();
-    if (share < 1.0)
-      surfaces_[which].place_between(starts_[which], ends_[which], share);
-    else
-      surfaces_[which].set_placement(ends_[which]);
-    carry(k, surfaces_[which].placement() * before.inverse());
-  }
-}
-
-double ContactTerms::obstacle_way() const {
-  double way = 0.0;
-  for (std::size_t k = 0; k < starts_.size(); ++k)
-    way = std::max(way, (ends_[k] - surfaces_[k].placement()).topRows<3>().colwise().norm().sum());
-  return way;
-}
 
 /// The places of the planes, once each.
 void ContactTerms::gather_places() {

@@ -41,12 +41,14 @@ double find_and_push(RadialState& s, int pushes, double from) {
   s.objective(s.fast);
   for (int push = 0; push < pushes && depth > deep && depth < from; ++push) {
     const RowMatrix<double> before = s.shape.coefficients;
+    const ContactWays ways = s.contact.ways();
     push_out(s);
     const double next = s.contact.find(s.shape.coefficients);
     const bool worse = next >= depth;
     if (worse) {
       s.shape.coefficients = before;
       ++s.shape.revision;
+      s.contact.set_ways(ways);
       s.contact.find(s.shape.coefficients);
     }
     s.objective(s.fast);
@@ -65,12 +67,14 @@ bool solve_round(RadialState& s, Index iterations, double tolerance, const Progr
   const bool converged = s.descend(s.fast, {iterations, tolerance, floor}, progress).converged;
   press_balanced(s);
   const double way = s.contact.fastest(s.shape.coefficients - before);
+  const ContactWays ways = s.contact.ways();
   double depth = s.contact.find(s.shape.coefficients, way);
   bool back = false;
   for (int half = 0; half < most_halves && depth > allowed; ++half) {
     back = true;
     s.shape.coefficients = 0.5 * (s.shape.coefficients + before);
     ++s.shape.revision;
+    s.contact.set_ways(ways);
     depth = s.contact.find(s.shape.coefficients);
   }
   return converged && !back;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "core/errors.h"
@@ -55,14 +56,6 @@ void go_back(const BarrierSurface& surface, PointsIn now, const std::vector<Inde
     nearest.distances[i] = beyond;
     offsets[i] = hit.normal.dot(hit.place);
   }
-}
-
-void recall_inside(const ContactState& state, std::vector<Points>& seen, RowMatrix<double>& clear) {
-  for (const ContactState::Inside& held : state.inside)
-    if (held.row < clear.rows() && held.surface < clear.cols()) {
-      seen[static_cast<std::size_t>(held.surface)].row(held.row) = held.seen.transpose();
-      clear(held.row, held.surface) = held.clear;
-    }
 }
 
 }  // namespace
@@ -128,42 +121,6 @@ void ContactTerms::release() {
   touches_itself_ = false;
 }
 
-void ContactTerms::begin(const RowMatrix<double>& coefficients) { resume({}, coefficients); }
-
-void ContactTerms::resume(const ContactState& state, const RowMatrix<double>& coefficients) {
-  if (!any()) return release();
-  points_.coarsen();
-  places_ = points_.at(coefficients);
-  if (self_) self_->begin(places_, [&] { return points_.normals_at(coefficients); });
-  const Index count = std::ssize(surfaces_);
-  const bool fits = std::ssize(state.placements) == count;
-  seen_.assign(surfaces_.size(), {});
-  anchors_.assign(surfaces_.size(), {});
-  clear_.resize(places_.rows(), count);
-  pressures_.resize(places_.rows(), count + 1);
-  for (Index k = 0; k < count; ++k) {
-    const auto which = static_cast<std::size_t>(k);
-    surfaces_[which].set_placement(fits ? state.placements[which] : ends_[which]);
-    see(k);
-  }
-  if (fits) recall_inside(state, seen_, clear_);
-  starts_ = fits ? state.placements : ends_;
-  carried_.assign(surfaces_.size(), Mat4::Identity());
-  release();
-  for (const ContactState::Pressure& held : state.pressures)
-    if (held.row < pressures_.rows() && held.surface < pressures_.cols()) {
-      pressures_(held.row, held.surface) = held.pressure;
-      if (held.surface < count)
-        anchors_[static_cast<std::size_t>(held.surface)].row(held.row) = held.anchor.transpose();
-    }
-}
-
-/// The ways from a surface start where the places are.
-void ContactTerms::see(Index k) {
-  seen_[static_cast<std::size_t>(k)] = anchors_[static_cast<std::size_t>(k)] = places_;
-  clear_.col(k) = surfaces_[static_cast<std::size_t>(k)].distances(places_);
-}
-
 double ContactTerms::fastest(const RowMatrix<double>& rates) {
   return std::sqrt(points_.at(rates).rowwise().squaredNorm().maxCoeff());
 }
@@ -172,10 +129,10 @@ double ContactTerms::fastest(const RowMatrix<double>& rates) {
 std::vector<Index> ContactTerms::near_rows() const {
   std::vector<Index> rows;
   for (Index i = 0; i < places_.rows(); ++i)
-    for (Index k = 0; k < clear_.cols(); ++k) {
+    for (Index k = 0; k < ways_.clear.cols(); ++k) {
       const auto which = static_cast<std::size_t>(k);
-      const double way = (places_.row(i) - seen_[which].row(i)).norm();
-      if (clear_(i, k) - way < near + further_ + surfaces_[which].margin()) {
+      const double way = (places_.row(i) - ways_.seen[which].row(i)).norm();
+      if (ways_.clear(i, k) - way < near + further_ + surfaces_[which].margin()) {
         rows.push_back(i);
         break;
       }
@@ -186,13 +143,13 @@ std::vector<Index> ContactTerms::near_rows() const {
 /// Adds the planes of obstacles and the ground for these places.
 void ContactTerms::find_outside(const std::vector<Index>& rows) {
   const Points now = rows_of(places_, rows);
-  for (Index k = 0; k < clear_.cols(); ++k) {
+  for (Index k = 0; k < ways_.clear.cols(); ++k) {
     const Vector distances = add_planes(k, rows, now);
     for (Index i = 0; i < now.rows(); ++i) {
       if (distances[i] <= 0.0) continue;  // it was last outside before
       const Index row = rows[static_cast<std::size_t>(i)];
-      seen_[static_cast<std::size_t>(k)].row(row) = now.row(i);
-      clear_(row, k) = distances[i];
+      ways_.seen[static_cast<std::size_t>(k)].row(row) = now.row(i);
+      ways_.clear(row, k) = distances[i];
     }
   }
 }
@@ -211,29 +168,17 @@ double ContactTerms::find(const RowMatrix<double>& coefficients, double further,
     const Points finer = points_.at(coefficients).bottomRows(points_.size() - before);
     places_.conservativeResize(points_.size(), Eigen::NoChange);
     places_.bottomRows(finer.rows()) = finer;
-    follow_finer_since(before);
+    pressures_.conservativeResize(places_.rows(), Eigen::NoChange);
+    pressures_.bottomRows(finer.rows()).setZero();
+    add_finer_since(before);
+    std::vector<Index> rows(static_cast<std::size_t>(finer.rows()));
+    std::iota(rows.begin(), rows.end(), before);
+    find_outside(rows);
   }
   deepest_outside_ = deepest_;
   if (self_) add_own_planes(coefficients, jumped);
   gather_places();
   return deepest_;
-}
-
-/// New places were last seen outside where their samples were.
-void ContactTerms::follow_finer_since(Index before) {
-  clear_.conservativeResize(places_.rows(), Eigen::NoChange);
-  pressures_.conservativeResize(places_.rows(), Eigen::NoChange);
-  pressures_.bottomRows(places_.rows() - before).setZero();
-  std::vector<Index> rows;
-  for (Points& seen : seen_) seen.conservativeResize(places_.rows(), Eigen::NoChange);
-  for (Points& anchors : anchors_) anchors.conservativeResize(places_.rows(), Eigen::NoChange);
-  for (Index row = before; row < places_.rows(); ++row) {
-    const Index sample = points_.sample_of(row);
-    clear_.row(row) = clear_.row(sample);
-    for (Points& seen : seen_) seen.row(row) = seen.row(sample);
-    rows.push_back(row);
-  }
-  find_outside(rows);
 }
 
 /// Samples between which and their neighbours an edge of an obstacle may poke through.
@@ -268,12 +213,12 @@ std::vector<Index> ContactTerms::at_edges() {
 /// negative also beyond what they came through.
 Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsIn now) {
   const BarrierSurface& surface = surfaces_[static_cast<std::size_t>(k)];
-  const Points& seen = seen_[static_cast<std::size_t>(k)];
+  const Points& seen = ways_.seen[static_cast<std::size_t>(k)];
   BarrierSurface::Nearest nearest = surface.nearest(now);
   std::vector<Index> moved_rows;  // those that may have come through
   for (Index i = 0; i < now.rows(); ++i) {
     const Index row = rows[static_cast<std::size_t>(i)];
-    const double way = (now.row(i) - seen.row(row)).norm(), clear = clear_(row, k);
+    const double way = (now.row(i) - seen.row(row)).norm(), clear = ways_.clear(row, k);
     if (clear > 0.0 && way > clear + std::max(0.0, nearest.distances[i]) - unsure) moved_rows.push_back(i);
   }
   std::vector<Index> starts;
@@ -302,7 +247,7 @@ Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsI
     plane.share = points_.share(row);
     plane.obstacle = k;
     plane.anchor = carried.row(i).transpose();
-    auto anchor = anchors_[static_cast<std::size_t>(k)].row(row);
+    auto anchor = ways_.anchors[static_cast<std::size_t>(k)].row(row);
     if (plane.pressure > 0.0) {  // it slides where it is farther from its anchor than friction lets it be
       const Vec3 slip = plane.along(plane.anchor - anchor.transpose());
       plane.anchor -= std::min(1.0, stuck / slip.norm()) * slip;

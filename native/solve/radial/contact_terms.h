@@ -4,22 +4,12 @@
 #include <optional>
 #include <vector>
 
-#include "energies/contact.h"
 #include "solve/radial/barrier_surface.h"
 #include "solve/radial/contact_points.h"
+#include "solve/radial/contact_ways.h"
 #include "solve/radial/secondary_motion.h"
-#include "solve/radial/self_contact.h"
 
 namespace arapfields {
-
-/// The planes that places of a surface are kept beyond, until they are found anew.
-struct ContactSet {
-  std::vector<Index> rows;  ///< which of the places that are followed
-  Points places;            ///< (n,3) theirs at rest
-  std::vector<ContactPlane> planes;
-  Revision revision = 0;   ///< 0: no planes
-  double stiffness = 0.0;  ///< of energy a unit of area for a unit of squared depth, halved
-};
 
 /// Where a surface meets obstacles and itself, and how hard it presses there. What is beyond a plane is told
 /// by the way that each place took since begin(), relative to the obstacle: nothing that is thinner than a
@@ -53,6 +43,9 @@ class ContactTerms {
   /// `further`: how much farther than usual, in cube units, what is near lies. `jumped`: the way here is not
   /// known, so that what the surface came through of itself is told by facing normals.
   double find(const RowMatrix<double>& coefficients, double further = 0.0, bool jumped = false);
+  ContactWays ways() const;
+  /// Takes back all searches since these were the ways.
+  void set_ways(ContactWays ways);
   /// The largest speed of a sample, where coefficients change at these rates.
   double fastest(const RowMatrix<double>& rates);
   /// Pressures after a solve that left the places of found() there, times a share of each surface. Returns
@@ -90,7 +83,7 @@ class ContactTerms {
   void find_outside(const std::vector<Index>& rows);
   Vector add_planes(Index k, const std::vector<Index>& rows, PointsIn now);
   std::vector<Index> at_edges();
-  void follow_finer_since(Index before);
+  void add_finer_since(Index before);
   void add_own_planes(const RowMatrix<double>& coefficients, bool jumped);
   void gather_places();
 
@@ -104,9 +97,7 @@ class ContactTerms {
   ContactPoints points_;
   Points places_;  // at the last look
   std::optional<SelfContact> self_;
-  // Of each surface, carried with it: where places were last known outside, and where friction holds them.
-  std::vector<Points> seen_, anchors_;
-  RowMatrix<double> clear_;      // (places, surfaces) no surface nearer to there
+  ContactWays ways_;
   RowMatrix<double> pressures_;  // (places, surfaces and the shape itself)
   ContactSet found_;
   Revision sets_ = 0;  // that were found

@@ -72,9 +72,9 @@ bool SelfContact::is_far(Index i, Index j, double distance) const {
 
 /// Whether what is beyond a sample came through it: it faced the same part before, or was before it.
 bool SelfContact::came_through(Index i, Index j, const Vec3& normal) const {
-  const Index before = faced_[static_cast<std::size_t>(i)];
+  const Index before = ways_.faced[static_cast<std::size_t>(i)];
   return (before >= 0 && !is_far(before, j, far_inside)) ||
-         (seen_.row(i) - seen_.row(j)).dot(normal.transpose()) >= 0.0;
+         (ways_.seen.row(i) - ways_.seen.row(j)).dot(normal.transpose()) >= 0.0;
 }
 
 /// For each cell the cells near it that hold a sample which may be far from one of its own inside the shape.
@@ -173,9 +173,9 @@ bool SelfContact::overlaps(PointsIn places, PointsIn normals) const {
 }
 
 void SelfContact::remember(PointsIn places, const std::vector<FacingPair>& pairs) {
-  seen_ = places;
-  faced_.assign(static_cast<std::size_t>(places.rows()), -1);
-  for (const FacingPair& pair : pairs) faced_[static_cast<std::size_t>(pair.first)] = pair.second;
+  ways_.seen = places;
+  ways_.faced.assign(static_cast<std::size_t>(places.rows()), -1);
+  for (const FacingPair& pair : pairs) ways_.faced[static_cast<std::size_t>(pair.first)] = pair.second;
 }
 
 void SelfContact::begin(PointsIn places, const Normals& normals) {

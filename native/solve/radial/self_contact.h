@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include "sampling/point_grid.h"
@@ -22,6 +23,11 @@ struct FacingPair {
 /// overlap others at rest, are left alone. Which side a sample came from tells what is beyond.
 class SelfContact {
  public:
+  /// What tells which side a place came from.
+  struct Ways {
+    Points seen;               ///< places at the last search
+    std::vector<Index> faced;  ///< what each faced then; −1: nothing
+  };
   using Normals = std::function<Points()>;  ///< (n,3) as long as the surface there is stretched
   /// For these rows of the problem's samples. Throws InvalidInput without normals.
   SelfContact(const RadialProblem& problem, const std::vector<Index>& rows, double kept);
@@ -31,6 +37,8 @@ class SelfContact {
   std::vector<FacingPair> find(PointsIn places, const Normals& normals, double near, bool jumped = false);
   /// Whether a part is inside another one, however deep, where it is not at rest.
   bool overlaps(PointsIn places, PointsIn normals) const;
+  const Ways& ways() const { return ways_; }
+  void set_ways(Ways ways) { ways_ = std::move(ways); }
   /// The ways start here.
   void begin(PointsIn places, const Normals& normals);
 
@@ -52,8 +60,7 @@ class SelfContact {
   Vector widths_;              // (n) of the shape there
   Vector least_;               // (n) gaps at rest, at most what is kept; 0: left alone
   double aside_ = 0.0;         // what is farther aside does not face
-  Points seen_;                // places at the last search
-  std::vector<Index> faced_;   // what each faced then; −1: nothing
+  Ways ways_;
 };
 
 }  // namespace arapfields

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The ways that a surface took beside obstacles, which may move, and what a next step needs of them.
+#include <cmath>
+#include <utility>
+
+#include "solve/radial/contact_terms.h"
+#include "solve/radial/handle_motion.h"
+
+namespace arapfields {
+namespace {
+
+/// Notes where samples that may be inside a surface were last seen outside of it.
+void note_inside(Index k, const Points& places, const Points& seen, const Vector& clear,
+                 ContactState& state) {
+  for (Index row = 0; row < places.rows(); ++row)
+    if (clear[row] > 0.0 && (places.row(row) - seen.row(row)).norm() >= clear[row])
+      state.inside.push_back({row, k, seen.row(row).transpose(), clear[row]});
+}
+
+void recall_inside(const ContactState& state, std::vector<Points>& seen, RowMatrix<double>& clear) {
+  for (const ContactState::Inside& held : state.inside)
+    if (held.row < clear.rows() && held.surface < clear.cols()) {
+      seen[static_cast<std::size_t>(held.surface)].row(held.row) = held.seen.transpose();
+      clear(held.row, held.surface) = held.clear;
+    }
+}
+
+}  // namespace
+
+void ContactTerms::begin(const RowMatrix<double>& coefficients) { resume({}, coefficients); }
+
+void ContactTerms::resume(const ContactState& state, const RowMatrix<double>& coefficients) {
+  if (!any()) return release();
+  points_.coarsen();
+  places_ = points_.at(coefficients);
+  if (self_) self_->begin(places_, [&] { return points_.normals_at(coefficients); });
+  const Index count = std::ssize(surfaces_);
+  const bool fits = std::ssize(state.placements) == count;
+  ways_.seen.assign(surfaces_.size(), {});
+  ways_.anchors.assign(surfaces_.size(), {});
+  ways_.clear.resize(places_.rows(), count);
+  pressures_.resize(places_.rows(), count + 1);
+  for (Index k = 0; k < count; ++k) {
+    const auto which = static_cast<std::size_t>(k);
+    surfaces_[which].set_placement(fits ? state.placements[which] : ends_[which]);
+    see(k);
+  }
+  if (fits) recall_inside(state, ways_.seen, ways_.clear);
+  starts_ = fits ? state.placements : ends_;
+  carried_.assign(surfaces_.size(), Mat4::Identity());
+  release();
+  for (const ContactState::Pressure& held : state.pressures)
+    if (held.row < pressures_.rows() && held.surface < pressures_.cols()) {
+      pressures_(held.row, held.surface) = held.pressure;
+      if (held.surface < count)
+        ways_.anchors[static_cast<std::size_t>(held.surface)].row(held.row) = held.anchor.transpose();
+    }
+}
+
+/// The ways from a surface start where the places are.
+void ContactTerms::see(Index k) {
+  ways_.seen[static_cast<std::size_t>(k)] = ways_.anchors[static_cast<std::size_t>(k)] = places_;
+  ways_.clear.col(k) = surfaces_[static_cast<std::size_t>(k)].distances(places_);
+}
+
+ContactState ContactTerms::held() const {
+  ContactState state;
+  for (const BarrierSurface& surface : surfaces_) state.placements.push_back(surface.placement());
+  for (Index row = 0; row < std::min<Index>(pressures_.rows(), points_.sample_count()); ++row)
+    for (Index k = 0; k < pressures_.cols(); ++k)
+      if (pressures_(row, k) > 0.0) {
+        const Points& of =
+            k < std::ssize(ways_.anchors) ? ways_.anchors[static_cast<std::size_t>(k)] : places_;
+        state.pressures.push_back({row, k, pressures_(row, k), of.row(row).transpose()});
+      }
+  const Points places = places_.topRows(std::min<Index>(places_.rows(), points_.sample_count()));
+  for (Index k = 0; k < std::ssize(surfaces_); ++k)
+    note_inside(k, places, ways_.seen[static_cast<std::size_t>(k)], ways_.clear.col(k), state);
+  return state;
+}
+
+void ContactTerms::carry(Index k, const Mat4& motion) {
+  const auto which = static_cast<std::size_t>(k);
+  carried_[which] = motion;
+  ways_.seen[which] = affine_image(ways_.seen[which], motion);
+  ways_.anchors[which] = affine_image(ways_.anchors[which], motion);
+}
+
+void ContactTerms::change_coordinates(const Mat4& motion) {
+  for (std::size_t k = 0; k < starts_.size(); ++k) {
+    starts_[k] = motion * starts_[k];
+    surfaces_[k].set_placement(starts_[k]);
+    ways_.seen[k] = affine_image(ways_.seen[k], motion);
+    ways_.anchors[k] = affine_image(ways_.anchors[k], motion);
+  }
+  places_ = affine_image(places_, motion);
+}
+
+void ContactTerms::move_obstacles(double share) {
+  for (Index k = 0; k < std::ssize(starts_); ++k) {
+    const auto which = static_cast<std::size_t>(k);
+    carried_[which].setIdentity();
+    if (surfaces_[which].placement() == ends_[which]) continue;
+    const Mat4 before = surfaces_[which].placement();
+    if (share < 1.0)
+      surfaces_[which].place_between(starts_[which], ends_[which], share);
+    else
+      surfaces_[which].set_placement(ends_[which]);
+    carry(k, surfaces_[which].placement() * before.inverse());
+  }
+}
+
+double ContactTerms::obstacle_way() const {
+  double way = 0.0;
+  for (std::size_t k = 0; k < starts_.size(); ++k)
+    way = std::max(way, (ends_[k] - surfaces_[k].placement()).topRows<3>().colwise().norm().sum());
+  return way;
+}
+
+/// New places were last seen outside where their samples were.
+void ContactTerms::add_finer_since(Index before) {
+  ways_.clear.conservativeResize(points_.size(), Eigen::NoChange);
+  for (Points& seen : ways_.seen) seen.conservativeResize(points_.size(), Eigen::NoChange);
+  for (Points& anchors : ways_.anchors) anchors.conservativeResize(points_.size(), Eigen::NoChange);
+  for (Index row = before; row < points_.size(); ++row) {
+    const Index sample = points_.sample_of(row);
+    ways_.clear.row(row) = ways_.clear.row(sample);
+    for (Points& seen : ways_.seen) seen.row(row) = seen.row(sample);
+    for (Points& anchors : ways_.anchors) anchors.row(row) = anchors.row(sample);
+  }
+}
+
+ContactWays ContactTerms::ways() const {
+  ContactWays ways = ways_;
+  if (self_) ways.own = self_->ways();
+  return ways;
+}
+
+void ContactTerms::set_ways(ContactWays ways) {
+  if (self_) self_->set_ways(std::move(ways.own));
+  ways_ = std::move(ways);
+  add_finer_since(ways_.clear.rows());
+}
+
+}  // namespace arapfields
