@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "solve/radial/handle_motion.h"
@@ -66,9 +67,8 @@ bool solve_round(RadialState& s, Index iterations, double tolerance, const Progr
   const double allowed = std::max(too_deep, s.contact.deepest());
   const bool converged = s.descend(s.fast, {iterations, tolerance, floor}, progress).converged;
   press_balanced(s);
-  const double way = s.contact.fastest(s.shape.coefficients - before);
   const ContactWays ways = s.contact.ways();
-  double depth = s.contact.find(s.shape.coefficients, way);
+  double depth = s.contact.find(s.shape.coefficients, std::nullopt);
   bool back = false;
   for (int half = 0; half < most_halves && depth > allowed; ++half) {
     back = true;

@@ -154,25 +154,25 @@ void ContactTerms::find_outside(const std::vector<Index>& rows) {
   }
 }
 
-double ContactTerms::find(const RowMatrix<double>& coefficients, double further, bool jumped) {
-  further_ = further;
+double ContactTerms::find(const RowMatrix<double>& coefficients, std::optional<double> further, bool jumped) {
+  const Points before = std::exchange(places_, points_.at(coefficients));
+  further_ = further ? *further : std::sqrt((places_ - before).rowwise().squaredNorm().maxCoeff());
   grips_ = false;
-  places_ = points_.at(coefficients);
   found_.planes.clear();
   deepest_ = 0.0;
   find_outside(near_rows());
   const std::vector<Index> edges = at_edges();
-  const Index before = points_.size();
+  const Index known = points_.size();
   points_.refine(edges);
-  if (points_.size() > before) {
-    const Points finer = points_.at(coefficients).bottomRows(points_.size() - before);
+  if (points_.size() > known) {
+    const Points finer = points_.at(coefficients).bottomRows(points_.size() - known);
     places_.conservativeResize(points_.size(), Eigen::NoChange);
     places_.bottomRows(finer.rows()) = finer;
     pressures_.conservativeResize(places_.rows(), Eigen::NoChange);
     pressures_.bottomRows(finer.rows()).setZero();
-    add_finer_since(before);
+    add_finer_since(known);
     std::vector<Index> rows(static_cast<std::size_t>(finer.rows()));
-    std::iota(rows.begin(), rows.end(), before);
+    std::iota(rows.begin(), rows.end(), known);
     find_outside(rows);
   }
   deepest_outside_ = deepest_;

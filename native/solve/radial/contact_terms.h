@@ -40,9 +40,11 @@ class ContactTerms {
   double obstacle_way() const;
 
   /// Follows the surface, and finds the planes near it. Returns how deep a place is beyond a margin.
-  /// `further`: how much farther than usual, in cube units, what is near lies. `jumped`: the way here is not
-  /// known, so that what the surface came through of itself is told by facing normals.
-  double find(const RowMatrix<double>& coefficients, double further = 0.0, bool jumped = false);
+  /// `further`: how much farther than usual, in cube units, what is near lies; none: as far as the surface
+  /// has moved since the last search. `jumped`: the way here is not known, so that what the surface came
+  /// through of itself is told by facing normals.
+  double find(const RowMatrix<double>& coefficients, std::optional<double> further = 0.0,
+              bool jumped = false);
   ContactWays ways() const;
   /// Takes back all searches since these were the ways.
   void set_ways(ContactWays ways);
