@@ -89,7 +89,7 @@ def test_a_bar_on_a_ball_comes_to_rest_however_far_its_ends_go_down():
 @pytest.mark.parametrize("itself", [False, True])
 @pytest.mark.parametrize("kind", ["cuboid", "pin above", "pin beside"])
 def test_a_handle_that_is_pulled_into_the_ground_gives_way(samples, kind, itself):
-    """The ground is 0.1 below the bar, whose end is pulled down by 0.9. A squashed one has an energy over 0.1."""
+    """By 0.9, where the ground is 0.1 below the bar. A bar that is squashed has an energy over 0.1."""
     ends = [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, DEEP[1])]
     if kind != "cuboid":
         place = np.array([3.8, 0, 0.5] if kind == "pin above" else [3.8, -0.5, 0])

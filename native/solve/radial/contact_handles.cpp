@@ -18,6 +18,8 @@ constexpr double settled = 1e-6;
 /// What lies under a point handle, in widths of the shape there: no farther from it at rest, nor aside of it
 /// as seen along a plane's normal.
 constexpr double under = 1.5, aside = 0.35;
+/// Samples that a handle at rest counts for where another one is pressed onto it.
+constexpr double unmoved = 1e9;
 /// Searches for the thickest part of the shape beside a point handle, which may lie at an edge.
 constexpr int thicker = 3;
 
@@ -125,6 +127,11 @@ std::vector<Index> hold_back(RadialState& s, std::vector<Mat4>& motions) {
   const auto target = [&](Index place, Index handle) -> Vec3 {
     return affine_image(set.places.row(place), motions[static_cast<std::size_t>(handle)]).row(0);
   };
+  const auto mass = [&](Index handle) {
+    const BoundHandles& handles = s.handles.bound();
+    const bool rests = handles.motion(handle) == Mat4::Identity();
+    return rests ? unmoved : static_cast<double>(handles.begin(handle + 1) - handles.begin(handle));
+  };
   std::vector<std::vector<Bound>> bounds(motions.size());
   const std::vector<Pin> points = pins(s, motions);
   const Points places = points.empty() ? Points() : contact_places(s);
@@ -138,10 +145,12 @@ std::vector<Index> hold_back(RadialState& s, std::vector<Mat4>& motions) {
     if (first < 0 || first == second || (plane.second >= 0 && second < 0)) continue;
     const Vec3 other = second < 0 ? Vec3(Vec3::Zero()) : target(plane.second, second);
     const double depth = plane.offset - plane.normal.dot(target(plane.first, first) - other);
-    const double each = second < 0 ? depth : 0.5 * depth;  // both go back
-    bounds[static_cast<std::size_t>(first)].push_back({plane.normal, each, plane.obstacle});
+    const double own =
+        second < 0 ? 1.0 : mass(second) / (mass(first) + mass(second));  // the lighter gives way
+    bounds[static_cast<std::size_t>(first)].push_back({plane.normal, own * depth, plane.obstacle});
     if (second >= 0)
-      bounds[static_cast<std::size_t>(second)].push_back({-plane.normal, each, plane.obstacle});
+      bounds[static_cast<std::size_t>(second)].push_back(
+          {-plane.normal, (1.0 - own) * depth, plane.obstacle});
   }
   for (std::size_t i = 0; i < motions.size(); ++i) {
     const auto [way, surface] = least_translation(bounds[i]);
