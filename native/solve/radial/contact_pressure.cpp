@@ -52,9 +52,9 @@ Index ContactTerms::sample_of(Index place) const {
   return points_.samples()[static_cast<std::size_t>(points_.sample_of(row))];
 }
 
-double ContactTerms::touching() const {
+double ContactSet::touching() const {
   double share = 0.0;
-  for (const ContactPlane& plane : found_.planes)
+  for (const ContactPlane& plane : planes)
     if (plane.pressure > 0.0) share += plane.share;
   return share;
 }
@@ -65,10 +65,10 @@ std::string ContactTerms::name_of(Index surface) const {
   return surface < std::ssize(surfaces_) ? "ground" : "itself";
 }
 
-Points ContactTerms::forces_at(const Vec3& place, const double* places) const {
-  Points forces = Points::Zero(pressures_.cols(), 3);
-  for (const ContactPlane& plane : found_.planes) {
-    const double share = nearness(places, plane.first, place) - nearness(places, plane.second, place);
+Points ContactSet::forces_at(const Vec3& place, const double* now, Index surfaces) const {
+  Points forces = Points::Zero(surfaces, 3);
+  for (const ContactPlane& plane : planes) {
+    const double share = nearness(now, plane.first, place) - nearness(now, plane.second, place);
     forces.row(plane.obstacle) += share * plane.share * plane.pressure * plane.normal.transpose();
   }
   return forces;
@@ -95,15 +95,15 @@ void ContactTerms::grip() {
     if (plane.second < 0) plane.grip = coefficient * plane.pressure;
 }
 
-void ContactTerms::harden(bool more) {
+void ContactSet::harden(bool more) {
   double sum = 0.0, share = 0.0;
-  for (const ContactPlane& plane : found_.planes) {
+  for (const ContactPlane& plane : planes) {
     sum += plane.share * plane.pressure;
     if (plane.pressure > 0.0) share += plane.share;
   }
   const double fitting = share > 0.0 ? sum / share / hover : 0.0;
-  const double wanted = std::max({found_.stiffness, fitting, more ? harder * found_.stiffness : 0.0});
-  found_.stiffness = std::min(wanted, hardest);
+  const double wanted = std::max({stiffness, fitting, more ? harder * stiffness : 0.0});
+  stiffness = std::min(wanted, hardest);
 }
 
 }  // namespace arapfields

@@ -84,7 +84,7 @@ bool solve_round(RadialState& s, Index iterations, double tolerance, const Progr
 void report_contact(RadialState& s) {
   const double scale = s.problem.frame().scale;
   ContactReport& report = s.report.contact;
-  report = {scale * s.contact.deepest(), s.contact.touching(), s.contact.deepest() > deep, {}};
+  report = {scale * s.contact.deepest(), s.contact.found().touching(), s.contact.deepest() > deep, {}};
   const RadialObjective<float>& objective = s.objective(s.fast);  // of the planes that were found last
   const Points places = contact_places(s);
   const Points values = objective.handle_values(s.measurements(s.fast)).cast<double>();
@@ -99,7 +99,8 @@ void report_contact(RadialState& s) {
     const double distance = left.rowwise().norm().mean();
     if (distance < held_back) continue;
     const Vec3 middle = values.middleRows(first, last - first).colwise().mean();
-    const Vector along = s.contact.forces_at(middle, places.data()) * left.colwise().mean().transpose();
+    const Vector along = s.contact.found().forces_at(middle, places.data(), s.contact.surface_count()) *
+                         left.colwise().mean().transpose();
     Index by = 0;
     const bool pressed = along.minCoeff(&by) < 0.0;
     const Index back = surfaces[static_cast<std::size_t>(handle)];

@@ -170,7 +170,7 @@ double ContactTerms::find(const RowMatrix<double>& coefficients, std::optional<d
     places_.bottomRows(finer.rows()) = finer;
     pressures_.conservativeResize(places_.rows(), Eigen::NoChange);
     pressures_.bottomRows(finer.rows()).setZero();
-    add_finer_since(known);
+    add_finer_ways();
     std::vector<Index> rows(static_cast<std::size_t>(finer.rows()));
     std::iota(rows.begin(), rows.end(), known);
     find_outside(rows);

@@ -57,16 +57,13 @@ class ContactTerms {
   Index surface_count() const { return pressures_.cols(); }
   /// Friction holds what was found, as hard as it presses.
   void grip();
-  /// The planes become as stiff as their pressures ask for, or `more`: where depths do not fall.
-  void harden(bool more);
+  void harden(bool more) { found_.harden(more); }
   /// No planes: the surface is free.
   void release();
 
   const ContactSet& found() const { return found_; }
   Index sample_of(Index place) const;  ///< of the problem's, that a found place is of
   bool presses() const { return !found_.planes.empty(); }
-  /// Forces of each surface, (surfaces, 3), on what is at a place: nearer ones count more.
-  Points forces_at(const Vec3& place, const double* places) const;
   std::string name_of(Index surface) const;
   double deepest() const { return deepest_; }
   /// The same beyond obstacles and the ground alone.
@@ -75,17 +72,15 @@ class ContactTerms {
   bool touches_itself() const { return touches_itself_; }
   /// Whether a part is inside another one there, however deep.
   bool overlaps(const RowMatrix<double>& coefficients);
-  double touching() const;
 
  private:
   void gather_surfaces();
   void see(Index k);
-  void carry(Index k, const Mat4& motion);
   std::vector<Index> near_rows() const;
   void find_outside(const std::vector<Index>& rows);
   Vector add_planes(Index k, const std::vector<Index>& rows, PointsIn now);
   std::vector<Index> at_edges();
-  void add_finer_since(Index before);
+  void add_finer_ways();
   void add_own_planes(const RowMatrix<double>& coefficients, bool jumped);
   void gather_places();
 

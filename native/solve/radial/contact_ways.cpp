@@ -79,19 +79,28 @@ ContactState ContactTerms::held() const {
   return state;
 }
 
-void ContactTerms::carry(Index k, const Mat4& motion) {
-  const auto which = static_cast<std::size_t>(k);
-  carried_[which] = motion;
-  ways_.seen[which] = affine_image(ways_.seen[which], motion);
-  ways_.anchors[which] = affine_image(ways_.anchors[which], motion);
+void ContactWays::carry(Index surface, const Mat4& motion) {
+  const auto k = static_cast<std::size_t>(surface);
+  seen[k] = affine_image(seen[k], motion);
+  anchors[k] = affine_image(anchors[k], motion);
+}
+
+void ContactWays::add(const std::vector<Index>& like) {
+  const Index before = clear.rows(), count = before + std::ssize(like);
+  clear.conservativeResize(count, Eigen::NoChange);
+  clear.bottomRows(std::ssize(like)) = clear(like, Eigen::all).eval();
+  for (std::vector<Points>* each : {&seen, &anchors})
+    for (Points& places : *each) {
+      places.conservativeResize(count, Eigen::NoChange);
+      places.bottomRows(std::ssize(like)) = places(like, Eigen::all).eval();
+    }
 }
 
 void ContactTerms::change_coordinates(const Mat4& motion) {
   for (std::size_t k = 0; k < starts_.size(); ++k) {
     starts_[k] = motion * starts_[k];
     surfaces_[k].set_placement(starts_[k]);
-    ways_.seen[k] = affine_image(ways_.seen[k], motion);
-    ways_.anchors[k] = affine_image(ways_.anchors[k], motion);
+    ways_.carry(static_cast<Index>(k), motion);
   }
   places_ = affine_image(places_, motion);
 }
@@ -106,7 +115,8 @@ void ContactTerms::move_obstacles(double share) {
       surfaces_[which].place_between(starts_[which], ends_[which], share);
     else
       surfaces_[which].set_placement(ends_[which]);
-    carry(k, surfaces_[which].placement() * before.inverse());
+    carried_[which] = surfaces_[which].placement() * before.inverse();
+    ways_.carry(k, carried_[which]);
   }
 }
 
@@ -118,16 +128,10 @@ double ContactTerms::obstacle_way() const {
 }
 
 /// New places were last seen outside where their samples were.
-void ContactTerms::add_finer_since(Index before) {
-  ways_.clear.conservativeResize(points_.size(), Eigen::NoChange);
-  for (Points& seen : ways_.seen) seen.conservativeResize(points_.size(), Eigen::NoChange);
-  for (Points& anchors : ways_.anchors) anchors.conservativeResize(points_.size(), Eigen::NoChange);
-  for (Index row = before; row < points_.size(); ++row) {
-    const Index sample = points_.sample_of(row);
-    ways_.clear.row(row) = ways_.clear.row(sample);
-    for (Points& seen : ways_.seen) seen.row(row) = seen.row(sample);
-    for (Points& anchors : ways_.anchors) anchors.row(row) = anchors.row(sample);
-  }
+void ContactTerms::add_finer_ways() {
+  std::vector<Index> samples;
+  for (Index row = ways_.clear.rows(); row < points_.size(); ++row) samples.push_back(points_.sample_of(row));
+  ways_.add(samples);
 }
 
 ContactWays ContactTerms::ways() const {
@@ -139,7 +143,7 @@ ContactWays ContactTerms::ways() const {
 void ContactTerms::set_ways(ContactWays ways) {
   if (self_) self_->set_ways(std::move(ways.own));
   ways_ = std::move(ways);
-  add_finer_since(ways_.clear.rows());
+  add_finer_ways();
 }
 
 }  // namespace arapfields

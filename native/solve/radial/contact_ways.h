@@ -15,6 +15,13 @@ struct ContactSet {
   std::vector<ContactPlane> planes;
   Revision revision = 0;   ///< 0: no planes
   double stiffness = 0.0;  ///< of energy a unit of area for a unit of squared depth, halved
+
+  /// The share of the area that presses.
+  double touching() const;
+  /// Forces of each surface, (surfaces, 3), on what is at a place: nearer ones count more.
+  Points forces_at(const Vec3& place, const double* now, Index surfaces) const;
+  /// The planes become as stiff as their pressures ask for, or `more`: where depths do not fall.
+  void harden(bool more);
 };
 
 /// The ways that places took, of each surface: `seen` and `anchors` go along with it.
@@ -23,6 +30,11 @@ struct ContactWays {
   std::vector<Points> anchors;  ///< where friction holds them
   RowMatrix<double> clear;      ///< (places, surfaces) no surface is nearer to where they were seen
   SelfContact::Ways own;
+
+  /// The surface and all that belongs to it have moved.
+  void carry(Index surface, const Mat4& motion);
+  /// Adds places, which are where the others at these rows are.
+  void add(const std::vector<Index>& like);
 };
 
 }  // namespace arapfields

@@ -101,7 +101,7 @@ void TimeIntegrator::integrate(const Progress& progress) {
       objective.set_targets(state_.handles.targets_at(motions));
       return integrate_step(scheme, progress.part(share(0.0), share(1.0)));
     };
-    const bool touches = state_.contact.touching() > 0.0;
+    const bool touches = state_.contact.found().touching() > 0.0;
     if (touches || !integrated(body_.accelerations.size() > 0 ? usual : TimeScheme::midpoint()))
       integrated(TimeScheme::backward_euler());
   }

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Contact of what moves: a body that falls, obstacles that sweep it along, friction."""
+
+import numpy as np
+import pytest
+from support.geometry.bar import LEFT, RIGHT, bar_samples, turned
+from support.geometry.contact_bar import ALIKE, DEEPEST, PLATE, live
+
+import arapfields as af
+
+
+@pytest.fixture(scope="module")
+def samples():
+    return bar_samples(16000)
+
+
+def test_a_body_that_falls_lands_on_the_ground(samples):
+    falling = live(samples, af.Contact(ground=-0.7))
+    falling.set_secondary_motion(af.SecondaryMotionOptions(gravity=200.0, damping=0.5))
+    lowest = []
+    for _ in range(12):
+        field = falling.step([LEFT, RIGHT], 1 / 24)
+        lowest.append(field(samples.points)[:, 2].min())
+    assert min(lowest) > -0.7 - DEEPEST
+    assert min(lowest) < -0.69
+
+
+def test_a_plate_that_moves_faster_than_it_is_thick_takes_the_shape_along(samples):
+    """The plate is 0.03 thick and rises by 0.2 a frame."""
+    ends = []
+    for rounding in (0.0, 1e-12):
+        swept = live(samples, af.Contact([af.Obstacle(PLATE, placement=turned(0, shift=(0, 0, -0.2)))]))
+        swept.set_handles([af.Cuboid(LEFT, LEFT)])
+        swept.solve()
+        for k in range(5):
+            rise = 0.2 * k - 0.2 + rounding
+            swept.set_contact(af.Contact([af.Obstacle(PLATE, placement=turned(0, shift=(0, 0, rise)))]))
+            field = swept.solve(iterations=20)
+        ends.append(field(samples.points))
+    over = ends[0][:, 0] > 0.05
+    assert over.sum() > 4000 and ends[0][over, 2].min() > -0.8 + rise - 2 * DEEPEST
+    assert np.abs(ends[1] - ends[0]).max() < ALIKE and swept.report.energy < 0.01
+
+
+def test_friction_holds_what_slides(samples):
+    """A bar falls by 0.01 onto the ground, a slope of 0.2, which holds it with a coefficient of 0.5."""
+    ways = []
+    for friction in (0.0, 0.5):
+        free = af.LiveOptions(samples=800, coarse_centers=30, fine_centers=150, handle_weight=1e-6)
+        contact = af.Contact(ground=-0.51, friction=friction)
+        resting = af.LiveDeformer(samples, [af.Cuboid(LEFT, LEFT)], free, contact=contact)
+        resting.set_secondary_motion(
+            af.SecondaryMotionOptions(gravity=30.0, damping=0.0), up=[-0.2, 0, np.sqrt(0.96)]
+        )
+        for _ in range(12):
+            field = resting.step(None, 1 / 24)
+        ways.append(field(samples.points)[:, 0].mean() - samples.points[:, 0].mean())
+    assert ways[0] > 0.6 and abs(ways[1]) < 0.03
+    for _ in range(12):
+        field = resting.step(None, 1 / 24)
+    later = field(samples.points)[:, 0].mean() - samples.points[:, 0].mean()
+    assert abs(later - ways[1]) < 1e-4  # it rests, and does not creep
