@@ -152,20 +152,27 @@ void ContactPoints::coarsen() {
   ++finer_places_;
   is_fine_.assign(samples_.size(), false);
   rest_.conservativeResize(sample_count(), Eigen::NoChange);
+  places_.conservativeResize(std::min(places_.rows(), sample_count()), Eigen::NoChange);
 }
 
-Points ContactPoints::at(const RowMatrix<double>& coefficients) {
-  const Index n = sample_count(), m = size() - n;
-  Points places(n + m, 3);
-  const auto fill = [&](Dependent<RadialEvaluator<double>, 1>& made, Revision of, Index first, Index count) {
-    const RadialEvaluator<double>& evaluator = made.get({of}, [&] {
-      return RadialEvaluator<double>(problem_.basis, rest_.middleRows(first, count), JetOrder::value);
+const Points& ContactPoints::at(const RowMatrix<double>& coefficients) {
+  const Index n = sample_count(), all = size();
+  const bool moved = coefficients.rows() != coefficients_.rows() || coefficients != coefficients_;
+  if (moved) places_.resize(0, 3);
+  coefficients_ = coefficients;
+  const Index known = places_.rows();
+  places_.conservativeResize(all, Eigen::NoChange);
+  const auto fill = [&](Dependent<RadialEvaluator<float>, 1>& made, Revision of, Index first, Index count) {
+    const RadialEvaluator<float>& evaluator = made.get({of}, [&] {
+      return RadialEvaluator<float>(problem_.basis, rest_.middleRows(first, count), JetOrder::value);
     });
-    evaluator.evaluate(coefficients, {places.data() + 3 * first, count, JetOrder::value});
+    PointsF places(count, 3);
+    evaluator.evaluate(coefficients, {places.data(), count, JetOrder::value});
+    places_.middleRows(first, count) = places.cast<double>();
   };
-  fill(evaluator_, 1, 0, n);
-  if (m > 0) fill(finer_, finer_places_, n, m);
-  return places;
+  if (known < n) fill(evaluator_, 1, 0, n);
+  if (all > std::max(n, known)) fill(finer_, finer_places_, n, all - n);
+  return places_;
 }
 
 Points ContactPoints::normals_at(const RowMatrix<double>& coefficients) {

@@ -37,7 +37,7 @@ class ContactPoints {
   /// The samples alone.
   void coarsen();
 
-  Points at(const RowMatrix<double>& coefficients);
+  const Points& at(const RowMatrix<double>& coefficients);
   /// Which way the samples face, as long as the surface is stretched.
   Points normals_at(const RowMatrix<double>& coefficients);
 
@@ -54,8 +54,10 @@ class ContactPoints {
   std::vector<Index> cells_;         // of each
   std::vector<std::vector<Index>> near_;
   Revision finer_places_ = 0;
-  Dependent<RadialEvaluator<double>, 1> evaluator_;
-  Dependent<RadialEvaluator<double>, 1> finer_;
+  Dependent<RadialEvaluator<float>, 1> evaluator_;
+  Dependent<RadialEvaluator<float>, 1> finer_;
+  RowMatrix<double> coefficients_;  // of the places that were asked for last
+  Points places_;
   Dependent<RadialEvaluator<float>, 1> slopes_;  // of the samples
 };
 
