@@ -10,10 +10,8 @@ namespace {
 
 /// A bone matters where it is at most so many times as far as the nearest, through the inside.
 constexpr float farthest_share = 12.0f;
-/// The same for bones of the other side: a leg does not move the other.
-constexpr float side_share = 2.0f;
-/// Of the distances of bones, and of those of the other side, in squared sizes of the shape.
-constexpr double distance_weight = 2e-6, side_weight = 1e-4;
+/// Of the distances of bones, in squared sizes of the shape.
+constexpr double distance_weight = 2e-6;
 
 }  // namespace
 
@@ -27,11 +25,10 @@ BoneChoice::BoneChoice(const RigShape& rig,
   const float least = std::max(distances[all.front()], static_cast<float>(rig.spacing));
   std::vector<double> costs;
   for (Index k = 0; k < most; ++k) {
-    const bool across = rig.sides[all[k]] * rig.sides[all[0]] < 0;
-    if (k > 0 && !(distances[all[k]] < (across ? side_share : farthest_share) * least)) continue;
+    if (k > 0 && !(distances[all[k]] < farthest_share * least)) continue;
     const double farther = static_cast<double>(distances[all[k]] / least) - 1.0;
     bones.push_back(all[k]);
-    costs.push_back((across ? side_weight : distance_weight) * farther * farther);
+    costs.push_back(distance_weight * farther * farther);
   }
   penalties = Eigen::Map<const Vector>(costs.data(), static_cast<Index>(costs.size()));
 }

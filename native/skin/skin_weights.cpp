@@ -7,6 +7,7 @@
 #include "core/parallel.h"
 #include "distance/welded_vertices.h"
 #include "skin/example_poses.h"
+#include "skin/limb_sides.h"
 #include "skin/vertex_blend.h"
 #include "skin/weight_fit.h"
 
@@ -76,6 +77,7 @@ RowMatrix<float> fitted_points(const RigShape& rig, PointsIn points, PointsIn no
   const VertexBlend blend(rig, points, normals);
   const Mirror mirror(rig, points);
   RowMatrix<float> nearby = blend(fitted.nodes), distances = blend(rig.bone_distances);
+  keep_limbs_apart(rig, points, normals, distances);
   mirror.average(nearby);
   mirror.average(distances);
   progress.report(0.93, "Weights");

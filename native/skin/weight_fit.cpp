@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/parallel.h"
+#include "skin/limb_sides.h"
 
 namespace arapfields {
 namespace {
@@ -15,8 +16,10 @@ constexpr int sweeps = 20;
 
 WeightFit::WeightFit(const RigShape& rig)
     : rig_(rig), weights_(RowMatrix<float>::Zero(rig.size(), rig.skeleton.count())) {
+  RowMatrix<float> distances = rig.bone_distances;
+  keep_limbs_apart(rig, rig.nodes, rig.normals, distances);
   for (Index i = 0; i < rig.size(); ++i) {
-    choices_.emplace_back(rig, rig.bone_distances.row(i));
+    choices_.emplace_back(rig, distances.row(i));
     squares_.push_back(BonePairs::Zero(choices_[i].count(), choices_[i].count()));
     weights_(i, choices_[i].bones.front()) = 1.0f;
   }

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "skin/limb_sides.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "sampling/oriented_points.h"
+
+namespace arapfields {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+/// In sizes of the shape: over this length before limbs part, bones of the other side lose their effect.
+constexpr double fade = 0.08;
+/// The same for the depth of a gap between limbs that do not part.
+constexpr double gap_fade = 0.006;
+/// A sheet that runs on across the plane turns less than this.
+constexpr double sheet_cosine = 0.7;
+/// Where a surface at the plane faces a limb's end with at least this cosine, the limb parts from its twin.
+constexpr double facing_end = 0.5;
+
+/// The bones of one side that hang on one another.
+struct Limb {
+  Vec3 along = Vec3::Zero();   ///< unit vector within the plane of symmetry, to the farthest end
+  double parting = -infinity;  ///< how far along it the limb and its twin still meet; −infinity: nowhere
+};
+
+/// The first bone of each bone's limb.
+std::vector<Index> roots_of(const RigShape& rig) {
+  std::vector<Index> roots;
+  for (Index b = 0; b < rig.skeleton.count(); ++b) {
+    Index root = b;
+    for (Index up = b; up >= 0 && rig.sides[up] == rig.sides[b]; up = rig.skeleton.bone(up).parent) root = up;
+    roots.push_back(root);
+  }
+  return roots;
+}
+
+/// By the first bone; the surface has outward normals.
+std::vector<Limb> limbs_of(const RigShape& rig, const std::vector<Index>& roots, PointsIn surface) {
+  std::vector<Limb> limbs(roots.size());
+  for (std::size_t b = 0; b < roots.size(); ++b) {
+    const Vec3 start = rig.skeleton.bone(roots[b]).head;
+    for (const Vec3& end : {rig.skeleton.bone(b).head, rig.skeleton.bone(b).tail})
+      if ((end - start).squaredNorm() > limbs[roots[b]].along.squaredNorm())
+        limbs[roots[b]].along = end - start;
+  }
+  for (Limb& limb : limbs) {
+    limb.along[rig.symmetry.axis] = 0.0;
+    limb.along.normalize();
+  }
+  const BoneRegions regions(rig.skeleton, surface, rig.samples.normals);
+  for (Index i = 0; i < surface.rows(); ++i) {
+    const Index b = regions.owner[i];
+    if (rig.sides[b] == 0) continue;
+    if (std::abs(surface(i, rig.symmetry.axis) - rig.symmetry.offset) > rig.spacing) continue;
+    const Vec3 along = limbs[roots[b]].along;
+    if (rig.samples.normals.row(i).dot(along) < facing_end) continue;
+    for (const Index side : {b, rig.symmetry.mirrored[b]}) {
+      Limb& limb = limbs[roots[side]];
+      limb.parting = std::max(limb.parting, limb.along.dot(surface.row(i)));
+    }
+  }
+  return limbs;
+}
+
+}  // namespace
+
+void keep_limbs_apart(const RigShape& rig, PointsIn points, PointsIn normals, RowMatrix<float>& distances) {
+  if (std::ranges::all_of(rig.sides, [](int side) { return side == 0; })) return;
+  const int axis = rig.symmetry.axis;
+  const Points surface = rig.samples.frame.to_mesh(rig.samples.points);
+  const std::vector<Index> roots = roots_of(rig);
+  const std::vector<Limb> limbs = limbs_of(rig, roots, surface);
+  Points middle = points;
+  middle.col(axis).setConstant(rig.symmetry.offset);
+  const std::vector<Index> nearest =
+      OrientedPoints(surface, rig.samples.normals).nearest(middle, Points::Zero(points.rows(), 3), 0.0);
+  for (Index i = 0; i < points.rows(); ++i) {
+    const double beyond = points(i, axis) - rig.symmetry.offset;
+    Index own = -1;
+    for (Index b = 0; b < rig.skeleton.count(); ++b)
+      if (rig.sides[b] * beyond > 0.0 && (own < 0 || distances(i, b) < distances(i, own))) own = b;
+    if (own < 0) continue;
+    // How far the point's place between the sides lies outside of the shape.
+    const Vec3 normal = rig.samples.normals.row(nearest[i]);
+    const double gap = normal.dot(Vec3(middle.row(i) - surface.row(nearest[i])));
+    const double closed = 1.0 - gap / (gap_fade * rig.extent);
+    const Limb& limb = limbs[roots[own]];
+    double open = closed;
+    if (limb.parting > -infinity) {
+      const double same = (normals.row(i).dot(normal) - sheet_cosine) / (1.0 - sheet_cosine);
+      open = std::max((limb.parting - limb.along.dot(points.row(i))) / (fade * rig.extent),
+                      std::clamp(closed, 0.0, 1.0) * std::min(1.0, 2.0 * same));
+    }
+    for (Index b = 0; b < rig.skeleton.count(); ++b)
+      if (rig.sides[b] * beyond < 0.0)
+        distances(i, b) = open > 0.0 ? distances(i, b) / static_cast<float>(std::min(open, 1.0))
+                                     : std::numeric_limits<float>::infinity();
+  }
+}
+
+}  // namespace arapfields
