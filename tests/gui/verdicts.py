@@ -153,6 +153,8 @@ EXPECTED = {  # of each part, every entry that it finds
         **all_of(TRUE, "wrap_undone", "wrap_undone_bones", "wrap_redone", "wrap_redone_bones"),
         "wrap_stack": Rule("a field and an armature", lambda figures: {"NODES", "ARMATURE"} <= {*figures}),
         **all_of(TRUE, "wrap_outlives_its_target", "wrap_opened_again"),
+        **all_of(TRUE, "sequence_escape", "sequence_undone"),
+        "sequence_rises_by": near(0.1, by=0.02),
     },
     "endings": {
         **dict.fromkeys(("ends_on_undo", "ends_on_load"), TRUE),

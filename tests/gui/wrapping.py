@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Wrap by mouse: the target chosen, landmarks clicked, the press, Esc, Factor, undo, a file opened again."""
+"""Wrap by mouse: the target chosen, landmarks clicked, the press, Esc, Factor, undo, a file opened again, and
+a sequence of scans."""
 
+import shutil
 import time
 import types
 
@@ -17,7 +19,8 @@ from addon.core.runtime import jobs
 
 SCAN_AT = Vector((2.0, 0, 0))
 # In the sidebar, of a window of 1600 × 1000, with Wrap alone open.
-EYEDROPPER, BUTTON, WRAP = (1263, 240), (1155, 265), (1155, 494)
+EYEDROPPER, BUTTON, WRAP = (1263, 240), (1155, 286), (1155, 517)
+SEQUENCE = (1155, 825)  # the same of an object that is wrapped, its bones fitted
 SETTLED = 1.5  # seconds in which the sidebar's sections slide to where they stay
 
 
@@ -160,6 +163,46 @@ def target_gone(figures, folder):
     bpy.ops.wm.open_mainfile(filepath=path)
     yield 2.0
     figures["wrap_opened_again"] = np.array_equal(shape(), before)
+    yield from sequence(figures, folder)
+
+
+def sequence(figures, folder):
+    """A scan that rises from frame 1 to frame 2: Esc in the first frame, then to the end; undone."""
+    body = bpy.data.objects["Body"]
+    shutil.rmtree(folder / "cache", ignore_errors=True)
+    with stage.override():
+        body.arapfields.wrap.frames = home = bpy.data.collections.new("Scans")
+        bpy.context.scene.collection.children.link(home)
+        for number in (1, 2):
+            scan, _ = wraps.scan_of(wraps.grown_parts())
+            scan.name, scan.location = f"scan_{number}", SCAN_AT + Vector((0, 0, 0.1 * number))
+            home.objects.link(scan)
+        for entry in body.arapfields.wrap.landmarks:  # their places went with the target
+            bpy.data.objects.remove(entry.on_target)
+        scenes.activate(body)
+        bpy.ops.ed.undo_push(message="scans")
+    yield SETTLED
+    before, stack = shape(), [m.type for m in body.modifiers]
+    yield from click(SEQUENCE, pause=1.0)
+    was_running = jobs.running() is not None
+    stage.picture(folder, "wrap-sequence")
+    stage.tool("mousemove", 600, 500)
+    yield from keys("Escape", pause=0.1)
+    yield from until_idle(20.0)
+    figures["sequence_escape"] = was_running and [m.type for m in body.modifiers] == stack
+    yield from click(SEQUENCE, pause=1.0)
+    yield from until_idle(400.0)
+    heights = []
+    for frame in (1, 2):
+        bpy.context.scene.frame_set(frame)
+        heights.append(shape()[:, 2].mean())
+    figures["sequence_rises_by"] = round(float(heights[1] - heights[0]), 3)
+    yield 0.6
+    stage.picture(folder, "wrap-sequence-done")
+    stage.tool("mousemove", 600, 500)
+    yield from keys("ctrl+z", pause=1.5)
+    stack_now = [m.type for m in bpy.data.objects["Body"].modifiers]
+    figures["sequence_undone"] = stack_now == stack and np.array_equal(shape(), before)
 
 
 def fielded(item):
