@@ -5,6 +5,7 @@ import math
 import re
 from types import SimpleNamespace
 
+from ..blender import modifier_stack
 from ..blender.evaluation import depsgraph_of
 from ..blender.language import translated
 from ..blender.native_options import options_of
@@ -52,6 +53,17 @@ def frames_of(numbers):
     numbers = sorted(numbers)
     step = math.gcd(*(number - numbers[0] for number in numbers)) or 1
     return Frames(float(numbers[0]), float(step), (numbers[-1] - numbers[0]) // step + 1)
+
+
+def put_after_armatures(item):
+    """A scan has its own pose: the modifier that plays it comes after those that would pose it again."""
+    stack, cache = list(item.modifiers), modifier_stack.find_cache(item)
+    if cache is None:
+        return
+    first = stack.index(cache)
+    last = max((k for k, one in enumerate(stack) if one.type == "ARMATURE"), default=first)
+    if last > first and all(one.type in modifier_stack.KEEPING for one in stack[first:last]):
+        item.modifiers.move(first, last)
 
 
 class WrapSolver(FrameSolver):
@@ -145,6 +157,10 @@ class WrapBake(ObjectBake):
     def place(self, context, job):
         line = yield from super().place(context, job)
         self.marks.put()
+        source = self.reference.get()
+        for item in (source, *(carried.reference.find() for carried in self.carried.carrying.objects)):
+            if item is not None and item.type == "MESH":
+                put_after_armatures(item)
         _, frame, report = self.worst
         worst = {"frame": plain(frame), "figures": describe("", report.to_dict(), 1.0)}
         return f"{line}; {translated('at worst, in frame {frame}: {figures}', **worst)}"

@@ -12,7 +12,7 @@ if IN_BLENDER:
     import bpy
     from support.blender import scenes
     from support.blender.baking import at, cache_file, cancelled_at, stepped
-    from support.blender.wraps import SMALL, bar_and_target
+    from support.blender.wraps import SMALL, bar_and_target, rigged_bar, soup_of
     from support.geometry import wrap_cases as cases
 
     import arapfields as af
@@ -84,6 +84,24 @@ def test_a_template_follows_a_collection_and_names_what_is_missing():
     assert "Template: Frame 6: scan_6: the mesh is empty; the shape before stays" in said, said
     assert any("4 frames of 66 points baked" in text and "at worst, in frame" in text for text in said), said
     assert bpy.ops.arapfields.remove_bake() == {"FINISHED"} and not item.modifiers
+
+
+def test_a_pose_does_not_add_to_what_is_scanned():
+    """Wrapped once, the field stands before the armature; a scan has its own pose."""
+    item, rig = rigged_bar()
+    for name, value in SMALL.items():
+        setattr(item.arapfields.wrap, name, value)
+    target = soup_of(item)
+    item.arapfields.wrap.onto = target
+    assert bpy.ops.arapfields.wrap() == {"FINISHED"}
+    rig.pose.bones["Upper"].rotation_mode = "XYZ"
+    rig.pose.bones["Upper"].rotation_euler.x = 0.8
+    assert bpy.ops.arapfields.wrap_sequence(filepath=cache_file(), start=1, end=1) == {"FINISHED"}
+    assert [m.type for m in item.modifiers if m.show_viewport] == ["ARMATURE", "MESH_CACHE"]
+    goal = scenes.world_points(target)
+    triangles = np.arange(len(goal)).reshape(-1, 3).astype(np.int32)
+    away = np.abs(af.MeshSdf(goal, triangles)(scenes.world_points(item))).mean()
+    assert away < OFF * np.linalg.norm(np.ptp(goal, axis=0))
 
 
 def test_a_target_that_changes_is_followed_into_shape_keys():
