@@ -9,7 +9,7 @@ import numpy as np
 from mathutils import Vector
 
 from ..blender import modifier_stack
-from ..blender.object_references import ObjectReference, settings_of
+from ..blender.object_references import ObjectReference, in_scene, settings_of
 from ..core.errors import UserError, refuse
 from ..core.geometry import posing
 from ..core.geometry.spaces import inverse, transform
@@ -23,6 +23,14 @@ def armatures_of(source):
     carried = [entry.item for entry in settings_of(source).carried]
     posing = [m.object for m in source.modifiers if modifier_stack.is_posing(source, m) and m.show_viewport]
     return [rig for rig in dict.fromkeys(posing) if rig not in carried]
+
+
+def posed_with(source):
+    """The source, and the meshes that it carries which its armatures pose too."""
+    worn = [entry.item for entry in settings_of(source).carried]
+    worn = [item for item in worn if in_scene(item) and item.type == "MESH" and item.library is None]
+    rigs = {*armatures_of(source)}
+    return [source, *(item for item in worn if rigs & {*armatures_of(item)})]
 
 
 def refusal(rig):

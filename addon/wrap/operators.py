@@ -63,15 +63,16 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
         space = space_of(source.matrix_world, source.name)
         other = landmarks.target_of(source, self.onto)
         self.end_live(context, source)
-        fitting = below = None
+        fitting, below = None, ()
         if (
             effective_value("fit_rig", settings.wrap, self)
             and self.in_place(source)
             and rest_bones.armatures_of(source)
         ):
             before = landmarks.world_vertices_at_rest(context, source)
-            fitting, below = rest_bones.Fitting(source, space), rest_bones.BeforeArmatures(source)
-            self.below = (*self.below, below)
+            fitting = rest_bones.Fitting(source, space)
+            below = [rest_bones.BeforeArmatures(one) for one in rest_bones.posed_with(source)]
+            self.below = (*self.below, *below)
             pairs = landmarks.read(source, space, before, landmarks.world_vertices_at_rest(context, source))
         else:
             pairs = landmarks.read(source, space)
@@ -101,8 +102,9 @@ def with_rest(item, marks, fitting, below):
     def apply(solved):
         said = item.apply(solved)
         marks.put()
+        for one in below:
+            one.kept = True
         if fitting is not None:
-            below.kept = True
             fitting.put(bpy.context)
         return said
 

@@ -10,7 +10,7 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
-    from support.blender.wraps import rigged_bar
+    from support.blender.wraps import SMALL, rigged_bar, soup_of
 
     import arapfields as af
     from addon.blender import mesh_arrays
@@ -188,3 +188,25 @@ def test_drivers_and_what_is_carried_go_to_the_target():
     assert np.abs(away - 1.4 * before).max() < 0.15 * 1.4 * before.max()  # smoothed at edges
     assert away.min() > 0 and not own.modifiers
     assert bpy.ops.arapfields.transfer() == {"FINISHED"} and len(target.children) == 1
+
+
+def test_clothes_of_a_wrapped_shape_are_posed_with_it():
+    item, rig = rigged_bar()
+    worn = item.copy()
+    worn.data = item.data.copy()
+    worn.shape_key_clear()
+    bpy.context.collection.objects.link(worn)
+    mesh_arrays.set_positions(worn.data, mesh_arrays.positions(item.data) * [1.0, 1.2, 1.2])
+    entry = item.arapfields.carried.add()
+    entry.item, entry.way = worn, "FOLLOW"
+    item.arapfields.wrap.onto = soup_of(item)
+    assert bpy.ops.arapfields.wrap(**SMALL) == {"FINISHED"}
+
+    def away():
+        body = af.MeshSdf(scenes.world_points(item), mesh_arrays.triangles(item.data))
+        return np.abs(body(scenes.world_points(worn))).max()
+
+    before = away()
+    rig.pose.bones["Upper"].rotation_mode, rig.pose.bones["Upper"].rotation_euler.x = "XYZ", 0.8
+    assert away() < 2 * before
+    assert [m.type for m in worn.modifiers] == ["NODES", "ARMATURE"]
