@@ -18,8 +18,8 @@ constexpr double settled = 1e-6;
 /// What lies under a point handle, in widths of the shape there: no farther from it at rest, nor aside of it
 /// as seen along a plane's normal.
 constexpr double under = 1.5, aside = 0.35;
-/// Samples that a handle at rest counts for where another one is pressed onto it.
-constexpr double unmoved = 1e9;
+/// A handle that has moved less than that, in cube units, is as good as at rest.
+constexpr double unmoved = 1e-3;
 /// Searches for the thickest part of the shape beside a point handle, which may lie at an edge.
 constexpr int thicker = 3;
 
@@ -49,6 +49,17 @@ std::pair<Vec3, Index> least_translation(const std::vector<Bound>& bounds) {
   return {way, most == pushes.end() || *most == 0.0
                    ? -1
                    : bounds[static_cast<std::size_t>(most - pushes.begin())].surface};
+}
+
+/// How little each handle gives way to others: what holds more, and what has moved less.
+Vector masses_of(const BoundHandles& handles) {
+  Vector masses(handles.count());
+  for (Index i = 0; i < handles.count(); ++i) {
+    const Index begin = handles.begin(i), rows = handles.begin(i + 1) - begin;
+    const Points way = handles.targets().middleRows(begin, rows) - handles.sources().middleRows(begin, rows);
+    masses[i] = static_cast<double>(rows) / (way.rowwise().squaredNorm().mean() + unmoved * unmoved);
+  }
+  return masses;
 }
 
 /// The handle that holds each of the problem's samples; −1: none.
@@ -127,11 +138,7 @@ std::vector<Index> hold_back(RadialState& s, std::vector<Mat4>& motions) {
   const auto target = [&](Index place, Index handle) -> Vec3 {
     return affine_image(set.places.row(place), motions[static_cast<std::size_t>(handle)]).row(0);
   };
-  const auto mass = [&](Index handle) {
-    const BoundHandles& handles = s.handles.bound();
-    const bool rests = handles.motion(handle) == Mat4::Identity();
-    return rests ? unmoved : static_cast<double>(handles.begin(handle + 1) - handles.begin(handle));
-  };
+  const Vector masses = masses_of(s.handles.bound());
   std::vector<std::vector<Bound>> bounds(motions.size());
   const std::vector<Pin> points = pins(s, motions);
   const Points places = points.empty() ? Points() : contact_places(s);
@@ -146,7 +153,7 @@ std::vector<Index> hold_back(RadialState& s, std::vector<Mat4>& motions) {
     const Vec3 other = second < 0 ? Vec3(Vec3::Zero()) : target(plane.second, second);
     const double depth = plane.offset - plane.normal.dot(target(plane.first, first) - other);
     const double own =
-        second < 0 ? 1.0 : mass(second) / (mass(first) + mass(second));  // the lighter gives way
+        second < 0 ? 1.0 : masses[second] / (masses[first] + masses[second]);  // the lighter gives way
     bounds[static_cast<std::size_t>(first)].push_back({plane.normal, own * depth, plane.obstacle});
     if (second >= 0)
       bounds[static_cast<std::size_t>(second)].push_back(

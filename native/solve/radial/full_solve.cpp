@@ -21,6 +21,8 @@ constexpr int steps_at_once = 10;
 constexpr double least_gain = 1e-3;
 /// It goes on while these steps bring what is deep in an obstacle out to less than this share.
 constexpr double still_comes_out = 0.8;
+/// Rises of the energy after which it goes on all the same: contact holds back what free steps had gained.
+constexpr int most_rises = 6;
 /// Factor on it where handles are held back: they would slide on for long.
 constexpr double less_where_held = 10.0;
 /// A deformation with `worth_a_first` centers starts from one with half of them, `most_first` at most.
@@ -80,6 +82,7 @@ LoopResult run(RadialSolver& live, const TrainingOptions& how, const Progress& p
   LoopResult result;
   Iteration iteration;
   bool ended = false;
+  int rose = 0;
   double before = std::numeric_limits<double>::infinity(), deepest = before;
   RadialHooks steps{hooks.energies, 1.0 / rigidity, {}};
   if (hooks.observer)
@@ -108,8 +111,9 @@ LoopResult run(RadialSolver& live, const TrainingOptions& how, const Progress& p
     }
     const ContactReport& contact = live.report().contact;
     const double least = (contact.held.empty() ? 1.0 : less_where_held) * bounds.least_gain;
+    const bool rises = hooks.contact && value - before >= least * value && rose++ < most_rises;
     const bool gains = live.report().iterations >= at_once && before - value >= least * value;
-    if (!gains && !(contact.unsettled && contact.deepest < still_comes_out * deepest)) break;
+    if (!gains && !rises && !(contact.unsettled && contact.deepest < still_comes_out * deepest)) break;
     before = value;
     deepest = contact.deepest;
     if (how.time_budget > 0.0 && result.seconds > how.time_budget) {
