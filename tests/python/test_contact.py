@@ -196,7 +196,7 @@ def test_what_cannot_be_is_named(samples):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "name", ["spot on box 0", "bunny on edge 0", "bunny on sheet 0", "spot on moving plate 0"]
+    "name", ["spot on box 0", "bunny on edge 0", "bunny on sheet 0", "rockerArm on moving plate 0"]
 )
 def test_no_vertex_of_many_is_deep(name):
     from benchmarks import contact, shapes

@@ -25,12 +25,13 @@ def test_a_body_that_falls_lands_on_the_ground(samples):
     assert min(lowest) < -0.69
 
 
-def test_a_plate_that_moves_faster_than_it_is_thick_takes_the_shape_along(samples):
-    """The plate is 0.03 thick and rises by 0.2 a frame."""
+@pytest.mark.parametrize("handles", [[LEFT], [LEFT, RIGHT]])
+def test_a_plate_that_moves_faster_than_it_is_thick_takes_the_shape_along(samples, handles):
+    """The plate is 0.03 thick and rises by 0.2 a frame. A handle over it gives way."""
     ends = []
     for rounding in (0.0, 1e-12):
         swept = live(samples, af.Contact([af.Obstacle(PLATE, placement=turned(0, shift=(0, 0, -0.2)))]))
-        swept.set_handles([af.Cuboid(LEFT, LEFT)])
+        swept.set_handles([af.Cuboid(handle, handle) for handle in handles])
         swept.solve()
         for k in range(5):
             rise = 0.2 * k - 0.2 + rounding

@@ -109,6 +109,13 @@ void report_contact(RadialState& s) {
   }
 }
 
+/// Has the handles pull towards where these motions take them, as far as contact lets them.
+void set_targets(RadialState& s, std::vector<Mat4> motions) {
+  RadialObjective<float>& objective = s.objective(s.fast);
+  hold_back(s, motions);
+  objective.set_targets(s.handles.targets_at(motions));
+}
+
 /// Takes the handles from earlier motions to their targets in so many steps.
 void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Index iterations,
               double tolerance, const Progress& progress) {
@@ -120,10 +127,7 @@ void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Inde
     const std::vector<Mat4> wanted =
         motions_between(s.handles.bound(), before, static_cast<double>(k) / static_cast<double>(steps));
     for (Index extra = more_rounds;;) {
-      std::vector<Mat4> motions = wanted;
-      RadialObjective<float>& objective = s.objective(s.fast);
-      hold_back(s, motions);
-      objective.set_targets(s.handles.targets_at(motions));
+      set_targets(s, wanted);
       const Index at_once = k < steps ? steps_on_the_way : std::clamp<Index>(left, 2, steps_between);
       const bool converged = solve_round(s, at_once, tolerance, progress);
       if (k < steps) break;
@@ -139,7 +143,7 @@ void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Inde
 }
 
 /// Takes obstacles that have moved to where they are now, and the surface along.
-void sweep(RadialState& s, double tolerance, const Progress& progress) {
+void sweep(RadialState& s, const std::vector<Mat4>& motions, double tolerance, const Progress& progress) {
   if (s.contact.obstacle_way() == 0.0) return;
   const auto wanted = static_cast<Index>(std::ceil(s.contact.obstacle_way() / obstacle_step));
   const Index parts = std::clamp<Index>(wanted, 1, most_steps);
@@ -147,7 +151,9 @@ void sweep(RadialState& s, double tolerance, const Progress& progress) {
   for (Index k = 1; k <= parts; ++k) {
     s.contact.move_obstacles(static_cast<double>(k) / static_cast<double>(parts));
     find_and_push(s, 1, too_deep);
-    if (k < parts && s.contact.presses()) solve_round(s, steps_on_the_way, tolerance, progress);
+    if (k == parts || !s.contact.presses()) continue;
+    set_targets(s, motions);
+    solve_round(s, steps_on_the_way, tolerance, progress);
   }
 }
 
@@ -192,12 +198,12 @@ double press_contact(RadialState& s) {
 
 void follow_in_contact(RadialState& s, Index iterations, double tolerance,
                        const std::function<void()>& freely, const Progress& progress) {
-  sweep(s, tolerance, progress);
   std::vector<Mat4> before = s.dynamics.motions;
   if (std::ssize(before) != s.handles.bound().count()) {
     before = motions_of(s.handles.bound());
     if (s.shape.coefficients == s.problem.basis.identity()) before.assign(before.size(), Mat4::Identity());
   }
+  sweep(s, before, tolerance, progress);
   const bool pressed = s.contact.presses();
   s.contact.find(s.shape.coefficients);
   if (s.contact.deepest_outside() > too_deep) {
