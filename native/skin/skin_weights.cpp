@@ -19,8 +19,8 @@ constexpr std::uint64_t stream = 34;
 constexpr int round_poses = 8;
 /// How often each joint turns at least.
 constexpr double least_activity = 0.8;
-/// In sizes of the shape, closed pieces that stay rigid.
-constexpr double rigid_size = 0.12;
+/// In sizes of the shape, the diagonals of closed pieces that stay rigid: eyes may be large.
+constexpr double rigid_size = 0.2;
 /// The share of a piece's weights from which one bone has them all.
 constexpr float one_bone = 0.8f;
 

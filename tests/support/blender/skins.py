@@ -72,7 +72,7 @@ def shirt(body):
 
 
 def eye():
-    bpy.ops.mesh.primitive_uv_sphere_add(segments=8, ring_count=6, radius=0.03, location=(LEG, 0.1, 0.2))
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=8, ring_count=6, radius=0.05, location=(LEG, 0.1, 0.2))
     return bpy.context.object
 
 
