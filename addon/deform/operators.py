@@ -13,7 +13,7 @@ from ..core.settings.parameters import DEFORM
 from ..handles import empties, scaling
 from ..handles.native_handles import native_handles
 from ..properties.choices import result_properties
-from ..solver.contact import for_job, native_contact
+from ..solver.contact import for_job, held_back, native_contact
 from .solve_job import SolveOperator, plan_solve_job
 
 
@@ -52,13 +52,10 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
 
         def solve(tracker, rest, samples, weight):
             natives = native_handles(af, handles, rest, samples)
-            return af.deform(
-                samples,
-                natives,
-                options,
-                contact=native_contact(contact),
-                task=tracker.start("Deforming", weight),
-            )
+            task, limits = tracker.start("Deforming", weight), native_contact(contact)
+            field = af.deform(samples, natives, options, contact=limits, task=task)
+            tracker.warnings += held_back(contact, handles, field.report)
+            return field
 
         return plan_solve_job(context, self, source, "DEFORM", values["samples"], values["seed"], solve)
 

@@ -26,6 +26,7 @@ class Solid(NamedTuple):
     triangles: np.ndarray  # (m, 3)
     placement: np.ndarray  # (4, 4) from there into solve space: it turns, moves and scales evenly
     margin: float
+    name: str
 
 
 class ContactTerm(NamedTuple):
@@ -67,6 +68,23 @@ class ContactTerm(NamedTuple):
 
 def native_contact(term, known=None):
     return None if term is None else term.made(known)
+
+
+def held_back(term, handles, report):
+    """Which of the handles contact keeps from their targets, by a solve's report, as UserErrors."""
+    found = []
+    for held in report.contact.held:
+        handle = handles[held.handle]
+        if not handle.name:  # what is far from all pins
+            continue
+        if held.by == "ground":
+            found.append(UserError("{name} is held back by the ground", handle))
+        elif held.by == "itself":
+            found.append(UserError("{name} is held back by the surface itself", handle))
+        else:
+            other = term.solids[int(held.by.removeprefix("obstacles[").rstrip("]"))].name
+            found.append(UserError("{name} is held back by {other}", handle, other=other))
+    return found
 
 
 def obstacles_of(source):
@@ -167,4 +185,4 @@ def read(item, margin, space, depsgraph):
         vertices, triangles = -vertices, triangles[:, ::-1]
     hashed = hashlib.sha1(np.ascontiguousarray(vertices).tobytes())
     hashed.update(np.ascontiguousarray(triangles).tobytes())
-    return Solid(hashed.hexdigest(), vertices, triangles, placement, margin)
+    return Solid(hashed.hexdigest(), vertices, triangles, placement, margin, item.name)

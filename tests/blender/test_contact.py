@@ -62,6 +62,7 @@ def test_a_live_shape_stays_outside_as_its_obstacle_comes_and_goes():
     scenes.activate(block, bar)
     bpy.ops.arapfields.add_obstacle()
     bpy.ops.arapfields.deform()
+    assert "Bar: Moving is held back by Cube" in [text for _, text in jobs.messages()]
     sdf_top = low - 0.2
     inside = local_points(bar)
     world = inside @ np.array(bar.matrix_world)[:3, :3].T + np.array(bar.matrix_world)[:3, 3]

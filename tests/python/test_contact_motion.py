@@ -36,7 +36,7 @@ def test_a_plate_that_moves_faster_than_it_is_thick_takes_the_shape_along(sample
         for k in range(5):
             rise = 0.2 * k - 0.2 + rounding
             swept.set_contact(af.Contact([af.Obstacle(PLATE, placement=turned(0, shift=(0, 0, rise)))]))
-            field = swept.solve(iterations=20)
+            field = swept.solve(iterations=60)  # along the plate's edge the bar slides for long
         ends.append(field(samples.points))
     over = ends[0][:, 0] > 0.05
     assert over.sum() > 4000 and ends[0][over, 2].min() > -0.8 + rise - 2 * DEEPEST
