@@ -135,8 +135,8 @@ def test_what_is_wrong_with_bones_is_named():
     bpy.data.objects.remove(bar)
     bar, rig = rigged_bar()
     with pytest.raises(RuntimeError, match="No bone of Armature is selected"):
-        for bone in rig.data.bones:
-            bone.select = False
+        for bone in rig.pose.bones:
+            (bone if hasattr(bone, "select") else bone.bone).select = False
         bpy.ops.arapfields.add_bones(bones="SELECTED")
     bpy.ops.arapfields.add_bones()
     rig.data.bones["Second"].name = "Third"

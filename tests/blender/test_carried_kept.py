@@ -15,6 +15,7 @@ if IN_BLENDER:
     from support.blender.scenes import camera
 
     from addon.live import sessions
+    from addon.solver.frame_range import curves_of
 
 pytestmark = pytest.mark.in_blender
 
@@ -32,7 +33,7 @@ def test_all_are_baked_at_once(format):
     for frame, height in ((1, 0.0), (3, 0.4)):
         moving.location.z = height
         moving.keyframe_insert("location", frame=frame)
-    for curve in (moving.animation_data.action.fcurves[2],):
+    for curve in curves_of(moving.animation_data.action):
         for point in curve.keyframe_points:
             point.interpolation = "LINEAR"
     scenes.activate(bar)
