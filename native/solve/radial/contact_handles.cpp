@@ -167,4 +167,9 @@ std::vector<Index> hold_back(RadialState& s, std::vector<Mat4>& motions) {
   return by;
 }
 
+void set_reachable_targets(RadialState& s, std::vector<Mat4> motions) {
+  hold_back(s, motions);
+  s.fast.objective.latest()->set_targets(s.handles.targets_at(motions));
+}
+
 }  // namespace arapfields

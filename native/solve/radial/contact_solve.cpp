@@ -109,13 +109,6 @@ void report_contact(RadialState& s) {
   }
 }
 
-/// Has the handles pull towards where these motions take them, as far as contact lets them.
-void set_targets(RadialState& s, std::vector<Mat4> motions) {
-  RadialObjective<float>& objective = s.objective(s.fast);
-  hold_back(s, motions);
-  objective.set_targets(s.handles.targets_at(motions));
-}
-
 /// Takes the handles from earlier motions to their targets in so many steps.
 void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Index iterations,
               double tolerance, const Progress& progress) {
@@ -127,7 +120,8 @@ void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Inde
     const std::vector<Mat4> wanted =
         motions_between(s.handles.bound(), before, static_cast<double>(k) / static_cast<double>(steps));
     for (Index extra = more_rounds;;) {
-      set_targets(s, wanted);
+      s.objective(s.fast);
+      set_reachable_targets(s, wanted);
       const Index at_once = k < steps ? steps_on_the_way : std::clamp<Index>(left, 2, steps_between);
       const bool converged = solve_round(s, at_once, tolerance, progress);
       if (k < steps) break;
@@ -152,7 +146,8 @@ void sweep(RadialState& s, const std::vector<Mat4>& motions, double tolerance, c
     s.contact.move_obstacles(static_cast<double>(k) / static_cast<double>(parts));
     find_and_push(s, 1, too_deep);
     if (k == parts || !s.contact.presses()) continue;
-    set_targets(s, motions);
+    s.objective(s.fast);
+    set_reachable_targets(s, motions);
     solve_round(s, steps_on_the_way, tolerance, progress);
   }
 }

@@ -24,9 +24,12 @@ Mat3 linear_between(const Mat3& a, const Mat3& b, double share) {
 
 }  // namespace
 
-Mat4 motion_between(const Mat4& from, const Mat4& to, double share) {
-  Mat4 result = (1.0 - share) * from + share * to;
-  result.topLeftCorner<3, 3>() = linear_between(from.topLeftCorner<3, 3>(), to.topLeftCorner<3, 3>(), share);
+Mat4 motion_between(const Mat4& from, const Mat4& to, double share, const Vec3& pivot) {
+  const auto a = from.topLeftCorner<3, 3>(), b = to.topLeftCorner<3, 3>();
+  const Vec3 start = a * pivot + from.topRightCorner<3, 1>(), end = b * pivot + to.topRightCorner<3, 1>();
+  Mat4 result = Mat4::Identity();
+  result.topLeftCorner<3, 3>() = linear_between(a, b, share);
+  result.topRightCorner<3, 1>() = (1.0 - share) * start + share * end - result.topLeftCorner<3, 3>() * pivot;
   return result;
 }
 
@@ -74,12 +77,7 @@ std::vector<Mat4> motions_between(const BoundHandles& handles, const std::vector
   for (Index i = 0; i < handles.count(); ++i) {
     const Index begin = handles.begin(i), end = handles.begin(i + 1);
     const Vec3 pivot = handles.sources().middleRows(begin, end - begin).colwise().mean();
-    const Mat4 &a = before[static_cast<std::size_t>(i)], &b = handles.motion(i);
-    const Vec3 from = a.topLeftCorner<3, 3>() * pivot + a.topRightCorner<3, 1>();
-    const Vec3 to = b.topLeftCorner<3, 3>() * pivot + b.topRightCorner<3, 1>();
-    Mat4& motion = motions.emplace_back(Mat4::Identity());
-    motion.topLeftCorner<3, 3>() = linear_between(a.topLeftCorner<3, 3>(), b.topLeftCorner<3, 3>(), share);
-    motion.topRightCorner<3, 1>() = (1.0 - share) * from + share * to - motion.topLeftCorner<3, 3>() * pivot;
+    motions.push_back(motion_between(before[static_cast<std::size_t>(i)], handles.motion(i), share, pivot));
   }
   return motions;
 }

@@ -19,16 +19,16 @@ struct Twist {
 /// The twist that brings points (n,3) nearest to others in `seconds`, by the weights (n).
 Twist twist_between(const Points& from, const Points& to, const Vector& weights, double seconds);
 
-/// A share of the way from one affine motion to another: rotations by slerp, all else along lines.
-Mat4 motion_between(const Mat4& from, const Mat4& to, double share);
+/// A share of the way from one affine motion to another: rotations about the pivot by slerp, all else along
+/// lines.
+Mat4 motion_between(const Mat4& from, const Mat4& to, double share, const Vec3& pivot = Vec3::Zero());
 
 /// Points (n,3) after an affine motion.
 Points affine_image(PointsIn points, const Mat4& motion);
 
 std::vector<Mat4> motions_of(const BoundHandles& handles);
 
-/// At a share of the way from earlier motions of the handles to the current ones: about the middle of each
-/// handle, rotations by slerp, all else along lines.
+/// At a share of the way from earlier motions of the handles to the current ones, about the middle of each.
 std::vector<Mat4> motions_between(const BoundHandles& handles, const std::vector<Mat4>& before, double share);
 
 /// Where motions of the handles take some rows of their pairs (ascending).

@@ -80,7 +80,7 @@ TimeIntegrator::TimeIntegrator(RadialState& state, double seconds)
 
 void TimeIntegrator::integrate(const Progress& progress) {
   state_.precondition(rounded(body_.mass() * usual.inert(drag_ * h_) / (usual.reach() * h_ * h_)));
-  RadialObjective<float>& objective = state_.objective(state_.fast);
+  state_.objective(state_.fast);
   state_.invalidate_history();
   if (body_.velocities.size() == 0) body_.velocities.setZero(state_.problem.basis.size(), 3);
   state_.report.iterations = state_.report.evaluations = 0;
@@ -96,9 +96,7 @@ void TimeIntegrator::integrate(const Progress& progress) {
     }
     const auto integrated = [&](const TimeScheme& scheme) {
       if (state_.contact.any()) state_.objective(state_.fast);
-      std::vector<Mat4> motions = motions_between(state_.handles.bound(), before_, share(scheme.w));
-      hold_back(state_, motions);
-      objective.set_targets(state_.handles.targets_at(motions));
+      set_reachable_targets(state_, motions_between(state_.handles.bound(), before_, share(scheme.w)));
       return integrate_step(scheme, progress.part(share(0.0), share(1.0)));
     };
     const bool touches = state_.contact.found().touching() > 0.0;
