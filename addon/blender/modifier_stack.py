@@ -12,6 +12,7 @@ from ..core.errors import UserError
 from ..names import FIELD_GROUP
 from .evaluation import updated
 from .object_references import settings_of
+from .removal import remove_modifier
 from .splat_layouts import holds_splats
 
 STAGE = "arapfields_stage"  # custom property of the scene that holds the copy
@@ -147,7 +148,7 @@ def cut_copy(source, kept):
     copied.hide_viewport = False
     for modifier in list(copied.modifiers):
         if modifier.name not in kept:
-            copied.modifiers.remove(modifier)
+            remove_modifier(modifier)
     return copied
 
 

@@ -16,9 +16,19 @@ def remove_mesh_object(item):
         bpy.data.actions.remove(action)
 
 
+def remove_modifier(modifier):
+    """A modifier. What its inputs name is let go of first: Blender 5.2 would count it as used for ever."""
+    inputs = getattr(getattr(modifier, "properties", None), "inputs", None)
+    for name in inputs.bl_rna.properties.keys() if inputs is not None else ():
+        slot = getattr(inputs, name)
+        if isinstance(getattr(slot, "value", None), bpy.types.ID):
+            slot.value = None
+    modifier.id_data.modifiers.remove(modifier)
+
+
 def remove_node_modifier(modifier):
     """A Geometry Nodes modifier, and its node group."""
     group = modifier.node_group
-    modifier.id_data.modifiers.remove(modifier)
+    remove_modifier(modifier)
     if group.users == 0:
         bpy.data.node_groups.remove(group)

@@ -18,6 +18,7 @@ if IN_BLENDER:
 
     from addon.blender import modifier_stack
     from addon.blender.object_references import source_of
+    from addon.field_modifier import inputs
     from addon.surface import staleness
 
 pytestmark = pytest.mark.in_blender
@@ -117,6 +118,23 @@ def test_reading_the_shape_leaves_unkeyed_poses_alone():
     with modifier_stack.evaluated_mesh(bpy.context, bar, in_place=True) as mesh:
         seen = max(vertex.co.y for vertex in mesh.vertices)
     assert abs(bone.rotation_euler.z - 1.1) < 1e-6 and seen > 0.6
+
+
+def test_reading_the_shape_leaves_no_users_behind():
+    bar, *_ = scenes.bar_with_handles()
+    group = bpy.data.node_groups.new("Beside", "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    group.interface.new_socket("Object", in_out="INPUT", socket_type="NodeSocketObject")
+    ends = [group.nodes.new(f"NodeGroup{end}") for end in ("Input", "Output")]
+    group.links.new(ends[0].outputs[0], ends[1].inputs[0])
+    modifier = bar.modifiers.new("Beside", "NODES")
+    modifier.node_group, named = group, bpy.data.objects.new("Named", None)
+    inputs.put(modifier, "Object", named)
+    before = named.users
+    with modifier_stack.mesh_of(bpy.context, bar, []) as mesh:
+        assert len(mesh.vertices) == len(bar.data.vertices)
+    assert named.users == before and inputs.get(modifier, "Object") == named
 
 
 def test_a_result_brings_no_source_along_when_it_is_appended():
