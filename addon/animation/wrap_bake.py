@@ -100,6 +100,7 @@ class WrapBake(ObjectBake):
         self.values = effective_values(WRAP, settings_of(source).wrap)
         self.options = options_of("wrap", self.values)
         self.last, self.worst, self.left_out = None, (-1.0, 0.0, None), {}
+        self.waiting = 0  # frames without a shape yet
 
     def request(self, context):
         try:
@@ -128,7 +129,7 @@ class WrapBake(ObjectBake):
         self.store.open(self.solver)
 
     def add(self, frame, request, is_baked=True, task=None):
-        """A frame that cannot be followed is named, and has the shape before it."""
+        """A frame that cannot be followed is named, and has the shape before it, or the first one."""
         try:
             if isinstance(request, Exception):
                 raise request
@@ -141,17 +142,18 @@ class WrapBake(ObjectBake):
             off = max(report.to_target_mean, report.from_target_mean)
             self.worst = max(self.worst, (off, frame, report), key=lambda one: one[0])
         except (UserError, ValueError, native.library().Diverged) as error:
-            if self.last is None:
-                raise UserError("Frame {frame}: {error}", frame=plain(frame), error=error) from error
             self.left_out.setdefault(translated(error), []).append(str(plain(frame)))
-        self.keep(self.last)
+        self.waiting += 1
+        while self.last is not None and self.waiting > 0:
+            self.keep(self.last)
+            self.waiting -= 1
 
     def finish(self, task):
-        for reason, frames in self.left_out.items():
-            named = {"frames": ", ".join(frames), "reason": reason}
-            self.carried.warnings.append(
-                UserError("Frame {frames}: {reason}; the shape before stays", **named)
-            )
+        named = [{"frame": ", ".join(frames), "error": reason} for reason, frames in self.left_out.items()]
+        if self.last is None:
+            told = [translated("Frame {frame}: {error}", **one) for one in named]
+            raise UserError("{error}", error="; ".join(told))
+        self.carried.warnings += [UserError("Frame {frame}: {error}; held", **one) for one in named]
         super().finish(task)
 
     def place(self, context, job):

@@ -176,8 +176,9 @@ Each frame starts from where the last one left the surface. Rigidity is measured
 nothing drifts.)")
       .def(py::init<const SurfaceSamples&, const DeformationField&, const WrapOptions&>(), "samples"_a,
            "field"_a, py::arg_v("options", WrapOptions(), "WrapOptions()"), R"(
-field: the DeformationField of `wrap` from these samples onto the first frame. options: as for `wrap`; stages,
-alignment and landmarks play no part. Raises InvalidInput.)")
+field: the DeformationField of `wrap` from these samples onto the first frame; or that of a later frame, behind
+which the sequence goes on. options: as for `wrap`; stages, alignment and landmarks play no part. Raises
+InvalidInput.)")
       .def(
           "next",
           [](WrapSequence& self, const FunctionArgument& target, Task* task) -> WrapResult {

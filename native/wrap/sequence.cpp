@@ -62,22 +62,29 @@ void hold(const WrapTarget& target, const SurfacePoints& now, PointsIn last, dou
 
 }  // namespace
 
-WrapSequence::WrapSequence(const SurfaceSamples& samples, const DeformationField& first,
+WrapSequence::WrapSequence(const SurfaceSamples& samples, const DeformationField& field,
                            const WrapOptions& options)
     : options_(options), frame_(samples.frame) {
   options.validate();
   require_samples(samples);
   require(samples.normals.rows() == samples.size(), "samples", "they have no normals",
           "a sequence needs one a sample");
-  const auto* composed = dynamic_cast<const ComposedField*>(&first);
+  const auto* composed = dynamic_cast<const ComposedField*>(&field);
   require(composed != nullptr, "field", "it is no field of wrap", "the wrap of the first frame is needed");
-  require(first.frame() == frame_, "field", "it was found for other samples",
+  require(field.frame() == frame_, "field", "it was found for other samples",
           "the samples of the first frame's wrap are needed");
   first_ = composed->steps();
-  kept_ = first.rest_points();
+  // The last step of a wrap is affine, that of a later frame has centers.
+  std::shared_ptr<const RadialField> last;
+  if (!first_.empty() && first_.back().map->basis().center_count() > 0) {
+    last = first_.back().map;
+    first_.pop_back();
+  }
+  kept_ = field.rest_points();
   Random random(static_cast<std::uint64_t>(options.seed));
   const std::vector<Index> rows = stratified(morton_order(samples.points), sequence_samples, random);
-  const MovedSurface surface(first, rows_of(samples.points, rows), rows_of(samples.normals, rows));
+  const MovedSurface surface(ComposedField(first_), rows_of(samples.points, rows),
+                             rows_of(samples.normals, rows));
   points_ = surface.points;
   normals_ = surface.normals;
   areas_ = surface.growth / surface.growth.sum();
@@ -86,7 +93,10 @@ WrapSequence::WrapSequence(const SurfaceSamples& samples, const DeformationField
   basis_ = radial_basis(points_, {{std::min(sequence_coarse_centers, centers), sequence_coarse_radius},
                                   {centers, sequence_fine_radius}});
   basis_.set_embedding(interior_embedding(points_, normals_));
-  coefficients_ = basis_.identity();
+  coefficients_ = last ? last->coefficients() : basis_.identity();
+  const Points& centers_of_last = last ? last->basis().centers : basis_.centers;
+  require(centers_of_last.rows() == basis_.centers.rows() && centers_of_last == basis_.centers, "field",
+          "it was found with other samples or options", "those of its sequence are needed");
 }
 
 WrapSolution WrapSequence::next(const ImplicitFunction& function, const Progress& progress) {

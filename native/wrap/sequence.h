@@ -16,9 +16,10 @@ namespace arapfields {
 /// field with one more after it is each frame's.
 class ARAPFIELDS_EXPORT WrapSequence {
  public:
-  /// `first` is the field that wrap found for the first frame, from these samples. Throws InvalidInput for
-  /// bad options and samples, and for another kind of field.
-  WrapSequence(const SurfaceSamples& samples, const DeformationField& first, const WrapOptions& options);
+  /// `field` is what wrap found for the first frame, from these samples; or what next did, and then the
+  /// sequence goes on behind that frame. Throws InvalidInput for bad options and samples, for others than
+  /// those of that sequence, and for another kind of field.
+  WrapSequence(const SurfaceSamples& samples, const DeformationField& field, const WrapOptions& options);
 
   /// Wraps onto the next frame: a function in the coordinates of the first. Throws InvalidInput that names
   /// `target` where there is no surface; Cancelled, with the sequence as it was. Any thread may call.

@@ -80,10 +80,19 @@ def test_a_template_follows_a_collection_and_names_what_is_missing():
     assert off(item, 2, 0.0) < OFF and off(item, 8, 0.3) < OFF
     assert np.array_equal(at(item, 4), at(item, 2)) and np.array_equal(at(item, 6), at(item, 2))
     said = dict(reversed(pair) for pair in jobs.messages())
-    assert "Template: Frame 4: There is no mesh; the shape before stays" in said, said
-    assert "Template: Frame 6: scan_6: the mesh is empty; the shape before stays" in said, said
+    assert "Template: Frame 4: There is no mesh; held" in said, said
+    assert "Template: Frame 6: scan_6: the mesh is empty; held" in said, said
     assert any("4 frames of 66 points baked" in text and "at worst, in frame" in text for text in said), said
     assert bpy.ops.arapfields.remove_bake() == {"FINISHED"} and not item.modifiers
+
+
+def test_bad_frames_at_the_beginning_have_the_first_good_shape():
+    item = scans(empty=(2, 4))
+    assert bpy.ops.arapfields.wrap_sequence(filepath=cache_file()) == {"FINISHED"}
+    assert np.array_equal(at(item, 2), at(item, 6)) and np.array_equal(at(item, 4), at(item, 6))
+    assert off(item, 6, 0.2) < OFF and off(item, 8, 0.3) < OFF
+    said = {text for _, text in jobs.messages()}
+    assert "Template: Frame 2: scan_2: the mesh is empty; held" in said, said
 
 
 def test_a_pose_does_not_add_to_what_is_scanned():

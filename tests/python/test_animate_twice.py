@@ -69,7 +69,7 @@ def test_the_second_of_two_says_so(place, capfd):
         assert in_child(lambda: animate(place, "--shard", "1/2")) == 0
         assert "another animate is at work on the same frames" in capfd.readouterr().out
         assert in_child(lambda: animate(place, "--shard", "1/2", tracks="other")) == 2
-        assert "another animate, of other frames" in capfd.readouterr().err
+        assert "another run, of other frames" in capfd.readouterr().err
     assert animate(place) == 0
     assert "wrote" in capfd.readouterr().out and not store.exists()
 

@@ -11,6 +11,7 @@ NOISE = 0.003  # of the diagonal, along each axis; new in each frame
 # Of the noise's own size: held points hardly move, and the basis averages over many scanned vertices.
 MOTION_OF_WHAT_IS_STILL = 0.5
 SLIDING = 0.3  # of the tip's way: its round end, stretched on one side, may slide along itself
+OPTIONS = af.WrapOptions(alignment="none", centers=200, stages=3, iterations=6)
 OFF = 0.005  # of the diagonal, on average from the surface without noise
 
 
@@ -21,15 +22,14 @@ def played():
     diagonal = np.linalg.norm(np.ptp(v, axis=0))
     scanned, faces = cases.figure(4)
     rng = np.random.default_rng(0)
-    options = af.WrapOptions(alignment="none", centers=200, stages=3, iterations=6)
     samples, true, found = af.sample_mesh(v, f, 2000), [], []
     sequence = None
     for angle in np.append(np.linspace(0, 0.3, 5), [0.3, 0.15, 0.0]):
         true.append((bent(scanned, angle), faces))
         noisy = true[-1][0] + rng.normal(0, NOISE * diagonal, scanned.shape)
         target = af.MeshSdf(noisy, faces)
-        field = sequence.next(target) if sequence else af.wrap(samples, target, [], options)
-        sequence = sequence or af.WrapSequence(samples, field, options)
+        field = sequence.next(target) if sequence else af.wrap(samples, target, [], OPTIONS)
+        sequence = sequence or af.WrapSequence(samples, field, OPTIONS)
         found.append(field(v))
     return v, diagonal, true, np.array(found), field, samples
 
@@ -68,12 +68,27 @@ def test_a_frames_field_is_kept_in_a_file(played, tmp_path):
     assert field.report.to_target_mean < 0.02
 
 
+def test_a_sequence_goes_on_from_a_frame_in_a_file(played, tmp_path):
+    """To the last bit: a frame's field holds all that its sequence keeps."""
+    v, _, true, *_, samples = played
+    targets = [af.MeshSdf(*mesh) for mesh in true[1:4]]
+    first = af.wrap(samples, af.MeshSdf(*true[0]), [], OPTIONS)
+    sequence = af.WrapSequence(samples, first, OPTIONS)
+    sequence.next(targets[0]).save(tmp_path / "frame.safetensors")
+    kept = af.DeformationField.load(tmp_path / "frame.safetensors")
+    again = af.WrapSequence(samples, kept, OPTIONS)
+    for target in targets[1:]:
+        assert np.array_equal(again.next(target)(v), sequence.next(target)(v))
+    with pytest.raises(af.InvalidInput, match="other samples or options"):
+        af.WrapSequence(samples, kept, af.WrapOptions(centers=50))
+
+
 def test_what_is_no_first_frame_is_named(played):
     v, *_, field, samples = played
     target = af.MeshSdf(*cases.figure(2))
     with pytest.raises(af.InvalidInput, match="samples"):
         af.WrapSequence(af.sample_mesh(2 * v, cases.figure(3)[1], 500), field)
-    sequence = af.WrapSequence(samples, field, af.WrapOptions(centers=50))
+    sequence = af.WrapSequence(samples, field, OPTIONS)
     task = af.Task()
     task.cancel()
     with pytest.raises(af.Cancelled):

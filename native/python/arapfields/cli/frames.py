@@ -98,7 +98,7 @@ class FrameStore:
                 file.seek(0)
                 if file.read() != made:
                     raise InvalidInput(
-                        f"{self.output}: another animate, of other frames or options, is at work on it; "
+                        f"{self.output}: another run, of other frames or options, is at work on it; "
                         "let it end, or choose another output"
                     ) from None
                 yield False

@@ -67,3 +67,11 @@ def read_distance(path):
     """A mesh's exact distance, or a signed distance that fit saved."""
     path = existing_file(path, SOURCES)
     return af.MeshSdf(*files.read_mesh(path)) if files.is_mesh(path) else files.read_sdf(path)
+
+
+def content(path):
+    """The bytes of one of many inputs; InvalidInput where the system does not give them."""
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise af.InvalidInput(f"{path}: {error.strerror}") from error

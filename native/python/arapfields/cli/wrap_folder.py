@@ -38,14 +38,13 @@ def run(args, options):
     output.mkdir(parents=True, exist_ok=True)
     source = sources.Source(args)
     samples = sources.samples(source, given(args, "wrap", "samples"), options.seed, args)
-    common = hashlib.blake2b(template.read_bytes())
-    common.update(repr((af.__version__, options.to_dict(), samples.points.tobytes())).encode())
+    common = made_of(template, options, samples)
     done, failed = {}, []
     for path in everything[number - 1 :: parts]:
         place = output / f"{path.stem}{template.suffix.lower()}"
         mark = common.copy()
-        mark.update(path.read_bytes())
         try:
+            mark.update(sources.content(path))
             done[path.name] = read_done(place, mark) or wrap_one(
                 place, mark, lambda path=path: sources.read_distance(path), source, samples, options, args
             )
@@ -57,8 +56,22 @@ def run(args, options):
             print(f"{name}: {off(done[name]):.2%} of the target's size off{notes and '; ' + notes}")
     if done:
         write_sheet(output, everything, template.suffix.lower())
+    refuse(failed, len(done) + len(failed))
+
+
+def made_of(template, options, samples):
+    """A hash of what all wraps of a template have in common."""
+    made = hashlib.blake2b(template.read_bytes())
+    made.update(repr((af.__version__, options.to_dict())).encode())
+    for rows in (samples.points, samples.weights, samples.bend_weights):
+        made.update(rows.tobytes())
+    return made
+
+
+def refuse(failed, count):
+    """InvalidInput with the reasons, where some of so many failed."""
     if failed:
-        raise af.InvalidInput(f"{len(failed)} of {len(done) + len(failed)} failed: {'; '.join(failed)}")
+        raise af.InvalidInput(f"{len(failed)} of {count} failed: {'; '.join(failed)}")
 
 
 def write_sheet(output, everything, suffix):
