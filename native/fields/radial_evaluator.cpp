@@ -119,7 +119,8 @@ void RadialEvaluator<Scalar>::for_blocks(Body&& body) const {
 }
 
 template <class Scalar>
-void RadialEvaluator<Scalar>::evaluate(const RowMatrix<double>& coefficients, JetView<Scalar> out) const {
+void RadialEvaluator<Scalar>::evaluate(const RowMatrix<double>& coefficients, JetView<Scalar> out,
+                                       const std::vector<Index>* of_blocks) const {
   require(out.count == count_, "out", std::to_string(out.count) + " points",
           std::to_string(count_) + " are needed");
   require(coefficients.rows() == center_count_ + 4 && coefficients.cols() == 3, "coefficients",
@@ -129,9 +130,11 @@ void RadialEvaluator<Scalar>::evaluate(const RowMatrix<double>& coefficients, Je
   const int columns_count = columns(out.order);
   const RowMatrix<Scalar> rounded = coefficients.cast<Scalar>();
   const Scalar* affine = rounded.data() + 3 * center_count_;
-  parallel_for(0, blocks(), blocks_per_task, [&](Index first, Index last) {
+  const Index count = of_blocks != nullptr ? std::ssize(*of_blocks) : blocks();
+  parallel_for(0, count, blocks_per_task, [&](Index first, Index last) {
     std::array<Scalar, 10 * 3 * block_size> jets;
-    for (Index b = first; b < last; ++b) {
+    for (Index at = first; at < last; ++at) {
+      const Index b = of_blocks != nullptr ? (*of_blocks)[static_cast<std::size_t>(at)] : at;
       const RadialBlock<Scalar> data = block(b);
       ARAPFIELDS_DISPATCH(radial_forward(data, rounded.data(), columns_count, jets.data()));
       const Index valid = std::min(block_size, count_ - b * block_size);

@@ -20,8 +20,10 @@ class RadialEvaluator {
   RadialEvaluator(const RadialBasis& basis, PointsIn points, JetOrder most = JetOrder::second);
   Index size() const { return count_; }
 
-  /// Jets of the field with these coefficients (size, 3): overwrites `out` (count = size(), any order).
-  void evaluate(const RowMatrix<double>& coefficients, JetView<Scalar> out) const;
+  /// Jets of the field with these coefficients (size, 3): overwrites `out` (count = size(), any order), or
+  /// what it holds of these blocks alone.
+  void evaluate(const RowMatrix<double>& coefficients, JetView<Scalar> out,
+                const std::vector<Index>* of_blocks = nullptr) const;
   /// Adds the pull-back of cotangents of such jets to `gradient` (size, 3).
   void pull_back(JetView<const Scalar> cotangents, RowMatrix<double>& gradient) const;
 

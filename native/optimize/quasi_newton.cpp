@@ -99,12 +99,12 @@ QuasiNewtonReport QuasiNewton::minimise(const MeasuredObjectiveOf<Scalar>& objec
   now.value = objective.value(now.u, &now.cotangents);
   report.evaluations = 1;
   if (!std::isfinite(now.value)) throw Diverged("NaN or infinity in the energy at the start");
-  RowMatrix<double> gradient = objective.pull_back(now.cotangents);
+  gradient_ = objective.pull_back(now.cotangents);
   Eigen::VectorX<Scalar> du;
   while (report.iterations < options.iterations) {
     progress.report(static_cast<double>(report.iterations) / static_cast<double>(options.iterations));
-    RowMatrix<double> step = direction(objective, gradient);
-    double slope = dot(gradient, step);
+    RowMatrix<double> step = direction(objective, gradient_);
+    double slope = dot(gradient_, step);
     if (!(slope < 0.0)) {  // the pairs describe another objective
       if (pairs_.empty()) break;
       forget();
@@ -126,13 +126,13 @@ QuasiNewtonReport QuasiNewton::minimise(const MeasuredObjectiveOf<Scalar>& objec
     step *= next.t;
     c += step;
     RowMatrix<double> next_gradient = objective.pull_back(next.cotangents);
-    Pair pair{step, next_gradient - gradient, 0.0};
+    Pair pair{step, next_gradient - gradient_, 0.0};
     pair.product = dot(pair.step, pair.change);
     if (pair.product > 1e-10 * std::sqrt(dot(pair.step, pair.step) * dot(pair.change, pair.change))) {
       pairs_.push_back(std::move(pair));
       if (pairs_.size() > history) pairs_.pop_front();
     }
-    gradient = std::move(next_gradient);
+    gradient_ = std::move(next_gradient);
     now = std::move(next);
     ++report.iterations;
     if (!objective.accepted(now.u)) {

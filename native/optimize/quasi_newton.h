@@ -59,6 +59,8 @@ class QuasiNewton {
     return minimise(objective, options, c, u, progress);
   }
   void forget() { pairs_.clear(); }
+  /// Where the last call ended.
+  const RowMatrix<double>& gradient() const { return gradient_; }
 
  private:
   struct Pair {
@@ -70,6 +72,7 @@ class QuasiNewton {
                               const RowMatrix<double>& gradient) const;
 
   std::deque<Pair> pairs_;
+  RowMatrix<double> gradient_;
 };
 
 }  // namespace arapfields

@@ -7,6 +7,7 @@
 #include "core/tall_product.h"
 #include "fields/radial_evaluator.h"
 #include "optimize/quasi_newton.h"
+#include "sampling/row_boxes.h"
 #include "tensors/dense.h"
 
 using namespace arapfields;
@@ -80,6 +81,11 @@ void check_evaluator(double tolerance) {
         Eigen::Map<const RowMatrix<Scalar>>(jets.view().data, size, 3).template cast<double>();
     const RowMatrix<double> rows = radial_rows(basis, points, order);
     BOOST_TEST((rows * c - found).norm() < tolerance * found.norm());
+    const std::vector<Index> blocks{1, 4};
+    JetBlock<Scalar> some(points.rows(), order);
+    sites.evaluate(c, some.view(), &blocks);
+    for (Index p = 0; p < points.rows(); ++p)
+      BOOST_TEST(*some.view().at(0, p) == (p / 16 == 1 || p / 16 == 4 ? *jets.view().at(0, p) : Scalar(0)));
     const RowMatrix<Scalar> cotangents = random_matrix(size, 3, 8).cast<Scalar>();
     RowMatrix<double> gradient = RowMatrix<double>::Zero(basis.size(), 3);
     sites.pull_back({cotangents.data(), points.rows(), order}, gradient);
@@ -91,6 +97,21 @@ void check_evaluator(double tolerance) {
 BOOST_AUTO_TEST_CASE(evaluators_agree_with_their_rows_and_pull_back_is_the_transpose) {
   check_evaluator<double>(1e-11);
   check_evaluator<float>(1e-5);
+}
+
+BOOST_AUTO_TEST_CASE(boxes_of_runs_bound_the_distances_of_their_rows) {
+  const Points points = random_points(77, 13);
+  const RowBoxes<4> boxes(points);
+  BOOST_TEST(boxes.count(boxes.levels() - 1) == 1);
+  for (Index level = 0; level < boxes.levels(); ++level)
+    for (Index i = 0; i < points.rows(); ++i)
+      for (Index j = 0; j < points.rows(); ++j) {
+        const Index a = i / boxes.run >> level, b = j / boxes.run >> level;
+        const double square = (points.row(i) - points.row(j)).squaredNorm();
+        const auto span = boxes.box(level, a).span(boxes.box(level, b));
+        BOOST_TEST(boxes.box(level, a).gap(boxes.box(level, b)) <= square + 1e-5);
+        BOOST_TEST(span.square().sum() >= square - 1e-5);
+      }
 }
 
 BOOST_AUTO_TEST_CASE(tall_products_agree_with_eigen) {

@@ -56,32 +56,26 @@ void press_balanced(RadialState& s) {
   if (!s.contact.presses()) return;
   const RadialObjective<float>& objective = *s.fast.objective.latest();
   const TallMatrix<float>& inverse_factor = s.preconditioner.inverse_factor.latest();
-  const VectorF& u = s.measurements(s.fast);
-  const Points places = objective.contact_values(u).cast<double>();
+  const Points places = contact_places(s);
   // What all other forces and those of each surface do, in the norm of the quasi-Newton model.
-  VectorF cotangents;
-  objective.value(u, &cotangents);
-  const Index size = 3 * places.rows();
-  cotangents.tail(size).setZero();
-  const auto half = [&] {
-    const PointsF result = inverse_factor.times(objective.pull_back(cotangents).cast<float>());
+  const auto half = [&](const RowMatrix<double>& gradient) {
+    const PointsF result = inverse_factor.times(gradient.cast<float>());
     return Vector(Eigen::Map<const VectorF>(result.data(), result.size()).cast<double>());
   };
-  const Vector others = half();
-  cotangents.setZero();
+  Vector others = half(s.history.optimizer.latest().gradient());
   const Index count = s.contact.surface_count();
-  RowMatrix<double> each(count, others.size());
+  RowMatrix<double> each = RowMatrix<double>::Zero(count, others.size());
   for (Index k = 0; k < count; ++k) {
-    cotangents.tail(size).setZero();
+    PointsF forces = PointsF::Zero(places.rows(), 3);
     for (const ContactPlane& plane : s.contact.found().planes) {
       if (plane.obstacle != k) continue;
-      const Eigen::Vector3f force =
-          (plane.share * plane.pressed(plane.gap(places.data()), s.contact.found().stiffness) * plane.normal)
-              .cast<float>();
-      cotangents.segment<3>(cotangents.size() - size + 3 * plane.first) += force;
-      if (plane.second >= 0) cotangents.segment<3>(cotangents.size() - size + 3 * plane.second) -= force;
+      const double pressed = plane.pressed(plane.gap(places.data()), s.contact.found().stiffness);
+      const Eigen::RowVector3f force = (plane.share * pressed * plane.normal).transpose().cast<float>();
+      forces.row(plane.first) += force;
+      if (plane.second >= 0) forces.row(plane.second) -= force;
     }
-    each.row(k) = half().transpose();
+    if (!forces.isZero(0.0f)) each.row(k) = half(objective.pull_back_contact(forces)).transpose();
+    others += each.row(k).transpose();
   }
   const RowMatrix<double> products = each * each.transpose();
   const Vector answer = each * others;

@@ -157,8 +157,7 @@ void ContactPoints::coarsen() {
 
 const Points& ContactPoints::at(const RowMatrix<double>& coefficients) {
   const Index n = sample_count(), all = size();
-  const bool moved = coefficients.rows() != coefficients_.rows() || coefficients != coefficients_;
-  if (moved) places_.resize(0, 3);
+  if (!is_at(coefficients)) places_.resize(0, 3);
   coefficients_ = coefficients;
   const Index known = places_.rows();
   places_.conservativeResize(all, Eigen::NoChange);
@@ -175,22 +174,27 @@ const Points& ContactPoints::at(const RowMatrix<double>& coefficients) {
   return places_;
 }
 
-Points ContactPoints::normals_at(const RowMatrix<double>& coefficients) {
+Points ContactPoints::normals_at(const RowMatrix<double>& coefficients, const std::vector<Index>* blocks) {
   const RadialEvaluator<float>& evaluator = slopes_.get({1}, [&] {
     return RadialEvaluator<float>(problem_.basis, rest_.topRows(sample_count()), JetOrder::first);
   });
   JetBlock<float> jets(evaluator.size(), JetOrder::first);
-  evaluator.evaluate(coefficients, jets.view());
-  Points normals = rows_of(problem_.samples.normals, samples_);
-  for (Index i = 0; i < normals.rows(); ++i) {
+  evaluator.evaluate(coefficients, jets.view(), blocks);
+  Points normals = Points::Zero(evaluator.size(), 3);
+  const auto turn = [&](Index i) {
     Mat3 slope;
     for (int k = 0; k < 3; ++k)
       slope.col(k) = Eigen::Map<const Eigen::Vector3f>(jets.view().at(first_column(k), i)).cast<double>();
-    const Vec3 rest = normals.row(i).transpose();
+    const Vec3 rest = problem_.samples.normals.row(samples_[static_cast<std::size_t>(i)]).transpose();
     const Vec3 moved = rest[0] * slope.col(1).cross(slope.col(2)) +
                        rest[1] * slope.col(2).cross(slope.col(0)) +
                        rest[2] * slope.col(0).cross(slope.col(1));
     normals.row(i) = moved.transpose();
+  };
+  const Index count = blocks != nullptr ? std::ssize(*blocks) : evaluator.blocks();
+  for (Index k = 0; k < count; ++k) {
+    const Index block = blocks != nullptr ? (*blocks)[static_cast<std::size_t>(k)] : k;
+    for (Index i = 16 * block; i < std::min(16 * block + 16, normals.rows()); ++i) turn(i);
   }
   return normals;
 }

@@ -38,8 +38,13 @@ class ContactPoints {
   void coarsen();
 
   const Points& at(const RowMatrix<double>& coefficients);
-  /// Which way the samples face, as long as the surface is stretched.
-  Points normals_at(const RowMatrix<double>& coefficients);
+  /// Whether these were the last ones.
+  bool is_at(const RowMatrix<double>& coefficients) const {
+    return coefficients.rows() == coefficients_.rows() && coefficients == coefficients_;
+  }
+  /// Which way the samples face, as long as the surface is stretched; zero outside of these blocks of 16, if
+  /// not null.
+  Points normals_at(const RowMatrix<double>& coefficients, const std::vector<Index>* blocks = nullptr);
 
  private:
   Points finer(Index sample);

@@ -59,11 +59,11 @@ double find_and_push(RadialState& s, int pushes, double from) {
   return depth;
 }
 
-/// Descends, and updates the pressures. Whether the descent converged. Goes back where that meets what was
-/// not near before.
-bool solve_round(RadialState& s, Index iterations, double tolerance, const Progress& progress) {
+/// Descends, and updates the pressures. Whether the descent converged. Goes back towards `before` where that
+/// meets what was not near there.
+bool solve_round(RadialState& s, const RowMatrix<double>& before, Index iterations, double tolerance,
+                 const Progress& progress) {
   stiffen_contact(s);
-  const RowMatrix<double> before = s.shape.coefficients;
   const double allowed = std::max(too_deep, s.contact.deepest());
   const bool converged = s.descend(s.fast, {iterations, tolerance, floor}, progress).converged;
   press_balanced(s);
@@ -116,14 +116,17 @@ void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Inde
   Index left = iterations;
   double before_it = std::numeric_limits<double>::infinity();
   s.contact.find(s.shape.coefficients);
+  SolveHistory::Start start{s.shape.coefficients, {}};
   for (Index k = 1; k <= steps; ++k) {
     const std::vector<Mat4> wanted =
         motions_between(s.handles.bound(), before, static_cast<double>(k) / static_cast<double>(steps));
     for (Index extra = more_rounds;;) {
       s.objective(s.fast);
       set_reachable_targets(s, wanted);
+      const RowMatrix<double> here = s.shape.coefficients;
+      if (steps == 1 && extra == more_rounds) start = s.extrapolate();
       const Index at_once = k < steps ? steps_on_the_way : std::clamp<Index>(left, 2, steps_between);
-      const bool converged = solve_round(s, at_once, tolerance, progress);
+      const bool converged = solve_round(s, here, at_once, tolerance, progress);
       if (k < steps) break;
       left -= at_once;
       const double depth = s.contact.deepest();
@@ -134,6 +137,8 @@ void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Inde
     }
   }
   find_and_push(s, most_pushes, nearly);
+  start.u.resize(0);  // of planes that have gone
+  s.history.start.set(s.start_revisions(), std::move(start));
 }
 
 /// Takes obstacles that have moved to where they are now, and the surface along.
@@ -148,7 +153,7 @@ void sweep(RadialState& s, const std::vector<Mat4>& motions, double tolerance, c
     if (k == parts || !s.contact.presses()) continue;
     s.objective(s.fast);
     set_reachable_targets(s, motions);
-    solve_round(s, steps_on_the_way, tolerance, progress);
+    solve_round(s, RowMatrix<double>(s.shape.coefficients), steps_on_the_way, tolerance, progress);
   }
 }
 

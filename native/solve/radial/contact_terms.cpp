@@ -69,6 +69,7 @@ void ContactTerms::set(const std::optional<Contact>& contact, const RowMatrix<do
                        contact->obstacles.size() == contact_->obstacles.size() &&
                        contact->ground.has_value() == contact_->ground.has_value();
   contact_ = contact;
+  known_ = false;
   if (goes_on) {
     const std::vector<BarrierSurface> before = std::exchange(surfaces_, {});
     gather_surfaces();
@@ -112,6 +113,7 @@ void ContactTerms::gather_surfaces() {
 }
 
 void ContactTerms::release() {
+  known_ = known_ && deepest_ <= 0.0 && !touches_itself_;  // then no planes are as good
   found_.revision = 0;
   found_.planes.clear();
   found_.places.resize(0, 3);
@@ -119,10 +121,6 @@ void ContactTerms::release() {
   pressures_.setZero();
   deepest_ = deepest_outside_ = 0.0;
   touches_itself_ = false;
-}
-
-double ContactTerms::fastest(const RowMatrix<double>& rates) {
-  return std::sqrt(points_.at(rates).rowwise().squaredNorm().maxCoeff());
 }
 
 /// Places that may have a plane.
@@ -155,6 +153,9 @@ void ContactTerms::find_outside(const std::vector<Index>& rows) {
 }
 
 double ContactTerms::find(const RowMatrix<double>& coefficients, std::optional<double> further, bool jumped) {
+  if (known_ && !grips_ && !jumped && further.value_or(0.0) <= further_ && points_.is_at(coefficients))
+    return deepest_;
+  known_ = true;
   const Points before = std::exchange(places_, points_.at(coefficients));
   further_ = further ? *further : std::sqrt((places_ - before).rowwise().squaredNorm().maxCoeff());
   grips_ = false;
@@ -263,7 +264,7 @@ void ContactTerms::add_own_planes(const RowMatrix<double>& coefficients, bool ju
   const Vector before = pressures_.col(own);
   touches_itself_ = false;
   pressures_.col(own).setZero();
-  const auto normals = [&] { return points_.normals_at(coefficients); };
+  const auto normals = [&](auto* blocks) { return points_.normals_at(coefficients, blocks); };
   const Points samples = places_.topRows(points_.sample_count());
   for (const FacingPair& pair :
        self_->find(samples, normals, std::min(near_itself + further_, farthest), jumped)) {

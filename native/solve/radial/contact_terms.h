@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -28,7 +29,7 @@ class ContactTerms {
   bool only_itself() const { return self_ && surfaces_.empty(); }
 
   /// The ways start here, without pressure, and obstacles are where they belong.
-  void begin(const RowMatrix<double>& coefficients);
+  void begin(const RowMatrix<double>& coefficients) { resume({}, coefficients); }
   /// What the next step depends on; begins there with it.
   ContactState held() const;
   void resume(const ContactState& state, const RowMatrix<double>& coefficients);
@@ -49,7 +50,9 @@ class ContactTerms {
   /// Takes back all searches since these were the ways.
   void set_ways(ContactWays ways);
   /// The largest speed of a sample, where coefficients change at these rates.
-  double fastest(const RowMatrix<double>& rates);
+  double fastest(const RowMatrix<double>& rates) {
+    return std::sqrt(points_.at(rates).rowwise().squaredNorm().maxCoeff());
+  }
   /// Pressures after a solve that left the places of found() there, times a share of each surface. Returns
   /// how much of them has changed, 0 to 1.
   double press(const double* places, const Vector& shares);
@@ -103,6 +106,7 @@ class ContactTerms {
   double further_ = 0.0;
   bool touches_itself_ = false;
   bool grips_ = false;  // what was found last
+  bool known_ = false;  // nothing but the coefficients has changed since
 };
 
 }  // namespace arapfields

@@ -27,13 +27,11 @@ void recall_inside(const ContactState& state, std::vector<Points>& seen, RowMatr
 
 }  // namespace
 
-void ContactTerms::begin(const RowMatrix<double>& coefficients) { resume({}, coefficients); }
-
 void ContactTerms::resume(const ContactState& state, const RowMatrix<double>& coefficients) {
   if (!any()) return release();
   points_.coarsen();
   places_ = points_.at(coefficients);
-  if (self_) self_->begin(places_, [&] { return points_.normals_at(coefficients); });
+  if (self_) self_->begin(places_, [&](auto* blocks) { return points_.normals_at(coefficients, blocks); });
   const Index count = std::ssize(surfaces_);
   const bool fits = std::ssize(state.placements) == count;
   ways_.seen.assign(surfaces_.size(), {});
@@ -49,6 +47,7 @@ void ContactTerms::resume(const ContactState& state, const RowMatrix<double>& co
   starts_ = fits ? state.placements : ends_;
   carried_.assign(surfaces_.size(), Mat4::Identity());
   release();
+  known_ = false;
   for (const ContactState::Pressure& held : state.pressures)
     if (held.row < pressures_.rows() && held.surface < pressures_.cols()) {
       pressures_(held.row, held.surface) = held.pressure;
@@ -110,6 +109,7 @@ void ContactTerms::move_obstacles(double share) {
     const auto which = static_cast<std::size_t>(k);
     carried_[which].setIdentity();
     if (surfaces_[which].placement() == ends_[which]) continue;
+    known_ = false;
     const Mat4 before = surfaces_[which].placement();
     if (share < 1.0)
       surfaces_[which].place_between(starts_[which], ends_[which], share);
@@ -143,6 +143,7 @@ ContactWays ContactTerms::ways() const {
 void ContactTerms::set_ways(ContactWays ways) {
   if (self_) self_->set_ways(std::move(ways.own));
   ways_ = std::move(ways);
+  known_ = false;
   add_finer_ways();
 }
 

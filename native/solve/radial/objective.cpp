@@ -175,6 +175,14 @@ RowMatrix<double> RadialObjective<Scalar>::pull_back(const Measurements& cotange
 }
 
 template <class Scalar>
+RowMatrix<double> RadialObjective<Scalar>::pull_back_contact(const PointsOf<Scalar>& cotangents) const {
+  RowMatrix<double> gradient = RowMatrix<double>::Zero(center_count() + 4, 3);
+  contact_.pull_back({cotangents.data(), contact_.size(), JetOrder::value}, gradient);
+  if (problem_.mirror) problem_.mirror->symmetrise(gradient);
+  return gradient;
+}
+
+template <class Scalar>
 RowMatrix<double> RadialObjective<Scalar>::precondition(const RowMatrix<double>& gradient) const {
   const double size = gradient.norm();
   if (!(size > 0.0)) return gradient;

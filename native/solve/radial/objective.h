@@ -71,7 +71,6 @@ class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
   Eigen::Map<const PointsOf<Scalar>> handle_values(const Measurements& u) const {
     return {u.data() + handle_offset(), pairs_.sources.rows(), 3};
   }
-
   /// Where the places of the contact are.
   Eigen::Map<const PointsOf<Scalar>> contact_values(const Measurements& u) const {
     return {u.data() + contact_offset(), contact_.size(), 3};
@@ -84,6 +83,7 @@ class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
   void measure(const RowMatrix<double>& c, Measurements& u) const override;
   double value(const Measurements& u, Measurements* cotangents) const override;
   RowMatrix<double> pull_back(const Measurements& cotangents) const override;
+  RowMatrix<double> pull_back_contact(const PointsOf<Scalar>& cotangents) const;  ///< from its places alone
   RowMatrix<double> precondition(const RowMatrix<double>& gradient) const override;
   bool accepted(const Measurements& u) const override;
 

@@ -15,8 +15,8 @@ namespace arapfields {
 namespace {
 
 /// Single precision serves down to this tolerance; what it cannot see is an energy of about the second
-/// number; its values are good to about the third share.
-constexpr double single_tolerance = 3e-5, single_floor = 1e-10, single_error = 1e-6;
+/// number.
+constexpr double single_tolerance = 3e-5, single_floor = 1e-10;
 
 /// Share of the handles' part of the energy below which a rigid motion of everything must bring it.
 constexpr double worthwhile_gain = 0.1;
@@ -34,34 +34,12 @@ void follow_rigidly(RadialState& s) {
   s.shape.jump();
 }
 
-/// A drag goes on as it went: starts one step further along the last change where that is better. Returns
-/// where it would have started else.
-SolveHistory::Start extrapolate(RadialState& s) {
-  const SolveHistory::Start before = s.history.start.take(s.start_revisions());
-  SolveHistory::Start now{s.shape.coefficients, s.measurements(s.fast)};
-  if (before.coefficients.size() == 0) return now;
-  const RadialObjective<float>& objective = *s.fast.objective.latest();
-  VectorF further;
-  if (before.u.size() > 0) {
-    further = 2.0f * now.u - before.u;
-  } else {
-    objective.measure(now.coefficients - before.coefficients, further);
-    further += now.u;
-  }
-  const double value = objective.value(now.u, nullptr);
-  if (objective.value(further, nullptr) < (1.0 - single_error) * value) {
-    s.shape.coefficients += now.coefficients - before.coefficients;
-    s.set_measurements(s.fast, std::move(further));
-  }
-  return now;
-}
-
 /// Without contact.
 void follow_freely(RadialState& s, Index iterations, double tolerance, const Progress& progress) {
   s.precondition(0.0);
   s.objective(s.fast);
   if (s.handles.any() && !s.style.any()) follow_rigidly(s);
-  SolveHistory::Start start = extrapolate(s);
+  SolveHistory::Start start = s.extrapolate();
   const QuasiNewtonOptions single{iterations, std::max(tolerance, single_tolerance), single_floor};
   const bool ended = s.descend(s.fast, single, progress).ended;
   const bool is_exact = tolerance < single_tolerance;

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "core/errors.h"
 #include "core/parallel.h"
+#include "sampling/point_grid.h"
 #include "sampling/sample_choice.h"
 
 namespace arapfields {
@@ -26,6 +26,10 @@ constexpr double spacings_aside = 2.0;
 /// Places where winding numbers are taken, and by how much more than at rest these are inside another part.
 constexpr Index most_probes = 500;
 constexpr double inside_another = 0.6;
+/// Of squares in single precision.
+constexpr double rounding = 1e-4;
+/// What normals are evaluated for at once.
+constexpr Index block_rows = 16;
 
 }  // namespace
 
@@ -45,12 +49,16 @@ SelfContact::SelfContact(const RadialProblem& problem, const std::vector<Index>&
   if (!samples.mesh_indices.empty())
     for (const Index row : rows) meshes_.push_back(samples.mesh_indices[static_cast<std::size_t>(row)]);
   widths_ = 2.0 * problem.shape->thickness->at(places);
+  RowMatrix<double> with_mesh = RowMatrix<double>::Zero(n, 7);
+  with_mesh.leftCols(6) = inside_;
+  for (std::size_t i = 0; i < meshes_.size(); ++i) with_mesh(static_cast<Index>(i), 6) = meshes_[i];
+  at_rest_ = RowBoxes<8>(with_mesh);
   const PointGrid grid(places, near_at_rest);  // about a square of the surface lies in each cell
   const double share = static_cast<double>(grid.size()) / static_cast<double>(n);
   aside_ = spacings_aside * near_at_rest * std::sqrt(share);
   least_ = Vector::Constant(n, kept);
   Vector at_rest = least_;
-  for (const FacingPair& pair : search(places, [&] { return normals; }, near_at_rest, Beyond::all))
+  for (const FacingPair& pair : search(places, [&](auto*) { return normals; }, near_at_rest, Beyond::all))
     for (const Index i : {pair.first, pair.second})
       at_rest[i] = std::min(at_rest[i], std::max(0.0, pair.gap));
   least_ = at_rest;
@@ -61,7 +69,7 @@ SelfContact::SelfContact(const RadialProblem& problem, const std::vector<Index>&
   std::nth_element(sorted.begin(), sorted.begin() + half, sorted.end());
   share_ = 1.0 / std::max(sorted[half], 1e-12);  // most probes are inside once
   windings_ *= share_;
-  begin(places, [&] { return normals; });
+  begin(places, [&](auto*) { return normals; });
 }
 
 bool SelfContact::is_far(Index i, Index j, double distance) const {
@@ -77,46 +85,61 @@ bool SelfContact::came_through(Index i, Index j, const Vec3& normal) const {
          (ways_.seen.row(i) - ways_.seen.row(j)).dot(normal.transpose()) >= 0.0;
 }
 
-/// For each cell the cells near it that hold a sample which may be far from one of its own inside the shape.
-std::vector<std::vector<Index>> SelfContact::near_parts(const PointGrid& grid) const {
-  using Box = Eigen::Array<double, 7, 1>;
-  std::vector<Box> low(static_cast<std::size_t>(grid.size())), high;
-  for (Index c = 0; c < grid.size(); ++c) {
-    Box least = Box::Constant(std::numeric_limits<double>::infinity()), most = -least;
-    for (const Index i : grid.rows(c)) {
-      Box at;
-      at << inside_.row(i).transpose(), meshes_.empty() ? 0.0 : meshes_[static_cast<std::size_t>(i)];
-      least = least.min(at);
-      most = most.max(at);
+/// Whether a sample of one run is near one of another that it is far from inside the shape.
+bool SelfContact::meet(PointsIn places, Index a, Index b, double near) const {
+  for (Index i = at_rest_.first(a); i < at_rest_.last(a); ++i)
+    for (Index j = at_rest_.first(b); j < at_rest_.last(b); ++j)
+      if ((places.row(i) - places.row(j)).squaredNorm() < near * near &&
+          std::min(least_[i], least_[j]) > 0.0 && is_far(i, j, far_inside))
+        return true;
+  return false;
+}
+
+/// For each run of samples those that it meets.
+std::vector<std::vector<Index>> SelfContact::near_runs(PointsIn places, const RowBoxes<4>& boxes,
+                                                       double near) const {
+  std::vector<std::vector<Index>> result(static_cast<std::size_t>(boxes.count()));
+  const auto reach = static_cast<float>((1.0 + rounding) * near * near);
+  const auto inside = static_cast<float>((1.0 - rounding) * far_inside * far_inside);
+  const auto descend = [&](const auto& self, Index level, Index a, Index b) -> void {
+    if (boxes.box(level, a).gap(boxes.box(level, b)) > reach) return;
+    const RowBoxes<8>::Row span = at_rest_.box(level, a).span(at_rest_.box(level, b));
+    if (span.square().sum() < inside) return;
+    if (level > 0) {
+      const Index count = boxes.count(level - 1);
+      for (Index i = 2 * a; i < std::min(2 * a + 2, count); ++i)
+        for (Index j = a == b ? i : 2 * b; j < std::min(2 * b + 2, count); ++j) self(self, level - 1, i, j);
+    } else if (meet(places, a, b, near)) {
+      result[static_cast<std::size_t>(a)].push_back(b);
+      if (a != b) result[static_cast<std::size_t>(b)].push_back(a);
     }
-    low[static_cast<std::size_t>(c)] = least;
-    high.push_back(most);
-  }
-  std::vector<std::vector<Index>> result(low.size());
-  for (std::size_t c = 0; c < low.size(); ++c)
-    grid.near(static_cast<Index>(c), [&](Index other) {
-      const auto o = static_cast<std::size_t>(other);
-      const Box size = high[c].max(high[o]) - low[c].min(low[o]);
-      if (size.head(6).matrix().squaredNorm() > far_inside * far_inside || size[6] > 0.0)
-        result[c].push_back(other);
-    });
+  };
+  descend(descend, boxes.levels() - 1, 0, 0);
   return result;
 }
 
 std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& normals_at, double near,
                                             Beyond beyond) const {
-  const Index n = places.rows();
-  const PointGrid grid(places, near);
-  const std::vector<std::vector<Index>> parts = near_parts(grid);
-  if (std::all_of(parts.begin(), parts.end(), [](const auto& p) { return p.empty(); })) return {};
-  const Points normals = normals_at().rowwise().normalized();
-  std::vector<Index> second(static_cast<std::size_t>(n), -1);
-  const auto visit = [&](Index i, const std::vector<Index>& cells) {
+  const RowBoxes<4> boxes(places);
+  const std::vector<std::vector<Index>> near_to = near_runs(places, boxes, near);
+  std::vector<Index> runs, blocks;
+  for (Index run = 0; run < boxes.count(); ++run) {
+    if (near_to[static_cast<std::size_t>(run)].empty()) continue;
+    runs.push_back(run);
+    const Index block = boxes.first(run) / block_rows;
+    if (blocks.empty() || blocks.back() != block) blocks.push_back(block);
+  }
+  if (runs.empty()) return {};
+  Points normals = normals_at(&blocks);
+  std::vector<Index> second(static_cast<std::size_t>(places.rows()), -1);
+  for (const Index run : runs)
+    for (Index i = boxes.first(run); i < boxes.last(run); ++i) normals.row(i).normalize();
+  const auto visit = [&](Index i, const std::vector<Index>& others) {
     if (least_[i] <= 0.0) return;
     const Vec3 place = places.row(i).transpose(), normal = normals.row(i).transpose();
     double nearest = near * near;
-    for (const Index cell : cells)
-      for (const Index j : grid.rows(cell)) {
+    for (const Index run : others)
+      for (Index j = boxes.first(run); j < boxes.last(run); ++j) {
         const Vec3 arm = place - places.row(j).transpose();
         const double square = arm.squaredNorm();
         if (square >= nearest) continue;
@@ -131,19 +154,22 @@ std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& norm
         second[static_cast<std::size_t>(i)] = j;
       }
   };
-  parallel_for(0, grid.size(), 16, [&](Index first_cell, Index last_cell) {
-    for (Index c = first_cell; c < last_cell; ++c)
-      if (!parts[static_cast<std::size_t>(c)].empty())
-        for (const Index i : grid.rows(c)) visit(i, parts[static_cast<std::size_t>(c)]);
+  parallel_for(0, std::ssize(runs), 32, [&](Index first, Index last) {
+    for (Index k = first; k < last; ++k) {
+      const Index run = runs[static_cast<std::size_t>(k)];
+      for (Index i = boxes.first(run); i < boxes.last(run); ++i)
+        visit(i, near_to[static_cast<std::size_t>(run)]);
+    }
   });
   std::vector<FacingPair> pairs;
-  for (Index i = 0; i < n; ++i) {
-    const Index j = second[static_cast<std::size_t>(i)];
-    if (j < 0) continue;
-    const Vec3 normal = normals.row(j).transpose();
-    pairs.push_back({i, j, normal, normal.dot((places.row(i) - places.row(j)).transpose()),
-                     std::min(least_[i], least_[j])});
-  }
+  for (const Index run : runs)
+    for (Index i = boxes.first(run); i < boxes.last(run); ++i) {
+      const Index j = second[static_cast<std::size_t>(i)];
+      if (j < 0) continue;
+      const Vec3 normal = normals.row(j).transpose();
+      pairs.push_back({i, j, normal, normal.dot((places.row(i) - places.row(j)).transpose()),
+                       std::min(least_[i], least_[j])});
+    }
   return pairs;
 }
 

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "sampling/point_grid.h"
+#include "sampling/row_boxes.h"
 #include "solve/radial/problem.h"
 
 namespace arapfields {
@@ -28,7 +28,8 @@ class SelfContact {
     Points seen;               ///< places at the last search
     std::vector<Index> faced;  ///< what each faced then; −1: nothing
   };
-  using Normals = std::function<Points()>;  ///< (n,3) as long as the surface there is stretched
+  /// (n,3) as long as the surface there is stretched, in these blocks of 16 rows; null: in all.
+  using Normals = std::function<Points(const std::vector<Index>* blocks)>;
   /// For these rows of the problem's samples. Throws InvalidInput without normals.
   SelfContact(const RadialProblem& problem, const std::vector<Index>& rows, double kept);
 
@@ -45,12 +46,14 @@ class SelfContact {
  private:
   enum class Beyond { as_came, shallow, all };  // which gaps below zero are pairs
   std::vector<FacingPair> search(PointsIn places, const Normals& normals, double near, Beyond beyond) const;
-  std::vector<std::vector<Index>> near_parts(const PointGrid& grid) const;
+  std::vector<std::vector<Index>> near_runs(PointsIn places, const RowBoxes<4>& boxes, double near) const;
+  bool meet(PointsIn places, Index a, Index b, double near) const;
   bool is_far(Index i, Index j, double distance) const;
   bool came_through(Index i, Index j, const Vec3& normal) const;
   void remember(PointsIn places, const std::vector<FacingPair>& pairs);
 
   RowMatrix<double> inside_;  // (n,6) rest places and their embedding
+  RowBoxes<8> at_rest_;       // of these and the mesh
   std::vector<std::int32_t> meshes_;
   Vector windings(PointsIn places, PointsIn normals) const;
 

@@ -11,6 +11,8 @@ namespace {
 
 /// Solves after which measurements that were only updated are taken afresh.
 constexpr int most_uses = 16;
+/// Values in single precision are good to about this share.
+constexpr double single_error = 1e-6;
 
 }  // namespace
 
@@ -102,6 +104,26 @@ const Eigen::VectorX<Scalar>& RadialState::measurements(RadialPrecision<Scalar>&
   });
 }
 template const VectorF& RadialState::measurements(RadialPrecision<float>&);
+
+SolveHistory::Start RadialState::extrapolate() {
+  const SolveHistory::Start before = history.start.take(start_revisions());
+  SolveHistory::Start now{shape.coefficients, measurements(fast)};
+  if (before.coefficients.size() == 0) return now;
+  const RadialObjective<float>& objective = *fast.objective.latest();
+  VectorF further;
+  if (before.u.size() > 0) {
+    further = 2.0f * now.u - before.u;
+  } else {
+    objective.measure(now.coefficients - before.coefficients, further);
+    further += now.u;
+  }
+  const double value = objective.value(now.u, nullptr);
+  if (objective.value(further, nullptr) < (1.0 - single_error) * value) {
+    shape.coefficients += now.coefficients - before.coefficients;
+    set_measurements(fast, std::move(further));
+  }
+  return now;
+}
 
 template <class Scalar>
 QuasiNewtonReport RadialState::descend(RadialPrecision<Scalar>& precision, const QuasiNewtonOptions& how,

@@ -74,13 +74,16 @@ struct RadialState {
   template <class Scalar>
   QuasiNewtonReport descend(RadialPrecision<Scalar>& precision, const QuasiNewtonOptions& how,
                             const Progress& progress);
+  /// A drag goes on as it went: starts one step further along the last change where that is better. Returns
+  /// where it would have started else.
+  SolveHistory::Start extrapolate();
   /// Measures the report in this precision.
   template <class Scalar>
   void measure(RadialPrecision<Scalar>& precision);
   /// What follows depends on the coefficients alone.
   void invalidate_history();
   std::array<Revision, 4> start_revisions() const {
-    return {problem.energy_revision, preconditioner.revision, shape.jumps, contact.found().revision};
+    return {problem.energy_revision, preconditioner.revision, shape.jumps, contact.presses()};
   }
 
   RadialProblem problem;
