@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "core/types.h"
@@ -27,12 +28,9 @@ class RowBoxes {
     float gap(const Box& other) const {
       return (low - other.high).max(other.low - high).max(0.0f).square().sum();
     }
-    /// The edges of the box around both.
-    Row span(const Box& other) const { return high.max(other.high) - low.min(other.low); }
   };
   static constexpr Index run = 4;
 
-  RowBoxes() : levels_(1) {}
   /// Of at most `width` columns.
   explicit RowBoxes(const Eigen::Ref<const RowMatrix<double>>& rows) : levels_(1), rows_(rows.rows()) {
     levels_[0].resize(static_cast<std::size_t>((rows.rows() + run - 1) / run));
@@ -47,9 +45,11 @@ class RowBoxes {
       levels_.push_back(std::move(next));
     }
   }
-  /// The rows of a run.
-  Index first(Index k) const { return k * run; }
-  Index last(Index k) const { return std::min(rows_, (k + 1) * run); }
+  /// What belongs to the rows of a run.
+  std::span<const Index> rows(Index k, const std::vector<Index>& of) const {
+    return std::span(of).subspan(static_cast<std::size_t>(k * run),
+                                 static_cast<std::size_t>(std::min(run, rows_ - k * run)));
+  }
   Index levels() const { return std::ssize(levels_); }
   /// How many boxes a level has; runs are level 0.
   Index count(Index level = 0) const { return std::ssize(levels_[static_cast<std::size_t>(level)]); }

@@ -117,6 +117,7 @@ void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Inde
   double before_it = std::numeric_limits<double>::infinity();
   s.contact.find(s.shape.coefficients);
   SolveHistory::Start start{s.shape.coefficients, {}};
+  const int uses = s.fast.uses;
   for (Index k = 1; k <= steps; ++k) {
     const std::vector<Mat4> wanted =
         motions_between(s.handles.bound(), before, static_cast<double>(k) / static_cast<double>(steps));
@@ -137,7 +138,7 @@ void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Inde
     }
   }
   find_and_push(s, most_pushes, nearly);
-  start.u.resize(0);  // of planes that have gone
+  if (s.fast.uses <= uses) start.u.resize(0);
   s.history.start.set(s.start_revisions(), std::move(start));
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/errors.h"
 #include "core/parallel.h"
@@ -28,6 +29,8 @@ constexpr Index most_probes = 500;
 constexpr double inside_another = 0.6;
 /// Of squares in single precision.
 constexpr double rounding = 1e-4;
+/// Meshes are so far from each other.
+constexpr double meshes_apart = 10.0;
 /// What normals are evaluated for at once.
 constexpr Index block_rows = 16;
 
@@ -49,10 +52,7 @@ SelfContact::SelfContact(const RadialProblem& problem, const std::vector<Index>&
   if (!samples.mesh_indices.empty())
     for (const Index row : rows) meshes_.push_back(samples.mesh_indices[static_cast<std::size_t>(row)]);
   widths_ = 2.0 * problem.shape->thickness->at(places);
-  RowMatrix<double> with_mesh = RowMatrix<double>::Zero(n, 7);
-  with_mesh.leftCols(6) = inside_;
-  for (std::size_t i = 0; i < meshes_.size(); ++i) with_mesh(static_cast<Index>(i), 6) = meshes_[i];
-  at_rest_ = RowBoxes<8>(with_mesh);
+  gather_rest();
   const PointGrid grid(places, near_at_rest);  // about a square of the surface lies in each cell
   const double share = static_cast<double>(grid.size()) / static_cast<double>(n);
   aside_ = spacings_aside * near_at_rest * std::sqrt(share);
@@ -72,6 +72,45 @@ SelfContact::SelfContact(const RadialProblem& problem, const std::vector<Index>&
   begin(places, [&](auto*) { return normals; });
 }
 
+/// Orders samples so that runs of them, pairs of these and so on are compact at rest, and finds the balls
+/// around these.
+void SelfContact::gather_rest() {
+  RowMatrix<double> rest = RowMatrix<double>::Zero(inside_.rows(), 8);
+  rest.leftCols(6) = inside_;
+  for (std::size_t i = 0; i < meshes_.size(); ++i) rest(static_cast<Index>(i), 6) = meshes_apart * meshes_[i];
+  order_.resize(static_cast<std::size_t>(rest.rows()));
+  std::iota(order_.begin(), order_.end(), 0);
+  const auto split = [&](const auto& self, Index first, Index last) -> void {
+    Index half = RowBoxes<8>::run;
+    if (last - first <= half) return;
+    while (2 * half < last - first) half *= 2;
+    const std::vector<Index> members(order_.begin() + first, order_.begin() + last);
+    const RowMatrix<double> rows = rest(members, Eigen::all);
+    Index longest = 0;
+    (rows.colwise().maxCoeff() - rows.colwise().minCoeff()).maxCoeff(&longest);
+    std::nth_element(
+        order_.begin() + first, order_.begin() + first + half, order_.begin() + last,
+        [&](Index i, Index j) { return std::pair(rest(i, longest), i) < std::pair(rest(j, longest), j); });
+    self(self, first, first + half);
+    self(self, first + half, last);
+  };
+  split(split, 0, rest.rows());
+  rest = rest(order_, Eigen::all).eval();
+  const RowBoxes<8> boxes(rest);
+  for (Index level = 0; level < boxes.levels(); ++level) {
+    std::vector<Ball>& balls = at_rest_.emplace_back(static_cast<std::size_t>(boxes.count(level)));
+    const Index rows = boxes.run << level;
+    for (Index k = 0; k < std::ssize(balls); ++k) {
+      Ball& ball = balls[static_cast<std::size_t>(k)];
+      ball.middle = 0.5f * (boxes.box(level, k).low + boxes.box(level, k).high);
+      const auto members = rest.middleRows(k * rows, std::min(rows, rest.rows() - k * rows));
+      const Eigen::RowVectorXd middle = ball.middle.matrix().transpose().cast<double>();
+      const double radius = std::sqrt((members.rowwise() - middle).rowwise().squaredNorm().maxCoeff());
+      ball.left = static_cast<float>(0.5 * (1.0 - rounding) * far_inside - radius);
+    }
+  }
+}
+
 bool SelfContact::is_far(Index i, Index j, double distance) const {
   if (!meshes_.empty() && meshes_[static_cast<std::size_t>(i)] != meshes_[static_cast<std::size_t>(j)])
     return true;
@@ -86,9 +125,9 @@ bool SelfContact::came_through(Index i, Index j, const Vec3& normal) const {
 }
 
 /// Whether a sample of one run is near one of another that it is far from inside the shape.
-bool SelfContact::meet(PointsIn places, Index a, Index b, double near) const {
-  for (Index i = at_rest_.first(a); i < at_rest_.last(a); ++i)
-    for (Index j = at_rest_.first(b); j < at_rest_.last(b); ++j)
+bool SelfContact::meet(PointsIn places, const RowBoxes<4>& boxes, Index a, Index b, double near) const {
+  for (const Index i : boxes.rows(a, order_))
+    for (const Index j : boxes.rows(b, order_))
       if ((places.row(i) - places.row(j)).squaredNorm() < near * near &&
           std::min(least_[i], least_[j]) > 0.0 && is_far(i, j, far_inside))
         return true;
@@ -100,16 +139,17 @@ std::vector<std::vector<Index>> SelfContact::near_runs(PointsIn places, const Ro
                                                        double near) const {
   std::vector<std::vector<Index>> result(static_cast<std::size_t>(boxes.count()));
   const auto reach = static_cast<float>((1.0 + rounding) * near * near);
-  const auto inside = static_cast<float>((1.0 - rounding) * far_inside * far_inside);
   const auto descend = [&](const auto& self, Index level, Index a, Index b) -> void {
     if (boxes.box(level, a).gap(boxes.box(level, b)) > reach) return;
-    const RowBoxes<8>::Row span = at_rest_.box(level, a).span(at_rest_.box(level, b));
-    if (span.square().sum() < inside) return;
+    const std::vector<Ball>& balls = at_rest_[static_cast<std::size_t>(level)];
+    const Ball &first = balls[static_cast<std::size_t>(a)], &second = balls[static_cast<std::size_t>(b)];
+    const float left = first.left + second.left;
+    if (left > 0.0f && (first.middle - second.middle).square().sum() < left * left) return;
     if (level > 0) {
       const Index count = boxes.count(level - 1);
       for (Index i = 2 * a; i < std::min(2 * a + 2, count); ++i)
         for (Index j = a == b ? i : 2 * b; j < std::min(2 * b + 2, count); ++j) self(self, level - 1, i, j);
-    } else if (meet(places, a, b, near)) {
+    } else if (meet(places, boxes, a, b, near)) {
       result[static_cast<std::size_t>(a)].push_back(b);
       if (a != b) result[static_cast<std::size_t>(b)].push_back(a);
     }
@@ -120,26 +160,27 @@ std::vector<std::vector<Index>> SelfContact::near_runs(PointsIn places, const Ro
 
 std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& normals_at, double near,
                                             Beyond beyond) const {
-  const RowBoxes<4> boxes(places);
+  const RowBoxes<4> boxes(rows_of(places, order_));
   const std::vector<std::vector<Index>> near_to = near_runs(places, boxes, near);
-  std::vector<Index> runs, blocks;
+  std::vector<Index> runs, samples, blocks;
   for (Index run = 0; run < boxes.count(); ++run) {
     if (near_to[static_cast<std::size_t>(run)].empty()) continue;
     runs.push_back(run);
-    const Index block = boxes.first(run) / block_rows;
-    if (blocks.empty() || blocks.back() != block) blocks.push_back(block);
+    for (const Index i : boxes.rows(run, order_)) samples.push_back(i);
   }
   if (runs.empty()) return {};
+  std::sort(samples.begin(), samples.end());
+  for (const Index i : samples)
+    if (blocks.empty() || blocks.back() != i / block_rows) blocks.push_back(i / block_rows);
   Points normals = normals_at(&blocks);
+  for (const Index i : samples) normals.row(i).normalize();
   std::vector<Index> second(static_cast<std::size_t>(places.rows()), -1);
-  for (const Index run : runs)
-    for (Index i = boxes.first(run); i < boxes.last(run); ++i) normals.row(i).normalize();
   const auto visit = [&](Index i, const std::vector<Index>& others) {
     if (least_[i] <= 0.0) return;
     const Vec3 place = places.row(i).transpose(), normal = normals.row(i).transpose();
     double nearest = near * near;
     for (const Index run : others)
-      for (Index j = boxes.first(run); j < boxes.last(run); ++j) {
+      for (const Index j : boxes.rows(run, order_)) {
         const Vec3 arm = place - places.row(j).transpose();
         const double square = arm.squaredNorm();
         if (square >= nearest) continue;
@@ -157,19 +198,17 @@ std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& norm
   parallel_for(0, std::ssize(runs), 32, [&](Index first, Index last) {
     for (Index k = first; k < last; ++k) {
       const Index run = runs[static_cast<std::size_t>(k)];
-      for (Index i = boxes.first(run); i < boxes.last(run); ++i)
-        visit(i, near_to[static_cast<std::size_t>(run)]);
+      for (const Index i : boxes.rows(run, order_)) visit(i, near_to[static_cast<std::size_t>(run)]);
     }
   });
   std::vector<FacingPair> pairs;
-  for (const Index run : runs)
-    for (Index i = boxes.first(run); i < boxes.last(run); ++i) {
-      const Index j = second[static_cast<std::size_t>(i)];
-      if (j < 0) continue;
-      const Vec3 normal = normals.row(j).transpose();
-      pairs.push_back({i, j, normal, normal.dot((places.row(i) - places.row(j)).transpose()),
-                       std::min(least_[i], least_[j])});
-    }
+  for (const Index i : samples) {
+    const Index j = second[static_cast<std::size_t>(i)];
+    if (j < 0) continue;
+    const Vec3 normal = normals.row(j).transpose();
+    pairs.push_back({i, j, normal, normal.dot((places.row(i) - places.row(j)).transpose()),
+                     std::min(least_[i], least_[j])});
+  }
   return pairs;
 }
 

@@ -47,13 +47,19 @@ class SelfContact {
   enum class Beyond { as_came, shallow, all };  // which gaps below zero are pairs
   std::vector<FacingPair> search(PointsIn places, const Normals& normals, double near, Beyond beyond) const;
   std::vector<std::vector<Index>> near_runs(PointsIn places, const RowBoxes<4>& boxes, double near) const;
-  bool meet(PointsIn places, Index a, Index b, double near) const;
+  bool meet(PointsIn places, const RowBoxes<4>& boxes, Index a, Index b, double near) const;
   bool is_far(Index i, Index j, double distance) const;
   bool came_through(Index i, Index j, const Vec3& normal) const;
+  void gather_rest();
   void remember(PointsIn places, const std::vector<FacingPair>& pairs);
 
   RowMatrix<double> inside_;  // (n,6) rest places and their embedding
-  RowBoxes<8> at_rest_;       // of these and the mesh
+  std::vector<Index> order_;  // of samples, as they lie together at rest
+  struct Ball {
+    Eigen::Array<float, 8, 1> middle;  // of rows of these, and the mesh
+    float left;                        // what its radius leaves of half the distance that is far
+  };
+  std::vector<std::vector<Ball>> at_rest_;  // for each level of boxes
   std::vector<std::int32_t> meshes_;
   Vector windings(PointsIn places, PointsIn normals) const;
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "solve/radial/state.h"
 
+#include <algorithm>
 #include <bit>
 
 #include "energies/distortion.h"
@@ -111,8 +112,10 @@ SolveHistory::Start RadialState::extrapolate() {
   if (before.coefficients.size() == 0) return now;
   const RadialObjective<float>& objective = *fast.objective.latest();
   VectorF further;
-  if (before.u.size() > 0) {
-    further = 2.0f * now.u - before.u;
+  if (const Index size = std::min(now.u.size(), before.u.size()); size > 0) {
+    further = now.u;
+    further.head(size) = 2.0f * now.u.head(size) - before.u.head(size);
+    objective.measure_contact(2.0 * now.coefficients - before.coefficients, further);  // of other planes
   } else {
     objective.measure(now.coefficients - before.coefficients, further);
     further += now.u;
