@@ -6,7 +6,7 @@ import pytest
 import trimesh
 from support.geometry import contact_cases
 from support.geometry.bar import LEFT, RIGHT, bar_samples, box, turned
-from support.geometry.characters import FOOT, HIP, LEG, trousers
+from support.geometry.characters import FOOT, HIP, LEG, THICKNESS, trousers
 from support.geometry.contact_bar import (
     ALIKE,
     BALL,
@@ -192,6 +192,29 @@ def test_what_cannot_be_is_named(samples):
         af.deform(samples, handles, af.DeformOptions(centers=50, exact_handles=True), contact=touch)
     with pytest.raises(af.InvalidInput, match="field='radial'"):
         af.deform(samples, handles, af.DeformOptions(field="neural"), contact=touch)
+
+
+@pytest.mark.parametrize("kind", ["cuboid", "pin"])
+def test_a_handle_gives_way_where_its_reflection_alone_meets_something(kind):
+    samples = af.sample_surface(trousers(), 6000, seed=0)
+    trunk, foot = box([0, 0, 1.1], [0.3, 0.3, 0.3]), box([LEG, 0, FOOT], [0.1, 0.1, 0.1])
+    way, side_of_leg = np.array([0.3, 0, 0]), np.array([LEG + THICKNESS, 0, FOOT])
+    handles = [af.Cuboid(trunk, trunk), af.Cuboid(foot, turned(0, shift=way) @ foot)]
+    if kind == "pin":
+        handles[1] = af.Point(side_of_leg, side_of_leg + way)
+    reach = LEG + THICKNESS + 0.05
+    found = []
+    for side in (1, -1):
+        wall = solid(trimesh.creation.box((0.2, 1, 1)), [side * (reach + 0.1), 0, 0])
+        contact = af.Contact([af.Obstacle(wall)])
+        pressed = af.LiveDeformer(samples, handles, af.LiveOptions(symmetry="x"), contact=contact)
+        field = pressed.solve(iterations=60)
+        assert np.abs(field(samples.points)[samples.points[:, 2] < 0.4, 0]).max() < reach + HIP * 2e-3
+        assert pressed.report.flipped_share == 0
+        (held,) = pressed.report.contact.held
+        assert held.handle == 1 and held.by == "obstacles[0]"
+        found.append((held.distance, pressed.report.energy))
+    assert found[1] == pytest.approx(found[0], rel=0.03)
 
 
 @pytest.mark.slow

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "fields/radial_evaluator.h"
+#include "sampling/oriented_points.h"
 #include "sampling/sample_choice.h"
 #include "solve/radial/contact_solve.h"
 #include "solve/radial/handle_motion.h"
@@ -114,15 +115,29 @@ std::vector<Pin> pins(RadialState& s, const std::vector<Mat4>& motions) {
   return result;
 }
 
+/// A place of a plane, or its reflection, and the handle that holds it; −1: none.
+struct Place {
+  Vec3 rest, now;
+  Index holder;
+};
+
 /// How far a pin's target lies beyond a plane for what is under it to keep its length; −∞: not under it.
-double beyond(const Pin& pin, const ContactPlane& plane, const Vec3& rest, const Vec3& now) {
-  const double length = (rest - pin.rest).norm();
-  const Vec3 arm = now - pin.now;
-  const double along = plane.normal.dot(arm);
-  if (length > under * pin.width || (arm - along * plane.normal).norm() > aside * pin.width)
+double beyond(const Pin& pin, const Vec3& normal, double offset, const Place& place) {
+  const double length = (place.rest - pin.rest).norm();
+  const Vec3 arm = place.now - pin.now;
+  const double along = normal.dot(arm);
+  if (length > under * pin.width || (arm - along * normal).norm() > aside * pin.width)
     return -std::numeric_limits<double>::infinity();
   const double longer = arm.norm() > 0.0 ? length / arm.norm() : 1.0;
-  return plane.offset - plane.normal.dot(pin.target) - longer * along;
+  return offset - normal.dot(pin.target) - longer * along;
+}
+
+const std::vector<Index>& mirrored(RadialState& s) {
+  return s.mirrored.get({1}, [&] {
+    const Points& samples = s.problem.surface();
+    const Points alike = Points::Zero(samples.rows(), 3);
+    return OrientedPoints(samples, alike).nearest(s.problem.mirror->reflected(samples), alike, 0.0);
+  });
 }
 
 }  // namespace
@@ -132,32 +147,47 @@ std::vector<Index> hold_back(RadialState& s, std::vector<Mat4>& motions) {
   const ContactSet& set = s.contact.found();
   if (motions.empty() || set.planes.empty()) return by;
   const std::vector<Index> holder = holders(s);
-  const auto holder_of = [&](Index place) {
-    return place < 0 ? -1 : holder[static_cast<std::size_t>(s.contact.sample_of(place))];
-  };
-  const auto target = [&](Index place, Index handle) -> Vec3 {
-    return affine_image(set.places.row(place), motions[static_cast<std::size_t>(handle)]).row(0);
-  };
   const Vector masses = masses_of(s.handles.bound());
   std::vector<std::vector<Bound>> bounds(motions.size());
   const std::vector<Pin> points = pins(s, motions);
   const Points places = points.empty() ? Points() : contact_places(s);
-  for (const ContactPlane& plane : set.planes) {
-    if (plane.second < 0)
+  const auto turned = [&](Vec3 arm, bool over) {
+    if (over) arm[s.problem.mirror->axis] *= -1.0;
+    return arm;
+  };
+  const auto place_of = [&](Index row, bool over) -> Place {
+    Index sample = s.contact.sample_of(row);
+    if (over) sample = mirrored(s)[static_cast<std::size_t>(sample)];
+    return {turned(set.places.row(row), over),
+            points.empty() ? Vec3(Vec3::Zero()) : turned(places.row(row), over),
+            holder[static_cast<std::size_t>(sample)]};
+  };
+  const auto target = [&](const Place& place) -> Vec3 {
+    return affine_image(place.rest.transpose(), motions[static_cast<std::size_t>(place.holder)]).row(0);
+  };
+  // What a symmetric field keeps beyond a plane, it keeps beyond the plane's reflection.
+  const auto bind = [&](const ContactPlane& plane, bool over) {
+    const Vec3 normal = turned(plane.normal, over);
+    const Place first = place_of(plane.first, over);
+    const bool to_itself = plane.second >= 0;
+    if (!to_itself)
       for (const Pin& pin : points)
-        if (const double depth = beyond(pin, plane, set.places.row(plane.first), places.row(plane.first));
-            depth > -pin.width)
-          bounds[static_cast<std::size_t>(pin.handle)].push_back({plane.normal, depth, plane.obstacle});
-    const Index first = holder_of(plane.first), second = holder_of(plane.second);
-    if (first < 0 || first == second || (plane.second >= 0 && second < 0)) continue;
-    const Vec3 other = second < 0 ? Vec3(Vec3::Zero()) : target(plane.second, second);
-    const double depth = plane.offset - plane.normal.dot(target(plane.first, first) - other);
-    const double own =
-        second < 0 ? 1.0 : masses[second] / (masses[first] + masses[second]);  // the lighter gives way
-    bounds[static_cast<std::size_t>(first)].push_back({plane.normal, own * depth, plane.obstacle});
-    if (second >= 0)
-      bounds[static_cast<std::size_t>(second)].push_back(
-          {-plane.normal, (1.0 - own) * depth, plane.obstacle});
+        if (const double depth = beyond(pin, normal, plane.offset, first); depth > -pin.width)
+          bounds[static_cast<std::size_t>(pin.handle)].push_back({normal, depth, plane.obstacle});
+    const Place second = to_itself ? place_of(plane.second, over) : Place{{}, {}, -1};
+    if (first.holder < 0 || first.holder == second.holder || (to_itself && second.holder < 0)) return;
+    const Vec3 other = to_itself ? target(second) : Vec3(Vec3::Zero());
+    const double depth = plane.offset - normal.dot(target(first) - other);
+    const double own = to_itself ? masses[second.holder] / (masses[first.holder] + masses[second.holder])
+                                 : 1.0;  // the lighter gives way
+    bounds[static_cast<std::size_t>(first.holder)].push_back({normal, own * depth, plane.obstacle});
+    if (to_itself)
+      bounds[static_cast<std::size_t>(second.holder)].push_back(
+          {-normal, (1.0 - own) * depth, plane.obstacle});
+  };
+  for (const ContactPlane& plane : set.planes) {
+    bind(plane, false);
+    if (s.problem.mirror) bind(plane, true);
   }
   for (std::size_t i = 0; i < motions.size(); ++i) {
     const auto [way, surface] = least_translation(bounds[i]);

@@ -92,7 +92,8 @@ struct RadialState {
   StiffnessTerms stiffness;
   SurfaceDynamics dynamics;
   ContactTerms contact;
-  Dependent<Vector, 1> pin_widths;  ///< of the shape at point handles
+  Dependent<Vector, 1> pin_widths;            ///< of the shape at point handles
+  Dependent<std::vector<Index>, 1> mirrored;  ///< with symmetry, the sample nearest to each one's reflection
   RadialHooks hooks;
   Revision hooks_revision = 0;
   RadialPreconditioner preconditioner;
