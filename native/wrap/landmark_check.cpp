@@ -35,14 +35,17 @@ constexpr double differ = 0.1, worse_factor = 1.3, worse = 0.2;
 constexpr double no_doubt = 0.05;
 /// A pair is wrong if it stays as many medians away, and at least and at most as far (tuned).
 constexpr double medians = 2.5, least_far = 0.08, most_far = 0.13;
-/// A pair that was left out returns if the stretch grows by no more than this, and is nearer than that.
-constexpr double more_stretch = 1.3, least_stretch = 0.02, may_return = 0.35;
+/// One that was left out is right all the same where a wrap without it brings it as near.
+constexpr double near_anyway = 0.03;
+/// It returns if a wrap that pulls firmly brings it within as many medians, or so near, and the stretch grows
+/// by no more than this; where it is farther away without, it is not tried (tuned).
+constexpr double firmly_near = 0.045, more_stretch = 1.1, least_stretch = 0.015, may_return = 0.35;
 /// Rounds of a wrap, and the factor by which a mirror image must fit better.
 constexpr int rounds = 4;
 constexpr double mirrored_gain = 2.0;
 /// The coarse wrap.
 constexpr int coarse_centers = 100, coarse_stages = 3, coarse_iterations = 3;
-constexpr double soft_pull = 0.3;
+constexpr double soft_pull = 0.3, firm_pull = 2.0;
 constexpr Index coarse_target_samples = 3000;
 
 /// Penalties of distances, each below 1 and their sum.
@@ -130,7 +133,6 @@ class Vote {
     options_.centers = coarse_centers;
     options_.stages = coarse_stages;
     options_.iterations = coarse_iterations;
-    options_.landmark_weight = soft_pull;
   }
 
   void from(const Similarity& start, double scale, bool is_fixed) {
@@ -140,7 +142,7 @@ class Vote {
     Trial trial;
     bool are_enough = true;
     for (int round = 0; round < rounds; ++round) {
-      trial = tried(at, kept);
+      trial = tried(at, kept, soft_pull);
       std::vector<Index> near = near_of(trial, kept);
       are_enough = static_cast<Index>(near.size()) >= fewest_;
       if (!are_enough) near = nearest_of(trial);
@@ -164,11 +166,13 @@ class Vote {
   const Vector& distances() const { return last_.distances; }
 
  private:
-  Trial tried(const Similarity& at, const std::vector<Index>& pulled) const {
+  Trial tried(const Similarity& at, const std::vector<Index>& pulled, double pull) const {
+    WrapOptions options = options_;
+    options.landmark_weight = pull;
     const WrapTarget placed = target_.transformed_back(at);
     WrapFlow flow(samples_, placed, source_.landmarks, at.inverse_of(source_.landmark_targets), pulled,
                   static_cast<std::uint64_t>(options_.seed));
-    flow.run(options_, progress_);
+    flow.run(options, progress_);
     return {(at.of(flow.landmarks()) - source_.landmark_targets).rowwise().norm() / target_.diagonal,
             flow.stretch()};
   }
@@ -186,38 +190,45 @@ class Vote {
     std::ranges::sort(result);
     return result;
   }
-  static double limit(const Trial& trial, const std::vector<Index>& pulled) {
+  /// As many medians of the pulled pairs' distances as make one doubtful.
+  static double spread(const Trial& trial, const std::vector<Index>& pulled) {
     std::vector<double> sorted;
     for (const Index row : pulled) sorted.push_back(trial.distances[row]);
     std::ranges::sort(sorted);
-    const double median = (sorted[(sorted.size() - 1) / 2] + sorted[sorted.size() / 2]) / 2.0;
-    return std::clamp(medians * median, least_far, most_far);
+    return medians * (sorted[(sorted.size() - 1) / 2] + sorted[sorted.size() / 2]) / 2.0;
+  }
+  static double limit(const Trial& trial, const std::vector<Index>& pulled) {
+    return std::clamp(spread(trial, pulled), least_far, most_far);
   }
   static std::vector<Index> near_of(const Trial& trial, const std::vector<Index>& pulled) {
     std::vector<Index> result;
     const double far = limit(trial, pulled);
     for (Index row = 0; row < trial.distances.size(); ++row)
-      if (trial.distances[row] < far) result.push_back(row);
+      if (trial.distances[row] < (std::ranges::binary_search(pulled, row) ? far : near_anyway))
+        result.push_back(row);
     return result;
   }
 
-  /// A pair that others had pushed away returns where the wrap reaches it without much more stretch; where it
-  /// stretches less with it, the pair may stay farther away.
+  /// A pair that others had pushed away, or the pose, returns where a firm pull reaches it without more
+  /// stretch: to reach a wrong place, the surface must stretch.
   void take_back(const Similarity& at, std::vector<Index>& kept, Trial& trial) const {
     std::vector<Index> away;
     for (Index row = 0; row < trial.distances.size(); ++row)
       if (!std::ranges::binary_search(kept, row) && trial.distances[row] < may_return) away.push_back(row);
+    if (away.empty()) return;
     std::ranges::sort(away, {}, [&](Index row) { return trial.distances[row]; });
+    trial = tried(at, kept, firm_pull);
     for (const Index row : away) {
       std::vector<Index> more = kept;
       more.insert(std::ranges::upper_bound(more, row), row);
-      const Trial with = tried(at, more);
-      const double far = with.stretch < trial.stretch ? most_far : limit(with, more);
+      Trial with = tried(at, more, firm_pull);
+      const double far = limit(with, more);
       if (with.stretch > more_stretch * trial.stretch + least_stretch ||
+          with.distances[row] >= std::max(firmly_near, spread(with, more)) ||
           std::ranges::any_of(more, [&](Index one) { return with.distances[one] >= far; }))
         continue;
       kept = std::move(more);
-      trial = with;
+      trial = std::move(with);
     }
   }
 

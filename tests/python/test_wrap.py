@@ -156,6 +156,34 @@ def test_landmarks_that_lie_are_named_and_left_out(figure, samples, wrong):
     assert np.array_equal(field(v), af.wrap(samples, sdf, right, options)(v))
 
 
+@pytest.mark.parametrize("seed", [2, 11, 24])
+def test_a_landmark_that_lies_a_little_is_named_beside_one_that_lies_much(seed):
+    """An eighth of the size off, on the same arm; the other one anywhere."""
+    v, f, ends = cases.star()
+    target_v, rng = cases.moved(v), np.random.default_rng(seed)
+    little, much = rng.choice(len(ends), 2, replace=False)
+    away = np.linalg.norm(target_v - target_v[ends[little]], axis=1) / np.linalg.norm(
+        np.ptp(target_v, axis=0)
+    )
+    told = ends.copy()
+    told[little] = rng.choice(np.flatnonzero((away > 0.11) & (away < 0.15)))
+    told[much] = rng.integers(len(v))
+    pairs = list(zip(v[ends], target_v[told], strict=True))
+    options = af.WrapOptions(centers=20, stages=1, iterations=1)
+    report = af.wrap(af.sample_mesh(v, f, 1500), af.MeshSdf(target_v, f), pairs, options).report
+    assert report.left_out == tuple(sorted((little, much)))
+
+
+@pytest.mark.parametrize(("liar", "told"), [(4, 251), (5, 200), (5, 30)])
+def test_a_landmark_on_a_round_back_is_not_blamed_for_what_another_says(figure, samples, liar, told):
+    v, f = figure
+    target_v, ends = cases.moved(v), ends_of(v)[:8]
+    pairs = [(v[end], target_v[told if i == liar else end]) for i, end in enumerate(ends)]
+    options = af.WrapOptions(centers=20, stages=1, iterations=1)
+    report = af.wrap(samples, af.MeshSdf(target_v, f), pairs, options).report
+    assert set(report.left_out) <= {liar}
+
+
 def test_landmarks_of_which_most_lie_are_not_followed_without_a_word(figure, samples):
     v, f = figure
     target_v, ends = cases.moved(v), ends_of(v)

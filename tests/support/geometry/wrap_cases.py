@@ -17,6 +17,18 @@ def figure(subdivisions=4):
     return v * (1 + nose + hump) * [1.0, 0.7, 0.6], f
 
 
+def star():
+    """(n, 3), (m, 3), (8,): a ball with five unlike arms; vertices at their ends and beside three of them."""
+    v, f = sphere(1.0, 4)
+    arms = np.array([[1, 0, 0], [-0.8, 0.6, 0.1], [0.1, -0.9, 0.4], [-0.3, 0.2, -0.9], [0.2, 0.8, 0.6]])
+    arms /= np.linalg.norm(arms, axis=1)[:, None]
+    squares = ((v[:, None] - arms) ** 2).sum(2)
+    v = v * (0.7 + np.exp(-squares * [14, 18, 12, 16, 14]) @ [[1.8], [1.2], [1.5], [1.0], [1.3]])
+    beside = [1.1 * arm + 0.25 * np.cross(arm, [0, 0, 1]) for arm in arms[[0, 1, 4]]]
+    ends = [np.argmax(v @ arm) for arm in arms]
+    return v, f, np.array(ends + [np.linalg.norm(v - place, axis=1).argmin() for place in beside])
+
+
 def rotation(axis, angle):
     axis = np.asarray(axis, float) / np.linalg.norm(axis)
     cross = np.cross(np.eye(3), axis)
