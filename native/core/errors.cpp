@@ -6,22 +6,25 @@
 
 namespace arapfields {
 
+InvalidInput::InvalidInput(std::string_view argument, std::string_view found, std::string_view allowed)
+    : std::invalid_argument(std::string(argument).append(": ").append(found).append("; ").append(allowed)) {}
+
 std::string number_text(double value) {
   char buffer[32];
   std::snprintf(buffer, sizeof buffer, "%g", value);
   return buffer;
 }
 
-void require_range(const std::string& argument, double value, double low, double high) {
+void require_range(std::string_view argument, double value, double low, double high) {
   require(std::isfinite(value) && value >= low && value <= high, argument, number_text(value),
           number_text(low) + " to " + number_text(high) + " is allowed");
 }
 
-void require_positive(const std::string& argument, double value) {
+void require_positive(std::string_view argument, double value) {
   require(std::isfinite(value) && value > 0.0, argument, number_text(value), "must be positive");
 }
 
-void require_not_negative(const std::string& argument, double value) {
+void require_not_negative(std::string_view argument, double value) {
   require(std::isfinite(value) && value >= 0.0, argument, number_text(value), "must not be negative");
 }
 

@@ -3,6 +3,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include "core/export.h"
 
@@ -13,8 +14,7 @@ namespace arapfields {
 class ARAPFIELDS_EXPORT InvalidInput : public std::invalid_argument {
  public:
   explicit InvalidInput(const std::string& what) : std::invalid_argument(what) {}
-  InvalidInput(const std::string& argument, const std::string& found, const std::string& allowed)
-      : std::invalid_argument(argument + ": " + found + "; " + allowed) {}
+  InvalidInput(std::string_view argument, std::string_view found, std::string_view allowed);
 };
 
 /// The caller's Task was cancelled. Python sees arapfields.Cancelled.
@@ -30,18 +30,17 @@ class ARAPFIELDS_EXPORT Diverged : public std::runtime_error {
 };
 
 /// Throws InvalidInput(argument, found, allowed) unless `holds`.
-inline void require(bool holds, const std::string& argument, const std::string& found,
-                    const std::string& allowed) {
+inline void require(bool holds, std::string_view argument, std::string_view found, std::string_view allowed) {
   if (!holds) throw InvalidInput(argument, found, allowed);
 }
 
 /// A number as these texts show it: six digits.
 ARAPFIELDS_EXPORT std::string number_text(double value);
 /// Throws InvalidInput unless the value is finite and within [low, high].
-ARAPFIELDS_EXPORT void require_range(const std::string& argument, double value, double low, double high);
+ARAPFIELDS_EXPORT void require_range(std::string_view argument, double value, double low, double high);
 /// Throws InvalidInput unless the value is finite and above 0.
-ARAPFIELDS_EXPORT void require_positive(const std::string& argument, double value);
+ARAPFIELDS_EXPORT void require_positive(std::string_view argument, double value);
 /// Throws InvalidInput unless the value is finite and 0 or more.
-ARAPFIELDS_EXPORT void require_not_negative(const std::string& argument, double value);
+ARAPFIELDS_EXPORT void require_not_negative(std::string_view argument, double value);
 
 }  // namespace arapfields

@@ -11,7 +11,7 @@ namespace {
 
 // Of the frame's scale: nearer to a triangle the offset to it is lost in rounding.
 constexpr double on_surface = 1e-12;
-constexpr Index grain = 1024;
+constexpr Index points_a_task = 1024;
 
 Points unit_normals(PointsIn vertices, TrianglesIn triangles) {
   Points normals(triangles.rows(), 3);
@@ -38,7 +38,7 @@ Vector MeshSdf::evaluate(PointsIn points, Points* gradients, const Progress& pro
   if (gradients == nullptr) return distances;
   const ClosestPoints closest = distance_.closest(points, progress);
   gradients->resize(points.rows(), 3);
-  parallel_for(0, points.rows(), grain, [&](Index begin, Index end) {
+  parallel_for(0, points.rows(), points_a_task, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       const Vec3 offset = (points.row(i) - closest.points.row(i)) / frame_.scale;
       if (offset.norm() > on_surface)

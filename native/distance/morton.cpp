@@ -11,7 +11,7 @@ namespace {
 
 constexpr int digit_bits = 10;
 constexpr std::uint32_t digit_mask = (1u << digit_bits) - 1;
-constexpr Index grain = 8192;
+constexpr Index codes_a_task = 8192;
 
 struct Keyed {
   std::uint32_t key;
@@ -48,7 +48,7 @@ std::vector<std::uint32_t> morton_order(PointsIn points) {
   const double side = std::max(0.5 * (0.5 * high - 0.5 * low).maxCoeff(), 1e-300);
   const double factor = 0.25 * 1023.999 / side;
   std::vector<Keyed> keyed(count), other(count);
-  parallel_for(0, points.rows(), grain, [&](Index begin, Index end) {
+  parallel_for(0, points.rows(), codes_a_task, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       std::uint32_t key = 0;
       for (int k = 0; k < 3; ++k)

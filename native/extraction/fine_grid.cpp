@@ -7,8 +7,6 @@
 namespace arapfields {
 namespace {
 
-constexpr float far = 1e30f;
-
 Place shifted(Place place, int axis, int by) {
   place[axis] += by;
   return place;
@@ -66,7 +64,7 @@ bool FineGrid::settle(const Place& place, Sample& sample, double slope) const {
         if (sample_at == samples_.end() || !sample_at->second.exact) continue;
         const double largest_change = slope * step * std::sqrt(static_cast<double>(i * i + j * j + k * k));
         if (std::abs(sample_at->second.value) <= largest_change) continue;
-        sample = {sample_at->second.value < 0.0f ? -far : far, false, true};
+        sample = {sample_at->second.value < 0.0f ? -SparseGrid::far : SparseGrid::far, false, true};
         return true;
       }
   return false;
@@ -83,7 +81,7 @@ void FineGrid::cut(const std::set<Place>& cells, double slope, EvaluationCounter
     if (sample.known) continue;
     const bool shared = place[0] % factor_ == 0 && place[1] % factor_ == 0 && place[2] % factor_ == 0;
     const int i = place[0] / factor_, j = place[1] / factor_, k = place[2] / factor_;
-    if (shared && (coarse_.exact(i, j, k) || std::abs(coarse_.value(i, j, k)) >= far))
+    if (shared && (coarse_.exact(i, j, k) || std::abs(coarse_.value(i, j, k)) >= SparseGrid::far))
       sample = {coarse_.value(i, j, k), coarse_.exact(i, j, k), true};
     else if (place[0] % 2 == 0 && place[1] % 2 == 0 && place[2] % 2 == 0)
       to_evaluate.push_back(place);

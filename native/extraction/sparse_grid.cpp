@@ -10,7 +10,6 @@
 namespace arapfields {
 namespace {
 
-constexpr float far = 1e30f;
 constexpr float outside_grid = std::numeric_limits<float>::quiet_NaN();
 constexpr Index blocks_per_chunk = 16;
 // Φ is evaluated where |p| is below this share of the model's bound on |Φ − p|, which is three times the

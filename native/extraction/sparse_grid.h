@@ -16,11 +16,12 @@ namespace arapfields {
 class SparseGrid {
  public:
   static constexpr int side = 8, points = side * side * side;
+  static constexpr float far = 1e30f;  ///< the value where only the sign is known
   static constexpr int window_side = side + 2, window_points = window_side * window_side * window_side;
 
   struct Block {
     int place[3];                ///< in blocks
-    float value[points];         ///< Φ, the model's p, or ±1e30 where only the sign is known
+    float value[points];         ///< Φ, the model's p, or ±far
     float error[points];         ///< Φ's sign is ambiguous where |value| is not above this
     std::uint8_t exact[points];  ///< whether value is Φ's own
   };

@@ -92,7 +92,7 @@ RowMatrix<double> fitted_slopes(const Points& nodes, const Points& values, const
 
 /// Nodes near the plane are put on it, all others followed by their reflections; returns each one's twin.
 std::vector<Index> add_reflections(Points& nodes, Points& normals, int axis, double width) {
-  constexpr double nearly_on_plane = 0.25;
+  constexpr double node_on_plane = 0.25;
   const Points places = nodes, directions = normals;
   nodes.resize(2 * places.rows(), 3);
   normals.resize(2 * places.rows(), 3);
@@ -101,7 +101,7 @@ std::vector<Index> add_reflections(Points& nodes, Points& normals, int axis, dou
   for (Index i = 0; i < places.rows(); ++i) {
     Eigen::RowVector3d flat = directions.row(i);
     flat[axis] = 0.0;
-    const bool on_plane = places(i, axis) < nearly_on_plane * width && flat.norm() > 0.5;
+    const bool on_plane = places(i, axis) < node_on_plane * width && flat.norm() > 0.5;
     for (int k = 0; k < (on_plane ? 1 : 2); ++k) {
       nodes.row(count + k) = places.row(i);
       normals.row(count + k) = on_plane ? Eigen::RowVector3d(flat.normalized()) : directions.row(i);

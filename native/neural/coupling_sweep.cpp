@@ -11,8 +11,6 @@
 namespace arapfields {
 namespace {
 
-std::size_t at_(int i) { return static_cast<std::size_t>(i); }
-
 /// Columns of a plane jet that carry a jet of `columns` columns.
 int plane_columns(int columns) { return columns == 10 ? columns2 : columns == 4 ? 3 : 1; }
 /// Rows of an encoding that are not zero: each entry knows one coordinate, so no mixed derivatives.
@@ -59,23 +57,23 @@ void each_entry(const CouplingShape& shape, Scalar x, int which, Use&& use) {
 template <class Scalar>
 ColumnBlock<Scalar> block_of(const CouplingShape& shape, const CouplingMemory& memory, int l,
                              const Tensor& bias) {
-  const Tensor& slope = memory.slope[at_(l)];
+  const Tensor& slope = memory.slope[l];
   ColumnBlock<Scalar> block;
-  block.z = memory.pre[at_(l)].data<Scalar>();
-  block.h = memory.activations[at_(l)].data<Scalar>();
+  block.z = memory.pre[l].data<Scalar>();
+  block.h = memory.activations[l].data<Scalar>();
   block.slope = slope.data<Scalar>();
   block.bias = bias.data<Scalar>();
   block.sharpness = static_cast<Scalar>(shape.softplus_sharpness);
   block.points = slope.size(0);
   block.width = slope.size(1);
-  block.columns = static_cast<int>(memory.pre[at_(l)].size(0) / slope.size(0));
+  block.columns = static_cast<int>(memory.pre[l].size(0) / slope.size(0));
   return block;
 }
 
 /// The plane jets of (s, t) of coupling layer i, by the two coordinates that memory.jets has for it.
 template <class Scalar>
 void condition(const CouplingShape& shape, const CouplingViews& views, int i, CouplingMemory& memory) {
-  const CouplingViews::Network& network = views.networks[at_(i)];
+  const CouplingViews::Network& network = views.networks[i];
   const Index count = memory.jets.size(1), entries = shape.fan_in(0);
   const int plane = plane_columns(static_cast<int>(memory.jets.size(0)));
   const auto* points = memory.jets.data<Scalar>();
@@ -92,11 +90,11 @@ void condition(const CouplingShape& shape, const CouplingViews& views, int i, Co
                    if (plane > 3) at(3 + which) = phi.second;
                  });
   for (int l = 0; l < shape.layers; ++l) {
-    const Tensor& below = l == 0 ? memory.encoding : memory.activations[at_(l - 1)];
+    const Tensor& below = l == 0 ? memory.encoding : memory.activations[l - 1];
     const Index rows = l == 0 ? encoded_rows(plane, count) : below.size(0);
-    Tensor pre = memory.pre[at_(l)].narrow(0, 0, rows);
-    multiply(pre, below.narrow(0, 0, rows), network.weights[at_(l)].t());
-    ARAPFIELDS_DISPATCH(activate_columns(block_of<Scalar>(shape, memory, l, network.biases[at_(l)])));
+    Tensor pre = memory.pre[l].narrow(0, 0, rows);
+    multiply(pre, below.narrow(0, 0, rows), network.weights[l].t());
+    ARAPFIELDS_DISPATCH(activate_columns(block_of<Scalar>(shape, memory, l, network.biases[l])));
   }
   multiply(memory.output, memory.activations.back(), network.weights.back().t());
   memory.output.narrow(0, 0, count).add(network.biases.back());
@@ -126,9 +124,9 @@ Tensor couple_as(const CouplingShape& shape, const CouplingViews& views, const T
   jets[0].assign(points);
   for (int k = 0; k < 3 && columns_here > 1; ++k) jets[first_column(k)].select(1, k).fill(1.0);
   for (int i = 0; i < shape.couplings; ++i) {
-    CouplingMemory& here = memory[at_(i) % memory.size()];
+    CouplingMemory& here = memory[i % memory.size()];
     condition<Scalar>(shape, views, i, here);
-    Tensor next = i + 1 < shape.couplings && memory.size() > 1 ? memory[at_(i + 1)].jets : jets;
+    Tensor next = i + 1 < shape.couplings && memory.size() > 1 ? memory[i + 1].jets : jets;
     if (i + 1 == shape.couplings && memory.size() > 1) next = empty_like(jets);
     if (!is_same(next, here.jets)) next.assign(here.jets);
     auto* moved = next.data<Scalar>();
@@ -162,9 +160,9 @@ void couple_back_as(const CouplingShape& shape, const CouplingViews& views, cons
   Tensor spare = empty_like(wide);
   Tensor encoded = empty({encoded_rows(plane, count), entries}, given);
   for (int i = shape.couplings - 1; i >= 0; --i) {
-    CouplingMemory& here = memory[at_(i)];
-    const CouplingViews::Network& network = views.networks[at_(i)];
-    CouplingViews::Network& into = gradient.networks[at_(i)];
+    CouplingMemory& here = memory[i];
+    const CouplingViews::Network& network = views.networks[i];
+    CouplingViews::Network& into = gradient.networks[i];
     const auto* jets = here.jets.data<Scalar>();
     const auto* output = here.output.data<Scalar>();
     auto* of_output = upper.data<Scalar>();
@@ -189,13 +187,13 @@ void couple_back_as(const CouplingShape& shape, const CouplingViews& views, cons
     add_multiplied(into.weights.back(), upper.t(), here.activations.back());
     multiply(wide, upper, network.weights.back());
     for (int l = shape.layers - 1; l >= 0; --l) {
-      ARAPFIELDS_DISPATCH(activate_columns_back(block_of<Scalar>(shape, here, l, network.biases[at_(l)]),
-                                                wide.data<Scalar>(), into.biases[at_(l)].data<Scalar>()));
-      const Tensor& below = l == 0 ? here.encoding : here.activations[at_(l - 1)];
+      ARAPFIELDS_DISPATCH(activate_columns_back(block_of<Scalar>(shape, here, l, network.biases[l]),
+                                                wide.data<Scalar>(), into.biases[l].data<Scalar>()));
+      const Tensor& below = l == 0 ? here.encoding : here.activations[l - 1];
       const Index rows = l == 0 ? encoded.size(0) : below.size(0);
       const Tensor used = wide.narrow(0, 0, rows);
-      add_multiplied(into.weights[at_(l)], used.t(), below.narrow(0, 0, rows));
-      multiply(l == 0 ? encoded : spare, used, network.weights[at_(l)]);
+      add_multiplied(into.weights[l], used.t(), below.narrow(0, 0, rows));
+      multiply(l == 0 ? encoded : spare, used, network.weights[l]);
       if (l > 0) std::swap(wide, spare);
     }
     const auto* of_entries = encoded.data<Scalar>();

@@ -111,7 +111,8 @@ LoopOptions loop_options(const FitOptions& options, const IterationObserver& obs
   double& rate = loop.training.learning_rate;
   if (rate == 0.0) rate = FitOptions::automatic_learning_rate(options.training.optimizer);
   loop.optimizer = {.momentum = 0.95, .adam_share = 0.1, .beta1 = 0.9, .beta2 = 0.99};
-  loop.schedule = {.warm_up = 20, .hold_fraction = 0.0, .final_share = 0.0, .fall = Schedule::Fall::linear};
+  loop.schedule = {
+      .warm_up = 20, .hold_fraction = 0.0, .final_share = 0.0, .fall = RateSchedule::Fall::linear};
   return loop;
 }
 

@@ -2,6 +2,7 @@
 #include "neural/mlp_sweep.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/parallel.h"
 #include "neural/jet_layer.h"
@@ -11,8 +12,6 @@
 namespace arapfields {
 namespace {
 
-std::size_t at_(int i) { return static_cast<std::size_t>(i); }
-
 /// The first rows·cols numbers of a flat buffer as a matrix.
 Tensor matrix(const Tensor& flat, Index rows, Index cols) {
   return flat.narrow(0, 0, rows * cols).view({rows, cols});
@@ -20,13 +19,13 @@ Tensor matrix(const Tensor& flat, Index rows, Index cols) {
 
 /// The rounded copy of layer l's weight; undefined where its products are exact.
 Tensor rounded_weight(const LayerViews& layers, int l) {
-  return at_(l) < layers.rounded.size() ? layers.rounded[at_(l)] : Tensor();
+  return std::cmp_less(l, layers.rounded.size()) ? layers.rounded[l] : Tensor();
 }
 
 /// c = a Wᵀ or a W for layer l's weight W.
 void times_weight(Tensor c, const Tensor& a, const LayerViews& layers, int l, bool transposed) {
   const Tensor rounded = rounded_weight(layers, l);
-  const Tensor& weight = rounded.defined() ? rounded : layers.weights[at_(l)];
+  const Tensor& weight = rounded.defined() ? rounded : layers.weights[l];
   const Tensor b = transposed ? weight.t() : weight;
   if (rounded.defined())
     c.assign(product(a.to(NumberType::bfloat16), b));
@@ -68,7 +67,7 @@ void encode_layer_back(const MlpShape& shape, const Tensor& cotangents, Block& b
 
 /// The derivatives of the outputs by the activations of layer l: rows for each point, at the top for all.
 const Tensor& adjoints_of(const LayerViews& layers, const Block& block, int l) {
-  return at_(l) < block.adjoints.size() ? block.adjoints[at_(l)] : layers.weights.back();
+  return std::cmp_less(l, block.adjoints.size()) ? block.adjoints[l] : layers.weights.back();
 }
 
 /// The encoding's entries as (count, 3, 2·octaves): an entry depends on one coordinate alone, so its second
@@ -86,9 +85,9 @@ void sweep_adjoints(const MlpShape& shape, const LayerViews& layers, Block& bloc
   Tensor second = space.second.narrow(0, 0, m * 6 * shape.outputs).view({m, 6, shape.outputs});
   second.set_zero();
   for (int l = shape.layers - 1; l >= 0; --l) {
-    adjoint_layer(shape.softplus_sharpness, block.activations[at_(l)], block.slope[at_(l)],
+    adjoint_layer(shape.softplus_sharpness, block.activations[l], block.slope[l],
                   adjoints_of(layers, block, l), below, second);
-    if (l > 0) times_weight(block.adjoints[at_(l - 1)], below, layers, l, false);
+    if (l > 0) times_weight(block.adjoints[l - 1], below, layers, l, false);
   }
   Tensor encoded = matrix(space.below, rows, shape.encoded());
   multiply(encoded, below, layers.weights[0]);
@@ -113,10 +112,10 @@ void sweep_adjoints_back(const MlpShape& shape, const LayerViews& layers, const 
   for (int l = 0; l < shape.layers; ++l) {
     times_weight(here, lower, layers, l, true);
     Tensor below = matrix(space.below, rows, shape.width);
-    Tensor partial = matrix(space.partial[at_(l)], block.columns * m, shape.width);
-    adjoint_layer_back(shape.softplus_sharpness, block.activations[at_(l)], block.slope[at_(l)],
+    Tensor partial = matrix(space.partial[l], block.columns * m, shape.width);
+    adjoint_layer_back(shape.softplus_sharpness, block.activations[l], block.slope[l],
                        adjoints_of(layers, block, l), second, here, below, partial);
-    add_outer(gradient.weights[at_(l)], below, lower, layers, l);
+    add_outer(gradient.weights[l], below, lower, layers, l);
     lower = here;
     std::swap(here, spare);
   }
@@ -167,7 +166,7 @@ void allocate(const MlpShape& shape, const Tensor& like, bool keep, Block& block
   for (int l = 0; l < shape.layers; ++l) {
     const bool own = keep || l < 2;
     block.activations.push_back(own ? empty({block.columns * m, shape.width}, like)
-                                    : block.activations[at_(l - 2)]);
+                                    : block.activations[l - 2]);
     block.slope.push_back(keep ? empty({m, shape.width}, like) : Tensor());
   }
   for (int l = 0; l + 1 < shape.layers && block.second; ++l)
@@ -222,14 +221,14 @@ void sweep_forward(const MlpShape& shape, const LayerViews& layers, const Tensor
   const Index rows = block.columns * block.count;
   Tensor jets = matrix(space.jets, rows, shape.width);
   for (int l = 0; l < shape.layers; ++l) {
-    Tensor& activations = block.activations[at_(l)];
-    const Tensor& below = block.columns == 1 && l > 0 ? block.activations[at_(l - 1)] : jets;
+    Tensor& activations = block.activations[l];
+    const Tensor& below = block.columns == 1 && l > 0 ? block.activations[l - 1] : jets;
     if (l == 0)
       encode_layer(shape, layers.weights[0], points, block);
     else
       times_weight(activations, below, layers, l, true);
-    activate_layer({shape.softplus_sharpness, block.columns}, activations, block.slope[at_(l)], jets,
-                   layers.biases[at_(l)]);
+    activate_layer({shape.softplus_sharpness, block.columns}, activations, block.slope[l], jets,
+                   layers.biases[l]);
   }
   const Tensor& top = block.columns == 1 ? block.activations.back() : jets;
   Tensor output = matrix(space.output, rows, shape.outputs);
@@ -252,12 +251,12 @@ void sweep_back(const MlpShape& shape, const LayerViews& layers, const Tensor& c
   gradient.biases.back() += sum(upper.narrow(0, 0, block.count), {0});
   Tensor here = matrix(space.jets, rows, shape.width), spare = matrix(space.other, rows, shape.width);
   for (int l = shape.layers - 1; l >= 0; --l) {
-    Tensor& activations = block.activations[at_(l)];
+    Tensor& activations = block.activations[l];
     times_weight(here, upper, layers, l + 1, false);
-    const Tensor partial = block.second ? matrix(space.partial[at_(l)], rows, shape.width) : Tensor();
-    activate_layer_back({shape.softplus_sharpness, block.columns}, activations, block.slope[at_(l)], partial,
-                        here, gradient.biases[at_(l)]);
-    add_outer(gradient.weights[at_(l + 1)], upper, activations, layers, l + 1);
+    const Tensor partial = block.second ? matrix(space.partial[l], rows, shape.width) : Tensor();
+    activate_layer_back({shape.softplus_sharpness, block.columns}, activations, block.slope[l], partial, here,
+                        gradient.biases[l]);
+    add_outer(gradient.weights[l + 1], upper, activations, layers, l + 1);
     upper = here;
     std::swap(here, spare);
   }
@@ -271,8 +270,8 @@ void sweep_to_points(const MlpShape& shape, const LayerViews& layers, Block& blo
   Tensor here = matrix(space.jets, m, shape.width), spare = matrix(space.other, m, shape.width);
   multiply_elements(here, block.slope.back(), layers.weights.back());
   for (int l = shape.layers - 2; l >= 0; --l) {
-    multiply(spare, here, layers.weights[at_(l + 1)]);
-    spare *= block.slope[at_(l)];
+    multiply(spare, here, layers.weights[l + 1]);
+    spare *= block.slope[l];
     std::swap(here, spare);
   }
   const Tensor encoded = product(here, layers.weights[0]) *= block.encoding[1];

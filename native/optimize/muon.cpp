@@ -22,7 +22,7 @@ struct Matrix : MatrixPlace {
   Tensor momentum, x, next, gram, polynomial;
 };
 
-struct Task {
+struct RowsTask {
   Matrix* matrix = nullptr;
   Index first = 0, count = 0;  // rows of x
 
@@ -45,10 +45,10 @@ struct Muon::State {
   MuonOptions options;
   AdamStep adam;
   std::vector<Matrix> matrices;
-  std::vector<Task> tasks;
+  std::vector<RowsTask> tasks;
   bool on_device = false;  // whose queue is filled by one thread
 
-  void for_each_task(const std::function<void(const Task&)>& body);
+  void for_each_task(const std::function<void(const RowsTask&)>& body);
   void for_each_matrix(const std::function<void(Matrix&)>& body);
 
  private:
@@ -61,7 +61,7 @@ struct Muon::State {
   }
 };
 
-void Muon::State::for_each_task(const std::function<void(const Task&)>& body) { for_each(tasks, body); }
+void Muon::State::for_each_task(const std::function<void(const RowsTask&)>& body) { for_each(tasks, body); }
 
 void Muon::State::for_each_matrix(const std::function<void(Matrix&)>& body) { for_each(matrices, body); }
 
@@ -114,20 +114,20 @@ void Muon::step(Tensor& parameters, Tensor& gradient, double learning_rate) {
     m.x /= norm(ahead) + 1e-30;
   });
   for (int i = 0; i < s.options.iterations; ++i) {
-    s.for_each_task([](const Task& t) {
+    s.for_each_task([](const RowsTask& t) {
       const Tensor& x = t.matrix->x;
       Tensor out = t.up_to_diagonal(t.matrix->gram);
       multiply(out, t.rows_of(x), x.narrow(0, 0, t.first + t.count).t());
       t.mirror(t.matrix->gram);
     });
-    s.for_each_task([](const Task& t) {
+    s.for_each_task([](const RowsTask& t) {
       const Tensor& gram = t.matrix->gram;
       Tensor out = t.up_to_diagonal(t.matrix->polynomial);
       out.assign(t.up_to_diagonal(gram));
       multiply(out, t.rows_of(gram), gram.narrow(1, 0, t.first + t.count), quintic, cubic);
       t.mirror(t.matrix->polynomial);
     });
-    s.for_each_task([](const Task& t) {
+    s.for_each_task([](const RowsTask& t) {
       Tensor out = t.rows_of(t.matrix->next);
       out.assign(t.rows_of(t.matrix->x));
       multiply(out, t.rows_of(t.matrix->polynomial), t.matrix->x, 1.0, slope);

@@ -156,7 +156,7 @@ class Run {
 
 }  // namespace
 
-double Schedule::share(int iteration, double done) const {
+double RateSchedule::share(int iteration, double done) const {
   const double rising = warm_up > 0 ? std::min(1.0, (iteration + 1.0) / warm_up) : 1.0;
   const double fallen = std::clamp((done - hold_fraction) / std::max(1e-9, 1.0 - hold_fraction), 0.0, 1.0);
   const double left = fall == Fall::linear ? 1.0 - fallen : 0.5 * (1.0 + std::cos(std::numbers::pi * fallen));

@@ -16,7 +16,7 @@ class Tensor;
 
 /// The learning rate over its peak: it rises over the first iterations, is held for a part of the run, and
 /// then falls, so that the last steps average out the noise of the batches.
-struct Schedule {
+struct RateSchedule {
   enum class Fall { linear, half_cosine };
   int warm_up = 0;  ///< iterations
   double hold_fraction = 0.5;
@@ -30,7 +30,7 @@ struct Schedule {
 struct LoopOptions {
   TrainingOptions training;  ///< the schedule follows the clock where a time budget is ahead
   OptimizerOptions optimizer;
-  Schedule schedule;
+  RateSchedule schedule;
   int steps = 1;               ///< of the optimizer that an iteration takes, at one rate
   IterationObserver observer;  ///< none: nothing is read for it
 };

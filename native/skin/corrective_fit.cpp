@@ -31,7 +31,7 @@ constexpr std::array<std::pair<int, int>, 6> entries{{{0, 0}, {1, 1}, {2, 2}, {0
 
 /// What a turn of the joint's axes does to its features.
 FeaturePairs turned(const Mat3& turn) {
-  FeaturePairs result = FeaturePairs::Zero();
+  FeaturePairs result = FeaturePairs::Zero(joint_features, joint_features);
   result.topLeftCorner<3, 3>() = turn;
   for (std::size_t f = 0; f < entries.size(); ++f) {
     const auto [j, k] = entries[f];

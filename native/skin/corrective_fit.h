@@ -5,15 +5,15 @@
 
 #include "core/task.h"
 #include "options/skin.h"
-#include "skin/mirror.h"
 #include "skin/rig_shape.h"
+#include "skin/rig_twins.h"
 
 namespace arapfields {
 
 /// Products of the entries of a joint's unit quaternion (w, x, y, z): wx, wy, wz, xx, yy, zz, xy, xz, yz.
 constexpr int joint_features = 9;
 using JointFeatures = Eigen::Matrix<double, joint_features, 1>;
-using FeaturePairs = Eigen::Matrix<double, joint_features, joint_features>;
+using FeaturePairs = Eigen::MatrixXd;  ///< (9,9)
 
 JointFeatures joint_features_of(const Mat3& rotation);
 
@@ -28,7 +28,7 @@ struct Reflection {
     return maps[twin(joint)].transpose() * coefficients;
   }
 
-  Mirror mirror;
+  RigTwins mirror;
   Vec3 signs;
   std::vector<FeaturePairs> maps;  ///< features of a joint → its twin's in the mirrored pose
 };

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "skin/correctives.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 
+#include "core/decompositions.h"
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "skin/corrective_fit.h"
@@ -28,20 +28,24 @@ std::vector<Key> chosen_keys(const Skeleton& skeleton, const CorrectiveFit& fit,
   std::vector<Key> all, result;
   for (Index b = 0; b < skeleton.count(); ++b) {
     if (skeleton.bone(b).parent < 0 || reflection.twin(b) < b) continue;
-    const auto x = fit.values.middleCols<joint_features>(b * joint_features);
-    const FeaturePairs moments = x.transpose() * x / static_cast<double>(x.rows());
-    const Eigen::SelfAdjointEigenSolver<FeaturePairs> root(moments + 1e-12 * FeaturePairs::Identity());
+    const auto x = fit.values.middleCols(b * joint_features, joint_features);
+    FeaturePairs moments = x.transpose() * x / static_cast<double>(x.rows());
+    moments.diagonal().array() += 1e-12;
+    const auto [values, vectors] = symmetric_eigen(moments);
+    const Vector roots = values.cwiseSqrt();
+    const FeaturePairs root = vectors * roots.asDiagonal() * vectors.transpose();
+    const FeaturePairs inverse_root = vectors * roots.cwiseInverse().asDiagonal() * vectors.transpose();
     FeaturePairs gains = effect[b];
     if (reflection.exists() && reflection.twin(b) == b) {  // keys become even or odd
-      FeaturePairs swap;
+      FeaturePairs swap(joint_features, joint_features);
       for (int f = 0; f < joint_features; ++f) swap.col(f) = reflection.polynomial(b, JointFeatures::Unit(f));
-      gains = 0.5 * (gains + swap * gains * swap.transpose()).eval();
+      gains = 0.5 * (gains + FeaturePairs(swap * gains * swap.transpose()));
     }
-    const Eigen::SelfAdjointEigenSolver<FeaturePairs> main(root.operatorSqrt() * gains * root.operatorSqrt());
+    const auto main = symmetric_eigen(root * gains * root);
     for (int k = 0; k < joint_features; ++k) {
-      JointFeatures c = root.operatorInverseSqrt() * main.eigenvectors().col(k);
+      JointFeatures c = inverse_root * main.vectors.col(k);
       c /= std::max((x * c).cwiseAbs().maxCoeff(), 1e-12);
-      all.push_back({main.eigenvalues()[k], b, c});
+      all.push_back({main.values[k], b, c});
     }
   }
   std::ranges::stable_sort(all, std::ranges::greater(), &Key::gain);
@@ -70,12 +74,12 @@ std::vector<FeaturePairs> effects_of(const RigShape& rig, const CorrectiveFit& f
         fit.slopes(region, Eigen::MatrixXd::Identity(count, count), 1 + vertices / most_seen);
     const double share = static_cast<double>(3 * region.vertices.size()) / static_cast<double>(slopes.cols());
     for (Index row = 0; row < count; row += joint_features) {
-      const auto part = slopes.middleRows<joint_features>(row);
+      const auto part = slopes.middleRows(row, joint_features);
       parts[r].push_back(share * part * part.transpose());
     }
   });
   progress.check();
-  std::vector<FeaturePairs> result(rig.skeleton.count(), FeaturePairs::Zero());
+  std::vector<FeaturePairs> result(rig.skeleton.count(), FeaturePairs::Zero(joint_features, joint_features));
   for (std::size_t r = 0; r < parts.size(); ++r)
     for (std::size_t k = 0; k < parts[r].size(); ++k) result[fit.regions[r].joints[k]] += parts[r][k];
   return result;

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "core/errors.h"
@@ -93,7 +94,10 @@ void Skeleton::join_roots() {
 Mat3 bone_axes(const Bone& bone) {
   const Vec3 y = (bone.tail - bone.head).normalized();
   Mat3 shortest = Vec3(-1.0, -1.0, 1.0).asDiagonal();  // straight down, as Blender has it
-  if (y[1] > -1.0 + 1e-9) shortest = Eigen::Quaterniond::FromTwoVectors(Vec3::UnitY(), y).toRotationMatrix();
+  if (y[1] > -1.0 + 1e-9) {
+    const double twice = std::sqrt(2.0 * (1.0 + y[1]));  // the cosine of half the angle to the y axis
+    shortest = Eigen::Quaterniond(0.5 * twice, y[2] / twice, 0.0, -y[0] / twice).toRotationMatrix();
+  }
   return Eigen::AngleAxisd(bone.roll, y) * shortest;
 }
 

@@ -75,7 +75,7 @@ RowMatrix<float> fitted_points(const RigShape& rig, PointsIn points, PointsIn no
   const Fitted fitted = fitted_nodes(rig, points, options, progress);
   progress.report(0.9, "Weights");
   const VertexBlend blend(rig, points, normals);
-  const Mirror mirror(rig, points);
+  const RigTwins mirror(rig, points);
   RowMatrix<float> nearby = blend(fitted.nodes), distances = blend(rig.bone_distances);
   keep_limbs_apart(rig, points, normals, distances);
   mirror.average(nearby);

@@ -68,7 +68,7 @@ Vector WeightFit::squared_errors(const ExamplePose& pose) const {
 
 RowMatrix<float> point_weights(const RigShape& rig, PointsIn points, const std::vector<ExamplePose>& poses,
                                const RowMatrix<float>& nearby, const RowMatrix<float>& distances,
-                               const Mirror& mirror, const SkinOptions& options) {
+                               const RigTwins& mirror, const SkinOptions& options) {
   RowMatrix<float> result = RowMatrix<float>::Zero(points.rows(), rig.skeleton.count());
   const double stiff = options.smoothness * smoothness_weight;
   parallel_for(0, points.rows(), 16, [&](Index first, Index last) {

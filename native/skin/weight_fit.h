@@ -6,7 +6,7 @@
 #include "core/task.h"
 #include "skin/bone_choice.h"
 #include "skin/example_poses.h"
-#include "skin/mirror.h"
+#include "skin/rig_twins.h"
 
 namespace arapfields {
 
@@ -43,6 +43,6 @@ class WeightFit {
 /// the nodes' weights there; `distances` are to the bones through the inside.
 RowMatrix<float> point_weights(const RigShape& rig, PointsIn points, const std::vector<ExamplePose>& poses,
                                const RowMatrix<float>& nearby, const RowMatrix<float>& distances,
-                               const Mirror& mirror, const SkinOptions& options);
+                               const RigTwins& mirror, const SkinOptions& options);
 
 }  // namespace arapfields

@@ -186,9 +186,9 @@ void WrapFlow::step(const WrapStage& stage, const Progress& progress) {
   progress.report(0.2);
 
   // Stiffness. On an open target, parts without a counterpart keep the rigidity of the first stage.
-  StiffnessTerms stiffness{samples.surface.points, samples.jacobians,
-                           stage.rigidity * samples.rest_area_weights,
-                           stage.viscosity * samples.current_area_weights, ridge * unit};
+  MotionStiffness stiffness{samples.surface.points, samples.jacobians,
+                            stage.rigidity * samples.rest_area_weights,
+                            stage.viscosity * samples.current_area_weights, ridge * unit};
   if (!target_.closed)
     stiffness.rigidity =
         samples.rest_area_weights.array() *

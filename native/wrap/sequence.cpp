@@ -132,12 +132,12 @@ WrapSolution WrapSequence::next(const ImplicitFunction& function, const Progress
     if (round >= rounds - held_rounds)
       hold(some, surface, last, options_.normal_weight, closeness * (1.0 + coverage * options_.coverage),
            pull);
-    const StiffnessTerms stiffness{.points = points_,
-                                   .jacobians = now.jacobians,
-                                   .rigidity = areas_.cwiseProduct(weights_),
-                                   .viscosity = sequence_viscosity * options_.bending * areas_,
-                                   .ridge = ridge * unit,
-                                   .at_rest = true};
+    const MotionStiffness stiffness{.points = points_,
+                                    .jacobians = now.jacobians,
+                                    .rigidity = areas_.cwiseProduct(weights_),
+                                    .viscosity = sequence_viscosity * options_.bending * areas_,
+                                    .ridge = ridge * unit,
+                                    .at_rest = true};
     const RowMatrix<double> change = solve_velocity(basis_, stiffness, pull, {}, part);
     coefficients += change;
     ++report.iterations;

@@ -33,7 +33,7 @@ struct PointBlock {
   MatrixF right_hand_side;       // (functions, 3)
   Eigen::Matrix<float, block_size, 6> forms;
 
-  PointBlock(const RadialBlock<double>& block, Index first, Index centers, const StiffnessTerms& stiffness,
+  PointBlock(const RadialBlock<double>& block, Index first, Index centers, const MotionStiffness& stiffness,
              const CorrespondenceTerms& correspondences) {
     const Index count = block.active_count, all = count + 4;
     functions.assign(block.active, block.active + count);
@@ -80,7 +80,7 @@ struct PointBlock {
   }
 };
 
-std::vector<PointBlock> point_blocks(const RadialBasis& basis, const StiffnessTerms& stiffness,
+std::vector<PointBlock> point_blocks(const RadialBasis& basis, const MotionStiffness& stiffness,
                                      const CorrespondenceTerms& correspondences) {
   const RadialEvaluator<double> field(basis, stiffness.points, JetOrder::first);
   std::vector<std::optional<PointBlock>> blocks(field.blocks());
@@ -150,7 +150,7 @@ RowMatrix<double> regularized_cholesky(RowMatrix<double>& matrix) {
 
 }  // namespace
 
-RowMatrix<double> solve_velocity(const RadialBasis& basis, const StiffnessTerms& stiffness,
+RowMatrix<double> solve_velocity(const RadialBasis& basis, const MotionStiffness& stiffness,
                                  const CorrespondenceTerms& correspondences, const LandmarkTerm& landmarks,
                                  const Progress& progress) {
   constexpr int entry_of[3][3] = {{0, 3, 4}, {3, 1, 5}, {4, 5, 2}};

@@ -8,7 +8,7 @@
 namespace arapfields {
 
 /// The stiffness of a surface in motion: what its velocity v is measured against at n points.
-struct StiffnessTerms {
+struct MotionStiffness {
   Points points;                ///< (n,3) current positions
   RowMatrix<double> jacobians;  ///< (n,9), row-major: J of the motion from rest until now
   Vector rigidity;              ///< (n) weights of ‖∇v J − (R − J)‖², R the rotation closest to J
@@ -26,7 +26,7 @@ struct LandmarkTerm {
 /// The velocity that minimises the sum of all terms: coefficients (basis.size(), 3) of a radial field. The
 /// terms are quadratic, so one Cholesky factor of the normal equations solves them (docs/method.md, section
 /// Wrap).
-RowMatrix<double> solve_velocity(const RadialBasis& basis, const StiffnessTerms& stiffness,
+RowMatrix<double> solve_velocity(const RadialBasis& basis, const MotionStiffness& stiffness,
                                  const CorrespondenceTerms& correspondences, const LandmarkTerm& landmarks,
                                  const Progress& progress);
 

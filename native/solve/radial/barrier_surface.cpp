@@ -14,7 +14,7 @@ namespace {
 /// A way that has come so near, in cube units, has met the surface; evaluations along a way, of which one
 /// along a surface needs many.
 constexpr double met = 2e-4;
-constexpr int most_steps = 150;
+constexpr int most_evaluations = 150;
 /// Slopes of functions below this say nothing of distances.
 constexpr double least_slope = 1e-3;
 /// How far a placement may be from an even scale.
@@ -156,7 +156,7 @@ std::vector<BarrierSurface::Hit> BarrierSurface::first_hits(PointsIn from, Point
   const auto place = [&](Index i) -> Vec3 {
     return ((1.0 - share[i]) * from.row(i) + share[i] * to.row(i)).transpose();
   };
-  for (int step = 0; step < most_steps && !on_the_way.empty(); ++step) {
+  for (int step = 0; step < most_evaluations && !on_the_way.empty(); ++step) {
     Points places(static_cast<Index>(on_the_way.size()), 3);
     for (std::size_t k = 0; k < on_the_way.size(); ++k)
       places.row(static_cast<Index>(k)) = place(on_the_way[k]).transpose();

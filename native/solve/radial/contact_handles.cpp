@@ -14,7 +14,7 @@ namespace arapfields {
 namespace {
 
 /// Sweeps over the planes of a handle, and the change, in cube units, below which these end.
-constexpr int sweeps = 200;
+constexpr int most_sweeps = 200;
 constexpr double settled = 1e-6;
 /// What lies under a point handle, in widths of the shape there: no farther from it at rest, nor aside of it
 /// as seen along a plane's normal.
@@ -37,7 +37,7 @@ std::pair<Vec3, Index> least_translation(const std::vector<Bound>& bounds) {
   Vec3 way = Vec3::Zero();
   std::vector<double> pushes(bounds.size(), 0.0);
   double change = settled;
-  for (int sweep = 0; sweep < sweeps && change >= settled; ++sweep) {
+  for (int sweep = 0; sweep < most_sweeps && change >= settled; ++sweep) {
     change = 0.0;
     for (std::size_t k = 0; k < bounds.size(); ++k) {
       const double next = std::max(0.0, pushes[k] + bounds[k].depth - bounds[k].normal.dot(way));

@@ -13,9 +13,9 @@
 namespace arapfields {
 namespace {
 
-/// Velocities and accelerations half of which a step of 1/96 s takes, as the root of its length, by their
+/// Velocities and accelerations half of which a usual step takes, as the root of its length, by their
 /// mean ‖J‖² + λ‖D‖² against their mean square: waves shorter than a part is thick, which solves see last.
-constexpr double smoothed = 3e3, usual_step = 1.0 / 96.0;
+constexpr double smoothed = 3e3;
 
 }  // namespace
 

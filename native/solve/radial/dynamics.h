@@ -11,6 +11,9 @@
 
 namespace arapfields {
 
+/// Seconds of the step for which the constants of motions are chosen.
+constexpr double usual_step = 1.0 / 96.0;
+
 /// The surface as a body with a mass: its velocity and acceleration, and the forces that it feels.
 class SurfaceDynamics {
  public:

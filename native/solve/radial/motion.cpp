@@ -19,10 +19,9 @@ namespace {
 constexpr double kept_of_fast = 0.7;
 constexpr TimeScheme usual = TimeScheme::generalised_alpha(kept_of_fast);
 
-/// Seconds of a step for which the next two hold.
-constexpr double usual_step = 1.0 / 96.0;
-/// A solve ends where a further step would gain less than the first share of the kinetic energy. It grows as
-/// the square of the step's length, up to the second. Single precision resolves the third and fourth.
+/// The solve of a usual step ends where a further one would gain less than the first share of the kinetic
+/// energy. It grows as the square of the step's length, up to the second. Single precision resolves the
+/// third and fourth.
 constexpr double motion_share = 3e-4, largest_share = 1e-2, motion_tolerance = 3e-5, motion_floor = 1e-10;
 /// Factor on the iterations of the first step from rest, whose acceleration is not known.
 constexpr Index first_iterations = 4;

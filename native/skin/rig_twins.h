@@ -9,8 +9,8 @@ namespace arapfields {
 
 /// What a rig's symmetry across a plane of the axes means for its bones and for some points; nothing where
 /// the rig has none.
-struct Mirror {
-  Mirror(const RigShape& rig, PointsIn points);
+struct RigTwins {
+  RigTwins(const RigShape& rig, PointsIn points);
 
   /// Values (points, bones) averaged with those of the mirrored points and bones.
   void average(RowMatrix<float>& values) const;

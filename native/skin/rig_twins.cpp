@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "skin/mirror.h"
+#include "skin/rig_twins.h"
 
 #include "sampling/oriented_points.h"
 
@@ -11,7 +11,7 @@ constexpr double symmetric_points = 1e-4;
 
 }  // namespace
 
-Mirror::Mirror(const RigShape& rig, PointsIn points) {
+RigTwins::RigTwins(const RigShape& rig, PointsIn points) {
   if (!rig.symmetry.is_whole()) return;
   bones = rig.symmetry.mirrored;
   Points reflected = points;
@@ -23,7 +23,7 @@ Mirror::Mirror(const RigShape& rig, PointsIn points) {
     if ((points.row(twins[i]) - reflected.row(i)).norm() > symmetric_points * rig.extent) twins[i] = -1;
 }
 
-void Mirror::average(RowMatrix<float>& values) const {
+void RigTwins::average(RowMatrix<float>& values) const {
   if (bones.empty()) return;
   const RowMatrix<float> before = values;
   for (Index i = 0; i < values.rows(); ++i)
