@@ -156,7 +156,7 @@ def run():
     neural = {name: neural_field(name) for name in ("bunny", "spot", "hand")}
     rows = [drag_row(name, field) for name, field in neural.items()]
     larger = {"coarse_centers": 100, "fine_centers": 600, "samples": 3000}
-    rows += [drag_row(name, field, 1, **larger) for name, field in neural.items()]
+    rows += [drag_row("bunny", neural["bunny"], 1, **larger)]
     rows += [drag_row("bunny", None, interior=False)]
     rows += [polish_row(name, neural[name]) for name in ("bunny", "hand")]
     rows += [style_row(aim, options) for aim, options in STYLES.items()]

@@ -133,15 +133,14 @@ def finger_row(finger, motion, degrees, field=None):
 
 
 def run():
-    rows = [row for name in ("bunny", "spot", "hand") for row in compare_rows(name)]
-    for centers in (120, 360, 720, 1200, 1500):
+    rows = [row for name in ("bunny", "hand") for row in compare_rows(name)]
+    for centers in (120, 360, 1500):
         rows.append(cost_row(centers, 2000))
-    rows += [cost_row(360, count) for count in (1000, 4000, 8000)]
+    rows += [cost_row(360, count) for count in (1000, 8000)]
     for finger, motion, degrees in (
         ("middle", "aside", -25),
         ("middle", "forward", 20),
         ("middle", "forward", 50),
-        ("index", "forward", 50),
     ):
         rows.append(finger_row(finger, motion, degrees))
         rows.append(finger_row(finger, motion, degrees, field="neural, 300 iterations"))

@@ -7,10 +7,9 @@ import sys
 
 from . import shapes
 
-SAMPLES = (300, 1000, 3000, 10_000, 30_000)
-WIDTHS = (64, 128, 256, 512)
-RESOLUTIONS = (64, 128, 256, 512)
-TRIANGLES = (1_000, 20_000, 300_000, 2_000_000)
+SAMPLES = (300, 10_000, 30_000)
+RESOLUTIONS = (64, 256, 512)
+TRIANGLES = (20_000, 2_000_000)
 
 SETTING = """
 import json, sys, time
@@ -51,9 +50,6 @@ def run():
     for count in SAMPLES:
         cost = measured(f"samples = {bunny}\n{warm}", solve.format(f"batch={count}"))
         rows.append({"what": "5 iterations, 4x256, samples", "size": count, **cost})
-    for width in WIDTHS:
-        cost = measured(f"samples = {bunny}\n{warm}", solve.format(f"batch=1000, width={width}"))
-        rows.append({"what": "5 iterations, 1,000 samples, width", "size": width, **cost})
     for resolution in RESOLUTIONS:
         prepare = "sdf = shapes.sdf('bunny')"
         rows.append(
