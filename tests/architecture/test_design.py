@@ -54,7 +54,9 @@ def test_no_file_needs_itself_by_way_of_others(language):
 
 def test_no_two_headers_define_one_name():
     """All of the library is one namespace: two classes of one name would share their functions when linked."""
-    definition = r"^(?:class|struct|enum class)\s+(?:ARAPFIELDS_\w+\s+)?(\w+)(?=\s*(?:final)?\s*(?:: [^;()]*)?\{)"
+    definition = (
+        r"^(?:class|struct|enum class)\s+(?:ARAPFIELDS_\w+\s+)?(\w+)(?=\s*(?:final)?\s*(?:: [^;()]*)?\{)"
+    )
     headers = {path: re.findall(definition, path.read_text(), flags=re.M) for path in NATIVE.rglob("*.h")}
     names = Counter(found for defined in headers.values() for found in defined)
     assert len(names) > 150
