@@ -53,7 +53,7 @@ def test_no_file_needs_itself_by_way_of_others(language):
 
 
 def test_no_two_headers_define_one_name():
-    """All of the library is one namespace: two classes of one name would share their functions when linked."""
+    """The library is one namespace: two classes of one name would share their functions when linked."""
     definition = (
         r"^(?:class|struct|enum class)\s+(?:ARAPFIELDS_\w+\s+)?(\w+)(?=\s*(?:final)?\s*(?:: [^;()]*)?\{)"
     )
