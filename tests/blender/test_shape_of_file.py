@@ -21,6 +21,7 @@ if IN_BLENDER:
 pytestmark = pytest.mark.in_blender
 
 OFF = 5e-3  # of the size, that a live shape may be off its fresh solve, and a release may change
+NO_MOTION = 1e-30  # where a coordinate is 0, a solve that ends at rest leaves its rounding
 
 
 def few_centers(test):
@@ -118,7 +119,7 @@ def test_each_live_style_is_that_of_the_settings_and_strength_0_is_rest():
         assert world.difference(world.shape(shell), world.fresh_shape(shell, "STYLIZE")) < OFF, name
     style.strength = 0.0
     step(refined=True)
-    assert sessions.is_live(shell) and np.array_equal(world.shape(shell), rest)
+    assert sessions.is_live(shell) and np.abs(world.shape(shell) - rest).max() < NO_MOTION
 
 
 @few_centers
