@@ -64,14 +64,16 @@ Vector masses_of(const BoundHandles& handles) {
 }
 
 /// The handle that holds each of the problem's samples; −1: none.
-std::vector<Index> holders(const RadialState& s) {
-  const BoundHandles& handles = s.handles.bound();
-  std::vector<Index> result(static_cast<std::size_t>(s.problem.samples.size()), -1);
-  for (Index i = 0; i < handles.count(); ++i)
-    for (Index pair = handles.begin(i); pair < handles.begin(i + 1); ++pair)
-      if (const Index sample = handles.members()[static_cast<std::size_t>(pair)]; sample >= 0)
-        result[static_cast<std::size_t>(sample)] = i;
-  return result;
+const std::vector<Index>& holders(RadialState& s) {
+  return s.holders.get({s.handles.revision()}, [&] {
+    const BoundHandles& handles = s.handles.bound();
+    std::vector<Index> result(static_cast<std::size_t>(s.problem.samples.size()), -1);
+    for (Index i = 0; i < handles.count(); ++i)
+      for (Index pair = handles.begin(i); pair < handles.begin(i + 1); ++pair)
+        if (const Index sample = handles.members()[static_cast<std::size_t>(pair)]; sample >= 0)
+          result[static_cast<std::size_t>(sample)] = i;
+    return result;
+  });
 }
 
 /// A handle at one point, beneath which the shape keeps its width.
@@ -146,8 +148,8 @@ std::vector<Index> hold_back(RadialState& s, std::vector<Mat4>& motions) {
   std::vector<Index> by(motions.size(), -1);
   const ContactSet& set = s.contact.found();
   if (motions.empty() || set.planes.empty()) return by;
-  const std::vector<Index> holder = holders(s);
-  const Vector masses = masses_of(s.handles.bound());
+  const std::vector<Index>& holder = holders(s);
+  const Vector masses = s.contact.itself() ? masses_of(s.handles.bound()) : Vector();
   std::vector<std::vector<Bound>> bounds(motions.size());
   const std::vector<Pin> points = pins(s, motions);
   const Points places = points.empty() ? Points() : contact_places(s);

@@ -92,6 +92,7 @@ struct RadialState {
   StiffnessTerms stiffness;
   SurfaceDynamics dynamics;
   ContactTerms contact;
+  Dependent<std::vector<Index>, 1> holders;   ///< which handle holds each sample; −1: none
   Dependent<Vector, 1> pin_widths;            ///< of the shape at point handles
   Dependent<std::vector<Index>, 1> mirrored;  ///< with symmetry, the sample nearest to each one's reflection
   RadialHooks hooks;
