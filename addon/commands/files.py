@@ -57,6 +57,9 @@ def read(path):
     """Makes the file's content all that is in this Blender."""
     if not check(path).is_file():
         raise UserError(f"{path}: no such file")
+    nothing = UserError(f"{path}: holds no mesh, or is damaged")
+    if path.stat().st_size == 0:  # each version of Blender says something else
+        raise nothing
     try:
         if path.suffix.lower() == ".blend":
             bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False)
@@ -67,7 +70,7 @@ def read(path):
         reason = str(error).removeprefix("Error: ").strip()
         raise UserError(f"{path}: Blender cannot read it ({reason})") from error
     if not any(is_source(item) for item in bpy.data.objects):
-        raise UserError(f"{path}: holds no mesh, or is damaged")
+        raise nothing
 
 
 def write(path, items):
@@ -120,7 +123,10 @@ def relative_textures(text, folder):
 
 
 def write_blend(path):
-    """Beside its place first, so that paths relative to the file hold."""
+    """Beside its place first, so that paths relative to the file hold.
+
+    It is read back: Blender 5.2 does not tell that a compressed file is cut short.
+    """
     from arapfields._files import whole_file
 
     with whole_file(path, beside=True) as partial:
@@ -130,3 +136,8 @@ def write_blend(path):
             if shutil.disk_usage(path.parent).free < ROOM:
                 raise not_whole(path) from error
             raise UserError(f"{path}: {error}") from error
+        try:
+            with bpy.data.libraries.load(str(partial)):
+                pass
+        except OSError as error:
+            raise not_whole(path) from error
