@@ -122,7 +122,7 @@ def test_a_motion_that_was_stopped_goes_on_as_if_it_had_not_been(pair, motion, m
         capsys.readouterr()
         assert wrap(frames, "-o", cache) == 2 and "another wrap is at work" in capsys.readouterr().err
     second = wraps_counted(monkeypatch)
-    assert wrap(frames, "-o", cache) == 0 and second == ["scan11"]
+    assert wrap(frames, "-o", cache, "--threads", "1") == 0 and second == ["scan11"]
     assert cache.read_bytes() == whole.read_bytes()
     assert not list(pair.glob(".*frames"))
     wraps_counted(monkeypatch, stop_at="scan11")

@@ -46,6 +46,11 @@ def add_flag(group, option, **settings):
         group.add_argument(f"--{name}", choices=choices, metavar=None if choices else "NAME", **settings)
 
 
+def of_results(options):
+    """The options as a dict, but for those that change no result."""
+    return {name: value for name, value in options.to_dict().items() if name != "threads"}
+
+
 def integer(low, high=2**31 - 1):
     """A flag's type: an integer from `low` to `high`."""
 
