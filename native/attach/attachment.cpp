@@ -25,6 +25,10 @@ namespace {
 constexpr double near_share = 0.03, far_share = 0.06;
 /// Spacings of the samples within which a point counts as on the surface.
 constexpr double surface_spacings = 1.5;
+/// Where large motions part or join what is near, a field off the surface can be steep. A point that it takes
+/// farther from its place above the moved surface than the first of its distances goes there instead, wholly
+/// from the second on.
+constexpr double steady = 1.0, astray = 2.0;
 /// Square root of a body's area in its sizes, roughly: for the spacing of samples.
 constexpr double area_side = 1.4;
 /// Mean influence of nearby frames from which a carried point follows fully.
@@ -97,10 +101,12 @@ class Attachment::State {
  private:
   Points frame_points_in(const Frame& frame) const { return frame.to_cube(frame_.to_mesh(frames_.points())); }
   std::shared_ptr<const CachedEvaluation> cached(const RadialField& field) const;
+  void bring_back(const DeformationField& field, Points& moved) const;
 
   Frame frame_;
   std::vector<Index> near_, far_;    // points that the field moves, and that frames move
   Points near_points_, far_points_;  // mesh coordinates, in spatial order
+  Points feet_, normals_;            // of the samples nearest to the points that the field moves
   Vector frame_weights_;             // (far) of the frames beside the field
   SurfaceFrames frames_;
   CarriedPoints carried_;
@@ -119,7 +125,9 @@ Attachment::State::State(const SurfaceSamples& samples, PointsIn points, const P
   const double spacing = area_side * size / std::sqrt(static_cast<double>(samples.size()));
   const double near = std::max(near_share * size, surface_spacings * spacing),
                far = near * far_share / near_share;
-  const Vector distances = nearest_distances(samples.points, placed, progress);
+  const SignedDistance surface = nearest_samples(samples.points, progress);
+  Vector distances(placed.rows());
+  surface.unsigned_distance(placed, distances, progress);
   distances_ = frame_.scale * distances;
   progress.report(0.3, "distances to the body");
   std::vector<double> weights;
@@ -129,6 +137,9 @@ Attachment::State::State(const SurfaceSamples& samples, PointsIn points, const P
     if (weight > 0.0) far_.push_back(i), weights.push_back(weight);
   }
   near_points_ = points(near_, Eigen::all);
+  const std::vector<std::int32_t> nearest = surface.closest(placed(near_, Eigen::all), progress).triangles;
+  feet_ = samples.points(nearest, Eigen::all);
+  normals_ = samples.normals(nearest, Eigen::all);
   far_points_ = points(far_, Eigen::all);
   frame_weights_ = Eigen::Map<const Vector>(weights.data(), static_cast<Index>(weights.size()));
   if (far_.empty()) return;
@@ -148,12 +159,39 @@ std::shared_ptr<const CachedEvaluation> Attachment::State::cached(const RadialFi
   return cache_ = std::move(evaluation);
 }
 
+/// A place above the moved surface: from the surface's first derivatives, as far along its normal as the root
+/// of its area has grown.
+void Attachment::State::bring_back(const DeformationField& field, Points& moved) const {
+  const Frame& frame = field.frame();
+  const Points feet = frame.to_cube(frame_.to_mesh(feet_)), places = frame.to_cube(near_points_);
+  const Points now = frame.to_cube(moved);
+  JetBlock<double> jets(feet.rows(), JetOrder::first);
+  field.evaluate(feet, jets.view());
+  const JetView<double> view = jets.view();
+  for (Index i = 0; i < feet.rows(); ++i) {
+    const Vec3 away = (places.row(i) - feet.row(i)).transpose(), normal = normals_.row(i).transpose();
+    const double height = away.dot(normal);
+    Mat3 slope;
+    for (int k = 0; k < 3; ++k) slope.col(k) = Eigen::Map<const Vec3>(view.at(first_column(k), i));
+    const Vec3 turned = normal[0] * slope.col(1).cross(slope.col(2)) +
+                        normal[1] * slope.col(2).cross(slope.col(0)) +
+                        normal[2] * slope.col(0).cross(slope.col(1));
+    const double grown = std::sqrt(turned.norm()), distance = grown * away.norm();
+    if (!(distance > 0.0)) continue;
+    const Vec3 above =
+        Eigen::Map<const Vec3>(view.at(0, i)) + slope * (away - height * normal) + height / grown * turned;
+    const Vec3 shift = above - now.row(i).transpose();
+    moved.row(i) += frame.scale * smooth_between(steady, astray, shift.norm() / distance) * shift.transpose();
+  }
+}
+
 Points Attachment::State::positions(const DeformationField& field) const {
   const ThreadScope threads;
   Points result(distances_.size(), 3);
   const RadialField* radial = as_radial(field);
   const auto cache = radial != nullptr ? cached(*radial) : nullptr;
-  const Points near = cache ? cache->moved(*radial) : field.at(near_points_);
+  Points near = cache ? cache->moved(*radial) : field.at(near_points_);
+  if (!cache) bring_back(field, near);
   for (std::size_t i = 0; i < near_.size(); ++i) result.row(near_[i]) = near.row(i);
   if (far_.empty()) return result;
   const Points frame_points = frame_points_in(field.frame());

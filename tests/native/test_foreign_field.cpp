@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The example of docs/development.md: a field that the library does not know, in all that takes fields.
+#include <algorithm>
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 
+#include "attach/attachment.h"
 #include "core/random.h"
 #include "energies/arap.h"
 #include "energies/distortion.h"
@@ -48,6 +50,27 @@ class Roll final : public DeformationField {
 };
 // [roll]
 
+/// Scales space, and lifts what is above a plane z = const by a jump, over a short way.
+class Jump final : public DeformationField {
+ public:
+  static constexpr double scale = 1.2, from = 0.01, way = 0.01;
+  explicit Jump(double height) : height_(height) {}
+
+  void evaluate(PointsIn points, JetView<double> out) const override {
+    for (Index p = 0; p < points.rows(); ++p) {
+      const double share = (points(p, 2) - from) / way;
+      Eigen::Map<Vec3>(out.at(0, p)) =
+          scale * points.row(p).transpose() + height_ * std::clamp(share, 0.0, 1.0) * Vec3::UnitZ();
+      if (out.order == JetOrder::value) continue;
+      for (int k = 0; k < 3; ++k) Eigen::Map<Vec3>(out.at(first_column(k), p)) = scale * Vec3::Unit(k);
+      if (share > 0.0 && share < 1.0) out.at(first_column(2), p)[2] += height_ / way;
+    }
+  }
+
+ private:
+  double height_;
+};
+
 Points some_points(Index count) {
   Random random(7);
   Points points(count, 3);
@@ -72,6 +95,26 @@ Points some_points(Index count) {
 }
 
 }  // namespace
+
+BOOST_AUTO_TEST_CASE(clothes_keep_their_place_above_the_surface_where_it_jumps) {
+  constexpr Index side = 50;
+  SurfaceSamples plate;
+  plate.points.resize(side * side, 3);
+  for (Index i = 0; i < side; ++i)
+    for (Index j = 0; j < side; ++j)
+      plate.points.row(i * side + j) << static_cast<double>(i) / side - 0.5,
+          static_cast<double>(j) / side - 0.5, 0.0;
+  plate.normals = Vec3::UnitZ().transpose().replicate(side * side, 1);
+  Points cloth = 0.5 * some_points(300);
+  cloth.col(2).setConstant(0.028);
+  cloth.bottomRows(100).col(2).setConstant(0.9 * Jump::from);
+  const Attachment attachment(plate, cloth);
+  const Points scaled = Jump::scale * cloth;
+  BOOST_TEST((attachment.positions(Jump(0.3)) - scaled).cwiseAbs().maxCoeff() < 1e-12);
+  const Points small = Jump(0.01).at(cloth);  // less than the distance: the field knows better
+  BOOST_TEST((attachment.positions(Jump(0.01)) - small).cwiseAbs().maxCoeff() < 1e-12);
+  BOOST_TEST(Attachment(plate, Points(0, 3)).positions(Jump(0.3)).rows() == 0);
+}
 
 BOOST_AUTO_TEST_CASE(energies_take_its_jets) {
   const double k = 0.9;
