@@ -5,10 +5,12 @@
 #include <cmath>
 #include <mutex>
 #include <typeinfo>
+#include <utility>
 #include <vector>
 
 #include "attach/surface_frames.h"
 #include "core/errors.h"
+#include "core/jacobians.h"
 #include "core/parallel.h"
 #include "distance/morton.h"
 #include "energies/rotation.h"
@@ -125,9 +127,8 @@ Attachment::State::State(const SurfaceSamples& samples, PointsIn points, const P
   const double spacing = area_side * size / std::sqrt(static_cast<double>(samples.size()));
   const double near = std::max(near_share * size, surface_spacings * spacing),
                far = near * far_share / near_share;
-  const SignedDistance surface = nearest_samples(samples.points, progress);
-  Vector distances(placed.rows());
-  surface.unsigned_distance(placed, distances, progress);
+  const ClosestPoints closest = nearest_samples(samples.points, progress).closest(placed, progress);
+  const Vector& distances = closest.distances;
   distances_ = frame_.scale * distances;
   progress.report(0.3, "distances to the body");
   std::vector<double> weights;
@@ -137,7 +138,8 @@ Attachment::State::State(const SurfaceSamples& samples, PointsIn points, const P
     if (weight > 0.0) far_.push_back(i), weights.push_back(weight);
   }
   near_points_ = points(near_, Eigen::all);
-  const std::vector<std::int32_t> nearest = surface.closest(placed(near_, Eigen::all), progress).triangles;
+  std::vector<Index> nearest;
+  for (const Index i : near_) nearest.push_back(closest.triangles[static_cast<std::size_t>(i)]);
   feet_ = samples.points(nearest, Eigen::all);
   normals_ = samples.normals(nearest, Eigen::all);
   far_points_ = points(far_, Eigen::all);
@@ -167,15 +169,12 @@ void Attachment::State::bring_back(const DeformationField& field, Points& moved)
   const Points now = frame.to_cube(moved);
   JetBlock<double> jets(feet.rows(), JetOrder::first);
   field.evaluate(feet, jets.view());
-  const JetView<double> view = jets.view();
+  const JetView<const double> view = std::as_const(jets).view();
   for (Index i = 0; i < feet.rows(); ++i) {
     const Vec3 away = (places.row(i) - feet.row(i)).transpose(), normal = normals_.row(i).transpose();
     const double height = away.dot(normal);
-    Mat3 slope;
-    for (int k = 0; k < 3; ++k) slope.col(k) = Eigen::Map<const Vec3>(view.at(first_column(k), i));
-    const Vec3 turned = normal[0] * slope.col(1).cross(slope.col(2)) +
-                        normal[1] * slope.col(2).cross(slope.col(0)) +
-                        normal[2] * slope.col(0).cross(slope.col(1));
+    const Mat3 slope = jacobian_at(view, i);
+    const Vec3 turned = area_vector(slope, normal);
     const double grown = std::sqrt(turned.norm()), distance = grown * away.norm();
     if (!(distance > 0.0)) continue;
     const Vec3 above =

@@ -5,30 +5,12 @@
 #include <cmath>
 
 #include "core/errors.h"
+#include "core/jacobians.h"
 #include "energies/kernels.h"
 #include "energies/ranges.h"
 
 namespace arapfields {
-namespace {
-
-template <class Scalar>
-Mat3 jacobian_at(JetView<const Scalar> jets, Index point) {
-  Mat3 j;
-  for (int k = 0; k < 3; ++k)
-    for (int i = 0; i < 3; ++i) j(i, k) = static_cast<double>(jets.at(first_column(k), point)[i]);
-  return j;
-}
-
-Mat3 cofactors(const Mat3& j) {
-  Mat3 c;
-  for (int k = 0; k < 3; ++k) {
-    const Vec3 a = j.col((k + 1) % 3), b = j.col((k + 2) % 3);
-    c.col(k) << a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0];
-  }
-  return c;
-}
-
-}  // namespace
+namespace {}  // namespace
 
 template <class Scalar>
 Distortion distortion(JetView<const Scalar> jets) {

@@ -12,7 +12,6 @@
 namespace arapfields {
 namespace {
 
-constexpr Index block_size = 16;
 constexpr Index blocks_per_task = 4;
 
 std::vector<double> center_rows(const RadialBasis& basis) {
@@ -201,6 +200,7 @@ void RadialEvaluator<Scalar>::pull_back(JetView<const Scalar> cotangents, RowMat
 
 RowMatrix<double> radial_rows(const RadialBasis& basis, PointsIn points, JetOrder order) {
   const RadialEvaluator<double> sites(basis, points, order);
+  constexpr Index block_size = RadialEvaluator<double>::block_size;
   const Index count = points.rows(), centers = basis.center_count();
   const int columns_count = columns(order);
   RowMatrix<double> result = RowMatrix<double>::Zero(columns_count * count, basis.size());

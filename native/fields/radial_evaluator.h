@@ -10,11 +10,13 @@
 namespace arapfields {
 
 /// Evaluates fields of one basis at fixed points, many times. Efficient where consecutive points are close
-/// (morton_order): each block of 16 keeps the list of centers whose support meets it. Float has half double's
+/// (morton_order): each block keeps the list of centers whose support meets it. Float has half double's
 /// cost and errors of some 1e-6 of the jets.
 template <class Scalar>
 class RadialEvaluator {
  public:
+  static constexpr Index block_size = 16;  ///< points
+
   RadialEvaluator() = default;
   /// `most`: the highest order that will be evaluated.
   RadialEvaluator(const RadialBasis& basis, PointsIn points, JetOrder most = JetOrder::second);
@@ -31,7 +33,7 @@ class RadialEvaluator {
   template <class Body>
   void for_blocks(Body&& body) const;
   Index center_count() const { return center_count_; }
-  Index blocks() const { return (count_ + 15) / 16; }
+  Index blocks() const { return (count_ + block_size - 1) / block_size; }
   /// Points 16 b to 16 b + 15, the last of all repeated.
   RadialBlock<Scalar> block(Index b) const;
 

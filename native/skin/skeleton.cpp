@@ -95,8 +95,8 @@ Mat3 bone_axes(const Bone& bone) {
   const Vec3 y = (bone.tail - bone.head).normalized();
   Mat3 shortest = Vec3(-1.0, -1.0, 1.0).asDiagonal();  // straight down, as Blender has it
   if (y[1] > -1.0 + 1e-9) {
-    const double twice = std::sqrt(2.0 * (1.0 + y[1]));  // the cosine of half the angle to the y axis
-    shortest = Eigen::Quaterniond(0.5 * twice, y[2] / twice, 0.0, -y[0] / twice).toRotationMatrix();
+    const double w = std::sqrt(0.5 * (1.0 + y[1]));  // the cosine of half the angle to the y axis
+    shortest = Eigen::Quaterniond(w, 0.5 * y[2] / w, 0.0, -0.5 * y[0] / w).toRotationMatrix();
   }
   return Eigen::AngleAxisd(bone.roll, y) * shortest;
 }

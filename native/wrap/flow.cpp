@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/jacobians.h"
 #include "core/parallel.h"
 #include "distance/morton.h"
 #include "fields/radial_evaluator.h"
@@ -50,8 +51,7 @@ double gradient_norm(const RadialBasis& basis, const RowMatrix<double>& velocity
   RadialEvaluator<double>(basis, points, JetOrder::first).evaluate(velocity, jets.view());
   double largest = 0.0;
   for (Index i = 0; i < points.rows(); ++i) {
-    Mat3 gradient;
-    for (int k = 0; k < 3; ++k) gradient.col(k) = Eigen::Map<const Vec3>(jets.view().at(first_column(k), i));
+    const Mat3 gradient = jacobian_at(std::as_const(jets).view(), i);
     largest = std::max(largest, squared_singular_values(gradient)[2]);
   }
   return std::sqrt(largest);
@@ -64,9 +64,7 @@ Points moved_normals(const RowMatrix<double>& jacobians, PointsIn normals, Vecto
   growth.resize(normals.rows());
   for (Index i = 0; i < normals.rows(); ++i) {
     const Mat3 jacobian = Eigen::Map<const RowMat3>(&jacobians(i, 0));
-    Mat3 cofactors;
-    for (int k = 0; k < 3; ++k) cofactors.col(k) = jacobian.col((k + 1) % 3).cross(jacobian.col((k + 2) % 3));
-    const Vec3 normal = cofactors * normals.row(i).transpose();
+    const Vec3 normal = cofactors(jacobian) * normals.row(i).transpose();
     growth[i] = normal.norm();
     if (growth[i] > 0.0) result.row(i) = normal.transpose() / growth[i];
   }

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "core/decompositions.h"
+#include "core/jacobians.h"
 #include "core/random.h"
 #include "sampling/sample_choice.h"
 
@@ -182,19 +183,14 @@ Points ContactPoints::normals_at(const RowMatrix<double>& coefficients, const st
   evaluator.evaluate(coefficients, jets.view(), blocks);
   Points normals = Points::Zero(evaluator.size(), 3);
   const auto turn = [&](Index i) {
-    Mat3 slope;
-    for (int k = 0; k < 3; ++k)
-      slope.col(k) = Eigen::Map<const Eigen::Vector3f>(jets.view().at(first_column(k), i)).cast<double>();
     const Vec3 rest = problem_.samples.normals.row(samples_[static_cast<std::size_t>(i)]).transpose();
-    const Vec3 moved = rest[0] * slope.col(1).cross(slope.col(2)) +
-                       rest[1] * slope.col(2).cross(slope.col(0)) +
-                       rest[2] * slope.col(0).cross(slope.col(1));
-    normals.row(i) = moved.transpose();
+    normals.row(i) = area_vector(jacobian_at(std::as_const(jets).view(), i), rest).transpose();
   };
   const Index count = blocks != nullptr ? std::ssize(*blocks) : evaluator.blocks();
   for (Index k = 0; k < count; ++k) {
     const Index block = blocks != nullptr ? (*blocks)[static_cast<std::size_t>(k)] : k;
-    for (Index i = 16 * block; i < std::min(16 * block + 16, normals.rows()); ++i) turn(i);
+    const Index first = evaluator.block_size * block;
+    for (Index i = first; i < std::min(first + evaluator.block_size, normals.rows()); ++i) turn(i);
   }
   return normals;
 }

@@ -42,7 +42,7 @@ class ContactPoints {
   bool is_at(const RowMatrix<double>& coefficients) const {
     return coefficients.rows() == coefficients_.rows() && coefficients == coefficients_;
   }
-  /// Which way the samples face, as long as the surface is stretched; zero outside of these blocks of 16, if
+  /// Which way the samples face, as long as the surface is stretched; zero outside of these blocks, if
   /// not null.
   Points normals_at(const RowMatrix<double>& coefficients, const std::vector<Index>* blocks = nullptr);
 

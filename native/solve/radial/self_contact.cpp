@@ -7,6 +7,7 @@
 
 #include "core/errors.h"
 #include "core/parallel.h"
+#include "fields/radial_evaluator.h"
 #include "sampling/point_grid.h"
 #include "sampling/sample_choice.h"
 
@@ -31,8 +32,6 @@ constexpr double inside_another = 0.6;
 constexpr double rounding = 1e-4;
 /// Meshes are so far from each other.
 constexpr double meshes_apart = 10.0;
-/// What normals are evaluated for at once.
-constexpr Index block_rows = 16;
 
 }  // namespace
 
@@ -171,7 +170,8 @@ std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& norm
   if (runs.empty()) return {};
   std::sort(samples.begin(), samples.end());
   for (const Index i : samples)
-    if (blocks.empty() || blocks.back() != i / block_rows) blocks.push_back(i / block_rows);
+    if (const Index block = i / RadialEvaluator<float>::block_size; blocks.empty() || blocks.back() != block)
+      blocks.push_back(block);
   Points normals = normals_at(&blocks);
   for (const Index i : samples) normals.row(i).normalize();
   std::vector<Index> second(static_cast<std::size_t>(places.rows()), -1);

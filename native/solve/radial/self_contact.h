@@ -28,7 +28,7 @@ class SelfContact {
     Points seen;               ///< places at the last search
     std::vector<Index> faced;  ///< what each faced then; −1: nothing
   };
-  /// (n,3) as long as the surface there is stretched, in these blocks of 16 rows; null: in all.
+  /// (n,3) as long as the surface there is stretched, in these blocks of a RadialEvaluator; null: in all.
   using Normals = std::function<Points(const std::vector<Index>* blocks)>;
   /// For these rows of the problem's samples. Throws InvalidInput without normals.
   SelfContact(const RadialProblem& problem, const std::vector<Index>& rows, double kept);

@@ -7,7 +7,7 @@ import numpy as np
 
 import arapfields as af
 
-from .options import given_options, of_results
+from .options import given_options, result_options
 from .touching import contact_key, contact_of
 
 STEPS, TOLERANCE = 300, 1e-6  # of a frame's solve, which starts from rest, where nothing else is said
@@ -69,7 +69,7 @@ class FrameSolver:
         rest = [(type(h).__name__, np.asarray(h.rest).tolist(), h.weight) for h in self._handles(index)]
         further = [] if self._secondary is None else [self._tracks.fps, self._secondary.to_dict()]
         text = repr(
-            [af.__version__, of_results(self._options), self._limits, rest, *further, *self._contact_key]
+            [af.__version__, result_options(self._options), self._limits, rest, *further, *self._contact_key]
         )
         return text.encode()
 

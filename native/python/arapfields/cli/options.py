@@ -46,7 +46,7 @@ def add_flag(group, option, **settings):
         group.add_argument(f"--{name}", choices=choices, metavar=None if choices else "NAME", **settings)
 
 
-def of_results(options):
+def result_options(options):
     """The options as a dict, but for those that change no result."""
     return {name: value for name, value in options.to_dict().items() if name != "threads"}
 

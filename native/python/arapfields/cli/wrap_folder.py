@@ -9,7 +9,7 @@ import arapfields as af
 
 from .._files import existing_file, json_text
 from . import contact_sheet, files, sources
-from .options import given, of_results
+from .options import given, result_options
 from .running import Outputs, with_progress
 
 ONE_TARGET = ("landmark", "landmarks", "save_field", "suggest")  # flags of which each target has its own
@@ -62,7 +62,7 @@ def run(args, options):
 def made_of(template, options, samples):
     """A hash of what all wraps of a template have in common."""
     made = hashlib.blake2b(template.read_bytes())
-    made.update(repr((af.__version__, of_results(options))).encode())
+    made.update(repr((af.__version__, result_options(options))).encode())
     for rows in (samples.points, samples.weights, samples.bend_weights):
         made.update(rows.tobytes())
     return made

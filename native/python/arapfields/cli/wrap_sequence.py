@@ -120,7 +120,7 @@ class Follower:
         place = self.store.place(self.good, [np.frombuffer(made.digest(), np.uint8)])
         if not self.store.has(place):
             frame = sources.read_distance(path)
-            self._stand_behind_last()
+            self._resume_after_last()
             field = with_progress(path.stem, lambda task: self._wrap(frame, task), quiet)
             self.behind = None
             field.save(field_of(place))
@@ -133,7 +133,7 @@ class Follower:
         self.last, self.good, self.is_next = place, self.good + 1, True
         return place
 
-    def _stand_behind_last(self):
+    def _resume_after_last(self):
         if self.last == self.behind:
             return
         try:
