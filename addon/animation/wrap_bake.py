@@ -3,7 +3,10 @@
 
 import math
 import re
+from pathlib import Path
 from types import SimpleNamespace
+
+import bpy
 
 from ..blender import modifier_stack
 from ..blender.evaluation import depsgraph_of
@@ -17,10 +20,10 @@ from ..core.runtime import native
 from ..core.settings.parameters import WRAP
 from ..deform.solve_job import describe
 from ..solver.frame_solver import FrameSolver
-from ..solver.request import Request
+from ..solver.request import Request, flat
 from ..solver.setup import sampled
 from ..wrap import landmarks
-from .caches import plain
+from .caches import BARRED, plain
 from .frames import Frames
 from .object_bake import ObjectBake
 
@@ -66,31 +69,44 @@ def put_after_armatures(item):
         item.modifiers.move(first, last)
 
 
+def scan_at(frame, scans):
+    scan = scans[frame].find() if frame in scans else None
+    if scan is None:
+        raise UserError("There is no mesh")
+    return scan
+
+
+def off(report):
+    """How far surface and scan are from each other, as a share of the scan's size."""
+    return max(report.to_target_mean, report.from_target_mean)
+
+
 class WrapSolver(FrameSolver):
     """A request has a scan's vertices and triangles as targets, landmarks as handles. A shape begins at the
     one before."""
 
-    def __init__(self, sampled_source, carrying, options):
-        self.options, self.sequence, self.report = options, None, None
+    def __init__(self, sampled_source, carrying, frames):
+        self.frames, self.report = frames, None
         super().__init__(sampled_source, carrying)
 
     def _make_solver(self, handles, energy):
         """A wrap has none before its first frame."""
 
     def solve_from_rest(self, request, task=None):
-        af, samples = native.library(), self.sampled.samples
-        scan = af.MeshSdf(*request.targets)
-        if self.sequence is None:
-            field = af.wrap(samples, scan, request.handles, self.options, task=task)
-            self.sequence = af.WrapSequence(samples, field, self.options)
-        else:
-            field = self.sequence.next(scan, task=task)
-        self.solver, self.report = SimpleNamespace(field=field), field.report
+        field, self.report = self.frames.follow(
+            b"".join(flat(request.targets)),
+            lambda: native.library().MeshSdf(*request.targets),
+            request.handles,
+            lambda call: call(task),
+        )
+        self.solver = SimpleNamespace(field=field)
         return self.exact_shape(request)
 
 
 class WrapBake(ObjectBake):
-    """`scans`: {frame: ObjectReference}; None where the source's own target changes from frame to frame."""
+    """`scans`: {frame: ObjectReference}; None where the source's own target changes from frame to frame.
+
+    What is kept lies beside the cache; of shape keys, in the session's folder."""
 
     def __init__(self, context, source, frames, scans, *paths):
         super().__init__(context, source, "WRAP", frames, *paths)
@@ -98,62 +114,57 @@ class WrapBake(ObjectBake):
         self.reader.moves_by_itself = True  # scans take memory: few are read ahead
         self.marks = landmarks.Marks(source)
         self.values = effective_values(WRAP, settings_of(source).wrap)
-        self.options = options_of("wrap", self.values)
-        self.last, self.worst, self.left_out = None, (-1.0, 0.0, None), {}
-        self.waiting = 0  # frames without a shape yet
+        self.reports, self.left_out = {}, {}  # by frame; frames by what is wrong with them
+        self.output = paths[0] if paths else Path(bpy.app.tempdir, BARRED.sub("_", source.name))
 
     def request(self, context):
         try:
             source, frame = self.reference.get(), context.scene.frame_current
             space = space_of(source.matrix_world, source.name)
-            scan = landmarks.target_of(source) if self.scans is None else self.scan_at(frame)
+            scan = landmarks.target_of(source) if self.scans is None else scan_at(frame, self.scans)
             self.reader.carrying.expect_motion()
             self.reader.refresh_carried(context)
             carried = self.reader.carrying.poses(space, depsgraph_of(context))
             mesh = landmarks.read_target(context, scan, space)
-            pairs = landmarks.read(source, space)
-            return Request([*mesh], None, self.reader.points, pairs, {}, carried, None)
+            marks = landmarks.read(source, space)
+            return Request([*mesh], None, self.reader.points, marks, {}, carried, None)
         except (UserError, ValueError) as error:
             return error
 
-    def scan_at(self, frame):
-        scan = self.scans[frame].find() if frame in self.scans else None
-        if scan is None:
-            raise UserError("There is no mesh")
-        return scan
-
     def prepare(self):
+        from arapfields.cli.frames import folder_beside
+        from arapfields.cli.wrap_frames import HeldFrames, WrappedFrames
+
         setup = sampled(self.reader.setup, self.values["samples"], self.values["seed"])
-        self.solver = WrapSolver(setup, self.reader.carrying, self.options)
+        options = options_of("wrap", self.values)
+        self.wrapped = WrappedFrames(folder_beside(self.output), setup.samples, options)
+        self.held = HeldFrames(self.keep)
+        self.solver = WrapSolver(setup, self.reader.carrying, self.wrapped)
         self.carried.prepare()
         self.store.open(self.solver)
 
     def add(self, frame, request, is_baked=True, task=None):
         """A frame that cannot be followed is named, and has the shape before it, or the first one."""
+        shape = None
         try:
             if isinstance(request, Exception):
                 raise request
             shape = self.solver.solve_from_rest(request, task)
-            if self.last is None:
-                notes = [self.marks.numbered(note) for note in self.solver.report.notes]
-                self.carried.warnings += [UserError("note: {text}", text=note) for note in notes]
-                self.marks.left_out = self.solver.report.left_out
-            report, self.last = self.solver.report, shape
-            off = max(report.to_target_mean, report.from_target_mean)
-            self.worst = max(self.worst, (off, frame, report), key=lambda one: one[0])
+            self.reports[frame] = self.solver.report
         except (UserError, ValueError, native.library().Diverged) as error:
             self.left_out.setdefault(translated(error), []).append(str(plain(frame)))
-        self.waiting += 1
-        while self.last is not None and self.waiting > 0:
-            self.keep(self.last)
-            self.waiting -= 1
+        self.held.add(shape)
 
     def finish(self, task):
         named = [{"frame": ", ".join(frames), "error": reason} for reason, frames in self.left_out.items()]
-        if self.last is None:
-            told = [translated("Frame {frame}: {error}", **one) for one in named]
-            raise UserError("{error}", error="; ".join(told))
-        self.carried.warnings += [UserError("Frame {frame}: {error}; held", **one) for one in named]
+        if not self.reports:
+            told = "; ".join(translated("Frame {frame}: {error}", **one) for one in named)
+            raise UserError("{error}", error=told)
+        first = next(iter(self.reports.values()))
+        self.marks.left_out = first.left_out
+        notes = [UserError("note: {text}", text=self.marks.numbered(note)) for note in first.notes]
+        self.carried.warnings += notes + [UserError("Frame {frame}: {error}; held", **one) for one in named]
+        self.wrapped.forget_others()
         super().finish(task)
 
     def place(self, context, job):
@@ -163,6 +174,9 @@ class WrapBake(ObjectBake):
         for item in (source, *(carried.reference.find() for carried in self.carried.carrying.objects)):
             if item is not None and item.type == "MESH":
                 put_after_armatures(item)
-        _, frame, report = self.worst
+        frame, report = max(self.reports.items(), key=lambda one: off(one[1]))
         worst = {"frame": plain(frame), "figures": describe("", report.to_dict(), 1.0)}
-        return f"{line}; {translated('at worst, in frame {frame}: {figures}', **worst)}"
+        parts = [line, translated("at worst, in frame {frame}: {figures}", **worst)]
+        if self.wrapped.found:
+            parts.append(translated("{count} frames were there already", count=self.wrapped.found))
+        return "; ".join(parts)

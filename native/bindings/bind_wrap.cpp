@@ -188,7 +188,19 @@ InvalidInput.)")
           },
           "target"_a, py::kw_only(), "task"_a = py::none(), R"(
 The DeformationField from rest onto the next frame, an ImplicitFunction as `wrap` takes it. field.report is a
-WrapReport. Raises InvalidInput and Cancelled; then the sequence is as it was.)");
+WrapReport. Raises InvalidInput and Cancelled; then the sequence is as it was.)")
+      .def_property(
+          "state", [](const WrapSequence& self) { return run_long([&] { return self.state(); }); },
+          [](WrapSequence& self, const ArrayArgument& state) {
+            const Points given = as_finite_points(state, "state");
+            run_long([&] { self.set_state(given); });
+          },
+          R"(
+(m, 3) what changes from frame to frame. Set to that of an earlier frame, the sequence goes on behind that one;
+with the first frame's field it is all that a sequence keeps. Raises InvalidInput.)")
+      .def_property_readonly(
+          "field", [](const WrapSequence& self) { return run_long([&] { return self.field(); }); }, R"(
+The DeformationField from rest to the frame of `state`, without a report.)");
 }
 
 }  // namespace

@@ -149,15 +149,37 @@ WrapSolution WrapSequence::next(const ImplicitFunction& function, const Progress
   report.diagonal = mesh_target.diagonal;
   for (std::string& warning : warnings_on(report.distortion, std::nullopt, {}))
     report.warnings.push_back(std::move(warning));
-  std::vector<FieldStep> steps = first_;
-  steps.push_back({moved, 1});
-  solution.field = std::make_shared<ComposedField>(std::move(steps));
-  solution.field->set_frame(frame_);
-  solution.field->set_rest_points(kept_);
+  solution.field = field_of(std::move(moved));
   report.seconds = watch.seconds();
   progress.report(1.0, "done");
   coefficients_ = std::move(coefficients);
   return solution;
+}
+
+Points WrapSequence::state() const {
+  const std::lock_guard lock(one_at_a_time_);
+  return coefficients_;
+}
+
+void WrapSequence::set_state(PointsIn state) {
+  const std::lock_guard lock(one_at_a_time_);
+  require(state.rows() == coefficients_.rows(), "state", "it is of another sequence",
+          "a state of this one is needed");
+  coefficients_ = state;
+}
+
+std::shared_ptr<DeformationField> WrapSequence::field() const {
+  const std::lock_guard lock(one_at_a_time_);
+  return field_of(std::make_shared<RadialField>(basis_, coefficients_));
+}
+
+std::shared_ptr<DeformationField> WrapSequence::field_of(std::shared_ptr<const RadialField> motion) const {
+  std::vector<FieldStep> steps = first_;
+  steps.push_back({std::move(motion), 1});
+  auto field = std::make_shared<ComposedField>(std::move(steps));
+  field->set_frame(frame_);
+  field->set_rest_points(kept_);
+  return field;
 }
 
 }  // namespace arapfields

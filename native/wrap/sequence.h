@@ -2,6 +2,7 @@
 // A surface that was wrapped onto the first frame of a scanned sequence, and follows the others.
 #pragma once
 
+#include <memory>
 #include <mutex>
 #include <vector>
 
@@ -25,8 +26,17 @@ class ARAPFIELDS_EXPORT WrapSequence {
   /// `target` where there is no surface; Cancelled, with the sequence as it was. Any thread may call.
   WrapSolution next(const ImplicitFunction& target, const Progress& progress = {});
 
+  /// (m,3) what changes from frame to frame: coefficients of the motion since the first one.
+  Points state() const;
+  /// Goes on behind the frame of this state. Throws InvalidInput for one of another sequence.
+  void set_state(PointsIn state);
+  /// From rest to the frame of the state.
+  std::shared_ptr<DeformationField> field() const;
+
  private:
-  std::mutex one_at_a_time_;
+  std::shared_ptr<DeformationField> field_of(std::shared_ptr<const RadialField> motion) const;
+
+  mutable std::mutex one_at_a_time_;
   WrapOptions options_;
   std::vector<FieldStep> first_;
   Frame frame_;

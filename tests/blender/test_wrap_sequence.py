@@ -3,6 +3,7 @@
 
 import tempfile
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
-    from support.blender.baking import at, cache_file, cancelled_at, stepped
+    from support.blender.baking import EXACT, at, cache_file, cancelled_at, stepped
     from support.blender.wraps import SMALL, bar_and_target, rigged_bar, soup_of
     from support.geometry import wrap_cases as cases
 
@@ -138,6 +139,53 @@ def test_a_cancelled_sequence_leaves_nothing():
     assert cancelled_at(operator, "frame 4") == {"CANCELLED"}
     assert operator.said == "Wrap Sequence cancelled"
     assert scenes.everything(item) == kept and not item.modifiers
+
+
+def wraps(**given):
+    """How many of its frames a sequence wraps: of the others it does not look at the scan's distances."""
+    with patch.object(af, "MeshSdf", side_effect=af.MeshSdf) as made:
+        assert bpy.ops.arapfields.wrap_sequence(**given) == {"FINISHED"}
+    return made.call_count
+
+
+def played(item):
+    return [at(item, frame).tolist() for frame in (2, 4, 6, 8)]
+
+
+@pytest.mark.parametrize("kept", ["cache", "keys"])
+def test_a_stopped_sequence_goes_on_as_if_it_had_not_been(kept):
+    item = scans()
+    given = {"filepath": cache_file()} if kept == "cache" else {"format": "KEYS"}
+    assert cancelled_at(stepped(ARAPFIELDS_OT_wrap_sequence, **given), "frame 6") == {"CANCELLED"}
+    count = wraps(**given)
+    assert 1 <= count <= 2
+    said = " ".join(text for _, text in jobs.messages())
+    assert f"{4 - count} frames were there already" in said, said
+    shown = played(item if kept == "cache" else bpy.data.objects["Template_baked"])
+    scenes.activate(item)
+    assert wraps(filepath=cache_file()) == 4
+    assert np.abs(np.subtract(played(item), shown)).max() < EXACT
+
+
+@pytest.mark.parametrize(("edited", "redone"), [(8, 1), (4, 3)])
+def test_an_edited_frame_is_wrapped_again_with_those_behind_it(edited, redone):
+    path, clothes = Path(cache_file()), scenes.bar("Clothes")
+    item, file = scans(), str(path.with_name("scene.blend"))
+    item.arapfields.carried.add().item = clothes
+    assert wraps(filepath=str(path)) == 4
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    bpy.ops.wm.open_mainfile(filepath=file)
+    item, clothes = bpy.data.objects["Template"], bpy.data.objects["Clothes"]
+    scenes.activate(item)
+    for vertex, place in zip(bpy.data.objects[f"scan_{edited}"].data.vertices, bent(0.12), strict=True):
+        vertex.co = place
+    assert wraps(filepath=str(path)) == redone
+    assert off(item, edited, 0.12) < OFF
+    shown, other = (played(item), played(clothes)), cache_file()
+    assert wraps(filepath=other) == 4
+    assert (played(item), played(clothes)) == shown and Path(other).read_bytes() == path.read_bytes()
+    item.arapfields.wrap.closeness = 0.5
+    assert wraps(filepath=str(path)) == 4
 
 
 def test_what_has_no_frames_is_refused():

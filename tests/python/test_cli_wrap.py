@@ -2,7 +2,6 @@
 """The verb wrap."""
 
 import json
-from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -11,8 +10,6 @@ from support.geometry import wrap_cases as cases
 from support.programs.cli import run
 
 import arapfields as af
-from arapfields.cli import frames as store
-from arapfields.cli import wrap_sequence
 from arapfields.cli.wrapping import read_landmarks, write_landmarks
 
 SMALL = ["--centers", "50", "--stages", "2", "--iterations", "5", "--samples", "1000", "--quiet"]
@@ -65,103 +62,6 @@ def test_landmarks_are_suggested(pair):
         again = pair / f"again{suffix}"
         write_landmarks(again, suffix, pairs)
         assert np.array_equal(read_landmarks(again), pairs)
-
-
-@pytest.fixture
-def motion(pair):
-    """The call that wraps the template onto three frames, and their folder."""
-    frames = pair / "frames"
-    frames.mkdir()
-    v, f = cases.figure(2)
-    for number in (10, 9, 11):  # by number, not by letter
-        shape = cases.bend(v, 0.05 * (number - 9))
-        trimesh.Trimesh(shape, f, process=False).export(frames / f"scan{number}.ply")
-    flags = ["--sequence", "--alignment", "none", *SMALL]
-    return frames, lambda *given: run("wrap", pair / "template.obj", *given, *flags)
-
-
-def test_frames_of_a_motion_go_into_a_point_cache(pair, motion, capsys):
-    (frames, wrap), cache, (v, f) = motion, pair / "motion.pc2", cases.figure(2)
-    assert wrap(frames, "-o", cache) == 0
-    with af.PointCacheReader(cache) as reader:
-        found = [reader[k] for k in range(3)]
-    for k in range(3):
-        away = np.abs(af.MeshSdf(cases.bend(v, 0.05 * k), f)(found[k].astype(float)))
-        assert away.mean() < 0.01 * np.linalg.norm(np.ptp(v, axis=0))
-    for wrong, text in (
-        ([pair / "scan.ply", "-o", cache], "no folder of frames"),
-        ([frames, "-o", pair / "out"], "--output"),
-        ([frames, "-o", cache, "--suggest", pair / "x.json"], "--suggest: has no meaning"),
-    ):
-        assert wrap(*wrong) == 2
-        assert text in " ".join(capsys.readouterr().err.split())
-
-
-def wraps_counted(monkeypatch, stop_at=None):
-    """Names of the frames that are wrapped from now on; Ctrl-C comes at one of them."""
-    wrapped = []
-
-    def with_progress(name, call, quiet):
-        if name == stop_at:
-            raise KeyboardInterrupt
-        field = call(None)
-        wrapped.append(name)
-        return field
-
-    monkeypatch.setattr(wrap_sequence, "with_progress", with_progress)
-    return wrapped
-
-
-def test_a_motion_that_was_stopped_goes_on_as_if_it_had_not_been(pair, motion, monkeypatch, capsys):
-    (frames, wrap), whole, cache = motion, pair / "whole.pc2", pair / "motion.pc2"
-    assert wrap(frames, "-o", whole) == 0
-    first = wraps_counted(monkeypatch, stop_at="scan11")
-    assert wrap(frames, "-o", cache) != 0 and first == ["scan9", "scan10"] and not cache.exists()
-    with monkeypatch.context() as elsewhere:
-        elsewhere.setattr(store, "lock", Mock(side_effect=BlockingIOError))
-        capsys.readouterr()
-        assert wrap(frames, "-o", cache) == 2 and "another wrap is at work" in capsys.readouterr().err
-    second = wraps_counted(monkeypatch)
-    assert wrap(frames, "-o", cache, "--threads", "1") == 0 and second == ["scan11"]
-    assert cache.read_bytes() == whole.read_bytes()
-    assert not list(pair.glob(".*frames"))
-    wraps_counted(monkeypatch, stop_at="scan11")
-    assert wrap(frames, "-o", cache) != 0
-    (frames / "scan10.ply").write_bytes((frames / "scan9.ply").read_bytes())
-    anew = wraps_counted(monkeypatch)
-    assert wrap(frames, "-o", cache) == 0 and anew == ["scan9", "scan10", "scan11"]
-
-
-@pytest.mark.parametrize("bad", ["scan9", "scan10", "scan11"])
-def test_a_bad_frame_is_held_named_and_tried_again(pair, motion, bad, monkeypatch, capsys):
-    (frames, wrap), cache = motion, pair / "motion.mdd"
-    good = (frames / f"{bad}.ply").read_bytes()
-    (frames / f"{bad}.ply").write_text("no mesh")
-    assert wrap(frames, "-o", cache) == 2
-    assert f"1 of 3 failed: {bad}.ply" in " ".join(capsys.readouterr().err.split())
-    with af.PointCacheReader(cache) as reader:
-        shapes = [reader[k] for k in range(3)]
-    held = ["scan9", "scan10", "scan11"].index(bad)
-    stands_in = max(held - 1, 0) if held else 1
-    assert np.array_equal(shapes[held], shapes[stands_in])
-    assert not np.array_equal(shapes[held], shapes[3 - held - stands_in])
-    again = wraps_counted(monkeypatch)
-    assert wrap(frames, "-o", cache) == 2 and again == []
-    (frames / f"{bad}.ply").write_bytes(good)
-    assert wrap(frames, "-o", cache) == 0
-    assert again == ["scan9", "scan10", "scan11"][held:]
-    anew = wraps_counted(monkeypatch)
-    assert wrap(frames, "-o", pair / "whole.mdd") == 0 and len(anew) == 3
-    assert cache.read_bytes() == (pair / "whole.mdd").read_bytes()
-
-
-def test_a_motion_without_a_good_frame_is_refused(pair, motion, capsys):
-    frames, wrap = motion
-    for path in frames.iterdir():
-        path.write_text("no mesh")
-    assert wrap(frames, "-o", pair / "motion.pc2") == 2
-    assert "3 of 3 failed: scan9.ply" in " ".join(capsys.readouterr().err.split())
-    assert not (pair / "motion.pc2").exists()
 
 
 def test_a_folder_is_done_once_and_a_bad_file_stops_no_other(pair, capsys):

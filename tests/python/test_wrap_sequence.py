@@ -76,9 +76,15 @@ def test_a_sequence_goes_on_from_a_frame_in_a_file(played, tmp_path):
     sequence = af.WrapSequence(samples, first, OPTIONS)
     sequence.next(targets[0]).save(tmp_path / "frame.safetensors")
     kept = af.DeformationField.load(tmp_path / "frame.safetensors")
-    again = af.WrapSequence(samples, kept, OPTIONS)
+    again, by_state = af.WrapSequence(samples, kept, OPTIONS), af.WrapSequence(samples, first, OPTIONS)
+    by_state.state = sequence.state
+    assert np.array_equal(by_state.field(v), sequence.field(v))
     for target in targets[1:]:
-        assert np.array_equal(again.next(target)(v), sequence.next(target)(v))
+        true_next = sequence.next(target)(v)
+        assert np.array_equal(again.next(target)(v), true_next)
+        assert np.array_equal(by_state.next(target)(v), true_next)
+    with pytest.raises(af.InvalidInput, match="state"):
+        by_state.state = sequence.state[1:]
     with pytest.raises(af.InvalidInput, match="other samples or options"):
         af.WrapSequence(samples, kept, af.WrapOptions(centers=50))
 

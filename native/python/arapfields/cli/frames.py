@@ -17,8 +17,13 @@ from .._native import InvalidInput
 TYPE = np.dtype("<f4")
 
 
+def folder_beside(output):
+    """The folder ".NAME.frames" of what is kept of an output's frames."""
+    return output.with_name(f".{output.name}.frames")
+
+
 class FrameStore:
-    """The folder ".NAME.frames" beside an output. Several processes, also of several machines, may fill it.
+    """The folder beside an output. Several processes, also of several machines, may fill it.
 
     A frame's file appears whole, and its name tells what it was made from: a frame whose handles, or whose
     mesh, options or version have changed is not found.
@@ -27,7 +32,7 @@ class FrameStore:
     def __init__(self, output, points, common):
         """`common`: bytes that stand for all that the frames have in common."""
         self.output = output = Path(output)
-        self.folder = output.with_name(f".{output.name}.frames")
+        self.folder = folder_beside(output)
         self.points, self._common = points, hashlib.blake2b(common, digest_size=16).digest()
 
     @property

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """wrap with a folder as its target: one template onto every mesh in it; what is done already is skipped."""
 
-import hashlib
 import json
 from pathlib import Path
 
@@ -9,8 +8,9 @@ import arapfields as af
 
 from .._files import existing_file, json_text
 from . import contact_sheet, files, sources
-from .options import given, result_options
+from .options import given
 from .running import Outputs, with_progress
+from .wrap_frames import made_of
 
 ONE_TARGET = ("landmark", "landmarks", "save_field", "suggest")  # flags of which each target has its own
 
@@ -38,7 +38,7 @@ def run(args, options):
     output.mkdir(parents=True, exist_ok=True)
     source = sources.Source(args)
     samples = sources.samples(source, given(args, "wrap", "samples"), options.seed, args)
-    common = made_of(template, options, samples)
+    common = made_of(samples, options, template.read_bytes())
     done, failed = {}, []
     for path in everything[number - 1 :: parts]:
         place = output / f"{path.stem}{template.suffix.lower()}"
@@ -57,15 +57,6 @@ def run(args, options):
     if done:
         write_sheet(output, everything, template.suffix.lower())
     refuse(failed, len(done) + len(failed))
-
-
-def made_of(template, options, samples):
-    """A hash of what all wraps of a template have in common."""
-    made = hashlib.blake2b(template.read_bytes())
-    made.update(repr((af.__version__, result_options(options))).encode())
-    for rows in (samples.points, samples.weights, samples.bend_weights):
-        made.update(rows.tobytes())
-    return made
 
 
 def refuse(failed, count):
