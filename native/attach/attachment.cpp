@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "attach/places_above.h"
 #include "attach/surface_frames.h"
 #include "core/errors.h"
 #include "core/jacobians.h"
@@ -27,10 +28,6 @@ namespace {
 constexpr double near_share = 0.03, far_share = 0.06;
 /// Spacings of the samples within which a point counts as on the surface.
 constexpr double surface_spacings = 1.5;
-/// Where large motions part or join what is near, a field off the surface can be steep. A point that it takes
-/// farther from its place above the moved surface than the first of its distances goes there instead, wholly
-/// from the second on.
-constexpr double steady = 1.0, astray = 2.0;
 /// Square root of a body's area in its sizes, roughly: for the spacing of samples.
 constexpr double area_side = 1.4;
 /// Mean influence of nearby frames from which a carried point follows fully.
@@ -103,14 +100,14 @@ class Attachment::State {
  private:
   Points frame_points_in(const Frame& frame) const { return frame.to_cube(frame_.to_mesh(frames_.points())); }
   std::shared_ptr<const CachedEvaluation> cached(const RadialField& field) const;
-  void bring_back(const DeformationField& field, Points& moved) const;
 
   Frame frame_;
   std::vector<Index> near_, far_;    // points that the field moves, and that frames move
   Points near_points_, far_points_;  // mesh coordinates, in spatial order
-  Points feet_, normals_;            // of the samples nearest to the points that the field moves
+  PlacesAbove places_;               // of the points that the field moves
   Vector frame_weights_;             // (far) of the frames beside the field
   SurfaceFrames frames_;
+  Points frame_normals_;
   CarriedPoints carried_;
   mutable std::mutex mutex_;
   mutable std::shared_ptr<const CachedEvaluation> cache_;
@@ -127,8 +124,7 @@ Attachment::State::State(const SurfaceSamples& samples, PointsIn points, const P
   const double spacing = area_side * size / std::sqrt(static_cast<double>(samples.size()));
   const double near = std::max(near_share * size, surface_spacings * spacing),
                far = near * far_share / near_share;
-  const ClosestPoints closest = nearest_samples(samples.points, progress).closest(placed, progress);
-  const Vector& distances = closest.distances;
+  const Vector distances = nearest_distances(samples.points, placed, progress);
   distances_ = frame_.scale * distances;
   progress.report(0.3, "distances to the body");
   std::vector<double> weights;
@@ -138,14 +134,12 @@ Attachment::State::State(const SurfaceSamples& samples, PointsIn points, const P
     if (weight > 0.0) far_.push_back(i), weights.push_back(weight);
   }
   near_points_ = points(near_, Eigen::all);
-  std::vector<Index> nearest;
-  for (const Index i : near_) nearest.push_back(closest.triangles[static_cast<std::size_t>(i)]);
-  feet_ = samples.points(nearest, Eigen::all);
-  normals_ = samples.normals(nearest, Eigen::all);
+  places_ = PlacesAbove(samples, placed(near_, Eigen::all), distances(near_), spacing);
   far_points_ = points(far_, Eigen::all);
   frame_weights_ = Eigen::Map<const Vector>(weights.data(), static_cast<Index>(weights.size()));
   if (far_.empty()) return;
   frames_ = SurfaceFrames(samples.points);
+  if (samples.normals.rows() == samples.size()) frame_normals_ = samples.normals(frames_.rows(), Eigen::all);
   progress.report(0.5, "frames of the body");
   carried_ = CarriedPoints(frames_, placed(far_, Eigen::all), distances(far_), size);
 }
@@ -161,36 +155,13 @@ std::shared_ptr<const CachedEvaluation> Attachment::State::cached(const RadialFi
   return cache_ = std::move(evaluation);
 }
 
-/// A place above the moved surface: from the surface's first derivatives, as far along its normal as the root
-/// of its area has grown.
-void Attachment::State::bring_back(const DeformationField& field, Points& moved) const {
-  const Frame& frame = field.frame();
-  const Points feet = frame.to_cube(frame_.to_mesh(feet_)), places = frame.to_cube(near_points_);
-  const Points now = frame.to_cube(moved);
-  JetBlock<double> jets(feet.rows(), JetOrder::first);
-  field.evaluate(feet, jets.view());
-  const JetView<const double> view = std::as_const(jets).view();
-  for (Index i = 0; i < feet.rows(); ++i) {
-    const Vec3 away = (places.row(i) - feet.row(i)).transpose(), normal = normals_.row(i).transpose();
-    const double height = away.dot(normal);
-    const Mat3 slope = jacobian_at(view, i);
-    const Vec3 turned = area_vector(slope, normal);
-    const double grown = std::sqrt(turned.norm()), distance = grown * away.norm();
-    if (!(distance > 0.0)) continue;
-    const Vec3 above =
-        Eigen::Map<const Vec3>(view.at(0, i)) + slope * (away - height * normal) + height / grown * turned;
-    const Vec3 shift = above - now.row(i).transpose();
-    moved.row(i) += frame.scale * smooth_between(steady, astray, shift.norm() / distance) * shift.transpose();
-  }
-}
-
 Points Attachment::State::positions(const DeformationField& field) const {
   const ThreadScope threads;
   Points result(distances_.size(), 3);
   const RadialField* radial = as_radial(field);
   const auto cache = radial != nullptr ? cached(*radial) : nullptr;
   Points near = cache ? cache->moved(*radial) : field.at(near_points_);
-  if (!cache) bring_back(field, near);
+  if (!cache) places_.adjust(field, near);
   for (std::size_t i = 0; i < near_.size(); ++i) result.row(near_[i]) = near.row(i);
   if (far_.empty()) return result;
   const Points frame_points = frame_points_in(field.frame());
@@ -202,10 +173,18 @@ Points Attachment::State::positions(const DeformationField& field) const {
     field.evaluate(frame_points, jets.view());
   std::vector<double> rotations(9 * count);
   closest_rotations<double>(jets.view().column(1), count, rotations.data());
+  Vector growth;  // of the surface; a radial field's clothes keep their size
+  if (!cache && frame_normals_.rows() > 0) {
+    growth.resize(count);
+    for (Index j = 0; j < count; ++j)
+      growth[j] = std::sqrt(
+          area_vector(jacobian_at(std::as_const(jets).view(), j), frame_normals_.row(j).transpose()).norm());
+  }
   // Differences in the field's own frame, so that a field that moves nothing moves nothing here.
   const Points shifts = (field.frame().scale / frame_.scale) *
                         (Eigen::Map<const Points>(jets.view().data, count, 3) - frame_points);
-  Points carried = frame_.to_mesh(carried_.moved(frames_, frames_.points() + shifts, rotations.data()));
+  Points carried =
+      frame_.to_mesh(carried_.moved(frames_, frames_.points() + shifts, rotations.data(), growth));
   for (std::size_t i = 0; i < far_.size(); ++i) {
     const Index row = static_cast<Index>(i);
     if (cache && cache->carried_influence().size() > 0 && cache->carried_influence()[row] < 1.0)

@@ -14,8 +14,8 @@ namespace arapfields {
 /// of the surface: f(p) + R(p) (y − p) for a point p of the surface, R the rotation closest to the Jacobian.
 /// Between the two distances both are mixed. Several frames blend at each point, with weights that vary
 /// smoothly, so that nothing tears where the nearest frame changes. Everything that does not depend on the
-/// field is computed once. Near the surface, points that a field other than a radial one takes astray keep
-/// their place above the surface, at a distance that grows as its area does.
+/// field is computed once. With a field other than a radial one, such as that of a wrap, distances from the
+/// surface grow as the root of its area does.
 class ARAPFIELDS_EXPORT Attachment {
  public:
   /// Samples of the body at rest and points (n,3) of mesh coordinates at rest. Throws InvalidInput for no

@@ -8,7 +8,7 @@
 
 namespace arapfields {
 
-/// Floats of one frame's motion: rotation − 1 by columns, offset, shift, 0.
+/// Floats of one frame's motion: growth · rotation − 1 by columns, offset, shift, growth − 1.
 constexpr int frame_length = 16;
 
 // sums (count, 16) ← for each point the weighted sum of its frames' rows. Point i has the entries

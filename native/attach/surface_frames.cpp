@@ -82,7 +82,8 @@ double smooth_between(double low, double high, double x) {
 
 SurfaceFrames::SurfaceFrames(PointsIn samples) {
   const FarthestPoints chosen = farthest_points(samples, levels.front());
-  points_ = samples(chosen.indices, Eigen::all);
+  rows_.assign(chosen.indices.begin(), chosen.indices.end());
+  points_ = samples(rows_, Eigen::all);
   // Each sample's nearest frame of each level; a coarser level is a prefix of the finest.
   const Index n = samples.rows();
   std::array<std::vector<Index>, levels.size()> nearest;
@@ -159,21 +160,25 @@ Vector CarriedPoints::nearby_means(const SurfaceFrames& frames, const Vector& va
   return means;
 }
 
-Points CarriedPoints::moved(const SurfaceFrames& frames, PointsIn positions, const double* rotations) const {
-  // Differences to the identity, so that it is reproduced exactly: x ↦ x + (R − 1) x + offset, and the shift.
+Points CarriedPoints::moved(const SurfaceFrames& frames, PointsIn positions, const double* rotations,
+                            const Vector& growth) const {
+  // Differences to the identity, so that it is reproduced exactly: x ↦ x + (s R − 1) x + offset, and the
+  // shift.
   const Points& points = frames.points();
   const Index m = points.rows();
   std::vector<float> rows(m * frame_length, 0.0f);
   for (Index j = 0; j < m; ++j) {
+    const double size = growth.size() > 0 ? growth[j] : 1.0;
     Mat3 change;
     for (int k = 0; k < 3; ++k)
-      for (int i = 0; i < 3; ++i) change(i, k) = rotations[(k * m + j) * 3 + i] - (i == k ? 1.0 : 0.0);
+      for (int i = 0; i < 3; ++i) change(i, k) = size * rotations[(k * m + j) * 3 + i] - (i == k ? 1.0 : 0.0);
     const Vec3 shift = (positions.row(j) - points.row(j)).transpose();
     const Vec3 offset = shift - change * points.row(j).transpose();
     float* row = &rows[j * frame_length];
     for (int k = 0; k < 9; ++k) row[k] = static_cast<float>(change(k % 3, k / 3));
     for (int k = 0; k < 3; ++k) row[9 + k] = static_cast<float>(offset[k]);
     for (int k = 0; k < 3; ++k) row[12 + k] = static_cast<float>(shift[k]);
+    row[15] = static_cast<float>(size - 1.0);
   }
   Points result(points_.rows(), 3);
   parallel_for(0, points_.rows(), 1024, [&](Index first, Index last) {
@@ -192,8 +197,8 @@ Points CarriedPoints::moved(const SurfaceFrames& frames, PointsIn positions, con
       for (int k = 0; k < 3; ++k) {
         by_maps += sum.segment<3>(3 * k).cast<double>() * point[k];
         for (int i = 0; i < 3; ++i) {
-          const float turn = rotations_of[(k * count + p) * 3 + i];
-          by_positions[i] += (static_cast<double>(turn) - (i == k ? 1.0 : 0.0)) * arm[k];
+          const double turn = (1.0 + static_cast<double>(sum[15])) * rotations_of[(k * count + p) * 3 + i];
+          by_positions[i] += (turn - (i == k ? 1.0 : 0.0)) * arm[k];
         }
       }
       result.row(first + p) = (point + 0.5 * (by_maps + by_positions)).transpose();

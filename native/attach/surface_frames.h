@@ -22,11 +22,14 @@ class SurfaceFrames {
   /// From samples (n,3) of the surface.
   explicit SurfaceFrames(PointsIn samples);
   const Points& points() const { return points_; }
+  /// Which samples they are.
+  const std::vector<Index>& rows() const { return rows_; }
   /// Area weights of a level's points; they sum to 1.
   const Vector& areas(std::size_t level) const { return areas_[level]; }
 
  private:
   Points points_;
+  std::vector<Index> rows_;
   std::array<Vector, levels.size()> areas_;
 };
 
@@ -46,8 +49,10 @@ class CarriedPoints {
 
   /// The moved points (n,3), from the frames' positions (m,3) and rotations (3, m, 3: column by column, as
   /// the first derivatives of jets). Of the two ways to blend rigid motions, blending positions cuts corners
-  /// where a surface bends, and blending maps overshoots by as much; the result is their mean.
-  Points moved(const SurfaceFrames& frames, PointsIn positions, const double* rotations) const;
+  /// where a surface bends, and blending maps overshoots by as much; the result is their mean. `growth` (m;
+  /// empty: all 1): factors of the distances from the frames.
+  Points moved(const SurfaceFrames& frames, PointsIn positions, const double* rotations,
+               const Vector& growth) const;
   /// Weighted means (n) of the frames' values (m), over nearby frames alone.
   Vector nearby_means(const SurfaceFrames& frames, const Vector& values) const;
 

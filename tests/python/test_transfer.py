@@ -10,6 +10,8 @@ import arapfields as af
 ROUNDING = 1e-12
 # Of a key on a mesh of other triangles, in its largest motion: what linear interpolation leaves.
 INTERPOLATION = 0.03
+# Of distances from the skin, on average: surfaces of some hundred triangles bend between samples.
+KEPT = 0.08
 # The same of the worst vertex; what triangles tell of the growth across them is .3 off.
 ACROSS = 0.1
 TURN = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
@@ -138,3 +140,32 @@ def test_bad_input_is_named(figure):
         task = af.Task()
         task.cancel()
         af.Correspondence(v, (v, f), (v, f), task=task)
+
+
+@pytest.mark.parametrize("distance", [0.01, 0.03, 0.1, 0.2])
+def test_clothes_keep_their_distance_as_the_body_grows(distance):
+    """Near the surface, where frames carry, and between: in units of how a wrap grows the surface there."""
+    v, f = cases.figure(3)
+    fat = v * (1 + 0.6 * np.exp(-3 * ((v - [-0.9, 0, 0]) ** 2).sum(1, keepdims=True)))
+    samples, options = af.sample_mesh(v, f, 3000), af.WrapOptions(alignment="none", **cases.SMALL)
+    field = af.wrap(samples, af.MeshSdf(fat, f), [], options)
+    body = field(v)
+    normals, areas = zip(*(vertex_normals(shape, f) for shape in (v, body)), strict=True)
+    worn = v + distance * normals[0]
+    now = af.MeshSdf(body, f)(af.Attachment(samples, worn).positions(field))
+    before = af.MeshSdf(v, f)(worn)
+    clear = before > 0.8 * distance  # of other parts of the body
+    ratio = (now / before / np.sqrt(areas[1] / areas[0]))[clear]
+    assert np.abs(ratio - 1).mean() < KEPT and now.min() > 0
+
+
+def vertex_normals(vertices, triangles):
+    """(n, 3) unit normals, and (n,) areas about the vertices."""
+    corners = vertices[triangles]
+    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sums = [
+        np.bincount(triangles.ravel(), np.repeat(c, 3), minlength=len(vertices))
+        for c in (*crosses.T, np.linalg.norm(crosses, axis=1))
+    ]
+    normals = np.stack(sums[:3], axis=1)
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True), sums[3]
