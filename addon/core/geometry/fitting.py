@@ -4,6 +4,7 @@
 import numpy as np
 
 REACH = 0.05  # of the diagonal: distance from the skin beyond which the wrap alone says where things go
+MISSING = 0.02  # of the diagonal: where the other body is farther from the wrapped one, it has a gap
 ROUNDS, SMOOTHINGS = 3, 5
 NEIGHBOURS = 30  # vertices of the body whose growth is that of a thing carried as a whole
 LEAST = 0.5  # of the wanted distance: what is nearer is pushed out without regard to its neighbours
@@ -18,6 +19,7 @@ class Body:
         self.own, self.other = af.MeshSdf(self.rest, self.triangles), af.MeshSdf(*onto)
         areas = [vertex_areas(shape, self.triangles) for shape in (self.rest, self.moved)]
         self.scale = np.sqrt(areas[1] / np.maximum(areas[0], 1e-30))  # of each vertex of the one that carries
+        self.away = np.abs(self.other(self.moved)) / self.diagonal
 
     def placed(self, rest, now):
         """How a thing as a whole grows, and its way (3,): `rest` and `now` (3,) are its middle."""
@@ -28,24 +30,27 @@ class Body:
         return scale, share * (wanted - float(self.other(there)[0])) * self.other.gradient(there)[0]
 
     def wanted(self, rest, triangles):
-        """(n,) signed distances from the other body that the vertices of a carried mesh are to have."""
+        """(n,) signed distances from the other body that the vertices of a carried mesh are to have, and (n,)
+        how much these count: less far from the skin, and where the other body has none."""
         body = self.rest, self.triangles
-        scale = self.af.Correspondence(self.rest, body, (rest, triangles)).values(self.scale)
-        return self.own(rest) * scale
+        places = self.af.Correspondence(self.rest, body, (rest, triangles))
+        wanted = self.own(rest) * places.values(self.scale)
+        off = wanted / (REACH * self.diagonal), places.values(self.away) / MISSING
+        return wanted, np.exp(-(off[0] ** 2) - off[1] ** 2)
 
     def fit(self, rest, moved, triangles):
         """(n, 3) vertices of a carried mesh, from where it is at rest and where the wrap's field takes it."""
-        wanted, shape = self.wanted(rest, triangles), np.array(moved, float)
-        near = np.exp(-((wanted / (REACH * self.diagonal)) ** 2))
+        (wanted, near), shape = self.wanted(rest, triangles), np.array(moved, float)
         edges = np.unique(np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
         for _ in range(ROUNDS):
             push = (near * (wanted - self.other(shape)))[:, None] * self.other.gradient(shape)
             for _ in range(SMOOTHINGS):
                 push = smoothed(push, edges)
             shape += push
+        least = LEAST * near * wanted
         for _ in range(ROUNDS):
-            self.push_out(shape, np.arange(len(shape))[:, None], LEAST * wanted)
-            self.push_out(shape, triangles, LEAST * wanted[triangles].mean(axis=1))
+            self.push_out(shape, np.arange(len(shape))[:, None], least)
+            self.push_out(shape, triangles, least[triangles].mean(axis=1))
         return shape
 
     def push_out(self, shape, groups, least):
