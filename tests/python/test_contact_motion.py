@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contact of what moves: a body that falls, obstacles that sweep it along, friction."""
+"""Contact of what moves: a body that falls, obstacles that sweep it along, friction, drags there and back."""
 
 import numpy as np
 import pytest
+from support.geometry import contact_cases
 from support.geometry.bar import LEFT, RIGHT, bar_samples, turned
 from support.geometry.contact_bar import ALIKE, DEEPEST, PLATE, live
 
@@ -61,3 +62,19 @@ def test_friction_holds_what_slides(samples):
         field = resting.step(None, 1 / 24)
     later = field(samples.points)[:, 0].mean() - samples.points[:, 0].mean()
     assert abs(later - ways[1]) < 1e-4  # it rests, and does not creep
+
+
+def test_legs_that_a_drag_has_crossed_come_back():
+    """On the way back the feet meet and hold each other apart, where a solve from rest has none crossed."""
+    (case,) = [case for case in contact_cases.figures() if case.name == "legs crossed 1"]
+    samples = af.sample_surface(contact_cases.BODIES["figure"], 20000, seed=0)
+    live = af.LiveDeformer(samples, case.handles, contact=af.Contact(itself=True))
+    rest = [handle.rest for handle in case.handles]
+    start = live.solve(rest, iterations=60)(samples.points)
+    way, names = np.linspace(0, 1, 41), set()
+    for share in (*way, *way[::-1]):
+        live.follow([(1 - share) * handle.rest + share * handle.target for handle in case.handles])
+        names.update(held.by for held in live.report.contact.held)
+    end = live.solve(rest, iterations=60, tolerance=1e-6)(samples.points)
+    assert names == {"itself"} and not live.report.contact.held
+    assert np.abs(end - start).max() < 1e-3 * np.ptp(samples.points, axis=0).max()

@@ -33,6 +33,10 @@ constexpr double too_deep = 0.03;
 constexpr int most_halves = 4;
 /// Handles farther from their targets against a force, in cube units, are held back.
 constexpr double held_back = 0.02;
+/// Steps without contact at most, where the shape itself holds a handle back.
+constexpr Index steps_apart = 60;
+/// A shape on another way is better if it has less energy by that share.
+constexpr double better = 0.01;
 /// What single precision cannot see of an energy.
 constexpr double floor = 1e-10;
 
@@ -164,6 +168,55 @@ void back_to(RadialState& s, const RowMatrix<double>& coefficients) {
   s.contact.begin(coefficients);
 }
 
+/// What is minimised, but for contact.
+double value_without_contact(RadialState& s) {
+  const RadialObjective<float>& objective = s.objective(s.fast);
+  const VectorF& u = s.measurements(s.fast);
+  return objective.value(u, nullptr) - objective.terms(u).contact;
+}
+
+/// Where the shape itself holds a handle back, a detour may have brought the surface there: solves without
+/// contact, and where the handles rest, pushes apart what overlaps then. Returns whether that is better; if
+/// not, all is as before.
+bool come_apart(RadialState& s, const std::vector<Mat4>& before, bool rests, Index iterations,
+                double tolerance, const std::function<void(Index)>& freely, const Progress& progress) {
+  const std::vector<HeldBack>& held = s.report.contact.held;
+  const Points& targets = s.handles.pairs().targets;
+  if (std::none_of(held.begin(), held.end(), [](const HeldBack& h) { return h.by == "itself"; })) {
+    s.tried.resize(0, 3);
+    return false;
+  }
+  if (s.tried.rows() == targets.rows() &&
+      (targets - s.tried).rowwise().norm().maxCoeff() <= (rests ? 0.0 : step_length_itself))
+    return false;
+  s.tried = targets;
+  const double value = value_without_contact(s);
+  const RadialShape shape = s.shape;
+  const SolveHistory history = s.history;
+  const RadialReport report = s.report;
+  ContactTerms::Pressing pressing = s.contact.pressing();
+  s.contact.release();
+  freely(steps_apart);
+  s.report.contact = {};
+  if (s.contact.find(s.shape.coefficients, 0.0, true) <= 0.0) {
+    s.contact.release();
+    if (!s.contact.overlaps(s.shape.coefficients)) return true;
+  } else if (rests && s.contact.deepest_outside() <= 0.0) {
+    approach(s, before, 1, iterations, tolerance, progress);
+    report_contact(s);
+    if (!s.contact.overlaps(s.shape.coefficients) && value_without_contact(s) < (1.0 - better) * value)
+      return true;
+  }
+  s.shape.coefficients = shape.coefficients;
+  s.shape.jumps = shape.jumps;
+  ++s.shape.revision;
+  s.history = history;
+  s.report = report;
+  s.contact.set_pressing(std::move(pressing));
+  s.contact.find(s.shape.coefficients);
+  return false;
+}
+
 }  // namespace
 
 Points contact_places(RadialState& s) {
@@ -198,7 +251,7 @@ double press_contact(RadialState& s) {
 }
 
 void follow_in_contact(RadialState& s, Index iterations, double tolerance,
-                       const std::function<void()>& freely, const Progress& progress) {
+                       const std::function<void(Index)>& freely, const Progress& progress) {
   std::vector<Mat4> before = s.dynamics.motions;
   if (std::ssize(before) != s.handles.bound().count()) {
     before = motions_of(s.handles.bound());
@@ -213,13 +266,14 @@ void follow_in_contact(RadialState& s, Index iterations, double tolerance,
   }
   const Points from = s.handles.targets_at(motions_between(s.handles.bound(), before, 0.0));
   const double way = (s.handles.pairs().targets - from).rowwise().norm().maxCoeff();
+  if (come_apart(s, before, way == 0.0, iterations, tolerance, freely, progress)) return;
   const double length = s.contact.itself() ? step_length_itself : step_length;
   RowMatrix<double> start;  // where parts were pushed apart that a free solve let overlap
   const bool leaps = s.contact.only_itself() && way > length;  // the way back may be another one
   if (leaps || (!pressed && s.contact.deepest() <= 0.0 && !s.contact.touches_itself())) {
     s.contact.release();
     start = s.shape.coefficients;
-    freely();
+    freely(iterations);
     s.report.contact = {};
     if (s.contact.find(s.shape.coefficients, 0.0, true) <= 0.0) {
       s.contact.release();

@@ -7,11 +7,11 @@
 
 namespace arapfields {
 
-/// Solves outside of the contact's obstacles. What a solve `freely` does not bring near any stays as that
-/// left it. Parts that overlap there are pushed apart. Where that does not do, and at obstacles, the targets
-/// are approached in steps that no sample jumps through anything by.
+/// Solves outside of the contact's obstacles. What a solve `freely`, in so many steps, does not bring near
+/// any stays as that left it. Parts that overlap there are pushed apart. Where that does not do, and at
+/// obstacles, the targets are approached in steps that no sample jumps through anything by.
 void follow_in_contact(RadialState& state, Index iterations, double tolerance,
-                       const std::function<void()>& freely, const Progress& progress);
+                       const std::function<void(Index)>& freely, const Progress& progress);
 
 /// Where the places of the planes that were found are now.
 Points contact_places(RadialState& state);

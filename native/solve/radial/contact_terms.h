@@ -49,6 +49,14 @@ class ContactTerms {
   ContactWays ways() const;
   /// Takes back all searches since these were the ways.
   void set_ways(ContactWays ways);
+  /// What a surface that presses goes on with, after a look elsewhere.
+  struct Pressing {
+    ContactWays ways;
+    RowMatrix<double> pressures;
+    double stiffness;
+  };
+  Pressing pressing() const { return {ways(), pressures_, found_.stiffness}; }
+  void set_pressing(Pressing pressing);
   /// The largest speed of a sample, where coefficients change at these rates.
   double fastest(const RowMatrix<double>& rates) {
     return std::sqrt(points_.at(rates).rowwise().squaredNorm().maxCoeff());

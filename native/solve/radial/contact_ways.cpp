@@ -147,4 +147,11 @@ void ContactTerms::set_ways(ContactWays ways) {
   add_finer_ways();
 }
 
+void ContactTerms::set_pressing(Pressing pressing) {
+  set_ways(std::move(pressing.ways));
+  pressures_.setZero();
+  pressures_.topRows(pressing.pressures.rows()) = pressing.pressures;
+  found_.stiffness = pressing.stiffness;
+}
+
 }  // namespace arapfields

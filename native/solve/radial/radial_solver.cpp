@@ -151,11 +151,11 @@ Index RadialSolver::follow(Index iterations, double tolerance, const Progress& p
   if (tolerance <= 0.0) tolerance = s.problem.options.tolerance;
   s.report.iterations = s.report.evaluations = 0;
   const bool is_exact = tolerance < single_tolerance;
-  const auto freely = [&] { follow_freely(s, iterations, tolerance, progress); };
+  const auto freely = [&](Index steps) { follow_freely(s, steps, tolerance, progress); };
   if (s.contact.any())
     follow_in_contact(s, iterations, std::max(tolerance, single_tolerance), freely, progress);
   else
-    freely();
+    freely(iterations);
   if (!s.handles.any() && s.hooks.energies.empty() && !s.contact.presses()) anchor_lowest_point(s);
   s.dynamics.zero_velocity(motions_of(s.handles.bound()));
   s.report.kinetic = s.report.speed = 0.0;

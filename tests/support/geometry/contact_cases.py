@@ -166,7 +166,7 @@ def _block(low, high):
     return Solid("box", np.diag(place)[:3].copy(), shift(place[:3, 3]))
 
 
-def _figures():
+def figures():
     """Feet onto steps, sitting, arms, legs, tails, and bars on themselves."""
     still = np.eye(4)
     trunk, head = ((0, 0, 0.7), 0.16, still), ((0, 0, 1.1), 0.07, still)
@@ -205,7 +205,7 @@ def family(data, seeds=(0, 1)):
     kinds = ("ball", "box", "edge", "plate", "sheet", "moving plate")
     cases = [_pressed(shape, data, kind, seed) for kind in kinds for shape in shapes for seed in seeds[:1]]
     cases += [_pressed("bar", data, kind, seed) for kind in kinds for seed in seeds[1:2]]
-    return cases + list(_figures())
+    return cases + list(figures())
 
 
 def deepest(case, points):
