@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from support.geometry import contact_cases
 from support.geometry.bar import LEFT, RIGHT, bar_samples, turned
-from support.geometry.contact_bar import ALIKE, DEEPEST, PLATE, live
+from support.geometry.contact_bar import ALIKE, BALL, DEEPEST, PLATE, live
 
 import arapfields as af
 
@@ -62,6 +62,19 @@ def test_friction_holds_what_slides(samples):
         field = resting.step(None, 1 / 24)
     later = field(samples.points)[:, 0].mean() - samples.points[:, 0].mean()
     assert abs(later - ways[1]) < 1e-4  # it rests, and does not creep
+
+
+def test_a_drag_onto_a_ball_ends_where_more_steps_end(samples):
+    """The handle slides around the ball, which has another plane wherever it goes."""
+    pressed = live(samples, af.Contact([af.Obstacle(BALL)]))
+    for share in np.linspace(0, 1, 41):
+        pose = [LEFT, turned(0, shift=share * np.array([0, 0.3, -1.2])) @ RIGHT]
+        pressed.follow(pose)
+    end = pressed.field(samples.points)
+    further = pressed.solve(pose, iterations=300, tolerance=1e-6)(samples.points)
+    assert np.abs(further - end).max() < ALIKE
+    (held,) = pressed.report.contact.held
+    assert held.handle == 1 and held.by == "obstacles[0]"
 
 
 def test_legs_that_a_drag_has_crossed_come_back():

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <tuple>
 
 #include "fields/radial_evaluator.h"
 #include "sampling/oriented_points.h"
@@ -24,11 +26,20 @@ constexpr double unmoved = 1e-3;
 /// Searches for the thickest part of the shape beside a point handle, which may lie at an edge.
 constexpr int thicker = 3;
 
+/// Planes of solids turn as long as the translation changes by more, in cube units, but so many times at
+/// most.
+constexpr int most_turns = 6;
+constexpr double turned_enough = 1e-4;
+/// Those that it ends so far from, in cube units, stay; so do those whose normal would be of another side.
+constexpr double near_bound = 0.05, same_side = 0.0;
+
 /// A translation moves a part along `normal` by `depth` or more.
 struct Bound {
   Vec3 normal;
   double depth;
   Index surface;
+  std::optional<Vec3> target = std::nullopt;  ///< of the place that stays outside of a solid
+  bool over = false;                          ///< by its reflection
 };
 
 /// The least translation within the bounds, and the surface that asks for the most of it, by the method of
@@ -50,6 +61,38 @@ std::pair<Vec3, Index> least_translation(const std::vector<Bound>& bounds) {
   return {way, most == pushes.end() || *most == 0.0
                    ? -1
                    : bounds[static_cast<std::size_t>(most - pushes.begin())].surface};
+}
+
+/// Where a translation would take what a handle holds, curved solids have other planes than where it is now.
+/// Whether any bound has become another one.
+bool turn_bounds(const RadialState& s, const Vec3& way, std::vector<Bound>& bounds) {
+  const auto turned = [&](Vec3 x, bool over) {
+    if (over) x[s.problem.mirror->axis] *= -1.0;
+    return x;
+  };
+  bool any = false;
+  for (Index k = 0; k < s.contact.surface_count(); ++k) {
+    const BarrierSurface* const solid = s.contact.solid(k);
+    std::vector<Bound*> of;
+    for (Bound& bound : bounds)
+      if (solid != nullptr && bound.surface == k && bound.target &&
+          bound.normal.dot(way) - bound.depth < near_bound)
+        of.push_back(&bound);
+    if (of.empty()) continue;
+    Points places(std::ssize(of), 3);
+    for (std::size_t m = 0; m < of.size(); ++m)
+      places.row(static_cast<Index>(m)) = turned(*of[m]->target + way, of[m]->over).transpose();
+    const BarrierSurface::Nearest there = solid->nearest(places);
+    for (std::size_t m = 0; m < of.size(); ++m) {
+      const auto row = static_cast<Index>(m);
+      const Vec3 normal = turned(there.normals.row(row).transpose(), of[m]->over);
+      if (normal.dot(of[m]->normal) < same_side) continue;
+      of[m]->normal = normal;
+      of[m]->depth = normal.dot(way) - there.distances[row] + solid->margin() + ContactTerms::kept;
+      any = true;
+    }
+  }
+  return any;
 }
 
 /// How little each handle gives way to others: what holds more, and what has moved less.
@@ -179,10 +222,12 @@ std::vector<Index> hold_back(RadialState& s, std::vector<Mat4>& motions) {
     const Place second = to_itself ? place_of(plane.second, over) : Place{{}, {}, -1};
     if (first.holder < 0 || first.holder == second.holder || (to_itself && second.holder < 0)) return;
     const Vec3 other = to_itself ? target(second) : Vec3(Vec3::Zero());
-    const double depth = plane.offset - normal.dot(target(first) - other);
+    const Vec3 wanted = target(first);
+    const double depth = plane.offset - normal.dot(wanted - other);
     const double own = to_itself ? masses[second.holder] / (masses[first.holder] + masses[second.holder])
                                  : 1.0;  // the lighter gives way
-    bounds[static_cast<std::size_t>(first.holder)].push_back({normal, own * depth, plane.obstacle});
+    bounds[static_cast<std::size_t>(first.holder)].push_back(
+        {normal, own * depth, plane.obstacle, to_itself ? std::nullopt : std::optional(wanted), over});
     if (to_itself)
       bounds[static_cast<std::size_t>(second.holder)].push_back(
           {-normal, (1.0 - own) * depth, plane.obstacle});
@@ -192,7 +237,12 @@ std::vector<Index> hold_back(RadialState& s, std::vector<Mat4>& motions) {
     if (s.problem.mirror) bind(plane, true);
   }
   for (std::size_t i = 0; i < motions.size(); ++i) {
-    const auto [way, surface] = least_translation(bounds[i]);
+    auto [way, surface] = least_translation(bounds[i]);
+    for (int turn = 0; surface >= 0 && turn < most_turns && turn_bounds(s, way, bounds[i]); ++turn) {
+      const Vec3 last = way;
+      std::tie(way, surface) = least_translation(bounds[i]);
+      if ((way - last).norm() < turned_enough) break;
+    }
     motions[i].topRightCorner<3, 1>() += way;
     by[i] = surface;
   }

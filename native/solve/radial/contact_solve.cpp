@@ -194,7 +194,7 @@ bool come_apart(RadialState& s, const std::vector<Mat4>& before, bool rests, Ind
   const RadialShape shape = s.shape;
   const SolveHistory history = s.history;
   const RadialReport report = s.report;
-  ContactTerms::Pressing pressing = s.contact.pressing();
+  ContactPressing pressing = s.contact.pressing();
   s.contact.release();
   freely(steps_apart);
   s.report.contact = {};

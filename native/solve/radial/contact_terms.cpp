@@ -24,10 +24,8 @@ constexpr double farthest = 0.12;
 constexpr double same_side = 0.3, opposite = -0.5;
 /// The cosine of neighbours' normals below which an edge lies between them.
 constexpr double smooth = 0.9;
-/// Distance that is kept beyond each margin, in cube units: what solves leave of a depth is within.
-constexpr double kept = 1.5e-3;
 /// More from the shape itself, of which the samples of both sides say less.
-constexpr double kept_itself = 2.0 * kept;
+constexpr double kept_itself = 2.0 * ContactTerms::kept;
 /// What distances may be off by, in cube units: a straight way through a sheet is just as long as both
 /// together.
 constexpr double unsure = 1e-4;

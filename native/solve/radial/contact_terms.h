@@ -17,6 +17,8 @@ namespace arapfields {
 /// step is passed.
 class ContactTerms {
  public:
+  /// Distance beyond each margin, in cube units: what solves leave of a depth is within.
+  static constexpr double kept = 1.5e-3;
   explicit ContactTerms(const RadialProblem& problem) : problem_(problem), points_(problem) {}
   /// Obstacles that only move or change stay where they were until move_obstacles(). Throws InvalidInput for
   /// what cannot be.
@@ -49,14 +51,9 @@ class ContactTerms {
   ContactWays ways() const;
   /// Takes back all searches since these were the ways.
   void set_ways(ContactWays ways);
-  /// What a surface that presses goes on with, after a look elsewhere.
-  struct Pressing {
-    ContactWays ways;
-    RowMatrix<double> pressures;
-    double stiffness;
-  };
-  Pressing pressing() const { return {ways(), pressures_, found_.stiffness}; }
-  void set_pressing(Pressing pressing);
+  /// What it goes on with after a look elsewhere.
+  ContactPressing pressing() const { return {ways(), pressures_, found_.stiffness}; }
+  void set_pressing(ContactPressing pressing);
   /// The largest speed of a sample, where coefficients change at these rates.
   double fastest(const RowMatrix<double>& rates) {
     return std::sqrt(points_.at(rates).rowwise().squaredNorm().maxCoeff());
@@ -76,6 +73,8 @@ class ContactTerms {
   Index sample_of(Index place) const;  ///< of the problem's, that a found place is of
   bool presses() const { return !found_.planes.empty(); }
   std::string name_of(Index surface) const;
+  /// A curved solid; null for sheets, the ground and the shape itself.
+  const BarrierSurface* solid(Index surface) const;
   double deepest() const { return deepest_; }
   /// The same beyond obstacles and the ground alone.
   double deepest_outside() const { return deepest_outside_; }

@@ -147,7 +147,7 @@ void ContactTerms::set_ways(ContactWays ways) {
   add_finer_ways();
 }
 
-void ContactTerms::set_pressing(Pressing pressing) {
+void ContactTerms::set_pressing(ContactPressing pressing) {
   set_ways(std::move(pressing.ways));
   pressures_.setZero();
   pressures_.topRows(pressing.pressures.rows()) = pressing.pressures;

@@ -37,4 +37,11 @@ struct ContactWays {
   void add(const std::vector<Index>& like);
 };
 
+/// What a surface that presses goes on with.
+struct ContactPressing {
+  ContactWays ways;
+  RowMatrix<double> pressures;
+  double stiffness = 0.0;
+};
+
 }  // namespace arapfields
