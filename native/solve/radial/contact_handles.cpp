@@ -71,24 +71,24 @@ bool turn_bounds(const RadialState& s, const Vec3& way, std::vector<Bound>& boun
     return x;
   };
   bool any = false;
-  for (Index k = 0; k < s.contact.surface_count(); ++k) {
-    const BarrierSurface* const solid = s.contact.solid(k);
+  for (Index k = 0; k < std::ssize(s.contact.surfaces()); ++k) {
+    const BarrierSurface& surface = s.contact.surfaces()[static_cast<std::size_t>(k)];
+    if (surface.is_flat() || surface.is_sheet()) continue;
     std::vector<Bound*> of;
     for (Bound& bound : bounds)
-      if (solid != nullptr && bound.surface == k && bound.target &&
-          bound.normal.dot(way) - bound.depth < near_bound)
+      if (bound.surface == k && bound.target && bound.normal.dot(way) - bound.depth < near_bound)
         of.push_back(&bound);
     if (of.empty()) continue;
     Points places(std::ssize(of), 3);
     for (std::size_t m = 0; m < of.size(); ++m)
       places.row(static_cast<Index>(m)) = turned(*of[m]->target + way, of[m]->over).transpose();
-    const BarrierSurface::Nearest there = solid->nearest(places);
+    const BarrierSurface::Nearest there = surface.nearest(places);
     for (std::size_t m = 0; m < of.size(); ++m) {
       const auto row = static_cast<Index>(m);
       const Vec3 normal = turned(there.normals.row(row).transpose(), of[m]->over);
       if (normal.dot(of[m]->normal) < same_side) continue;
       of[m]->normal = normal;
-      of[m]->depth = normal.dot(way) - there.distances[row] + solid->margin() + ContactTerms::kept;
+      of[m]->depth = normal.dot(way) - there.distances[row] + surface.margin() + ContactTerms::kept;
       any = true;
     }
   }

@@ -65,12 +65,6 @@ std::string ContactTerms::name_of(Index surface) const {
   return surface < std::ssize(surfaces_) ? "ground" : "itself";
 }
 
-const BarrierSurface* ContactTerms::solid(Index surface) const {
-  if (surface >= std::ssize(surfaces_)) return nullptr;
-  const BarrierSurface& result = surfaces_[static_cast<std::size_t>(surface)];
-  return result.is_flat() || result.is_sheet() ? nullptr : &result;
-}
-
 Points ContactSet::forces_at(const Vec3& place, const double* now, Index surfaces) const {
   Points forces = Points::Zero(surfaces, 3);
   for (const ContactPlane& plane : planes) {

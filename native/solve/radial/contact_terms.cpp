@@ -56,6 +56,35 @@ void go_back(const BarrierSurface& surface, PointsIn now, const std::vector<Inde
   }
 }
 
+/// Samples between which and their neighbours an edge of an obstacle may poke through.
+std::vector<Index> at_edges(const ContactSet& found, ContactPoints& points,
+                            const std::vector<BarrierSurface>& surfaces) {
+  std::vector<const ContactPlane*> of(static_cast<std::size_t>(points.sample_count()));
+  std::vector<Index> edges;
+  const double reach = 2.0 * points.spacing();
+  std::size_t first = 0;
+  while (first < found.planes.size()) {  // those of one surface lie beside each other
+    std::fill(of.begin(), of.end(), nullptr);
+    const Index k = found.planes[first].obstacle;
+    std::size_t last = first;
+    for (; last < found.planes.size() && found.planes[last].obstacle == k; ++last)
+      if (found.planes[last].first < points.sample_count())
+        of[static_cast<std::size_t>(found.planes[last].first)] = &found.planes[last];
+    for (; first < last && !surfaces[static_cast<std::size_t>(k)].is_flat(); ++first) {
+      const ContactPlane& plane = found.planes[first];
+      if (plane.first >= points.sample_count() || plane.start > reach) continue;
+      for (const Index other : points.neighbours(plane.first)) {
+        const ContactPlane* const beside = of[static_cast<std::size_t>(other)];
+        if (beside == nullptr || beside->normal.dot(plane.normal) > smooth) continue;
+        edges.push_back(plane.first);
+        break;
+      }
+    }
+    first = last;
+  }
+  return edges;
+}
+
 }  // namespace
 
 void ContactTerms::set(const std::optional<Contact>& contact, const RowMatrix<double>& coefficients) {
@@ -160,7 +189,7 @@ double ContactTerms::find(const RowMatrix<double>& coefficients, std::optional<d
   found_.planes.clear();
   deepest_ = 0.0;
   find_outside(near_rows());
-  const std::vector<Index> edges = at_edges();
+  const std::vector<Index> edges = at_edges(found_, points_, surfaces_);
   const Index known = points_.size();
   points_.refine(edges);
   if (points_.size() > known) {
@@ -178,34 +207,6 @@ double ContactTerms::find(const RowMatrix<double>& coefficients, std::optional<d
   if (self_) add_own_planes(coefficients, jumped);
   gather_places();
   return deepest_;
-}
-
-/// Samples between which and their neighbours an edge of an obstacle may poke through.
-std::vector<Index> ContactTerms::at_edges() {
-  std::vector<const ContactPlane*> of(static_cast<std::size_t>(points_.sample_count()));
-  std::vector<Index> edges;
-  const double reach = 2.0 * points_.spacing();
-  std::size_t first = 0;
-  while (first < found_.planes.size()) {  // those of one surface lie beside each other
-    std::fill(of.begin(), of.end(), nullptr);
-    const Index k = found_.planes[first].obstacle;
-    std::size_t last = first;
-    for (; last < found_.planes.size() && found_.planes[last].obstacle == k; ++last)
-      if (found_.planes[last].first < points_.sample_count())
-        of[static_cast<std::size_t>(found_.planes[last].first)] = &found_.planes[last];
-    for (; first < last && !surfaces_[static_cast<std::size_t>(k)].is_flat(); ++first) {
-      const ContactPlane& plane = found_.planes[first];
-      if (plane.first >= points_.sample_count() || plane.start > reach) continue;
-      for (const Index other : points_.neighbours(plane.first)) {
-        const ContactPlane* const beside = of[static_cast<std::size_t>(other)];
-        if (beside == nullptr || beside->normal.dot(plane.normal) > smooth) continue;
-        edges.push_back(plane.first);
-        break;
-      }
-    }
-    first = last;
-  }
-  return edges;
 }
 
 /// Adds the planes of one surface for places (rows) that are `now` there. Returns their distances from it,

@@ -73,8 +73,8 @@ class ContactTerms {
   Index sample_of(Index place) const;  ///< of the problem's, that a found place is of
   bool presses() const { return !found_.planes.empty(); }
   std::string name_of(Index surface) const;
-  /// A curved solid; null for sheets, the ground and the shape itself.
-  const BarrierSurface* solid(Index surface) const;
+  /// Obstacles and the ground.
+  const std::vector<BarrierSurface>& surfaces() const { return surfaces_; }
   double deepest() const { return deepest_; }
   /// The same beyond obstacles and the ground alone.
   double deepest_outside() const { return deepest_outside_; }
@@ -89,7 +89,6 @@ class ContactTerms {
   std::vector<Index> near_rows() const;
   void find_outside(const std::vector<Index>& rows);
   Vector add_planes(Index k, const std::vector<Index>& rows, PointsIn now);
-  std::vector<Index> at_edges();
   void add_finer_ways();
   void add_own_planes(const RowMatrix<double>& coefficients, bool jumped);
   void gather_places();
