@@ -35,14 +35,21 @@ double ball_of(ConstPointsRef<double> rows, double* center) {
 }  // namespace
 
 template <class Scalar>
-RadialEvaluator<Scalar>::RadialEvaluator(const RadialBasis& basis, PointsIn points, JetOrder most)
+RadialEvaluator<Scalar>::RadialEvaluator(const RadialBasis& basis, PointsIn points, JetOrder most,
+                                         const Points* known)
     : center_count_(basis.center_count()), count_(points.rows()), most_(most) {
   const std::vector<double> exact = center_rows(basis);
   centers_.assign(exact.begin(), exact.end());
   points_.resize(blocks() * 3 * block_size);
   JetBlock<double> jets(basis.embedding ? count_ : 0, most);
   if (basis.embedding) {
-    basis.embedding->evaluate(points, jets.view());
+    if (known != nullptr) {
+      require(most == JetOrder::value && known->rows() == count_, "embedded",
+              std::to_string(known->rows()) + " rows", "one for each point is needed, and values alone");
+      Eigen::Map<Points>(jets.view().data, count_, 3) = *known;
+    } else {
+      basis.embedding->evaluate(points, jets.view());
+    }
     pack_embedding(jets);
   }
   const Eigen::Map<const Points> embedded(jets.view().data, jets.view().count, 3);
@@ -198,8 +205,9 @@ void RadialEvaluator<Scalar>::pull_back(JetView<const Scalar> cotangents, RowMat
   }
 }
 
-RowMatrix<double> radial_rows(const RadialBasis& basis, PointsIn points, JetOrder order) {
-  const RadialEvaluator<double> sites(basis, points, order);
+RowMatrix<double> radial_rows(const RadialBasis& basis, PointsIn points, JetOrder order,
+                              const Points* embedded) {
+  const RadialEvaluator<double> sites(basis, points, order, embedded);
   constexpr Index block_size = RadialEvaluator<double>::block_size;
   const Index count = points.rows(), centers = basis.center_count();
   const int columns_count = columns(order);

@@ -18,8 +18,10 @@ class RadialEvaluator {
   static constexpr Index block_size = 16;  ///< points
 
   RadialEvaluator() = default;
-  /// `most`: the highest order that will be evaluated.
-  RadialEvaluator(const RadialBasis& basis, PointsIn points, JetOrder most = JetOrder::second);
+  /// `most`: the highest order that will be evaluated. `embedded`: the basis' embedding of the points, where
+  /// that is known and values are enough.
+  RadialEvaluator(const RadialBasis& basis, PointsIn points, JetOrder most = JetOrder::second,
+                  const Points* embedded = nullptr);
   Index size() const { return count_; }
 
   /// Jets of the field with these coefficients (size, 3): overwrites `out` (count = size(), any order), or
@@ -52,7 +54,8 @@ class RadialEvaluator {
   std::vector<Index> start_;
 };
 
-/// Basis functions' own jets at the points: (columns·n, size), column by column.
-RowMatrix<double> radial_rows(const RadialBasis& basis, PointsIn points, JetOrder order);
+/// Basis functions' own jets at the points: (columns·n, size), column by column. `embedded` as above.
+RowMatrix<double> radial_rows(const RadialBasis& basis, PointsIn points, JetOrder order,
+                              const Points* embedded = nullptr);
 
 }  // namespace arapfields

@@ -33,6 +33,7 @@ void ContactPoints::choose() {
   Random random(static_cast<std::uint64_t>(problem_.options.seed), 3);
   samples_ = stratified(problem_.shape->order, std::min(most_samples, problem_.samples.size()), random);
   rest_ = rows_of(problem_.surface(), samples_);
+  embedded_ = embedded_at(rest_);
   const double wide = 0.05;  // a cell holds about a square of the surface
   const PointGrid coarse(rest_, wide);
   spacing_ = wide * std::sqrt(static_cast<double>(coarse.size()) / static_cast<double>(rest_.rows()));
@@ -50,6 +51,17 @@ double ContactPoints::share(Index row) const {
 }
 
 Points ContactPoints::rest(const std::vector<Index>& rows) const { return rows_of(rest_, rows); }
+
+Points ContactPoints::embedded(const std::vector<Index>& rows) const {
+  return embedded_.rows() > 0 ? rows_of(embedded_, rows) : Points(0, 3);
+}
+
+Points ContactPoints::embedded_at(PointsIn places) const {
+  if (!problem_.basis.embedding) return Points(0, 3);
+  Points result(places.rows(), 3);
+  problem_.basis.embedding->evaluate(places, {result.data(), result.rows(), JetOrder::value});
+  return result;
+}
 
 const std::vector<Index>& ContactPoints::neighbours(Index sample) {
   const Index n = sample_count();
@@ -135,6 +147,7 @@ Points ContactPoints::finer(Index sample) {
 
 void ContactPoints::refine(const std::vector<Index>& samples) {
   if (problem_.samples.normals.rows() != problem_.samples.size()) return;
+  const Index known = rest_.rows();
   for (const Index sample : samples) {
     if (is_fine_[static_cast<std::size_t>(sample)] || std::ssize(parents_) > most_finer) continue;
     is_fine_[static_cast<std::size_t>(sample)] = true;
@@ -145,6 +158,10 @@ void ContactPoints::refine(const std::vector<Index>& samples) {
     rest_.bottomRows(more.rows()) = more;
     parents_.insert(parents_.end(), static_cast<std::size_t>(more.rows()), sample);
   }
+  const Points more = embedded_at(rest_.bottomRows(rest_.rows() - known));
+  if (more.rows() == 0) return;
+  embedded_.conservativeResize(rest_.rows(), Eigen::NoChange);
+  embedded_.bottomRows(more.rows()) = more;
 }
 
 void ContactPoints::coarsen() {
@@ -153,6 +170,7 @@ void ContactPoints::coarsen() {
   ++finer_places_;
   is_fine_.assign(samples_.size(), false);
   rest_.conservativeResize(sample_count(), Eigen::NoChange);
+  if (embedded_.rows() > 0) embedded_.conservativeResize(sample_count(), Eigen::NoChange);
   places_.conservativeResize(std::min(places_.rows(), sample_count()), Eigen::NoChange);
 }
 
@@ -164,7 +182,9 @@ const Points& ContactPoints::at(const RowMatrix<double>& coefficients) {
   places_.conservativeResize(all, Eigen::NoChange);
   const auto fill = [&](Dependent<RadialEvaluator<float>, 1>& made, Revision of, Index first, Index count) {
     const RadialEvaluator<float>& evaluator = made.get({of}, [&] {
-      return RadialEvaluator<float>(problem_.basis, rest_.middleRows(first, count), JetOrder::value);
+      const Points embedded = embedded_.middleRows(first, embedded_.rows() > 0 ? count : 0);
+      return RadialEvaluator<float>(problem_.basis, rest_.middleRows(first, count), JetOrder::value,
+                                    embedded.rows() > 0 ? &embedded : nullptr);
     });
     PointsF places(count, 3);
     evaluator.evaluate(coefficients, {places.data(), count, JetOrder::value});

@@ -28,6 +28,8 @@ class ContactPoints {
   /// The area that a place stands for, as a share of the whole.
   double share(Index row) const;
   Points rest(const std::vector<Index>& rows) const;
+  /// The same in the basis' embedding; empty without one.
+  Points embedded(const std::vector<Index>& rows) const;
   /// About the distance of a sample to what it stands for.
   double spacing() const { return spacing_; }
   /// Samples near one at rest, on the same side.
@@ -48,12 +50,14 @@ class ContactPoints {
 
  private:
   Points finer(Index sample);
+  Points embedded_at(PointsIn places) const;
 
   const RadialProblem& problem_;
   std::vector<Index> samples_;
   std::vector<Index> parents_;  // of the finer places
   std::vector<bool> is_fine_;   // samples
   Points rest_;
+  Points embedded_;  // rest_
   double spacing_ = 0.0;
   std::unique_ptr<PointGrid> grid_;  // of the samples
   std::vector<Index> cells_;         // of each

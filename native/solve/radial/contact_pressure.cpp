@@ -37,6 +37,7 @@ void ContactTerms::gather_places() {
   std::sort(used.begin(), used.end());
   used.erase(std::unique(used.begin(), used.end()), used.end());
   found_.places = points_.rest(used);
+  found_.embedded = points_.embedded(used);
   const auto row_of = [&](Index row) {
     return std::lower_bound(used.begin(), used.end(), row) - used.begin();
   };

@@ -28,9 +28,13 @@ void ContactRows::add(const RadialBasis& basis, const ContactSet& set,
     first.push_back(plane.first);
     if (plane.second >= 0) carrying.push_back(i), carriers.push_back(plane.second);
   }
-  RowMatrix<double> values = radial_rows(basis, rows_of(set.places, first), JetOrder::value);
-  if (!carriers.empty())
-    values(carrying, Eigen::all) -= radial_rows(basis, rows_of(set.places, carriers), JetOrder::value);
+  const auto values_at = [&](const std::vector<Index>& places) {
+    const Points embedded = set.embedded.rows() > 0 ? rows_of(set.embedded, places) : Points(0, 3);
+    return radial_rows(basis, rows_of(set.places, places), JetOrder::value,
+                       embedded.rows() > 0 ? &embedded : nullptr);
+  };
+  RowMatrix<double> values = values_at(first);
+  if (!carriers.empty()) values(carrying, Eigen::all) -= values_at(carriers);
   rows.conservativeResize(before + count, basis.size());
   normals.conservativeResize(before + count, 3);
   normals.bottomRows(count) = along;

@@ -144,6 +144,7 @@ void ContactTerms::release() {
   found_.revision = 0;
   found_.planes.clear();
   found_.places.resize(0, 3);
+  found_.embedded.resize(0, 3);
   found_.stiffness = softest;
   pressures_.setZero();
   deepest_ = deepest_outside_ = 0.0;

@@ -12,6 +12,7 @@ namespace arapfields {
 struct ContactSet {
   std::vector<Index> rows;  ///< which of the places that are followed
   Points places;            ///< (n,3) theirs at rest
+  Points embedded;          ///< (n,3) these, in the basis' embedding; empty without one
   std::vector<ContactPlane> planes;
   Revision revision = 0;   ///< 0: no planes
   double stiffness = 0.0;  ///< of energy a unit of area for a unit of squared depth, halved

@@ -46,7 +46,8 @@ void RadialObjective<Scalar>::set_contact(const ContactSet& contact) {
   contact_stiffness_ = {};
   contact_ = contact.planes.empty()
                  ? RadialEvaluator<Scalar>()
-                 : RadialEvaluator<Scalar>(problem_.basis, contact.places, JetOrder::value);
+                 : RadialEvaluator<Scalar>(problem_.basis, contact.places, JetOrder::value,
+                                           contact.embedded.rows() > 0 ? &contact.embedded : nullptr);
 }
 
 template <class Scalar>
