@@ -2,8 +2,8 @@
 #include "bindings/arguments.h"
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
-#include "skin/bone_regions.h"
 #include "skin/correctives.h"
+#include "skin/rig_shape.h"
 #include "skin/skin_weights.h"
 #include "skin/skinning.h"
 

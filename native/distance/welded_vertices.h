@@ -13,6 +13,8 @@ struct WeldedVertices {
 
   std::vector<std::int32_t> first;  ///< (n) of each vertex, the first at its place
   Points normals;                   ///< (n,3) of those; zero where no triangle is
+  /// Which piece each vertex (n) belongs to, from 0: vertices that triangles join are of one.
+  std::vector<Index> pieces(const TriangleMesh& mesh) const;
   /// Closed pieces of at most this size, as lists of vertices: eyes, teeth, buttons.
   std::vector<std::vector<Index>> closed_pieces(const TriangleMesh& mesh, double size) const;
 };

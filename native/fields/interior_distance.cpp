@@ -21,7 +21,8 @@ constexpr double sheet_spacings = 2.5, sheet_cosine = 0.3;
 
 }  // namespace
 
-InteriorGraph::InteriorGraph(PointsIn nodes, PointsIn normals, double spacing) : edges_(nodes.rows()) {
+InteriorGraph::InteriorGraph(PointsIn nodes, PointsIn normals, double spacing, const MayJoin& may_join)
+    : edges_(nodes.rows()) {
   const double extent = (nodes.colwise().maxCoeff() - nodes.colwise().minCoeff()).maxCoeff();
   const Vector radii = inner_radii(nodes, normals, nodes, normals, {.most = extent});
   const Points centers = nodes - radii.asDiagonal() * normals;
@@ -33,8 +34,9 @@ InteriorGraph::InteriorGraph(PointsIn nodes, PointsIn normals, double spacing) :
         const double square = (nodes.row(i) - nodes.row(j)).squaredNorm();
         const double larger = std::max(radii[i], radii[j]), smaller = std::min(radii[i], radii[j]);
         const double limit = larger + overlap_share * smaller;
-        if ((centers.row(i) - centers.row(j)).squaredNorm() < limit * limit ||
-            (square < near * near && normals.row(i).dot(normals.row(j)) > sheet_cosine))
+        if (((centers.row(i) - centers.row(j)).squaredNorm() < limit * limit ||
+             (square < near * near && normals.row(i).dot(normals.row(j)) > sheet_cosine)) &&
+            (!may_join || may_join(i, j)))
           edges_[i].push_back({static_cast<std::int32_t>(j), static_cast<float>(std::sqrt(square))});
       }
   });

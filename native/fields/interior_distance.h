@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <functional>
 #include <utility>
 #include <vector>
 
 #include "core/types.h"
 
 namespace arapfields {
+
+/// Of two points, by their rows.
+using MayJoin = std::function<bool(Index, Index)>;
 
 /// A graph on samples of a surface, with edges where a path inside the shape joins them. Each node has the
 /// largest ball that touches the surface there from inside and holds no other node; two nodes are joined
@@ -19,8 +23,9 @@ class InteriorGraph {
     float length;
   };
 
-  /// Nodes (n,3), their outward unit normals (n,3), and how far apart neighbours are.
-  InteriorGraph(PointsIn nodes, PointsIn normals, double spacing);
+  /// Nodes (n,3), their outward unit normals (n,3), and how far apart neighbours are; `may_join` tells of two
+  /// nodes whether an edge may join them, none: always.
+  InteriorGraph(PointsIn nodes, PointsIn normals, double spacing, const MayJoin& may_join = {});
   Index size() const { return static_cast<Index>(edges_.size()); }
   const std::vector<Edge>& edges(Index node) const { return edges_[node]; }
   /// Lengths (n, sources) of the shortest paths from the first `sources` nodes.

@@ -8,7 +8,6 @@
 
 #include "core/decompositions.h"
 #include "core/parallel.h"
-#include "fields/interior_distance.h"
 #include "fields/interior_embedding_kernel.h"
 #include "fields/radial_basis.h"
 
@@ -177,7 +176,8 @@ void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out) const {
   });
 }
 
-std::shared_ptr<const InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn normals, int axis) {
+std::shared_ptr<const InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn normals, int axis,
+                                                            const MayJoin& may_join) {
   if (samples.rows() < least_nodes || normals.rows() != samples.rows()) return nullptr;
   const Index most = axis < 0 ? most_nodes : most_nodes / 2;
   const FarthestPoints chosen = farthest_points(samples, std::min<Index>(most, samples.rows()));
@@ -192,7 +192,11 @@ std::shared_ptr<const InteriorEmbedding> interior_embedding(PointsIn samples, Po
   const Index n = embedding.nodes.rows();
   // Landmarks are the first nodes, and no half of a pair.
   const Index count = landmarks + (axis >= 0 && twins[landmarks - 1] == landmarks ? 1 : 0);
-  const InteriorGraph graph(embedding.nodes, node_normals, embedding.width);
+  const MayJoin rows_may_join = [&](Index i, Index j) {
+    return may_join(chosen.indices[i], chosen.indices[j]);
+  };
+  const InteriorGraph graph(embedding.nodes, node_normals, embedding.width,
+                            may_join ? rows_may_join : MayJoin());
   RowMatrix<double> excess = (detour * graph.distances(count)).array().square();
   for (Index i = 0; i < n; ++i)
     for (Index l = 0; l < count; ++l)

@@ -5,6 +5,7 @@
 
 #include "core/jets.h"
 #include "core/types.h"
+#include "fields/interior_distance.h"
 
 namespace arapfields {
 
@@ -26,9 +27,10 @@ struct ARAPFIELDS_EXPORT InteriorEmbedding {
 /// interior distances exceed straight ones (landmark multidimensional scaling: de Silva, Tenenbaum 2004).
 /// Null where they hardly do, and for less than a hundred different samples. With an axis (0, 1, 2), samples
 /// lie where that coordinate is positive, stand for their reflections too, and ψ is symmetric: the interior
-/// distances from x to y and from S x to S y are the same.
+/// distances from x to y and from S x to S y are the same. `may_join` tells of two samples whether a way may
+/// lead straight from one to the other, none: always; without an axis.
 ARAPFIELDS_EXPORT std::shared_ptr<const InteriorEmbedding> interior_embedding(PointsIn samples,
-                                                                              PointsIn normals,
-                                                                              int axis = -1);
+                                                                              PointsIn normals, int axis = -1,
+                                                                              const MayJoin& may_join = {});
 
 }  // namespace arapfields

@@ -15,7 +15,7 @@ constexpr double distance_weight = 2e-6;
 
 }  // namespace
 
-BoneChoice::BoneChoice(const RigShape& rig,
+BoneChoice::BoneChoice(const RigShape& rig, Index owner,
                        const Eigen::Ref<const Eigen::Matrix<float, 1, Eigen::Dynamic>>& distances) {
   const Skeleton& skeleton = rig.skeleton;
   std::vector<Index> all(skeleton.count());
@@ -25,7 +25,9 @@ BoneChoice::BoneChoice(const RigShape& rig,
   const float least = std::max(distances[all.front()], static_cast<float>(rig.spacing));
   std::vector<double> costs;
   for (Index k = 0; k < most; ++k) {
-    if (k > 0 && !(distances[all[k]] < farthest_share * least)) continue;
+    if (k > 0 && !(distances[all[k]] < farthest_share * least &&
+                   rig.matters(all[k], owner, static_cast<double>(least))))
+      continue;
     const double farther = static_cast<double>(distances[all[k]] / least) - 1.0;
     bones.push_back(all[k]);
     costs.push_back(distance_weight * farther * farther);

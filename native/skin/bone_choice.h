@@ -8,11 +8,12 @@
 
 namespace arapfields {
 
-/// Which bones may move a point of the shape at rest, and how much each is disfavoured for being far, from
-/// the lengths (bones) of the ways to them through the inside.
+/// Which bones may move a point of the shape at rest that belongs to a bone, and how much each is disfavoured
+/// for being far, from the lengths (bones) of the ways to them through the inside.
 class BoneChoice {
  public:
-  BoneChoice(const RigShape& rig, const Eigen::Ref<const Eigen::Matrix<float, 1, Eigen::Dynamic>>& distances);
+  BoneChoice(const RigShape& rig, Index owner,
+             const Eigen::Ref<const Eigen::Matrix<float, 1, Eigen::Dynamic>>& distances);
 
   Index count() const { return static_cast<Index>(bones.size()); }
   /// wᵀ G w is the squared distance in sizes of the shape, for weights of sum one, of a point from where a

@@ -3,29 +3,37 @@
 
 #include <vector>
 
-#include "energies/handles.h"
 #include "fields/interior_distance.h"
-#include "mesh/surface_samples.h"
 #include "skin/skeleton.h"
+#include "skin/surface_points.h"
 
 namespace arapfields {
 
-/// Which bone each of some points (n,3) of a surface lies at. A bone on the outer side of the surface counts
-/// as farther than one inside.
+/// Which bone each node of a shape belongs to. A surface with bones in it belongs to these, each node to the
+/// one that is nearest through the inside; others belong to what they touch.
 struct BoneRegions {
-  BoneRegions(const Skeleton& skeleton, PointsIn points, PointsIn normals);
+  /// The nodes are these samples, about `spacing` apart, and the graph's.
+  BoneRegions(const Skeleton& skeleton, const SurfacePoints& surfaces, const std::vector<Index>& nodes,
+              double spacing, const InteriorGraph& graph);
 
-  RowMatrix<float> distances;  ///< (n, bones) straight, in units of the points
-  std::vector<Index> owner;    ///< (n) the bone
+  /// Lengths (n, bones) of the shortest ways to each bone.
+  RowMatrix<float> distances(const InteriorGraph& graph) const;
+
+  std::vector<Index> owner;   ///< (n) the bone
+  RowMatrix<float> straight;  ///< (n, bones) straight distances
 };
 
-/// Each bone as a handle at rest: it holds the samples about its middle, up to its end where no bone follows.
-/// Mesh coordinates. Throws InvalidInput that names a bone far outside of the shape.
-std::vector<Handle> bone_handles(const SurfaceSamples& samples, const Skeleton& skeleton);
-ARAPFIELDS_EXPORT std::vector<Handle> bone_handles(const SurfaceSamples& samples,
-                                                   const std::vector<Bone>& bones);
+/// How far bones are from each other along the skeleton.
+class BoneTree {
+ public:
+  explicit BoneTree(const Skeleton& skeleton);
 
-/// Lengths (n, bones) of the shortest ways from the graph's nodes (n,3) through the inside to each bone.
-RowMatrix<float> interior_bone_distances(const InteriorGraph& graph, const BoneRegions& regions);
+  /// Whether a bone can matter to what belongs to another, at this distance from it.
+  bool matters(Index bone, Index owner, double distance) const;
+
+ private:
+  Eigen::MatrixXi steps_;    // (bones, bones) from one to the other
+  Eigen::MatrixXd between_;  // (bones, bones) length of the bones between
+};
 
 }  // namespace arapfields

@@ -66,8 +66,9 @@ Reflection::Reflection(const RigShape& rig, PointsIn points) : mirror(rig, point
                           bone_axes(rig.skeleton.bone(b))));
 }
 
-CorrectiveFit::CorrectiveFit(const RigShape& rig, PointsIn vertices, const RowMatrix<float>& weights,
-                             const SkinOptions& options, const Progress& progress)
+CorrectiveFit::CorrectiveFit(const RigShape& rig, PointsIn vertices, const std::vector<Index>& nodes,
+                             const RowMatrix<float>& weights, const SkinOptions& options,
+                             const Progress& progress)
     : reflection(rig, vertices), region_of_(vertices.rows(), -1), right_(vertices.rows()) {
   const Skeleton& skeleton = rig.skeleton;
   find_regions(skeleton, weights);
@@ -83,7 +84,7 @@ CorrectiveFit::CorrectiveFit(const RigShape& rig, PointsIn vertices, const RowMa
     if (region_of_[i] >= 0)
       right_[i].setZero(static_cast<Index>(regions[region_of_[i]].joints.size()) * joint_features, 3);
   }
-  ExamplePoses examples(rig, vertices, options, progress.part(0.0, 0.1));
+  ExamplePoses examples(rig, vertices, nodes, options, progress.part(0.0, 0.1));
   Random random(options.seed, stream);
   const Vector always = Vector::Ones(joints);
   for (Index p = 0; p < poses; ++p) {

@@ -44,9 +44,9 @@ class CorrectiveFit {
     bool mirrored;  ///< mirrored poses count too
   };
 
-  /// Weights (n, bones); throws Cancelled.
-  CorrectiveFit(const RigShape& rig, PointsIn vertices, const RowMatrix<float>& weights,
-                const SkinOptions& options, const Progress& progress);
+  /// Vertices (n,3) near these nodes, weights (n, bones); throws Cancelled.
+  CorrectiveFit(const RigShape& rig, PointsIn vertices, const std::vector<Index>& nodes,
+                const RowMatrix<float>& weights, const SkinOptions& options, const Progress& progress);
 
   /// (columns, 3 · vertices of the region, step by step) on polynomials (the region's features, columns).
   Eigen::MatrixXd slopes(const Region& region, const Eigen::MatrixXd& polynomials, Index step = 1) const;

@@ -6,6 +6,7 @@
 #include "core/decompositions.h"
 #include "core/errors.h"
 #include "core/parallel.h"
+#include "distance/welded_vertices.h"
 #include "skin/corrective_fit.h"
 
 namespace arapfields {
@@ -100,10 +101,12 @@ std::vector<Corrective> skin_correctives(const TriangleMesh& mesh, const std::ve
   require(weights.rows() == mesh.vertices.rows() && weights.cols() == static_cast<Index>(bones.size()),
           "weights", std::to_string(weights.rows()) + " by " + std::to_string(weights.cols()),
           "a row for each vertex and a column for each bone are needed");
-  const RigShape rig(sample_mesh(mesh.vertices, mesh.triangles, options.samples, options.seed, painted),
-                     bones, progress);
+  const WeldedVertices welded(mesh);
+  const RigShape rig = rig_shape(mesh, welded, painted, bones, options, progress);
   const Index n = mesh.vertices.rows();
-  const CorrectiveFit fit(rig, mesh.vertices, weights, options, progress.part(0.0, 0.8));
+  const CorrectiveFit fit(rig, mesh.vertices,
+                          rig.nearest_nodes({mesh.vertices, welded.normals, welded.pieces(mesh)}), weights,
+                          options, progress.part(0.0, 0.8));
   progress.report(0.8, "Correctives");
   const std::vector<Key> keys =
       chosen_keys(rig.skeleton, fit, effects_of(rig, fit, progress), options.correctives);

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "solve/radial/rest_shape.h"
+
 namespace arapfields {
 namespace {
 
@@ -26,12 +28,24 @@ Mat3 random_rotation(const Bone& bone, Random& random) {
   return angle > 0.0 ? Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix() : Mat3::Identity();
 }
 
+/// With surfaces that cut each other, parts that other bones move are far from each other; else the solver's.
+std::shared_ptr<const RestShape> rest_shape(const RigShape& rig, std::uint64_t seed) {
+  if (!rig.cuts_itself()) return nullptr;
+  return std::make_shared<const RestShape>(rig.samples, true, seed, -1, [&](Index i, Index j) {
+    return rig.may_join(rig.sample_nodes[i], rig.sample_nodes[j]);
+  });
+}
+
 }  // namespace
 
-ExamplePoses::ExamplePoses(const RigShape& rig, PointsIn points, const SkinOptions& options,
-                           const Progress& progress)
-    : rig_(rig), solver_(rig.samples, rig.handles, solver_options(options), progress) {
+ExamplePoses::ExamplePoses(const RigShape& rig, PointsIn points, const std::vector<Index>& near,
+                           const SkinOptions& options, const Progress& progress)
+    : rig_(rig),
+      solver_(rig.samples, rig.handles, solver_options(options), progress, rest_shape(rig, options.seed)),
+      points_(points) {
   solver_.track(points);
+  if (rig.cuts_itself())
+    for (Index i = 0; i < points.rows(); ++i) holders_.push_back(rig.holder(points.row(i), near[i]));
 }
 
 ExamplePose ExamplePoses::draw(Random& random, const Vector& activity, const Progress& progress) {
@@ -49,6 +63,10 @@ ExamplePose ExamplePoses::draw(Random& random, const Vector& activity, const Pro
   solver_.set_targets(moved);
   solver_.follow(0, 0.0, progress);
   pose.shape = solver_.tracked();
+  for (Index i = 0; i < static_cast<Index>(holders_.size()); ++i)
+    if (const Index b = holders_[i]; b >= 0)
+      pose.shape.row(i) =
+          (pose.motions[b] * points_.row(i).transpose().homogeneous()).head<3>().cast<float>();
   return pose;
 }
 

@@ -21,8 +21,9 @@ struct ExamplePose {
 /// Poses a shape by its bones as handles.
 class ExamplePoses {
  public:
-  /// The field moves these points (n,3).
-  ExamplePoses(const RigShape& rig, PointsIn points, const SkinOptions& options, const Progress& progress);
+  /// The field moves these points (n,3), near these nodes; what a bone holds goes with the bone.
+  ExamplePoses(const RigShape& rig, PointsIn points, const std::vector<Index>& near,
+               const SkinOptions& options, const Progress& progress);
 
   /// A pose in which each joint turns with this probability (joints), within its limits.
   ExamplePose draw(Random& random, const Vector& activity, const Progress& progress);
@@ -30,6 +31,8 @@ class ExamplePoses {
  private:
   const RigShape& rig_;
   RadialSolver solver_;
+  Points points_;
+  std::vector<Index> holders_;
 };
 
 }  // namespace arapfields

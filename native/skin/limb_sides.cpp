@@ -5,8 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "sampling/oriented_points.h"
-
 namespace arapfields {
 namespace {
 
@@ -17,6 +15,8 @@ constexpr double fade = 0.08;
 constexpr double gap_fade = 0.006;
 /// A sheet that runs on across the plane turns less than this.
 constexpr double sheet_cosine = 0.7;
+/// How much farther a bone straight outside of the surface counts than one inside.
+constexpr double outside = 3.0;
 /// Where a surface at the plane faces a limb's end with at least this cosine, the limb parts from its twin.
 constexpr double facing_end = 0.5;
 
@@ -37,6 +37,18 @@ std::vector<Index> roots_of(const RigShape& rig) {
   return roots;
 }
 
+/// The nearest bone to a place on the surface, on whose outer side bones count as farther.
+Index nearest_bone(const Skeleton& skeleton, const Vec3& place, const Vec3& normal) {
+  double least = infinity;
+  Index result = 0;
+  for (Index b = 0; b < skeleton.count(); ++b) {
+    const Vec3 to = skeleton.nearest(b, place) - place;
+    const double cost = to.norm() + outside * std::max(0.0, to.dot(normal));
+    if (cost < least) least = cost, result = b;
+  }
+  return result;
+}
+
 /// By the first bone; the surface has outward normals.
 std::vector<Limb> limbs_of(const RigShape& rig, const std::vector<Index>& roots, PointsIn surface) {
   std::vector<Limb> limbs(roots.size());
@@ -50,11 +62,10 @@ std::vector<Limb> limbs_of(const RigShape& rig, const std::vector<Index>& roots,
     limb.along[rig.symmetry.axis] = 0.0;
     limb.along.normalize();
   }
-  const BoneRegions regions(rig.skeleton, surface, rig.samples.normals);
   for (Index i = 0; i < surface.rows(); ++i) {
-    const Index b = regions.owner[i];
-    if (rig.sides[b] == 0) continue;
     if (std::abs(surface(i, rig.symmetry.axis) - rig.symmetry.offset) > rig.spacing) continue;
+    const Index b = nearest_bone(rig.skeleton, surface.row(i), rig.samples.normals.row(i));
+    if (rig.sides[b] == 0) continue;
     const Vec3 along = limbs[roots[b]].along;
     if (rig.samples.normals.row(i).dot(along) < facing_end) continue;
     for (const Index side : {b, rig.symmetry.mirrored[b]}) {
@@ -67,16 +78,16 @@ std::vector<Limb> limbs_of(const RigShape& rig, const std::vector<Index>& roots,
 
 }  // namespace
 
-void keep_limbs_apart(const RigShape& rig, PointsIn points, PointsIn normals, RowMatrix<float>& distances) {
+void keep_limbs_apart(const RigShape& rig, const SurfacePoints& given, RowMatrix<float>& distances) {
+  const Points &points = given.points, &normals = given.normals, &surface = rig.surface.points;
   if (std::ranges::all_of(rig.sides, [](int side) { return side == 0; })) return;
   const int axis = rig.symmetry.axis;
-  const Points surface = rig.samples.frame.to_mesh(rig.samples.points);
   const std::vector<Index> roots = roots_of(rig);
   const std::vector<Limb> limbs = limbs_of(rig, roots, surface);
-  Points middle = points;
+  SurfacePoints between{points, Points::Zero(points.rows(), 3), given.pieces};
+  Points& middle = between.points;
   middle.col(axis).setConstant(rig.symmetry.offset);
-  const std::vector<Index> nearest =
-      OrientedPoints(surface, rig.samples.normals).nearest(middle, Points::Zero(points.rows(), 3), 0.0);
+  const std::vector<Index> nearest = rig.nearest_samples(between);
   for (Index i = 0; i < points.rows(); ++i) {
     const double beyond = points(i, axis) - rig.symmetry.offset;
     Index own = -1;

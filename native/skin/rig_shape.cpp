@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "skin/rig_shape.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
+#include "core/errors.h"
+#include "core/parallel.h"
+#include "distance/signed_distance.h"
 #include "sampling/canonical_order.h"
 #include "sampling/nearest_sample.h"
 #include "sampling/sample_choice.h"
@@ -24,38 +29,145 @@ const SurfaceSamples& checked(const SurfaceSamples& samples) {
   return samples;
 }
 
+/// What of a bone's length holds points, and how many samples it holds at least.
+constexpr double hold_from = 0.3, hold_to = 0.7;
+constexpr Index least_held = 12;
+/// A point about a bone's end that is so much nearer to it than to all that follow goes with the bone.
+constexpr float clearly = 0.5f;
+/// Surfaces so many spacings from others that go another way are trusted, as far as touching ones.
+constexpr double trusted_spacings = 3.0, least_trust = 1e-3;
+/// In sizes of the shape, how far a bone may lie from it.
+constexpr double farthest = 0.5;
+
 }  // namespace
 
-RigShape::RigShape(const SurfaceSamples& surface, const std::vector<Bone>& bones, const Progress& progress)
-    : samples(checked(surface)), skeleton(bones), handles(bone_handles(samples, skeleton)) {
-  const Points points = samples.frame.to_mesh(samples.points);
+RigShape::RigShape(const SurfaceSamples& given, const std::vector<Bone>& bones, const Progress& progress,
+                   std::vector<Index> pieces)
+    : samples(checked(given)), skeleton(bones), tree(skeleton) {
+  if (pieces.empty()) pieces.assign(samples.size(), 0);
+  surface = {samples.frame.to_mesh(samples.points), samples.normals, std::move(pieces)};
   const std::vector<Index> chosen = evenly(canonical_order(samples.points), most_nodes);
-  nodes = rows_of(points, chosen);
-  normals = rows_of(samples.normals, chosen);
-  extent = body_size(points);
-  // A sphere's area by its radius of gyration.
+  nodes = {rows_of(surface.points, chosen), rows_of(surface.normals, chosen), {}};
+  node_counts_.assign(surface.count(), 0);
+  for (const Index i : chosen) {
+    nodes.pieces.push_back(surface.pieces[i]);
+    ++node_counts_[surface.pieces[i]];
+  }
+  places_ = OrientedPoints(nodes.points, nodes.normals);
+  extent = body_size(surface.points);
   symmetry = skeleton.symmetry(symmetric_bones * extent);
   for (Index b = 0; b < skeleton.count(); ++b) {
     const Index other = symmetry.mirrored[b];
     const double middle = 0.5 * (skeleton.bone(b).head + skeleton.bone(b).tail)[symmetry.axis];
     sides.push_back(other < 0 || other == b ? 0 : middle < symmetry.offset ? -1 : 1);
   }
+  // A sphere's area by its radius of gyration.
   spacing = std::sqrt(4.0 * std::numbers::pi / static_cast<double>(size())) * extent / 2.5;
   progress.check();
-  const InteriorGraph graph(nodes, normals, spacing);
+  const InteriorGraph all(nodes.points, nodes.normals, spacing);
   progress.check();
-  bone_distances = interior_bone_distances(graph, BoneRegions(skeleton, nodes, normals));
+  const BoneRegions regions(skeleton, surface, chosen, spacing, all);
+  owners = regions.owner;
+  set_trust();
+  const InteriorGraph graph(nodes.points, nodes.normals, spacing,
+                            [&](Index i, Index j) { return may_join(i, j); });
+  progress.check();
+  bone_distances = regions.distances(graph);
   neighbours.resize(size());
   for (Index i = 0; i < size(); ++i) {
     double total = 0.0;
     for (const auto& edge : graph.edges(i)) {
       const double away = static_cast<double>(edge.length) / spacing;
       if (away > neighbour_spacings) continue;
+      if (nodes.pieces[edge.to] != nodes.pieces[i] && stands_alone(nodes.pieces[i])) continue;
       neighbours[i].emplace_back(edge.to, std::exp(-away * away));
       total += neighbours[i].back().second;
     }
     for (auto& [to, weight] : neighbours[i]) weight /= total;
   }
+  sample_nodes = nearest_nodes(surface);
+  set_handles();
+}
+
+void RigShape::set_trust() {
+  trust.resize(size());
+  const double far = trusted_spacings * spacing;
+  parallel_for(0, size(), 64, [&](Index first, Index last) {
+    for (Index i = first; i < last; ++i) {
+      double square = far * far;
+      for (const Index j : places_.within(nodes.points.row(i), far))
+        if (nodes.pieces[i] != nodes.pieces[j] && !tree.matters(owners[i], owners[j], 0.0))
+          square = std::min(square, (nodes.points.row(i) - nodes.points.row(j)).squaredNorm());
+      trust[i] = std::max(least_trust, square / (far * far));
+    }
+  });
+  cuts_itself_ = trust.minCoeff() < 1.0;
+}
+
+std::vector<Index> RigShape::nodes_within(const Vec3& place, double distance, Index piece) const {
+  std::vector<Index> result = places_.within(place, distance);
+  std::erase_if(result, [&](Index node) { return nodes.pieces[node] != piece && stands_alone(piece); });
+  std::ranges::sort(result);
+  return result;
+}
+
+Index RigShape::holder(const Vec3& point, Index node) const {
+  const Index b = owners[node];
+  const double t = skeleton.along(b, point);
+  if (t < hold_from) return -1;
+  if (t <= hold_to || skeleton.is_leaf(b)) return b;
+  for (Index other = 0; other < skeleton.count(); ++other)
+    if (skeleton.bone(other).parent == b && bone_distances(node, b) > clearly * bone_distances(node, other))
+      return -1;
+  return b;
+}
+
+void RigShape::set_handles() {
+  const Points& points = surface.points;
+  std::vector<std::vector<Index>> held(skeleton.count());
+  for (Index i = 0; i < points.rows(); ++i)
+    if (const Index b = holder(points.row(i), sample_nodes[i]); b >= 0) held[b].push_back(i);
+  for (Index b = 0; b < skeleton.count(); ++b) {
+    const Bone& bone = skeleton.bone(b);
+    const auto away = [&](Index i) {
+      const Vec3 point = points.row(i);
+      return (skeleton.nearest(b, point) - point).norm();
+    };
+    std::vector<Index> all(points.rows());
+    std::iota(all.begin(), all.end(), Index{0});
+    const Index count = std::min<Index>(least_held, points.rows());
+    std::ranges::partial_sort(all, all.begin() + count, {}, away);
+    const std::string name =
+        bone.name.empty() ? "bones[" + std::to_string(skeleton.original(b)) + "]" : "bone " + bone.name;
+    require(away(all.front()) < farthest * extent, name, "it lies far outside of the shape",
+            "move it into the shape, or make it a helper");
+    if (static_cast<Index>(held[b].size()) < least_held) {
+      held[b].assign(all.begin(), all.begin() + count);
+      std::ranges::sort(held[b]);
+    }
+    Handle handle;
+    handle.kind = Handle::Kind::region;
+    handle.rest = bone_box(bone);
+    handle.target = handle.rest;
+    handle.samples = std::move(held[b]);
+    handles.push_back(std::move(handle));
+  }
+}
+
+RigShape rig_shape(const TriangleMesh& mesh, const WeldedVertices& welded, const VertexWeights& painted,
+                   const std::vector<Bone>& bones, const SkinOptions& options, const Progress& progress) {
+  const SurfaceSamples samples =
+      sample_mesh(mesh.vertices, mesh.triangles, options.samples, options.seed, painted);
+  const std::vector<Index> piece_of = welded.pieces(mesh);
+  const SignedDistance soup(mesh.vertices, mesh.triangles, progress);
+  std::vector<Index> pieces;
+  for (const std::int32_t t : soup.closest(samples.frame.to_mesh(samples.points), progress).triangles)
+    pieces.push_back(piece_of[mesh.triangles(t, 0)]);
+  return RigShape(samples, bones, progress, std::move(pieces));
+}
+
+std::vector<Handle> bone_handles(const SurfaceSamples& samples, const std::vector<Bone>& bones) {
+  return RigShape(samples, bones, {}).handles;
 }
 
 }  // namespace arapfields

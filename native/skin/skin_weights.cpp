@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/parallel.h"
 #include "distance/welded_vertices.h"
@@ -28,8 +29,7 @@ constexpr float one_bone = 0.8f;
 Vector activity_of(const RigShape& rig, const Vector& errors) {
   Vector result = Vector::Zero(rig.skeleton.count());
   for (Index i = 0; i < rig.size(); ++i) {
-    Index nearest = 0;
-    rig.bone_distances.row(i).minCoeff(&nearest);
+    const Index nearest = rig.owners[i];
     result[nearest] += errors[i];
     if (rig.skeleton.bone(nearest).parent >= 0) result[rig.skeleton.bone(nearest).parent] += errors[i];
   }
@@ -43,11 +43,14 @@ struct Fitted {
 };
 
 /// The poses have the nodes and then these points.
-Fitted fitted_nodes(const RigShape& rig, PointsIn points, const SkinOptions& options,
-                    const Progress& progress) {
+Fitted fitted_nodes(const RigShape& rig, PointsIn points, const std::vector<Index>& near,
+                    const SkinOptions& options, const Progress& progress) {
   Points moved(rig.size() + points.rows(), 3);
-  moved << rig.nodes, points;
-  ExamplePoses poses(rig, moved, options, progress.part(0.0, 0.1));
+  moved << rig.nodes.points, points;
+  std::vector<Index> nearest(rig.size());
+  std::iota(nearest.begin(), nearest.end(), Index{0});
+  nearest.insert(nearest.end(), near.begin(), near.end());
+  ExamplePoses poses(rig, moved, nearest, options, progress.part(0.0, 0.1));
   WeightFit fit(rig);
   Fitted result;
   Random random(options.seed, stream);
@@ -69,19 +72,22 @@ Fitted fitted_nodes(const RigShape& rig, PointsIn points, const SkinOptions& opt
   return result;
 }
 
-/// Weights of points with normals (n,3) of the shape.
-RowMatrix<float> fitted_points(const RigShape& rig, PointsIn points, PointsIn normals,
-                               const SkinOptions& options, const Progress& progress) {
-  const Fitted fitted = fitted_nodes(rig, points, options, progress);
+/// Weights of points of the shape.
+RowMatrix<float> fitted_points(const RigShape& rig, const SurfacePoints& given, const SkinOptions& options,
+                               const Progress& progress) {
+  const Points& points = given.points;
+  const std::vector<Index> near = rig.nearest_nodes(given);
+  const Fitted fitted = fitted_nodes(rig, points, near, options, progress);
   progress.report(0.9, "Weights");
-  const VertexBlend blend(rig, points, normals);
+  const VertexBlend blend(rig, given, near);
   const RigTwins mirror(rig, points);
   RowMatrix<float> nearby = blend(fitted.nodes), distances = blend(rig.bone_distances);
-  keep_limbs_apart(rig, points, normals, distances);
+  keep_limbs_apart(rig, given, distances);
   mirror.average(nearby);
   mirror.average(distances);
   progress.report(0.93, "Weights");
-  RowMatrix<float> result = point_weights(rig, points, fitted.poses, nearby, distances, mirror, options);
+  RowMatrix<float> result =
+      point_weights(rig, points, fitted.poses, nearby, distances, near, mirror, options);
   mirror.average(result);
   return result;
 }
@@ -135,8 +141,10 @@ RowMatrix<float> skin_weights(const SurfaceSamples& samples, const std::vector<B
   const ThreadScope threads(options.threads);
   const RigShape rig(samples, bones, progress);
   const Points points = samples.frame.to_mesh(samples.points);
-  return finished(rig, fitted_points(rig, points, samples.normals, options, progress),
-                  static_cast<Index>(bones.size()), options.influences);
+  return finished(
+      rig,
+      fitted_points(rig, {points, samples.normals, std::vector<Index>(points.rows(), 0)}, options, progress),
+      static_cast<Index>(bones.size()), options.influences);
 }
 
 RowMatrix<float> skin_weights(const TriangleMesh& mesh, const std::vector<Bone>& bones,
@@ -144,10 +152,10 @@ RowMatrix<float> skin_weights(const TriangleMesh& mesh, const std::vector<Bone>&
                               const VertexWeights& painted) {
   options.validate();
   const ThreadScope threads(options.threads);
-  const RigShape rig(sample_mesh(mesh.vertices, mesh.triangles, options.samples, options.seed, painted),
-                     bones, progress);
   const WeldedVertices welded(mesh);
-  RowMatrix<float> fitted = fitted_points(rig, mesh.vertices, welded.normals, options, progress);
+  const RigShape rig = rig_shape(mesh, welded, painted, bones, options, progress);
+  RowMatrix<float> fitted =
+      fitted_points(rig, {mesh.vertices, welded.normals, welded.pieces(mesh)}, options, progress);
   make_rigid(rig, mesh, welded, fitted);
   for (Index i = 0; i < fitted.rows(); ++i) fitted.row(i) = fitted.row(welded.first[i]).eval();
   return finished(rig, std::move(fitted), static_cast<Index>(bones.size()), options.influences);

@@ -6,7 +6,6 @@
 #include <algorithm>
 
 #include "core/parallel.h"
-#include "sampling/oriented_points.h"
 
 namespace arapfields {
 namespace {
@@ -15,24 +14,27 @@ namespace {
 constexpr double reach = 2.5, other_side = 1e-4;
 /// Slopes are damped by this, which matters where few nodes are near.
 constexpr double damping = 0.05;
+/// Where a node would count by less, all lie to one side of the point, and their mean serves.
+constexpr double least_weight = -0.25;
 
 }  // namespace
 
-VertexBlend::VertexBlend(const RigShape& rig, PointsIn points, PointsIn normals) : entries_(points.rows()) {
-  const OrientedPoints tree(rig.nodes, rig.normals);
+VertexBlend::VertexBlend(const RigShape& rig, const SurfacePoints& given, const std::vector<Index>& nearest)
+    : entries_(given.points.rows()) {
+  const Points &points = given.points, &normals = given.normals;
   const double width = reach * rig.spacing;
-  const std::vector<Index> nearest = tree.nearest(points, normals, rig.spacing);
   parallel_for(0, points.rows(), 64, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       const Vec3 point = points.row(i), normal = normals.row(i);
-      std::vector<Index> near = tree.within(point, width);
-      std::ranges::sort(near);
+      std::vector<Index> near = rig.nodes_within(point, width, given.pieces[i]);
+      std::erase_if(
+          near, [&](Index node) { return !rig.tree.matters(rig.owners[node], rig.owners[nearest[i]], 0.0); });
       std::vector<Eigen::Vector4d> lines;
       std::vector<double> kernel;
       Eigen::Matrix4d moments = Eigen::Matrix4d::Zero();
       for (const Index node : near) {
-        const Vec3 away = (Vec3(rig.nodes.row(node)) - point) / width;
-        const double side = normal.dot(rig.normals.row(node).transpose());
+        const Vec3 away = (Vec3(rig.nodes.points.row(node)) - point) / width;
+        const double side = normal.dot(rig.nodes.normals.row(node).transpose());
         const double falls = std::max(0.0, 1.0 - away.squaredNorm());
         kernel.push_back(falls * falls * falls * std::max(other_side, std::min(1.0, 0.5 + side)));
         lines.push_back(Eigen::Vector4d(1.0, away[0], away[1], away[2]));
@@ -44,7 +46,9 @@ VertexBlend::VertexBlend(const RigShape& rig, PointsIn points, PointsIn normals)
         continue;
       }
       moments.diagonal().tail<3>().array() += damping * total;
-      const Eigen::Vector4d factor = moments.ldlt().solve(Eigen::Vector4d::UnitX());
+      Eigen::Vector4d factor = moments.ldlt().solve(Eigen::Vector4d::UnitX());
+      for (std::size_t k = 0; k < near.size(); ++k)
+        if (kernel[k] * factor.dot(lines[k]) < least_weight) factor = Eigen::Vector4d::UnitX();
       for (std::size_t k = 0; k < near.size(); ++k)
         entries_[i].push_back({near[k], static_cast<float>(kernel[k] * factor.dot(lines[k]))});
       double sum = 0.0;

@@ -8,10 +8,11 @@
 namespace arapfields {
 
 /// Values at a rig's nodes taken to other points of the surface: linear where the nodes are, from those of
-/// the same side.
+/// the same surface and side.
 class VertexBlend {
  public:
-  VertexBlend(const RigShape& rig, PointsIn points, PointsIn normals);
+  /// Of some points and their nearest nodes.
+  VertexBlend(const RigShape& rig, const SurfacePoints& given, const std::vector<Index>& nearest);
 
   /// Values (nodes, k) at the points (n, k).
   RowMatrix<float> operator()(const RowMatrix<float>& values) const;

@@ -17,9 +17,9 @@ constexpr int sweeps = 20;
 WeightFit::WeightFit(const RigShape& rig)
     : rig_(rig), weights_(RowMatrix<float>::Zero(rig.size(), rig.skeleton.count())) {
   RowMatrix<float> distances = rig.bone_distances;
-  keep_limbs_apart(rig, rig.nodes, rig.normals, distances);
+  keep_limbs_apart(rig, rig.nodes, distances);
   for (Index i = 0; i < rig.size(); ++i) {
-    choices_.emplace_back(rig, distances.row(i));
+    choices_.emplace_back(rig, rig.owners[i], distances.row(i));
     squares_.push_back(BonePairs::Zero(choices_[i].count(), choices_[i].count()));
     weights_(i, choices_[i].bones.front()) = 1.0f;
   }
@@ -29,15 +29,15 @@ void WeightFit::add(const ExamplePose& pose) {
   ++poses_;
   parallel_for(0, rig_.size(), 64, [&](Index first, Index last) {
     for (Index i = first; i < last; ++i)
-      squares_[i] +=
-          choices_[i].square(rig_.nodes.row(i), pose.motions, pose.shape.row(i).cast<double>(), rig_.extent);
+      squares_[i] += choices_[i].square(rig_.nodes.points.row(i), pose.motions,
+                                        pose.shape.row(i).cast<double>(), rig_.extent);
   });
 }
 
 void WeightFit::update(Index node, double smoothness) {
   const BoneChoice& choice = choices_[node];
   const double stiff = smoothness * smoothness_weight;
-  BonePairs h = squares_[node] / static_cast<double>(poses_);
+  BonePairs h = squares_[node] * (rig_.trust[node] / static_cast<double>(poses_));
   h.diagonal().array() += stiff;
   FewBones g = -choice.penalties;
   for (Index j = 0; j < choice.count(); ++j)
@@ -60,7 +60,7 @@ Vector WeightFit::squared_errors(const ExamplePose& pose) const {
     Vec3 off = -pose.shape.row(i).cast<double>();
     for (const Index b : choices_[i].bones)
       off += static_cast<double>(weights_(i, b)) *
-             (pose.motions[b] * rig_.nodes.row(i).transpose().homogeneous()).head<3>();
+             (pose.motions[b] * rig_.nodes.points.row(i).transpose().homogeneous()).head<3>();
     result[i] = off.squaredNorm() / (rig_.extent * rig_.extent);
   }
   return result;
@@ -68,12 +68,13 @@ Vector WeightFit::squared_errors(const ExamplePose& pose) const {
 
 RowMatrix<float> point_weights(const RigShape& rig, PointsIn points, const std::vector<ExamplePose>& poses,
                                const RowMatrix<float>& nearby, const RowMatrix<float>& distances,
-                               const RigTwins& mirror, const SkinOptions& options) {
+                               const std::vector<Index>& near, const RigTwins& mirror,
+                               const SkinOptions& options) {
   RowMatrix<float> result = RowMatrix<float>::Zero(points.rows(), rig.skeleton.count());
   const double stiff = options.smoothness * smoothness_weight;
   parallel_for(0, points.rows(), 16, [&](Index first, Index last) {
     for (Index i = first; i < last; ++i) {
-      const BoneChoice choice(rig, distances.row(i));
+      const BoneChoice choice(rig, rig.owners[near[i]], distances.row(i));
       const Index twin = mirror.twin(i), k = choice.count();
       BoneChoice other = choice;
       if (twin >= 0)
@@ -86,7 +87,7 @@ RowMatrix<float> point_weights(const RigShape& rig, PointsIn points, const std::
         };
         h += twin < 0 ? square(choice, i) : BonePairs(0.5 * (square(choice, i) + square(other, twin)));
       }
-      h /= static_cast<double>(poses.size());
+      h *= rig.trust[near[i]] / static_cast<double>(poses.size());
       h.diagonal().array() += stiff;
       FewBones g = -choice.penalties;
       for (Index j = 0; j < k; ++j) g[j] += stiff * static_cast<double>(nearby(i, choice.bones[j]));

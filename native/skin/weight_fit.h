@@ -40,9 +40,11 @@ class WeightFit {
 
 /// Weights of other points of the shape, at most `influences` a point above 0, that reproduce the same poses,
 /// whose rows from `first` on are the points'. What the poses leave open is as in `nearby` (points, bones),
-/// the nodes' weights there; `distances` are to the bones through the inside.
+/// the nodes' weights there; `distances` are to the bones through the inside, and `near` the nodes that the
+/// points are nearest to.
 RowMatrix<float> point_weights(const RigShape& rig, PointsIn points, const std::vector<ExamplePose>& poses,
                                const RowMatrix<float>& nearby, const RowMatrix<float>& distances,
-                               const RigTwins& mirror, const SkinOptions& options);
+                               const std::vector<Index>& near, const RigTwins& mirror,
+                               const SkinOptions& options);
 
 }  // namespace arapfields

@@ -2,7 +2,7 @@
 // Weights of bones from poses, and skinning with them.
 #pragma once
 
-#include "skin/bone_regions.h"
 #include "skin/correctives.h"
+#include "skin/rig_shape.h"
 #include "skin/skin_weights.h"
 #include "skin/skinning.h"

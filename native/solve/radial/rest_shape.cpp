@@ -18,7 +18,8 @@ constexpr std::uint64_t stream = 2;
 
 }  // namespace
 
-RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t seed, int axis) {
+RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t seed, int axis,
+                     const MayJoin& may_join) {
   require_samples(samples);
   order = canonical_order(samples.points);
   thickness = std::make_shared<const LocalThickness>(samples.points, samples.normals, order);
@@ -38,7 +39,9 @@ RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t
     normals = std::move(half.normals);
     layout = std::move(half.layout);
   }
-  if (interior && normals.rows() > 0) embedding = interior_embedding(sites, normals, axis);
+  if (!interior || normals.rows() == 0) return;
+  const MayJoin sites_may_join = [&](Index i, Index j) { return may_join(chosen[i], chosen[j]); };
+  embedding = interior_embedding(sites, normals, axis, may_join ? sites_may_join : MayJoin());
 }
 
 }  // namespace arapfields

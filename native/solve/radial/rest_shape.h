@@ -17,8 +17,9 @@ namespace arapfields {
 struct RestShape {
   /// `interior`: whether ways through the interior are looked for; `axis`: 0, 1 or 2 where fields are to be
   /// symmetric across the plane on which that coordinate is 0. Throws InvalidInput for no samples and for NaN
-  /// or infinity among them.
-  RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t seed, int axis = -1);
+  /// or infinity among them. `may_join` is of samples, as interior_embedding() has it.
+  RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t seed, int axis = -1,
+            const MayJoin& may_join = {});
 
   std::vector<std::uint32_t> order;  ///< the samples, neighbours beside each other
   std::shared_ptr<const LocalThickness> thickness;

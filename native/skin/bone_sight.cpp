@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "skin/bone_sight.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace arapfields {
+namespace {
+
+/// What is so much farther than the nearest in a direction is hidden.
+constexpr double hidden = 1.2;
+
+/// The cell of a cube around the origin, each of its faces divided into count × count, in a direction.
+std::size_t cell_of(const Vec3& way, int count) {
+  int axis = 0;
+  const double most = way.cwiseAbs().maxCoeff(&axis);
+  const auto at = [&](double x) {
+    return std::clamp(static_cast<int>((0.5 + 0.5 * x / most) * count), 0, count - 1);
+  };
+  const int face = 2 * axis + (way[axis] < 0.0 ? 1 : 0);
+  return static_cast<std::size_t>((face * count + at(way[(axis + 1) % 3])) * count + at(way[(axis + 2) % 3]));
+}
+
+}  // namespace
+
+BoneSight::BoneSight(const SurfacePoints& surfaces, Index pieces, const Vec3& place)
+    : place_(place), sides_(pieces), depths_(pieces) {
+  for (auto& each : depths_) each.fill(std::numeric_limits<float>::infinity());
+  for (Index i = 0; i < surfaces.points.rows(); ++i) {
+    const Vec3 way = surfaces.points.row(i).transpose() - place;
+    const double distance = way.norm();
+    if (!(distance > 0.0)) continue;
+    const auto piece = static_cast<std::size_t>(surfaces.pieces[i]);
+    sides_[piece][cell_of(way, wide)] = true;
+    float& depth = depths_[piece][cell_of(way, fine)];
+    depth = std::min(depth, static_cast<float>(distance));
+  }
+}
+
+bool BoneSight::sees(const Vec3& point, Index piece, double tolerance) const {
+  const Vec3 way = point - place_;
+  const double distance = way.norm();
+  if (!(distance > 0.0)) return true;
+  const auto depth = static_cast<double>(depths_[static_cast<std::size_t>(piece)][cell_of(way, fine)]);
+  return distance <= hidden * depth + tolerance;
+}
+
+}  // namespace arapfields

@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "skin/node_owners.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <queue>
+
+#include "core/parallel.h"
+
+namespace arapfields {
+namespace {
+
+constexpr float infinity = std::numeric_limits<float>::infinity();
+/// Places along a bone from which nodes are seen.
+constexpr Index least_places = 5, most_places = 40;
+/// A place is inside a surface that lies on so many sides of it; a bone that is inside none may be in one
+/// that lies on fewer.
+constexpr int enough_sides = 21, least_sides = 14;
+/// A bone is in a surface with so much of its length.
+constexpr double share_inside = 0.4;
+/// A surface touches what is so many spacings farther than the nearest.
+constexpr double touching_spacings = 0.5;
+
+/// On how many sides a surface must lie around a place of a bone for the bone to be in it there. Bones that
+/// are in none are in the one that lies most around them.
+std::vector<int> sides_needed(const std::vector<BoneSight>& places, Index pieces) {
+  std::vector<int> result(pieces, BoneSight::all_sides + 1);
+  int most = 0;
+  Index best = -1;
+  bool any = false;
+  for (Index piece = 0; piece < pieces; ++piece) {
+    int inside = 0, sum = 0;
+    for (const BoneSight& place : places) {
+      sum += place.sides(piece);
+      if (place.sides(piece) >= enough_sides) ++inside;
+    }
+    if (inside >= share_inside * static_cast<double>(places.size())) {
+      result[piece] = enough_sides;
+      any = true;
+    }
+    if (sum > most) most = sum, best = piece;
+  }
+  if (!any && most >= least_sides * static_cast<int>(places.size())) result[best] = 0;
+  return result;
+}
+
+}  // namespace
+
+NodeOwners::NodeOwners(const SurfacePoints& surfaces, const std::vector<Index>& nodes, double spacing,
+                       const InteriorGraph& graph, const RowMatrix<float>& straight)
+    : surfaces_(surfaces),
+      pieces_(surfaces.count()),
+      nodes_(nodes),
+      spacing_(spacing),
+      graph_(graph),
+      straight_(straight),
+      best_(nodes.size(), {infinity, -1}) {}
+
+std::vector<Index> NodeOwners::found(const Skeleton& skeleton) {
+  see(skeleton);
+  spread();
+  take_free_surfaces();
+  fill();
+  touch();
+  spread();
+  fill();
+  std::vector<Index> result;
+  for (const Length& each : best_) result.push_back(each.second);
+  return result;
+}
+
+/// Straight ways from each bone to the nodes that it sees of the surfaces in which it lies.
+void NodeOwners::see(const Skeleton& skeleton) {
+  std::vector<std::vector<Length>> ways(skeleton.count());
+  parallel_jobs(skeleton.count(), [&](Index b) {
+    const Vec3 head = skeleton.bone(b).head, along = skeleton.bone(b).tail - head;
+    const auto count =
+        std::clamp(static_cast<Index>(std::ceil(along.norm() / spacing_)), least_places, most_places);
+    std::vector<BoneSight> places;
+    for (Index k = 0; k < count; ++k)
+      places.emplace_back(surfaces_, pieces_,
+                          head + (static_cast<double>(k) + 0.5) / static_cast<double>(count) * along);
+    const std::vector<int> least = sides_needed(places, pieces_);
+    ways[b] = best_;
+    for (std::size_t i = 0; i < nodes_.size(); ++i)
+      for (const BoneSight& place : places)
+        if (place.sides(piece(i)) >= least[piece(i)] &&
+            place.sees(surfaces_.points.row(nodes_[i]), piece(i), 0.5 * spacing_)) {
+          ways[b][i] = {straight_(static_cast<Index>(i), b), b};
+          break;
+        }
+  });
+  for (const std::vector<Length>& each : ways)
+    for (std::size_t i = 0; i < nodes_.size(); ++i) best_[i] = std::min(best_[i], each[i]);
+}
+
+/// A bone that lies in no surface takes the nearest one where no bone lies; others may join it there. Where
+/// all are so, each node belongs to the nearest bone.
+void NodeOwners::take_free_surfaces() {
+  std::vector<bool> has_surface(straight_.cols(), false);
+  for (const Length& each : best_)
+    if (each.second >= 0) has_surface[each.second] = true;
+  const bool none = std::ranges::find(has_surface, true) == has_surface.end();
+  std::vector<Length> taken(nodes_.size(), {infinity, -1});
+  for (Index b = 0; b < straight_.cols(); ++b) {
+    Index nearest = 0;
+    straight_.col(b).minCoeff(&nearest);
+    if (has_surface[b] || has_bone(nearest)) continue;
+    for (std::size_t i = 0; i < nodes_.size(); ++i)
+      if (none || piece(i) == piece(nearest))
+        taken[i] = std::min(taken[i], Length(straight_(static_cast<Index>(i), b), b));
+  }
+  for (std::size_t i = 0; i < nodes_.size(); ++i) best_[i] = std::min(best_[i], taken[i]);
+}
+
+/// Nodes take the bone to which the way on their own surface is shortest.
+void NodeOwners::spread() {
+  using Entry = std::pair<Length, std::size_t>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
+  for (std::size_t i = 0; i < best_.size(); ++i)
+    if (has_bone(i)) queue.emplace(best_[i], i);
+  while (!queue.empty()) {
+    const auto [length, i] = queue.top();
+    queue.pop();
+    if (length > best_[i]) continue;
+    for (const InteriorGraph::Edge& edge : graph_.edges(static_cast<Index>(i))) {
+      const Length next(length.first + edge.length, length.second);
+      if (!(next < best_[edge.to]) || piece(i) != piece(edge.to)) continue;
+      best_[edge.to] = next;
+      queue.emplace(next, edge.to);
+    }
+  }
+}
+
+/// Nodes of a surface with bones that no way reaches belong with the nearest there.
+void NodeOwners::fill() {
+  std::map<Index, Nodes> reached;
+  for (std::size_t i = 0; i < best_.size(); ++i)
+    if (has_bone(i)) reached[piece(i)].push_back(i);
+  for (std::size_t i = 0; i < best_.size(); ++i) {
+    if (has_bone(i) || !reached.contains(piece(i))) continue;
+    const Nodes& others = reached[piece(i)];
+    const auto nearest = std::ranges::min_element(others, {}, [&](std::size_t j) { return square(i, j); });
+    best_[i] = best_[*nearest];
+  }
+}
+
+/// Where a surface without bones touches others, its nodes belong with what they touch, of the same side
+/// above all.
+void NodeOwners::touch() {
+  std::map<Index, Nodes> without;
+  Nodes others;
+  for (std::size_t i = 0; i < best_.size(); ++i)
+    if (!has_bone(i)) without[piece(i)].push_back(i);
+  if (without.empty()) return;
+  std::vector<char> hidden(best_.size(), 0);
+  parallel_for(0, graph_.size(), 16, [&](Index first, Index last) {
+    for (Index i = first; i < last; ++i) hidden[i] = has_bone(i) && within_another(i) ? 1 : 0;
+  });
+  for (std::size_t i = 0; i < best_.size(); ++i)
+    if (has_bone(i) && hidden[i] == 0) others.push_back(i);
+  if (others.empty())
+    for (std::size_t i = 0; i < best_.size(); ++i)
+      if (has_bone(i)) others.push_back(i);
+  const auto turned = [&](std::size_t i, std::size_t j) {  // in squares of the spacing
+    const auto& normals = surfaces_.normals;
+    return spacing_ * spacing_ * (normals.row(nodes_[i]) - normals.row(nodes_[j])).squaredNorm();
+  };
+  for (const auto& [piece, own] : without) {
+    std::vector<std::pair<double, std::size_t>> near;
+    for (const std::size_t i : own) {
+      near.emplace_back(std::numeric_limits<double>::infinity(), 0);
+      for (const std::size_t j : others)
+        near.back() = std::min(near.back(), {square(i, j) + turned(i, j), j});
+    }
+    const double reach = std::sqrt(std::ranges::min_element(near)->first) + touching_spacings * spacing_;
+    for (std::size_t k = 0; k < own.size(); ++k)
+      if (near[k].first <= reach * reach) best_[own[k]] = {0.0f, best_[near[k].second].second};
+  }
+}
+
+bool NodeOwners::within_another(std::size_t node) const {
+  const BoneSight sight(surfaces_, pieces_, surfaces_.points.row(nodes_[node]));
+  for (Index other = 0; other < pieces_; ++other)
+    if (other != piece(node) && sight.sides(other) >= enough_sides) return true;
+  return false;
+}
+
+}  // namespace arapfields

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "skin/bone_sight.h"
+
+namespace arapfields {
+
+/// Finds which bone each node of a shape belongs to, of samples on surfaces that may cut each other. What is
+/// given has to outlive it.
+class NodeOwners {
+ public:
+  /// The nodes are these samples, about `spacing` apart, and the graph's; `straight` are distances (n,
+  /// bones).
+  NodeOwners(const SurfacePoints& surfaces, const std::vector<Index>& nodes, double spacing,
+             const InteriorGraph& graph, const RowMatrix<float>& straight);
+
+  /// Bones (n).
+  std::vector<Index> found(const Skeleton& skeleton);
+
+ private:
+  using Length = std::pair<float, Index>;  // of the way to a node, and the bone where it begins
+  using Nodes = std::vector<std::size_t>;
+
+  bool has_bone(std::size_t node) const { return best_[node].second >= 0; }
+  Index piece(std::size_t node) const { return surfaces_.pieces[nodes_[node]]; }
+  double square(std::size_t node, std::size_t other) const {
+    return (surfaces_.points.row(nodes_[node]) - surfaces_.points.row(nodes_[other])).squaredNorm();
+  }
+  void see(const Skeleton& skeleton);
+  void take_free_surfaces();
+  void spread();
+  void fill();
+  void touch();
+  bool within_another(std::size_t node) const;
+
+  const SurfacePoints& surfaces_;
+  Index pieces_;
+  const std::vector<Index>& nodes_;
+  double spacing_;
+  const InteriorGraph& graph_;
+  const RowMatrix<float>& straight_;
+  std::vector<Length> best_;
+};
+
+}  // namespace arapfields

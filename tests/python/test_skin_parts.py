@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Skin weights of figures built from closed parts that cut each other, as game characters are."""
+
+import numpy as np
+import pytest
+
+import arapfields as af
+
+OPTIONS = af.SkinOptions(poses=16, samples=4000)
+LEG, HIP, ANKLE = 0.1, 0.5, 0.15
+# Head tail parent of each bone.
+BONES = {
+    "Spine": ((0, 0, HIP), (0, 0, 0.9), None),
+    "Head": ((0, 0, 0.95), (0, 0, 1.2), "Spine"),
+    "Arm.L": ((0.15, 0, 0.8), (0.5, 0, 0.8), "Spine"),
+    "Arm.R": ((-0.15, 0, 0.8), (-0.5, 0, 0.8), "Spine"),
+    "Leg.L": ((LEG, 0, HIP), (LEG, 0, ANKLE), "Spine"),
+    "Leg.R": ((-LEG, 0, HIP), (-LEG, 0, ANKLE), "Spine"),
+    "Foot.L": ((LEG, 0, ANKLE), (LEG, -0.25, 0.05), "Leg.L"),
+    "Foot.R": ((-LEG, 0, ANKLE), (-LEG, -0.25, 0.05), "Leg.R"),
+}
+NAMES = list(BONES)
+
+
+def ellipsoid(center, radii, count=24):
+    """A closed surface, its triangles outwards."""
+    u, v = np.meshgrid(
+        np.linspace(0, np.pi, count + 1), 2 * np.pi * np.arange(2 * count) / (2 * count), indexing="ij"
+    )
+    points = np.stack([np.sin(u) * np.cos(v), np.sin(u) * np.sin(v), np.cos(u)], -1).reshape(-1, 3)
+    row, column = (
+        each.ravel() for each in np.meshgrid(np.arange(count), np.arange(2 * count), indexing="ij")
+    )
+    a, b = row * 2 * count + column, row * 2 * count + (column + 1) % (2 * count)
+    triangles = np.concatenate(
+        [np.stack([a, a + 2 * count, b], 1), np.stack([b, a + 2 * count, b + 2 * count], 1)]
+    )
+    return points * radii + center, triangles
+
+
+def figure():
+    """(vertices, triangles, the part of each vertex): a hollow head whose wall has a thickness, and shoes that
+    reach into each other."""
+    hollow = ellipsoid((0, 0, 1.15), (0.33, 0.3, 0.27))
+    parts = {
+        "trunk": ellipsoid((0, 0, 0.7), (0.17, 0.12, 0.3)),
+        "head": ellipsoid((0, 0, 1.15), (0.35, 0.32, 0.29)),
+        "lining": (hollow[0], hollow[1][:, ::-1]),
+    }
+    for side, x in (("L", 1), ("R", -1)):
+        parts[f"arm.{side}"] = ellipsoid((0.32 * x, 0, 0.8), (0.22, 0.05, 0.05))
+        parts[f"leg.{side}"] = ellipsoid((LEG * x, 0, 0.3), (0.07, 0.07, 0.25))
+        parts[f"shoe.{side}"] = ellipsoid((LEG * x, -0.08, 0.08), (LEG + 0.015, 0.22, 0.08))
+    sizes = [len(vertices) for vertices, _ in parts.values()]
+    starts = np.cumsum([0, *sizes[:-1]])
+    triangles = [faces + start for (_, faces), start in zip(parts.values(), starts, strict=True)]
+    return (
+        np.concatenate([v for v, _ in parts.values()]),
+        np.concatenate(triangles),
+        np.repeat(list(parts), sizes),
+    )
+
+
+@pytest.fixture(scope="module")
+def skinned():
+    vertices, triangles, parts = figure()
+    bones = [
+        af.Bone(head, tail, None if up is None else NAMES.index(up), name=n)
+        for n, (head, tail, up) in BONES.items()
+    ]
+    return vertices, parts, np.asarray(af.skin_weights((vertices, triangles), bones, OPTIONS))
+
+
+def share(weights, *bones):
+    return weights[:, [NAMES.index(bone) for bone in bones]].sum(1)
+
+
+def test_a_hollow_head_goes_with_its_bone_and_not_with_the_arms_below(skinned):
+    vertices, parts, weights = skinned
+    upper = np.isin(parts, ["head", "lining"]) & (vertices[:, 2] > 1.1)
+    assert share(weights[upper], "Head").min() > 0.9
+    assert share(weights[np.isin(parts, ["head", "lining"])], "Arm.L", "Arm.R").max() < 0.05
+
+
+@pytest.mark.parametrize(("side", "other"), ["LR", "RL"])
+def test_shoes_that_reach_into_each_other_stay_apart(skinned, side, other):
+    _, parts, weights = skinned
+    shoe = weights[parts == f"shoe.{side}"]
+    assert share(shoe, f"Foot.{other}", f"Leg.{other}").max() < 0.01
+    assert share(shoe, f"Foot.{side}", f"Leg.{side}").min() > 0.95
