@@ -19,7 +19,7 @@ constexpr double most_between = 0.5;
 
 }  // namespace
 
-BoneRegions::BoneRegions(const Skeleton& skeleton, const SurfacePoints& surfaces,
+BoneRegions::BoneRegions(const Skeleton& skeleton, const PiecePoints& surfaces,
                          const std::vector<Index>& nodes, double spacing, const InteriorGraph& graph)
     : straight(graph.size(), skeleton.count()) {
   for (Index i = 0; i < graph.size(); ++i) {

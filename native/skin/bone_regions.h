@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "fields/interior_distance.h"
+#include "skin/piece_points.h"
 #include "skin/skeleton.h"
-#include "skin/surface_points.h"
 
 namespace arapfields {
 
@@ -13,7 +13,7 @@ namespace arapfields {
 /// one that is nearest through the inside; others belong to what they touch.
 struct BoneRegions {
   /// The nodes are these samples, about `spacing` apart, and the graph's.
-  BoneRegions(const Skeleton& skeleton, const SurfacePoints& surfaces, const std::vector<Index>& nodes,
+  BoneRegions(const Skeleton& skeleton, const PiecePoints& surfaces, const std::vector<Index>& nodes,
               double spacing, const InteriorGraph& graph);
 
   /// Lengths (n, bones) of the shortest ways to each bone.

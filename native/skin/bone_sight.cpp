@@ -24,25 +24,26 @@ std::size_t cell_of(const Vec3& way, int count) {
 
 }  // namespace
 
-BoneSight::BoneSight(const SurfacePoints& surfaces, Index pieces, const Vec3& place)
-    : place_(place), sides_(pieces), depths_(pieces) {
+BoneSight::BoneSight(const PiecePoints& surfaces, const std::vector<Index>& slots, Index count,
+                     const Vec3& place)
+    : place_(place), sides_(count), depths_(count) {
   for (auto& each : depths_) each.fill(std::numeric_limits<float>::infinity());
   for (Index i = 0; i < surfaces.points.rows(); ++i) {
     const Vec3 way = surfaces.points.row(i).transpose() - place;
     const double distance = way.norm();
-    if (!(distance > 0.0)) continue;
-    const auto piece = static_cast<std::size_t>(surfaces.pieces[i]);
-    sides_[piece][cell_of(way, wide)] = true;
-    float& depth = depths_[piece][cell_of(way, fine)];
+    const Index slot = slots[surfaces.pieces[i]];
+    if (slot < 0 || !(distance > 0.0)) continue;
+    sides_[slot][cell_of(way, wide)] = true;
+    float& depth = depths_[slot][cell_of(way, fine)];
     depth = std::min(depth, static_cast<float>(distance));
   }
 }
 
-bool BoneSight::sees(const Vec3& point, Index piece, double tolerance) const {
+bool BoneSight::sees(const Vec3& point, Index slot, double tolerance) const {
   const Vec3 way = point - place_;
   const double distance = way.norm();
   if (!(distance > 0.0)) return true;
-  const auto depth = static_cast<double>(depths_[static_cast<std::size_t>(piece)][cell_of(way, fine)]);
+  const auto depth = static_cast<double>(depths_[static_cast<std::size_t>(slot)][cell_of(way, fine)]);
   return distance <= hidden * depth + tolerance;
 }
 

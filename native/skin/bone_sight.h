@@ -11,17 +11,19 @@ namespace arapfields {
 
 /// What is seen of surfaces from a place: how far away they are in each direction.
 class BoneSight {
-  static constexpr int wide = 2, fine = 6;  // cells of a cube's edge
+  static constexpr int wide = 2;  // cells of a cube's edge
+  static constexpr int fine = 6;
 
  public:
   static constexpr int all_sides = 6 * wide * wide;
 
-  BoneSight(const SurfacePoints& surfaces, Index pieces, const Vec3& place);
+  /// Of the points those whose surface has one of `count` slots, by the number of the surface; −1: none.
+  BoneSight(const PiecePoints& surfaces, const std::vector<Index>& slots, Index count, const Vec3& place);
 
   /// On how many sides of the place a surface lies.
-  int sides(Index piece) const { return static_cast<int>(sides_[static_cast<std::size_t>(piece)].count()); }
+  int sides(Index slot) const { return static_cast<int>(sides_[static_cast<std::size_t>(slot)].count()); }
   /// Whether nothing of a point's own surface hides it; `tolerance` is a length.
-  bool sees(const Vec3& point, Index piece, double tolerance) const;
+  bool sees(const Vec3& point, Index slot, double tolerance) const;
 
  private:
   Vec3 place_;

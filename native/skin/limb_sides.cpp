@@ -78,13 +78,13 @@ std::vector<Limb> limbs_of(const RigShape& rig, const std::vector<Index>& roots,
 
 }  // namespace
 
-void keep_limbs_apart(const RigShape& rig, const SurfacePoints& given, RowMatrix<float>& distances) {
+void keep_limbs_apart(const RigShape& rig, const PiecePoints& given, RowMatrix<float>& distances) {
   const Points &points = given.points, &normals = given.normals, &surface = rig.surface.points;
   if (std::ranges::all_of(rig.sides, [](int side) { return side == 0; })) return;
   const int axis = rig.symmetry.axis;
   const std::vector<Index> roots = roots_of(rig);
   const std::vector<Limb> limbs = limbs_of(rig, roots, surface);
-  SurfacePoints between{points, Points::Zero(points.rows(), 3), given.pieces};
+  PiecePoints between{points, Points::Zero(points.rows(), 3), given.pieces};
   Points& middle = between.points;
   middle.col(axis).setConstant(rig.symmetry.offset);
   const std::vector<Index> nearest = rig.nearest_samples(between);

@@ -19,6 +19,8 @@ constexpr Index least_places = 5, most_places = 40;
 /// A place is inside a surface that lies on so many sides of it; a bone that is inside none may be in one
 /// that lies on fewer.
 constexpr int enough_sides = 21, least_sides = 14;
+/// A surface with fewer samples cannot be seen to lie around a bone.
+constexpr Index least_samples = BoneSight::all_sides;
 /// A bone is in a surface with so much of its length.
 constexpr double share_inside = 0.4;
 /// A surface touches what is so many spacings farther than the nearest.
@@ -26,22 +28,22 @@ constexpr double touching_spacings = 0.5;
 
 /// On how many sides a surface must lie around a place of a bone for the bone to be in it there. Bones that
 /// are in none are in the one that lies most around them.
-std::vector<int> sides_needed(const std::vector<BoneSight>& places, Index pieces) {
-  std::vector<int> result(pieces, BoneSight::all_sides + 1);
+std::vector<int> sides_needed(const std::vector<BoneSight>& places, Index slots) {
+  std::vector<int> result(slots, BoneSight::all_sides + 1);
   int most = 0;
   Index best = -1;
   bool any = false;
-  for (Index piece = 0; piece < pieces; ++piece) {
+  for (Index slot = 0; slot < slots; ++slot) {
     int inside = 0, sum = 0;
     for (const BoneSight& place : places) {
-      sum += place.sides(piece);
-      if (place.sides(piece) >= enough_sides) ++inside;
+      sum += place.sides(slot);
+      if (place.sides(slot) >= enough_sides) ++inside;
     }
     if (inside >= share_inside * static_cast<double>(places.size())) {
-      result[piece] = enough_sides;
+      result[slot] = enough_sides;
       any = true;
     }
-    if (sum > most) most = sum, best = piece;
+    if (sum > most) most = sum, best = slot;
   }
   if (!any && most >= least_sides * static_cast<int>(places.size())) result[best] = 0;
   return result;
@@ -49,15 +51,20 @@ std::vector<int> sides_needed(const std::vector<BoneSight>& places, Index pieces
 
 }  // namespace
 
-NodeOwners::NodeOwners(const SurfacePoints& surfaces, const std::vector<Index>& nodes, double spacing,
+NodeOwners::NodeOwners(const PiecePoints& surfaces, const std::vector<Index>& nodes, double spacing,
                        const InteriorGraph& graph, const RowMatrix<float>& straight)
     : surfaces_(surfaces),
-      pieces_(surfaces.count()),
       nodes_(nodes),
       spacing_(spacing),
       graph_(graph),
       straight_(straight),
-      best_(nodes.size(), {infinity, -1}) {}
+      slots_(surfaces.count(), -1),
+      best_(nodes.size(), {infinity, -1}) {
+  std::vector<Index> sizes(slots_.size(), 0);
+  for (const Index piece : surfaces.pieces) ++sizes[piece];
+  for (std::size_t piece = 0; piece < sizes.size(); ++piece)
+    if (sizes[piece] >= least_samples) slots_[piece] = slot_count_++;
+}
 
 std::vector<Index> NodeOwners::found(const Skeleton& skeleton) {
   see(skeleton);
@@ -81,17 +88,20 @@ void NodeOwners::see(const Skeleton& skeleton) {
         std::clamp(static_cast<Index>(std::ceil(along.norm() / spacing_)), least_places, most_places);
     std::vector<BoneSight> places;
     for (Index k = 0; k < count; ++k)
-      places.emplace_back(surfaces_, pieces_,
+      places.emplace_back(surfaces_, slots_, slot_count_,
                           head + (static_cast<double>(k) + 0.5) / static_cast<double>(count) * along);
-    const std::vector<int> least = sides_needed(places, pieces_);
+    const std::vector<int> least = sides_needed(places, slot_count_);
     ways[b] = best_;
-    for (std::size_t i = 0; i < nodes_.size(); ++i)
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+      const Index own = slot(i);
+      if (own < 0) continue;
       for (const BoneSight& place : places)
-        if (place.sides(piece(i)) >= least[piece(i)] &&
-            place.sees(surfaces_.points.row(nodes_[i]), piece(i), 0.5 * spacing_)) {
+        if (place.sides(own) >= least[own] &&
+            place.sees(surfaces_.points.row(nodes_[i]), own, 0.5 * spacing_)) {
           ways[b][i] = {straight_(static_cast<Index>(i), b), b};
           break;
         }
+    }
   });
   for (const std::vector<Length>& each : ways)
     for (std::size_t i = 0; i < nodes_.size(); ++i) best_[i] = std::min(best_[i], each[i]);
@@ -183,9 +193,9 @@ void NodeOwners::touch() {
 }
 
 bool NodeOwners::within_another(std::size_t node) const {
-  const BoneSight sight(surfaces_, pieces_, surfaces_.points.row(nodes_[node]));
-  for (Index other = 0; other < pieces_; ++other)
-    if (other != piece(node) && sight.sides(other) >= enough_sides) return true;
+  const BoneSight sight(surfaces_, slots_, slot_count_, surfaces_.points.row(nodes_[node]));
+  for (Index other = 0; other < slot_count_; ++other)
+    if (other != slot(node) && sight.sides(other) >= enough_sides) return true;
   return false;
 }
 

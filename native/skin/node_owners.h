@@ -14,7 +14,7 @@ class NodeOwners {
  public:
   /// The nodes are these samples, about `spacing` apart, and the graph's; `straight` are distances (n,
   /// bones).
-  NodeOwners(const SurfacePoints& surfaces, const std::vector<Index>& nodes, double spacing,
+  NodeOwners(const PiecePoints& surfaces, const std::vector<Index>& nodes, double spacing,
              const InteriorGraph& graph, const RowMatrix<float>& straight);
 
   /// Bones (n).
@@ -26,6 +26,7 @@ class NodeOwners {
 
   bool has_bone(std::size_t node) const { return best_[node].second >= 0; }
   Index piece(std::size_t node) const { return surfaces_.pieces[nodes_[node]]; }
+  Index slot(std::size_t node) const { return slots_[piece(node)]; }
   double square(std::size_t node, std::size_t other) const {
     return (surfaces_.points.row(nodes_[node]) - surfaces_.points.row(nodes_[other])).squaredNorm();
   }
@@ -36,12 +37,13 @@ class NodeOwners {
   void touch();
   bool within_another(std::size_t node) const;
 
-  const SurfacePoints& surfaces_;
-  Index pieces_;
+  const PiecePoints& surfaces_;
   const std::vector<Index>& nodes_;
   double spacing_;
   const InteriorGraph& graph_;
   const RowMatrix<float>& straight_;
+  std::vector<Index> slots_;  // of the surfaces that may lie around bones; −1: others
+  Index slot_count_ = 0;
   std::vector<Length> best_;
 };
 

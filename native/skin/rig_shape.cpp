@@ -12,6 +12,7 @@
 #include "sampling/canonical_order.h"
 #include "sampling/nearest_sample.h"
 #include "sampling/sample_choice.h"
+#include "skin/bone_sight.h"
 #include "solve/setup.h"
 
 namespace arapfields {
@@ -35,7 +36,7 @@ constexpr Index least_held = 12;
 /// A point about a bone's end that is so much nearer to it than to all that follow goes with the bone.
 constexpr float clearly = 0.5f;
 /// Surfaces so many spacings from others that go another way are trusted, as far as touching ones.
-constexpr double trusted_spacings = 3.0, least_trust = 1e-3;
+constexpr double trusted_spacings = 4.0, least_trust = 1e-3;
 /// In sizes of the shape, how far a bone may lie from it.
 constexpr double farthest = 0.5;
 
@@ -98,7 +99,7 @@ void RigShape::set_trust() {
       for (const Index j : places_.within(nodes.points.row(i), far))
         if (nodes.pieces[i] != nodes.pieces[j] && !tree.matters(owners[i], owners[j], 0.0))
           square = std::min(square, (nodes.points.row(i) - nodes.points.row(j)).squaredNorm());
-      trust[i] = std::max(least_trust, square / (far * far));
+      trust[i] = std::max(least_trust, std::pow(square / (far * far), 2));
     }
   });
   cuts_itself_ = trust.minCoeff() < 1.0;
@@ -163,6 +164,10 @@ RigShape rig_shape(const TriangleMesh& mesh, const WeldedVertices& welded, const
   std::vector<Index> pieces;
   for (const std::int32_t t : soup.closest(samples.frame.to_mesh(samples.points), progress).triangles)
     pieces.push_back(piece_of[mesh.triangles(t, 0)]);
+  std::vector<Index> sizes(welded.first.size(), 0);
+  for (const Index piece : pieces) ++sizes[piece];
+  const auto in_crumbs = [&](Index piece) { return sizes[piece] < BoneSight::all_sides; };
+  if (2 * std::ranges::count_if(pieces, in_crumbs) > samples.size()) pieces.clear();  // a soup of triangles
   return RigShape(samples, bones, progress, std::move(pieces));
 }
 

@@ -8,7 +8,7 @@
 #include "options/skin.h"
 #include "sampling/oriented_points.h"
 #include "skin/bone_regions.h"
-#include "skin/surface_points.h"
+#include "skin/piece_points.h"
 
 namespace arapfields {
 
@@ -22,10 +22,10 @@ struct RigShape {
 
   Index size() const { return nodes.points.rows(); }
   /// The nearest node of the same surface and side of each of some points, and the nearest sample.
-  std::vector<Index> nearest_nodes(const SurfacePoints& points) const {
+  std::vector<Index> nearest_nodes(const PiecePoints& points) const {
     return nearest_on_own(points, nodes, spacing, enough_nodes());
   }
-  std::vector<Index> nearest_samples(const SurfacePoints& points) const {
+  std::vector<Index> nearest_samples(const PiecePoints& points) const {
     return nearest_on_own(points, surface, 0.0, enough_nodes());
   }
   /// Whether surfaces of parts that go different ways touch or cut each other.
@@ -46,10 +46,10 @@ struct RigShape {
   Skeleton::Symmetry symmetry;
   std::vector<int> sides;  ///< of each bone: −1 and 1 off the plane of symmetry, 0 elsewhere
   std::vector<Handle> handles;
-  SurfacePoints surface;  ///< the samples
-  SurfacePoints nodes;    ///< (n) of these
-  double extent;          ///< size of the shape
-  double spacing;         ///< of the nodes
+  PiecePoints surface;  ///< the samples
+  PiecePoints nodes;    ///< (n) of these
+  double extent;        ///< size of the shape
+  double spacing;       ///< of the nodes
   /// Neighbours of each node through the inside, with weights of sum one.
   std::vector<std::vector<std::pair<Index, double>>> neighbours;
   RowMatrix<float> bone_distances;  ///< (n, bones) through the inside
@@ -60,7 +60,9 @@ struct RigShape {
  private:
   /// How many nodes a surface needs that needs no other's. Where parts touch, each stands alone.
   Index enough_nodes() const { return cuts_itself_ ? 1 : 30; }
-  bool stands_alone(Index piece) const { return node_counts_[piece] >= enough_nodes(); }
+  bool stands_alone(Index piece) const {
+    return piece < static_cast<Index>(node_counts_.size()) && node_counts_[piece] >= enough_nodes();
+  }
   void set_trust();
   void set_handles();
 

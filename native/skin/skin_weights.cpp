@@ -73,7 +73,7 @@ Fitted fitted_nodes(const RigShape& rig, PointsIn points, const std::vector<Inde
 }
 
 /// Weights of points of the shape.
-RowMatrix<float> fitted_points(const RigShape& rig, const SurfacePoints& given, const SkinOptions& options,
+RowMatrix<float> fitted_points(const RigShape& rig, const PiecePoints& given, const SkinOptions& options,
                                const Progress& progress) {
   const Points& points = given.points;
   const std::vector<Index> near = rig.nearest_nodes(given);

@@ -19,7 +19,7 @@ constexpr double least_weight = -0.25;
 
 }  // namespace
 
-VertexBlend::VertexBlend(const RigShape& rig, const SurfacePoints& given, const std::vector<Index>& nearest)
+VertexBlend::VertexBlend(const RigShape& rig, const PiecePoints& given, const std::vector<Index>& nearest)
     : entries_(given.points.rows()) {
   const Points &points = given.points, &normals = given.normals;
   const double width = reach * rig.spacing;

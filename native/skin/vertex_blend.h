@@ -12,7 +12,7 @@ namespace arapfields {
 class VertexBlend {
  public:
   /// Of some points and their nearest nodes.
-  VertexBlend(const RigShape& rig, const SurfacePoints& given, const std::vector<Index>& nearest);
+  VertexBlend(const RigShape& rig, const PiecePoints& given, const std::vector<Index>& nearest);
 
   /// Values (nodes, k) at the points (n, k).
   RowMatrix<float> operator()(const RowMatrix<float>& values) const;

@@ -8,15 +8,16 @@
 namespace arapfields {
 
 /// Points of a shape that may be of several surfaces, which may cut each other: body, hair, shoes.
-struct SurfacePoints {
-  Points points, normals;     ///< (n,3) normals are of unit length, outwards
+struct PiecePoints {
+  Points points;              ///< (n,3)
+  Points normals;             ///< (n,3) unit length, outwards
   std::vector<Index> pieces;  ///< (n) which surface each lies on, from 0
   Index count() const;        ///< of surfaces
 };
 
 /// For each of some points the other with the least |p − q|² + turn² |n − m|². Those of a surface on which
 /// there are at least so many others have one of these.
-std::vector<Index> nearest_on_own(const SurfacePoints& points, const SurfacePoints& others, double turn,
+std::vector<Index> nearest_on_own(const PiecePoints& points, const PiecePoints& others, double turn,
                                   Index enough);
 
 }  // namespace arapfields

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "skin/surface_points.h"
+#include "skin/piece_points.h"
 
 #include <algorithm>
 #include <map>
@@ -9,9 +9,9 @@
 
 namespace arapfields {
 
-Index SurfacePoints::count() const { return pieces.empty() ? 0 : 1 + *std::ranges::max_element(pieces); }
+Index PiecePoints::count() const { return pieces.empty() ? 0 : 1 + *std::ranges::max_element(pieces); }
 
-std::vector<Index> nearest_on_own(const SurfacePoints& points, const SurfacePoints& others, double turn,
+std::vector<Index> nearest_on_own(const PiecePoints& points, const PiecePoints& others, double turn,
                                   Index enough) {
   std::vector<Index> result =
       OrientedPoints(others.points, others.normals).nearest(points.points, points.normals, turn);
