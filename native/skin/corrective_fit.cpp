@@ -84,7 +84,7 @@ CorrectiveFit::CorrectiveFit(const RigShape& rig, PointsIn vertices, const std::
     if (region_of_[i] >= 0)
       right_[i].setZero(static_cast<Index>(regions[region_of_[i]].joints.size()) * joint_features, 3);
   }
-  ExamplePoses examples(rig, vertices, nodes, options, progress.part(0.0, 0.1));
+  ExamplePoses examples(rig, vertices, options, progress.part(0.0, 0.1));
   Random random(options.seed, stream);
   const Vector always = Vector::Ones(joints);
   for (Index p = 0; p < poses; ++p) {
@@ -108,10 +108,11 @@ CorrectiveFit::CorrectiveFit(const RigShape& rig, PointsIn vertices, const std::
         const Mat3 linear = blend.leftCols<3>();
         const Vec3 off = linear.inverse() * (there - linear * rest - blend.col(3));
         if (!off.allFinite()) continue;
+        const auto trusted = static_cast<float>(rig.trust[nodes[i]]);
         Index row = 0;
         for (const Index b : regions[region_of_[i]].joints) {
           right_[i].middleRows<joint_features>(row) +=
-              seen.segment<joint_features>(b * joint_features) * off.cast<float>().transpose();
+              seen.segment<joint_features>(b * joint_features) * (trusted * off.cast<float>()).transpose();
           row += joint_features;
         }
       }

@@ -104,9 +104,9 @@ std::vector<Corrective> skin_correctives(const TriangleMesh& mesh, const std::ve
   const WeldedVertices welded(mesh);
   const RigShape rig = rig_shape(mesh, welded, painted, bones, options, progress);
   const Index n = mesh.vertices.rows();
-  const CorrectiveFit fit(rig, mesh.vertices,
-                          rig.nearest_nodes({mesh.vertices, welded.normals, welded.pieces(mesh)}), weights,
-                          options, progress.part(0.0, 0.8));
+  std::vector<Index> nodes = rig.nearest_nodes({mesh.vertices, welded.normals, welded.pieces(mesh)});
+  for (Index i = 0; i < n; ++i) nodes[i] = nodes[welded.first[i]];
+  const CorrectiveFit fit(rig, mesh.vertices, nodes, weights, options, progress.part(0.0, 0.8));
   progress.report(0.8, "Correctives");
   const std::vector<Key> keys =
       chosen_keys(rig.skeleton, fit, effects_of(rig, fit, progress), options.correctives);

@@ -38,14 +38,17 @@ std::shared_ptr<const RestShape> rest_shape(const RigShape& rig, std::uint64_t s
 
 }  // namespace
 
-ExamplePoses::ExamplePoses(const RigShape& rig, PointsIn points, const std::vector<Index>& near,
-                           const SkinOptions& options, const Progress& progress)
+ExamplePoses::ExamplePoses(const RigShape& rig, PointsIn points, const SkinOptions& options,
+                           const Progress& progress)
     : rig_(rig),
       solver_(rig.samples, rig.handles, solver_options(options), progress, rest_shape(rig, options.seed)),
       points_(points) {
   solver_.track(points);
-  if (rig.cuts_itself())
-    for (Index i = 0; i < points.rows(); ++i) holders_.push_back(rig.holder(points.row(i), near[i]));
+}
+
+void ExamplePoses::hold(const std::vector<Index>& near) {
+  holders_.clear();
+  for (Index i = 0; i < points_.rows(); ++i) holders_.push_back(rig_.holder(points_.row(i), near[i]));
 }
 
 ExamplePose ExamplePoses::draw(Random& random, const Vector& activity, const Progress& progress) {

@@ -21,9 +21,11 @@ struct ExamplePose {
 /// Poses a shape by its bones as handles.
 class ExamplePoses {
  public:
-  /// The field moves these points (n,3), near these nodes; what a bone holds goes with the bone.
-  ExamplePoses(const RigShape& rig, PointsIn points, const std::vector<Index>& near,
-               const SkinOptions& options, const Progress& progress);
+  /// The field moves these points (n,3).
+  ExamplePoses(const RigShape& rig, PointsIn points, const SkinOptions& options, const Progress& progress);
+
+  /// From now on what bones hold goes with them, of points near these nodes (n).
+  void hold(const std::vector<Index>& near);
 
   /// A pose in which each joint turns with this probability (joints), within its limits.
   ExamplePose draw(Random& random, const Vector& activity, const Progress& progress);

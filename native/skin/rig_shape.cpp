@@ -37,6 +37,8 @@ constexpr Index least_held = 12;
 constexpr float clearly = 0.5f;
 /// Surfaces so many spacings from others that go another way are trusted, as far as touching ones.
 constexpr double trusted_spacings = 4.0, least_trust = 1e-3;
+/// Parts touch where so large a share of the nodes is trusted less than this.
+constexpr double many = 0.03, doubtful_trust = 0.25;
 /// In sizes of the shape, how far a bone may lie from it.
 constexpr double farthest = 0.5;
 
@@ -102,7 +104,9 @@ void RigShape::set_trust() {
       trust[i] = std::max(least_trust, std::pow(square / (far * far), 2));
     }
   });
-  cuts_itself_ = trust.minCoeff() < 1.0;
+  const auto doubtful = static_cast<double>((trust.array() < doubtful_trust).count());
+  cuts_itself_ = doubtful > many * static_cast<double>(size());
+  if (!cuts_itself_) trust.setOnes();
 }
 
 std::vector<Index> RigShape::nodes_within(const Vec3& place, double distance, Index piece) const {

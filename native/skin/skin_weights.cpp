@@ -50,7 +50,8 @@ Fitted fitted_nodes(const RigShape& rig, PointsIn points, const std::vector<Inde
   std::vector<Index> nearest(rig.size());
   std::iota(nearest.begin(), nearest.end(), Index{0});
   nearest.insert(nearest.end(), near.begin(), near.end());
-  ExamplePoses poses(rig, moved, nearest, options, progress.part(0.0, 0.1));
+  ExamplePoses poses(rig, moved, options, progress.part(0.0, 0.1));
+  if (rig.cuts_itself()) poses.hold(nearest);
   WeightFit fit(rig);
   Fitted result;
   Random random(options.seed, stream);

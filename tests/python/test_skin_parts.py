@@ -20,9 +20,13 @@ BONES = {
     "Foot.R": ((-LEG, 0, ANKLE), (-LEG, -0.25, 0.05), "Leg.R"),
 }
 NAMES = list(BONES)
+BONES_OF_FIGURE = [
+    af.Bone(head, tail, None if up is None else NAMES.index(up), name=n)
+    for n, (head, tail, up) in BONES.items()
+]
 
 
-def ellipsoid(center, radii, count=24):
+def ellipsoid(center, radii, count):
     """A closed surface, its triangles outwards."""
     u, v = np.meshgrid(
         np.linspace(0, np.pi, count + 1), 2 * np.pi * np.arange(2 * count) / (2 * count), indexing="ij"
@@ -38,18 +42,18 @@ def ellipsoid(center, radii, count=24):
     return points * radii + center, triangles
 
 
-def figure():
+def figure(count=24):
     """(vertices, triangles, the part of each vertex): a head with a hollow, shoes that cut each other."""
-    hollow = ellipsoid((0, 0, 1.15), (0.33, 0.3, 0.27))
+    hollow = ellipsoid((0, 0, 1.15), (0.33, 0.3, 0.27), count)
     parts = {
-        "trunk": ellipsoid((0, 0, 0.7), (0.17, 0.12, 0.3)),
-        "head": ellipsoid((0, 0, 1.15), (0.35, 0.32, 0.29)),
+        "trunk": ellipsoid((0, 0, 0.7), (0.17, 0.12, 0.3), count),
+        "head": ellipsoid((0, 0, 1.15), (0.35, 0.32, 0.29), count),
         "lining": (hollow[0], hollow[1][:, ::-1]),
     }
     for side, x in (("L", 1), ("R", -1)):
-        parts[f"arm.{side}"] = ellipsoid((0.32 * x, 0, 0.8), (0.22, 0.05, 0.05))
-        parts[f"leg.{side}"] = ellipsoid((LEG * x, 0, 0.3), (0.07, 0.07, 0.25))
-        parts[f"shoe.{side}"] = ellipsoid((LEG * x, -0.08, 0.08), (LEG + 0.015, 0.22, 0.08))
+        parts[f"arm.{side}"] = ellipsoid((0.32 * x, 0, 0.8), (0.22, 0.05, 0.05), count)
+        parts[f"leg.{side}"] = ellipsoid((LEG * x, 0, 0.3), (0.07, 0.07, 0.25), count)
+        parts[f"shoe.{side}"] = ellipsoid((LEG * x, -0.08, 0.08), (LEG + 0.015, 0.22, 0.08), count)
     sizes = [len(vertices) for vertices, _ in parts.values()]
     starts = np.cumsum([0, *sizes[:-1]])
     triangles = [faces + start for (_, faces), start in zip(parts.values(), starts, strict=True)]
@@ -63,11 +67,20 @@ def figure():
 @pytest.fixture(scope="module")
 def skinned():
     vertices, triangles, parts = figure()
-    bones = [
-        af.Bone(head, tail, None if up is None else NAMES.index(up), name=n)
-        for n, (head, tail, up) in BONES.items()
-    ]
-    return vertices, parts, np.asarray(af.skin_weights((vertices, triangles), bones, OPTIONS))
+    return vertices, parts, np.asarray(af.skin_weights((vertices, triangles), BONES_OF_FIGURE, OPTIONS))
+
+
+def test_correctives_open_no_cracks_between_triangles_that_only_touch():
+    vertices, triangles, _ = figure(count=10)
+    loose, alone = vertices[triangles].reshape(-1, 3), np.arange(triangles.size).reshape(-1, 3)
+    options = af.SkinOptions(poses=8, samples=2000, correctives=6)
+    weights = af.skin_weights((loose, alone), BONES_OF_FIGURE, options)
+    keys = af.skin_correctives(loose, alone, BONES_OF_FIGURE, weights, options)
+    _, place = np.unique(loose, axis=0, return_inverse=True)
+    for key in keys:
+        offsets = np.asarray(key.offsets)
+        _, first = np.unique(place, return_index=True)
+        assert np.allclose(offsets, offsets[first][place.ravel()], atol=1e-9)
 
 
 def share(weights, *bones):
