@@ -108,7 +108,7 @@ CorrectiveFit::CorrectiveFit(const RigShape& rig, PointsIn vertices, const std::
         const Mat3 linear = blend.leftCols<3>();
         const Vec3 off = linear.inverse() * (there - linear * rest - blend.col(3));
         if (!off.allFinite()) continue;
-        const auto trusted = static_cast<float>(rig.trust[nodes[i]]);
+        const auto trusted = static_cast<float>(rig.key_trust[nodes[i]]);
         Index row = 0;
         for (const Index b : regions[region_of_[i]].joints) {
           right_[i].middleRows<joint_features>(row) +=

@@ -39,6 +39,8 @@ constexpr float clearly = 0.5f;
 constexpr double trusted_spacings = 4.0, least_trust = 1e-3;
 /// Parts touch where so large a share of the nodes is trusted less than this.
 constexpr double many = 0.03, doubtful_trust = 0.25;
+/// The share of a surface in doubt from which it gets no correctives.
+constexpr double much = 0.1;
 /// In sizes of the shape, how far a bone may lie from it.
 constexpr double farthest = 0.5;
 
@@ -107,6 +109,15 @@ void RigShape::set_trust() {
   const auto doubtful = static_cast<double>((trust.array() < doubtful_trust).count());
   cuts_itself_ = doubtful > many * static_cast<double>(size());
   if (!cuts_itself_) trust.setOnes();
+  std::vector<Index> in_doubt(node_counts_.size(), 0);
+  for (Index i = 0; i < size(); ++i)
+    if (trust[i] < doubtful_trust) ++in_doubt[nodes.pieces[i]];
+  key_trust = trust;
+  for (Index i = 0; i < size(); ++i) {
+    const Index piece = nodes.pieces[i];
+    if (static_cast<double>(in_doubt[piece]) > much * static_cast<double>(node_counts_[piece]))
+      key_trust[i] = 0.0;
+  }
 }
 
 std::vector<Index> RigShape::nodes_within(const Vec3& place, double distance, Index piece) const {

@@ -55,6 +55,7 @@ struct RigShape {
   RowMatrix<float> bone_distances;  ///< (n, bones) through the inside
   std::vector<Index> owners;        ///< (n) the bone that each node belongs to
   Vector trust;                     ///< (n) in the field's shape, less where others' surfaces are near
+  Vector key_trust;                 ///< (n) the same, 0 on surfaces much of which is doubtful
   std::vector<Index> sample_nodes;  ///< the node nearest to each sample
 
  private:
