@@ -3,8 +3,9 @@
 
 import numpy as np
 import pytest
+import trimesh
 from support.geometry import contact_cases
-from support.geometry.bar import LEFT, RIGHT, bar_samples, turned
+from support.geometry.bar import LEFT, RIGHT, bar_samples, box, turned
 from support.geometry.contact_bar import ALIKE, BALL, DEEPEST, PLATE, live
 
 import arapfields as af
@@ -91,3 +92,26 @@ def test_legs_that_a_drag_has_crossed_come_back():
     end = live.solve(rest, iterations=60, tolerance=1e-6)(samples.points)
     assert names == {"itself"} and not live.report.contact.held
     assert np.abs(end - start).max() < 1e-3 * np.ptp(samples.points, axis=0).max()
+
+
+def test_parts_that_cut_each_other_at_rest_slide_freely():
+    """Arms that reach into the head above them are pulled inwards; nothing else touches."""
+    ball = trimesh.creation.icosphere(4)
+    parts = [
+        ball.copy().apply_scale(radii).apply_translation(center)
+        for radii, center in (
+            ((0.17, 0.12, 0.3), (0, 0, 0.7)),
+            ((0.35, 0.32, 0.29), (0, 0, 1.15)),
+            ((0.3, 0.08, 0.08), (0.27, 0, 0.86)),
+            ((0.3, 0.08, 0.08), (-0.27, 0, 0.86)),
+        )
+    ]
+    figure = trimesh.util.concatenate(parts)
+    samples = af.sample_mesh(figure.vertices, figure.faces, 8000, seed=0)
+    handles = [box([x, 0, z], [r] * 3) for x, z, r in ((0, 0.6, 0.12), (0.5, 0.86, 0.08), (-0.5, 0.86, 0.08))]
+    pulled = [turned(0, shift=(x, 0, 0)) @ m for x, m in zip((0, -0.1, 0.1), handles, strict=True)]
+    shapes = []
+    for contact in (None, af.Contact(itself=True)):
+        solver = af.LiveDeformer(samples, [af.Cuboid(m, m) for m in handles], contact=contact)
+        shapes.append(solver.solve(pulled)(samples.points))
+    assert (shapes[0] == shapes[1]).all()

@@ -28,6 +28,9 @@ constexpr double spacings_aside = 2.0;
 /// Places where winding numbers are taken, and by how much more than at rest these are inside another part.
 constexpr Index most_probes = 500;
 constexpr double inside_another = 0.6;
+/// Where parts cut each other at rest, samples that are nearer there, in cube units, are left alone if one is
+/// no farther beyond the other than what is kept: the embedding, a function of the place, is of no use there.
+constexpr double near_a_cut = 0.1;
 /// Of squares in single precision.
 constexpr double rounding = 1e-4;
 /// Meshes are so far from each other.
@@ -55,12 +58,8 @@ SelfContact::SelfContact(const RadialProblem& problem, const std::vector<Index>&
   const PointGrid grid(places, near_at_rest);  // about a square of the surface lies in each cell
   const double share = static_cast<double>(grid.size()) / static_cast<double>(n);
   aside_ = spacings_aside * near_at_rest * std::sqrt(share);
-  least_ = Vector::Constant(n, kept);
-  Vector at_rest = least_;
-  for (const FacingPair& pair : search(places, [&](auto*) { return normals; }, near_at_rest, Beyond::all))
-    for (const Index i : {pair.first, pair.second})
-      at_rest[i] = std::min(at_rest[i], std::max(0.0, pair.gap));
-  least_ = at_rest;
+  kept_ = kept;
+  normals_ = normals;
   for (Index i = 0; i < n; i += std::max<Index>(1, n / most_probes)) probes_.push_back(i);
   windings_ = windings(places, normals);
   Vector sorted = windings_;
@@ -68,6 +67,13 @@ SelfContact::SelfContact(const RadialProblem& problem, const std::vector<Index>&
   std::nth_element(sorted.begin(), sorted.begin() + half, sorted.end());
   share_ = 1.0 / std::max(sorted[half], 1e-12);  // most probes are inside once
   windings_ *= share_;
+  is_cut_ = windings_.maxCoeff() > 1.0 + inside_another;
+  least_ = Vector::Constant(n, kept);
+  Vector at_rest = least_;
+  for (const FacingPair& pair : search(places, [&](auto*) { return normals; }, near_at_rest, Beyond::all))
+    for (const Index i : {pair.first, pair.second})
+      at_rest[i] = std::min(at_rest[i], std::max(0.0, pair.gap));
+  least_ = at_rest;
   begin(places, [&](auto*) { return normals; });
 }
 
@@ -114,6 +120,13 @@ bool SelfContact::is_far(Index i, Index j, double distance) const {
   if (!meshes_.empty() && meshes_[static_cast<std::size_t>(i)] != meshes_[static_cast<std::size_t>(j)])
     return true;
   return (inside_.row(i) - inside_.row(j)).squaredNorm() > distance * distance;
+}
+
+/// Whether two samples of parts that cut each other at rest are left alone.
+bool SelfContact::is_cut(Index i, Index j) const {
+  const Vec3 arm = (inside_.row(i) - inside_.row(j)).leftCols<3>().transpose();
+  return is_cut_ && arm.squaredNorm() < near_a_cut * near_a_cut &&
+         std::min(normals_.row(j).dot(arm), -normals_.row(i).dot(arm)) < kept_;
 }
 
 /// Whether what is beyond a sample came through it: it faced the same part before, or was before it.
@@ -185,7 +198,8 @@ std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& norm
         const double square = arm.squaredNorm();
         if (square >= nearest) continue;
         const Vec3 other = normals.row(j).transpose();
-        if (normal.dot(other) > facing || least_[j] <= 0.0 || !is_far(i, j, far_inside)) continue;
+        if (normal.dot(other) > facing || least_[j] <= 0.0 || !is_far(i, j, far_inside) || is_cut(i, j))
+          continue;
         const double gap = arm.dot(other);
         if (square - gap * gap > aside_ * aside_ || -gap > std::min(widths_[i], widths_[j])) continue;
         const double least = beyond == Beyond::shallow ? -shallow : 0.0;

@@ -49,11 +49,15 @@ class SelfContact {
   std::vector<std::vector<Index>> near_runs(PointsIn places, const RowBoxes<4>& boxes, double near) const;
   bool meet(PointsIn places, const RowBoxes<4>& boxes, Index a, Index b, double near) const;
   bool is_far(Index i, Index j, double distance) const;
+  bool is_cut(Index i, Index j) const;
   bool came_through(Index i, Index j, const Vec3& normal) const;
   void gather_rest();
   void remember(PointsIn places, const std::vector<FacingPair>& pairs);
 
   RowMatrix<double> inside_;  // (n,6) rest places and their embedding
+  Points normals_;            // (n,3) at rest
+  double kept_ = 0.0;
+  bool is_cut_ = false;       // whether parts cut each other at rest
   std::vector<Index> order_;  // of samples, as they lie together at rest
   struct Ball {
     Eigen::Array<float, 8, 1> middle;  // of rows of these, and the mesh
