@@ -38,9 +38,9 @@ constexpr float clearly = 0.5f;
 /// Surfaces so many spacings from others that go another way are trusted, as far as touching ones.
 constexpr double trusted_spacings = 4.0, least_trust = 1e-3;
 /// Parts touch where so large a share of the nodes is trusted less than this.
-constexpr double many = 0.03, doubtful_trust = 0.25;
+constexpr double doubtful_nodes = 0.03, doubtful_trust = 0.25;
 /// The share of a surface in doubt from which it gets no correctives.
-constexpr double much = 0.1;
+constexpr double doubtful_surface = 0.1;
 /// In sizes of the shape, how far a bone may lie from it.
 constexpr double farthest = 0.5;
 
@@ -107,7 +107,7 @@ void RigShape::set_trust() {
     }
   });
   const auto doubtful = static_cast<double>((trust.array() < doubtful_trust).count());
-  cuts_itself_ = doubtful > many * static_cast<double>(size());
+  cuts_itself_ = doubtful > doubtful_nodes * static_cast<double>(size());
   if (!cuts_itself_) trust.setOnes();
   std::vector<Index> in_doubt(node_counts_.size(), 0);
   for (Index i = 0; i < size(); ++i)
@@ -115,7 +115,7 @@ void RigShape::set_trust() {
   key_trust = trust;
   for (Index i = 0; i < size(); ++i) {
     const Index piece = nodes.pieces[i];
-    if (static_cast<double>(in_doubt[piece]) > much * static_cast<double>(node_counts_[piece]))
+    if (static_cast<double>(in_doubt[piece]) > doubtful_surface * static_cast<double>(node_counts_[piece]))
       key_trust[i] = 0.0;
   }
 }
@@ -181,8 +181,8 @@ RigShape rig_shape(const TriangleMesh& mesh, const WeldedVertices& welded, const
     pieces.push_back(piece_of[mesh.triangles(t, 0)]);
   std::vector<Index> sizes(welded.first.size(), 0);
   for (const Index piece : pieces) ++sizes[piece];
-  const auto in_crumbs = [&](Index piece) { return sizes[piece] < BoneSight::all_sides; };
-  if (2 * std::ranges::count_if(pieces, in_crumbs) > samples.size()) pieces.clear();  // a soup of triangles
+  const auto is_small = [&](Index piece) { return sizes[piece] < BoneSight::all_sides; };
+  if (2 * std::ranges::count_if(pieces, is_small) > samples.size()) pieces.clear();  // a soup of triangles
   return RigShape(samples, bones, progress, std::move(pieces));
 }
 

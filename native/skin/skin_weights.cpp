@@ -141,11 +141,8 @@ RowMatrix<float> skin_weights(const SurfaceSamples& samples, const std::vector<B
   options.validate();
   const ThreadScope threads(options.threads);
   const RigShape rig(samples, bones, progress);
-  const Points points = samples.frame.to_mesh(samples.points);
-  return finished(
-      rig,
-      fitted_points(rig, {points, samples.normals, std::vector<Index>(points.rows(), 0)}, options, progress),
-      static_cast<Index>(bones.size()), options.influences);
+  return finished(rig, fitted_points(rig, rig.surface, options, progress), static_cast<Index>(bones.size()),
+                  options.influences);
 }
 
 RowMatrix<float> skin_weights(const TriangleMesh& mesh, const std::vector<Bone>& bones,

@@ -94,17 +94,22 @@ Points some_points(Index count) {
   static_cast<void>(value), static_cast<void>(worst), static_cast<void>(rest), static_cast<void>(mesh);
 }
 
-}  // namespace
-
-BOOST_AUTO_TEST_CASE(clothes_keep_their_place_above_the_surface_whatever_the_field_is_beside_it) {
-  constexpr Index side = 50;
+/// A unit square with side × side samples in a grid.
+SurfaceSamples plate_of(Index side) {
   SurfaceSamples plate;
   plate.points.resize(side * side, 3);
   for (Index i = 0; i < side; ++i)
     for (Index j = 0; j < side; ++j)
-      plate.points.row(i * side + j) << static_cast<double>(i) / side - 0.5,
-          static_cast<double>(j) / side - 0.5, 0.0;
+      plate.points.row(i * side + j) << static_cast<double>(i) / static_cast<double>(side) - 0.5,
+          static_cast<double>(j) / static_cast<double>(side) - 0.5, 0.0;
   plate.normals = Vec3::UnitZ().transpose().replicate(side * side, 1);
+  return plate;
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(clothes_keep_their_place_above_the_surface_whatever_the_field_is_beside_it) {
+  const SurfaceSamples plate = plate_of(50);
   Points cloth = 0.5 * some_points(300);
   cloth.col(2).setConstant(0.028);
   cloth.middleRows(100, 100).col(2).setConstant(0.9 * Jump::from);
@@ -120,14 +125,7 @@ BOOST_AUTO_TEST_CASE(clothes_keep_their_place_above_the_surface_whatever_the_fie
 }
 
 BOOST_AUTO_TEST_CASE(clothes_on_what_rolls_up_keep_their_distance_or_go_with_the_field) {
-  constexpr Index side = 60;
-  SurfaceSamples plate;
-  plate.points.resize(side * side, 3);
-  for (Index i = 0; i < side; ++i)
-    for (Index j = 0; j < side; ++j)
-      plate.points.row(i * side + j) << static_cast<double>(i) / side - 0.5,
-          static_cast<double>(j) / side - 0.5, 0.0;
-  plate.normals = Vec3::UnitZ().transpose().replicate(side * side, 1);
+  const SurfaceSamples plate = plate_of(60);
   Points cloth = 0.6 * some_points(200);
   cloth.col(2).setConstant(0.02);
   // Off a roll's axis by 1/k − z, so as far from the surface as at rest; the field has that, too.
