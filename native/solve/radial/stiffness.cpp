@@ -20,9 +20,7 @@ namespace {
 
 /// Centers overlap so much that the matrix is singular up to rounding.
 constexpr double ridge = 1e-9;
-/// Samples for each center, and at least. Three mixtures stand for the nine derivatives at a sample: more
-/// samples for the same number of products, so that no basis function falls between them.
-constexpr Index samples_a_center = 4, least_samples = 1000;
+/// Three mixtures stand for the nine derivatives at a sample, for a third of the products.
 constexpr int derivatives = 9, mixtures = 3;
 /// Samples of a stance.
 constexpr Index stance_samples = 1000;
@@ -160,20 +158,12 @@ void StiffnessAssembler::add(Index first, Index last, RowMatrix<double>& sum) {
 RowMatrix<double> stiffness_matrix(const RadialBasis& basis, PointsIn samples, const Vector& bending,
                                    const Vector& weights, const Progress& progress,
                                    const HandleBlend* blend) {
-  const Index enough = std::max(least_samples, samples_a_center * basis.center_count());
-  const Index taken = std::min<Index>(samples.rows(), enough);
-  Points some(taken, 3);
-  Vector roots(taken), weight_roots(weights.size() > 0 ? taken : 0);
-  for (Index i = 0; i < taken; ++i) {
-    some.row(i) = samples.row(i * samples.rows() / taken);
-    roots[i] = std::sqrt(bending[i * samples.rows() / taken]);
-    if (weights.size() > 0) weight_roots[i] = std::sqrt(weights[i * samples.rows() / taken]);
-  }
-  const RadialEvaluator<double> sites(basis, some);
-  Vector free(blend != nullptr ? (derivatives + 1) * taken : 0);
-  if (blend != nullptr) blend->free_weight(some, JetOrder::second, free.data());
+  const RadialEvaluator<double> sites(basis, samples);
+  Vector free(blend != nullptr ? (derivatives + 1) * samples.rows() : 0);
+  if (blend != nullptr) blend->free_weight(samples, JetOrder::second, free.data());
   std::vector<RowMatrix<double>> sums(parts, RowMatrix<double>::Zero(basis.size(), basis.size()));
-  std::vector<StiffnessAssembler> assemblers(parts, StiffnessAssembler(sites, roots, weight_roots, free));
+  std::vector<StiffnessAssembler> assemblers(
+      parts, StiffnessAssembler(sites, bending.cwiseSqrt(), weights.cwiseSqrt(), free));
   const Index groups = (sites.blocks() + blocks_at_once - 1) / blocks_at_once;
   for (Index slice = 0; slice < slices; ++slice) {
     parallel_jobs(parts, [&](Index part) {
@@ -186,7 +176,7 @@ RowMatrix<double> stiffness_matrix(const RadialBasis& basis, PointsIn samples, c
     progress.report(static_cast<double>(slice + 1) / slices, "stiffness");
   }
   for (std::size_t part = 1; part < sums.size(); ++part) sums[0] += sums[part];
-  return sums[0] / static_cast<double>(taken);
+  return sums[0] / static_cast<double>(samples.rows());
 }
 
 std::pair<RowMatrix<double>, Vector> stance_rows(const RadialBasis& basis, PointsIn samples,

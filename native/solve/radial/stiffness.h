@@ -9,7 +9,7 @@
 
 namespace arapfields {
 
-/// mean w (‖J‖² + λ‖D‖²) over (some of) the samples, with each one's λ and w (empty: all 1), as a matrix of
+/// mean w (‖J‖² + λ‖D‖²) over the samples, with each one's λ and w (empty: all 1), as a matrix of
 /// the basis, of which the lower triangle is filled: what of the energy's Hessian depends on the rest surface
 /// alone. An estimate, for preconditioners: it takes three mixtures of the derivatives at a sample. With
 /// exact handles, of the functions times their blend's free weight.
