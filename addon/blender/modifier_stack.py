@@ -20,6 +20,8 @@ FREE_NORMALS = "custom_normal"  # attribute of custom normals; free ones are vec
 # What a new field modifier comes before, at the end of a stack: it refines the shape and follows it.
 REFINING = {"SUBSURF", "MULTIRES", "BEVEL", "SOLIDIFY", "EDGE_SPLIT", "WEIGHTED_NORMAL", "NORMAL_EDIT"}
 REFINING |= {"TRIANGULATE", "WIREFRAME"}
+# Modifiers before which Blender allows those alone that do nothing but deform, as nodes may do more.
+ORIGINAL = {"MULTIRES", "SOFT_BODY"}
 # Modifiers that keep every vertex and its number.
 KEEPING = {"ARMATURE", "CAST", "CLOTH", "COLLISION", "CORRECTIVE_SMOOTH", "CURVE", "DATA_TRANSFER"}
 KEEPING |= {"DISPLACE", "HOOK", "LAPLACIANDEFORM", "LAPLACIANSMOOTH", "LATTICE", "MESH_CACHE", "MESH_DEFORM"}
@@ -56,18 +58,24 @@ def place(source):
     if holds_splats(source):  # what comes after draws them
         return 0
     if settings_of(source).under_rig:
-        return next((index for index, one in enumerate(stack) if is_posing(source, one)), len(stack))
+        posing = next((index for index, one in enumerate(stack) if is_posing(source, one)), len(stack))
+        return max(posing, earliest(stack))
     return end(stack)
 
 
 def end(stack):
     """Where a modifier comes that deforms what those of a stack make, before those that only refine it."""
-    index = len(stack)
-    while index and (
+    index, least = len(stack), earliest(stack)
+    while index > least and (
         stack[index - 1].type in REFINING or getattr(stack[index - 1], "use_pin_to_last", False)
     ):
         index -= 1
     return index
+
+
+def earliest(stack):
+    """Where nodes can come first in a stack."""
+    return max((index + 1 for index, one in enumerate(stack) if one.type in ORIGINAL), default=0)
 
 
 def before(source, in_place):

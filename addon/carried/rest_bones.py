@@ -133,6 +133,11 @@ class BeforeArmatures:
     """The field's place before a source's armatures, taken for one wrap and given back where that fails."""
 
     def __init__(self, source):
+        stack = list(source.modifiers)
+        first = next((k for k, one in enumerate(stack) if modifier_stack.is_posing(source, one)), len(stack))
+        if first < modifier_stack.earliest(stack):
+            last = stack[modifier_stack.earliest(stack) - 1].name
+            raise UserError("{name}: move its armature behind {modifier}", source, modifier=last)
         self.source = ObjectReference(source)
         self.was, self.index, self.kept = settings_of(source).under_rig, None, False
         settings_of(source).under_rig = True
@@ -140,8 +145,6 @@ class BeforeArmatures:
         if modifier is None:
             return
         index = source.modifiers.find(modifier.name)
-        posing = (k for k, m in enumerate(source.modifiers) if modifier_stack.is_posing(source, m))
-        first = next(posing, index)
         if first < index:
             self.index = index
             source.modifiers.move(index, first)

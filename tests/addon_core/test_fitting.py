@@ -10,6 +10,7 @@ from addon.core.geometry import fitting
 
 DISTANCE = 0.02  # of clothes from a ball of radius 1
 CLOSE = 0.2  # of that
+SAME = 1e-9  # of the radius: sums in another order
 STILL = 1e-3  # of the radius: what hardly counts moves by no more
 
 
@@ -42,3 +43,15 @@ def test_where_the_other_body_has_a_gap_clothes_stay(ball):
     worn = (1 + DISTANCE) * v
     shape, above = body.fit(worn, worn, f), v[:, 2] > 0.7
     assert np.abs(shape - worn)[above].max() < STILL
+
+
+def test_clothes_whose_vertices_are_split_at_seams_stay_closed():
+    """As game formats write them: each triangle by itself. They go where the joined ones go."""
+    v, f = sphere(1.0, 4)
+    body = fitting.Body(af, (v, v, f), (v, f))
+    near = 1 + DISTANCE * (0.2 + 0.1 * np.sin(9 * v))
+    joined = body.fit((1 + DISTANCE) * v, near * v, f)
+    split = body.fit(
+        (1 + DISTANCE) * v[f].reshape(-1, 3), (near * v)[f].reshape(-1, 3), np.arange(f.size).reshape(-1, 3)
+    )
+    assert np.abs(split - joined[f].reshape(-1, 3)).max() < SAME

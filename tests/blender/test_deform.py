@@ -11,6 +11,7 @@ if IN_BLENDER:
     import bpy
     from mathutils import Matrix
     from support.blender import scenes
+    from support.blender.live import step
 
     from addon.core.runtime import jobs
     from addon.deform import solve_job
@@ -86,6 +87,25 @@ def test_modifiers_are_read_and_the_result_is_what_was_shown():
     after = scenes.world_points(result)
     assert len(after) == len(before) > len(bar.data.vertices) and not result.modifiers
     assert np.abs((after - before)[before[:, 0] < -0.8]).max() < 0.08
+
+
+def test_a_sculpted_mesh_is_moved_after_its_multires():
+    """Blender lets nothing but deforming modifiers stand before one."""
+    bar, _, moving = scenes.bar_with_handles()
+    bar.modifiers.new("Multires", "MULTIRES")
+    bpy.ops.object.multires_subdivide(modifier="Multires")
+    bar.modifiers.new("Triangulate", "TRIANGULATE")
+    before = scenes.world_points(bar)
+    moving.location.z += 0.4
+    assert bpy.ops.arapfields.deform(**scenes.QUICK | {"iterations": 120}) == {"FINISHED"}
+    assert [modifier.type for modifier in bar.modifiers] == ["MULTIRES", "NODES", "TRIANGULATE"]
+    after = scenes.world_points(bar)
+    assert len(after) == len(before) > 2 * len(bar.data.vertices)
+    assert np.abs(after - before)[before[:, 0] < -0.8].max() < 0.08
+    assert np.abs(after - before - [0, 0, 0.4])[before[:, 0] > 0.8].max() < 0.12
+    bpy.ops.arapfields.live()
+    step()
+    assert np.abs(scenes.world_points(bar) - after).max() < 0.05
 
 
 PLACES = {

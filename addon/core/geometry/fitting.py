@@ -39,7 +39,13 @@ class Body:
         return wanted, np.exp(-(off[0] ** 2) - off[1] ** 2)
 
     def fit(self, rest, moved, triangles):
-        """(n, 3) vertices of a carried mesh, from where it is at rest and where the wrap's field takes it."""
+        """(n, 3) vertices of a carried mesh, from where it is at rest and where the wrap's field takes it.
+
+        Vertices that are at one place at rest stay together.
+        """
+        _, first, joined = np.unique(rest, axis=0, return_index=True, return_inverse=True)
+        if len(first) < len(rest):
+            return self.fit(rest[first], moved[first], joined.ravel()[triangles])[joined.ravel()]
         (wanted, near), shape = self.wanted(rest, triangles), np.array(moved, float)
         edges = np.unique(np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
         for _ in range(ROUNDS):
