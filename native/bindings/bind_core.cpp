@@ -7,6 +7,7 @@
 #include "core/memory.h"
 #include "core/parallel.h"
 #include "core/simd_level.h"
+#include "tensors/device.h"
 
 namespace arapfields::python {
 void raise_diverged(const Diverged& error, const py::object& last_good) {
@@ -38,6 +39,10 @@ void translate(std::exception_ptr raised) {
     PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(result.ptr())), result.ptr());
   } catch (const py::cast_error& error) {
     py::set_error(PyExc_TypeError, error.what());
+  } catch (const std::exception& error) {
+    const std::optional<BackendError> told = backend_error(error);
+    if (!told) throw;
+    py::set_error(told->out_of_memory ? PyExc_MemoryError : PyExc_RuntimeError, told->text.c_str());
   }
 }
 
@@ -54,7 +59,7 @@ void bind_core(py::module_& module) {
       "An optimization met NaN or infinity; names the stage and the option to change.\n"
       "Its attribute last_good is the last field, or fit, with finite numbers.";
 
-  py::register_exception_translator(&translate);
+  py::register_local_exception_translator(&translate);  // errors of other modules stay theirs
 
   py::class_<Task>(module, "Task", "Cancels a long call and reads its progress, from any thread.")
       .def(py::init<>())

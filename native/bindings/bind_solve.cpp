@@ -196,13 +196,14 @@ void bind_solve_testing(py::module_& module) {
   py::class_<LossProbe>(testing, "LossProbe")
       .def(py::init([](const SurfaceSamples& samples, const std::vector<Handle>& handles, int width,
                        double bending, const Points& preferred, double gauss, double barrier, double margin,
-                       double keep_stance, const py::object& energies) {
+                       double keep_stance, const py::object& energies, const std::string& device) {
              return std::make_unique<LossProbe>(samples, handles, width, bending, preferred, gauss, barrier,
-                                                margin, keep_stance, as_energies(energies, samples.frame));
+                                                margin, keep_stance, as_energies(energies, samples.frame),
+                                                device);
            }),
            "samples"_a, "handles"_a, "width"_a = 8, "bending"_a = 0.0, "preferred"_a = Points(),
            "gauss"_a = 0.0, "barrier"_a = 0.0, "margin"_a = 0.0, "keep_stance"_a = 0.0,
-           "energies"_a = py::tuple())
+           "energies"_a = py::tuple(), "device"_a = "cpu")
       .def(
           "__call__",
           [](LossProbe& self, const Vector& parameters, std::uint64_t seed) {

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <exception>
+#include <optional>
 #include <string>
 
 #include "core/export.h"
 
 namespace arapfields {
 
-/// "auto" → "cpu", as long as CUDA is experimental; throws InvalidInput for a name that is unknown or
+/// "auto" → "cpu"; throws InvalidInput for a name that is unknown or
 /// not available.
 ARAPFIELDS_EXPORT std::string resolve_device(const std::string& device);
 /// Whether a CUDA device was found, and why not.
@@ -15,6 +17,14 @@ ARAPFIELDS_EXPORT std::string device_report();
 /// What does the library's products: "torch" or "eigen" (ARAPFIELDS_BACKEND).
 ARAPFIELDS_EXPORT std::string backend_name();
 
-bool has_cuda();
+int cuda_devices();
+
+struct BackendError {
+  std::string text;
+  bool out_of_memory;
+};
+/// An error that the backend raised, without its list of C++ calls; none if it is another's. Once memory has
+/// run out, a device gets back what the backend keeps of it for later.
+ARAPFIELDS_EXPORT std::optional<BackendError> backend_error(const std::exception& error);
 
 }  // namespace arapfields

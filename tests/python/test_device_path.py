@@ -25,6 +25,7 @@ SINGULAR_VALUES = {
     "large": [1e4, 3e3, 1e3],
 }
 STYLE = af.preferred_normals("cube")
+needs_cuda = pytest.mark.skipif(not torch.cuda.is_available(), reason="torch reports no CUDA device")
 
 
 @contextlib.contextmanager
@@ -101,7 +102,7 @@ def test_handles_equal_the_kernels(dtype):
 TERMS = {
     "bend": dict(bending=0.05),
     "stylized": dict(preferred=STYLE, gauss=2.0, barrier=3.0),
-    "everything": dict(bending=0.01, preferred=STYLE, gauss=2.0, barrier=3.0, margin=0.4),
+    "everything": dict(bending=0.01, preferred=STYLE, gauss=2.0, barrier=3.0, margin=0.4, keep_stance=0.7),
 }
 
 
@@ -158,13 +159,19 @@ def test_divergence_is_noticed_and_the_last_good_state_kept():
         af.deform(cases.bar_samples(200), cases.bar_handles(), options)
 
 
-needs_cuda = pytest.mark.skipif(not torch.cuda.is_available(), reason="torch reports no CUDA device")
+@needs_cuda
+@pytest.mark.parametrize("terms", TERMS.values(), ids=TERMS)
+def test_losses_and_their_gradients_on_a_cuda_device_equal_the_kernels(terms):
+    results = []
+    for device in ("cpu", "cuda"):
+        probe = testing.LossProbe(cases.bar_samples(60), cases.bar_handles(30.0), device=device, **terms)
+        parameters = np.random.default_rng(5).normal(size=probe.size) * 0.2
+        results.append(probe(parameters, seed=5))
+    agree(results[1], results[0], tolerances.COMPOSED)
 
 
 @needs_cuda
-@pytest.mark.parametrize(
-    "extra", [{}, dict(exact_handles=True), dict(start="radial", invertibility=0.1)], ids=str
-)
+@pytest.mark.parametrize("extra", [{}, dict(start="radial", invertibility=0.1)], ids=str)
 def test_a_cuda_device_arrives_where_the_processor_does(extra):
     results = []
     for device in ("cpu", "cuda"):
@@ -174,6 +181,17 @@ def test_a_cuda_device_arrives_where_the_processor_does(extra):
     assert results[1].report.energy == pytest.approx(results[0].report.energy, rel=tolerances.COMPOSED_SOLVE)
     points = cases.bar_samples(100, seed=1).points
     assert np.abs(results[1](points) - results[0](points)).max() < 0.05
+
+
+@needs_cuda
+def test_exact_handles_on_a_cuda_device_start_as_on_the_processor():
+    """After sixty steps the energies of two seeds differ by far more than those of two devices."""
+    losses = []
+    for device in ("cpu", "cuda"):
+        options = af.DeformOptions(iterations=2, width=64, batch=200, device=device, exact_handles=True)
+        report = af.deform(cases.bar_samples(600), cases.bar_handles(40.0), options).report
+        losses.append([loss for _, loss in report.loss])
+    assert losses[1] == pytest.approx(losses[0], rel=tolerances.FLOAT32_ENERGY)
 
 
 @needs_cuda
@@ -191,9 +209,34 @@ def test_the_loop_does_not_wait_for_a_cuda_device(capfd):
     assert waits[1] > 0 and waits[2] == waits[1]
 
 
+@needs_cuda
+def test_a_device_without_memory_is_named_and_gets_it_back():
+    samples, handles = cases.bar_samples(600), cases.bar_handles(40.0)
+    many = af.SurfaceSamples(
+        np.tile(samples.points, (500, 1)), np.tile(samples.normals, (500, 1)), frame=samples.frame
+    )
+    vast = af.DeformOptions(iterations=1, width=4096, layers=8, batch=len(many.points), device="cuda")
+    with pytest.raises(MemoryError, match=r"^CUDA out of memory") as raised:
+        af.deform(many, handles, vast)
+    assert "frame #" not in str(raised.value)
+    free, whole = torch.cuda.mem_get_info()
+    assert free > 0.9 * whole
+    af.deform(samples, handles, af.DeformOptions(iterations=1, device="cuda"))
+
+
+@pytest.mark.parametrize(
+    "name", ["cuda:x", "cudafoo", "cuda:", "cuda:-1", "cuda: 1", "cuda:99999999999", "gpu"]
+)
+def test_a_name_of_no_device_is_refused(name):
+    with pytest.raises(af.InvalidInput, match=r"device: '.*'; 'auto', 'cpu', 'cuda' or 'cuda:N' is allowed"):
+        af.deform(cases.bar_samples(100), cases.bar_handles(40.0), af.DeformOptions(device=name))
+
+
 def test_a_device_that_is_not_there_is_refused_with_the_reason():
     if torch.cuda.is_available():
         assert af.device_report() == "a CUDA device was found"
+        with pytest.raises(af.InvalidInput, match="device: 'cuda:99'; the last CUDA device is 'cuda:"):
+            af.deform(cases.bar_samples(100), cases.bar_handles(40.0), af.DeformOptions(device="cuda:99"))
         return
     assert af.device_report().startswith("no CUDA device: ")
     with pytest.raises(af.InvalidInput, match="device: 'cuda'; no CUDA device: "):

@@ -21,9 +21,9 @@ std::shared_ptr<const HandleBlend> exact_blend(const BoundHandles& handles, doub
 }  // namespace
 
 struct LossProbe::State {
-  State(const SurfaceSamples& given, int width, ObjectiveTerms terms)
+  State(const SurfaceSamples& given, int width, ObjectiveTerms terms, const std::string& device)
       : samples(given),
-        field(MlpShape{{width, 2, 2, 1.0, 5.0}, 3}, 0, true),
+        field(MlpShape{{width, 2, 2, 1.0, 5.0}, 3}, 0, true, device),
         objective(samples, std::move(terms)) {}
 
   SurfaceSamples samples;
@@ -33,7 +33,7 @@ struct LossProbe::State {
 
 LossProbe::LossProbe(const SurfaceSamples& samples, const std::vector<Handle>& handles, int width,
                      double bending, const Points& preferred, double gauss, double barrier, double margin,
-                     double keep_stance, const ExternalEnergies& external) {
+                     double keep_stance, const ExternalEnergies& external, const std::string& device) {
   ObjectiveTerms terms;
   terms.batch = 20;
   terms.external = external;
@@ -46,7 +46,7 @@ LossProbe::LossProbe(const SurfaceSamples& samples, const std::vector<Handle>& h
   terms.barrier_threshold = 0.9;
   terms.handles = BoundHandles(handles, samples.points);
   terms.pull.handle_batch = 8;
-  state_ = std::make_unique<State>(samples, width, std::move(terms));
+  state_ = std::make_unique<State>(samples, width, std::move(terms), device);
   if (margin > 0.0)
     state_->field.set_handles(exact_blend(state_->objective.objective_terms().handles, margin));
 }

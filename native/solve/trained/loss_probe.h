@@ -25,7 +25,7 @@ class ARAPFIELDS_EXPORT_TO_TESTS LossProbe {
  public:
   LossProbe(const SurfaceSamples& samples, const std::vector<Handle>& handles, int width, double bending,
             const Points& preferred, double gauss, double barrier, double margin, double keep_stance,
-            const ExternalEnergies& external = {});
+            const ExternalEnergies& external = {}, const std::string& device = "cpu");
   ~LossProbe();
   /// The parameters become these; the subsets are those of the seed.
   LossGradient operator()(const Vector& parameters, std::uint64_t seed);

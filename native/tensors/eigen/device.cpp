@@ -5,8 +5,10 @@ namespace arapfields {
 
 std::string backend_name() { return "eigen"; }
 
-bool has_cuda() { return false; }
+int cuda_devices() { return 0; }
 
 std::string device_report() { return "no CUDA device: this build has no libtorch"; }
+
+std::optional<BackendError> backend_error(const std::exception&) { return std::nullopt; }
 
 }  // namespace arapfields
