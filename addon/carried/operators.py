@@ -7,6 +7,7 @@ from ..blender.property_definitions import choice, flag
 from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError, refuse
 from ..core.settings.choices import CARRYING
+from ..handles import bones
 from ..live import sessions
 from . import carried_objects, refusals
 
@@ -48,7 +49,8 @@ class ARAPFIELDS_OT_carry(CarriedOperator, bpy.types.Operator):
         if not added:
             nothing = translated("Select the objects to carry as well")
             raise UserError("{error}", error="\n".join(refused) or nothing)
-        for text in refused:
+        error = bones.unposed(context, source)
+        for text in [*refused, *([] if error is None else [translated(error)])]:
             self.report({"WARNING"}, text)
         return translated("{name} carries {count} more objects", name=source.name, count=added)
 

@@ -55,6 +55,31 @@ def holding_groups(context, source):
     return {group.name for group in source.vertex_groups if group.index in indices}
 
 
+def unposed(context, source):
+    """Why meshes that a source carries stay behind its bones, as a UserError; None where none does.
+
+    A carried mesh goes with the source alone: not with bones that only its own vertex groups name.
+    """
+    handles = {(entry.rig, entry.bone) for entry in settings_of(source).handles if entry.kind == "BONE"}
+    rigs, names = {rig for rig, _ in handles if in_scene(rig)}, []
+    for entry in settings_of(source).carried:
+        item = entry.item
+        if not in_scene(item) or item.type != "MESH" or entry.way == "RIGID":
+            continue
+        own = rigs & {modifier.object for modifier in item.modifiers if modifier.type == "ARMATURE"}
+        groups = holding_groups(context, item) if own else ()
+        bones = [(rig, bone.name) for rig in own for bone in rig.data.bones if bone.use_deform]
+        if any(bone[1] in groups and bone not in handles for bone in bones):
+            names.append(item.name)
+    if not names:
+        return None
+    return UserError(
+        "Bones that {name} has no vertex groups of do not pose {items}; join these with it first (Ctrl J)",
+        source,
+        items=", ".join(names),
+    )
+
+
 def find(source, rig, name):
     """Index of the bone's handle in the source's list, or -1."""
     entries = enumerate(settings_of(source).handles)

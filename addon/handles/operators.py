@@ -118,6 +118,9 @@ class ARAPFIELDS_OT_add_bones(HandleOperator, bpy.types.Operator):
         for name in names:
             bones.add(source, rig, name, groups)
         held_counts.count_inside(context, source)
+        error = bones.unposed(context, source) if self.bones != "SELECTED" else None
+        if error is not None:
+            self.report({"WARNING"}, translated(error))
         return translated("{count} handles added to {name}", count=len(names), name=source.name)
 
 

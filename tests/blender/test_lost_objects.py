@@ -11,9 +11,11 @@ if IN_BLENDER:
     import bpy
     from support.blender import scenes
     from support.blender.baking import animated
+    from support.blender.bones import rigged_bar
     from support.blender.scenes import delete
 
     from addon.blender.object_references import source_of
+    from addon.carried import operators as carried
     from addon.handles import empties, operators
 
 pytestmark = pytest.mark.in_blender
@@ -71,6 +73,26 @@ def test_a_handle_that_holds_nothing_is_said():
     scenes.activate(far, bar)
     said = reports(operators.ARAPFIELDS_OT_add_handle, kind="CUBE", place="AUTO", group="")
     assert said["WARNING"] == ["No part of the surface lies in the rest region of Far"]
+
+
+def test_meshes_with_bones_of_their_own_are_said():
+    """A figure of several objects: the body alone has handles, and a sleeve's bone moves nothing."""
+    bar, rig = rigged_bar()
+    bar.vertex_groups.remove(bar.vertex_groups["Second"])
+    shirt, sleeve = scenes.bar("Shirt"), scenes.bar("Sleeve")
+    for item, bone in ((shirt, "Bone"), (sleeve, "Second")):
+        item.vertex_groups.new(name=bone).add(range(len(item.data.vertices)), 1.0, "REPLACE")
+        item.modifiers.new("Armature", "ARMATURE").object = rig
+    scenes.activate(shirt, sleeve, bar)
+    said = reports(carried.ARAPFIELDS_OT_carry, way="FOLLOW")
+    assert not said["WARNING"]
+    scenes.activate(rig, bar)
+    line = "Bones that Bar has no vertex groups of do not pose Sleeve; join these with it first (Ctrl J)"
+    for name in ("AUTO", "DEFORMING"):
+        assert reports(operators.ARAPFIELDS_OT_add_bones, bones=name)["WARNING"] == [line]
+    scenes.activate(sleeve, bar)
+    assert reports(carried.ARAPFIELDS_OT_carry, way="TOGETHER")["WARNING"] == [line]
+    assert not reports(carried.ARAPFIELDS_OT_carry, way="RIGID")["WARNING"]
 
 
 def reports(operator, **properties):
