@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <atomic>
 #include <exception>
+#include <utility>
 
 #include "core/errors.h"
+#include "core/task.h"
 #include "core/thread_pool.h"
 
 namespace arapfields {
@@ -14,8 +16,9 @@ namespace {
 /// Chunks that a loop is split into at the most: enough for many threads to share them evenly.
 constexpr Index most_chunks = 128;
 
-thread_local int scope_threads = 0;      // 0 outside of every ThreadScope
-thread_local bool in_loop_body = false;  // in which further loops are not split
+thread_local int scope_threads = 0;              // 0 outside of every ThreadScope
+thread_local bool in_loop_body = false;          // in which further loops are not split
+thread_local const Progress* checked = nullptr;  // by the loops in a CancelScope
 
 /// The first exception of some threads, and whether there is one.
 class FirstError {
@@ -47,6 +50,7 @@ void parallel_jobs_in_slots(Index count, const std::function<void(Index, Index)>
     in_loop_body = true;
     for (Index job = next++; job < count && !error.any(); job = next++) {
       try {
+        if (slot == 0 && checked) checked->check();  // slot 0 is the calling thread
         body(job, slot);
       } catch (...) {
         error.keep();
@@ -81,6 +85,10 @@ ThreadScope::ThreadScope(int threads) : before_(scope_threads) {
 }
 
 ThreadScope::~ThreadScope() { scope_threads = before_; }
+
+CancelScope::CancelScope(const Progress& progress) : before_(std::exchange(checked, &progress)) {}
+
+CancelScope::~CancelScope() { checked = before_; }
 
 int thread_count() {
   if (in_loop_body) return 1;

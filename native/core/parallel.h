@@ -8,6 +8,7 @@
 #include "core/types.h"
 
 namespace arapfields {
+class Progress;
 
 /// Splits [begin, end) into chunks of at least `grain` and runs body(chunk_begin, chunk_end) for each on the
 /// call's threads (ThreadScope), which take the next chunk as they come free. The chunks depend on the range
@@ -36,6 +37,19 @@ class ARAPFIELDS_EXPORT ThreadScope {
  private:
   int before_;
   std::optional<SerialLibrary> serial_;
+};
+
+/// While it lives, the calling thread's loops end with Cancelled once the task of `progress` is cancelled.
+/// What they write is then incomplete: for work whose result is thrown away. `progress` must outlive it.
+class ARAPFIELDS_EXPORT CancelScope {
+ public:
+  explicit CancelScope(const Progress& progress);
+  ~CancelScope();
+  CancelScope(const CancelScope&) = delete;
+  CancelScope& operator=(const CancelScope&) = delete;
+
+ private:
+  const Progress* before_;
 };
 
 /// The threads that a loop here would be split over: those of the innermost ThreadScope, else as many as

@@ -51,6 +51,7 @@ class Run {
         good_(trained.parameters.clone()) {}
 
   LoopResult operator()() {
+    const CancelScope scope(progress_);
     int& iteration = result_.iterations;
     for (; iteration < options_.training.iterations; ++iteration) {
       progress_.check();
