@@ -7,9 +7,6 @@
 namespace arapfields {
 namespace {
 
-constexpr int first_of_pair[6] = {0, 1, 2, 0, 0, 1};
-constexpr int second_of_pair[6] = {0, 1, 2, 1, 2, 2};
-
 template <class Scalar>
 AdjointBlock<Scalar> block_of(double sharpness, const Tensor& activations, const Tensor& slope,
                               const Tensor& adjoints, Tensor& below) {
@@ -47,35 +44,46 @@ Tensor by_output(const Tensor& rows, Index outputs) {
   return rows.view({outputs, rows.size(0) / outputs, rows.size(1)});
 }
 
+/// Products of the derivatives z (3, n, width) by pairs of axes, (6, n, width): xx, yy, zz, xy, xz, yz.
+Tensor by_pairs(const Tensor& z) {
+  const Tensor pairs = empty({6, z.size(1), z.size(2)}, z);
+  multiply_elements(pairs.slice(0, 0, 3), z, z);
+  multiply_elements(pairs.slice(0, 3, 5), z.slice(0, 0, 1), z.slice(0, 1, 3));
+  multiply_elements(pairs.slice(0, 5, 6), z.slice(0, 1, 2), z.slice(0, 2, 3));
+  return pairs;
+}
+
+/// For each point the products of its rows in `a` (rows, n, width) and `b` (columns, n, width).
+Tensor products_of_rows(const Tensor& a, const Tensor& b) {
+  const Tensor every = b.expand({b.size(0), a.size(1), b.size(2)});
+  return batch_product(a.transpose(0, 1), every.permute({1, 2, 0}));
+}
+
 void adjoint_composed(double sharpness, const Tensor& activations, const Tensor& s, const Tensor& adjoints,
                       Tensor& below, Tensor& second) {
   const Index outputs = second.size(2);
   const Tensor z = activations.view({4, s.size(0), s.size(1)}).from(0, 1);
   const Tensor q = by_output(adjoints, outputs), curve = sharpness * s * (1 - s);
   by_output(below, outputs).assign(s * q);
-  for (int c = 0; c < 6; ++c) {
-    const Tensor bent = curve * z[first_of_pair[c]] * z[second_of_pair[c]];
-    second.select(1, c) += sum(q * bent, {2}).t();
-  }
+  second += products_of_rows(curve * by_pairs(z), q);
 }
 
 void adjoint_back_composed(double sharpness, const Tensor& activations, const Tensor& s,
                            const Tensor& adjoints, const Tensor& second, Tensor& cotangents, Tensor& below,
                            Tensor& partial) {
-  const Index outputs = second.size(2);
-  const Tensor z = activations.view({4, s.size(0), s.size(1)}).from(0, 1);
+  const Index outputs = second.size(2), n = s.size(0), width = s.size(1);
+  const Tensor z = activations.view({4, n, width}).from(0, 1);
   const Tensor q = by_output(adjoints, outputs), curve = sharpness * s * (1 - s);
-  Tensor g = by_output(cotangents, outputs), part = partial.view({4, s.size(0), s.size(1)});
-  Tensor bent = zeros_like(g);
-  part.set_zero();
-  for (int c = 0; c < 6; ++c) {
-    const int i = first_of_pair[c], j = second_of_pair[c];
-    const Tensor d = second.select(1, c).t().unsqueeze(-1);  // (outputs, n, 1)
-    const Tensor weighted = sum(q * d, {0}) * curve;
-    bent += d * (z[i] * z[j]);
-    part[1 + i] += weighted * z[j];
-    part[1 + j] += weighted * z[i];
-  }
+  Tensor g = by_output(cotangents, outputs), part = partial.view({4, n, width});
+  const Tensor bent = batch_product(second.transpose(1, 2), by_pairs(z).transpose(0, 1)).transpose(0, 1);
+  // Of each pair Σ q d over the outputs; a pair of one axis acts on its derivative twice.
+  const Tensor every = q.expand({outputs, n, width});
+  const Tensor weighted = batch_product(second, every.transpose(0, 1)).transpose(0, 1) * curve;
+  weighted.slice(0, 0, 3) *= 2.0;
+  const Tensor x = weighted[0], y = weighted[1], w = weighted[2];
+  const Tensor xy = weighted[3], xw = weighted[4], yw = weighted[5];
+  const Tensor matrix = stack({x, xy, xw, xy, y, yw, xw, yw, w}, 0).view({3, 3, n, width});
+  part.from(0, 1).assign(sum(matrix * z, {1}));
   part[0].assign(curve * sum(q * (g + sharpness * (1 - 2 * s) * bent), {0}));
   g.assign(s * g + curve * bent);
   by_output(below, outputs).assign(s * q);
