@@ -8,6 +8,7 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "fields/radial_evaluator.h"
+#include "sampling/oriented_points.h"
 #include "sampling/point_grid.h"
 #include "sampling/sample_choice.h"
 
@@ -28,9 +29,16 @@ constexpr double spacings_aside = 2.0;
 /// Places where winding numbers are taken, and by how much more than at rest these are inside another part.
 constexpr Index most_probes = 500;
 constexpr double inside_another = 0.6;
+/// The same above a sample that has entered another part: windings are blurred there.
+constexpr double entered = 0.4;
+/// Samples above which it is greater at rest are inside.
+constexpr double inside = 0.5;
 /// Where parts cut each other at rest, samples that are nearer there, in cube units, are left alone if one is
 /// no farther beyond the other than what is kept: the embedding, a function of the place, is of no use there.
+/// Probes that are nearer to a cut tell nothing.
 constexpr double near_a_cut = 0.1;
+/// Sides of a surface.
+constexpr double outwards = 1.0, inwards = -1.0;
 /// Of squares in single precision.
 constexpr double rounding = 1e-4;
 /// Meshes are so far from each other.
@@ -61,20 +69,52 @@ SelfContact::SelfContact(const RadialProblem& problem, const std::vector<Index>&
   kept_ = kept;
   normals_ = normals;
   for (Index i = 0; i < n; i += std::max<Index>(1, n / most_probes)) probes_.push_back(i);
-  windings_ = windings(places, normals);
-  Vector sorted = windings_;
-  const Index half = sorted.size() / 2;
-  std::nth_element(sorted.begin(), sorted.begin() + half, sorted.end());
-  share_ = 1.0 / std::max(sorted[half], 1e-12);  // most probes are inside once
-  windings_ *= share_;
-  is_cut_ = windings_.maxCoeff() > 1.0 + inside_another;
+  measure_rest(places);
   least_ = Vector::Constant(n, kept);
   Vector at_rest = least_;
-  for (const FacingPair& pair : search(places, [&](auto*) { return normals; }, near_at_rest, Beyond::all))
+  for (const FacingPair& pair : search(places, [&](auto*) { return normals; }, near_at_rest, Beyond::at_rest))
     for (const Index i : {pair.first, pair.second})
       at_rest[i] = std::min(at_rest[i], std::max(0.0, pair.gap));
-  least_ = at_rest;
+  least_ = (above_.array() > inside).select(0.0, at_rest);
   begin(places, [&](auto*) { return normals; });
+}
+
+/// Finds what a sample adds to winding numbers, and these at rest.
+void SelfContact::measure_rest(PointsIn places) {
+  const SampleWindings at_rest(places, normals_, aside_);
+  above_.resize(places.rows());
+  parallel_for(0, above_.size(), 64, [&](Index first, Index last) {
+    for (Index i = first; i < last; ++i) above_[i] = winding(at_rest, i, outwards, places, normals_);
+  });
+  below_ = below(at_rest, places, normals_);
+  Vector jumps = below_ - above_(probes_);
+  const Index half = jumps.size() / 2;
+  std::nth_element(jumps.begin(), jumps.begin() + half, jumps.end());
+  share_ = 1.0 / std::max(jumps[half], 1e-12);  // one between the sides of a surface
+  below_ *= share_;
+  above_ *= share_;
+  is_cut_ = below_.maxCoeff() > 1.0 + inside_another;
+  if (is_cut_) find_cuts(places);
+}
+
+/// Finds the nearest place that is inside another part, and leaves out the probes that are near it.
+void SelfContact::find_cuts(PointsIn places) {
+  std::vector<Index> within, kept;
+  for (Index i = 0; i < above_.size(); ++i)
+    if (above_[i] > inside) within.push_back(i);
+  if (within.empty()) return;
+  const auto alike = [](const Points& points) -> Points { return Points::Zero(points.rows(), 3); };
+  const Points cuts = rows_of(places, within);
+  cuts_ = rows_of(cuts, OrientedPoints(cuts, alike(cuts)).nearest(places, alike(places), 0.0));
+  std::vector<Index> probes;
+  for (Index k = 0; k < below_.size(); ++k) {
+    const Index i = probes_[static_cast<std::size_t>(k)];
+    if ((places.row(i) - cuts_.row(i)).norm() < near_a_cut) continue;
+    kept.push_back(k);
+    probes.push_back(i);
+  }
+  below_ = entries_of(below_, kept);
+  probes_ = std::move(probes);
 }
 
 /// Orders samples so that runs of them, pairs of these and so on are compact at rest, and finds the balls
@@ -122,11 +162,18 @@ bool SelfContact::is_far(Index i, Index j, double distance) const {
   return (inside_.row(i) - inside_.row(j)).squaredNorm() > distance * distance;
 }
 
-/// Whether two samples of parts that cut each other at rest are left alone.
+/// Whether two samples of parts that cut each other at rest are left alone: where they are near each other by
+/// way of the cut, or one behind the other.
 bool SelfContact::is_cut(Index i, Index j) const {
-  const Vec3 arm = (inside_.row(i) - inside_.row(j)).leftCols<3>().transpose();
-  return is_cut_ && arm.squaredNorm() < near_a_cut * near_a_cut &&
-         std::min(normals_.row(j).dot(arm), -normals_.row(i).dot(arm)) < kept_;
+  if (!is_cut_) return false;
+  const auto at = [&](Index k) { return inside_.row(k).leftCols<3>(); };
+  const Vec3 arm = (at(i) - at(j)).transpose();
+  if (arm.squaredNorm() < near_a_cut * near_a_cut &&
+      std::min(normals_.row(j).dot(arm), -normals_.row(i).dot(arm)) < kept_)
+    return true;
+  return cuts_.rows() > 0 && (at(i) - cuts_.row(i)).norm() + (cuts_.row(i) - cuts_.row(j)).norm() +
+                                     (cuts_.row(j) - at(j)).norm() <
+                                 far_inside;
 }
 
 /// Whether what is beyond a sample came through it: it faced the same part before, or was before it.
@@ -188,7 +235,8 @@ std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& norm
   Points normals = normals_at(&blocks);
   for (const Index i : samples) normals.row(i).normalize();
   std::vector<Index> second(static_cast<std::size_t>(places.rows()), -1);
-  const auto visit = [&](Index i, const std::vector<Index>& others) {
+  const auto visit = [&](Index i, const std::vector<Index>& others, Beyond which) {
+    second[static_cast<std::size_t>(i)] = -1;
     if (least_[i] <= 0.0) return;
     const Vec3 place = places.row(i).transpose(), normal = normals.row(i).transpose();
     double nearest = near * near;
@@ -202,19 +250,34 @@ std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& norm
           continue;
         const double gap = arm.dot(other);
         if (square - gap * gap > aside_ * aside_ || -gap > std::min(widths_[i], widths_[j])) continue;
-        const double least = beyond == Beyond::shallow ? -shallow : 0.0;
-        if (gap < least && beyond != Beyond::all && !(beyond == Beyond::as_came && came_through(i, j, other)))
+        const double least = which == Beyond::shallow ? -shallow : 0.0;
+        if (gap < least && which < Beyond::all && !(which == Beyond::as_came && came_through(i, j, other)))
           continue;
         nearest = square;
         second[static_cast<std::size_t>(i)] = j;
       }
   };
-  parallel_for(0, std::ssize(runs), 32, [&](Index first, Index last) {
-    for (Index k = first; k < last; ++k) {
-      const Index run = runs[static_cast<std::size_t>(k)];
-      for (const Index i : boxes.rows(run, order_)) visit(i, near_to[static_cast<std::size_t>(run)]);
-    }
-  });
+  const auto each = [&](const auto& look) {
+    parallel_for(0, std::ssize(runs), 32, [&](Index first, Index last) {
+      for (Index k = first; k < last; ++k) {
+        const Index run = runs[static_cast<std::size_t>(k)];
+        for (const Index i : boxes.rows(run, order_)) look(i, near_to[static_cast<std::size_t>(run)]);
+      }
+    });
+  };
+  each([&](Index i, const std::vector<Index>& others) { visit(i, others, beyond); });
+  const auto is_beyond = [&](Index i) {
+    const Index j = second[static_cast<std::size_t>(i)];
+    return j >= 0 && normals.row(j).dot(places.row(i) - places.row(j)) < 0.0;
+  };
+  if (beyond != Beyond::at_rest && std::any_of(samples.begin(), samples.end(), is_beyond)) {
+    const Points all = normals_at(nullptr);
+    const SampleWindings now(places, share_ * all, aside_);
+    each([&](Index i, const std::vector<Index>& others) {  // the two sides of what is squashed do not meet
+      if (is_beyond(i) && winding(now, i, outwards, places, all) - above_[i] < entered)
+        visit(i, others, Beyond::none);
+    });
+  }
   std::vector<FacingPair> pairs;
   for (const Index i : samples) {
     const Index j = second[static_cast<std::size_t>(i)];
@@ -226,29 +289,24 @@ std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& norm
   return pairs;
 }
 
-/// Winding numbers a little below the probes, by the samples as dipoles (Barill et al. 2018, Fast winding
-/// numbers for soups and clouds).
-Vector SelfContact::windings(PointsIn places, PointsIn normals) const {
+/// The winding number a little above or below a sample.
+double SelfContact::winding(const SampleWindings& windings, Index i, double side, PointsIn places,
+                            PointsIn normals) const {
+  const double way = side * std::min(aside_, 0.5 * widths_[i]);
+  return windings.at((places.row(i) + way * normals.row(i).normalized()).transpose());
+}
+
+/// The same below the probes.
+Vector SelfContact::below(const SampleWindings& windings, PointsIn places, PointsIn normals) const {
   Vector result(std::ssize(probes_));
-  parallel_for(0, result.size(), 16, [&](Index first, Index last) {
-    for (Index k = first; k < last; ++k) {
-      const Index row = probes_[static_cast<std::size_t>(k)];
-      const double depth = std::min(aside_, 0.5 * widths_[row]);
-      const Eigen::RowVector3d at = places.row(row) - depth * normals.row(row).normalized();
-      double sum = 0.0;
-      for (Index i = 0; i < places.rows(); ++i) {
-        const Eigen::RowVector3d arm = places.row(i) - at;
-        const double square = arm.squaredNorm() + 0.25 * aside_ * aside_;
-        sum += arm.dot(normals.row(i)) / (square * std::sqrt(square));
-      }
-      result[k] = share_ * sum;
-    }
-  });
+  for (Index k = 0; k < result.size(); ++k)
+    result[k] = winding(windings, probes_[static_cast<std::size_t>(k)], inwards, places, normals);
   return result;
 }
 
 bool SelfContact::overlaps(PointsIn places, PointsIn normals) const {
-  return (windings(places, normals) - windings_).array().maxCoeff() > inside_another;
+  const SampleWindings now(places, share_ * normals, aside_);
+  return !probes_.empty() && (below(now, places, normals) - below_).maxCoeff() > inside_another;
 }
 
 void SelfContact::remember(PointsIn places, const std::vector<FacingPair>& pairs) {

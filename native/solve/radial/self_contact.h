@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "sampling/row_boxes.h"
+#include "sampling/sample_windings.h"
 #include "solve/radial/problem.h"
 
 namespace arapfields {
@@ -44,13 +45,18 @@ class SelfContact {
   void begin(PointsIn places, const Normals& normals);
 
  private:
-  enum class Beyond { as_came, shallow, all };  // which gaps below zero are pairs
+  /// Which gaps below zero are pairs.
+  enum class Beyond { none, as_came, shallow, all, at_rest };
   std::vector<FacingPair> search(PointsIn places, const Normals& normals, double near, Beyond beyond) const;
   std::vector<std::vector<Index>> near_runs(PointsIn places, const RowBoxes<4>& boxes, double near) const;
   bool meet(PointsIn places, const RowBoxes<4>& boxes, Index a, Index b, double near) const;
   bool is_far(Index i, Index j, double distance) const;
   bool is_cut(Index i, Index j) const;
   bool came_through(Index i, Index j, const Vec3& normal) const;
+  double winding(const SampleWindings& windings, Index i, double side, PointsIn places,
+                 PointsIn normals) const;
+  void measure_rest(PointsIn places);
+  void find_cuts(PointsIn places);
   void gather_rest();
   void remember(PointsIn places, const std::vector<FacingPair>& pairs);
 
@@ -65,10 +71,12 @@ class SelfContact {
   };
   std::vector<std::vector<Ball>> at_rest_;  // for each level of boxes
   std::vector<std::int32_t> meshes_;
-  Vector windings(PointsIn places, PointsIn normals) const;
+  Vector below(const SampleWindings& windings, PointsIn places, PointsIn normals) const;
 
-  std::vector<Index> probes_;  // rows where windings are taken
-  Vector windings_;            // there at rest
+  Points cuts_;                // (n,3) nearest places at rest that are inside another part; empty: none
+  std::vector<Index> probes_;  // rows below which windings are taken
+  Vector below_;               // windings there at rest
+  Vector above_;               // (n) windings above the samples at rest
   double share_ = 1.0;         // of a sample in them
   Vector widths_;              // (n) of the shape there
   Vector least_;               // (n) gaps at rest, at most what is kept; 0: left alone

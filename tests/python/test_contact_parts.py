@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Contact of a figure with itself, where its parts cut each other at rest."""
+
+import numpy as np
+import pytest
+from support.geometry.bar import box, turned
+from support.geometry.parts import figure
+
+import arapfields as af
+
+TRUNK = box([0, 0, 0.7], [0.12] * 3)
+HANDS = [box([side * 0.5, 0, 0.8], [0.06] * 3) for side in (1, -1)]
+HEIGHT = 1.4
+
+
+def drag(live, way, steps=11):
+    """Both hands inwards, along and up by `way`, and back: (shares flipped, energy at the far end)"""
+    flipped, energies = [], []
+    for k in np.r_[np.linspace(0, 1, steps), np.linspace(1, 0, steps)]:
+        ways = [k * np.multiply((side, 1, 1), way) for side in (-1, 1)]
+        pose = [TRUNK, *(turned(0, shift=w) @ hand for w, hand in zip(ways, HANDS, strict=True))]
+        live.follow(pose)
+        flipped.append(live.report.flipped_share)
+        energies.append(live.report.energy)
+    return flipped, energies[steps - 1]
+
+
+@pytest.mark.parametrize(
+    ("way", "crumples"),
+    [((0.3, -0.2, -0.3), False), ((0.25, -0.12, -0.4), False), ((0.35, -0.15, -0.1), True)],
+)
+def test_parts_that_cut_each_other_are_dragged_as_without_contact(way, crumples):
+    """Arms pushed into the trunk crumple, with contact or without."""
+    vertices, triangles, _ = figure(16)
+    samples = af.sample_mesh(vertices, triangles, 8000, seed=0)
+    handles = [af.Cuboid(m, m) for m in (TRUNK, *HANDS)]
+    free = drag(af.LiveDeformer(samples, handles), way)
+    live = af.LiveDeformer(samples, handles, contact=af.Contact(itself=True))
+    rest = live.solve(iterations=60)(vertices)
+    flipped, energy = drag(live, way)
+    back = live.solve([TRUNK, *HANDS], iterations=60, tolerance=1e-6)(vertices)
+    assert np.abs(back - rest).max() < 1e-3 * HEIGHT
+    assert max(flipped) <= max(free[0]) + 0.02 * crumples  # before: .48
+    assert energy < (3 if crumples else 1.1) * free[1]
