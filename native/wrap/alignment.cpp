@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "core/decompositions.h"
 #include "core/errors.h"
@@ -146,19 +145,22 @@ Similarity by_shape(const WrapSource& source, const WrapTarget& target, double s
     candidates.push_back(coarse.improve(at, coarse_rounds));
     progress.check();
   }
-  candidates[0].first *= upright_preference;
-  std::sort(candidates.begin(), candidates.end(),
+  std::sort(candidates.begin() + 1, candidates.end(),  // the first, which is not turned, is in the final
             [](const auto& a, const auto& b) { return a.first < b.first; });
-  std::pair<double, Similarity> best{std::numeric_limits<double>::infinity(), {}};
-  for (std::size_t i = 0; i < std::min<std::size_t>(finalists, candidates.size()); ++i) {
+  std::pair<double, Similarity> best = fine.improve(candidates[0].second, fine_rounds);
+  double least = turn_gain * best.first;
+  for (std::size_t i = 1; i < std::min<std::size_t>(finalists, candidates.size()); ++i) {
     const auto refined = fine.improve(candidates[i].second, fine_rounds);
-    if (refined.first < best.first) best = refined;
+    if (refined.first < least) {
+      best = refined;
+      least = refined.first;
+    }
     progress.check();
   }
   const double share = best.first / target.diagonal;
   if (share > unlike_shapes)
     warnings.push_back(
-        "the shapes are not alike: the best turn leaves them " + percent_text(share) +
+        "the shapes are not alike: placed, they are " + percent_text(share) +
         " of the target's size apart, normals counted; pairs of landmarks would say what belongs "
         "to what");
   return best.second;

@@ -38,9 +38,9 @@ void check_landmarks(const WrapSource& source, const WrapTarget& target);
 void check_contradictions(const WrapSource& source, const WrapTarget& target, const std::vector<Index>& rows);
 
 /// The similarity, cube → the target's coordinates, with which a wrap begins. With three landmarks or more it
-/// is their least-squares fit; else it is the best result of iterative closest points (Besl, McKay 1992) from
-/// the rotations that align the principal axes. `normal_weight` weights normals beside distances. Appends to
-/// `warnings`.
+/// is their least-squares fit; else it is the result of iterative closest points (Besl, McKay 1992) from no
+/// rotation, or from one that aligns the principal axes where that is far better. `normal_weight` weights
+/// normals beside distances. Appends to `warnings`.
 Similarity wrap_alignment(const WrapSource& source, const WrapTarget& target, AlignmentKind kind,
                           double normal_weight, std::vector<std::string>& warnings, const Progress& progress);
 

@@ -90,11 +90,13 @@ constexpr Index spacing_samples = 200;
 
 /// Samples and rounds of the first pass over all rotations, and of the second over the best of them.
 constexpr Index coarse_samples = 300, fine_samples = 1500;
-constexpr int coarse_rounds = 6, fine_rounds = 30, finalists = 4;
+constexpr int coarse_rounds = 6, fine_rounds = 30, finalists = 5;
 /// Weight of landmarks in the pairs where there are fewer than three.
 constexpr double landmark_share = 0.5;
-/// Factor on the error of the unrotated pose, which wins unless another rotation is that much better.
-constexpr double upright_preference = 0.9;
+/// A turn must leave less than this share of the error of the surface as it lies. One shape that lies
+/// elsewhere leaves a fifth; of shapes that are not alike, nine tenths would stand on their heads or look
+/// back for a gain of a tenth or two.
+constexpr double turn_gain = 0.5;
 
 // Checks of the input; all but the last are shares of a surface's own diagonal.
 

@@ -38,6 +38,13 @@ def test_a_moved_scaled_and_bent_shape_is_found_again(figure, samples, landmarks
     assert away < 0.08  # its points too, nearly: nothing but rigidity keeps them from sliding along it
 
 
+def test_shapes_that_are_not_alike_stay_upright():
+    """A big head fits a big body a little better upside down."""
+    little, big = cases.doll(0.35, 0.5), cases.doll(0.5, 0.45)
+    field = af.wrap(af.sample_mesh(*little, 1500), af.MeshSdf(*big), [], af.WrapOptions(**cases.SMALL))
+    assert (np.diag(field.jacobian([[0, 0, 0.4]])[0]) > 0).all()
+
+
 @pytest.mark.parametrize("name", ["weights", "bend_weights"])
 def test_what_weighs_more_resists_more(figure, samples, name):
     """The nose beside the rest of a shape that is to become a ball."""

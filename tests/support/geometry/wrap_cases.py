@@ -29,6 +29,16 @@ def star():
     return v, f, np.array(ends + [np.linalg.norm(v - place, axis=1).argmin() for place in beside])
 
 
+def doll(head, body):
+    """A ball with a nose on another one with feet, of these radii; it looks along -y."""
+    balls = [(body, (0, 0, 0)), (head, (0, 0, 0.8)), (0.12, (0, -head, 0.8))]
+    balls += [(0.15, (side, -0.1, -0.45)) for side in (-0.25, 0.25)]
+    v, f = sphere(1.0, 3)
+    return np.concatenate([radius * v + at for radius, at in balls]), np.concatenate(
+        [f + k * len(v) for k in range(len(balls))]
+    )
+
+
 def rotation(axis, angle):
     axis = np.asarray(axis, float) / np.linalg.norm(axis)
     cross = np.cross(np.eye(3), axis)
