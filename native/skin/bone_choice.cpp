@@ -15,7 +15,7 @@ constexpr double distance_weight = 2e-6;
 
 }  // namespace
 
-BoneChoice::BoneChoice(const RigShape& rig, Index owner,
+BoneChoice::BoneChoice(const RigShape& rig, Index node,
                        const Eigen::Ref<const Eigen::Matrix<float, 1, Eigen::Dynamic>>& distances) {
   const Skeleton& skeleton = rig.skeleton;
   std::vector<Index> all(skeleton.count());
@@ -23,13 +23,13 @@ BoneChoice::BoneChoice(const RigShape& rig, Index owner,
   const Index most = std::min<Index>(most_candidates, skeleton.count());
   std::ranges::partial_sort(all, all.begin() + most, {}, [&](Index b) { return distances[b]; });
   const float least = std::max(distances[all.front()], static_cast<float>(rig.spacing));
+  for (Index k = 0; k < most; ++k)
+    if (distances[all[k]] < farthest_share * least && rig.may_move(all[k], node, static_cast<double>(least)))
+      bones.push_back(all[k]);
+  if (bones.empty()) bones.push_back(all.front());
   std::vector<double> costs;
-  for (Index k = 0; k < most; ++k) {
-    if (k > 0 && !(distances[all[k]] < farthest_share * least &&
-                   rig.matters(all[k], owner, static_cast<double>(least))))
-      continue;
-    const double farther = static_cast<double>(distances[all[k]] / least) - 1.0;
-    bones.push_back(all[k]);
+  for (const Index b : bones) {
+    const double farther = static_cast<double>(distances[b] / least) - 1.0;
     costs.push_back(distance_weight * farther * farther);
   }
   penalties = Eigen::Map<const Vector>(costs.data(), static_cast<Index>(costs.size()));

@@ -8,11 +8,11 @@
 
 namespace arapfields {
 
-/// Which bones may move a point of the shape at rest that belongs to a bone, and how much each is disfavoured
+/// Which bones may move a point of the shape at rest that is near a node, and how much each is disfavoured
 /// for being far, from the lengths (bones) of the ways to them through the inside.
 class BoneChoice {
  public:
-  BoneChoice(const RigShape& rig, Index owner,
+  BoneChoice(const RigShape& rig, Index node,
              const Eigen::Ref<const Eigen::Matrix<float, 1, Eigen::Dynamic>>& distances);
 
   Index count() const { return static_cast<Index>(bones.size()); }

@@ -27,7 +27,9 @@ BoneRegions::BoneRegions(const Skeleton& skeleton, const PiecePoints& surfaces,
     for (Index b = 0; b < skeleton.count(); ++b)
       straight(i, b) = static_cast<float>((skeleton.nearest(b, node) - node).norm());
   }
-  owner = NodeOwners(surfaces, nodes, spacing, graph, straight).found(skeleton);
+  NodeOwners owners(surfaces, nodes, spacing, graph, straight);
+  owner = owners.found(skeleton);
+  own_bones = owners.own_bones();
 }
 
 RowMatrix<float> BoneRegions::distances(const InteriorGraph& graph) const {

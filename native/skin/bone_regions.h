@@ -19,8 +19,9 @@ struct BoneRegions {
   /// Lengths (n, bones) of the shortest ways to each bone.
   RowMatrix<float> distances(const InteriorGraph& graph) const;
 
-  std::vector<Index> owner;   ///< (n) the bone
-  RowMatrix<float> straight;  ///< (n, bones) straight distances
+  std::vector<Index> owner;      ///< (n) the bone
+  std::vector<Index> own_bones;  ///< of each surface: how many lie in it
+  RowMatrix<float> straight;     ///< (n, bones) straight distances
 };
 
 /// How far bones are from each other along the skeleton.

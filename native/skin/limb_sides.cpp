@@ -78,7 +78,8 @@ std::vector<Limb> limbs_of(const RigShape& rig, const std::vector<Index>& roots,
 
 }  // namespace
 
-void keep_limbs_apart(const RigShape& rig, const PiecePoints& given, RowMatrix<float>& distances) {
+void keep_limbs_apart(const RigShape& rig, const PiecePoints& given, const std::vector<Index>& near,
+                      RowMatrix<float>& distances) {
   const Points &points = given.points, &normals = given.normals, &surface = rig.surface.points;
   if (std::ranges::all_of(rig.sides, [](int side) { return side == 0; })) return;
   const int axis = rig.symmetry.axis;
@@ -89,6 +90,12 @@ void keep_limbs_apart(const RigShape& rig, const PiecePoints& given, RowMatrix<f
   middle.col(axis).setConstant(rig.symmetry.offset);
   const std::vector<Index> nearest = rig.nearest_samples(between);
   for (Index i = 0; i < points.rows(); ++i) {
+    // Parts that touch may cross the plane.
+    if (const int own_side = rig.sides[rig.owners[near[i]]]; rig.cuts_itself() && own_side != 0) {
+      for (Index b = 0; b < rig.skeleton.count(); ++b)
+        if (rig.sides[b] == -own_side) distances(i, b) = std::numeric_limits<float>::infinity();
+      continue;
+    }
     const double beyond = points(i, axis) - rig.symmetry.offset;
     Index own = -1;
     for (Index b = 0; b < rig.skeleton.count(); ++b)

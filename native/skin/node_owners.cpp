@@ -2,10 +2,13 @@
 #include "skin/node_owners.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <map>
+#include <numbers>
 #include <queue>
 
 #include "core/parallel.h"
@@ -23,6 +26,14 @@ constexpr int enough_sides = 21, least_sides = 14;
 constexpr Index least_samples = BoneSight::all_sides;
 /// A bone is in a surface with so much of its length.
 constexpr double share_inside = 0.4;
+/// A joint is the middle of a surface with so many samples, the farthest at most so many times as far as the
+/// nearest, and their mean at most at such a share of its distance.
+constexpr Index least_around = 4;
+constexpr double farthest_around = 1.5, mean_around = 0.6;
+/// On so many sides a ring lies around a bone, on the nearest with at least such a share of the farthest
+/// distance.
+constexpr std::size_t ring_sides = 8;
+constexpr double ring_share = 0.25;
 /// A surface touches what is so many spacings farther than the nearest.
 constexpr double touching_spacings = 0.5;
 
@@ -59,7 +70,8 @@ NodeOwners::NodeOwners(const PiecePoints& surfaces, const std::vector<Index>& no
       graph_(graph),
       straight_(straight),
       slots_(surfaces.count(), -1),
-      best_(nodes.size(), {infinity, -1}) {
+      best_(nodes.size(), {infinity, -1}),
+      own_(slots_.size()) {
   std::vector<Index> sizes(slots_.size(), 0);
   for (const Index piece : surfaces.pieces) ++sizes[piece];
   for (std::size_t piece = 0; piece < sizes.size(); ++piece)
@@ -71,11 +83,19 @@ std::vector<Index> NodeOwners::found(const Skeleton& skeleton) {
   spread();
   take_free_surfaces();
   fill();
-  touch();
+  for (std::size_t i = 0; i < best_.size(); ++i)
+    if (has_bone(i)) own_[piece(i)].insert(best_[i].second);
+  touch(skeleton);
   spread();
   fill();
   std::vector<Index> result;
   for (const Length& each : best_) result.push_back(each.second);
+  return result;
+}
+
+std::vector<Index> NodeOwners::own_bones() const {
+  std::vector<Index> result;
+  for (const std::set<Index>& each : own_) result.push_back(static_cast<Index>(each.size()));
   return result;
 }
 
@@ -84,6 +104,14 @@ void NodeOwners::see(const Skeleton& skeleton) {
   std::vector<std::vector<Length>> ways(skeleton.count());
   parallel_jobs(skeleton.count(), [&](Index b) {
     const Vec3 head = skeleton.bone(b).head, along = skeleton.bone(b).tail - head;
+    ways[b] = best_;
+    if (skeleton.has_open_end(b)) {
+      if (const Index around = surface_around(head); around >= 0) {
+        for (std::size_t i = 0; i < nodes_.size(); ++i)
+          if (piece(i) == around) ways[b][i] = {straight_(static_cast<Index>(i), b), b};
+        return;
+      }
+    }
     const auto count =
         std::clamp(static_cast<Index>(std::ceil(along.norm() / spacing_)), least_places, most_places);
     std::vector<BoneSight> places;
@@ -91,7 +119,6 @@ void NodeOwners::see(const Skeleton& skeleton) {
       places.emplace_back(surfaces_, slots_, slot_count_,
                           head + (static_cast<double>(k) + 0.5) / static_cast<double>(count) * along);
     const std::vector<int> least = sides_needed(places, slot_count_);
-    ways[b] = best_;
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       const Index own = slot(i);
       if (own < 0) continue;
@@ -105,6 +132,28 @@ void NodeOwners::see(const Skeleton& skeleton) {
   });
   for (const std::vector<Length>& each : ways)
     for (std::size_t i = 0; i < nodes_.size(); ++i) best_[i] = std::min(best_[i], each[i]);
+}
+
+/// The surface of which a joint is the middle, as of an eye; −1 for none.
+Index NodeOwners::surface_around(const Vec3& joint) const {
+  std::vector<double> least(slots_.size(), std::numeric_limits<double>::infinity()), most(slots_.size(), 0.0);
+  std::vector<Vec3> sums(slots_.size(), Vec3::Zero());
+  std::vector<Index> counts(slots_.size(), 0);
+  for (Index i = 0; i < surfaces_.points.rows(); ++i) {
+    const Vec3 way = surfaces_.points.row(i).transpose() - joint;
+    const Index piece = surfaces_.pieces[i];
+    least[piece] = std::min(least[piece], way.norm());
+    most[piece] = std::max(most[piece], way.norm());
+    sums[piece] += way;
+    ++counts[piece];
+  }
+  Index result = -1;
+  for (std::size_t piece = 0; piece < least.size(); ++piece)
+    if (counts[piece] >= least_around && most[piece] < farthest_around * least[piece] &&
+        sums[piece].norm() < mean_around * least[piece] * static_cast<double>(counts[piece]) &&
+        (result < 0 || most[piece] < most[static_cast<std::size_t>(result)]))
+      result = static_cast<Index>(piece);
+  return result;
 }
 
 /// A bone that lies in no surface takes the nearest one where no bone lies; others may join it there. Where
@@ -158,28 +207,57 @@ void NodeOwners::fill() {
   }
 }
 
+/// Whether nodes lie around a bone as a ring does.
+bool NodeOwners::lies_about(const Nodes& nodes, const Bone& bone) const {
+  const Mat3 axes = bone_axes(bone);
+  const double length = (bone.tail - bone.head).norm();
+  const Index count = std::clamp(static_cast<Index>(std::ceil(length / spacing_)), least_places, most_places);
+  for (Index k = 0; k < count; ++k) {
+    const double along = length * (static_cast<double>(k) + 0.5) / static_cast<double>(count);
+    std::array<double, ring_sides> nearest;
+    nearest.fill(std::numeric_limits<double>::infinity());
+    for (const std::size_t i : nodes) {
+      const Vec3 way = axes.transpose() * (surfaces_.points.row(nodes_[i]).transpose() - bone.head);
+      const double away = std::hypot(way[0], way[2]);
+      if (std::abs(way[1] - along) > away) continue;
+      const double turns = std::atan2(way[0], way[2]) / (2.0 * std::numbers::pi) + 0.5;
+      double& least = nearest[static_cast<std::size_t>(turns * ring_sides) % ring_sides];
+      least = std::min(least, away);
+    }
+    const auto [least, most] = std::ranges::minmax_element(nearest);
+    if (*least > ring_share * *most) return true;
+  }
+  return false;
+}
+
 /// Where a surface without bones touches others, its nodes belong with what they touch, of the same side
-/// above all.
-void NodeOwners::touch() {
+/// above all, and of bones next to the nearest of these. A ring belongs with the bones inside it.
+void NodeOwners::touch(const Skeleton& skeleton) {
   std::map<Index, Nodes> without;
-  Nodes others;
+  Nodes all, seen;
   for (std::size_t i = 0; i < best_.size(); ++i)
     if (!has_bone(i)) without[piece(i)].push_back(i);
   if (without.empty()) return;
+  const BoneTree tree(skeleton);
   std::vector<char> hidden(best_.size(), 0);
   parallel_for(0, graph_.size(), 16, [&](Index first, Index last) {
     for (Index i = first; i < last; ++i) hidden[i] = has_bone(i) && within_another(i) ? 1 : 0;
   });
   for (std::size_t i = 0; i < best_.size(); ++i)
-    if (has_bone(i) && hidden[i] == 0) others.push_back(i);
-  if (others.empty())
-    for (std::size_t i = 0; i < best_.size(); ++i)
-      if (has_bone(i)) others.push_back(i);
+    if (has_bone(i)) (hidden[i] == 0 ? seen : all).push_back(i);
+  all.insert(all.end(), seen.begin(), seen.end());
+  if (seen.empty()) seen = all;
   const auto turned = [&](std::size_t i, std::size_t j) {  // in squares of the spacing
     const auto& normals = surfaces_.normals;
     return spacing_ * spacing_ * (normals.row(nodes_[i]) - normals.row(nodes_[j])).squaredNorm();
   };
   for (const auto& [piece, own] : without) {
+    std::vector<bool> about;
+    for (Index b = 0; b < skeleton.count(); ++b) about.push_back(lies_about(own, skeleton.bone(b)));
+    Nodes others;
+    std::ranges::copy_if(all, std::back_inserter(others),
+                         [&](std::size_t j) { return about[best_[j].second]; });
+    if (others.empty()) others = seen;
     std::vector<std::pair<double, std::size_t>> near;
     for (const std::size_t i : own) {
       near.emplace_back(std::numeric_limits<double>::infinity(), 0);
@@ -187,8 +265,17 @@ void NodeOwners::touch() {
         near.back() = std::min(near.back(), {square(i, j) + turned(i, j), j});
     }
     const double reach = std::sqrt(std::ranges::min_element(near)->first) + touching_spacings * spacing_;
+    std::map<Index, float> lengths;  // of the bones that it touches
+    for (const auto& [away, j] : near)
+      if (away <= reach * reach) lengths[best_[j].second] = 0.0f;
+    for (auto& [b, length] : lengths)
+      for (const std::size_t i : own) length += straight_(static_cast<Index>(i), b);
+    const Index main =
+        std::ranges::min_element(lengths, {}, [](const auto& each) { return each.second; })->first;
     for (std::size_t k = 0; k < own.size(); ++k)
-      if (near[k].first <= reach * reach) best_[own[k]] = {0.0f, best_[near[k].second].second};
+      if (const Index b = best_[near[k].second].second;
+          near[k].first <= reach * reach && tree.matters(b, main, 0.0))
+        best_[own[k]] = {0.0f, b};
   }
 }
 

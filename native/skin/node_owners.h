@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -19,6 +20,8 @@ class NodeOwners {
 
   /// Bones (n).
   std::vector<Index> found(const Skeleton& skeleton);
+  /// Of each surface how many bones lie in it.
+  std::vector<Index> own_bones() const;
 
  private:
   using Length = std::pair<float, Index>;  // of the way to a node, and the bone where it begins
@@ -31,10 +34,12 @@ class NodeOwners {
     return (surfaces_.points.row(nodes_[node]) - surfaces_.points.row(nodes_[other])).squaredNorm();
   }
   void see(const Skeleton& skeleton);
+  Index surface_around(const Vec3& joint) const;
   void take_free_surfaces();
   void spread();
   void fill();
-  void touch();
+  bool lies_about(const Nodes& nodes, const Bone& bone) const;
+  void touch(const Skeleton& skeleton);
   bool within_another(std::size_t node) const;
 
   const PiecePoints& surfaces_;
@@ -45,6 +50,7 @@ class NodeOwners {
   std::vector<Index> slots_;  // of the surfaces that may lie around bones; −1: others
   Index slot_count_ = 0;
   std::vector<Length> best_;
+  std::vector<std::set<Index>> own_;
 };
 
 }  // namespace arapfields

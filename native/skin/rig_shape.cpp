@@ -35,6 +35,8 @@ constexpr double hold_from = 0.3, hold_to = 0.7;
 constexpr Index least_held = 12;
 /// A point about a bone's end that is so much nearer to it than to all that follow goes with the bone.
 constexpr float clearly = 0.5f;
+/// A bone that owns a smaller share of a surface does not move it where parts touch.
+constexpr double owning_share = 0.05;
 /// Surfaces so many spacings from others that go another way are trusted, as far as touching ones.
 constexpr double trusted_spacings = 4.0, least_trust = 1e-3;
 /// Parts touch where so large a share of the nodes is trusted less than this.
@@ -73,6 +75,8 @@ RigShape::RigShape(const SurfaceSamples& given, const std::vector<Bone>& bones, 
   progress.check();
   const BoneRegions regions(skeleton, surface, chosen, spacing, all);
   owners = regions.owner;
+  own_bones_ = regions.own_bones;
+  set_movers();
   set_trust();
   const InteriorGraph graph(nodes.points, nodes.normals, spacing,
                             [&](Index i, Index j) { return may_join(i, j); });
@@ -92,6 +96,22 @@ RigShape::RigShape(const SurfaceSamples& given, const std::vector<Bone>& bones, 
   }
   sample_nodes = nearest_nodes(surface);
   set_handles();
+}
+
+void RigShape::set_movers() {
+  std::vector<std::vector<Index>> owned(surface.count(), std::vector<Index>(skeleton.count(), 0));
+  std::vector<Index> all_owned(skeleton.count(), 0);
+  for (Index i = 0; i < size(); ++i) {
+    ++owned[nodes.pieces[i]][owners[i]];
+    ++all_owned[owners[i]];
+  }
+  for (std::size_t piece = 0; piece < owned.size(); ++piece) {
+    moves_.emplace_back();
+    for (Index b = 0; b < skeleton.count(); ++b)
+      moves_.back().push_back(static_cast<double>(owned[piece][b]) >
+                              owning_share *
+                                  static_cast<double>(std::min(node_counts_[piece], all_owned[b])));
+  }
 }
 
 void RigShape::set_trust() {

@@ -34,6 +34,14 @@ struct RigShape {
   bool matters(Index bone, Index owner, double distance) const {
     return !cuts_itself_ || tree.matters(bone, owner, distance);
   }
+  /// Whether a bone may move a node, at this distance from it. Where parts touch, those of its surface alone.
+  bool may_move(Index bone, Index node, double distance) const {
+    return !cuts_itself_ || (tree.matters(bone, owners[node], distance) && moves_[nodes.pieces[node]][bone]);
+  }
+  /// Whether several bones lie in a surface.
+  bool bends(Index piece) const {
+    return own_bones_.size() > 1 && piece < static_cast<Index>(own_bones_.size()) && own_bones_[piece] > 1;
+  }
   bool may_join(Index node, Index other) const { return matters(owners[node], owners[other], 0.0); }
   /// Nodes of a surface within a distance of a place, in order.
   std::vector<Index> nodes_within(const Vec3& place, double distance, Index piece) const;
@@ -64,11 +72,14 @@ struct RigShape {
   bool stands_alone(Index piece) const {
     return piece < static_cast<Index>(node_counts_.size()) && node_counts_[piece] >= enough_nodes();
   }
+  void set_movers();
   void set_trust();
   void set_handles();
 
   OrientedPoints places_;
-  std::vector<Index> node_counts_;  // of each surface
+  std::vector<Index> node_counts_;        // of each surface
+  std::vector<Index> own_bones_;          // of each surface: how many lie in it
+  std::vector<std::vector<bool>> moves_;  // of each surface: the bones that own much of it
   bool cuts_itself_ = false;
 };
 

@@ -11,6 +11,9 @@
 namespace arapfields {
 namespace {
 
+/// In lengths of the bone.
+constexpr double same_length = 1e-4, apart = 1e-2;
+
 std::string name_of(const std::vector<Bone>& bones, Index i) {
   return bones[i].name.empty() ? "bones[" + std::to_string(i) + "]" : "bone " + bones[i].name;
 }
@@ -43,6 +46,13 @@ void require_bones(const std::vector<Bone>& bones) {
   }
 }
 
+/// Whether a bone begins apart from its parent's tail and is exactly as long.
+bool copies_length(const Bone& bone, const Bone& parent) {
+  const double length = (parent.tail - parent.head).norm();
+  return std::abs((bone.tail - bone.head).norm() - length) < same_length * length &&
+         (bone.head - parent.tail).norm() > apart * length;
+}
+
 }  // namespace
 
 Skeleton::Skeleton(const std::vector<Bone>& bones) {
@@ -62,6 +72,10 @@ Skeleton::Skeleton(const std::vector<Bone>& bones) {
   leaf_.assign(bones_.size(), true);
   for (const Bone& bone : bones_)
     if (bone.parent >= 0) leaf_[bone.parent] = false;
+  for (Index b = 0; b < count(); ++b) {
+    const Index parent = bones[original_[b]].parent;
+    open_.push_back(leaf_[b] && parent >= 0 && copies_length(bones_[b], bones[parent]));
+  }
   std::vector<Index> depth(bones_.size(), 0);
   for (Index b = 0; b < count(); ++b)
     for (Index p = bones_[b].parent; p >= 0; p = bones_[p].parent) ++depth[b];

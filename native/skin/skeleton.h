@@ -39,6 +39,9 @@ class Skeleton {
   const Bone& bone(Index b) const { return bones_[b]; }  ///< its parent is among the deforming ones
   Index original(Index b) const { return original_[b]; }
   bool is_leaf(Index b) const { return leaf_[b]; }
+  /// Whether only its head is known: of a file's joints importers make the last bone of a chain as long as
+  /// its parent.
+  bool has_open_end(Index b) const { return open_[b]; }
   /// Motions (bones) from rest, from each bone's rotation in its own axes.
   std::vector<Mat4> motions(const std::vector<Mat3>& rotations) const;
   /// Mirrored bone of each across the plane of the axes where most have one, −1 for none.
@@ -62,6 +65,7 @@ class Skeleton {
   std::vector<Index> original_;
   std::vector<Index> order_;  // parents first
   std::vector<bool> leaf_;
+  std::vector<bool> open_;
 };
 
 }  // namespace arapfields

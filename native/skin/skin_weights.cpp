@@ -83,7 +83,7 @@ RowMatrix<float> fitted_points(const RigShape& rig, const PiecePoints& given, co
   const VertexBlend blend(rig, given, near);
   const RigTwins mirror(rig, points);
   RowMatrix<float> nearby = blend(fitted.nodes), distances = blend(rig.bone_distances);
-  keep_limbs_apart(rig, given, distances);
+  keep_limbs_apart(rig, given, near, distances);
   mirror.average(nearby);
   mirror.average(distances);
   progress.report(0.93, "Weights");
@@ -110,11 +110,13 @@ void keep_largest(Eigen::Ref<RowMatrix<float>> row, int influences) {
 /// Each small closed piece gets one motion: of one bone, where that moves nearly all of it.
 void make_rigid(const RigShape& rig, const TriangleMesh& mesh, const WeldedVertices& welded,
                 RowMatrix<float>& weights) {
+  const std::vector<Index> pieces = welded.pieces(mesh);
   for (const std::vector<Index>& piece : welded.closed_pieces(mesh, rigid_size * rig.extent)) {
+    if (rig.bends(pieces[piece.front()])) continue;
     RowMatrix<float> mean = RowMatrix<float>::Zero(1, weights.cols());
     for (const Index v : piece) mean += weights.row(v).cwiseMax(0.0f);
     Index most = 0;
-    if (mean.row(0).maxCoeff(&most) > one_bone * mean.sum()) {
+    if (mean.row(0).maxCoeff(&most) > (rig.cuts_itself() ? 0.0f : one_bone * mean.sum())) {
       mean.setZero();
       mean(0, most) = 1.0f;
     }

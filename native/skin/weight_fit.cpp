@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <numeric>
 
 #include "core/parallel.h"
 #include "skin/limb_sides.h"
@@ -17,9 +18,11 @@ constexpr int sweeps = 20;
 WeightFit::WeightFit(const RigShape& rig)
     : rig_(rig), weights_(RowMatrix<float>::Zero(rig.size(), rig.skeleton.count())) {
   RowMatrix<float> distances = rig.bone_distances;
-  keep_limbs_apart(rig, rig.nodes, distances);
+  std::vector<Index> all(rig.size());
+  std::iota(all.begin(), all.end(), Index{0});
+  keep_limbs_apart(rig, rig.nodes, all, distances);
   for (Index i = 0; i < rig.size(); ++i) {
-    choices_.emplace_back(rig, rig.owners[i], distances.row(i));
+    choices_.emplace_back(rig, i, distances.row(i));
     squares_.push_back(BonePairs::Zero(choices_[i].count(), choices_[i].count()));
     weights_(i, choices_[i].bones.front()) = 1.0f;
   }
@@ -74,7 +77,7 @@ RowMatrix<float> point_weights(const RigShape& rig, PointsIn points, const std::
   const double stiff = options.smoothness * smoothness_weight;
   parallel_for(0, points.rows(), 16, [&](Index first, Index last) {
     for (Index i = first; i < last; ++i) {
-      const BoneChoice choice(rig, rig.owners[near[i]], distances.row(i));
+      const BoneChoice choice(rig, near[i], distances.row(i));
       const Index twin = mirror.twin(i), k = choice.count();
       BoneChoice other = choice;
       if (twin >= 0)

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from support.geometry.parts import LEG, figure
+from support.geometry.parts import LEG, ellipsoid, figure
 
 import arapfields as af
 
@@ -20,6 +20,9 @@ BONES = {
     "Foot.L": ((LEG, 0, ANKLE), (LEG, -0.25, 0.05), "Leg.L"),
     "Foot.R": ((-LEG, 0, ANKLE), (-LEG, -0.25, 0.05), "Leg.R"),
 }
+EYE = 0.05
+for side, x in (("L", 1), ("R", -1)):  # as importers make them of a file's joints: as long as the head's bone
+    BONES[f"Eye.{side}"] = ((0.15 * x, -0.27, 1.15), (0.15 * x, -0.27, 1.4), "Head")
 NAMES = list(BONES)
 BONES_OF_FIGURE = [
     af.Bone(head, tail, None if up is None else NAMES.index(up), name=n)
@@ -27,14 +30,43 @@ BONES_OF_FIGURE = [
 ]
 
 
+def ring(center, radius, thickness, count):
+    """A closed ring about the vertical, its triangles outwards."""
+    u, v = np.meshgrid(*2 * [2 * np.pi * np.arange(count) / count], indexing="ij")
+    out = radius + thickness * np.cos(v)
+    points = np.stack([out * np.cos(u), out * np.sin(u), thickness * np.sin(v)], -1).reshape(-1, 3)
+    corner = np.arange(count * count).reshape(count, count)
+    around, up = np.roll(corner, -1, 0), np.roll(corner, -1, 1)
+    both = np.roll(around, -1, 1)
+    triangles = np.concatenate(
+        [np.stack([corner, around, both], -1), np.stack([corner, both, up], -1)]
+    ).reshape(-1, 3)
+    return points + center, triangles
+
+
+def dressed(count=24):
+    """The figure with rings about its ankles that cut each other, buttons between its shoes, and eyes."""
+    vertices, triangles, parts = figure(count)
+    for side, x in (("L", 1), ("R", -1)):
+        for name, (points, faces) in {
+            "ring": ring((LEG * x, 0, 0.2), LEG + 0.02, 0.03, count),
+            "button": ellipsoid((0.01 * x, -0.2, 0.1), (0.03, 0.03, 0.03), count // 2),
+            "eye": ellipsoid((0.15 * x, -0.27, 1.15), (EYE, EYE, EYE), count // 2),
+        }.items():
+            triangles = np.concatenate([triangles, faces + len(vertices)])
+            vertices = np.concatenate([vertices, points])
+            parts = np.concatenate([parts, [f"{name}.{side}"] * len(points)])
+    return vertices, triangles, parts
+
+
 @pytest.fixture(scope="module")
 def skinned():
-    vertices, triangles, parts = figure()
+    vertices, triangles, parts = dressed()
     return vertices, parts, np.asarray(af.skin_weights((vertices, triangles), BONES_OF_FIGURE, OPTIONS))
 
 
 def test_correctives_open_no_cracks_between_triangles_that_only_touch():
-    vertices, triangles, _ = figure(count=10)
+    vertices, triangles, _ = dressed(count=10)
     loose, alone = vertices[triangles].reshape(-1, 3), np.arange(triangles.size).reshape(-1, 3)
     options = af.SkinOptions(poses=8, samples=2000, correctives=6)
     weights = af.skin_weights((loose, alone), BONES_OF_FIGURE, options)
@@ -63,3 +95,34 @@ def test_shoes_that_reach_into_each_other_stay_apart(skinned, side, other):
     shoe = weights[parts == f"shoe.{side}"]
     assert share(shoe, f"Foot.{other}", f"Leg.{other}").max() < 0.01
     assert share(shoe, f"Foot.{side}", f"Leg.{side}").min() > 0.6
+
+
+@pytest.mark.parametrize(("side", "other"), ["LR", "RL"])
+def test_rings_about_a_leg_go_with_it_on_both_sides_of_the_middle(skinned, side, other):
+    vertices, parts, weights = skinned
+    ring = weights[parts == f"ring.{side}"]
+    across = vertices[parts == f"ring.{side}", 0] * (1 if side == "L" else -1) < -0.02
+    assert across.any()
+    assert share(ring, f"Foot.{other}", f"Leg.{other}").max() < 0.01
+    assert share(ring, f"Foot.{side}", f"Leg.{side}").min() > 0.9
+
+
+@pytest.mark.parametrize("side", "LR")
+def test_a_small_part_between_limbs_goes_whole_with_one_bone(skinned, side):
+    _, parts, weights = skinned
+    button = weights[parts == f"button.{side}"]
+    assert (button == button[0]).all()
+    assert np.count_nonzero(button[0]) == 1
+
+
+def test_a_part_goes_with_its_own_bones_alone(skinned):
+    _, parts, weights = skinned
+    trunk = weights[parts == "trunk"]
+    assert share(trunk, "Arm.L", "Arm.R", "Leg.L", "Leg.R", "Head").max() == 0
+
+
+@pytest.mark.parametrize("side", "LR")
+def test_a_joint_in_the_middle_of_an_eye_turns_the_eye_alone(skinned, side):
+    _, parts, weights = skinned
+    assert share(weights[parts == f"eye.{side}"], f"Eye.{side}").min() == 1
+    assert share(weights[parts == "head"], f"Eye.{side}").max() == 0
