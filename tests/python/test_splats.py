@@ -16,6 +16,7 @@ from arapfields.__main__ import main
 SINGLE = 1e-5  # what single precision leaves of a covariance
 EXACT = 1e-6  # a rigid motion, of single-precision numbers of a size of 1
 PREPARED = 2e-4  # of the size: jets in single precision
+AT_THE_LIMIT = 0.002  # share of splats that one of two ways divides: their first part is elsewhere
 DRAWN = 0.02  # a covariance of points that are drawn
 PSNR_SAME = 60.0  # dB: the same picture but for rounding
 FIELDS = ("centers", "rotations", "scales", "opacities", "harmonics")
@@ -119,8 +120,9 @@ def test_prepared_splats_move_as_others_do():
         before, moved = again, field.apply_to(rest, max_stretch=most)
         again = prepared.moved(field, before, max_stretch=most)
         assert before is None or len(before) == 0  # its memory is the result's
-        assert len(prepared) == len(rest) and abs(len(again) - len(moved)) <= 0.002 * len(moved)
-        assert np.abs(again.centers[: len(rest)] - moved.centers[: len(rest)]).max() < 0.05
+        assert len(prepared) == len(rest) and abs(len(again) - len(moved)) <= AT_THE_LIMIT * len(moved)
+        apart = np.abs(again.centers[: len(rest)] - moved.centers[: len(rest)]).max(1)
+        assert (apart > 5 * PREPARED).mean() <= AT_THE_LIMIT and apart.max() < moved.scales.max()
         if most == np.inf:
             assert np.abs(again.centers - moved.centers).max() < PREPARED
             off = np.abs(covariances(again) - covariances(moved)).max((1, 2))
