@@ -58,8 +58,7 @@ def place(source):
     if holds_splats(source):  # what comes after draws them
         return 0
     if settings_of(source).under_rig:
-        posing = next((index for index, one in enumerate(stack) if is_posing(source, one)), len(stack))
-        return max(posing, earliest(stack))
+        return max(first_posing(source), earliest(stack))
     return end(stack)
 
 
@@ -71,6 +70,12 @@ def end(stack):
     ):
         index -= 1
     return index
+
+
+def first_posing(source):
+    """Where the first modifier stands that poses a source's shape; the stack's length without one."""
+    stack = list(source.modifiers)
+    return next((index for index, one in enumerate(stack) if is_posing(source, one)), len(stack))
 
 
 def earliest(stack):

@@ -133,8 +133,7 @@ class BeforeArmatures:
     """The field's place before a source's armatures, taken for one wrap and given back where that fails."""
 
     def __init__(self, source):
-        stack = list(source.modifiers)
-        first = next((k for k, one in enumerate(stack) if modifier_stack.is_posing(source, one)), len(stack))
+        stack, first = list(source.modifiers), modifier_stack.first_posing(source)
         if first < modifier_stack.earliest(stack):
             last = stack[modifier_stack.earliest(stack) - 1].name
             raise UserError("{name}: move its armature behind {modifier}", source, modifier=last)

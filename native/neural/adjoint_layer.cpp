@@ -53,19 +53,13 @@ Tensor by_pairs(const Tensor& z) {
   return pairs;
 }
 
-/// For each point the products of its rows in `a` (rows, n, width) and `b` (columns, n, width).
-Tensor products_of_rows(const Tensor& a, const Tensor& b) {
-  const Tensor every = b.expand({b.size(0), a.size(1), b.size(2)});
-  return batch_product(a.transpose(0, 1), every.permute({1, 2, 0}));
-}
-
 void adjoint_composed(double sharpness, const Tensor& activations, const Tensor& s, const Tensor& adjoints,
                       Tensor& below, Tensor& second) {
-  const Index outputs = second.size(2);
-  const Tensor z = activations.view({4, s.size(0), s.size(1)}).from(0, 1);
-  const Tensor q = by_output(adjoints, outputs), curve = sharpness * s * (1 - s);
+  const Index outputs = second.size(2), n = s.size(0), width = s.size(1);
+  const Tensor z = activations.view({4, n, width}).from(0, 1);
+  const Tensor q = by_output(adjoints, outputs).expand({outputs, n, width}), curve = sharpness * s * (1 - s);
   by_output(below, outputs).assign(s * q);
-  second += products_of_rows(curve * by_pairs(z), q);
+  second += batch_product((curve * by_pairs(z)).transpose(0, 1), q.permute({1, 2, 0}));
 }
 
 void adjoint_back_composed(double sharpness, const Tensor& activations, const Tensor& s,
@@ -73,12 +67,11 @@ void adjoint_back_composed(double sharpness, const Tensor& activations, const Te
                            Tensor& partial) {
   const Index outputs = second.size(2), n = s.size(0), width = s.size(1);
   const Tensor z = activations.view({4, n, width}).from(0, 1);
-  const Tensor q = by_output(adjoints, outputs), curve = sharpness * s * (1 - s);
+  const Tensor q = by_output(adjoints, outputs).expand({outputs, n, width}), curve = sharpness * s * (1 - s);
   Tensor g = by_output(cotangents, outputs), part = partial.view({4, n, width});
   const Tensor bent = batch_product(second.transpose(1, 2), by_pairs(z).transpose(0, 1)).transpose(0, 1);
   // Of each pair Σ q d over the outputs; a pair of one axis acts on its derivative twice.
-  const Tensor every = q.expand({outputs, n, width});
-  const Tensor weighted = batch_product(second, every.transpose(0, 1)).transpose(0, 1) * curve;
+  const Tensor weighted = batch_product(second, q.transpose(0, 1)).transpose(0, 1) * curve;
   weighted.slice(0, 0, 3) *= 2.0;
   const Tensor x = weighted[0], y = weighted[1], w = weighted[2];
   const Tensor xy = weighted[3], xw = weighted[4], yw = weighted[5];

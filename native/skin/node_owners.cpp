@@ -60,6 +60,15 @@ std::vector<int> sides_needed(const std::vector<BoneSight>& places, Index slots)
   return result;
 }
 
+/// Where a bone is looked at, in shares of its length.
+std::vector<double> shares_along(double length, double spacing) {
+  const Index count = std::clamp(static_cast<Index>(std::ceil(length / spacing)), least_places, most_places);
+  std::vector<double> shares;
+  for (Index k = 0; k < count; ++k)
+    shares.push_back((static_cast<double>(k) + 0.5) / static_cast<double>(count));
+  return shares;
+}
+
 }  // namespace
 
 NodeOwners::NodeOwners(const PiecePoints& surfaces, const std::vector<Index>& nodes, double spacing,
@@ -112,12 +121,9 @@ void NodeOwners::see(const Skeleton& skeleton) {
         return;
       }
     }
-    const auto count =
-        std::clamp(static_cast<Index>(std::ceil(along.norm() / spacing_)), least_places, most_places);
     std::vector<BoneSight> places;
-    for (Index k = 0; k < count; ++k)
-      places.emplace_back(surfaces_, slots_, slot_count_,
-                          head + (static_cast<double>(k) + 0.5) / static_cast<double>(count) * along);
+    for (const double share : shares_along(along.norm(), spacing_))
+      places.emplace_back(surfaces_, slots_, slot_count_, head + share * along);
     const std::vector<int> least = sides_needed(places, slot_count_);
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       const Index own = slot(i);
@@ -211,15 +217,13 @@ void NodeOwners::fill() {
 bool NodeOwners::lies_about(const Nodes& nodes, const Bone& bone) const {
   const Mat3 axes = bone_axes(bone);
   const double length = (bone.tail - bone.head).norm();
-  const Index count = std::clamp(static_cast<Index>(std::ceil(length / spacing_)), least_places, most_places);
-  for (Index k = 0; k < count; ++k) {
-    const double along = length * (static_cast<double>(k) + 0.5) / static_cast<double>(count);
+  for (const double share : shares_along(length, spacing_)) {
     std::array<double, ring_sides> nearest;
     nearest.fill(std::numeric_limits<double>::infinity());
     for (const std::size_t i : nodes) {
       const Vec3 way = axes.transpose() * (surfaces_.points.row(nodes_[i]).transpose() - bone.head);
       const double away = std::hypot(way[0], way[2]);
-      if (std::abs(way[1] - along) > away) continue;
+      if (std::abs(way[1] - share * length) > away) continue;
       const double turns = std::atan2(way[0], way[2]) / (2.0 * std::numbers::pi) + 0.5;
       double& least = nearest[static_cast<std::size_t>(turns * ring_sides) % ring_sides];
       least = std::min(least, away);

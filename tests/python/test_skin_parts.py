@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from support.geometry import meshes
 from support.geometry.parts import LEG, ellipsoid, figure
 
 import arapfields as af
@@ -30,26 +31,13 @@ BONES_OF_FIGURE = [
 ]
 
 
-def ring(center, radius, thickness, count):
-    """A closed ring about the vertical, its triangles outwards."""
-    u, v = np.meshgrid(*2 * [2 * np.pi * np.arange(count) / count], indexing="ij")
-    out = radius + thickness * np.cos(v)
-    points = np.stack([out * np.cos(u), out * np.sin(u), thickness * np.sin(v)], -1).reshape(-1, 3)
-    corner = np.arange(count * count).reshape(count, count)
-    around, up = np.roll(corner, -1, 0), np.roll(corner, -1, 1)
-    both = np.roll(around, -1, 1)
-    triangles = np.concatenate(
-        [np.stack([corner, around, both], -1), np.stack([corner, both, up], -1)]
-    ).reshape(-1, 3)
-    return points + center, triangles
-
-
 def dressed(count=24):
     """The figure with rings about its ankles that cut each other, buttons between its shoes, and eyes."""
     vertices, triangles, parts = figure(count)
+    about, triangles_about = meshes.torus(LEG + 0.02, 0.03, count, count)
     for side, x in (("L", 1), ("R", -1)):
         for name, (points, faces) in {
-            "ring": ring((LEG * x, 0, 0.2), LEG + 0.02, 0.03, count),
+            "ring": (np.add(about, (LEG * x, 0, 0.2)), triangles_about),
             "button": ellipsoid((0.01 * x, -0.2, 0.1), (0.03, 0.03, 0.03), count // 2),
             "eye": ellipsoid((0.15 * x, -0.27, 1.15), (EYE, EYE, EYE), count // 2),
         }.items():
