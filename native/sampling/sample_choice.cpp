@@ -3,7 +3,16 @@
 
 #include <algorithm>
 
+#include "sampling/nearest_sample.h"
+
 namespace arapfields {
+namespace {
+
+/// How far from the chosen points others lie at most, in means of these distances. On one surface, chance
+/// leaves no such gaps.
+constexpr double widest_gap = 6.0;
+
+}  // namespace
 
 std::vector<Index> random_subset(Index n, Index count, Random& random) {
   std::vector<Index> all(static_cast<std::size_t>(n));
@@ -23,6 +32,17 @@ std::vector<Index> stratified(const std::vector<std::uint32_t>& list, Index coun
     result.push_back(list[static_cast<std::size_t>(begin + random.below(end - begin))]);
   }
   return result;
+}
+
+std::vector<Index> missed_rows(PointsIn points, const std::vector<Index>& chosen) {
+  std::vector<Index> missed;
+  const auto left = points.rows() - static_cast<Index>(chosen.size());
+  if (left <= 0 || chosen.empty()) return missed;
+  const Vector away = nearest_distances(rows_of(points, chosen), points);
+  const double widest = widest_gap * away.sum() / static_cast<double>(left);
+  for (Index i = 0; i < away.size(); ++i)
+    if (away[i] > widest) missed.push_back(i);
+  return missed;
 }
 
 Points rows_of(PointsIn points, const std::vector<Index>& rows) {

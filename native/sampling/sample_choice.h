@@ -17,6 +17,9 @@ std::vector<Index> random_subset(Index n, Index count, Random& random);
 /// order.
 std::vector<Index> stratified(const std::vector<std::uint32_t>& list, Index count, Random& random);
 
+/// The rows of points (n,3) that lie far from all of the chosen ones: of loose parts that were missed.
+std::vector<Index> missed_rows(PointsIn points, const std::vector<Index>& chosen);
+
 Points rows_of(PointsIn points, const std::vector<Index>& rows);
 Vector entries_of(const Vector& numbers, const std::vector<Index>& rows);
 

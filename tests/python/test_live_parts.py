@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 import safetensors
+from support.geometry import meshes
 from support.geometry.bar import bar_samples
 from support.geometry.cases import shift
 from support.geometry.fork import BOTTOM, LEGS, TIP, fork_samples
@@ -12,6 +13,8 @@ import arapfields as af
 
 # Single precision, of coefficients that nearly cancel between the layers of centers.
 SINGLE = 1e-4
+# A step of a handle: what it pulls at is never farther from where it goes.
+LEFT_BEHIND = 0.02
 
 
 @pytest.fixture(scope="module")
@@ -77,3 +80,16 @@ def test_loose_parts_stay_together():
     live = af.LiveDeformer(af.SurfaceSamples(points, normals), [af.Point([-1.1, 0, 0], [-1.1, 0, 0])])
     field = live.solve([[-1.1, 0.5, 0]], iterations=100)
     assert np.abs(field(points) - points - [0, 0.5, 0]).max() < 0.05
+
+
+def test_a_held_speck_beside_a_ball_swings_with_it():
+    """Chosen by chance, none of the samples that the handle pulls at would be of it."""
+    ball, speck = meshes.sphere(1.0, 4), meshes.box((0.01, 0.01, 0.01))
+    v = np.concatenate([ball[0], speck[0] + [0.0, 0.0, 2.0]])
+    samples = af.sample_mesh(v, np.concatenate([ball[1], speck[1] + len(ball[0])]), count=6000, seed=2)
+    live = af.LiveDeformer(samples, [af.Region(list(range(6000)), np.eye(4), np.eye(4))])
+    live.set_secondary_motion(af.SecondaryMotionOptions())
+    for step in range(1, 9):
+        way = [0.02 * step, 0.0, 0.0]
+        moved = live.step([shift(way)], 1 / 24)(v)
+        assert np.linalg.norm(moved - v - way, axis=1).max() < LEFT_BEHIND

@@ -57,8 +57,10 @@ void HandleTerms::choose_pairs() {
   Random random(static_cast<std::uint64_t>(problem_.options.seed), 1);
   std::vector<double> weights;
   for (Index i = 0; i < bound_.count(); ++i) {
-    const std::vector<Index> rows =
-        random_subset(bound_.begin(i + 1) - bound_.begin(i), problem_.options.handle_samples, random);
+    const Index held = bound_.begin(i + 1) - bound_.begin(i);
+    std::vector<Index> rows = random_subset(held, problem_.options.handle_samples, random);
+    const auto missed = missed_rows(bound_.sources().middleRows(bound_.begin(i), held), rows);
+    rows.insert(rows.end(), missed.begin(), missed.end());
     const double share = 1.0 / static_cast<double>(static_cast<Index>(rows.size()) * bound_.count());
     for (const Index row : rows) {
       rows_.push_back(bound_.begin(i) + row);

@@ -32,7 +32,9 @@ RadialProblem::RadialProblem(const SurfaceSamples& surface, const LiveOptions& s
   const bool two_layers = shape || options.fine_centers >= worth_two_layers;
   if (!shape) shape = std::make_shared<const RestShape>(samples, options.interior, seed, axis);
   Random random(seed);
-  add_energy_samples(stratified(shape->order, options.samples, random));
+  const std::vector<Index> chosen = stratified(shape->order, options.samples, random);
+  add_energy_samples(chosen);
+  add_energy_samples(missed_rows(samples.points, chosen));
   std::vector<RadialScale> scales;
   if (options.coarse_centers > 0) scales.push_back({options.coarse_centers, options.coarse_radius_factor});
   scales.push_back({options.fine_centers, options.fine_radius_factor, two_layers});
