@@ -12,6 +12,7 @@
 #include "mesh/sample_mesh.h"
 #include "sampling/sample_surface.h"
 #include "wrap/parameters.h"
+#include "wrap/scan_noise.h"
 
 namespace arapfields {
 namespace {
@@ -21,7 +22,7 @@ using namespace wrap_parameters;
 SurfaceSamples samples_of(const ImplicitFunction& function, Index count, std::uint64_t seed,
                           const Progress& progress) {
   if (const auto* mesh = dynamic_cast<const MeshSdf*>(&function))
-    return sample_mesh(mesh->vertices(), mesh->triangles(), count, seed);
+    return sample_mesh(without_noise({mesh->vertices(), mesh->triangles()}), mesh->triangles(), count, seed);
   try {
     return sample_surface(
         function, {.count = static_cast<int>(count), .seed = static_cast<std::int64_t>(seed)}, progress);
