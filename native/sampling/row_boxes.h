@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <span>
 #include <vector>
 
 #include "core/types.h"
@@ -28,11 +27,16 @@ class RowBoxes {
     float gap(const Box& other) const {
       return (low - other.high).max(other.low - high).max(0.0f).square().sum();
     }
+    /// No inner product of a row in one and a row in the other is less.
+    float least_product(const Box& other) const {
+      const Row a = low * other.low, b = low * other.high, c = high * other.low, d = high * other.high;
+      return a.min(b).min(c.min(d)).sum();
+    }
   };
   static constexpr Index run = 4;
 
   /// Of at most `width` columns.
-  explicit RowBoxes(const Eigen::Ref<const RowMatrix<double>>& rows) : levels_(1), rows_(rows.rows()) {
+  explicit RowBoxes(const Eigen::Ref<const RowMatrix<double>>& rows) : levels_(1) {
     levels_[0].resize(static_cast<std::size_t>((rows.rows() + run - 1) / run));
     Row row = Row::Zero();
     for (Index i = 0; i < rows.rows(); ++i) {
@@ -45,11 +49,6 @@ class RowBoxes {
       levels_.push_back(std::move(next));
     }
   }
-  /// What belongs to the rows of a run.
-  std::span<const Index> rows(Index k, const std::vector<Index>& of) const {
-    return std::span(of).subspan(static_cast<std::size_t>(k * run),
-                                 static_cast<std::size_t>(std::min(run, rows_ - k * run)));
-  }
   Index levels() const { return std::ssize(levels_); }
   /// How many boxes a level has; runs are level 0.
   Index count(Index level = 0) const { return std::ssize(levels_[static_cast<std::size_t>(level)]); }
@@ -59,7 +58,6 @@ class RowBoxes {
 
  private:
   std::vector<std::vector<Box>> levels_;
-  Index rows_ = 0;
 };
 
 }  // namespace arapfields

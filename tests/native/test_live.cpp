@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
 #include <boost/test/unit_test.hpp>
 #include <cmath>
 
@@ -7,6 +8,7 @@
 #include "core/tall_product.h"
 #include "fields/radial_evaluator.h"
 #include "optimize/quasi_newton.h"
+#include "sampling/facing_runs.h"
 #include "sampling/row_boxes.h"
 #include "tensors/dense.h"
 
@@ -109,7 +111,38 @@ BOOST_AUTO_TEST_CASE(boxes_of_runs_bound_the_distances_of_their_rows) {
         const Index a = i / boxes.run >> level, b = j / boxes.run >> level;
         const double square = (points.row(i) - points.row(j)).squaredNorm();
         BOOST_TEST(boxes.box(level, a).gap(boxes.box(level, b)) <= square + 1e-5);
+        BOOST_TEST(boxes.box(level, a).least_product(boxes.box(level, b)) <=
+                   points.row(i).dot(points.row(j)) + 1e-5);
       }
+}
+
+BOOST_AUTO_TEST_CASE(runs_meet_where_their_samples_do) {
+  const Index n = 78;
+  const double far = 3.0, near = 0.4, facing = -0.1;
+  const RowMatrix<double> rest = random_matrix(n, 8, 14);
+  const Points places = random_points(n, 15);
+  const Points known = Points(random_matrix(n, 3, 16)).rowwise().normalized();
+  Eigen::Array<bool, Eigen::Dynamic, 1> open(n);
+  for (Index i = 0; i < n; ++i) open[i] = i % 5 != 0;
+  const FacingRuns runs(rest, far);
+  for (const Points& normals : {Points(0, 3), known}) {
+    const auto met = runs.meeting(places, normals, open, near, facing);
+    Index found = 0;
+    for (Index a = 0; a < runs.count(); ++a)
+      for (Index b = 0; b < runs.count(); ++b) {
+        bool meets = false;
+        for (const Index i : runs.samples(a))
+          for (const Index j : runs.samples(b))
+            meets = meets || (open[i] && open[j] && (places.row(i) - places.row(j)).norm() < near &&
+                              (rest.row(i) - rest.row(j)).norm() > far &&
+                              (normals.rows() == 0 || normals.row(i).dot(normals.row(j)) <= facing));
+        const auto& of = met[static_cast<std::size_t>(a)];
+        BOOST_TEST((std::count(of.begin(), of.end(), b) == (meets ? 1 : 0)));
+        found += meets;
+      }
+    BOOST_TEST(found > 0);
+    BOOST_TEST(found < runs.count() * runs.count());
+  }
 }
 
 BOOST_AUTO_TEST_CASE(tall_products_agree_with_eigen) {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <utility>
 
 #include "core/errors.h"
 #include "core/parallel.h"
@@ -39,8 +39,6 @@ constexpr double inside = 0.5;
 constexpr double near_a_cut = 0.1;
 /// Sides of a surface.
 constexpr double outwards = 1.0, inwards = -1.0;
-/// Of squares in single precision.
-constexpr double rounding = 1e-4;
 /// Meshes are so far from each other.
 constexpr double meshes_apart = 10.0;
 
@@ -62,12 +60,15 @@ SelfContact::SelfContact(const RadialProblem& problem, const std::vector<Index>&
   if (!samples.mesh_indices.empty())
     for (const Index row : rows) meshes_.push_back(samples.mesh_indices[static_cast<std::size_t>(row)]);
   widths_ = 2.0 * problem.shape->thickness->at(places);
-  gather_rest();
+  normals_ = normals;
+  RowMatrix<double> rest = RowMatrix<double>::Zero(n, 8);
+  rest.leftCols(6) = inside_;
+  for (std::size_t i = 0; i < meshes_.size(); ++i) rest(static_cast<Index>(i), 6) = meshes_apart * meshes_[i];
+  runs_.emplace(std::move(rest), far_inside);
   const PointGrid grid(places, near_at_rest);  // about a square of the surface lies in each cell
   const double share = static_cast<double>(grid.size()) / static_cast<double>(n);
   aside_ = spacings_aside * near_at_rest * std::sqrt(share);
   kept_ = kept;
-  normals_ = normals;
   for (Index i = 0; i < n; i += std::max<Index>(1, n / most_probes)) probes_.push_back(i);
   measure_rest(places);
   least_ = Vector::Constant(n, kept);
@@ -117,45 +118,6 @@ void SelfContact::find_cuts(PointsIn places) {
   probes_ = std::move(probes);
 }
 
-/// Orders samples so that runs of them, pairs of these and so on are compact at rest, and finds the balls
-/// around these.
-void SelfContact::gather_rest() {
-  RowMatrix<double> rest = RowMatrix<double>::Zero(inside_.rows(), 8);
-  rest.leftCols(6) = inside_;
-  for (std::size_t i = 0; i < meshes_.size(); ++i) rest(static_cast<Index>(i), 6) = meshes_apart * meshes_[i];
-  order_.resize(static_cast<std::size_t>(rest.rows()));
-  std::iota(order_.begin(), order_.end(), 0);
-  const auto split = [&](const auto& self, Index first, Index last) -> void {
-    Index half = RowBoxes<8>::run;
-    if (last - first <= half) return;
-    while (2 * half < last - first) half *= 2;
-    const std::vector<Index> members(order_.begin() + first, order_.begin() + last);
-    const RowMatrix<double> rows = rest(members, Eigen::all);
-    Index longest = 0;
-    (rows.colwise().maxCoeff() - rows.colwise().minCoeff()).maxCoeff(&longest);
-    std::nth_element(
-        order_.begin() + first, order_.begin() + first + half, order_.begin() + last,
-        [&](Index i, Index j) { return std::pair(rest(i, longest), i) < std::pair(rest(j, longest), j); });
-    self(self, first, first + half);
-    self(self, first + half, last);
-  };
-  split(split, 0, rest.rows());
-  rest = rest(order_, Eigen::all).eval();
-  const RowBoxes<8> boxes(rest);
-  for (Index level = 0; level < boxes.levels(); ++level) {
-    std::vector<Ball>& balls = at_rest_.emplace_back(static_cast<std::size_t>(boxes.count(level)));
-    const Index rows = boxes.run << level;
-    for (Index k = 0; k < std::ssize(balls); ++k) {
-      Ball& ball = balls[static_cast<std::size_t>(k)];
-      ball.middle = 0.5f * (boxes.box(level, k).low + boxes.box(level, k).high);
-      const auto members = rest.middleRows(k * rows, std::min(rows, rest.rows() - k * rows));
-      const Eigen::RowVectorXd middle = ball.middle.matrix().transpose().cast<double>();
-      const double radius = std::sqrt((members.rowwise() - middle).rowwise().squaredNorm().maxCoeff());
-      ball.left = static_cast<float>(0.5 * (1.0 - rounding) * far_inside - radius);
-    }
-  }
-}
-
 bool SelfContact::is_far(Index i, Index j, double distance) const {
   if (!meshes_.empty() && meshes_[static_cast<std::size_t>(i)] != meshes_[static_cast<std::size_t>(j)])
     return true;
@@ -183,57 +145,28 @@ bool SelfContact::came_through(Index i, Index j, const Vec3& normal) const {
          (ways_.seen.row(i) - ways_.seen.row(j)).dot(normal.transpose()) >= 0.0;
 }
 
-/// Whether a sample of one run is near one of another that it is far from inside the shape.
-bool SelfContact::meet(PointsIn places, const RowBoxes<4>& boxes, Index a, Index b, double near) const {
-  for (const Index i : boxes.rows(a, order_))
-    for (const Index j : boxes.rows(b, order_))
-      if ((places.row(i) - places.row(j)).squaredNorm() < near * near &&
-          std::min(least_[i], least_[j]) > 0.0 && is_far(i, j, far_inside))
-        return true;
-  return false;
-}
-
-/// For each run of samples those that it meets.
-std::vector<std::vector<Index>> SelfContact::near_runs(PointsIn places, const RowBoxes<4>& boxes,
-                                                       double near) const {
-  std::vector<std::vector<Index>> result(static_cast<std::size_t>(boxes.count()));
-  const auto reach = static_cast<float>((1.0 + rounding) * near * near);
-  const auto descend = [&](const auto& self, Index level, Index a, Index b) -> void {
-    if (boxes.box(level, a).gap(boxes.box(level, b)) > reach) return;
-    const std::vector<Ball>& balls = at_rest_[static_cast<std::size_t>(level)];
-    const Ball &first = balls[static_cast<std::size_t>(a)], &second = balls[static_cast<std::size_t>(b)];
-    const float left = first.left + second.left;
-    if (left > 0.0f && (first.middle - second.middle).square().sum() < left * left) return;
-    if (level > 0) {
-      const Index count = boxes.count(level - 1);
-      for (Index i = 2 * a; i < std::min(2 * a + 2, count); ++i)
-        for (Index j = a == b ? i : 2 * b; j < std::min(2 * b + 2, count); ++j) self(self, level - 1, i, j);
-    } else if (meet(places, boxes, a, b, near)) {
-      result[static_cast<std::size_t>(a)].push_back(b);
-      if (a != b) result[static_cast<std::size_t>(b)].push_back(a);
-    }
-  };
-  descend(descend, boxes.levels() - 1, 0, 0);
-  return result;
-}
-
 std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& normals_at, double near,
-                                            Beyond beyond) const {
-  const RowBoxes<4> boxes(rows_of(places, order_));
-  const std::vector<std::vector<Index>> near_to = near_runs(places, boxes, near);
+                                            Beyond beyond) {
+  Points areas;  // known at once where they are needed everywhere, as they are below
+  if (std::exchange(is_beyond_, false)) areas = normals_at(nullptr);
+  Points normals = areas.rowwise().normalized();
+  const std::vector<std::vector<Index>> near_to =
+      runs_->meeting(places, normals, least_.array() > 0.0, near, facing);
   std::vector<Index> runs, samples, blocks;
-  for (Index run = 0; run < boxes.count(); ++run) {
+  for (Index run = 0; run < runs_->count(); ++run) {
     if (near_to[static_cast<std::size_t>(run)].empty()) continue;
     runs.push_back(run);
-    for (const Index i : boxes.rows(run, order_)) samples.push_back(i);
+    for (const Index i : runs_->samples(run)) samples.push_back(i);
   }
   if (runs.empty()) return {};
   std::sort(samples.begin(), samples.end());
   for (const Index i : samples)
     if (const Index block = i / RadialEvaluator<float>::block_size; blocks.empty() || blocks.back() != block)
       blocks.push_back(block);
-  Points normals = normals_at(&blocks);
-  for (const Index i : samples) normals.row(i).normalize();
+  if (normals.rows() == 0) {
+    normals = normals_at(&blocks);
+    for (const Index i : samples) normals.row(i).normalize();
+  }
   std::vector<Index> second(static_cast<std::size_t>(places.rows()), -1);
   const auto visit = [&](Index i, const std::vector<Index>& others, Beyond which) {
     second[static_cast<std::size_t>(i)] = -1;
@@ -241,7 +174,7 @@ std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& norm
     const Vec3 place = places.row(i).transpose(), normal = normals.row(i).transpose();
     double nearest = near * near;
     for (const Index run : others)
-      for (const Index j : boxes.rows(run, order_)) {
+      for (const Index j : runs_->samples(run)) {
         const Vec3 arm = place - places.row(j).transpose();
         const double square = arm.squaredNorm();
         if (square >= nearest) continue;
@@ -261,7 +194,7 @@ std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& norm
     parallel_for(0, std::ssize(runs), 32, [&](Index first, Index last) {
       for (Index k = first; k < last; ++k) {
         const Index run = runs[static_cast<std::size_t>(k)];
-        for (const Index i : boxes.rows(run, order_)) look(i, near_to[static_cast<std::size_t>(run)]);
+        for (const Index i : runs_->samples(run)) look(i, near_to[static_cast<std::size_t>(run)]);
       }
     });
   };
@@ -270,11 +203,12 @@ std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& norm
     const Index j = second[static_cast<std::size_t>(i)];
     return j >= 0 && normals.row(j).dot(places.row(i) - places.row(j)) < 0.0;
   };
-  if (beyond != Beyond::at_rest && std::any_of(samples.begin(), samples.end(), is_beyond)) {
-    const Points all = normals_at(nullptr);
-    const SampleWindings now(places, share_ * all, aside_);
+  is_beyond_ = beyond != Beyond::at_rest && std::any_of(samples.begin(), samples.end(), is_beyond);
+  if (is_beyond_) {
+    if (areas.rows() == 0) areas = normals_at(nullptr);
+    const SampleWindings now(places, share_ * areas, aside_);
     each([&](Index i, const std::vector<Index>& others) {  // the two sides of what is squashed do not meet
-      if (is_beyond(i) && winding(now, i, outwards, places, all) - above_[i] < entered)
+      if (is_beyond(i) && winding(now, i, outwards, places, areas) - above_[i] < entered)
         visit(i, others, Beyond::none);
     });
   }

@@ -2,10 +2,11 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <utility>
 #include <vector>
 
-#include "sampling/row_boxes.h"
+#include "sampling/facing_runs.h"
 #include "sampling/sample_windings.h"
 #include "solve/radial/problem.h"
 
@@ -47,9 +48,7 @@ class SelfContact {
  private:
   /// Which gaps below zero are pairs.
   enum class Beyond { none, as_came, shallow, all, at_rest };
-  std::vector<FacingPair> search(PointsIn places, const Normals& normals, double near, Beyond beyond) const;
-  std::vector<std::vector<Index>> near_runs(PointsIn places, const RowBoxes<4>& boxes, double near) const;
-  bool meet(PointsIn places, const RowBoxes<4>& boxes, Index a, Index b, double near) const;
+  std::vector<FacingPair> search(PointsIn places, const Normals& normals, double near, Beyond beyond);
   bool is_far(Index i, Index j, double distance) const;
   bool is_cut(Index i, Index j) const;
   bool came_through(Index i, Index j, const Vec3& normal) const;
@@ -57,19 +56,13 @@ class SelfContact {
                  PointsIn normals) const;
   void measure_rest(PointsIn places);
   void find_cuts(PointsIn places);
-  void gather_rest();
   void remember(PointsIn places, const std::vector<FacingPair>& pairs);
 
   RowMatrix<double> inside_;  // (n,6) rest places and their embedding
   Points normals_;            // (n,3) at rest
   double kept_ = 0.0;
-  bool is_cut_ = false;       // whether parts cut each other at rest
-  std::vector<Index> order_;  // of samples, as they lie together at rest
-  struct Ball {
-    Eigen::Array<float, 8, 1> middle;  // of rows of these, and the mesh
-    float left;                        // what its radius leaves of half the distance that is far
-  };
-  std::vector<std::vector<Ball>> at_rest_;  // for each level of boxes
+  bool is_cut_ = false;  // whether parts cut each other at rest
+  std::optional<FacingRuns> runs_;
   std::vector<std::int32_t> meshes_;
   Vector below(const SampleWindings& windings, PointsIn places, PointsIn normals) const;
 
@@ -82,6 +75,7 @@ class SelfContact {
   Vector least_;               // (n) gaps at rest, at most what is kept; 0: left alone
   double aside_ = 0.0;         // what is farther aside does not face
   Ways ways_;
+  bool is_beyond_ = false;  // whether a sample was beyond another at the last search
 };
 
 }  // namespace arapfields
