@@ -24,9 +24,10 @@ constexpr double deep = 5e-4;
 /// Pushes at the end, while something is deeper, but not so deep that it is still on its way.
 constexpr int most_pushes = 6;
 constexpr double nearly = 0.01;
-/// Rounds beyond the iterations that were asked for, while something is deeper.
+/// Rounds beyond the iterations that were asked for, while something is deeper; of the shape itself, only
+/// while that falls.
 constexpr Index more_rounds = 4;
-/// Planes become stiffer where a round leaves more than this share of a depth.
+/// Depths fall where a round leaves no more than this share. Planes become stiffer where they do not.
 constexpr double still_comes_out = 0.8;
 /// A round that ends so deep, in cube units, is taken back by halves, so many times at most.
 constexpr double too_deep = 0.03;
@@ -118,7 +119,7 @@ void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Inde
               double tolerance, const Progress& progress) {
   s.precondition(0.0);
   Index left = iterations;
-  double before_it = std::numeric_limits<double>::infinity();
+  double before_it = std::numeric_limits<double>::infinity(), least = before_it;
   s.contact.find(s.shape.coefficients);
   SolveHistory::Start start{s.shape.coefficients, {}};
   const int uses = s.fast.uses;
@@ -139,6 +140,8 @@ void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Inde
       s.contact.harden(depth > deep && depth < nearly && depth > still_comes_out * before_it);
       before_it = depth;
       if (left <= 0 && (depth < deep || extra-- == 0)) break;
+      if (left <= 0 && s.contact.deepest_outside() < deep && depth > still_comes_out * least) break;
+      least = std::min(least, depth);
     }
   }
   find_and_push(s, most_pushes, nearly);
