@@ -178,6 +178,17 @@ double value_without_contact(RadialState& s) {
   return objective.value(u, nullptr) - objective.terms(u).contact;
 }
 
+/// Starts at these coefficients if they have less energy without contact.
+bool start_better(RadialState& s, const RowMatrix<double>& coefficients) {
+  const double value = value_without_contact(s);
+  const RowMatrix<double> before = std::exchange(s.shape.coefficients, coefficients);
+  s.shape.jump();
+  if (value_without_contact(s) < value) return true;
+  s.shape.coefficients = before;
+  ++s.shape.revision;
+  return false;
+}
+
 /// Where the shape itself holds a handle back, a detour may have brought the surface there: solves without
 /// contact, and where the handles rest, pushes apart what overlaps then. Returns whether that is better; if
 /// not, all is as before.
@@ -186,20 +197,21 @@ bool come_apart(RadialState& s, const std::vector<Mat4>& before, bool rests, Ind
   const std::vector<HeldBack>& held = s.report.contact.held;
   const Points& targets = s.handles.pairs().targets;
   if (std::none_of(held.begin(), held.end(), [](const HeldBack& h) { return h.by == "itself"; })) {
-    s.tried.resize(0, 3);
+    s.tried = {};
     return false;
   }
-  if (s.tried.rows() == targets.rows() &&
-      (targets - s.tried).rowwise().norm().maxCoeff() <= (rests ? 0.0 : step_length_itself))
+  const bool again = s.tried.targets.rows() == targets.rows();
+  if (again && (targets - s.tried.targets).rowwise().norm().maxCoeff() <= (rests ? 0.0 : step_length_itself))
     return false;
-  s.tried = targets;
   const double value = value_without_contact(s);
   const RadialShape shape = s.shape;
   const SolveHistory history = s.history;
   const RadialReport report = s.report;
   ContactPressing pressing = s.contact.pressing();
   s.contact.release();
-  freely(steps_apart);
+  const bool goes_on = again && start_better(s, s.tried.coefficients);
+  freely(goes_on ? std::min(2 * iterations, steps_apart) : steps_apart);
+  s.tried = {targets, s.shape.coefficients};
   s.report.contact = {};
   if (s.contact.find(s.shape.coefficients, 0.0, true) <= 0.0) {
     s.contact.release();

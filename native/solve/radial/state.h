@@ -95,7 +95,10 @@ struct RadialState {
   Dependent<std::vector<Index>, 1> holders;   ///< which handle holds each sample; −1: none
   Dependent<Vector, 1> pin_widths;            ///< of the shape at point handles
   Dependent<std::vector<Index>, 1> mirrored;  ///< with symmetry, the sample nearest to each one's reflection
-  Points tried;  ///< the handles' targets where a solve without contact was tried last
+  struct Tried {
+    Points targets;                  ///< the handles'
+    RowMatrix<double> coefficients;  ///< of what they made
+  } tried;                           ///< where a solve without contact was tried last
   RadialHooks hooks;
   Revision hooks_revision = 0;
   RadialPreconditioner preconditioner;
