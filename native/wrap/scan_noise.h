@@ -12,7 +12,8 @@ namespace arapfields {
 double vertex_noise(const TriangleMesh& mesh);
 
 /// The vertices (n,3) smoothed without shrinking, by as much as they are noisy; the mesh's own where they are
-/// not. Source: Taubin 1995, "A Signal Processing Approach to Fair Surface Design".
+/// not, or where that would move them further than noise does. Source: Taubin 1995, "A Signal Processing
+/// Approach to Fair Surface Design".
 Points without_noise(const TriangleMesh& mesh);
 
 }  // namespace arapfields
