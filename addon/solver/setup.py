@@ -47,8 +47,9 @@ class SampledSource:
     topology: Topology | None = None
 
 
-def sampled(setup, count=SAMPLES, seed=0):
-    """The SampledSource of a setup; on a worker."""
+def sampled(setup, count=None, seed=0):
+    """The SampledSource of a setup, of SAMPLES unless a count is given; on a worker."""
+    count = SAMPLES if count is None else count
     surface, tracker = setup.surface, ProgressTracker(native.library().Task)
     moves_points = setup.cells is None
     samples = surface.samples(tracker, count, seed, own_triangles=surface.exact and moves_points)
