@@ -26,6 +26,9 @@ namespace {
 /// Shares of the body's size: up to the first distance a point moves with the field, from the second with
 /// frames.
 constexpr double near_share = 0.03, far_share = 0.06;
+/// Off the surface a radial field can be steep, as under a style. Where it stretches the way from a frame to
+/// what is above it by more than the first factor, both distances shrink, from the second on by `narrowest`.
+constexpr double steady = 1.5, steep = 3.0, narrowest = 3.0;
 /// Spacings of the samples within which a point counts as on the surface.
 constexpr double surface_spacings = 1.5;
 /// Square root of a body's area in its sizes, roughly: for the spacing of samples.
@@ -88,6 +91,20 @@ const RadialField* as_radial(const DeformationField& field) {
   return typeid(field) == typeid(RadialField) ? dynamic_cast<const RadialField*>(&field) : nullptr;
 }
 
+/// Points that frames move, and how far they are from the surface.
+struct Framed {
+  std::vector<Index> rows;
+  Points points;  // mesh coordinates
+  Vector distances;
+  CarriedPoints carried;
+};
+
+struct FrameMotion {
+  Points positions;
+  std::vector<double> rotations;
+  Vector growth;  // empty: all 1
+};
+
 }  // namespace
 
 class Attachment::State {
@@ -100,15 +117,19 @@ class Attachment::State {
  private:
   Points frame_points_in(const Frame& frame) const { return frame.to_cube(frame_.to_mesh(frames_.points())); }
   std::shared_ptr<const CachedEvaluation> cached(const RadialField& field) const;
+  Vector steepness(const Points& probed, const Points& frames) const;
+  void blend(const Framed& some, const FrameMotion& frames, const Vector& steep_at, const Vector& influence,
+             Points& result) const;
 
   Frame frame_;
-  std::vector<Index> near_, far_;    // points that the field moves, and that frames move
-  Points near_points_, far_points_;  // mesh coordinates, in spatial order
-  PlacesAbove places_;               // of the points that the field moves
-  Vector frame_weights_;             // (far) of the frames beside the field
+  double near_reach_ = 0.0, far_reach_ = 0.0;
+  std::vector<Index> near_;  // points that the field moves, in spatial order
+  Points near_points_;       // mesh coordinates
+  Points probed_;            // these, then what is above the frames, in both distances
+  PlacesAbove places_;       // of the points that the field moves
   SurfaceFrames frames_;
   Points frame_normals_;
-  CarriedPoints carried_;
+  Framed far_, close_;  // moved by frames everywhere, and only where the field is steep
   mutable std::mutex mutex_;
   mutable std::shared_ptr<const CachedEvaluation> cache_;
 };
@@ -122,26 +143,34 @@ Attachment::State::State(const SurfaceSamples& samples, PointsIn points, const P
   require(placed.allFinite(), "points", "some are too far away", "they must be within reach of the body");
   const double size = body_size(samples.points);
   const double spacing = area_side * size / std::sqrt(static_cast<double>(samples.size()));
-  const double near = std::max(near_share * size, surface_spacings * spacing),
-               far = near * far_share / near_share;
+  near_reach_ = std::max(near_share * size, surface_spacings * spacing);
+  far_reach_ = near_reach_ * far_share / near_share;
   const Vector distances = nearest_distances(samples.points, placed, progress);
   distances_ = frame_.scale * distances;
   progress.report(0.3, "distances to the body");
-  std::vector<double> weights;
   for (const std::uint32_t i : points.rows() > 0 ? morton_order(placed) : std::vector<std::uint32_t>()) {
-    const double weight = smooth_between(near, far, distances[i]);
+    const double weight = smooth_between(near_reach_, far_reach_, distances[i]);
     if (weight < 1.0) near_.push_back(i);
-    if (weight > 0.0) far_.push_back(i), weights.push_back(weight);
+    if (weight > 0.0) far_.rows.push_back(i);
+    if (weight <= 0.0 && narrowest * distances[i] > near_reach_) close_.rows.push_back(i);
   }
   near_points_ = points(near_, Eigen::all);
   places_ = PlacesAbove(samples, placed(near_, Eigen::all), distances(near_), spacing);
-  far_points_ = points(far_, Eigen::all);
-  frame_weights_ = Eigen::Map<const Vector>(weights.data(), static_cast<Index>(weights.size()));
-  if (far_.empty()) return;
+  probed_ = near_points_;
+  if (far_.rows.empty() && close_.rows.empty()) return;
   frames_ = SurfaceFrames(samples.points);
   if (samples.normals.rows() == samples.size()) frame_normals_ = samples.normals(frames_.rows(), Eigen::all);
   progress.report(0.5, "frames of the body");
-  carried_ = CarriedPoints(frames_, placed(far_, Eigen::all), distances(far_), size);
+  for (Framed* some : {&far_, &close_}) {
+    some->points = points(some->rows, Eigen::all);
+    some->distances = distances(some->rows);
+    some->carried = CarriedPoints(frames_, placed(some->rows, Eigen::all), some->distances, size);
+  }
+  if (near_.empty() || frame_normals_.rows() == 0) return;
+  const Points& from = frames_.points();
+  probed_.resize(near_points_.rows() + 2 * from.rows(), 3);
+  probed_ << near_points_, frame_.to_mesh(from + near_reach_ * frame_normals_),
+      frame_.to_mesh(from + far_reach_ * frame_normals_);
 }
 
 std::shared_ptr<const CachedEvaluation> Attachment::State::cached(const RadialField& field) const {
@@ -149,10 +178,43 @@ std::shared_ptr<const CachedEvaluation> Attachment::State::cached(const RadialFi
     const std::lock_guard lock(mutex_);
     if (cache_ && cache_->matches(field)) return cache_;
   }
-  auto evaluation = std::make_shared<const CachedEvaluation>(
-      field, near_points_, frame_points_in(field.frame()), frames_, carried_);
+  auto evaluation = std::make_shared<const CachedEvaluation>(field, probed_, frame_points_in(field.frame()),
+                                                             frames_, far_.carried);
   const std::lock_guard lock(mutex_);
   return cache_ = std::move(evaluation);
+}
+
+/// How steep a field is above each frame, from 0 to 1; empty: nowhere. From where it takes `probed_`, in mesh
+/// coordinates, and the frames, in the cube.
+Vector Attachment::State::steepness(const Points& probed, const Points& frames) const {
+  const Index count = frames.rows(), first = near_points_.rows();
+  if (probed.rows() == first) return {};
+  const Points above = frame_.to_cube(probed.bottomRows(2 * count));
+  const Vector near = (above.topRows(count) - frames).rowwise().norm() / near_reach_;
+  const Vector far = (above.bottomRows(count) - frames).rowwise().norm() / far_reach_;
+  Vector steep_at(count);
+  for (Index j = 0; j < count; ++j) steep_at[j] = smooth_between(steady, steep, std::max(near[j], far[j]));
+  return steep_at.maxCoeff() > 0.0 ? steep_at : Vector();
+}
+
+/// Moves points towards where the frames take them: by their distance, where the field is steep a greater
+/// one.
+void Attachment::State::blend(const Framed& some, const FrameMotion& frames, const Vector& steep_at,
+                              const Vector& influence, Points& result) const {
+  Points carried =
+      frame_.to_mesh(some.carried.moved(frames_, frames.positions, frames.rotations.data(), frames.growth));
+  const Vector narrower = steep_at.size() > 0 ? some.carried.means(steep_at) : Vector();
+  for (std::size_t i = 0; i < some.rows.size(); ++i) {
+    const Index row = static_cast<Index>(i);
+    if (influence.size() > 0 && influence[row] < 1.0)
+      carried.row(row) = some.points.row(row) + influence[row] * (carried.row(row) - some.points.row(row));
+    const double factor = narrower.size() > 0 ? 1.0 + (narrowest - 1.0) * narrower[row] : 1.0;
+    const double weight = smooth_between(near_reach_, far_reach_, factor * some.distances[row]);
+    if (weight < 1.0)
+      result.row(some.rows[i]) += weight * (carried.row(row) - result.row(some.rows[i]));
+    else
+      result.row(some.rows[i]) = carried.row(row);
+  }
 }
 
 Points Attachment::State::positions(const DeformationField& field) const {
@@ -163,7 +225,7 @@ Points Attachment::State::positions(const DeformationField& field) const {
   Points near = cache ? cache->moved(*radial) : field.at(near_points_);
   if (!cache) places_.adjust(field, near);
   for (std::size_t i = 0; i < near_.size(); ++i) result.row(near_[i]) = near.row(i);
-  if (far_.empty()) return result;
+  if (frames_.points().rows() == 0) return result;
   const Points frame_points = frame_points_in(field.frame());
   const Index count = frame_points.rows();
   JetBlock<double> jets(count, JetOrder::first);
@@ -171,31 +233,23 @@ Points Attachment::State::positions(const DeformationField& field) const {
     cache->evaluate_at_frames(*radial, jets.view());
   else
     field.evaluate(frame_points, jets.view());
-  std::vector<double> rotations(9 * count);
-  closest_rotations<double>(jets.view().column(1), count, rotations.data());
-  Vector growth;  // of the surface; a radial field's clothes keep their size
-  if (!cache && frame_normals_.rows() > 0) {
-    growth.resize(count);
+  FrameMotion frames;
+  frames.rotations.resize(9 * count);
+  closest_rotations<double>(jets.view().column(1), count, frames.rotations.data());
+  if (!cache && frame_normals_.rows() > 0) {  // a radial field's clothes keep their size
+    frames.growth.resize(count);
     for (Index j = 0; j < count; ++j)
-      growth[j] = std::sqrt(
+      frames.growth[j] = std::sqrt(
           area_vector(jacobian_at(std::as_const(jets).view(), j), frame_normals_.row(j).transpose()).norm());
   }
   // Differences in the field's own frame, so that a field that moves nothing moves nothing here.
-  const Points shifts = (field.frame().scale / frame_.scale) *
-                        (Eigen::Map<const Points>(jets.view().data, count, 3) - frame_points);
-  Points carried =
-      frame_.to_mesh(carried_.moved(frames_, frames_.points() + shifts, rotations.data(), growth));
-  for (std::size_t i = 0; i < far_.size(); ++i) {
-    const Index row = static_cast<Index>(i);
-    if (cache && cache->carried_influence().size() > 0 && cache->carried_influence()[row] < 1.0)
-      carried.row(row) =
-          far_points_.row(row) + cache->carried_influence()[row] * (carried.row(row) - far_points_.row(row));
-    const double weight = frame_weights_[row];
-    if (weight < 1.0)
-      result.row(far_[i]) += weight * (carried.row(row) - result.row(far_[i]));
-    else
-      result.row(far_[i]) = carried.row(row);
-  }
+  frames.positions =
+      frames_.points() + (field.frame().scale / frame_.scale) *
+                             (Eigen::Map<const Points>(jets.view().data, count, 3) - frame_points);
+  const Vector influence = cache ? cache->carried_influence() : Vector();
+  const Vector steep_at = cache && influence.size() == 0 ? steepness(near, frames.positions) : Vector();
+  blend(far_, frames, steep_at, influence, result);
+  if (steep_at.size() > 0) blend(close_, frames, steep_at, {}, result);
   return result;
 }
 

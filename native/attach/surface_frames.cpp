@@ -146,6 +146,19 @@ void CarriedPoints::compute_weights(const SurfaceFrames& frames) {
     }
 }
 
+Vector CarriedPoints::means(const Vector& values) const {
+  Vector result(points_.rows());
+  parallel_for(0, points_.rows(), 1024, [&](Index first, Index last) {
+    for (Index i = first; i < last; ++i) {
+      double sum = 0.0;
+      for (std::int64_t e = start_[i]; e < start_[i + 1]; ++e)
+        sum += static_cast<double>(weights_[e]) * values[frames_[e]];
+      result[i] = sum;
+    }
+  });
+  return result;
+}
+
 Vector CarriedPoints::nearby_means(const SurfaceFrames& frames, const Vector& values) const {
   const Weights weights(frames, size_, nearby_cutoff);
   Vector means = Vector::Zero(points_.rows());

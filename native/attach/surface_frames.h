@@ -53,7 +53,9 @@ class CarriedPoints {
   /// empty: all 1): factors of the distances from the frames.
   Points moved(const SurfaceFrames& frames, PointsIn positions, const double* rotations,
                const Vector& growth) const;
-  /// Weighted means (n) of the frames' values (m), over nearby frames alone.
+  /// Weighted means (n) of the frames' values (m).
+  Vector means(const Vector& values) const;
+  /// The same over nearby frames alone.
   Vector nearby_means(const SurfaceFrames& frames, const Vector& values) const;
 
  private:

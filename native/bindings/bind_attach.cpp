@@ -14,9 +14,10 @@ Points carried along by a body, such as clothes, hair, hats or lattices, that it
 
 Within 0.03 of the body's size, points move with the field. Beyond 0.06 they move with rigid frames of the
 surface, f(p) + R(p) (y − p). Several frames blend at each point, so that nothing tears where the nearest
-frame changes. Between the two distances both are mixed. With a field that is not radial, such as a wrap's,
-distances grow as the root of the surface's area does. Everything that depends on the rest shapes alone is
-computed once; positions() is cheap enough for each frame of a live session.)")
+frame changes. Between the two distances both are mixed; under a style, whose field is steep off the surface,
+both shrink to a third. With a field that is not radial, such as a wrap's, distances grow as the root of the
+surface's area does. Everything that depends on the rest shapes alone is computed once; positions() is cheap
+enough for each frame of a live session.)")
       .def(py::init([](const SurfaceSamples& samples, const ArrayArgument& points, Task* task) {
              const Points mesh = as_points(points, "points");
              return run_long(task, [&](const Progress& progress) {
