@@ -10,6 +10,7 @@ from ..blender.object_references import in_scene, settings_of
 from ..core.errors import UserError
 from . import empties, movers
 
+LEAST_HELD = 4  # samples about a bone without a group: of fewer, another draw may have none
 HOLD_FROM = 0.8  # weight of a bone's group from which it holds; between two bones the surface bends freely
 
 
@@ -99,6 +100,21 @@ def add(source, rig, name, groups):
         entry.hold_from = HOLD_FROM
     entry.rest = (np.linalg.inv(empties.matrix_of(source)) @ rest_in_world(rig, name)).ravel()
     return entry
+
+
+def keep_holding(source, rig, names):
+    """Takes bones off the list that hold nothing; returns the names of the others, UserError without any."""
+    held = []
+    for name in names:
+        index = find(source, rig, name)
+        entry = settings_of(source).handles[index]
+        if entry.group or entry.inside >= LEAST_HELD:
+            held.append(name)
+        else:
+            empties.remove(source, index)
+    if not held:
+        raise UserError("No bone of {rig} is near the surface of {name}", source, rig=rig.name)
+    return held
 
 
 def rest_in_world(rig, name):

@@ -25,10 +25,10 @@ INTERVAL = 0.03  # seconds between looks at the worker
 pending = {}  # session_uid of the source → the coroutine that counts
 
 
-def count_inside(context, source):
+def count_inside(context, source, at_once=False):
     """Stores each handle's count with it."""
     coroutine = counting(context, source)
-    if not has_window() or len(points_of(source.data)) < LARGE:
+    if at_once or not has_window() or len(points_of(source.data)) < LARGE:
         run_to_completion(coroutine)
         return
     for entry in empties.used(source):

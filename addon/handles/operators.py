@@ -117,7 +117,9 @@ class ARAPFIELDS_OT_add_bones(HandleOperator, bpy.types.Operator):
         names = bones.chosen(rig, self.bones, groups)
         for name in names:
             bones.add(source, rig, name, groups)
-        held_counts.count_inside(context, source)
+        held_counts.count_inside(context, source, at_once=self.bones != "SELECTED")
+        if self.bones != "SELECTED":
+            names = bones.keep_holding(source, rig, names)
         error = bones.unposed(context, source) if self.bones != "SELECTED" else None
         if error is not None:
             self.report({"WARNING"}, translated(error))

@@ -128,6 +128,27 @@ def test_bones_without_groups_hold_what_lies_about_them():
     assert np.abs(shift[rest[:, 0] < -0.9]).max() < 0.05
 
 
+def test_bones_whose_envelopes_are_wider_than_the_mesh_hold_what_is_nearest():
+    """As in files whose armature is scaled; a bone far from the mesh is no handle."""
+    bar, rig = rigged_bar(with_groups=False)
+    scenes.activate(rig)
+    bpy.ops.object.mode_set(mode="EDIT")
+    far = rig.data.edit_bones.new("Far")
+    far.head, far.tail = (0, 0, 9), (0, 0, 10)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for bone in rig.data.bones:
+        bone.envelope_distance = 25.0
+    scenes.activate(rig, bar)
+    assert bpy.ops.arapfields.add_bones(bones="DEFORMING") == {"FINISHED"}
+    handles = bar.arapfields.handles
+    assert [entry.bone for entry in handles] == ["Bone", "Second"]
+    assert min(entry.inside for entry in handles) > 1000
+    bar.location.z = -500
+    bpy.context.view_layer.update()
+    with pytest.raises(RuntimeError, match="No bone of Armature is near the surface of Bar"):
+        bpy.ops.arapfields.add_bones(bones="DEFORMING")
+
+
 def test_what_is_wrong_with_bones_is_named():
     bar = scenes.bar()
     with pytest.raises(RuntimeError, match="Bar follows no armature"):

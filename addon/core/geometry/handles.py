@@ -12,8 +12,8 @@ PIN_SAMPLES = 12  # of the surface that a pin holds at least: those nearest to i
 FAR_SHARE = 0.5  # of the largest distance from all pins: what is farther is far
 FAR_WEIGHT = 0.02  # with which what is far holds its place, relative to a pin
 REST_WEIGHT = 0.1  # with which the rest is kept
-BONE_GAP = 0.25  # of a bone's width by which what it holds is nearer to it than to any other bone
-BONE_LIMIT = 4.0  # widths within which a bone that holds nothing takes what is nearest
+BONE_SHARE = 0.75  # of the distance to any other bone, within which a bone holds: at joints none does
+BONE_LIMIT = 4.0  # widths within which a bone that holds little takes the nearest of its side
 ANCHOR_TOLERANCE = 1e-5  # motion, relative to the box, below which a handle is an anchor
 LEAST_VOLUME = 1e-6  # of a box that may scale, relative to a cube as long as its longest side
 MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
@@ -58,14 +58,14 @@ class Handle:
         return np.sort(highest[weights[highest] > 0])
 
     def about_bone(self, points, handles):
-        """Indices of the points in the capsule along a bone that are nearer to it than to the other bones."""
+        """Indices of the points in the capsule along a bone that are much nearer to it than to others."""
         away = self._from_bone(points)
         bones = [handle for handle in handles if handle.kind == "BONE" and handle is not self]
         others = np.min([bone._from_bone(points) for bone in bones], axis=0) if bones else np.inf
-        away = np.where(away + BONE_GAP <= others, away, np.inf)
-        held = np.flatnonzero(away <= 1)
-        if len(held):
+        held = np.flatnonzero((away <= 1) & (away <= BONE_SHARE * others))
+        if len(held) >= PIN_SAMPLES:
             return held
+        away = np.where(away <= others, away, np.inf)
         nearest = np.argsort(away, kind="stable")[:PIN_SAMPLES]
         return np.sort(nearest[away[nearest] <= BONE_LIMIT])
 
