@@ -27,10 +27,10 @@ constexpr double turn_share = 0.1, thin_share = 0.01;
 // Affine fits about vertices. Tuned: on keys of shapes with a known map, by the map itself and by wraps.
 
 /// Points on the surface; the radius of their weights exp(−d²/r²), a share of the diagonal; where these end.
-constexpr Index fit_points = 3000;
-constexpr double fit_radius = 0.06, fit_end = 2.2;
+constexpr Index fit_points = 4000;
+constexpr double fit_radius = 0.04, fit_end = 2.2;
 /// Weight of the triangles' J, in squares of the radius: it counts where points lie in a plane.
-constexpr double fit_ridge = 0.003;
+constexpr double fit_ridge = 0.0005;
 /// Deviation from the triangles' J, as a share of a point's way, at which it counts a quarter: lips part.
 constexpr double fit_trust = 0.5;
 

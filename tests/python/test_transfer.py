@@ -13,7 +13,7 @@ INTERPOLATION = 0.03
 # Of distances from the skin, on average: surfaces of some hundred triangles bend between samples.
 KEPT = 0.08
 # The same of the worst vertex; what triangles tell of the growth across them is .3 off.
-ACROSS = 0.1
+ACROSS = 0.05
 TURN = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
 
 
