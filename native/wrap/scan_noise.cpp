@@ -118,7 +118,7 @@ double noise_variance(const TriangleMesh& mesh, const WeldedVertices& welded, co
   if (static_cast<Index>(pairs.size()) < least_pairs) return 0.0;
   Points normals = welded.normals;
   for (int round = 0; round < normal_rounds; ++round) normals -= neighbours.differences(normals);
-  normals.rowwise().normalize();
+  for (Index v = 0; v < normals.rows(); ++v) normals.row(v).normalize();
   const Vector first = neighbours.differences(mesh.vertices).cwiseProduct(normals).rowwise().sum();
   Vector unit(neighbours.size());
   Random random(0);

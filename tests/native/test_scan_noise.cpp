@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/random.h"
+#include "distance/welded_vertices.h"
 #include "shapes.h"
 #include "wrap/scan_noise.h"
 
@@ -56,6 +57,18 @@ BOOST_AUTO_TEST_CASE(clean_and_coarse_meshes_stay_as_they_are) {
   for (const TriangleMesh& mesh :
        {shapes::torus(96, 48), shapes::torus(24, 16), shapes::torus(12, 8), square_ring(32), square_ring(64)})
     BOOST_TEST((without_noise(mesh).array() == mesh.vertices.array()).all());
+}
+
+BOOST_AUTO_TEST_CASE(a_sheet_of_two_triangles_back_to_back_tells_nothing) {
+  TriangleMesh scan = noisy(shapes::torus(192, 96), 0.01);
+  const double noise = vertex_noise(scan);
+  const auto first = static_cast<std::int32_t>(scan.vertices.rows());
+  scan.vertices.conservativeResize(first + 4, 3);
+  scan.vertices.bottomRows(4) << 2, 0, 0, 3, 0, 0, 2, 1, 0, 3, 1, 0;  // the last is loose
+  scan.triangles.conservativeResize(scan.triangles.rows() + 2, 3);
+  scan.triangles.bottomRows(2) << first, first + 1, first + 2, first, first + 2, first + 1;
+  BOOST_TEST(WeldedVertices(scan).normals.allFinite());
+  BOOST_TEST(vertex_noise(scan) == noise, boost::test_tools::tolerance(0.05));
 }
 
 BOOST_AUTO_TEST_CASE(copies_of_a_vertex_stay_together) {
