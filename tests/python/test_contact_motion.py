@@ -6,7 +6,7 @@ import pytest
 import trimesh
 from support.geometry import contact_cases
 from support.geometry.bar import LEFT, RIGHT, bar_samples, box, turned
-from support.geometry.contact_bar import ALIKE, BALL, DEEPEST, PLATE, live
+from support.geometry.contact_bar import ALIKE, BALL, BLOCK, DEEPEST, PLATE, live
 
 import arapfields as af
 
@@ -63,6 +63,17 @@ def test_friction_holds_what_slides(samples):
         field = resting.step(None, 1 / 24)
     later = field(samples.points)[:, 0].mean() - samples.points[:, 0].mean()
     assert abs(later - ways[1]) < 1e-4  # it rests, and does not creep
+
+
+def test_small_steps_out_of_a_block_go_on_from_each_other(samples):
+    """The bar's end begins in the block; what three iterations leave there is no reason to begin anew."""
+    placement = turned(0, shift=(0, 0, 0.55))
+    lifted = live(samples, af.Contact([af.Obstacle(BLOCK, placement=placement)]))
+    energies = []
+    for _ in range(6):
+        lifted.follow([LEFT, RIGHT], iterations=3, tolerance=3e-5)
+        energies.append(lifted.report.energy)
+    assert energies[-1] < 0.1 * energies[0] and lifted.report.contact.deepest < DEEPEST
 
 
 def test_a_drag_onto_a_ball_ends_where_more_steps_end(samples):

@@ -272,10 +272,11 @@ void follow_in_contact(RadialState& s, Index iterations, double tolerance,
     before = motions_of(s.handles.bound());
     if (s.shape.coefficients == s.problem.basis.identity()) before.assign(before.size(), Mat4::Identity());
   }
+  const bool goes_on = s.contact.ended_at(s.shape.revision);
   sweep(s, before, tolerance, progress);
   const bool pressed = s.contact.presses();
   s.contact.find(s.shape.coefficients);
-  if (s.contact.deepest_outside() > too_deep) {
+  if (!goes_on && s.contact.deepest_outside() > too_deep) {
     back_to(s, s.problem.basis.identity());  // what was not followed here is followed from rest
     before.assign(before.size(), Mat4::Identity());
   }

@@ -97,6 +97,7 @@ void ContactTerms::set(const std::optional<Contact>& contact, const RowMatrix<do
                        contact->ground.has_value() == contact_->ground.has_value();
   contact_ = contact;
   known_ = false;
+  ended_.reset();
   if (goes_on) {
     const std::vector<BarrierSurface> before = std::exchange(surfaces_, {});
     gather_surfaces();

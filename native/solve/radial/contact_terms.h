@@ -68,16 +68,17 @@ class ContactTerms {
   void harden(bool more) { found_.harden(more); }
   /// No planes: the surface is free.
   void release();
+  /// A solve with this contact left the shape at that revision; whether it did.
+  void end_at(Revision shape) { ended_ = shape; }
+  bool ended_at(Revision shape) const { return ended_ == shape; }
 
   const ContactSet& found() const { return found_; }
   Index sample_of(Index place) const;  ///< of the problem's, that a found place is of
   bool presses() const { return !found_.planes.empty(); }
   std::string name_of(Index surface) const;
-  /// Obstacles and the ground.
-  const std::vector<BarrierSurface>& surfaces() const { return surfaces_; }
+  const std::vector<BarrierSurface>& surfaces() const { return surfaces_; }  ///< obstacles and the ground
   double deepest() const { return deepest_; }
-  /// The same beyond obstacles and the ground alone.
-  double deepest_outside() const { return deepest_outside_; }
+  double deepest_outside() const { return deepest_outside_; }  ///< beyond obstacles and the ground alone
   /// Whether parts of the surface touch as they were found.
   bool touches_itself() const { return touches_itself_; }
   /// Whether a part is inside another one there, however deep.
@@ -107,6 +108,7 @@ class ContactTerms {
   RowMatrix<double> pressures_;  // (places, surfaces and the shape itself)
   ContactSet found_;
   Revision sets_ = 0;  // that were found
+  std::optional<Revision> ended_;
   double deepest_ = 0.0;
   double deepest_outside_ = 0.0;
   double further_ = 0.0;

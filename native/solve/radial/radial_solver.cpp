@@ -157,6 +157,7 @@ Index RadialSolver::follow(Index iterations, double tolerance, const Progress& p
   else
     freely(iterations);
   if (!s.handles.any() && s.hooks.energies.empty() && !s.contact.presses()) anchor_lowest_point(s);
+  s.contact.end_at(s.shape.revision);
   s.dynamics.zero_velocity(motions_of(s.handles.bound()));
   s.report.kinetic = s.report.speed = 0.0;
   s.unmeasured = is_exact ? RadialState::Unmeasured::exact : RadialState::Unmeasured::fast;
