@@ -117,12 +117,13 @@ class ARAPFIELDS_OT_add_bones(HandleOperator, bpy.types.Operator):
         names = bones.chosen(rig, self.bones, groups)
         for name in names:
             bones.add(source, rig, name, groups)
-        held_counts.count_inside(context, source, at_once=self.bones != "SELECTED")
-        if self.bones != "SELECTED":
+        is_asked = self.bones == "SELECTED"
+        held_counts.count_inside(context, source, at_once=not is_asked)
+        if not is_asked:
             names = bones.keep_holding(source, rig, names)
-        error = bones.unposed(context, source) if self.bones != "SELECTED" else None
-        if error is not None:
-            self.report({"WARNING"}, translated(error))
+            error = bones.unposed(context, source)
+            if error is not None:
+                self.report({"WARNING"}, translated(error))
         return translated("{count} handles added to {name}", count=len(names), name=source.name)
 
 
