@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <map>
 
+#include "core/unit_rows.h"
 #include "distance/is_closed.h"
 
 namespace arapfields {
@@ -15,7 +16,7 @@ WeldedVertices::WeldedVertices(const TriangleMesh& mesh)
     const Vec3 area = (corner(1) - corner(0)).cross(corner(2) - corner(0));
     for (int k = 0; k < 3; ++k) normals.row(first[mesh.triangles(t, k)]) += area;
   }
-  for (Index v = 0; v < normals.rows(); ++v) normals.row(v).normalize();  // zero stays zero
+  normals = unit_rows(normals);
 }
 
 std::vector<Index> WeldedVertices::pieces(const TriangleMesh& mesh) const {

@@ -20,4 +20,9 @@ inline void validate(const TriangleMesh& mesh) { validate(mesh.vertices, mesh.tr
 /// The vertices that some triangle refers to, in the order of `vertices`. The mesh must be valid.
 ARAPFIELDS_EXPORT Points used_vertices(PointsIn vertices, TrianglesIn triangles);
 
+/// Of the bounding box of points (n,3).
+inline double diagonal_of(PointsIn points) {
+  return (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm();
+}
+
 }  // namespace arapfields

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "core/unit_rows.h"
+
 namespace arapfields {
 namespace {
 
@@ -12,15 +14,6 @@ constexpr Index probes = 64;                            // points that decide on
 constexpr double least_step = 4e-3, most_step = 0.128;  // in cube units; each is twice the one before
 // Cosines of 15 and 5 degrees. Half of a surface's creases or of a network's noise stays far below the first.
 constexpr double trusted = 0.9659, settled = 0.9962;
-
-/// Rows of unit length; zeros stay.
-template <class Rows>
-Points directions(const Eigen::MatrixBase<Rows>& rows) {
-  Points result = rows.rowwise().normalized();
-  for (Index i = 0; i < rows.rows(); ++i)
-    if (rows.row(i).isZero(0.0)) result.row(i).setZero();
-  return result;
-}
 
 double median_cosine(const Points& a, const Points& b) {
   Vector cosines = a.cwiseProduct(b).rowwise().sum();
@@ -49,7 +42,7 @@ Points SurfaceNormals::differences(const PointsF& points, double step) {
         (values.segment(ahead, n) - values.segment(behind, n)).cast<double>().array() /
         (shifted.col(axis).segment(ahead, n) - shifted.col(axis).segment(behind, n)).cast<double>().array();
   }
-  return directions(result);
+  return unit_rows(result);
 }
 
 void SurfaceNormals::choose_step(const PointsF& points, const Points& gradients) {
@@ -67,7 +60,7 @@ void SurfaceNormals::choose_step(const PointsF& points, const Points& gradients)
 }
 
 Points SurfaceNormals::operator()(const PointsF& points, const PointsF& gradients) {
-  Points normals = directions(gradients.cast<double>());
+  Points normals = unit_rows(gradients.cast<double>());
   if (points.rows() == 0) return normals;
   if (!chosen_) choose_step(points, normals);
   chosen_ = true;

@@ -7,6 +7,7 @@
 #include "core/decompositions.h"
 #include "core/errors.h"
 #include "energies/alignment.h"
+#include "mesh/triangle_mesh.h"
 #include "sampling/nearest_sample.h"
 #include "sampling/sample_choice.h"
 #include "wrap/parameters.h"
@@ -15,10 +16,6 @@ namespace arapfields {
 namespace {
 
 using namespace wrap_parameters;
-
-double diagonal_of(PointsIn points) {
-  return (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm();
-}
 
 void require_on(PointsIn surface, PointsIn places, const char* which) {
   const Vector distances = nearest_distances(surface, places);

@@ -24,10 +24,6 @@ constexpr double no_motion = 1e-4;
 /// Solves at most after the first, each with half the differences about triangles that fold.
 constexpr int most_rounds = 6;
 
-double diagonal_of(const TriangleMesh& mesh) {
-  return (mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff()).norm();
-}
-
 }  // namespace
 
 CarriedMotion::CarriedMotion(const TriangleMesh& giving, const TriangleMesh& receiving,
@@ -57,7 +53,7 @@ CarriedMotion::CarriedMotion(const TriangleMesh& giving, const TriangleMesh& rec
   }
   progress.check();
 
-  const double length = reach * diagonal_of(receiving);
+  const double length = reach * diagonal_of(receiving.vertices);
   anchors_ = areas / std::max(length * length, 1e-300);
   for (Index v = 0; v < count; ++v)
     if (!(anchors_[v] > 0.0)) anchors_[v] = 1.0;  // loose vertices, and all but the first at a position

@@ -8,6 +8,7 @@
 
 #include "core/parallel.h"
 #include "core/random.h"
+#include "core/unit_rows.h"
 #include "distance/welded_vertices.h"
 
 namespace arapfields {
@@ -100,13 +101,18 @@ std::vector<std::pair<std::int32_t, std::int32_t>> inner_pairs(const Neighbours&
   return pairs;
 }
 
+double median(std::vector<double> numbers) {
+  const auto middle = numbers.begin() + static_cast<std::ptrdiff_t>(numbers.size() / 2);
+  std::nth_element(numbers.begin(), middle, numbers.end());
+  return *middle;
+}
+
 /// Of pairs, with values far beyond the usual ones taken as `outlier` times those.
 double covariance(const Vector& values, const std::vector<std::pair<std::int32_t, std::int32_t>>& pairs) {
   std::vector<double> sizes;
   sizes.reserve(pairs.size());
   for (const auto& [a, b] : pairs) sizes.push_back(std::abs(values[a]));
-  std::nth_element(sizes.begin(), sizes.begin() + sizes.size() / 2, sizes.end());
-  const double most = outlier * sizes[sizes.size() / 2];
+  const double most = outlier * median(std::move(sizes));
   double sum = 0.0;
   for (const auto& [a, b] : pairs)
     sum += std::clamp(values[a], -most, most) * std::clamp(values[b], -most, most);
@@ -118,7 +124,7 @@ double noise_variance(const TriangleMesh& mesh, const WeldedVertices& welded, co
   if (static_cast<Index>(pairs.size()) < least_pairs) return 0.0;
   Points normals = welded.normals;
   for (int round = 0; round < normal_rounds; ++round) normals -= neighbours.differences(normals);
-  for (Index v = 0; v < normals.rows(); ++v) normals.row(v).normalize();
+  normals = unit_rows(normals);
   const Vector first = neighbours.differences(mesh.vertices).cwiseProduct(normals).rowwise().sum();
   Vector unit(neighbours.size());
   Random random(0);
@@ -151,10 +157,8 @@ Points without_noise(const TriangleMesh& mesh) {
   std::vector<double> along;
   for (Index v = 0; v < moves.rows(); ++v)
     if (welded.first[v] == v) along.push_back(std::abs(moves.row(v).dot(welded.normals.row(v))));
-  const auto middle = along.begin() + static_cast<std::ptrdiff_t>(along.size() / 2);
-  std::nth_element(along.begin(), middle, along.end());
-  if (!(*middle <= median_move * deviation)) return mesh.vertices;  // it is the shape's own
-  const double diagonal = (mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff()).norm();
+  if (!(median(std::move(along)) <= median_move * deviation)) return mesh.vertices;  // it is the shape's own
+  const double diagonal = diagonal_of(mesh.vertices);
   const double share = variance / (variance + std::pow(harmless_noise * diagonal, 2));
   for (Index v = 0; v < moves.rows(); ++v)
     moves.row(v) *= share * std::min(1.0, most_move * deviation / std::max(moves.row(v).norm(), deviation));

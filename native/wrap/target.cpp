@@ -102,7 +102,7 @@ WrapTarget wrap_target(const ImplicitFunction& function, Index count, std::uint6
   target.normals = samples.normals;
   for (Index i = 0; i < target.normals.rows(); ++i)  // of triangles without area
     if (!(target.normals.row(i).squaredNorm() > 0.5)) target.normals.row(i) = Vec3::UnitZ().transpose();
-  target.diagonal = (target.points.colwise().maxCoeff() - target.points.colwise().minCoeff()).norm();
+  target.diagonal = diagonal_of(target.points);
   target.spacing = mean_spacing(target.points);
   target.tree = OrientedPoints(target.points, target.normals);
   target.interior = Vector::Ones(target.points.rows());

@@ -104,7 +104,7 @@ void fit_surroundings(const TriangleMesh& rest, PointsIn moved, std::vector<Mat3
     after.row(i).setZero();
     for (int k = 0; k < 3; ++k) after.row(i) += draw.corners[k] * moved.row(rest.triangles(draw.triangle, k));
   }
-  const double diagonal = (rest.vertices.colwise().maxCoeff() - rest.vertices.colwise().minCoeff()).norm();
+  const double diagonal = diagonal_of(rest.vertices);
   const double square = std::pow(fit_radius * diagonal, 2);
   parallel_for(0, rest.vertices.rows(), 64, [&](Index begin, Index end) {
     for (Index v = begin; v < end; ++v) {
@@ -161,7 +161,7 @@ SurfacePlaces places_on(const TriangleMesh& mesh, PointsIn points, PointsIn norm
       centers.row(t) = edges_of(t).at(Vec3::Constant(1.0 / 3.0));
       facing.row(t) = edges_of(t).area.normalized();
     }
-    const double diagonal = (mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff()).norm();
+    const double diagonal = diagonal_of(mesh.vertices);
     const std::vector<Index> near =
         OrientedPoints(centers, facing)
             .nearest(points(doubtful, Eigen::all), normals(doubtful, Eigen::all), turn_share * diagonal);

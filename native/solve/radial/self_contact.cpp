@@ -7,6 +7,7 @@
 
 #include "core/errors.h"
 #include "core/parallel.h"
+#include "core/unit_rows.h"
 #include "fields/radial_evaluator.h"
 #include "sampling/oriented_points.h"
 #include "sampling/point_grid.h"
@@ -149,7 +150,7 @@ std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& norm
                                             Beyond beyond) {
   Points areas;  // known at once where they are needed everywhere, as they are below
   if (std::exchange(is_beyond_, false)) areas = normals_at(nullptr);
-  Points normals = areas.rowwise().normalized();
+  Points normals = unit_rows(areas);
   const std::vector<std::vector<Index>> near_to =
       runs_->meeting(places, normals, least_.array() > 0.0, near, facing);
   std::vector<Index> runs, samples, blocks;
