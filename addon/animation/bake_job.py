@@ -22,7 +22,7 @@ class BakePass:
     """
 
     def __init__(self, bakes, frames):
-        self.bakes, self.frames = bakes, frames
+        self.bakes, self.frames, self.failed = bakes, frames, []
         starts = [bake.simulation.start for bake in bakes if bake.simulation is not None]
         self.played = frames.with_those_before(min(starts)) if starts else list(frames)
         moving = any(bake.reader.moves_by_itself or bake.reader.carrying.objects for bake in bakes)
@@ -67,21 +67,37 @@ class BakePass:
             raise
 
     def place(self, context, job, failures):
-        """Coroutine: what was baked is put in its place; returns the line to report."""
+        """Coroutine: what was baked is put in its place, once all is ready; returns the line to report."""
         lines = []
         for bake in self.bakes:
-            try:
-                if bake.error is not None:
-                    raise bake.error
-                lines.append((yield from bake.place(context, job)))
+            yield from self.unless_it_fails(bake, bake.ready(context, job), failures)
+        for bake in self.bakes:
+            line = yield from self.unless_it_fails(bake, bake.place(context), failures)
+            if line is not None:
+                lines.append(line)
                 failures += [f"{bake.name}: {translated(reason)}" for reason in bake.carried.warnings]
-            except (UserError, ValueError) as error:
-                failures.append(f"{bake.name}: {translated(error)}")
         if not lines:
             raise UserError("{error}", error=failures.pop())
         return ", ".join(lines)
+
+    def unless_it_fails(self, bake, coroutine, failures):
+        """Coroutine: the result of another; None where the bake has failed, which is told once."""
+        if bake not in self.failed:
+            try:
+                if bake.error is not None:
+                    raise bake.error
+                return (yield from coroutine)
+            except (UserError, ValueError) as error:
+                self.failed.append(bake)
+                failures.append(f"{bake.name}: {translated(error)}")
+        return None
 
     def discard(self):
         """Removes what is not in its place."""
         for bake in self.bakes:
             bake.discard()
+
+    def discard_keys(self):
+        """The same of shape keys; on the main thread."""
+        for bake in self.bakes:
+            bake.store.discard_item()

@@ -62,6 +62,7 @@ class BakeOperator(JobOperator):
             job.cancel()
             job.join()
             self.frames_pass.discard()
+            self.frames_pass.discard_keys()
 
     def values(self, source):
         """The settings by name; `start` and `end` where they were given or the range is one's own."""

@@ -8,8 +8,11 @@ from pathlib import Path
 
 import bpy
 
+from ..blender.language import translated
 from ..core.errors import UserError
+from ..core.runtime.coroutines import Pause
 from ..field_modifier import cache_modifier
+from ..results import result_objects
 
 SUFFIXES = {"PC2": ".pc2", "MDD": ".mdd"}
 BARRED = re.compile(r'[\x00-\x1f/\\:*?"<>|]')  # letters that a file's name cannot have
@@ -20,7 +23,7 @@ class ShapeKeys:
     """The frames of one object, kept in memory for its shape keys."""
 
     def __init__(self):
-        self.shapes = []
+        self.shapes, self.item = [], None  # item: an object that no scene has, with the keys
 
     def open(self, solver):
         """Before the first frame; on the worker, as all but `commit`."""
@@ -34,6 +37,27 @@ class ShapeKeys:
     def discard(self):
         self.shapes.clear()
 
+    def make(self, mesh, frames, job):
+        """Coroutine on the main thread: an object of that mesh with a shape key a frame."""
+        self.item, names = bpy.data.objects.new(mesh.name, mesh), [plain(frame) for frame in frames]
+        for number, frame in enumerate(names):
+            text = translated("Storing frame {frame}", frame=frame)
+            job.report_main_thread(number / len(names), text)
+            result_objects.add_frame(self.item, names, number, self.shapes[number])
+            self.shapes[number] = None  # the key has it
+            yield Pause.REDRAW
+
+    def forget(self):
+        """Another object has the mesh now."""
+        bpy.data.objects.remove(self.item)
+        self.item = None
+
+    def discard_item(self):
+        """Removes what no other object has; on the main thread."""
+        if self.item is not None:
+            with contextlib.suppress(ReferenceError):  # the file was left
+                result_objects.discard(self.item)
+
 
 class CacheFile:
     """The frames of one object in a point cache, which takes its place when it is committed.
@@ -44,6 +68,9 @@ class CacheFile:
     def __init__(self, path, modifier_path, frames, fps):
         self.path, self.modifier_path, self.frames, self._fps = path, modifier_path, frames, fps
         self._writer = None
+
+    def discard_item(self):
+        """There is none."""
 
     def open(self, solver):
         self.open_for(len(solver.rest))

@@ -6,13 +6,15 @@ point clouds and Grease Pencil, by a mesh of their points. Curves and lattices g
 objects and bones keyframes.
 """
 
+import contextlib
+
 from ..blender import modifier_stack
 from ..blender.language import translated
 from ..carried import played_points
 from ..carried.carried_objects import KINDS, find
 from ..carried.carriers import MeshCarrier
 from ..carried.points import AttributeCarrier, KeyCarrier, drop_key, key_points, own_key, put_key
-from ..carried.transforms import BonesCarrier
+from ..carried.transforms import BonesCarrier, PoseCarrier
 from ..core.errors import UserError, as_user_error
 from ..core.runtime.coroutines import Pause
 from ..field_modifier import cache_modifier
@@ -32,7 +34,7 @@ class CarriedBake:
 
     def __init__(self, carrying, frames, cache_of, fps, is_shared):
         self.carrying, self.frames, self.warnings = carrying, frames, []
-        self.shapes, self.caches = {}, {}  # by carried object
+        self.shapes, self.caches, self.keyed = {}, {}, {}  # by carried object; keyed: a snapshot a frame
         if carrying.nodes is not None:
             name = carrying.source.name
             self.warnings.append(UserError("The field of {name} as nodes is not baked: it stands", name=name))
@@ -67,9 +69,35 @@ class CarriedBake:
             cache.discard()
         self.shapes.clear()
 
-    def place(self, context, source, job):
+    def read_keyframes(self, context, source, job):
+        """Coroutine: plays the frames and notes what deltas and poses are to be keyed, over what the objects'
+        own animation gives; all stay as they are."""
+        bound = {}
+        for carried, shapes in self.shapes.items():
+            if isinstance(carried.carrier, PoseCarrier) and len(shapes) == self.frames.count:
+                with contextlib.suppress(UserError):  # which is told where it is placed
+                    found = carried.item_and_entry(source)
+                    bound[carried] = *found, carried.carrier.snapshot(*found)
+        if not bound:
+            return
+        try:
+            with playing(context.scene) as show:
+                for number, frame in enumerate(self.frames):
+                    text = translated("Storing frame {frame}", frame=plain(frame))
+                    job.report_main_thread(number / self.frames.count, text)
+                    show(frame)
+                    for carried, (item, entry, _) in bound.items():
+                        carried.carrier.bind(context, item, entry)
+                        carried.carrier.write(item, entry, self.shapes[carried][number])
+                        self.keyed.setdefault(carried, []).append(carried.carrier.snapshot(item, entry))
+                    yield Pause.REDRAW
+        finally:
+            with contextlib.suppress(ReferenceError):  # the file was left
+                for carried, (item, entry, before) in bound.items():
+                    carried.carrier.restore(item, entry, before)
+
+    def place(self, context, source):
         """Coroutine: puts all in their places; one that cannot take its motion is named."""
-        moved = []
         for carried in self.carrying.objects:
             try:
                 item, entry = carried.reference.get(), find(source, carried.reference.get())
@@ -87,11 +115,9 @@ class CarriedBake:
                 elif isinstance(carried.carrier, KeyCarrier):
                     self.add_keys(carried, item)
                 else:
-                    moved.append(carried)
+                    yield from self.add_keyframes(context, carried, item, entry)
             except (UserError, OSError, RuntimeError) as error:
                 self.warnings.append(as_user_error(error))
-        if moved:
-            yield from self.add_keyframes(context, source, moved, job)
         self.warnings += self.carrying.take_warnings()
 
     def play(self, carried, item):
@@ -131,19 +157,11 @@ class CarriedBake:
                 key.value = float(frame == frames[number])
                 key.keyframe_insert("value", frame=frame)
 
-    def add_keyframes(self, context, source, moved, job):
-        """Plays the frames: deltas and poses are keyed over what the objects' own animation gives."""
-        with playing(context.scene) as show:
-            for number, frame in enumerate(self.frames):
-                job.report_main_thread(
-                    number / self.frames.count, translated("Storing frame {frame}", frame=plain(frame))
-                )
-                show(frame)
-                for carried in moved:
-                    item, entry = carried.reference.get(), find(source, carried.reference.get())
-                    carried.carrier.bind(context, item, entry)
-                    carried.carrier.write(item, entry, self.shapes[carried][number])
-                    insert(item, carried.carrier, frame)
+    def add_keyframes(self, context, carried, item, entry):
+        with playing(context.scene):  # which shows the present frame's keys at last
+            for frame, state in zip(self.frames, self.keyed[carried], strict=True):
+                carried.carrier.restore(item, entry, state)
+                insert(item, carried.carrier, frame)
                 yield Pause.REDRAW
 
 

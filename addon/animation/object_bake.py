@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One object's bake: its solver, where its frames go, and what plays them at last."""
 
-import contextlib
 import functools
 import json
 
@@ -9,7 +8,6 @@ from ..blender import mesh_arrays
 from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..core.errors import UserError, as_user_error
-from ..core.runtime.coroutines import Pause
 from ..handles import empties
 from ..live import sessions
 from ..results import placement, result_objects, visibility
@@ -19,7 +17,7 @@ from ..solver.setup import sampled
 from ..solver.simulation import Simulation
 from ..solver.source_reader import SourceChanged, SourceReader
 from . import loops
-from .caches import CacheFile, ShapeKeys, cache_beside, keys_weight, plain, size_text
+from .caches import CacheFile, ShapeKeys, cache_beside, keys_weight, size_text
 from .carried_bake import CarriedBake
 from .parts import SharedCache
 
@@ -135,16 +133,21 @@ class ObjectBake:
         self.store.discard()
         self.carried.discard()
 
-    def place(self, context, job):
+    def ready(self, context, job):
+        """Coroutine: what takes long of placing, which the user may cancel: nothing is in its place yet."""
+        source = self.unchanged_source()
+        yield from self.carried.read_keyframes(context, source, job)
+        if isinstance(self.store, ShapeKeys):
+            yield from self.store.make(self.mesh(context, source), self.frames, job)
+
+    def place(self, context):
         """Coroutine: the caches in their places and what plays them; returns the line to report."""
         source = self.unchanged_source()
-        if isinstance(self.store, ShapeKeys):
-            line = yield from self.add_keys(context, source, job)
-        else:
-            line = self.place_cache(context, source)
+        place = self.place_keys if isinstance(self.store, ShapeKeys) else self.place_cache
+        line = place(context, source)
         if self.carried.carrying.objects:
             sessions.end(context, source)
-            yield from self.carried.place(context, source, job)
+            yield from self.carried.place(context, source)
         return line
 
     def place_cache(self, context, source):
@@ -159,7 +162,7 @@ class ObjectBake:
             )
         self.store.commit()
         sessions.end(context, source)  # what was live is baked now
-        player = source if self.in_place else self.new_object(context, source)
+        player = source if self.in_place else self.new_object(context, source, self.mesh(context, source))
         visibility.show_alone(source, player)
         self.store.play_on(player)
         digest, faces = mesh_arrays.fingerprint(player.data)
@@ -187,27 +190,17 @@ class ObjectBake:
             return result_objects.surface_mesh(source, solver.to_local(solver.rest), solver.sampled.topology)
         return result_objects.shown_mesh(context, source, len(solver.rest))
 
-    def new_object(self, context, source):
+    def new_object(self, context, source, mesh):
         report = {"frames": self.frames.count}
-        return result_objects.show(context, source, "BAKE", "BAKE", self.mesh(context, source), report)
+        return result_objects.show(context, source, "BAKE", "BAKE", mesh, report)
 
-    def add_keys(self, context, source, job):
-        """Coroutine: the object with a shape key a frame; taken away again where the user cancels."""
-        item, shapes = self.new_object(context, source), self.store.shapes
-        frames, is_whole = [plain(frame) for frame in self.frames], False
-        weight = size_text(keys_weight(len(self.solver.rest), len(frames)))
-        try:
-            for number, frame in enumerate(frames):
-                text = translated("Storing frame {frame}", frame=frame)
-                job.report_main_thread(number / len(frames), text)
-                result_objects.add_frame(item, frames, number, shapes[number])
-                shapes[number] = None  # the key has it
-                yield Pause.REDRAW
-            context.scene.frame_set(context.scene.frame_current)  # else the key stored last stays on
-            visibility.show_alone(source, item)
-            is_whole = True
-        finally:
-            if not is_whole:
-                with contextlib.suppress(ReferenceError):
-                    result_objects.discard(item)
-        return translated("{count} frames baked into shape keys of {size}", count=len(frames), size=weight)
+    def place_keys(self, context, source):
+        item = self.new_object(context, source, self.store.item.data)
+        self.store.forget()
+        context.scene.frame_set(context.scene.frame_current)  # else the key stored last stays on
+        visibility.show_alone(source, item)
+        return translated(
+            "{count} frames baked into shape keys of {size}",
+            count=self.frames.count,
+            size=size_text(keys_weight(len(self.solver.rest), self.frames.count)),
+        )

@@ -167,8 +167,8 @@ class WrapBake(ObjectBake):
         self.wrapped.forget_others()
         super().finish(task)
 
-    def place(self, context, job):
-        line = yield from super().place(context, job)
+    def place(self, context):
+        line = yield from super().place(context)
         self.marks.put()
         source = self.reference.get()
         for item in (source, *(carried.reference.find() for carried in self.carried.carrying.objects)):

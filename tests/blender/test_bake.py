@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Baking animated handles into shape keys, and leaving it half done."""
 
+import os
+import tempfile
+
 import numpy as np
 import pytest
 from support.blender.inside import IN_BLENDER
@@ -8,10 +11,12 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
-    from support.blender.baking import animated, cancelled_at, stepped
+    from support.blender.baking import animated, at, cancelled_at, stepped
+    from support.blender.riders import rider
 
     from addon.animation import caches
     from addon.core.runtime import jobs
+    from addon.solver.frame_range import curves_of
 
 pytestmark = pytest.mark.in_blender
 
@@ -47,6 +52,43 @@ def test_a_cancelled_bake_leaves_nothing():
         assert operator.said == "Bake cancelled"
         assert bpy.context.scene.frame_current == 1 and bar.name == "Bar"
         assert names() == before and not bar.hide_get(), stage
+
+
+@pytest.mark.parametrize("format", ["PC2", "KEYS"])
+def test_a_cancelled_bake_leaves_an_earlier_one_and_what_is_carried(format):
+    """Cancelled while keyframes of what is carried are stored, which comes last."""
+    animated()
+    items = [rider(kind) for kind in ("MESH", "CURVE", "EMPTY", "ARMATURE")]
+    scenes.activate(*items, bpy.data.objects["Bar"])
+    bpy.ops.arapfields.carry()
+    folder = tempfile.mkdtemp()
+
+    def state():
+        objects, layer = bpy.data.objects, bpy.context.view_layer
+        return (
+            [sorted(kind.keys()) for kind in (objects, bpy.data.meshes, bpy.data.shape_keys)],
+            [[m.name for m in item.modifiers] for item in objects],
+            {action.name: [len(c.keyframe_points) for c in curves_of(action)] for action in bpy.data.actions},
+            [(tuple(item.delta_location), item.hide_get(), item.select_get()) for item in objects],
+            [tuple(bone.matrix_basis.translation) for bone in objects["Tail"].pose.bones],
+            layer.objects.active.name,
+            sorted(os.listdir(folder)),
+        )
+
+    def cancelled(frame):
+        scenes.activate(bpy.data.objects["Bar"])
+        before = state()
+        operator = stepped(format=format, start=1, end=5, folder=folder)
+        assert cancelled_at(operator, f"Storing frame {frame}") == {"CANCELLED"}
+        bpy.context.view_layer.update()
+        assert operator.said == "Bake cancelled" and state() == before
+
+    cancelled(1)
+    cancelled(3)
+    assert bpy.ops.arapfields.bake(format=format, start=1, end=3, folder=folder) == {"FINISHED"}
+    cancelled(3)
+    seen = bpy.data.objects["Bar_baked" if format == "KEYS" else "Bar"]
+    assert np.ptp([at(seen, frame)[:, 2].max() for frame in (1, 3)]) > 0.1
 
 
 def test_many_keys_say_what_they_weigh():
