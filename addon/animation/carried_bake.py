@@ -158,10 +158,11 @@ class CarriedBake:
                 key.keyframe_insert("value", frame=frame)
 
     def add_keyframes(self, context, carried, item, entry):
+        turns = {}
         with playing(context.scene):  # which shows the present frame's keys at last
             for frame, state in zip(self.frames, self.keyed[carried], strict=True):
                 carried.carrier.restore(item, entry, state)
-                insert(item, carried.carrier, frame)
+                insert(item, carried.carrier, frame, turns)
                 yield Pause.REDRAW
 
 
@@ -174,14 +175,24 @@ def remove(item):
         played_points.remove(item)
 
 
-def insert(item, carrier, frame):
-    """Keyframes of what a carrier has written."""
-    turned = "rotation_quaternion" if item.rotation_mode == "QUATERNION" else "rotation_euler"
+def insert(item, carrier, frame, turns):
+    """Keyframes of what a carrier has written. `turns`: {(owner's name, channel): its rotation at the frame
+    before}, which this one goes on from, so that none turns the long way round between frames."""
+    euler, quaternion = "rotation_euler", "rotation_quaternion"
     if not isinstance(carrier, BonesCarrier):
-        for path in ("delta_location", f"delta_{turned}"):
-            item.keyframe_insert(path, frame=frame)
-        return
-    for bone in item.pose.bones:
-        mode = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
-        for path in ("location", mode.get(bone.rotation_mode, "rotation_euler"), "scale"):
-            bone.keyframe_insert(path, frame=frame)
+        turned = quaternion if item.rotation_mode == "QUATERNION" else euler
+        channels = [(item, f"delta_{turned}", ["delta_location"])]
+    else:
+        modes = {"QUATERNION": quaternion, "AXIS_ANGLE": "rotation_axis_angle"}
+        channels = [
+            (bone, modes.get(bone.rotation_mode, euler), ["location", "scale"]) for bone in item.pose.bones
+        ]
+    for owner, turned, others in channels:
+        if turned != "rotation_axis_angle":
+            turn = getattr(owner, turned).copy()
+            if (owner.name, turned) in turns:
+                turn.make_compatible(turns[owner.name, turned])
+            turns[owner.name, turned] = turn
+            setattr(owner, turned, turn)
+        for path in (turned, *others):
+            owner.keyframe_insert(path, frame=frame)

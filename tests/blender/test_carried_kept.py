@@ -64,6 +64,32 @@ def test_all_are_baked_at_once(format):
     assert not any(data.name.endswith("_played") for data in (*bpy.data.objects, *bpy.data.meshes))
 
 
+@pytest.mark.parametrize("mode", ["XYZ", "QUATERNION"])
+def test_what_turns_round_is_keyed_without_a_turn_back(mode):
+    """Between frames, as motion blur sees them, it is between where it is at the frames."""
+    bar, moving = body()
+    spot, tail = rider("EMPTY"), rider("ARMATURE")
+    spot.rotation_mode = tail.pose.bones[0].rotation_mode = mode
+    scenes.activate(spot, tail, bar)
+    bpy.ops.arapfields.carry()
+    for frame in range(1, 8):
+        for handle in (moving, bpy.data.objects["Fixed"]):
+            handle.rotation_euler.x = 1.0 * (frame - 1)
+            handle.keyframe_insert("rotation_euler", frame=frame)
+    scenes.activate(bar)
+    bpy.ops.arapfields.bake(start=1, end=7, folder=tempfile.mkdtemp())
+
+    def at(item, frame):
+        bpy.context.scene.frame_set(int(frame), subframe=frame % 1)
+        return shown(item)
+
+    for item in (spot, tail):
+        for frame in range(1, 7):
+            ends, middle = [at(item, frame), at(item, frame + 1)], at(item, frame + 0.5)
+            step = np.abs(ends[1] - ends[0]).max()
+            assert all(np.abs(middle - end).max() < 0.9 * step for end in ends), (item.name, frame)
+
+
 def test_undo_and_redo_take_all_along():
     bpy.context.preferences.edit.use_global_undo = True
     bar, moving = body()
