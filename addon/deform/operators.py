@@ -13,7 +13,7 @@ from ..core.settings.parameters import DEFORM
 from ..handles import empties, scaling
 from ..handles.native_handles import native_handles
 from ..properties.choices import result_properties
-from ..solver.contact import for_job, held_back, native_contact
+from ..solver.contact import for_job, native_contact, notes_on
 from .solve_job import SolveOperator, plan_solve_job
 
 
@@ -54,7 +54,7 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
             natives = native_handles(af, handles, rest, samples)
             task, limits = tracker.start("Deforming", weight), native_contact(contact)
             field = af.deform(samples, natives, options, contact=limits, task=task)
-            tracker.warnings += held_back(contact, handles, field.report)
+            tracker.warnings += notes_on(contact, handles, field.report)
             return field
 
         return plan_solve_job(context, self, source, "DEFORM", values["samples"], values["seed"], solve)

@@ -70,9 +70,16 @@ def native_contact(term, known=None):
     return None if term is None else term.made(known)
 
 
-def held_back(term, handles, report):
-    """Which of the handles contact keeps from their targets, by a solve's report, as UserErrors."""
-    found = []
+def notes_on(term, handles, report):
+    """What crosses the surface, and which handles contact holds back, by a solve's report, as UserErrors."""
+
+    def solid(name):
+        return term.solids[int(name.removeprefix("obstacles[").rstrip("]"))]
+
+    found = [
+        UserError("{name} crosses the surface; what lies inside of it stays there", solid(name))
+        for name in report.contact.crossing
+    ]
     for held in report.contact.held:
         handle = handles[held.handle]
         if not handle.name:  # what is far from all pins
@@ -82,8 +89,7 @@ def held_back(term, handles, report):
         elif held.by == "itself":
             found.append(UserError("{name} is held back by the surface itself", handle))
         else:
-            other = term.solids[int(held.by.removeprefix("obstacles[").rstrip("]"))].name
-            found.append(UserError("{name} is held back by {other}", handle, other=other))
+            found.append(UserError("{name} is held back by {other}", handle, other=solid(held.by).name))
     return found
 
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bindings/reports.h"
 
+#include <pybind11/stl.h>
+
 #include "bindings/arrays.h"
 
 namespace arapfields::python {
@@ -16,7 +18,7 @@ py::object contact_report(const ContactReport& contact) {
   for (const HeldBack& h : contact.held)
     held.append(make_report("HeldBack", "handle"_a = h.handle, "by"_a = h.by, "distance"_a = h.distance));
   return make_report("ContactReport", "deepest"_a = contact.deepest, "touching"_a = contact.touching,
-                     "held"_a = py::tuple(held));
+                     "held"_a = py::tuple(held), "crossing"_a = py::tuple(py::cast(contact.crossing)));
 }
 
 const char* name_of(StopReason reason) {

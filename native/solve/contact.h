@@ -49,9 +49,11 @@ struct ContactReport {
   double touching = 0.0;   ///< share of the area that presses
   bool unsettled = false;  ///< more steps would bring it out
   std::vector<HeldBack> held;
+  /// Names of the obstacles whose middle lay in the surface where it began: what is inside of them stays.
+  std::vector<std::string> crossing;
 };
 
-/// Sentences that say which handles are held back by what.
+/// Sentences that say which handles are held back by what, and what crosses the surface.
 std::vector<std::string> notes_on(const ContactReport& report);
 
 /// Throws InvalidInput for null functions and for numbers that are negative or not finite.

@@ -68,6 +68,10 @@ def test_a_live_shape_stays_outside_as_its_obstacle_comes_and_goes():
     world = inside @ np.array(bar.matrix_world)[:3, :3].T + np.array(bar.matrix_world)[:3, 3]
     over = (np.abs(world[:, :2] - np.array(block.location)[:2]) < 0.48).all(axis=1)
     assert over.any() and world[over, 2].min() > sdf_top - 2e-3 * size
+    block.location, block.scale = bar.location, (0.05, 3, 3)
+    bpy.ops.arapfields.deform()
+    crosses = "Bar: Cube crosses the surface; what lies inside of it stays there"
+    assert crosses in [text for _, text in jobs.messages()]
 
 
 def test_what_cannot_be_an_obstacle_is_said():

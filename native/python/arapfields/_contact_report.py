@@ -26,3 +26,5 @@ class ContactReport(Report):
     touching: float
     """Share of the area that presses."""
     held: tuple[HeldBack, ...]
+    crossing: tuple[str, ...]
+    """"obstacles[0]", say: an obstacle that crosses the surface at rest; what is inside it stays."""

@@ -50,6 +50,8 @@ std::vector<std::string> notes_on(const ContactReport& report) {
   for (const HeldBack& held : report.held)
     notes.push_back("handles[" + std::to_string(held.handle) + "] is held back by " + held.by + ", " +
                     number_text(held.distance) + " from its target");
+  for (const std::string& name : report.crossing)
+    notes.push_back(name + " crosses the surface; what lies inside of it stays there");
   return notes;
 }
 

@@ -89,7 +89,7 @@ bool solve_round(RadialState& s, const RowMatrix<double>& before, Index iteratio
 void report_contact(RadialState& s) {
   const double scale = s.problem.frame().scale;
   ContactReport& report = s.report.contact;
-  report = {scale * s.contact.deepest(), s.contact.found().touching(), s.contact.deepest() > deep, {}};
+  report = {scale * s.contact.deepest(), s.contact.found().touching(), s.contact.deepest() > deep, {}, {}};
   const RadialObjective<float>& objective = s.objective(s.fast);  // of the planes that were found last
   const Points places = contact_places(s);
   const Points values = objective.handle_values(s.measurements(s.fast)).cast<double>();

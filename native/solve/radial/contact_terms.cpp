@@ -106,8 +106,10 @@ void ContactTerms::set(const std::optional<Contact>& contact, const RowMatrix<do
       BarrierSurface& surface = surfaces_[static_cast<std::size_t>(k)];
       if (surface.is_alike(before[static_cast<std::size_t>(k)]))
         surface.set_placement(before[static_cast<std::size_t>(k)].placement());  // the ways go on
-      else
+      else {
         see(k);
+        ways_.cross(k, surface, points_, places_);
+      }
       starts_.push_back(surface.placement());
     }
     return;
@@ -233,9 +235,13 @@ Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsI
   go_back(surface, now, moved_rows, hits, near + further_, nearest, offsets);
   const Points carried = affine_image(now, carried_[static_cast<std::size_t>(k)]);
   for (Index i = 0; i < now.rows(); ++i) {
-    const double margin = surface.margin() + kept, gap = nearest.distances[i] - margin;
     const Index row = rows[static_cast<std::size_t>(i)];
-    if (gap > near + further_) {
+    const bool crossed = ways_.crosses(k, points_.sample_of(row));
+    double margin = surface.margin() + kept;
+    if (crossed) margin = std::clamp(ways_.clear(row, k), 0.0, margin);  // it is not taken apart there
+    const double gap = nearest.distances[i] - margin;
+    const bool left = ways_.clear(row, k) == ContactWays::left_inside && nearest.distances[i] < 0.0;
+    if (left || gap > near + further_) {
       pressures_(row, k) = 0.0;
       continue;
     }

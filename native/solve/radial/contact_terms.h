@@ -12,16 +12,14 @@
 
 namespace arapfields {
 
-/// Where a surface meets obstacles and itself, and how hard it presses there. What is beyond a plane is told
-/// by the way that each place took since begin(), relative to the obstacle: nothing that is thinner than a
-/// step is passed.
+/// Where a surface meets obstacles and itself, and how hard it presses. What is beyond a plane is told by the
+/// ways of places since begin(), relative to the obstacle: nothing that is thinner than a step is passed.
 class ContactTerms {
  public:
   /// Distance beyond each margin, in cube units: what solves leave of a depth is within.
   static constexpr double kept = 1.5e-3;
   explicit ContactTerms(const RadialProblem& problem) : problem_(problem), points_(problem) {}
-  /// Obstacles that only move or change stay where they were until move_obstacles(). Throws InvalidInput for
-  /// what cannot be.
+  /// Obstacles that only move or change stay where they were until move_obstacles(). Throws InvalidInput.
   void set(const std::optional<Contact>& contact, const RowMatrix<double>& coefficients);
   /// A ground beside that of the contact; whether it is another one than before.
   bool set_further_ground(const std::optional<Ground>& ground);
@@ -81,6 +79,7 @@ class ContactTerms {
   double deepest_outside() const { return deepest_outside_; }  ///< beyond obstacles and the ground alone
   /// Whether parts of the surface touch as they were found.
   bool touches_itself() const { return touches_itself_; }
+  std::vector<Index> crossing() const { return ways_.crossing(); }  ///< surfaces that places stay inside of
   /// Whether a part is inside another one there, however deep.
   bool overlaps(const RowMatrix<double>& coefficients);
 

@@ -9,11 +9,12 @@
 namespace arapfields {
 namespace {
 
-/// Notes where samples that may be inside a surface were last seen outside of it.
+/// Notes samples that stay inside a surface, and where those that may be inside were last seen outside of it.
 void note_inside(Index k, const Points& places, const Points& seen, const Vector& clear,
                  ContactState& state) {
   for (Index row = 0; row < places.rows(); ++row)
-    if (clear[row] > 0.0 && (places.row(row) - seen.row(row)).norm() >= clear[row])
+    if (clear[row] == ContactWays::left_inside ||
+        (clear[row] > 0.0 && (places.row(row) - seen.row(row)).norm() >= clear[row]))
       state.inside.push_back({row, k, seen.row(row).transpose(), clear[row]});
 }
 
@@ -36,14 +37,20 @@ void ContactTerms::resume(const ContactState& state, const RowMatrix<double>& co
   const bool fits = std::ssize(state.placements) == count;
   ways_.seen.assign(surfaces_.size(), {});
   ways_.anchors.assign(surfaces_.size(), {});
+  ways_.crossed.assign(surfaces_.size(), {});
   ways_.clear.resize(places_.rows(), count);
   pressures_.resize(places_.rows(), count + 1);
   for (Index k = 0; k < count; ++k) {
     const auto which = static_cast<std::size_t>(k);
     surfaces_[which].set_placement(fits ? state.placements[which] : ends_[which]);
     see(k);
+    if (!fits) ways_.cross(k, surfaces_[which], points_, places_);
   }
-  if (fits) recall_inside(state, ways_.seen, ways_.clear);
+  if (fits) {
+    recall_inside(state, ways_.seen, ways_.clear);
+    ways_.crossed = state.crossed;
+    ways_.crossed.resize(surfaces_.size());
+  }
   starts_ = fits ? state.placements : ends_;
   carried_.assign(surfaces_.size(), Mat4::Identity());
   release();
@@ -72,6 +79,7 @@ ContactState ContactTerms::held() const {
             k < std::ssize(ways_.anchors) ? ways_.anchors[static_cast<std::size_t>(k)] : places_;
         state.pressures.push_back({row, k, pressures_(row, k), of.row(row).transpose()});
       }
+  state.crossed = ways_.crossed;
   const Points places = places_.topRows(std::min<Index>(places_.rows(), points_.sample_count()));
   for (Index k = 0; k < std::ssize(surfaces_); ++k)
     note_inside(k, places, ways_.seen[static_cast<std::size_t>(k)], ways_.clear.col(k), state);
@@ -127,11 +135,14 @@ double ContactTerms::obstacle_way() const {
   return way;
 }
 
-/// New places were last seen outside where their samples were.
+/// New places were last seen outside where their samples were. Where an obstacle crosses the surface, they
+/// begin where they are.
 void ContactTerms::add_finer_ways() {
   std::vector<Index> samples;
   for (Index row = ways_.clear.rows(); row < points_.size(); ++row) samples.push_back(points_.sample_of(row));
   ways_.add(samples);
+  for (Index k = 0; k < std::ssize(surfaces_); ++k)
+    ways_.begin_beside_crossings(k, surfaces_[static_cast<std::size_t>(k)], samples, places_);
 }
 
 ContactWays ContactTerms::ways() const {

@@ -31,9 +31,11 @@ struct ContactState {
     Index row;
     Index surface;
     Vec3 seen;
-    double clear;  ///< distance there
+    double clear;  ///< distance there; −∞: it stays inside, where an obstacle crosses the surface
   };
   std::vector<Inside> inside;  ///< where what may be inside was last seen outside
+  /// Of each surface, the samples that it crosses at or beside; empty: none.
+  std::vector<std::vector<bool>> crossed;
 };
 
 /// Where a body is and how it moves: all that the next step depends on beside its handles' targets.

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Obstacles that cross the shape where it begins: neither of their sides is the one that it comes from."""
+
+import numpy as np
+import pytest
+import trimesh
+from support.geometry.bar import LEFT, RIGHT, bar_samples, turned
+from support.geometry.contact_bar import ALIKE, live, solid
+
+import arapfields as af
+
+# What is beside an obstacle keeps its distance from it.
+BESIDE = 0.02
+CROSSINGS = {
+    "plate": ((0.04, 1.5, 1.5), [0.4, 0, 0]),
+    "thin plate": ((0.004, 1.5, 1.5), [0.4, 0, 0]),
+    "rod": ((0.1, 0.1, 3.0), [0.0, 0, 0]),
+    "plate along it": ((3.0, 1.5, 0.04), [1.5, 0, 0.0]),
+}
+
+
+def box_at(extents, center):
+    mesh = trimesh.creation.box(extents).subdivide().subdivide()
+    return solid(mesh, center)
+
+
+@pytest.mark.parametrize(("extents", "center"), CROSSINGS.values(), ids=CROSSINGS)
+def test_an_obstacle_that_crosses_the_shape_tears_nothing(extents, center):
+    samples = bar_samples(16000)
+    across = af.Contact([af.Obstacle(box_at(extents, center))])
+    pressed = live(samples, across)
+    rest = pressed.solve(iterations=60)(samples.points)
+    assert np.abs(rest - samples.points).max() < BESIDE
+    turn = [LEFT, turned(0, shift=(0, 0.2, 0)) @ RIGHT]
+    field = pressed.solve(turn, iterations=60)
+    assert pressed.report.flipped_share == 0 and pressed.report.max_stretch < 1.5
+    again = live(samples, across).solve(turn, iterations=60)
+    assert np.abs(again(samples.points) - field(samples.points)).max() < ALIKE
+
+
+def test_what_crosses_is_named():
+    ball = solid(trimesh.creation.icosphere(3, 0.3), [0, 0, 0.7])
+    contact = af.Contact([af.Obstacle(ball), af.Obstacle(box_at(*CROSSINGS["plate"]))])
+    handles = [af.Cuboid(matrix, matrix) for matrix in (LEFT, RIGHT)]
+    report = af.deform(bar_samples(6000), handles, contact=contact).report
+    assert report.contact.crossing == ("obstacles[1]",)
+    assert "obstacles[1] crosses the surface" in " ".join(report.notes)
+    assert report.contact.touching > 0  # the ball, which is not so deep, presses
+    alone = af.deform(bar_samples(6000), handles, contact=af.Contact([af.Obstacle(ball)])).report
+    assert alone.contact.crossing == ()
+
+
+def test_motion_goes_on_from_its_state_where_an_obstacle_crosses():
+    samples = bar_samples(8000)
+    contact = af.Contact([af.Obstacle(box_at(*CROSSINGS["plate"]))])
+    ways = []
+    for resumes in (False, True):
+        body = live(samples, contact)
+        body.set_secondary_motion(af.SecondaryMotionOptions(gravity=2.0))
+        for frame in range(6):
+            pose = [LEFT, turned(0, shift=(0, 0.05 * min(frame, 3), 0)) @ RIGHT]
+            field = body.step(pose, 1 / 24)
+            if resumes:
+                body.motion_state = body.motion_state
+        ways.append(field(samples.points))
+    assert np.abs(ways[0] - ways[1]).max() < 1e-3
