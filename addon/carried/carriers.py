@@ -38,6 +38,11 @@ class Carrier:
     def moved(self, rest, now, parent, after):
         return np.ascontiguousarray(transform(inverse(now), after), dtype=np.float32)
 
+    def rebased(self, shape, own, parent):
+        """The same shape, as `moved` gives it, where (4, 4) `own` takes the object's coordinates to new ones,
+        and `parent` those of its parent."""
+        return np.ascontiguousarray(transform(own, shape), dtype=np.float32)
+
 
 class MeshCarrier(Carrier):
     """A mesh, by the field's modifier."""

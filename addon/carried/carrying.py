@@ -13,6 +13,7 @@ from ..field_nodes import helper
 from . import refusals
 from .carried_objects import CarriedObject, CarriedPose, find, give_back, is_carried_otherwise
 from .carriers import MeshCarrier
+from .rest_bones import above_field
 from .transforms import BonesCarrier
 from .world_matrices import world_matrices
 
@@ -24,7 +25,7 @@ class Carrying:
 
     def __init__(self, context, source):
         self.source, self.warnings, self.objects, self.before = ObjectReference(source), [], [], {}
-        self.rigs = modifier_stack.handle_rigs(source)
+        self.rigs, self.under = modifier_stack.handle_rigs(source), above_field(source)
         self.nodes = helper.Follower(source) if helper.of(source) else None
         for entry in settings_of(source).carried:
             try:
@@ -45,7 +46,7 @@ class Carrying:
             except UserError as error:
                 self.warnings.append(error)
                 continue
-            rest = space.world_to_solve @ world_matrices(item, self.rigs, depsgraph).rest
+            rest = space.world_to_solve @ world_matrices(item, self.rigs, depsgraph, under=self.under).rest
             meshes.append((transform(rest, mesh.vertices), mesh.triangles))
         return meshes
 
@@ -58,7 +59,7 @@ class Carrying:
             try:
                 item, entry = carried.item_and_entry(source)
                 basis = carried.carrier.basis(item, entry, depsgraph)
-                world = world_matrices(item, self.rigs, depsgraph, basis)
+                world = world_matrices(item, self.rigs, depsgraph, basis, self.under)
             except UserError as error:
                 self.leave(carried, error)
                 continue

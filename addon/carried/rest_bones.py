@@ -25,6 +25,11 @@ def armatures_of(source):
     return [rig for rig in dict.fromkeys(posing) if rig not in carried]
 
 
+def above_field(source):
+    """The armatures that pose what a source's field has moved."""
+    return armatures_of(source) if settings_of(source).under_rig else []
+
+
 def posed_with(source):
     """The source, and the meshes that it carries which its armatures pose too."""
     worn = [entry.item for entry in settings_of(source).carried]

@@ -71,6 +71,9 @@ class TransformCarrier(PoseCarrier):
         whole = posing.rigid_motion_of(transform(rest, self.points), after)
         return inverse(parent) @ whole @ rest
 
+    def rebased(self, shape, own, parent):
+        return parent @ shape
+
     def write(self, item, entry, basis):
         base = self.own_state(item, entry)
         turn = posing.turn_between(own_basis(item, base), basis)
@@ -138,6 +141,9 @@ class BonesCarrier(PoseCarrier):
         before = transform(rest, self.points)
         in_solve = rest @ self.poses
         return inverse(now) @ posing.bone_poses(in_solve, before, after)
+
+    def rebased(self, shape, own, parent):
+        return own @ shape
 
     def write(self, item, entry, targets):
         motion.written.add(item.session_uid)

@@ -11,6 +11,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ..core.errors import UserError
+from .rest_bones import resting
 
 FOLLOWING = {"CHILD_OF", "COPY_LOCATION", "COPY_TRANSFORMS", "ARMATURE"}  # constraints that place an object
 
@@ -28,10 +29,18 @@ def array(matrix):
     return np.array(matrix, dtype=np.float64)
 
 
-def world_matrices(item, rigs, depsgraph, basis=None):
-    """The object's matrices; `basis` is its own motion where that is not the object's present one."""
+def world_matrices(item, rigs, depsgraph, basis=None, under=()):
+    """The object's matrices; `basis` is its own motion where that is not the object's present one.
+
+    `under`: armatures that pose what the field has moved. What hangs on one of their bones is taken without
+    the pose: at rest where the bones were before they were fitted, now where they rest since.
+    """
     seen = item.evaluated_get(depsgraph)
     now, own = array(seen.matrix_world), array(seen.matrix_basis)
+    if hangs_on(item, under):
+        basis = own if basis is None else basis
+        rest, parent = (unposed_parent(item, under, depsgraph, found) for found in (first_rest, present_rest))
+        return WorldMatrices(rest @ basis, parent @ own, parent)
     parent = parent_now(item, depsgraph, now, own)
     if basis is None and not hangs_on(item, rigs):
         return WorldMatrices(now, now, parent)
@@ -66,6 +75,35 @@ def parent_of(item, depsgraph, world, posed):
     if bone.use_relative_parent:
         tail = np.linalg.inv(array(bone.matrix_local))
     return world @ array(pose if posed else bone.matrix_local) @ tail @ inverse
+
+
+def unposed_parent(item, rigs, depsgraph, rest_of):
+    """The same where the bones of these armatures have no pose; `rest_of(rig, name)`: a bone's (4, 4) matrix
+    and length."""
+    parent, inverse = item.parent, array(item.matrix_parent_inverse)
+    if not (parent in rigs and item.parent_type == "BONE"):
+        own = array(parent.evaluated_get(depsgraph).matrix_basis)
+        world = unposed_parent(parent, rigs, depsgraph, rest_of) @ own
+        return parent_of(item, depsgraph, world, posed=True)
+    if item.parent_bone not in parent.data.bones:
+        raise UserError("{name} hangs on {parent} in a way that cannot be followed", **names(item))
+    matrix, length = rest_of(parent, item.parent_bone)
+    tail = array(Matrix.Translation((0, length, 0)))
+    if parent.data.bones[item.parent_bone].use_relative_parent:
+        tail = np.linalg.inv(matrix)
+    return array(parent.evaluated_get(depsgraph).matrix_world) @ matrix @ tail @ inverse
+
+
+def first_rest(rig, name):
+    """A bone's rest before any fit."""
+    bones, poses, lengths = resting(rig)
+    index = bones.index(name)
+    return poses[index], lengths[index]
+
+
+def present_rest(rig, name):
+    bone = rig.data.bones[name]
+    return array(bone.matrix_local), bone.length
 
 
 def names(item):

@@ -8,6 +8,7 @@ from ..blender import mesh_arrays, modifier_stack
 from ..blender.evaluation import depsgraph_of
 from ..blender.object_references import in_scene, settings_of
 from ..carried.carried_objects import carrier_class
+from ..carried.rest_bones import above_field
 from ..carried.transforms import TransformCarrier
 from ..carried.world_matrices import array, world_matrices
 from ..core.errors import UserError
@@ -41,7 +42,7 @@ def copies(context, source, target, given, own, rigs):
             if issubclass(carrier_class(item, entry.way), TransformCarrier):
                 matrix = placed(context, source, item, entry, body)
             elif item.type == "MESH":
-                shape = fitted(context, item, body)
+                shape = fitted(context, source, item, body)
             else:
                 raise UserError("{name} is not copied: it is no mesh", item)
         except UserError as error:
@@ -56,7 +57,8 @@ def placed(context, source, item, entry, body):
     """(4, 4) matrix of what is carried as a whole: it grows as the body does there, about its middle."""
     depsgraph = depsgraph_of(context)
     basis = TransformCarrier(context, item).basis(item, entry, depsgraph)
-    world = world_matrices(item, modifier_stack.handle_rigs(source), depsgraph, basis)
+    rigs = modifier_stack.handle_rigs(source)
+    world = world_matrices(item, rigs, depsgraph, basis, above_field(source))
     middle = np.array(item.bound_box).mean(axis=0)[None]
     rest, now = (transform(matrix, middle)[0] for matrix in (world.rest, world.now))
     scale, way = body.placed(rest, now)
@@ -66,22 +68,24 @@ def placed(context, source, item, entry, body):
     return grown @ world.now
 
 
-def fitted(context, item, body):
+def fitted(context, source, item, body):
     """(n, 3) vertices of a carried mesh in the world, and (k, n, 3) those of its keys, or None."""
     if not modifier_stack.keeps_vertices(item):
         raise UserError("Modifiers of {name} change its vertices; it is not copied", item)
-    world = matrix_of(item)
+    world = world_matrices(item, (), depsgraph_of(context), under=above_field(source))
     with modifier_stack.evaluated_mesh(context, item, in_place=True) as mesh:
-        rest, triangles = transform(world, mesh_arrays.positions(mesh)), mesh_arrays.triangles(mesh)
+        rest, triangles = transform(world.rest, mesh_arrays.positions(mesh)), mesh_arrays.triangles(mesh)
     if modifier_stack.find(item) is None:
         raise UserError("The field does not move {name}; wrap again", item)
     with modifier_stack.moved_mesh(context, item) as mesh:
-        moved = transform(world, mesh_arrays.positions(mesh))
+        moved = transform(world.now, mesh_arrays.positions(mesh))
     shape = body.fit(rest, moved, triangles)
     keys = item.data.shape_keys
     if keys is None:
         return shape, None
-    points = [transform(world, mesh_arrays.vectors(block.data, "co")) - rest for block in keys.key_blocks]
+    points = [
+        transform(world.rest, mesh_arrays.vectors(block.data, "co")) - rest for block in keys.key_blocks
+    ]
     same = native.library().Correspondence(shape, (rest, triangles), (shape, triangles))
     return shape, shape + same.displacements(np.array(points))
 
@@ -94,9 +98,10 @@ def copy_of(item, target):
     copied = item.copy()
     if item.data is not None:
         copied.data = item.data.copy()
+    if item.type == "MESH":
+        motion.discard(copied)
     copied.name, copied[COPY_OF] = f"{item.name} {target.name}", item.name
     settings_of(copied).carried_by = None
-    motion.discard(copied)
     for home in target.users_collection:
         home.objects.link(copied)
     return copied

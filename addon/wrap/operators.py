@@ -11,7 +11,7 @@ from ..blender.object_references import settings_of
 from ..blender.presets import preset_classes
 from ..blender.property_definitions import annotations, effective_value, effective_values, integer, text
 from ..blender.source_operator import SourceOperator
-from ..carried import rest_bones
+from ..carried import hanging, rest_bones
 from ..core.errors import UserError
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
@@ -105,7 +105,8 @@ def with_rest(item, marks, fitting, below):
         for one in below:
             one.kept = True
         if fitting is not None:
-            fitting.put(bpy.context)
+            context, (result, _) = bpy.context, solved
+            hanging.follow(context, marks.source.get(), result.carried, lambda: fitting.put(context))
         return said
 
     return replace(item, apply=apply)

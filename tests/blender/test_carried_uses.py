@@ -7,7 +7,8 @@ from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
-    from support.blender import scenes
+    from mathutils import Vector
+    from support.blender import scenes, wraps
     from support.blender.bones import rigged_bar
     from support.blender.live import step
     from support.blender.riders import body, link, rider, shown, taken
@@ -18,6 +19,7 @@ if IN_BLENDER:
 pytestmark = pytest.mark.in_blender
 
 CLOSE = 1e-5  # single precision of positions of size one
+NEAR = 0.02  # of a bar of length two: between the mesh and what it carries the field is interpolated
 
 
 def test_what_moves_anyway_is_named_and_left():
@@ -137,3 +139,47 @@ def test_a_group_of_a_bone_that_is_missing_is_named():
             run()
     assert len(bar.arapfields.handles) == 2 and bar.modifiers["Armature"].show_viewport
     assert len(bar.modifiers) == 1
+
+
+@pytest.mark.parametrize("posed", [False, True])
+def test_what_hangs_on_a_fitted_bone_lies_where_the_field_takes_it(posed):
+    """A patch on the bar's side, an Empty and a lamp, children of a bone: not moved by field and bone."""
+    item, rig = wraps.rigged_bar()
+    item.arapfields.wrap.onto = wraps.soup_of(item)
+    corner = item.data.vertices[int(np.argmax([v.co.x + v.co.y for v in item.data.vertices]))].index
+    patch = bpy.data.objects.new("Patch", bpy.data.meshes.new("Patch"))
+    spot = bpy.data.objects.new("Spot", None)
+    lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
+    at = item.data.vertices[corner].co
+    patch.data.from_pydata([at, at - Vector((0.1, 0, 0)), at - Vector((0, 0, 0.1))], [], [(0, 1, 2)])
+    lamp.location, spot.location, spot.empty_display_size = at, at, 0.05
+    for one in (patch, spot, lamp):
+        bpy.context.collection.objects.link(one)
+        bpy.context.view_layer.update()
+        world = one.matrix_world.copy()
+        one.parent, one.parent_type, one.parent_bone = rig, "BONE", "Upper"
+        bpy.context.view_layer.update()
+        one.matrix_world = world
+    if posed:
+        rig.pose.bones["Upper"].rotation_mode = "XYZ"
+        rig.pose.bones["Upper"].rotation_euler.x = 0.4
+    bpy.context.view_layer.update()
+    scenes.activate(patch, spot, lamp, item)
+    bpy.ops.arapfields.carry()
+    seen = []
+    for _ in range(2):
+        assert bpy.ops.arapfields.wrap(**wraps.SMALL) == {"FINISHED"}
+        bpy.context.view_layer.update()
+        on_bar = scenes.world_points(item)[corner]
+        seen.append([on_bar, scenes.world_points(patch)[0], np.array(spot.matrix_world.translation)])
+        near = np.linalg.norm(np.array(seen[-1][1:]) - on_bar, axis=1)
+        assert near[0] < NEAR and near[1] < 2 * NEAR, near
+    assert np.abs(np.array(seen[1]) - seen[0]).max() < 1e-4
+    assert bpy.ops.arapfields.transfer() == {"FINISHED"}
+    copies = {item["arapfields_copy_of"]: item for item in bpy.data.objects if "arapfields_copy_of" in item}
+    assert sorted(copies) == ["Lamp", "Patch", "Spot"]
+    rig.pose.bones["Upper"].rotation_euler.x = 0.0  # the copies of what hangs on bones have no pose
+    bpy.context.view_layer.update()
+    on_bar = scenes.world_points(item)[corner]
+    assert np.linalg.norm(scenes.world_points(copies["Patch"])[0] - on_bar) < 3 * NEAR
+    assert np.linalg.norm(np.array(copies["Spot"].matrix_world.translation) - on_bar) < 3 * NEAR

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Carried objects that hang on bones which a wrap fits: they stay where the field took them."""
+
+import contextlib
+
+from ..blender.evaluation import depsgraph_of
+from ..core.errors import UserError
+from ..core.geometry.spaces import inverse
+from .carried_objects import find
+from .rest_bones import above_field
+from .world_matrices import hangs_on, world_matrices
+
+
+def follow(context, source, shapes, fit):
+    """Calls `fit`, which moves bones of the source at rest; what `shapes` has, [(carried object, what its
+    carrier wrote)], stays where it is."""
+    under = above_field(source)
+    found = [(carried, shape, carried.reference.find()) for carried, shape in shapes]
+    found = [one for one in found if one[2] is not None and hangs_on(one[2], under)]
+
+    def places():
+        depsgraph = depsgraph_of(context)
+        return [world_matrices(item, (), depsgraph, under=under) for *_, item in found]
+
+    before = places()
+    fit()
+    context.view_layer.update()
+    for (carried, shape, item), was, now in zip(found, before, places(), strict=True):
+        own, parent = inverse(now.now) @ was.now, inverse(now.parent) @ was.parent
+        with contextlib.suppress(UserError):  # which was told when it was put there first
+            carried.carrier.write(item, find(source, item), carried.carrier.rebased(shape, own, parent))
