@@ -11,18 +11,25 @@ import contextlib
 from ..blender import modifier_stack
 from ..blender.language import translated
 from ..carried import played_points
-from ..carried.carried_objects import KINDS, find
+from ..carried.carried_objects import carrier_class, find
 from ..carried.carriers import MeshCarrier
-from ..carried.points import AttributeCarrier, KeyCarrier, drop_key, key_points, own_key, put_key
-from ..carried.transforms import BonesCarrier, PoseCarrier
+from ..carried.points import (
+    BAKED_KEY,
+    AttributeCarrier,
+    KeyCarrier,
+    drop_key,
+    forget_baked_keys,
+    key_points,
+    own_key,
+    put_key,
+)
+from ..carried.transforms import BAKED_GROUP, BonesCarrier, PoseCarrier, TransformCarrier, forget_baked
 from ..core.errors import UserError, as_user_error
 from ..core.runtime.coroutines import Pause
 from ..field_modifier import cache_modifier
 from ..results import result_objects, visibility
 from .caches import CacheFile, plain
 from .frames import playing
-
-BAKED_KEY = "ARAP Fields frame "  # how baked keys of curves and lattices begin
 
 
 class CarriedBake:
@@ -142,12 +149,11 @@ class CarriedBake:
     def add_keys(self, carried, item):
         """A shape key a frame, in place of those of an earlier bake."""
         mask = own_key(item).vertex_group if own_key(item) is not None else ""
+        forget_baked_keys(item)
         drop_key(item, also_basis=False)
         if item.data.shape_keys is None:
             item.shape_key_add(name="Basis", from_mix=False)
         keys = item.data.shape_keys
-        for key in [key for key in keys.key_blocks if key.name.startswith(BAKED_KEY)]:
-            item.shape_key_remove(key)
         basis, frames = key_points(keys.reference_key), [plain(frame) for frame in self.frames]
         for number, shape in enumerate(self.shapes[carried]):
             key = item.shape_key_add(name=f"{BAKED_KEY}{frames[number]}", from_mix=False)
@@ -159,6 +165,8 @@ class CarriedBake:
 
     def add_keyframes(self, context, carried, item, entry):
         turns = {}
+        if not isinstance(carried.carrier, BonesCarrier):
+            forget_baked(item)
         with playing(context.scene):  # which shows the present frame's keys at last
             for frame, state in zip(self.frames, self.keyed[carried], strict=True):
                 carried.carrier.restore(item, entry, state)
@@ -166,13 +174,18 @@ class CarriedBake:
                 yield Pause.REDRAW
 
 
-def remove(item):
-    """Takes the modifier off that plays a carried object's bake; keys stay."""
-    if item.type == "MESH":
-        if modifier_stack.find_cache(item) is not None:
-            cache_modifier.remove(item)
-    elif KINDS.get(item.type) is AttributeCarrier:
+def remove(item, entry):
+    """Takes off a carried object what plays its bake; keys of bones stay."""
+    kind = carrier_class(item, entry.way)
+    if item.type == "MESH" and modifier_stack.find_cache(item) is not None:
+        cache_modifier.remove(item)
+    if kind is AttributeCarrier:
         played_points.remove(item)
+    elif kind is KeyCarrier:
+        forget_baked_keys(item)
+    elif kind is TransformCarrier:
+        forget_baked(item)
+        kind.put_state(item, kind.own_state(item, entry))
 
 
 def insert(item, carrier, frame, turns):
@@ -194,5 +207,6 @@ def insert(item, carrier, frame, turns):
                 turn.make_compatible(turns[owner.name, turned])
             turns[owner.name, turned] = turn
             setattr(owner, turned, turn)
+        group = {} if isinstance(carrier, BonesCarrier) else {"group": BAKED_GROUP}
         for path in (turned, *others):
-            owner.keyframe_insert(path, frame=frame)
+            owner.keyframe_insert(path, frame=frame, **group)

@@ -151,7 +151,7 @@ class ARAPFIELDS_OT_remove_bake(SourceOperator, bpy.types.Operator):
         cache_modifier.remove(source)
         for entry in settings_of(source).carried:
             if entry.item is not None and entry.item.library is None:
-                carried_bake.remove(entry.item)
+                carried_bake.remove(entry.item, entry)
 
 
 CLASSES = [ARAPFIELDS_OT_bake, ARAPFIELDS_OT_wrap_sequence, ARAPFIELDS_OT_remove_bake]

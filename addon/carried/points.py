@@ -4,6 +4,7 @@
 import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack
+from ..blender.actions import remove_curves
 from ..blender.removal import remove_node_modifier
 from ..core.errors import UserError
 from ..field_modifier import motion, node_group
@@ -12,6 +13,7 @@ from . import played_points
 from .carriers import Carrier
 from .drawings import layers_of
 
+BAKED_KEY = "ARAP Fields frame "  # how baked keys of curves and lattices begin
 SURFACE_NODE = "GeometryNodeDeformCurvesOnSurface"  # of modifiers that move hair with its surface
 
 
@@ -135,6 +137,7 @@ class KeyCarrier(Carrier):
 
     @staticmethod
     def release(item, entry):
+        forget_baked_keys(item)
         drop_key(item, also_basis=True)
 
 
@@ -150,6 +153,15 @@ def drop_key(item, also_basis):
     keys = item.data.shape_keys
     if also_basis and keys is not None and len(keys.key_blocks) == 1:
         item.shape_key_clear()
+
+
+def forget_baked_keys(item):
+    """Removes the shape keys that a bake made, with their animation."""
+    keys = item.data.shape_keys
+    if keys is not None:
+        remove_curves(keys, lambda one: one.data_path.startswith(f'key_blocks["{BAKED_KEY}'))
+        for key in [key for key in keys.key_blocks if key.name.startswith(BAKED_KEY)]:
+            item.shape_key_remove(key)
 
 
 FIELDS = ("co", "handle_left", "handle_right")  # of a Bézier point

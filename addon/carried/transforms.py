@@ -6,6 +6,7 @@ import json
 import numpy as np
 from mathutils import Euler, Matrix, Quaternion, Vector
 
+from ..blender.actions import remove_curves
 from ..core.errors import UserError
 from ..core.geometry import posing
 from ..core.geometry.spaces import inverse, transform
@@ -74,6 +75,11 @@ class TransformCarrier(PoseCarrier):
     def rebased(self, shape, own, parent):
         return parent @ shape
 
+    @classmethod
+    def release(cls, item, entry):
+        forget_baked(item)
+        super().release(item, entry)
+
     def write(self, item, entry, basis):
         base = self.own_state(item, entry)
         turn = posing.turn_between(own_basis(item, base), basis)
@@ -96,6 +102,12 @@ class TransformCarrier(PoseCarrier):
 
 
 DELTAS = ("delta_location", "delta_rotation_euler", "delta_rotation_quaternion")
+BAKED_GROUP = "ARAP Fields"  # of the curves of deltas that a bake keyed
+
+
+def forget_baked(item):
+    """Removes the keys of deltas that a bake made; the user's own stay."""
+    remove_curves(item, lambda one: one.group is not None and one.group.name == BAKED_GROUP)
 
 
 def own_basis(item, base):

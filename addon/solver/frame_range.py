@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which frames the animation of a source's handles, style or target spans."""
 
+from ..blender.actions import bags_of
 from ..blender.object_references import settings_of
 from ..handles import empties, movers
 
@@ -76,9 +77,6 @@ def has_keys(item, path):
 
 
 def curves_of(action):
-    """An action's curves; from Blender 4.4 on they lie in the channel bags of its layers' strips."""
-    for layer in getattr(action, "layers", ()):
-        for strip in layer.strips:
-            for bag in getattr(strip, "channelbags", ()):
-                yield from bag.fcurves
-    yield from getattr(action, "fcurves", ())
+    """An action's curves."""
+    for bag in bags_of(action):
+        yield from bag.fcurves

@@ -90,6 +90,34 @@ def test_what_turns_round_is_keyed_without_a_turn_back(mode):
             assert all(np.abs(middle - end).max() < 0.9 * step for end in ends), (item.name, frame)
 
 
+@pytest.mark.parametrize("how", ["remove_bake", "release"])
+def test_keys_of_a_bake_go_with_it_and_the_users_own_stay(how):
+    bar, moving = body()
+    spot, cord, own = rider("EMPTY"), rider("CURVE"), rider("EMPTY")
+    own.keyframe_insert("delta_location", frame=1)
+    for frame, height in ((1, 0.0), (6, 0.4)):
+        moving.location.z = height
+        moving.keyframe_insert("location", frame=frame)
+    scenes.activate(spot, cord, own, bar)
+    bpy.ops.arapfields.carry()
+    bpy.context.scene.frame_set(1)
+    rest = [shown(item) for item in (spot, cord)]
+    scenes.activate(bar)
+    folder = tempfile.mkdtemp()
+    for start, end in ((1, 6), (3, 4)):
+        assert bpy.ops.arapfields.bake(start=start, end=end, folder=folder) == {"FINISHED"}
+        for action in (spot.animation_data.action, cord.data.shape_keys.animation_data.action):
+            frames = {point.co.x for curve in curves_of(action) for point in curve.keyframe_points}
+            assert frames == set(range(start, end + 1)), frames
+    assert getattr(bpy.ops.arapfields, how)(**({"all": True} if how == "release" else {})) == {"FINISHED"}
+    for frame in (1, 4):
+        bpy.context.scene.frame_set(frame)
+        for item, before in zip((spot, cord), rest, strict=True):
+            assert np.abs(shown(item) - before).max() < CLOSE
+    left = {curve.data_path for curve in curves_of(own.animation_data.action)}
+    assert "delta_location" in left and spot.animation_data.action is None
+
+
 def test_undo_and_redo_take_all_along():
     bpy.context.preferences.edit.use_global_undo = True
     bar, moving = body()

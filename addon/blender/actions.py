@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Curves of actions, in all versions of Blender."""
+
+import bpy
+
+
+def bags_of(action):
+    """What holds an action's curves: from Blender 4.4 on the channel bags of its layers' strips."""
+    for layer in getattr(action, "layers", ()):
+        for strip in layer.strips:
+            yield from getattr(strip, "channelbags", ())
+    if hasattr(action, "fcurves"):
+        yield action
+
+
+def remove_curves(owner, is_removed):
+    """Removes those curves of the owner's action of which `is_removed(curve)` holds, and the action where
+    nothing is left of it."""
+    action = owner.animation_data.action if owner.animation_data is not None else None
+    if action is None:
+        return
+    removed, left = 0, 0
+    for bag in bags_of(action):
+        for curve in list(bag.fcurves):
+            if is_removed(curve):
+                bag.fcurves.remove(curve)
+                removed += 1
+        left += len(bag.fcurves)
+    if removed and not left:
+        owner.animation_data.action = None
+        if action.users == 0:
+            bpy.data.actions.remove(action)
