@@ -150,7 +150,7 @@ def test_what_hangs_on_a_fitted_bone_lies_where_the_field_takes_it(posed):
     patch = bpy.data.objects.new("Patch", bpy.data.meshes.new("Patch"))
     spot = bpy.data.objects.new("Spot", None)
     lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
-    at = item.data.vertices[corner].co
+    at = Vector(scenes.world_points(item)[corner])
     patch.data.from_pydata([at, at - Vector((0.1, 0, 0)), at - Vector((0, 0, 0.1))], [], [(0, 1, 2)])
     lamp.location, spot.location, spot.empty_display_size = at, at, 0.05
     for one in (patch, spot, lamp):
