@@ -158,13 +158,10 @@ def warn(session):
 
 
 def end_with_error(uid, session, error):
-    """Also ends one whose source was deleted, which stays as it is: an undone step brings back both."""
+    """An undone step brings it back; a source that was deleted stays as it is."""
     source = session.source.find()
-    if session.display.in_place and source is not None and not in_scene(source):
-        live.part_with(uid)
-    else:
-        live.pop(uid, None)
-        session.stop()
+    live.part_with(uid)
+    if not session.display.in_place or source is None or in_scene(source):
         take_away(session)
     text = translated("{error}; live mode ended", error=translated(error))
     jobs.add_message("ERROR", f"{session.source.name}: {text}")

@@ -8,10 +8,13 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
+    from support.blender.bones import rigged_bar
     from support.blender.live import step
     from support.blender.pins import pin
     from support.blender.scenes import delete
 
+    from addon.blender import modifier_stack
+    from addon.core.runtime import jobs
     from addon.live import sessions
 
 pytestmark = pytest.mark.in_blender
@@ -49,6 +52,29 @@ def test_a_deleted_source_comes_back_live_and_as_it_was():
     step()
     bar = bpy.data.objects["Bar"]
     assert sessions.is_live(bar) and np.array_equal(scenes.world_points(bar), shown)
+
+
+def test_a_modifier_that_was_removed_comes_back_live_with_undo():
+    """Its armature, whose bones are handles, was off and nothing moved in its place."""
+    bpy.context.preferences.edit.use_global_undo = True
+    bar, rig = rigged_bar()
+    scenes.activate(rig, bar)
+    bpy.ops.arapfields.add_bones()
+    scenes.activate(bar)
+    bpy.ops.arapfields.live()
+    rig.pose.bones["Second"].rotation_euler.z = 0.7
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="posed")
+    step(refined=True)
+    posed = scenes.world_points(bar)
+    bar.modifiers.remove(modifier_stack.find(bar))
+    bpy.ops.ed.undo_push(message="removed")
+    step()
+    assert not sessions.live and "was removed" in str(jobs.messages())
+    bpy.ops.ed.undo()
+    step(refined=True)
+    bar = bpy.data.objects["Bar"]
+    assert sessions.is_live(bar) and np.abs(scenes.world_points(bar) - posed).max() < 1e-4
 
 
 def test_edits_of_a_live_source_are_followed():
