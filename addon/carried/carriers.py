@@ -38,6 +38,10 @@ class Carrier:
     def moved(self, rest, now, parent, after):
         return np.ascontiguousarray(transform(inverse(now), after), dtype=np.float32)
 
+    def present(self, item, entry):
+        """The shape that was written last; None where there is none, or it cannot be told."""
+        return None
+
     def rebased(self, shape, own, parent):
         """The same shape, as `moved` gives it, where (4, 4) `own` takes the object's coordinates to new ones,
         and `parent` those of its parent."""
@@ -57,6 +61,10 @@ class MeshCarrier(Carrier):
 
     def write(self, item, entry, shape):
         motion.write(item, motion.Motion(shape - self.points.astype(np.float32)))
+
+    def present(self, item, entry):
+        moved = motion.snapshot(item)
+        return None if moved is None or moved.offsets is None else self.points + moved.offsets
 
     def snapshot(self, item, entry):
         return motion.snapshot(item)

@@ -4,9 +4,11 @@
 import contextlib
 
 from ..blender.evaluation import depsgraph_of
-from ..core.errors import UserError
+from ..blender.object_references import settings_of
+from ..core.errors import UserError, refuse
 from ..core.geometry.spaces import inverse
-from .carried_objects import find
+from . import refusals
+from .carried_objects import CarriedObject, find
 from .rest_bones import above_field
 from .world_matrices import hangs_on, world_matrices
 
@@ -29,3 +31,15 @@ def follow(context, source, shapes, fit):
         own, parent = inverse(now.now) @ was.now, inverse(now.parent) @ was.parent
         with contextlib.suppress(UserError):  # which was told when it was put there first
             carried.carrier.write(item, find(source, item), carried.carrier.rebased(shape, own, parent))
+
+
+def present(context, source):
+    """[(carried object, its shape)] as `follow` takes them, of what the field has moved; nobody is named."""
+    found = []
+    for entry in settings_of(source).carried:
+        with contextlib.suppress(UserError, ValueError):
+            refuse(refusals.of_entry(source, entry))
+            carried = CarriedObject(context, entry)
+            shape = carried.carrier.present(entry.item, entry)
+            found += [] if shape is None else [(carried, shape)]
+    return found

@@ -72,6 +72,9 @@ class TransformCarrier(PoseCarrier):
         whole = posing.rigid_motion_of(transform(rest, self.points), after)
         return inverse(parent) @ whole @ rest
 
+    def present(self, item, entry):
+        return own_basis(item, self.state(item)) if base_kind_of(entry) == self.base_kind else None
+
     def rebased(self, shape, own, parent):
         return parent @ shape
 

@@ -175,7 +175,8 @@ class ARAPFIELDS_OT_reset_bones(SourceOperator, bpy.types.Operator):
         return None if rest_bones.fitted(source) else UserError("No bones were fitted to {name}", source)
 
     def change(self, context, source):
-        rest_bones.reset(context, source)
+        shapes = hanging.present(context, source)
+        hanging.follow(context, source, shapes, lambda: rest_bones.reset(context, source))
 
 
 class ARAPFIELDS_OT_transfer(SourceOperator, bpy.types.Operator):

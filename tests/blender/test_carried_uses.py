@@ -183,3 +183,7 @@ def test_what_hangs_on_a_fitted_bone_lies_where_the_field_takes_it(posed):
     on_bar = scenes.world_points(item)[corner]
     assert np.linalg.norm(scenes.world_points(copies["Patch"])[0] - on_bar) < 3 * NEAR
     assert np.linalg.norm(np.array(copies["Spot"].matrix_world.translation) - on_bar) < 3 * NEAR
+    assert bpy.ops.arapfields.reset_bones() == {"FINISHED"}
+    bpy.context.view_layer.update()
+    assert np.linalg.norm(scenes.world_points(patch)[0] - on_bar) < NEAR
+    assert np.linalg.norm(np.array(spot.matrix_world.translation) - on_bar) < 2 * NEAR
