@@ -4,6 +4,7 @@
 Reads lines of JSON, {"file", "function", "arguments"}, and answers each with one line: "" or a traceback.
 """
 
+import ctypes
 import faulthandler
 import functools
 import importlib.util
@@ -51,6 +52,8 @@ def main():
     os.dup2(2, 1)  # what Blender prints must not pass for an answer
     for line in sys.stdin:
         print(json.dumps(run(json.loads(line))), file=answers, flush=True)
+    if os.name == "nt":  # under Wine Blender's libraries may wait for ever for each other's threads
+        ctypes.windll.kernel32.TerminateProcess(ctypes.c_void_p(-1), 0)
 
 
 if __name__ == "__main__":
