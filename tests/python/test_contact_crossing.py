@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import trimesh
 from support.geometry.bar import LEFT, RIGHT, bar_samples, turned
-from support.geometry.contact_bar import ALIKE, live, solid
+from support.geometry.contact_bar import ALIKE, DEEPEST, live, solid
 
 import arapfields as af
 
@@ -48,6 +48,18 @@ def test_what_crosses_is_named():
     assert report.contact.touching > 0  # the ball, which is not so deep, presses
     alone = af.deform(bar_samples(6000), handles, contact=af.Contact([af.Obstacle(ball)])).report
     assert alone.contact.crossing == ()
+
+
+@pytest.mark.parametrize("height", [0.03, -0.03])
+def test_a_ball_sunk_by_half_is_on_the_side_of_its_middle(height):
+    samples = bar_samples(6000)
+    ball = solid(trimesh.creation.icosphere(4, 0.3), [0, 0, 0.5 + height])
+    handles = [af.Cuboid(matrix, matrix) for matrix in (LEFT, RIGHT)]
+    field = af.deform(samples, handles, contact=af.Contact([af.Obstacle(ball)]))
+    moved = field(samples.points)
+    assert ball(moved).min() > -DEEPEST
+    assert field.report.contact.crossing == () and field.report.max_stretch < 1.5
+    assert (moved[:, 2].max() > 0.7) == (height < 0)
 
 
 def test_motion_goes_on_from_its_state_where_an_obstacle_crosses():

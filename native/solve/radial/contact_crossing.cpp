@@ -15,11 +15,23 @@ namespace {
 constexpr double opposite = -0.5;
 /// Samples are beside each other that lie no farther apart at rest, in spacings.
 constexpr double nearby = 3.0;
+/// A part of a surface has one side where its mean normal is as long; along it ways out lead whose cosine is
+/// at least `along` somewhere, and nowhere beyond `against` on the other side.
+constexpr double one_sided = 0.5, along = 0.7, against = -0.2;
 
 struct Crossing {
   std::vector<Index> inside;  ///< samples that lie inside, together with all that are inside beside them
   std::vector<Index> beside;  ///< samples outside, between which and their neighbours it crosses
 };
+
+/// Whether the ways out lead all to one side of the surface, so that it comes out whole.
+bool comes_out(PointsIn ways_out, PointsIn normals) {
+  const Vec3 mean = normals.colwise().mean();
+  if (mean.norm() < one_sided) return false;
+  const Vector cosines = ways_out * mean.normalized();
+  return (cosines.minCoeff() > against && cosines.maxCoeff() > along) ||
+         (cosines.maxCoeff() < -against && cosines.minCoeff() < -along);
+}
 
 /// `places` are those of the samples, `distances` theirs from the obstacle.
 Crossing crossing_of(const BarrierSurface& obstacle, ContactPoints& points, PointsIn places,
@@ -44,27 +56,33 @@ Crossing crossing_of(const BarrierSurface& obstacle, ContactPoints& points, Poin
         if (other != m && (rest.row(other) - rest.row(m)).norm() < reach) take(other);
     });
   };
-  std::vector<bool> left(near.size());
-  std::vector<Index> front;
-  const auto leave = [&](Index m) {
-    if (left[static_cast<std::size_t>(m)]) return;
-    left[static_cast<std::size_t>(m)] = true;
-    if (is_inside(m)) front.push_back(m);
+  std::vector<bool> left(near.size()), seen(near.size());
+  // All that is inside beside m, and what is outside there.
+  const auto leave_part = [&](Index m) {
+    std::vector<Index> part{m}, samples, edge;
+    seen[static_cast<std::size_t>(m)] = true;
+    for (std::size_t next = 0; next < part.size(); ++next) {
+      samples.push_back(near[static_cast<std::size_t>(part[next])]);
+      each_neighbour(part[next], [&](Index other) {
+        if (!is_inside(other)) edge.push_back(other);
+        if (!is_inside(other) || seen[static_cast<std::size_t>(other)]) return;
+        seen[static_cast<std::size_t>(other)] = true;
+        part.push_back(other);
+      });
+    }
+    if (comes_out(rows_of(normals, part), points.normals(samples))) return;
+    for (const std::vector<Index>* rows : {&part, &edge})
+      for (const Index row : *rows) left[static_cast<std::size_t>(row)] = true;
   };
   std::vector<std::pair<Index, Index>> pairs;  // outside, on opposite sides
   for (Index m = 0; m < std::ssize(near); ++m)
     each_neighbour(m, [&](Index other) {
       if (normals.row(m).dot(normals.row(other)) > opposite) return;
-      if (is_inside(m))
-        leave(m);
-      else if (!is_inside(other) && m < other)
+      if (is_inside(m) && !seen[static_cast<std::size_t>(m)])
+        leave_part(m);
+      else if (!is_inside(m) && !is_inside(other) && m < other)
         pairs.emplace_back(m, other);
     });
-  while (!front.empty()) {
-    const Index m = front.back();
-    front.pop_back();
-    each_neighbour(m, leave);
-  }
   std::vector<Index> from, to;
   for (const auto& [a, b] : pairs) {
     from.push_back(a);

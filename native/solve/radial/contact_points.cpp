@@ -56,6 +56,15 @@ Points ContactPoints::embedded(const std::vector<Index>& rows) const {
   return embedded_.rows() > 0 ? rows_of(embedded_, rows) : Points(0, 3);
 }
 
+Points ContactPoints::normals(const std::vector<Index>& samples) const {
+  Points result = Points::Zero(std::ssize(samples), 3);
+  if (problem_.samples.normals.rows() != problem_.samples.size()) return result;
+  for (std::size_t i = 0; i < samples.size(); ++i)
+    result.row(static_cast<Index>(i)) =
+        problem_.samples.normals.row(samples_[static_cast<std::size_t>(samples[i])]).normalized();
+  return result;
+}
+
 Points ContactPoints::embedded_at(PointsIn places) const {
   if (!problem_.basis.embedding) return Points(0, 3);
   Points result(places.rows(), 3);

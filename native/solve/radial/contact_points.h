@@ -30,6 +30,8 @@ class ContactPoints {
   Points rest(const std::vector<Index>& rows) const;
   /// The same in the basis' embedding; empty without one.
   Points embedded(const std::vector<Index>& rows) const;
+  /// Of samples, as they face at rest; zero where that is not known.
+  Points normals(const std::vector<Index>& samples) const;
   /// About the distance of a sample to what it stands for.
   double spacing() const { return spacing_; }
   /// Samples near one at rest, on the same side.
