@@ -111,6 +111,7 @@ class WrapBake(ObjectBake):
     def __init__(self, context, source, frames, scans, *paths):
         super().__init__(context, source, "WRAP", frames, *paths)
         self.scans, self.simulation = scans, None
+        self.reader.carrying.is_shown_posed = True  # caches are put behind the armatures
         self.reader.moves_by_itself = True  # scans take memory: few are read ahead
         self.marks = landmarks.Marks(source)
         self.values = effective_values(WRAP, settings_of(source).wrap)

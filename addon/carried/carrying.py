@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """All that a source carries, for one run: read, moved by fields on a worker, shown, and taken back."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack
@@ -26,6 +28,7 @@ class Carrying:
     def __init__(self, context, source):
         self.source, self.warnings, self.objects, self.before = ObjectReference(source), [], [], {}
         self.rigs, self.under = modifier_stack.handle_rigs(source), above_field(source)
+        self.is_shown_posed = False  # whether what is written lies behind the armatures of `under`
         self.nodes = helper.Follower(source) if helper.of(source) else None
         for entry in settings_of(source).carried:
             try:
@@ -60,6 +63,9 @@ class Carrying:
                 item, entry = carried.item_and_entry(source)
                 basis = carried.carrier.basis(item, entry, depsgraph)
                 world = world_matrices(item, self.rigs, depsgraph, basis, self.under)
+                if self.is_shown_posed:
+                    posed = world_matrices(item, self.rigs, depsgraph, basis)
+                    world = replace(world, now=posed.now, parent=posed.parent)
             except UserError as error:
                 self.leave(carried, error)
                 continue

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Carried objects that are edited, lost or refused, that share an armature, and bakes."""
 
+import tempfile
+
 import numpy as np
 import pytest
 from support.blender.inside import IN_BLENDER
@@ -141,25 +143,35 @@ def test_a_group_of_a_bone_that_is_missing_is_named():
     assert len(bar.modifiers) == 1
 
 
+def hung_on(rig, item):
+    """Makes it a child of a bone, where it is."""
+    bpy.context.view_layer.update()
+    world = item.matrix_world.copy()
+    item.parent, item.parent_type, item.parent_bone = rig, "BONE", "Upper"
+    bpy.context.view_layer.update()
+    item.matrix_world = world
+
+
+def patch_at(item):
+    """(patch, number of the bar's vertex at which its first vertex lies)."""
+    corner = int(np.argmax([v.co.x + v.co.y for v in item.data.vertices]))
+    at = Vector(scenes.world_points(item)[corner])
+    patch = link("Patch", bpy.data.meshes.new("Patch"))
+    patch.data.from_pydata([at, at - Vector((0.1, 0, 0)), at - Vector((0, 0, 0.1))], [], [(0, 1, 2)])
+    return patch, corner
+
+
 @pytest.mark.parametrize("posed", [False, True])
 def test_what_hangs_on_a_fitted_bone_lies_where_the_field_takes_it(posed):
     """A patch on the bar's side, an Empty and a lamp, children of a bone: not moved by field and bone."""
     item, rig = wraps.rigged_bar()
     item.arapfields.wrap.onto = wraps.soup_of(item)
-    corner = item.data.vertices[int(np.argmax([v.co.x + v.co.y for v in item.data.vertices]))].index
-    patch = bpy.data.objects.new("Patch", bpy.data.meshes.new("Patch"))
-    spot = bpy.data.objects.new("Spot", None)
-    lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
-    at = Vector(scenes.world_points(item)[corner])
-    patch.data.from_pydata([at, at - Vector((0.1, 0, 0)), at - Vector((0, 0, 0.1))], [], [(0, 1, 2)])
-    lamp.location, spot.location, spot.empty_display_size = at, at, 0.05
+    patch, corner = patch_at(item)
+    at = scenes.world_points(item)[corner]
+    spot, lamp = link("Spot", None, at), link("Lamp", bpy.data.lights.new("Lamp", "POINT"), at)
+    spot.empty_display_size = 0.05
     for one in (patch, spot, lamp):
-        bpy.context.collection.objects.link(one)
-        bpy.context.view_layer.update()
-        world = one.matrix_world.copy()
-        one.parent, one.parent_type, one.parent_bone = rig, "BONE", "Upper"
-        bpy.context.view_layer.update()
-        one.matrix_world = world
+        hung_on(rig, one)
     if posed:
         rig.pose.bones["Upper"].rotation_mode = "XYZ"
         rig.pose.bones["Upper"].rotation_euler.x = 0.4
@@ -187,3 +199,22 @@ def test_what_hangs_on_a_fitted_bone_lies_where_the_field_takes_it(posed):
     bpy.context.view_layer.update()
     assert np.linalg.norm(scenes.world_points(patch)[0] - on_bar) < NEAR
     assert np.linalg.norm(np.array(spot.matrix_world.translation) - on_bar) < 2 * NEAR
+
+
+def test_what_hangs_on_a_posed_bone_goes_with_a_sequence_after_a_wrap():
+    """The sequence plays behind the armature, whose bones the wrap has fitted."""
+    item, rig = wraps.rigged_bar()
+    item.arapfields.wrap.onto = wraps.soup_of(item)
+    for name, value in wraps.SMALL.items():
+        setattr(item.arapfields.wrap, name, value)
+    patch, corner = patch_at(item)
+    hung_on(rig, patch)
+    scenes.activate(patch, item)
+    bpy.ops.arapfields.carry()
+    assert bpy.ops.arapfields.wrap() == {"FINISHED"}
+    rig.pose.bones["Upper"].rotation_mode = "XYZ"
+    rig.pose.bones["Upper"].rotation_euler.x = 0.4
+    scenes.activate(item)
+    assert bpy.ops.arapfields.wrap_sequence(start=1, end=2, folder=tempfile.mkdtemp()) == {"FINISHED"}
+    bpy.context.scene.frame_set(2)
+    assert np.linalg.norm(scenes.world_points(patch)[0] - scenes.world_points(item)[corner]) < NEAR
