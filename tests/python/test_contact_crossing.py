@@ -26,7 +26,7 @@ def box_at(extents, center):
 
 @pytest.mark.parametrize(("extents", "center"), CROSSINGS.values(), ids=CROSSINGS)
 def test_an_obstacle_that_crosses_the_shape_tears_nothing(extents, center):
-    samples = bar_samples(16000)
+    samples = bar_samples(8000)
     across = af.Contact([af.Obstacle(box_at(extents, center))])
     pressed = live(samples, across)
     rest = pressed.solve(iterations=60)(samples.points)
@@ -42,17 +42,17 @@ def test_what_crosses_is_named():
     ball = solid(trimesh.creation.icosphere(3, 0.3), [0, 0, 0.7])
     contact = af.Contact([af.Obstacle(ball), af.Obstacle(box_at(*CROSSINGS["plate"]))])
     handles = [af.Cuboid(matrix, matrix) for matrix in (LEFT, RIGHT)]
-    report = af.deform(bar_samples(6000), handles, contact=contact).report
+    report = af.deform(bar_samples(2000), handles, contact=contact).report
     assert report.contact.crossing == ("obstacles[1]",)
     assert "obstacles[1] crosses the surface" in " ".join(report.notes)
     assert report.contact.touching > 0  # the ball, which is not so deep, presses
-    alone = af.deform(bar_samples(6000), handles, contact=af.Contact([af.Obstacle(ball)])).report
+    alone = af.deform(bar_samples(2000), handles, contact=af.Contact([af.Obstacle(ball)])).report
     assert alone.contact.crossing == ()
 
 
 @pytest.mark.parametrize("height", [0.03, -0.03])
 def test_a_ball_sunk_by_half_is_on_the_side_of_its_middle(height):
-    samples = bar_samples(6000)
+    samples = bar_samples(4000)
     ball = solid(trimesh.creation.icosphere(4, 0.3), [0, 0, 0.5 + height])
     handles = [af.Cuboid(matrix, matrix) for matrix in (LEFT, RIGHT)]
     field = af.deform(samples, handles, contact=af.Contact([af.Obstacle(ball)]))
