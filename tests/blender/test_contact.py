@@ -61,7 +61,7 @@ def test_a_live_shape_stays_outside_as_its_obstacle_comes_and_goes():
     bar.arapfields.contact.use, bar.arapfields.contact.use_ground = True, False
     scenes.activate(block, bar)
     bpy.ops.arapfields.add_obstacle()
-    bpy.ops.arapfields.deform()
+    bpy.ops.arapfields.deform(samples=3000)
     assert "Bar: Moving is held back by Cube" in [text for _, text in jobs.messages()]
     sdf_top = low - 0.2
     inside = local_points(bar)
