@@ -50,6 +50,16 @@ def test_what_crosses_is_named():
     assert alone.contact.crossing == ()
 
 
+def test_nothing_crosses_without_contact():
+    shape = live(bar_samples(4000), af.Contact([af.Obstacle(box_at(*CROSSINGS["plate"]))]))
+    shape.solve()
+    assert shape.report.contact.crossing == ("obstacles[0]",)
+    for contact in (None, af.Contact(itself=True)):
+        shape.set_contact(contact)
+        shape.solve([LEFT, turned(20) @ RIGHT])
+        assert shape.report.contact.crossing == ()
+
+
 @pytest.mark.parametrize("height", [0.03, -0.03])
 def test_a_ball_sunk_by_half_is_on_the_side_of_its_middle(height):
     samples = bar_samples(4000)

@@ -29,15 +29,16 @@ void recall_inside(const ContactState& state, std::vector<Points>& seen, RowMatr
 }  // namespace
 
 void ContactTerms::resume(const ContactState& state, const RowMatrix<double>& coefficients) {
+  ways_ = {};
   if (!any()) return release();
   points_.coarsen();
   places_ = points_.at(coefficients);
   if (self_) self_->begin(places_, [&](auto* blocks) { return points_.normals_at(coefficients, blocks); });
   const Index count = std::ssize(surfaces_);
   const bool fits = std::ssize(state.placements) == count;
-  ways_.seen.assign(surfaces_.size(), {});
-  ways_.anchors.assign(surfaces_.size(), {});
-  ways_.crossed.assign(surfaces_.size(), {});
+  ways_.seen.resize(surfaces_.size());
+  ways_.anchors.resize(surfaces_.size());
+  ways_.crossed.resize(surfaces_.size());
   ways_.clear.resize(places_.rows(), count);
   pressures_.resize(places_.rows(), count + 1);
   for (Index k = 0; k < count; ++k) {
