@@ -194,9 +194,9 @@ def insert(item, carrier, frame, turns):
     euler, quaternion = "rotation_euler", "rotation_quaternion"
     if not isinstance(carrier, BonesCarrier):
         turned = quaternion if item.rotation_mode == "QUATERNION" else euler
-        channels = [(item, f"delta_{turned}", ["delta_location"])]
+        channels, group = [(item, f"delta_{turned}", ["delta_location"])], BAKED_GROUP
     else:
-        modes = {"QUATERNION": quaternion, "AXIS_ANGLE": "rotation_axis_angle"}
+        modes, group = {"QUATERNION": quaternion, "AXIS_ANGLE": "rotation_axis_angle"}, ""
         channels = [
             (bone, modes.get(bone.rotation_mode, euler), ["location", "scale"]) for bone in item.pose.bones
         ]
@@ -207,6 +207,5 @@ def insert(item, carrier, frame, turns):
                 turn.make_compatible(turns[owner.name, turned])
             turns[owner.name, turned] = turn
             setattr(owner, turned, turn)
-        group = {} if isinstance(carrier, BonesCarrier) else {"group": BAKED_GROUP}
         for path in (turned, *others):
-            owner.keyframe_insert(path, frame=frame, **group)
+            owner.keyframe_insert(path, frame=frame, group=group)

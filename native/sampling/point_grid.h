@@ -17,6 +17,13 @@ class PointGrid {
   /// Cells that hold points, and those of each.
   Index size() const { return static_cast<Index>(cells_.size()); }
   std::span<const Index> rows(Index cell) const { return rows_of(cells_[static_cast<std::size_t>(cell)]); }
+  /// The cell of each point (n).
+  std::vector<Index> cell_of_each() const {
+    std::vector<Index> cells(rows_.size());
+    for (Index c = 0; c < size(); ++c)
+      for (const Index row : rows(c)) cells[static_cast<std::size_t>(row)] = c;
+    return cells;
+  }
   /// Calls visit(cell) for the cells, of those that hold points, that touch this one, and itself.
   template <class Visit>
   void near(Index cell, Visit&& visit) const {

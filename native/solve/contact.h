@@ -49,7 +49,7 @@ struct ContactReport {
   double touching = 0.0;   ///< share of the area that presses
   bool unsettled = false;  ///< more steps would bring it out
   std::vector<HeldBack> held;
-  /// Names of the obstacles whose middle lay in the surface where it began: what is inside of them stays.
+  /// Names of the obstacles that cross the surface where it began: what lies inside of them stays there.
   std::vector<std::string> crossing;
 };
 

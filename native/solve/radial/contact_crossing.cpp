@@ -19,11 +19,6 @@ constexpr double nearby = 3.0;
 /// at least `along` somewhere, and nowhere beyond `against` on the other side.
 constexpr double one_sided = 0.5, along = 0.7, against = -0.2;
 
-struct Crossing {
-  std::vector<Index> inside;  ///< samples that lie inside, together with all that are inside beside them
-  std::vector<Index> beside;  ///< samples outside, between which and their neighbours it crosses
-};
-
 /// Whether the ways out lead all to one side of the surface, so that it comes out whole.
 bool comes_out(PointsIn ways_out, PointsIn normals) {
   const Vec3 mean = normals.colwise().mean();
@@ -33,10 +28,12 @@ bool comes_out(PointsIn ways_out, PointsIn normals) {
          (cosines.maxCoeff() < -against && cosines.minCoeff() < -along);
 }
 
-/// `places` are those of the samples, `distances` theirs from the obstacle.
-Crossing crossing_of(const BarrierSurface& obstacle, ContactPoints& points, PointsIn places,
-                     const Vector& distances) {
-  Crossing result;
+/// The samples that lie inside where an obstacle crosses the surface, with all that are inside beside them,
+/// and those outside, between which and their neighbours it crosses. `places` are those of the samples,
+/// `distances` theirs from the obstacle.
+std::vector<Index> crossed_samples(const BarrierSurface& obstacle, const ContactPoints& points,
+                                   PointsIn places, const Vector& distances) {
+  std::vector<Index> result;
   if (obstacle.is_flat() || obstacle.is_sheet()) return result;
   const double reach = nearby * points.spacing();
   std::vector<Index> near;
@@ -45,9 +42,7 @@ Crossing crossing_of(const BarrierSurface& obstacle, ContactPoints& points, Poin
   if (near.empty()) return result;
   const Points theirs = rows_of(places, near), rest = points.rest(near);
   const PointGrid grid(rest, reach);
-  std::vector<Index> cells(near.size());
-  for (Index c = 0; c < grid.size(); ++c)
-    for (const Index m : grid.rows(c)) cells[static_cast<std::size_t>(m)] = c;
+  const std::vector<Index> cells = grid.cell_of_each();
   const Points normals = obstacle.nearest(theirs).normals;
   const auto is_inside = [&](Index m) { return distances[near[static_cast<std::size_t>(m)]] < 0.0; };
   const auto each_neighbour = [&](Index m, auto&& take) {
@@ -64,8 +59,8 @@ Crossing crossing_of(const BarrierSurface& obstacle, ContactPoints& points, Poin
     for (std::size_t next = 0; next < part.size(); ++next) {
       samples.push_back(near[static_cast<std::size_t>(part[next])]);
       each_neighbour(part[next], [&](Index other) {
-        if (!is_inside(other)) edge.push_back(other);
-        if (!is_inside(other) || seen[static_cast<std::size_t>(other)]) return;
+        if (seen[static_cast<std::size_t>(other)]) return;
+        if (!is_inside(other)) return edge.push_back(other);
         seen[static_cast<std::size_t>(other)] = true;
         part.push_back(other);
       });
@@ -94,31 +89,32 @@ Crossing crossing_of(const BarrierSurface& obstacle, ContactPoints& points, Poin
     if (hits[k].share <= 1.0)
       left[static_cast<std::size_t>(pairs[k].first)] = left[static_cast<std::size_t>(pairs[k].second)] = true;
   for (Index m = 0; m < std::ssize(near); ++m)
-    if (left[static_cast<std::size_t>(m)])
-      (is_inside(m) ? result.inside : result.beside).push_back(near[static_cast<std::size_t>(m)]);
+    if (left[static_cast<std::size_t>(m)]) result.push_back(near[static_cast<std::size_t>(m)]);
   return result;
 }
 
 }  // namespace
 
-void ContactWays::cross(Index surface, const BarrierSurface& obstacle, ContactPoints& points,
+void ContactWays::cross(Index surface, const BarrierSurface& obstacle, const ContactPoints& points,
                         PointsIn places) {
   std::vector<bool>& samples = crossed[static_cast<std::size_t>(surface)];
   samples.clear();
   const Index count = points.sample_count();
-  const Crossing crossing =
-      crossing_of(obstacle, points, places.topRows(count), clear.col(surface).head(count));
-  if (crossing.inside.empty() && crossing.beside.empty()) return;
+  const std::vector<Index> rows =
+      crossed_samples(obstacle, points, places.topRows(count), clear.col(surface).head(count));
+  if (rows.empty()) return;
   samples.assign(static_cast<std::size_t>(count), false);
-  for (const std::vector<Index>* rows : {&crossing.inside, &crossing.beside})
-    for (const Index row : *rows) samples[static_cast<std::size_t>(row)] = true;
-  for (const Index row : crossing.inside) clear(row, surface) = left_inside;
+  for (const Index row : rows) {
+    samples[static_cast<std::size_t>(row)] = true;
+    if (clear(row, surface) < 0.0) clear(row, surface) = left_inside;
+  }
 }
 
 std::vector<Index> ContactWays::crossing() const {
   std::vector<Index> surfaces;
-  for (Index k = 0; k < clear.cols(); ++k)
-    if ((clear.col(k).array() == left_inside).any()) surfaces.push_back(k);
+  for (Index k = 0; k < std::ssize(crossed); ++k)
+    if (!crossed[static_cast<std::size_t>(k)].empty() && (clear.col(k).array() == left_inside).any())
+      surfaces.push_back(k);
   return surfaces;
 }
 

@@ -8,6 +8,7 @@
 #include "core/decompositions.h"
 #include "core/jacobians.h"
 #include "core/random.h"
+#include "core/unit_rows.h"
 #include "sampling/sample_choice.h"
 
 namespace arapfields {
@@ -57,12 +58,10 @@ Points ContactPoints::embedded(const std::vector<Index>& rows) const {
 }
 
 Points ContactPoints::normals(const std::vector<Index>& samples) const {
-  Points result = Points::Zero(std::ssize(samples), 3);
-  if (problem_.samples.normals.rows() != problem_.samples.size()) return result;
-  for (std::size_t i = 0; i < samples.size(); ++i)
-    result.row(static_cast<Index>(i)) =
-        problem_.samples.normals.row(samples_[static_cast<std::size_t>(samples[i])]).normalized();
-  return result;
+  if (problem_.samples.normals.rows() != problem_.samples.size()) return Points::Zero(std::ssize(samples), 3);
+  std::vector<Index> rows;
+  for (const Index i : samples) rows.push_back(samples_[static_cast<std::size_t>(i)]);
+  return unit_rows(rows_of(problem_.samples.normals, rows));
 }
 
 Points ContactPoints::embedded_at(PointsIn places) const {
@@ -76,9 +75,7 @@ const std::vector<Index>& ContactPoints::neighbours(Index sample) {
   const Index n = sample_count();
   if (!grid_) {
     grid_ = std::make_unique<PointGrid>(rest_.topRows(n), 2.0 * reach * spacing_);
-    cells_.resize(static_cast<std::size_t>(n));
-    for (Index c = 0; c < grid_->size(); ++c)
-      for (const Index i : grid_->rows(c)) cells_[static_cast<std::size_t>(i)] = c;
+    cells_ = grid_->cell_of_each();
   }
   std::vector<Index>& found = near_[static_cast<std::size_t>(sample)];
   if (!found.empty()) return found;

@@ -40,7 +40,7 @@ struct ContactWays {
   SelfContact::Ways own;
 
   /// Finds where the surface crosses that of the places: what is inside there stays.
-  void cross(Index surface, const BarrierSurface& obstacle, ContactPoints& points, PointsIn places);
+  void cross(Index surface, const BarrierSurface& obstacle, const ContactPoints& points, PointsIn places);
   /// Surfaces that places stay inside of.
   std::vector<Index> crossing() const;
   bool crosses(Index surface, Index sample) const {
